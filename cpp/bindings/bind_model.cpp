@@ -1,0 +1,95 @@
+// The model: vehicle data, the catalogue of effects, one evaluation.
+#include "arrays.hpp"
+#include "register.hpp"
+#include "sysid/dynamics/step.hpp"
+
+namespace sysid::bindings {
+
+namespace {
+
+py::dict describe(const ParameterInfo& info) {
+    py::dict d;
+    d["name"] = info.name;
+    d["unit"] = info.unit;
+    d["null_value"] = info.null_value;
+    d["typical"] = info.typical;
+    d["matters"] = info.matters;
+    d["lower"] = info.lower;
+    d["upper"] = info.upper;
+    return d;
+}
+
+py::list base_parameters() {
+    py::list all;
+    for (const ParameterInfo& info : kBaseParameterInfos) all.append(describe(info));
+    return all;
+}
+
+py::list effects() {
+    py::list all;
+    for (std::size_t i = 0; i < kEffectCount; ++i) {
+        const EffectInfo& info = kEffectInfos[i];
+        py::dict d;
+        d["id"] = info.id;
+        d["title"] = info.title;
+        d["equation"] = info.equation;
+        d["source"] = info.source;
+        d["excited_by"] = info.excited_by;
+        d["moves"] = info.moves;
+        d["scored_at_typical"] = info.scored_at_typical;
+        d["needs_force"] = info.needs_force;
+        d["offset"] = kBaseParameterCount + effect_offset(i);
+        py::list parameters;
+        for (std::size_t j = 0; j < info.parameter_count; ++j)
+            parameters.append(describe(info.parameters[j]));
+        d["parameters"] = parameters;
+        all.append(d);
+    }
+    return all;
+}
+
+Array evaluate(const SingleTrack& model, const Array& p, const Array& motion, double steer,
+               double longitudinal) {
+    const double* values = vector(p, kParameterCount, "parameters");
+    const double* x = vector(motion, kMotionStates, "motion");
+    const std::array<double, kPushes> calm{};
+    const Input u{steer, longitudinal};
+    ModelState<double> state{};
+    std::copy(x, x + kMotionStates, state.begin());
+    settle_auxiliary(model, state, calm.data(), u, values);
+    ModelState<double> rate;
+    const auto w = model.evaluate(state.data(), calm.data(), state.data() + kMotionStates, u,
+                                  values, rate.data(), rate.data() + kMotionStates);
+    Array out = empty(1, 11);
+    double* o = out.mutable_data();
+    const std::array<double, 11> all{rate[0],   rate[1], rate[2], w.a_x,  w.a_y, w.alpha_f,
+                                     w.alpha_r, w.fz_f,  w.fz_r,  w.fy_f, w.fy_r};
+    std::copy(all.begin(), all.end(), o);
+    return out;
+}
+
+}  // namespace
+
+void register_model(py::module_& m) {
+    py::class_<VehicleData>(m, "VehicleData")
+        .def(py::init<>())
+        .def_readwrite("mass_kg", &VehicleData::mass_kg)
+        .def_readwrite("lf_m", &VehicleData::lf_m)
+        .def_readwrite("lr_m", &VehicleData::lr_m)
+        .def_readwrite("cg_height_m", &VehicleData::cg_height_m)
+        .def_readwrite("drag_area_m2", &VehicleData::drag_area_m2)
+        .def_readwrite("air_density_kgpm3", &VehicleData::air_density_kgpm3)
+        .def_readwrite("brake_front_share", &VehicleData::brake_front_share)
+        .def_readwrite("drive_front_share", &VehicleData::drive_front_share);
+    py::class_<SingleTrack>(m, "SingleTrack")
+        .def(py::init([](const VehicleData& car, EffectMask effects, bool force_known) {
+                 return SingleTrack{car, effects, force_known};
+             }),
+             py::arg("car"), py::arg("effects"), py::arg("force_known"))
+        .def("evaluate", &evaluate, py::arg("parameters"), py::arg("motion"), py::arg("steer"),
+             py::arg("longitudinal"));
+    m.def("base_parameters", &base_parameters);
+    m.def("effects", &effects);
+}
+
+}  // namespace sysid::bindings

@@ -1,0 +1,45 @@
+#include "arrays.hpp"
+#include "register.hpp"
+#include "sysid/simulate/simulator.hpp"
+
+namespace sysid::bindings {
+
+void register_simulate(py::module_& m) {
+    py::class_<Driver>(m, "Driver")
+        .def(py::init<>())
+        .def_readwrite("reaction_s", &Driver::reaction_s)
+        .def_readwrite("yaw_rate_gain", &Driver::yaw_rate_gain)
+        .def_readwrite("yaw_rate_integral_ps", &Driver::yaw_rate_integral_ps)
+        .def_readwrite("understeer_radps2pm", &Driver::understeer_radps2pm)
+        .def_readwrite("speed_gain_ps", &Driver::speed_gain_ps)
+        .def_readwrite("steer_limit_rad", &Driver::steer_limit_rad)
+        .def_readwrite("steer_rate_limit_radps", &Driver::steer_rate_limit_radps)
+        .def_readwrite("drive_limit_n", &Driver::drive_limit_n)
+        .def_readwrite("brake_limit_n", &Driver::brake_limit_n)
+        .def_readwrite("power_limit_w", &Driver::power_limit_w)
+        .def_readwrite("force_rate_limit_nps", &Driver::force_rate_limit_nps)
+        .def_readwrite("tracks_path", &Driver::tracks_path);
+    m.def(
+        "simulate",
+        [](const SingleTrack& model, const Array& p, double dt, const Array& references,
+           const Driver& driver, const Array& disturbance, double initial_speed) {
+            const auto n = references.ndim() == 2 ? references.shape(0) : 0;
+            if (n < 2) throw std::invalid_argument("references: expected two samples or more");
+            const double* r = matrix(references, n, 3, "references");
+            const double* values = vector(p, kParameterCount, "parameters");
+            const double* d = matrix(disturbance, n, 3, "disturbance");
+            std::vector<Reference> wanted(static_cast<std::size_t>(n));
+            for (auto& w : wanted) {
+                w = {r[0], r[1], r[2]};
+                r += 3;
+            }
+            const Drive drive = unlocked(
+                [&] { return simulate(model, values, dt, wanted, driver, d, initial_speed); });
+            return py::make_tuple(copy_of(drive.inputs, 2), copy_of(drive.states, kModelStates),
+                                  copy_of(drive.outputs, kChannels), drive.lost_at);
+        },
+        py::arg("model"), py::arg("parameters"), py::arg("dt"), py::arg("references"),
+        py::arg("driver"), py::arg("disturbance"), py::arg("initial_speed"));
+}
+
+}  // namespace sysid::bindings

@@ -1,0 +1,11 @@
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace sysid::bindings {
+
+void register_model(pybind11::module_& m);
+void register_simulate(pybind11::module_& m);
+void register_identify(pybind11::module_& m);
+
+}  // namespace sysid::bindings

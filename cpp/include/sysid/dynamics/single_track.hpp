@@ -1,0 +1,204 @@
+// The single-track model with three degrees of freedom and whatever effects are switched on.
+//
+//   m (dv_x/dt - v_y r) = F_xf cos(delta) - F_yf sin(delta) + F_xr - 1/2 rho C_dA v_x^2     (1)
+//   m (dv_y/dt + v_x r) = F_yf cos(delta) + F_xf sin(delta) + F_yr                          (2)
+//   I_z dr/dt = l_f (F_yf cos(delta) + F_xf sin(delta)) - l_r F_yr                          (3)
+//   alpha_f = delta - atan2(v_y + l_f r, v_x),  alpha_r = -atan2(v_y - l_r r, v_x)          (4)
+//   F_zf = m g l_r/L - m a_x h/L,  F_zr = m g l_f/L + m a_x h/L,                            (5)
+//   with m a_x the sum of forces on the right of (1).
+// Rajamani, Vehicle Dynamics and Control (2nd ed.), ch. 2 and 4; tyres: `model/tyre.hpp`.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "sysid/dynamics/parameters.hpp"
+#include "sysid/math/dual.hpp"
+#include "sysid/model/vehicle.hpp"
+
+namespace sysid {
+
+/// What the driver does, at one instant.
+struct Input {
+    double steer_rad = 0.0;
+    double longitudinal =
+        0.0;  // total wheel force [N], or measured a_x [m/s2] where that is unknown
+};
+
+/// What disturbs the motion: forces and a moment, and accelerations that no accelerometer feels.
+enum Push : int { kForceX, kForceY, kMomentZ, kGravityX, kGravityY, kPushes };
+
+/// A car with its effects; the parameters' values stay outside, so that they can carry derivatives.
+struct SingleTrack {
+    VehicleData car;
+    EffectMask effects = 0;
+    bool force_known = true;  // false: `Input::longitudinal` is the measured acceleration
+
+    /// Evaluates (1) to (5). `motion` = v_x, v_y, r; `push` = disturbance, see
+    /// `Push`; `aux` = auxiliary states; `rate` receives the derivatives of motion and aux.
+    template <class S, class T>
+    Workings<S> evaluate(const S* motion, const S* push, const S* aux, const Input& u, const T* p,
+                         S* rate, S* aux_rate) const {
+        Workings<S> w = begin(motion, u, p);
+        const T* q = p + kBaseParameterCount;
+        const auto each = [&](auto&& visit) { for_each_active(effects, q, visit); };
+        each([&](auto e, const T* own) { e.vehicle(own, w); });
+        // Backwards: what the sensors did last to the acceleration is undone first.
+        for_each_active_backwards(effects, q, [&](auto e, const T* own) { e.input(own, w); });
+        for (int i = 0; i < kAuxiliaryStates; ++i) aux_rate[i] = S(0.0);
+        each([&](auto e, const T* own) { e.steering(own, w, aux, aux_rate); });
+        settle_outside_forces(w, push);
+        each([&](auto e, const T* own) { e.body(own, w); });
+        slip_angles(w);
+        each([&](auto e, const T* own) { e.slip(own, w, aux, aux_rate); });
+        const S mu_f = magic_formula(w.alpha_f, front_tyre(p));
+        const S mu_r = magic_formula(w.alpha_r, rear_tyre(p));
+        axle_loads(w, mu_f);
+        each([&](auto e, const T* own) { e.loads(own, w); });
+        w.mu_peak_f = S(p[kDFront]);
+        w.mu_peak_r = S(p[kDRear]);
+        each([&](auto e, const T* own) { e.grip(own, w); });
+        w.fy_f = w.fz_f * mu_f * w.grip_f;
+        w.fy_r = w.fz_r * mu_r * w.grip_r;
+        balance(w);
+        rate[0] = w.a_x + w.v_y * w.r + w.gravity_x;
+        rate[1] = w.a_y - w.v_x * w.r + w.gravity_y;
+        rate[2] = w.r_dot;
+        return w;
+    }
+
+    /// What the sensors read: v_x, v_y, r, a_x, a_y.
+    template <class S, class T>
+    void sense(const Workings<S>& w, const T* p, S* y) const {
+        y[kVx] = w.v_x;
+        y[kVy] = w.v_y;
+        y[kYawRate] = w.r;
+        y[kAx] = w.a_x;
+        y[kAy] = w.a_y;
+        for_each_active(effects, p + kBaseParameterCount,
+                        [&](auto e, const T* own) { e.sensors(own, w, y); });
+    }
+
+    /// Fastest rate [1/s] of the motion and of the active effects, for choosing integration steps.
+    double fastest_rate(const double* p, double v_x) const {
+        const double load = car.mass_kg * kGravity / (car.lf_m + car.lr_m);
+        const double c_f = p[kBFront] * p[kCFront] * p[kDFront] * load * car.lr_m;
+        const double c_r = p[kBRear] * p[kCRear] * p[kDRear] * load * car.lf_m;
+        const double yaw = (c_f * car.lf_m * car.lf_m + c_r * car.lr_m * car.lr_m) / p[kYawInertia];
+        double fastest = std::max(yaw, (c_f + c_r) / car.mass_kg) / v_x;
+        for_each_active(effects, p + kBaseParameterCount, [&](auto e, const double* own) {
+            fastest = std::max(fastest, e.rate(own, v_x));
+        });
+        return fastest;
+    }
+
+  private:
+    template <class T>
+    static TyreCoefficients<T> front_tyre(const T* p) {
+        return {p[kBFront], p[kCFront], p[kDFront], p[kEFront]};
+    }
+    template <class T>
+    static TyreCoefficients<T> rear_tyre(const T* p) {
+        return {p[kBRear], p[kCRear], p[kDRear], p[kERear]};
+    }
+
+    template <class S, class T>
+    Workings<S> begin(const S* motion, const Input& u, const T* p) const {
+        Workings<S> w;
+        w.m = S(car.mass_kg);
+        w.I_z = S(p[kYawInertia]);
+        w.l_f = S(car.lf_m);
+        w.l_r = S(car.lr_m);
+        w.h = car.cg_height_m;
+        w.rho = car.air_density_kgpm3;
+        w.drag_area = S(car.drag_area_m2);
+        w.v_x = motion[0];
+        w.v_y = motion[1];
+        w.r = motion[2];
+        w.delta = S(u.steer_rad);
+        w.fx = S(force_known ? u.longitudinal : 0.0);
+        w.ax_input = S(force_known ? 0.0 : u.longitudinal);
+        w.grip_f = w.grip_r = S(1.0);
+        return w;
+    }
+
+    template <class S>
+    static void settle_outside_forces(Workings<S>& w, const S* push) {
+        const S speed_squared = w.v_x * abs_of(w.v_x);
+        w.force_x = push[kForceX] - 0.5 * w.rho * (w.drag_area * speed_squared);
+        w.force_y = push[kForceY];
+        w.moment_z = push[kMomentZ];
+        w.gravity_x = push[kGravityX];
+        w.gravity_y = push[kGravityY];
+    }
+
+    template <class S>
+    static S abs_of(const S& x) {
+        using std::abs;
+        return abs(x);
+    }
+
+    template <class S>
+    static void slip_angles(Workings<S>& w) {
+        using std::atan2;
+        w.alpha_f = w.delta - atan2(w.v_y + w.l_f * w.r, w.v_x);
+        w.alpha_r = -atan2(w.v_y - w.l_r * w.r, w.v_x);
+    }
+
+    // The front load depends on a_x, which depends on the front lateral force, which is
+    // proportional to the front load: (1) and (5) are solved together for F_zf.
+    template <class S>
+    void axle_loads(Workings<S>& w, const S& mu_f) const {
+        using std::cos;
+        using std::sin;
+        const S wheelbase = w.l_f + w.l_r;
+        const S weight = w.m * kGravity;
+        w.fz0_f = weight * w.l_r / wheelbase;
+        w.fz0_r = weight * w.l_f / wheelbase;
+        const S c = cos(w.delta);
+        const S s = sin(w.delta);
+        const S lever = w.h / wheelbase;
+        S pull;  // m a_x
+        if (force_known) {
+            split_force(w);
+            const S rest = w.fx_f * c + w.fx_r + w.force_x;
+            const S front = (w.fz0_f - lever * rest) / (1.0 - lever * (mu_f * s));
+            pull = rest - front * (mu_f * s);
+        } else {
+            pull = w.m * w.ax_input;
+            const S front = w.fz0_f - lever * pull;
+            const S along = pull - w.force_x + front * (mu_f * s);  // F_xf cos(delta) + F_xr
+            const double share = front_share(along);
+            w.fx = along / (share * c + (1.0 - share));
+            split_force(w);
+        }
+        w.fz_f = w.fz0_f - lever * pull;
+        w.fz_r = w.fz0_r + lever * pull;
+    }
+
+    template <class S>
+    double front_share(const S& force) const {
+        return value_of(force) < 0.0 ? car.brake_front_share : car.drive_front_share;
+    }
+
+    template <class S>
+    void split_force(Workings<S>& w) const {
+        const double front = front_share(w.fx);
+        w.fx_f = front * w.fx;
+        w.fx_r = (1.0 - front) * w.fx;
+    }
+
+    template <class S>
+    void balance(Workings<S>& w) const {
+        using std::cos;
+        using std::sin;
+        const S c = cos(w.delta);
+        const S s = sin(w.delta);
+        const S front_lateral = w.fy_f * c + w.fx_f * s;
+        w.a_x = force_known ? (w.fx_f * c - w.fy_f * s + w.fx_r + w.force_x) / w.m : w.ax_input;
+        w.a_y = (front_lateral + w.fy_r + w.force_y) / w.m;
+        w.r_dot = (w.l_f * front_lateral - w.l_r * w.fy_r + w.moment_z) / w.I_z;
+    }
+};
+
+}  // namespace sysid

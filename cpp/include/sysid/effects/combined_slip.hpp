@@ -1,0 +1,37 @@
+#pragma once
+
+#include "sysid/effects/effect.hpp"
+#include "sysid/math/dual.hpp"
+
+namespace sysid {
+
+/// Friction ellipse: longitudinal force takes lateral force away. The parameter is the square of
+/// the usual shape factor, so that the derivative at zero exists.
+struct CombinedSlip : Effect {
+    static constexpr EffectInfo info{"combined_slip",
+                                     "combined slip: drive and brake force cost lateral force",
+                                     "F_y *= sqrt(1 - p (F_x / (D F_z))^2)",
+                                     "Pacejka, Tire and Vehicle Dynamics (3rd ed.), ch. 4",
+                                     "braking and accelerating while cornering",
+                                     "ay_mps2, yaw_rate_radps",
+                                     1,
+                                     {{"ellipse", "1", 0.0, 1.0, 0.2, 0.0, 1.5}}};
+
+    template <class T, class S>
+    static void grip(const T* p, Workings<S>& w) {
+        w.grip_f *= left_over(p[0], w.fx_f / (w.mu_peak_f * w.fz_f));
+        w.grip_r *= left_over(p[0], w.fx_r / (w.mu_peak_r * w.fz_r));
+    }
+
+    // Beyond 98 % of the ellipse the root is continued by its tangent's floor: a locked wheel keeps
+    // a little lateral force, and the derivative stays finite.
+    template <class T, class S>
+    static S left_over(const T& p, const S& used) {
+        using std::sqrt;
+        const S rest = 1.0 - p * (used * used);
+        if (value_of(rest) < 0.04) return S(0.2);
+        return sqrt(rest);
+    }
+};
+
+}  // namespace sysid

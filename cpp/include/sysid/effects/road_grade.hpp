@@ -1,0 +1,26 @@
+#pragma once
+
+#include "sysid/effects/effect.hpp"
+#include "sysid/model/vehicle.hpp"
+
+namespace sysid {
+
+/// The road climbs; positive uphill.
+struct RoadGrade : Effect {
+    static constexpr EffectInfo info{"road_grade",
+                                     "road grade, positive uphill",
+                                     "dv_x/dt -= g sin(theta)",
+                                     "Rajamani, Vehicle Dynamics and Control, eq. (4.1)",
+                                     "the same road out and back",
+                                     "vx_mps",
+                                     1,
+                                     {{"grade_rad", "rad", 0.0, 0.03, 0.005, -0.5, 0.5}}};
+
+    template <class T, class S>
+    static void body(const T* p, Workings<S>& w) {
+        using std::sin;
+        w.gravity_x = w.gravity_x - kGravity * sin(p[0]);
+    }
+};
+
+}  // namespace sysid

@@ -1,0 +1,75 @@
+// One-step-ahead prediction errors, whitened, and their derivatives: the residuals of everything.
+//
+// The extended Kalman filter runs once and its gains are kept. With the gains frozen, the
+// prediction errors are a smooth function of the parameters, and the mean of the filter, written
+// once on the scalar type, gives their exact derivatives. Ljung, System Identification (2nd ed.),
+// sec. 7.2.
+#pragma once
+
+#include <vector>
+
+#include "sysid/identify/problem.hpp"
+
+namespace sysid {
+
+/// Filter gains of every sample: the correction of (v_x, v_y, r, F_x, F_y, M_z, auxiliary states)
+/// and the inverse Cholesky factor that whitens the innovation. Zero where a measurement is
+/// missing.
+struct FrozenStep {
+    Mat<kStatesFull, kChannels> gain;
+    Mat<kChannels, kChannels> whitener;
+};
+
+struct FrozenFilter {
+    std::vector<std::vector<FrozenStep>> runs;
+    double correlation_time_s = 0.5;
+    double log_likelihood = 0.0;
+    std::size_t observed = 0;  // measured elements that count
+};
+
+FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise);
+
+/// Whitened prediction errors, kChannels per sample, runs one after the other.
+void residuals(const Problem& problem, const double* p, const FrozenFilter& filter, double* out);
+
+/// Minus the derivatives of the residuals with respect to the parameters `columns`;
+/// row-major, (kChannels * samples) x columns.size().
+void sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,
+                   const std::vector<int>& columns, double* out);
+
+/// Gauss-Newton normal equations over the parameters `columns`: half the sum of squared residuals,
+/// G^T e and G^T G (row-major) with G the sensitivities.
+double normal_equations(const Problem& problem, const double* p, const FrozenFilter& filter,
+                        const std::vector<int>& columns, double* gradient, double* information);
+
+/// Half the sum of squared residuals alone.
+double half_sum_of_squares(const Problem& problem, const double* p, const FrozenFilter& filter);
+
+/// Sensitivities to signals that push or shift: column b answers to `signals` (samples x count,
+/// row-major) added to target b: a `Push`, or kPushes + a `Channel` for a sensor reading.
+void signal_sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,
+                          const double* signals, const std::vector<int>& targets, double* out);
+
+/// Derivatives of the log-likelihood with respect to the logarithms of the noise parameters
+/// (sensor, motion, wander, correlation time), and their expected information (row-major).
+double noise_score(const Problem& problem, const double* p, const Noise& noise, double* gradient,
+                   double* information);
+
+/// Everything the filter, or the smoother, says of each sample.
+struct Trace {
+    std::vector<double> innovation;  // samples x kChannels; NaN where missing
+    std::vector<double> spread;      // its expected standard deviation
+    std::vector<double> whitened;    // zero where missing
+    std::vector<double> log_density;  // -1/2 log det S, per sample
+    std::vector<double> state;       // samples x kStatesFull, filtered or smoothed
+    std::vector<double> state_std;
+    double log_likelihood = 0.0;
+};
+
+Trace trace(const Problem& problem, const double* p, const Noise& noise, bool smoothed);
+
+/// Prediction errors `ahead` samples ahead, from the filtered state: samples x kChannels.
+void look_ahead(const Problem& problem, const double* p, const Noise& noise, std::size_t ahead,
+                double* errors);
+
+}  // namespace sysid

@@ -1,0 +1,80 @@
+// Driving of one car, ready for estimation: what was done, what was measured, how noisy it is.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "sysid/dynamics/step.hpp"
+#include "sysid/math/linear.hpp"
+
+namespace sysid {
+
+/// One uninterrupted stretch of a log at a constant sampling interval.
+struct Run {
+    double dt = 0.01;
+    std::vector<Input> inputs;
+    std::vector<Vec<kChannels>> measurements;  // NaN where missing
+    std::size_t size() const { return inputs.size(); }
+};
+
+/// The noise model that fitting, comparing, diagnosing and validating share.
+///
+/// Sensors are white. The motion is disturbed by white accelerations, and by forces and a moment
+/// that wander with one correlation time (Ornstein-Uhlenbeck): they take up what the model cannot
+/// explain, so that the innovations stay white and the uncertainty honest.
+struct Noise {
+    std::array<double, kChannels> sensor{};      // standard deviations, in the channels' units
+    std::array<double, kMotionStates> motion{};  // per square root of a second
+    std::array<double, kMotionStates> wander{};  // F_x, F_y [N], M_z [N m]
+    double correlation_time_s = 0.5;
+};
+constexpr int kNoiseParameters = kChannels + 2 * kMotionStates + 1;
+
+/// Motion and wandering disturbance; with the auxiliary states where an effect has states of its
+/// own.
+constexpr int kStatesPlain = 2 * kMotionStates;
+constexpr int kStatesFull = kStatesPlain + kAuxiliaryStates;
+
+struct Problem {
+    SingleTrack model;
+    std::vector<Run> runs;
+
+    std::size_t samples() const {
+        std::size_t n = 0;
+        for (const Run& run : runs) n += run.size();
+        return n;
+    }
+};
+
+inline bool has_own_states(EffectMask mask) {
+    bool found = false;
+    const std::array<double, kEffectParameterCount> ones = [] {
+        std::array<double, kEffectParameterCount> a{};
+        a.fill(1.0);
+        return a;
+    }();
+    for_each_active(mask, ones.data(), [&](auto effect, const double* p) {
+        found = found || effect.rate(p, 1.0) > 0.0;
+    });
+    return found;
+}
+
+/// Where a run starts: the measured motion where there is one, settled auxiliary states.
+inline ModelState<double> initial_state(const SingleTrack& model, const Run& run, const double* p) {
+    const auto first = [&](int channel, double otherwise) {
+        for (std::size_t k = 0; k < run.size() && k < 50; ++k)
+            if (!std::isnan(run.measurements[k][channel])) return run.measurements[k][channel];
+        return otherwise;
+    };
+    ModelState<double> x{};
+    x[0] = first(kVx, 10.0);
+    x[1] = first(kVy, 0.0);
+    x[2] = first(kYawRate, 0.0);
+    const std::array<double, kPushes> calm{};
+    settle_auxiliary(model, x, calm.data(), run.inputs.front(), p);
+    return x;
+}
+
+}  // namespace sysid

@@ -1,0 +1,23 @@
+// Axle lateral force per unit of vertical load.
+#pragma once
+
+#include <cmath>
+
+namespace sysid {
+
+template <class S>
+struct TyreCoefficients {
+    S B, C, D, E;
+};
+
+/// Magic Formula, Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (4.6) without shifts:
+/// F_y / F_z = D sin(C atan(B alpha - E (B alpha - atan(B alpha)))).
+template <class S, class T>
+S magic_formula(const S& alpha, const TyreCoefficients<T>& tyre) {
+    using std::atan;
+    using std::sin;
+    const S x = tyre.B * alpha;
+    return tyre.D * sin(tyre.C * atan(x - tyre.E * (x - atan(x))));
+}
+
+}  // namespace sysid

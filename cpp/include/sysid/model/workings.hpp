@@ -1,0 +1,49 @@
+// The intermediate quantities of one evaluation of the single-track model.
+//
+// The model fills them stage by stage; each effect changes the ones it is about, at the stage where
+// they are complete and not yet used. Symbols follow the equations in `single_track.hpp`.
+#pragma once
+
+#include "sysid/model/tyre.hpp"
+
+namespace sysid {
+
+template <class S>
+struct Workings {
+    // the car (stage `vehicle`)
+    S m, I_z, l_f, l_r;
+    double h = 0.0;    // height of the centre of gravity [m]
+    double rho = 0.0;  // air density [kg/m3]
+    S drag_area;       // C_d A [m2]
+    S fz0_f, fz0_r;    // static axle loads [N]
+    // motion
+    S v_x, v_y, r;
+    // inputs (stages `input` and `steering`)
+    S delta;     // road-wheel angle that acts [rad]
+    S fx;        // total wheel force [N], or
+    S ax_input;  // measured longitudinal specific force [m/s2] that stands in for it
+    // forces from outside and gravity in the road plane (stage `body`)
+    S force_x, force_y;      // [N]
+    S moment_z;              // [N m]
+    S gravity_x, gravity_y;  // felt by the motion, not by an accelerometer [m/s2]
+    // tyres (stages `slip`, `loads`, `grip`)
+    S alpha_f, alpha_r;      // slip angles [rad]
+    S fx_f, fx_r;            // longitudinal axle forces [N]
+    S fz_f, fz_r;            // axle loads [N]
+    S mu_peak_f, mu_peak_r;  // D of the Magic Formula
+    S grip_f, grip_r;        // factors on the lateral axle forces
+    S fy_f, fy_r;            // lateral axle forces [N]
+    // results
+    S a_x, a_y;  // specific force at the centre of gravity [m/s2]
+    S r_dot;     // yaw acceleration [rad/s2]
+};
+
+/// States some effects own: a lagging road-wheel angle and lagging slip angles.
+enum AuxiliaryState : int { kSteerLagged = 0, kSlipFrontLagged = 1, kSlipRearLagged = 2 };
+constexpr int kAuxiliaryStates = 3;
+
+/// Measured channels, in the order of every measurement vector.
+enum Channel : int { kVx = 0, kVy = 1, kYawRate = 2, kAx = 3, kAy = 4 };
+constexpr int kChannels = 5;
+
+}  // namespace sysid

@@ -1,0 +1,201 @@
+#include "sysid/identify/prediction_error.hpp"
+
+#include "sysid/identify/run_system.hpp"
+
+namespace sysid {
+
+namespace {
+
+constexpr int kWidth = 8;  // directions differentiated in one pass
+using Wide = Dual<kWidth>;
+
+template <int NX>
+void freeze_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
+                std::vector<FrozenStep>& steps, FrozenFilter& filter) {
+    const RunSystem<NX> system(problem.model, run, p, noise);
+    steps.resize(run.size());
+    filter.log_likelihood += extended_kalman_filter<NX, kChannels>(
+        system, system.initial_mean(), system.initial_covariance(),
+        [&](std::size_t k, const auto& s) {
+            steps[k].gain.setZero();
+            steps[k].gain.template topRows<NX>() = s.update.gain;
+            Mat<kChannels, kChannels> present = Mat<kChannels, kChannels>::Identity();
+            for (int i = 0; i < kChannels; ++i)
+                if (std::isnan(run.measurements[k][i])) present(i, i) = 0.0;
+            steps[k].whitener =
+                s.update.lower.template triangularView<Eigen::Lower>().solve(present);
+            filter.observed += static_cast<std::size_t>(s.update.observed);
+        });
+}
+
+/// The mean of the filter with frozen gains. `disturb(k, push)` may add to the disturbance acting
+/// from sample k-1 to k and `shift(k, y)` to the expected reading; `keep(k, e)` gets whitened
+/// errors.
+template <class S, class T, class Disturb, class Shift, class Keep>
+void run_frozen(const SingleTrack& model, const Run& run, const double* p_values, const T* p,
+                const std::vector<FrozenStep>& steps, double correlation_time, Disturb&& disturb,
+                Shift&& shift, Keep&& keep) {
+    const ModelState<double> start = initial_state(model, run, p_values);
+    ModelState<S> x;
+    for (std::size_t i = 0; i < kModelStates; ++i) x[i] = S(start[i]);
+    std::array<S, kMotionStates> wander;
+    wander.fill(S(0.0));
+    const double forget = std::exp(-run.dt / correlation_time);
+    std::array<S, kPushes> push;
+    std::array<S, kChannels> error;
+    std::array<S, kChannels> white;
+    const auto fill_push = [&](std::size_t k) {
+        push.fill(S(0.0));
+        for (std::size_t i = 0; i < kMotionStates; ++i) push[i] = wander[i];
+        disturb(k, push);
+    };
+    for (std::size_t k = 0; k < run.size(); ++k) {
+        fill_push(k);
+        if (k > 0) {
+            const int substeps = substeps_for(model, p_values, value_of(x[0]), run.dt);
+            advance(model, x, push.data(), run.inputs[k - 1], run.inputs[k], p, run.dt, substeps);
+            for (S& w : wander) w = forget * w;
+            fill_push(k);
+        }
+        auto y = sense(model, x, push.data(), run.inputs[k], p);
+        shift(k, y);
+        const FrozenStep& step = steps[k];
+        for (int i = 0; i < kChannels; ++i) {
+            const double measured = run.measurements[k][i];
+            const auto n = static_cast<std::size_t>(i);
+            error[n] = std::isnan(measured) ? S(0.0) : measured - y[n];
+        }
+        for (int i = 0; i < kChannels; ++i) {
+            S sum(0.0);
+            for (int j = 0; j <= i; ++j)
+                sum += step.whitener(i, j) * error[static_cast<std::size_t>(j)];
+            white[static_cast<std::size_t>(i)] = sum;
+        }
+        keep(k, white);
+        for (int i = 0; i < kStatesFull; ++i) {
+            S correction(0.0);
+            for (int j = 0; j < kChannels; ++j)
+                correction += step.gain(i, j) * error[static_cast<std::size_t>(j)];
+            const auto n = static_cast<std::size_t>(i);
+            if (i < kMotionStates)
+                x[n] += correction;
+            else if (i < kStatesPlain)
+                wander[n - kMotionStates] += correction;
+            else
+                x[n - kMotionStates] += correction;
+        }
+    }
+}
+
+const auto kNothing = [](std::size_t, auto&) {};
+
+/// The parameter vector with up to kWidth of `columns`, from `first` on, as directions.
+std::vector<Wide> seeded(const double* p, const std::vector<int>& columns, std::size_t first) {
+    std::vector<Wide> wide(p, p + kParameterCount);
+    for (std::size_t i = first; i < columns.size() && i < first + kWidth; ++i)
+        wide[static_cast<std::size_t>(columns[i])].d[i - first] = 1.0;
+    return wide;
+}
+
+}  // namespace
+
+FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise) {
+    FrozenFilter filter;
+    filter.correlation_time_s = noise.correlation_time_s;
+    filter.runs.resize(problem.runs.size());
+    with_state_size(problem.model.effects, [&](auto nx) {
+        for (std::size_t i = 0; i < problem.runs.size(); ++i)
+            freeze_run<decltype(nx)::value>(problem, problem.runs[i], p, noise, filter.runs[i],
+                                            filter);
+    });
+    return filter;
+}
+
+void residuals(const Problem& problem, const double* p, const FrozenFilter& filter, double* out) {
+    for (std::size_t i = 0; i < problem.runs.size(); ++i) {
+        run_frozen<double>(problem.model, problem.runs[i], p, p, filter.runs[i],
+                           filter.correlation_time_s, kNothing, kNothing,
+                           [&](std::size_t, const auto& white) {
+                               for (double value : white) *out++ = value;
+                           });
+    }
+}
+
+double half_sum_of_squares(const Problem& problem, const double* p, const FrozenFilter& filter) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < problem.runs.size(); ++i) {
+        run_frozen<double>(problem.model, problem.runs[i], p, p, filter.runs[i],
+                           filter.correlation_time_s, kNothing, kNothing,
+                           [&](std::size_t, const auto& white) {
+                               for (double value : white) sum += value * value;
+                           });
+    }
+    return 0.5 * sum;
+}
+
+void sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,
+                   const std::vector<int>& columns, double* out) {
+    const std::size_t width = columns.size();
+    for (std::size_t first = 0; first < width; first += kWidth) {
+        const std::vector<Wide> wide = seeded(p, columns, first);
+        const std::size_t count = std::min<std::size_t>(kWidth, width - first);
+        double* row = out + first;
+        for (std::size_t i = 0; i < problem.runs.size(); ++i) {
+            run_frozen<Wide>(problem.model, problem.runs[i], p, wide.data(), filter.runs[i],
+                             filter.correlation_time_s, kNothing, kNothing,
+                             [&](std::size_t, const auto& white) {
+                                 for (const Wide& e : white) {
+                                     for (std::size_t j = 0; j < count; ++j) row[j] = -e.d[j];
+                                     row += width;
+                                 }
+                             });
+        }
+    }
+}
+
+double normal_equations(const Problem& problem, const double* p, const FrozenFilter& filter,
+                        const std::vector<int>& columns, double* gradient, double* information) {
+    const auto width = static_cast<Eigen::Index>(columns.size());
+    const auto rows = static_cast<Eigen::Index>(problem.samples() * kChannels);
+    using Wholes = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Wholes G(rows, width);
+    sensitivities(problem, p, filter, columns, G.data());
+    Eigen::VectorXd e(rows);
+    residuals(problem, p, filter, e.data());
+    Eigen::Map<Eigen::VectorXd>(gradient, width).noalias() = G.transpose() * e;
+    Eigen::Map<Wholes>(information, width, width).noalias() = G.transpose() * G;
+    return 0.5 * e.squaredNorm();
+}
+
+void signal_sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,
+                          const double* signals, const std::vector<int>& targets, double* out) {
+    const std::size_t width = targets.size();
+    for (std::size_t first = 0; first < width; first += kWidth) {
+        const std::size_t count = std::min<std::size_t>(kWidth, width - first);
+        double* row = out + first;
+        std::size_t offset = 0;
+        for (std::size_t i = 0; i < problem.runs.size(); ++i) {
+            const auto add = [&](std::size_t k, auto& onto, int base) {
+                for (std::size_t j = 0; j < count; ++j) {
+                    const int target = targets[first + j] - base;
+                    if (target < 0 || target >= static_cast<int>(onto.size())) continue;
+                    onto[static_cast<std::size_t>(target)].d[j] +=
+                        signals[(offset + k) * width + first + j];
+                }
+            };
+            run_frozen<Wide>(
+                problem.model, problem.runs[i], p, p, filter.runs[i], filter.correlation_time_s,
+                [&](std::size_t k, auto& push) { add(k, push, 0); },
+                [&](std::size_t k, auto& y) { add(k, y, kPushes); },
+                [&](std::size_t, const auto& white) {
+                    for (const Wide& e : white) {
+                        for (std::size_t j = 0; j < count; ++j) row[j] = -e.d[j];
+                        row += width;
+                    }
+                });
+            offset += problem.runs[i].size();
+        }
+    }
+}
+
+}  // namespace sysid

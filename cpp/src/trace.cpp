@@ -1,0 +1,97 @@
+#include "sysid/estimate/smoother.hpp"
+#include "sysid/identify/prediction_error.hpp"
+#include "sysid/identify/run_system.hpp"
+
+namespace sysid {
+
+namespace {
+
+template <int NX>
+void store_state(std::vector<double>& mean_out, std::vector<double>& std_out, const Vec<NX>& mean,
+                 const Mat<NX, NX>& covariance) {
+    for (int i = 0; i < kStatesFull; ++i) {
+        mean_out.push_back(i < NX ? mean[i] : std::nan(""));
+        std_out.push_back(i < NX ? std::sqrt(std::max(covariance(i, i), 0.0)) : std::nan(""));
+    }
+}
+
+template <int NX>
+void trace_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
+               bool smoothed, Trace& out) {
+    const RunSystem<NX> system(problem.model, run, p, noise);
+    std::vector<FilterStep<NX, kChannels>> steps;
+    if (smoothed) steps.reserve(run.size());
+    out.log_likelihood += extended_kalman_filter<NX, kChannels>(
+        system, system.initial_mean(), system.initial_covariance(),
+        [&](std::size_t k, const auto& s) {
+            const Mat<kChannels, kChannels> S = s.update.lower * s.update.lower.transpose();
+            const Vec<kChannels> white =
+                s.update.lower.template triangularView<Eigen::Lower>().solve(s.update.innovation);
+            for (int i = 0; i < kChannels; ++i) {
+                const bool missing = std::isnan(run.measurements[k][i]);
+                out.innovation.push_back(missing ? std::nan("") : s.update.innovation[i]);
+                out.spread.push_back(missing ? std::nan("") : std::sqrt(S(i, i)));
+                out.whitened.push_back(missing ? 0.0 : white[i]);
+            }
+            out.log_density.push_back(-s.update.lower.diagonal().array().log().sum());
+            if (smoothed)
+                steps.push_back(s);
+            else
+                store_state<NX>(out.state, out.state_std, s.mean, s.covariance);
+        });
+    if (!smoothed) return;
+    for (const auto& s : smooth<NX, kChannels>(steps))
+        store_state<NX>(out.state, out.state_std, s.mean, s.covariance);
+}
+
+template <int NX>
+void look_ahead_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
+                    std::size_t ahead, double* errors) {
+    const RunSystem<NX> system(problem.model, run, p, noise);
+    std::vector<Vec<NX>> means(run.size());
+    extended_kalman_filter<NX, kChannels>(system, system.initial_mean(),
+                                          system.initial_covariance(),
+                                          [&](std::size_t k, const auto& s) { means[k] = s.mean; });
+    std::fill(errors, errors + run.size() * kChannels, std::nan(""));
+    const std::array<double, kPushes> calm{};
+    for (std::size_t k = 0; k + ahead < run.size(); ++k) {
+        ModelState<double> x = system.start();
+        for (int i = 0; i < NX; ++i) {
+            if (i < kMotionStates) x[static_cast<std::size_t>(i)] = means[k][i];
+            if (i >= kStatesPlain) x[static_cast<std::size_t>(i - kMotionStates)] = means[k][i];
+        }
+        for (std::size_t n = k + 1; n <= k + ahead; ++n) {
+            const int substeps = substeps_for(problem.model, p, x[0], run.dt);
+            advance(problem.model, x, calm.data(), run.inputs[n - 1], run.inputs[n], p, run.dt,
+                    substeps);
+        }
+        const std::size_t at = k + ahead;
+        const auto y = sense(problem.model, x, calm.data(), run.inputs[at], p);
+        for (int i = 0; i < kChannels; ++i)
+            errors[at * kChannels + static_cast<std::size_t>(i)] =
+                run.measurements[at][i] - y[static_cast<std::size_t>(i)];
+    }
+}
+
+}  // namespace
+
+Trace trace(const Problem& problem, const double* p, const Noise& noise, bool smoothed) {
+    Trace out;
+    with_state_size(problem.model.effects, [&](auto nx) {
+        for (const Run& run : problem.runs)
+            trace_run<decltype(nx)::value>(problem, run, p, noise, smoothed, out);
+    });
+    return out;
+}
+
+void look_ahead(const Problem& problem, const double* p, const Noise& noise, std::size_t ahead,
+                double* errors) {
+    with_state_size(problem.model.effects, [&](auto nx) {
+        for (const Run& run : problem.runs) {
+            look_ahead_run<decltype(nx)::value>(problem, run, p, noise, ahead, errors);
+            errors += run.size() * kChannels;
+        }
+    });
+}
+
+}  // namespace sysid

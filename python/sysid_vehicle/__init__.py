@@ -1,0 +1,53 @@
+"""From a driving log to a better car model.
+
+Compare a single-track model with what was measured, see where it fails, learn which physical effect
+is missing, add it, and watch the error fall on driving the fit never saw.
+"""
+
+from . import manoeuvres
+from ._core import __version__
+from .compare import Comparison, compare
+from .diagnose import Diagnosis, diagnose
+from .effects import Effect, catalogue, effect
+from .errors import InvalidInput, NumericalError, SysidError, SysidWarning
+from .estimate import Driving, NoiseModel
+from .identify import Fit, identify
+from .log import Log, check_excitation
+from .model import Model
+from .read import ChannelMap, read_log
+from .simulate import RoadDisturbance, SensorNoise, drive, example_vehicle
+from .study import Study, improve
+from .vehicle import Tyre, Vehicle
+
+__all__ = [
+    "ChannelMap",
+    "Comparison",
+    "Diagnosis",
+    "Driving",
+    "Effect",
+    "Fit",
+    "InvalidInput",
+    "Log",
+    "Model",
+    "NoiseModel",
+    "NumericalError",
+    "RoadDisturbance",
+    "SensorNoise",
+    "Study",
+    "SysidError",
+    "SysidWarning",
+    "Tyre",
+    "Vehicle",
+    "__version__",
+    "catalogue",
+    "check_excitation",
+    "compare",
+    "diagnose",
+    "drive",
+    "effect",
+    "example_vehicle",
+    "identify",
+    "improve",
+    "manoeuvres",
+    "read_log",
+]

@@ -1,0 +1,6 @@
+"""Comparison of a fitted model with driving."""
+
+from .compare import ChannelScore, Comparison, compare
+from .where import FailureMap, Region
+
+__all__ = ["ChannelScore", "Comparison", "FailureMap", "Region", "compare"]

@@ -1,0 +1,181 @@
+"""How well a model predicts driving, channel by channel, and where it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .._arrays import FloatArray
+from .._text import html_table, number, text_table
+from ..estimate import MEASURED, UNITS, Driving, NoiseModel
+from ..identify import Fit
+from ..log import Log
+from .where import FailureMap, Region
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["ChannelScore", "Comparison", "compare"]
+
+
+@dataclass(frozen=True)
+class ChannelScore:
+    """One channel's one-step-ahead error.
+
+    Attributes
+    ----------
+    rmse, noise_floor : float
+        Of the prediction error, in the channel's unit; and what it would be were the model right.
+    nrmse : float
+        Root mean square of the error over its expected spread; 1 is the noise floor.
+    r2 : float
+        Share of the channel's variance that is predicted.
+    """
+
+    rmse: float
+    noise_floor: float
+    nrmse: float
+    r2: float
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A model against driving.
+
+    Attributes
+    ----------
+    error : float
+        Root mean square of the normalised one-step-ahead residual over all channels; 1 is the noise
+        floor.
+    channels : dict
+        Scores by channel.
+    regions : tuple of Region
+        Where it fails most: ranges of speed and lateral acceleration.
+    failure_map : FailureMap
+        The error over speed and lateral acceleration.
+    time_s, log_number : array, shape (n,)
+        Of each sample.
+    residual : array, shape (n, 5)
+        Normalised one-step-ahead residuals; NaN where nothing was measured.
+    log_likelihood : float
+        Of the driving under the model and the noise it was fitted with.
+    """
+
+    title: str
+    error: float
+    channels: dict[str, ChannelScore]
+    regions: tuple[Region, ...]
+    failure_map: FailureMap
+    time_s: FloatArray
+    log_number: FloatArray
+    residual: FloatArray
+    log_likelihood: float
+
+    _HEAD = ("channel", "rmse", "noise floor", "rmse / floor", "R2", "unit")
+
+    def _rows(self) -> list[list[str]]:
+        return [
+            [c, number(s.rmse), number(s.noise_floor), f"{s.nrmse:.3f}", f"{s.r2:.4f}", UNITS[c]]
+            for c, s in self.channels.items()
+        ]
+
+    def _headline(self) -> str:
+        return f"{self.title}: error {self.error:.3f} of the noise floor, one step ahead"
+
+    def __str__(self) -> str:
+        parts = [self._headline(), text_table(self._HEAD, self._rows())]
+        if self.regions:
+            parts.append("Where it fails most")
+            parts += [f"  {r}" for r in self.regions]
+        return "\n".join(parts)
+
+    def _repr_html_(self) -> str:
+        where = "".join(f"<li>{r}</li>" for r in self.regions)
+        return (
+            f"<p>{self._headline()}</p>{html_table(self._HEAD, self._rows())}<ul>{where}</ul>"
+        )
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """The map of where the model fails."""
+        return self.failure_map.plot(ax)
+
+    def plot_residuals(self, ax: Axes | None = None) -> Axes:
+        """Normalised residuals of each channel over the samples, averaged over a second."""
+        import matplotlib.pyplot as plt
+
+        if ax is None:
+            ax = plt.subplots(figsize=(8.0, 3.5))[1]
+        for i, c in enumerate(MEASURED):
+            if c in self.channels:
+                smooth = _running_rms(self.residual[:, i], self.log_number, 50)
+                ax.plot(np.arange(len(smooth)), smooth, label=c, lw=1.0)
+        ax.axhline(1.0, color="0.3", lw=0.8, ls="--")
+        ax.set(xlabel="usable sample", ylabel="residual / noise floor (running rms)")
+        ax.legend(fontsize="small", ncols=3)
+        return ax
+
+
+def _running_rms(e: FloatArray, log_number: FloatArray, width: int) -> FloatArray:
+    square = np.where(np.isfinite(e), e, 0.0) ** 2
+    count = np.isfinite(e).astype(float)
+    box = np.ones(width)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        out: FloatArray = np.sqrt(np.convolve(square, box, "same") / np.convolve(count, box, "same"))
+    out[np.flatnonzero(np.diff(log_number))] = np.nan  # breaks the line between logs
+    return out
+
+
+def compare(
+    fit: Fit, logs: Log | Sequence[Log] | Driving, *, noise: NoiseModel | None = None
+) -> Comparison:
+    """Compare a fitted model with driving, one step ahead.
+
+    Parameters
+    ----------
+    fit : Fit
+    logs : Log, sequence of Log, or Driving
+        Driving to compare with; what the fit never saw tells most.
+    noise : NoiseModel, optional
+        Whose sensors and white motion noise are the noise floor; by default the fit's. Models that
+        are compared with each other need the same one.
+
+    Returns
+    -------
+    Comparison
+    """
+    driving = Driving.of(logs)
+    problem = driving.problem(fit.model)
+    p = fit.model.vector()
+    floor = (fit.noise if noise is None else noise).floor()
+    trace = problem.trace(p, floor.vector(), False)
+    white = np.where(np.isfinite(driving.measured), trace["whitened"], np.nan)
+    normalised = trace["innovation"] / trace["spread"]
+    scores = {}
+    for i, c in enumerate(MEASURED):
+        there = np.isfinite(normalised[:, i])
+        if not there.any():
+            continue
+        e = trace["innovation"][there, i]
+        spread = float(np.var(driving.measured[there, i]))
+        scores[c] = ChannelScore(
+            float(np.sqrt(np.mean(e**2))),
+            float(np.sqrt(np.mean(trace["spread"][there, i] ** 2))),
+            float(np.sqrt(np.mean(normalised[there, i] ** 2))),
+            float(1.0 - np.mean(e**2) / spread) if spread > 0 else float("nan"),
+        )
+    failures = FailureMap.of(driving, white)
+    title = f"{', '.join(fit.model.effects) or 'baseline'} on {driving}"
+    return Comparison(
+        title,
+        float(np.sqrt(np.nanmean(white**2))),
+        scores,
+        failures.worst(),
+        failures,
+        driving.channel("time_s"),
+        driving.log_number,
+        normalised,
+        float(problem.freeze(p, fit.noise.vector()).log_likelihood),
+    )

@@ -1,0 +1,313 @@
+"""Which physical effect is a fitted model missing?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from tqdm.auto import tqdm
+
+from .. import _core
+from .._text import html_table, number, text_table
+from ..effects import Effect, effect
+from ..errors import InvalidInput
+from ..estimate import Driving
+from ..identify import Fit, refine, refit
+from ..log import Log
+from .omnibus import Omnibus, omnibus
+from .score import Score, ScoreBoard, score_board
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["Candidate", "Diagnosis", "diagnose"]
+
+_REFITS = 5
+_TELLS_APART = 9.0  # twice the log-likelihood, or a statistic: three standard errors
+_BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One effect that may be missing.
+
+    Attributes
+    ----------
+    statistic : float
+        Score statistic; after a refit, twice the gain in log-likelihood.
+    p_value : float
+        Of the baseline being complete, corrected for testing all effects.
+    value, std : tuple of float
+        Parameters, predicted or refitted.
+    predicted_error : float
+        One-step error with the effect, where 1 is what the present noise model expects.
+    retained : float
+        Share of the effect that the fitted parameters cannot copy.
+    indistinguishable_from : tuple of str
+        Effects that this driving cannot tell from it.
+    fit : Fit or None
+        The model with the effect, where it was refitted.
+    """
+
+    effect: Effect
+    statistic: float
+    p_value: float
+    value: tuple[float, ...]
+    std: tuple[float, ...]
+    predicted_error: float
+    retained: float
+    variance_ratio: float
+    indistinguishable_from: tuple[str, ...] = ()
+    fit: Fit | None = None
+
+    @property
+    def id(self) -> str:
+        """Id of the effect."""
+        return self.effect.id
+
+    @property
+    def size(self) -> str:
+        """Its parameters with standard errors, in words."""
+        return ", ".join(
+            f"{p.name} {number(v, 3)} +- {number(s, 2)} {p.unit}"
+            for p, v, s in zip(self.effect.parameters, self.value, self.std, strict=True)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Effects ranked by the evidence that they are missing.
+
+    Attributes
+    ----------
+    ranking : tuple of Candidate
+        All candidates, the most likely first.
+    omnibus : Omnibus
+        Whether anything at all is left.
+    alpha : float
+        Rate of false claims accepted, over all effects together.
+    """
+
+    fit: Fit
+    ranking: tuple[Candidate, ...]
+    omnibus: Omnibus
+    alpha: float
+
+    @property
+    def significant(self) -> tuple[Candidate, ...]:
+        """Candidates for which there is evidence."""
+        return tuple(c for c in self.ranking if c.p_value < self.alpha)
+
+    @property
+    def best(self) -> Effect:
+        """The effect most likely missing.
+
+        Raises
+        ------
+        InvalidInput
+            There is evidence for none.
+        """
+        if not self.significant:
+            raise InvalidInput(
+                "no effect of the catalogue is missing as far as this driving can show: "
+                f"{self.omnibus}"
+            )
+        return self.ranking[0].effect
+
+    _HEAD = ("effect", "statistic", "p", "error with it", "size", "cannot tell from")
+
+    def _rows(self, most: int = 12) -> list[list[str]]:
+        return [
+            [
+                c.id,
+                f"{c.statistic:.1f}",
+                f"{c.p_value:.2g}",
+                f"{c.predicted_error:.4f}",
+                c.size,
+                ", ".join(c.indistinguishable_from),
+            ]
+            for c in self.ranking[:most]
+        ]
+
+    def _headline(self) -> str:
+        n = len(self.significant)
+        if n == 0:
+            what = "no effect of the catalogue is missing"
+        else:
+            what = f"most likely missing: {self.ranking[0].effect.title}"
+            if self.ranking[0].indistinguishable_from:
+                twins = ", ".join(self.ranking[0].indistinguishable_from)
+                what += f" (this driving cannot tell it from {twins})"
+        return f"{what}; {self.omnibus}"
+
+    def __str__(self) -> str:
+        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{self._headline()}</p>{html_table(self._HEAD, self._rows())}"
+
+    def plot(self, ax: Axes | None = None, most: int = 10) -> Axes:
+        """Bars of the evidence for each effect."""
+        import matplotlib.pyplot as plt
+
+        if ax is None:
+            ax = plt.subplots(figsize=(6.0, 3.5))[1]
+        shown = self.ranking[:most][::-1]
+        colours = ["tab:red" if c.p_value < self.alpha else "0.7" for c in shown]
+        ax.barh([c.id for c in shown], [max(c.statistic, 0.1) for c in shown], color=colours)
+        ax.set(xscale="log", xlabel="evidence (score statistic; refitted: 2 x gain in log-likelihood)")
+        return ax
+
+
+def diagnose(
+    fit: Fit,
+    logs: Log | Sequence[Log] | Driving | None = None,
+    *,
+    candidates: Sequence[str | Effect] | None = None,
+    alpha: float = 0.05,
+    refits: int = _REFITS,
+    workers: int = 2,
+    seed: int = 0,
+    progress: bool = False,
+) -> Diagnosis:
+    """Rank the effects a fitted model may lack.
+
+    All candidates are scored at once (`score.py`); the best few are refitted with their exact dynamics
+    and ordered by likelihood.
+
+    Parameters
+    ----------
+    fit : Fit
+    logs : Log, sequence of Log, or Driving, optional
+        What the model was fitted to; by default what `fit` remembers.
+    candidates : sequence of str, optional
+        Effects to consider; by default all that the model lacks.
+    alpha : float
+        Rate of false claims accepted, over all effects together.
+    refits : int
+        How many of the best to refit; 0 ranks by score alone.
+    """
+    driving = fit.driving if logs is None else Driving.of(logs)
+    possible = fit.model.candidates
+    if candidates is not None:
+        wanted = {effect(c).id for c in candidates}
+        possible = tuple(e for e in possible if e.id in wanted)
+    board = score_board(fit, driving, possible)
+    family = board.family_p_values(seed=seed)
+    present = max(int(np.isfinite(driving.measured).sum()), 1)
+    remaining = float(board.residual @ board.residual)
+    ranked = [
+        Candidate(
+            s.effect,
+            s.statistic,
+            family[s.effect.id],
+            s.value,
+            s.std,
+            float(np.sqrt(max(remaining - s.statistic * max(s.variance_ratio, 1.0), 0.0) / present)),
+            s.retained,
+            s.variance_ratio,
+            _score_twins(board, s),
+        )
+        for s in board.scores
+    ]
+    few = [c for c in ranked if c.p_value < alpha][:refits]
+    if few:
+        with ThreadPoolExecutor(workers) as pool:
+            tried = list(
+                tqdm(
+                    pool.map(lambda c: _refitted(fit, driving, c), few),
+                    total=len(few),
+                    desc="refits",
+                    disable=not progress,
+                )
+            )
+            # Under the noise of the poorer model they differ less than they really do.
+            top = max(c.statistic for c in tried)
+            near = [c for c in tried if c.statistic > 0.4 * top]
+            finished = list(pool.map(lambda c: _finished(fit, c), near))
+        finished.sort(key=lambda c: -_merit(c, driving.samples))
+        finished = [_with_refit_twins(c, finished) for c in finished]
+        done = {c.id for c in finished}
+        others = sorted((c for c in tried if c.id not in done), key=lambda c: -c.statistic)
+        done |= {c.id for c in others}
+        ranked = finished + others + [c for c in ranked if c.id not in done]
+    return Diagnosis(fit, tuple(ranked), omnibus(fit, driving), alpha)
+
+
+def _merit(c: Candidate, samples: int) -> float:
+    """Gain in log-likelihood less the Bayesian price of its parameters."""
+    return 0.5 * c.statistic - 0.5 * len(c.effect.parameters) * float(np.log(samples))
+
+
+def _score_twins(board: ScoreBoard, score: Score) -> tuple[str, ...]:
+    """Rivals which leave nothing for the effect, and for which the effect leaves nothing."""
+    own = board.joint_statistic(score.effect.id)
+    twins = []
+    if own < _TELLS_APART:
+        return ()
+    for rival in board.scores:
+        if rival.effect.id == score.effect.id:
+            continue
+        theirs = board.joint_statistic(rival.effect.id)
+        both = board.joint_statistic(score.effect.id, rival.effect.id)
+        if both - theirs < _TELLS_APART and both - own < _TELLS_APART:
+            twins.append(rival.effect.id)
+    return tuple(twins)
+
+
+def _refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
+    """The candidate with its exact dynamics, under the noise of the model without it."""
+    best: Fit | None = None
+    for values in _starts(c):
+        model = fit.model.add(c.effect).with_values(values)
+        try:
+            trial = refit(model, driving, fit.noise)
+        except (_core.NumericalFailure, np.linalg.LinAlgError):
+            continue
+        if best is None or trial.log_likelihood > best.log_likelihood:
+            best = trial
+    return replace(c, statistic=0.0) if best is None else _with_fit(fit, c, best)
+
+
+def _finished(fit: Fit, c: Candidate) -> Candidate:
+    """The candidate with noise of its own."""
+    if c.fit is None:
+        return c
+    return _with_fit(fit, c, refine(c.fit.model, c.fit.driving, c.fit.noise))
+
+
+def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:
+    names = [f"{c.id}.{p.name}" for p in c.effect.parameters]
+    return replace(
+        c,
+        statistic=2.0 * (found.log_likelihood - fit.log_likelihood),
+        value=tuple(found[n].value for n in names),
+        std=tuple(found[n].std for n in names),
+        fit=found,
+    )
+
+
+def _starts(c: Candidate) -> list[dict[str, float]]:
+    predicted = {}
+    for p, v in zip(c.effect.parameters, c.value, strict=True):
+        reach = _BEYOND * p.typical
+        value = float(np.clip(v, p.null_value - reach, p.null_value + reach))
+        predicted[f"{c.id}.{p.name}"] = float(np.clip(value, p.lower, p.upper))
+    starts = [predicted]
+    if len(c.effect.parameters) == 1 and c.effect.parameters[0].one_sided:
+        # Far from its null value the dynamics of such an effect are not those of the score.
+        starts.append({f"{c.id}.{c.effect.parameters[0].name}": c.effect.parameters[0].typical})
+    return starts
+
+
+def _with_refit_twins(c: Candidate, all_: list[Candidate]) -> Candidate:
+    """Among refitted effects the likelihood itself says which cannot be told apart."""
+    near = tuple(
+        o.id for o in all_ if o is not c and abs(o.statistic - c.statistic) < _TELLS_APART
+    )
+    refitted = {o.id for o in all_}
+    twins = (*near, *(t for t in c.indistinguishable_from if t not in refitted))
+    return replace(c, indistinguishable_from=twins)

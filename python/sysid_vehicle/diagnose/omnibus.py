@@ -1,0 +1,121 @@
+"""Is anything left that depends on the driving? A test against flexible unknown forces.
+
+Signals of speed, acceleration and steering, as virtual forces, moments, accelerations and sensor
+shifts, are scored together after projection on all the model can already do (a portmanteau score
+test; Lin, Biometrika 1997). Signals are built from what was known one sample earlier: the noise of a
+measurement must not enter its own prediction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from ..estimate import Driving
+from ..identify import Fit
+from .score import _basis, _pseudo_inverse, _variance_ratio
+
+__all__ = ["Omnibus", "omnibus"]
+
+# Targets in the core's order: pushes F_x, F_y, M_z, then accelerations, then sensor readings.
+_TARGETS = {"F_x": 0, "F_y": 1, "M_z": 2, "dv_x/dt": 3, "dv_y/dt": 4}
+_SENSORS = {"r": 7, "a_x": 8, "a_y": 9}
+
+
+@dataclass(frozen=True)
+class Omnibus:
+    """Result of the test.
+
+    Attributes
+    ----------
+    p_value : float
+        Of a complete model.
+    strongest : str
+        Target that carries most of the evidence.
+    """
+
+    statistic: float
+    degrees: int
+    p_value: float
+    strongest: str
+
+    def __str__(self) -> str:
+        if self.p_value > 0.01:
+            return f"nothing left that depends on the driving (p = {self.p_value:.2g})"
+        return (
+            f"something is left that depends on the driving, mostly in {self.strongest} "
+            f"(p = {self.p_value:.2g})"
+        )
+
+
+def omnibus(fit: Fit, driving: Driving) -> Omnibus:
+    """Test a fitted model, with the effects it has, for anything left."""
+    problem = driving.problem(fit.model)
+    p = fit.model.vector()
+    noise = fit.noise.vector()
+    frozen = problem.freeze(p, noise)
+    e = problem.residuals(p, frozen).ravel()
+    known = fit.model.parameters
+    basis = _basis(problem.sensitivities(p, frozen, [known[n].column for n in fit.model.free_names]))
+    names, signals, targets = _virtual(problem, p, noise, driving)
+    G = problem.signal_sensitivities(p, frozen, as_float64(signals), targets)
+    R = G - basis @ (basis.T @ G)
+    kept = np.linalg.norm(R, axis=0) > 1e-3 * np.maximum(np.linalg.norm(G, axis=0), 1e-300)
+    R, names = R[:, kept], [n for n, k in zip(names, kept, strict=True) if k]
+    e = e - basis @ (basis.T @ e)
+    statistic, degrees = _statistic(R, e)
+    by_target = {
+        t: _statistic(R[:, [n == t for n in names]], e)[0] for t in dict.fromkeys(names)
+    }
+    return Omnibus(
+        statistic,
+        degrees,
+        float(chi2.sf(statistic, degrees)),
+        max(by_target, key=lambda t: by_target[t]),
+    )
+
+
+def _statistic(R: FloatArray, e: FloatArray) -> tuple[float, int]:
+    inverse, rank = _pseudo_inverse(R.T @ R)
+    S = R.T @ e
+    value = inverse @ S
+    ratio = _variance_ratio(R[:, :1] * 0.0 + (R @ value)[:, None], e - R @ value, inverse[:1, :1])
+    return float(S @ value) / max(ratio, 1.0), rank
+
+
+def _virtual(
+    problem: _core.Problem, p: FloatArray, noise: FloatArray, driving: Driving
+) -> tuple[list[str], FloatArray, list[int]]:
+    state = problem.trace(p, noise, False)["state"]
+    v, r = state[:, 0], state[:, 2]
+    a = v * r / 9.81
+    steer = driving.channel("steer_rad")
+    push = driving.channel("fx_n" if driving.force_known else "ax_mps2")
+    push = push / max(float(np.nanstd(push)), 1e-9)
+    w = v / 20.0
+    one = np.ones_like(v)
+    shapes = [one, w**2, a, a**3, a * w**2, a**2, push, push * a, push * np.abs(a), push**2, r]
+    turn = steer - np.concatenate([steer[:1], steer[:-1]])
+    shapes.append(turn / max(float(np.std(turn)), 1e-9))
+    force = np.column_stack(shapes)
+    few = np.column_stack([one, w**2, a, push])
+    # Known one sample earlier; the first sample of a stretch knows nothing.
+    force, few = (np.vstack([np.zeros((1, m.shape[1])), m[:-1]]) for m in (force, few))
+    for t in (force, few):
+        t[np.flatnonzero(np.diff(driving.log_number)) + 1] = 0.0
+    names: list[str] = []
+    targets: list[int] = []
+    blocks: list[FloatArray] = []
+    heavy = set() if driving.force_known else {"F_x"}
+    for target, number in {**_TARGETS, **_SENSORS}.items():
+        if target in heavy or (target == "a_x" and not driving.force_known):
+            continue
+        block = force if number <= 2 else few
+        blocks.append(block)
+        names += [target] * block.shape[1]
+        targets += [number] * block.shape[1]
+    return names, np.hstack(blocks), targets

@@ -1,0 +1,145 @@
+"""Logs made ready for the core: usable stretches, inputs, measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from ..errors import InvalidInput
+from ..log import Log
+from ..model import Model
+from .inputs import quiet
+
+__all__ = ["MEASURED", "UNITS", "Driving"]
+
+MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+"""Measured channels, in the core's order."""
+
+UNITS = dict(zip(MEASURED, ("m/s", "m/s", "rad/s", "m/s2", "m/s2"), strict=True))
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Samples `where` of log number `log`."""
+
+    log: int
+    where: slice
+
+
+@dataclass(frozen=True, eq=False)
+class Driving:
+    """Everything usable in some logs of one car.
+
+    Parameters
+    ----------
+    logs : tuple of Log
+        Separate runs of the same car.
+    force_known : bool
+        Whether the total wheel force was logged in all of them. If not, the measured longitudinal
+        acceleration stands in for it and is no longer a measurement to predict.
+    """
+
+    logs: tuple[Log, ...]
+    force_known: bool
+
+    @classmethod
+    def of(cls, logs: Log | Sequence[Log] | Driving) -> Driving:
+        """Driving from one log, several, or itself.
+
+        Raises
+        ------
+        InvalidInput
+            No log, or no usable stretch in them.
+        """
+        if isinstance(logs, Driving):
+            return logs
+        several = (logs,) if isinstance(logs, Log) else tuple(logs)
+        if not several:
+            raise InvalidInput("no log was given; pass one Log or a list of them")
+        found = cls(several, all(log.has("fx_n") for log in several))
+        if not found.stretches:
+            names = ", ".join(log.name for log in several)
+            raise InvalidInput(
+                f"{names}: no stretch of 1 s or more at 3 m/s or faster has the inputs it needs"
+            )
+        return found
+
+    @cached_property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """The usable stretches, in the order in which the core's results come."""
+        return tuple(
+            Stretch(i, where) for i, log in enumerate(self.logs) for where in log.stretches()
+        )
+
+    def channel(self, name: str) -> FloatArray:
+        """A channel over all stretches; NaN throughout where a log lacks it."""
+        parts = []
+        for s in self.stretches:
+            log = self.logs[s.log]
+            whole = log[name] if log.has(name) else np.full(log.n, np.nan)
+            parts.append(whole[s.where])
+        return np.concatenate(parts)
+
+    @cached_property
+    def log_number(self) -> FloatArray:
+        """For each sample, the number of the log it comes from."""
+        return np.concatenate(
+            [np.full(s.where.stop - s.where.start, float(s.log)) for s in self.stretches]
+        )
+
+    @cached_property
+    def measured(self) -> FloatArray:
+        """Measurements to predict, samples x 5; NaN where missing or used as an input."""
+        y = np.column_stack([self.channel(c) for c in MEASURED])
+        if not self.force_known:
+            y[:, MEASURED.index("ax_mps2")] = np.nan
+        return y
+
+    @property
+    def samples(self) -> int:
+        """Number of usable samples."""
+        return len(self.measured)
+
+    @property
+    def present(self) -> tuple[str, ...]:
+        """Measured channels that there are to predict."""
+        there = np.isfinite(self.measured).any(axis=0)
+        return tuple(c for c, yes in zip(MEASURED, there, strict=True) if yes)
+
+    def problem(self, model: Model, *, most_samples: int | None = None) -> _core.Problem:
+        """The core's problem for a model; of at most so many samples, if that is asked for."""
+        problem = _core.Problem(model.core(force_known=self.force_known))
+        for log, where in self._pieces(most_samples):
+            push = "fx_n" if self.force_known else "ax_mps2"
+            inputs = np.column_stack([quiet(log["steer_rad"][where]), quiet(log[push][where])])
+            y = np.full((len(inputs), len(MEASURED)), np.nan)
+            for i, c in enumerate(MEASURED):
+                if log.has(c) and (self.force_known or c != "ax_mps2"):
+                    y[:, i] = log[c][where]
+            problem.add_run(1.0 / log.rate_hz, as_float64(inputs), as_float64(y))
+        return problem
+
+    def _pieces(self, most_samples: int | None) -> list[tuple[Log, slice]]:
+        whole = [(self.logs[s.log], s.where) for s in self.stretches]
+        if most_samples is None or self.samples <= most_samples:
+            return whole
+        # Windows of some seconds, evenly spread, keep every kind of driving in.
+        pieces: list[tuple[Log, slice]] = []
+        share = most_samples / self.samples
+        for log, where in whole:
+            length = int(4.0 * log.rate_hz)
+            for start in range(where.start, where.stop, max(int(length / share), 1)):
+                stop = min(start + length, where.stop)
+                if stop - start > length // 2 or not pieces:
+                    pieces.append((log, slice(start, stop)))
+        return pieces
+
+    def __str__(self) -> str:
+        seconds = sum((s.where.stop - s.where.start) / self.logs[s.log].rate_hz for s in self.stretches)
+        names = ", ".join(log.name for log in self.logs)
+        return f"{names}: {seconds:.1f} s usable in {len(self.stretches)} stretch(es)"

@@ -1,0 +1,139 @@
+"""The noise model: how noisy the sensors are, and how strongly the motion is disturbed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from html import escape
+
+import numpy as np
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from ..vehicle import Vehicle
+from .driving import MEASURED, UNITS, Driving
+from .inputs import white_noise_std
+
+__all__ = ["NoiseModel", "first_guess", "learn_noise"]
+
+_SENSORS = slice(0, 5)
+_MOTION = slice(5, 8)
+_WANDER = slice(8, 11)
+_TIME = 11
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Standard deviations of white sensor noise and of what disturbs the motion.
+
+    Attributes
+    ----------
+    sensor : tuple of 5 floats
+        vx, vy [m/s], yaw rate [rad/s], ax, ay [m/s2].
+    motion : tuple of 3 floats
+        White disturbance of vx, vy [m/s per root second], yaw rate [rad/s per root second].
+    wander : tuple of 3 floats
+        Wandering force x, y [N] and yaw moment [N m] (Ornstein-Uhlenbeck). Takes up what the model
+        does not explain.
+    correlation_time_s : float
+        Correlation time of the wandering.
+    """
+
+    sensor: tuple[float, ...]
+    motion: tuple[float, ...]
+    wander: tuple[float, ...]
+    correlation_time_s: float
+
+    def vector(self) -> FloatArray:
+        """In the core's order."""
+        return as_float64([*self.sensor, *self.motion, *self.wander, self.correlation_time_s])
+
+    @classmethod
+    def from_vector(cls, v: FloatArray) -> NoiseModel:
+        """From the core's order."""
+        return cls(
+            tuple(map(float, v[_SENSORS])),
+            tuple(map(float, v[_MOTION])),
+            tuple(map(float, v[_WANDER])),
+            float(v[_TIME]),
+        )
+
+    def floor(self) -> NoiseModel:
+        """The same noise without the wandering: what remains if the model explains everything."""
+        return replace(self, wander=(0.0, 0.0, 0.0))
+
+    def __str__(self) -> str:
+        lines = [
+            f"  {c:15s} {s:10.3g} {UNITS[c]}" for c, s in zip(MEASURED, self.sensor, strict=True)
+        ]
+        force_x, force_y, moment = self.wander
+        lines.append(
+            f"  unexplained force {force_x:.3g} N forward, {force_y:.3g} N sideways, yaw moment "
+            f"{moment:.3g} N m, wandering over {self.correlation_time_s:.2g} s"
+        )
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+
+_SMALLEST = np.array([1e-3, 1e-3, 1e-4, 5e-3, 5e-3])
+
+
+def _limits(vehicle: Vehicle) -> tuple[FloatArray, FloatArray]:
+    weight = vehicle.mass_kg * 9.81
+    arm = weight * vehicle.wheelbase_m / 4.0
+    low = np.concatenate(
+        [_SMALLEST, [1e-4, 1e-4, 1e-5], 1e-4 * np.array([weight, weight, arm]), [0.05]]
+    )
+    high = np.concatenate(
+        [[5.0, 5.0, 1.0, 20.0, 20.0], [2.0, 2.0, 1.0], 0.6 * np.array([weight, weight, arm]), [1.0]]
+    )
+    return np.log(low), np.log(high)
+
+
+def first_guess(driving: Driving, vehicle: Vehicle) -> NoiseModel:
+    """A generous start: sensors from their fast scatter, the motion free to follow them."""
+    sensors = [max(white_noise_std(y), s) for y, s in zip(driving.measured.T, _SMALLEST, strict=True)]
+    weight = vehicle.mass_kg * 9.81
+    wander = (0.02 * weight, 0.04 * weight, 0.02 * weight * vehicle.wheelbase_m / 2.0)
+    return NoiseModel(tuple(sensors), (0.02, 0.02, 0.01), wander, 0.3)
+
+
+def learn_noise(
+    problem: _core.Problem, p: FloatArray, start: NoiseModel, vehicle: Vehicle, *, rounds: int = 8
+) -> tuple[NoiseModel, float]:
+    """Noise of maximum likelihood at fixed model parameters, and the log-likelihood.
+
+    Fisher scoring with Levenberg's damping on the logarithms of the noise parameters; the likelihood
+    never falls.
+    """
+    low, high = _limits(vehicle)
+    eta = np.clip(np.log(np.maximum(start.vector(), 1e-12)), low, high)
+    value, gradient, information = problem.noise_score(p, np.exp(eta))
+    damping = 1e-2
+    for _ in range(rounds):
+        # At a bound, only steps back inside count.
+        free = ~(((eta <= low) & (gradient < 0)) | ((eta >= high) & (gradient > 0)))
+        free &= np.diag(information) > 1e-9
+        if not free.any():
+            break
+        gained = 0.0
+        for _ in range(6):
+            scale = np.diag(information)[free]
+            system = information[np.ix_(free, free)] + np.diag(damping * scale + 1e-3)
+            step = np.zeros_like(eta)
+            step[free] = np.clip(np.linalg.solve(system, gradient[free]), -1.5, 1.5)
+            trial = np.clip(eta + step, low, high)
+            try:
+                trial_value, g, info = problem.noise_score(p, np.exp(trial))
+            except _core.NumericalFailure:
+                trial_value = -np.inf
+            if trial_value > value:
+                gained = trial_value - value
+                eta, value, gradient, information = trial, trial_value, g, info
+                damping = max(damping / 5.0, 1e-6)
+                break
+            damping *= 8.0
+        if gained < 0.05:
+            break
+    return NoiseModel.from_vector(np.exp(eta)), float(value)

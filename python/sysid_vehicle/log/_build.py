@@ -1,0 +1,223 @@
+"""From columns of numbers to the checked, uniformly sampled channels of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..errors import InvalidInput, near_names, warn
+from . import _checks
+from ._channels import CHANNELS, REQUIRED, FloatArray
+from ._grid import at, check_time, to_grid
+from ._plausibility import check_units_and_signs
+from ._signals import fill_short_gaps, spikes
+
+_MIN_USABLE_S = 5.0
+_FILL_S = 0.1
+
+
+class Columns(Protocol):
+    """Anything with named columns: a dict of arrays, a DataFrame, ``numpy.load`` of an .npz."""
+
+    def keys(self) -> Iterable[Any]:
+        """Return the column names."""
+
+    def __getitem__(self, key: Any, /) -> Any:
+        """Return one column."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """Channels on their grid, and whether the source had been uniform."""
+
+    channels: dict[str, FloatArray]
+    rate_hz: float
+    uniform: bool
+
+
+def build(data: Columns, name: str, despike: Iterable[str], check: bool) -> Built:
+    """Make the channels of a log; every error and warning begins with the log's `name`."""
+    notes: list[str] = []
+    try:
+        built = _build(data, tuple(despike), check, notes)
+    except InvalidInput as error:
+        raise InvalidInput(f"{name}: {error}") from error
+    for note in notes:
+        warn(f"{name}: {note}")
+    return built
+
+
+def _build(data: Columns, despike: tuple[str, ...], check: bool, notes: list[str]) -> Built:
+    columns = _collect(data, notes)
+    time_s = columns.pop("time_s")
+    if time_s.size < 2:
+        raise InvalidInput(f"time_s: only {time_s.size} sample(s); a log needs at least two")
+    check_time(time_s)
+    notes += _checks.nan_block_notes(time_s, columns)
+    for channel in despike:
+        if channel not in columns:
+            raise InvalidInput(f"{channel}: is to be despiked but is absent; remove the request")
+    removed = _handle_spikes(time_s, columns, despike, notes)
+
+    quiet = removed | {key for key, values in columns.items() if not np.isnan(values).any()}
+    grid, columns, note = to_grid(time_s, columns)
+    notes += [note] if note else []
+    rate_hz = (grid.size - 1) / float(grid[-1] - grid[0])
+    _fill_inputs(grid, columns, rate_hz, quiet, notes)
+
+    channels = {"time_s": grid}
+    channels.update((key, columns.pop(key)) for key in CHANNELS if key in columns)
+    channels.update(columns)
+    if check:
+        _check(channels, rate_hz, notes)
+    for values in channels.values():
+        values.flags.writeable = False
+    return Built(channels, rate_hz, uniform=not note)
+
+
+def _collect(data: Columns, notes: list[str]) -> dict[str, FloatArray]:
+    keys = list(data.keys())
+    names = [str(key) for key in keys]
+    _check_presence(names)
+    columns: dict[str, FloatArray] = {}
+    for key, name in zip(keys, names, strict=True):
+        values = _as_floats(data[key], name)
+        if values is not None:
+            columns[name] = values
+    n = columns["time_s"].size
+    for name in list(columns):
+        values = columns[name]
+        if values.size != n:
+            raise InvalidInput(
+                f"{name}: has {values.size} samples, time_s has {n}; give columns of equal length"
+            )
+        endless = np.flatnonzero(np.isinf(values))
+        if endless.size and name != "time_s":
+            raise InvalidInput(
+                f"{name}: infinite at {at(int(endless[0]), columns['time_s'])} ({endless.size} "
+                f"such samples); leave missing measurements empty or NaN"
+            )
+        if n and name in CHANNELS and name != "time_s" and np.isnan(values).all():
+            if CHANNELS[name].required:
+                raise InvalidInput(
+                    f"{name}: holds no value at any of the {n} samples; the model needs it: check "
+                    f"the column or map another one to it"
+                )
+            del columns[name]
+            notes.append(
+                f"{name}: holds no value at any of the {n} samples and is treated as absent; "
+                f"leave the column out"
+            )
+    if "fx_n" not in columns and "ax_mps2" not in columns:
+        raise InvalidInput(
+            f"fx_n and ax_mps2: both are absent, so nothing tells how the car is driven and braked "
+            f"(columns: {', '.join(names)}); give at least one of them"
+        )
+    return columns
+
+
+def _check_presence(names: list[str]) -> None:
+    missing = [channel for channel in REQUIRED if channel not in names]
+    if missing:
+        listed = ", ".join(
+            f"{channel}{near_names(channel, set(names) - set(CHANNELS))}" for channel in missing
+        )
+        raise InvalidInput(
+            f"missing column{'s' if len(missing) > 1 else ''} {listed}; rename the column, or name "
+            f"its source in a channel map (columns: {', '.join(names)})"
+        )
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidInput(f"{name}: {names.count(name)} columns have this name; keep one")
+
+
+def _as_floats(values: Any, name: str) -> FloatArray | None:
+    """Return a private float64 copy of a column; None for an extra column that is not numeric."""
+    raw = np.asarray(values)
+    try:
+        if raw.dtype.kind in "mMc":  # dates would become nanoseconds, complex numbers lose a part
+            raise TypeError
+        array = raw.astype(np.float64)
+    except (TypeError, ValueError):
+        if name not in CHANNELS:
+            return None
+        for i, value in enumerate(raw.flat):
+            try:
+                float(value)
+            except (TypeError, ValueError):
+                raise InvalidInput(
+                    f"{name}: {str(value)!r} at sample {i} is not a number; correct it, or use NaN "
+                    f"for a missing measurement"
+                ) from None
+        raise InvalidInput(f"{name}: holds {raw.dtype}; give a column of plain numbers") from None
+    if array.ndim != 1:
+        if name not in CHANNELS:
+            return None
+        raise InvalidInput(f"{name}: has shape {array.shape}; give a one-dimensional array")
+    return array
+
+
+def _handle_spikes(
+    time_s: FloatArray, columns: dict[str, FloatArray], despike: tuple[str, ...], notes: list[str]
+) -> set[str]:
+    """Blank spikes in the channels of `despike`; elsewhere only tell of them in the steering."""
+    removed = set()
+    for name in dict.fromkeys((*despike, "steer_rad")):
+        found = spikes(columns[name])
+        if found.size == 0:
+            continue
+        place = f"{found.size} one-sample spike(s), first at {at(int(found[0]), time_s)}"
+        times = _checks.listing(time_s[found])
+        if name in despike:
+            columns[name][found] = np.nan
+            removed.add(name)
+            notes.append(f"{name}: removed {place}; t = {times}; check that they are no movement")
+        else:
+            notes.append(
+                f"{name}: {place}; t = {times}; the model would follow them: put "
+                f"despike = true for {name} in the channel map"
+            )
+    return removed
+
+
+def _fill_inputs(
+    time_s: FloatArray,
+    columns: dict[str, FloatArray],
+    rate_hz: float,
+    quiet: set[str],
+    notes: list[str],
+) -> None:
+    """Interpolate short holes in what drives the model.
+
+    Holes of the channels in `quiet` come from removed spikes or gaps in time, which have their own
+    note.
+    """
+    drive = "fx_n" if "fx_n" in columns else "ax_mps2"
+    for name in ("steer_rad", drive):
+        columns[name], gaps = fill_short_gaps(columns[name], max(1, round(_FILL_S * rate_hz)))
+        if gaps and name not in quiet:
+            count = sum(b - a for a, b in gaps)
+            notes.append(
+                f"{name}: {count} missing sample(s) in {len(gaps)} short hole(s), first at "
+                f"{at(gaps[0][0], time_s)}, were interpolated, because the model needs this input "
+                f"at every sample; check the recording if there are many"
+            )
+
+
+def _check(channels: dict[str, FloatArray], rate_hz: float, notes: list[str]) -> None:
+    time_s = channels["time_s"]
+    usable = _checks.usable_seconds(channels, rate_hz)
+    if usable < _MIN_USABLE_S:
+        raise InvalidInput(
+            f"vx_mps and steer_rad: only {usable:.3g} s of the log can be used (samples 0 to "
+            f"{time_s.size - 1}, t = {time_s[0]:.6g} to {time_s[-1]:.6g} s, car moving, steering "
+            f"known); at least {_MIN_USABLE_S:g} s are needed, 30 s with corners are good"
+        )
+    check_units_and_signs(channels, rate_hz)
+    dull = _checks.excitation_note(channels, rate_hz)
+    notes += _checks.low_rate_note(rate_hz)
+    notes += _checks.frozen_notes(channels, rate_hz, excited=not dull)
+    notes += [dull] if dull else []

@@ -1,0 +1,130 @@
+"""Small operations on one channel, all on a uniform grid and aware of NaN."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._channels import FloatArray
+
+# A spike stands out this many times from the local noise, from the quantum of the channel and
+# (as a fraction) from its range: below, it could be a quick but true movement.
+_SPIKE_NOISE, _SPIKE_QUANTA, _SPIKE_RANGE = 8.0, 3.0, 0.05
+_SPIKE_NEIGHBOURS = 0.3  # the neighbours of a spike differ by less than this part of it
+_SPIKE_APPROACH = 3.0  # and it exceeds by this factor the steps just before and just after
+_SPIKE_WINDOW = 51
+
+
+def runs(mask: np.ndarray) -> list[tuple[int, int]]:
+    """Return the half-open index ranges ``(start, stop)`` in which `mask` is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def filled(values: FloatArray) -> FloatArray:
+    """Return `values` with NaN replaced by linear interpolation (held at both ends)."""
+    good = np.isfinite(values)
+    if good.all() or not good.any():
+        return values
+    index = np.arange(values.size)
+    return np.interp(index, index[good], values[good])
+
+
+def fill_short_gaps(values: FloatArray, longest: int) -> tuple[FloatArray, list[tuple[int, int]]]:
+    """Interpolate inner NaN runs of at most `longest` samples; return the runs filled too."""
+    gaps = [
+        (a, b) for a, b in runs(np.isnan(values)) if b - a <= longest and a > 0 and b < values.size
+    ]
+    if not gaps:
+        return values, []
+    dense, result = filled(values), values.copy()
+    for a, b in gaps:
+        result[a:b] = dense[a:b]
+    return result, gaps
+
+
+def smoothed(values: FloatArray, width: int) -> FloatArray:
+    """Return the centred moving average over about `width` samples, NaN interpolated first."""
+    half = min(width // 2, (values.size - 1) // 2)
+    if half < 1:
+        return filled(values)
+    padded = np.pad(filled(values), half, mode="edge")
+    total = np.concatenate(([0.0], np.cumsum(padded)))
+    span = 2 * half + 1
+    averaged: FloatArray = (total[span:] - total[:-span]) / span
+    return averaged
+
+
+def median_of_five(values: FloatArray) -> FloatArray:
+    """Return the centred running median of five samples."""
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="edge"), 5)
+    medians: FloatArray = np.median(windows, axis=1)
+    return medians
+
+
+def _local_median(values: FloatArray, at: np.ndarray) -> FloatArray:
+    """Return the median of `values` in a window around each index of `at`."""
+    half = _SPIKE_WINDOW // 2
+    starts = np.clip(at - half, 0, max(values.size - _SPIKE_WINDOW, 0))
+    return np.array([np.median(values[s : s + _SPIKE_WINDOW]) for s in starts])
+
+
+def spikes(values: FloatArray) -> np.ndarray:
+    """Return the indices of isolated one-sample spikes.
+
+    A sample is one if its two neighbours agree with each other and it deviates from the median
+    of five by far more than the local noise, which is taken as the median magnitude of the second
+    difference: that is also large where the channel moves quickly for good reason.
+    """
+    if values.size < 7:
+        return np.empty(0, dtype=np.intp)
+    x = filled(values)
+    deviation = np.abs(x - median_of_five(x))
+    steps = np.abs(np.diff(x))
+    quantum = np.min(steps[steps > 0.0], initial=np.inf)
+    low, high = np.percentile(x, (1, 99))
+    floor = max(_SPIKE_RANGE * (high - low), _SPIKE_QUANTA * quantum if quantum < np.inf else 0.0)
+    inner = slice(2, -2)  # only there are both neighbours and the steps beside them known
+    candidates = np.flatnonzero((deviation[inner] > floor) & np.isfinite(values[inner])) + 2
+    if candidates.size == 0:
+        return candidates
+    size = deviation[candidates]
+    apart = np.abs(x[candidates + 1] - x[candidates - 1])
+    beside = np.maximum(steps[candidates - 2], steps[candidates + 1])
+    candidates = candidates[(apart < _SPIKE_NEIGHBOURS * size) & (_SPIKE_APPROACH * beside < size)]
+    second = np.pad(np.abs(np.diff(x, 2)), 1, mode="edge")
+    noise = _local_median(second, candidates)
+    return candidates[deviation[candidates] > _SPIKE_NOISE * noise]
+
+
+@dataclass(frozen=True)
+class Relation:
+    """How one channel follows another: `ratio` = median of y / x where x is large."""
+
+    ratio: float
+    cosine: float
+    correlation: float
+
+    @property
+    def together(self) -> bool:
+        """Whether both clearly move alike."""
+        return self.cosine > 0.8 and self.correlation > 0.5
+
+    @property
+    def opposed(self) -> bool:
+        """Whether both clearly move against each other, not only by an offset."""
+        return self.cosine < -0.5 and self.correlation < 0.2
+
+
+def relation(x: FloatArray, y: FloatArray) -> Relation:
+    """Compare two channels of equal length, insensitive to their scales."""
+    large = np.abs(x) >= np.percentile(np.abs(x), 75)
+    large &= x != 0.0
+    ratio = float(np.median(y[large] / x[large])) if large.any() else float("nan")
+    return Relation(ratio, _cosine(x, y), _cosine(x - x.mean(), y - y.mean()))
+
+
+def _cosine(x: FloatArray, y: FloatArray) -> float:
+    size = float(np.linalg.norm(x) * np.linalg.norm(y))
+    return float(x @ y) / size if size > 0.0 else 0.0

@@ -1,0 +1,176 @@
+"""A car model: the single track with Magic Formula tyres, and the effects added to it.
+
+Equations: `cpp/include/sysid/dynamics/single_track.hpp`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from html import escape
+
+import numpy as np
+
+from . import _core
+from ._arrays import FloatArray
+from .effects import Effect, Parameter, base_parameters, catalogue, effect
+from .errors import InvalidInput
+from .vehicle import Tyre, Vehicle
+
+__all__ = ["Model"]
+
+_YAW_INERTIA = "yaw_inertia_kgm2"
+
+
+@dataclass(frozen=True)
+class Model:
+    """The baseline of a vehicle, with effects.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        What is known beforehand; its tyres are starting values.
+    effects : tuple of str
+        Ids of the effects that act.
+    values : mapping of str to float
+        Values of parameters, by full name (`B_front`, `steer_lag.time_constant_s`), where they differ
+        from the vehicle's, or from the null values of effects.
+    """
+
+    vehicle: Vehicle
+    effects: tuple[str, ...] = ()
+    values: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        ids = tuple(effect(e).id for e in self.effects)
+        if len(set(ids)) != len(ids):
+            raise InvalidInput(f"an effect is named twice: {', '.join(ids)}")
+        object.__setattr__(self, "effects", ids)
+        known = self.names
+        for name in self.values:
+            if name not in known:
+                raise InvalidInput(f"the model has no parameter '{name}'; it has {', '.join(known)}")
+
+    def add(self, *names: str | Effect) -> Model:
+        """The same model with more effects, at their null values."""
+        return replace(self, effects=(*self.effects, *(effect(n).id for n in names)))
+
+    def drop(self, *names: str | Effect) -> Model:
+        """The same model with fewer effects."""
+        gone = {effect(n).id for n in names}
+        kept = tuple(e for e in self.effects if e not in gone)
+        values = {k: v for k, v in self.values.items() if k.split(".")[0] not in gone}
+        return replace(self, effects=kept, values=values)
+
+    def with_values(self, values: Mapping[str, float]) -> Model:
+        """The same model with some parameters at other values."""
+        return replace(self, values={**self.values, **values})
+
+    @property
+    def parts(self) -> tuple[Effect, ...]:
+        """The effects that act."""
+        return tuple(effect(e) for e in self.effects)
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Parameters by full name, those of the baseline first."""
+        named = {p.name: p for p in base_parameters()}
+        for e in self.parts:
+            named.update({f"{e.id}.{p.name}": p for p in e.parameters})
+        return named
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Full names of all parameters."""
+        return tuple(self.parameters)
+
+    @property
+    def free_names(self) -> tuple[str, ...]:
+        """Parameters that driving has to tell: tyres, effects, and a yaw inertia nobody knows."""
+        known = self.vehicle.yaw_inertia_kgm2 is not None
+        return tuple(n for n in self.names if not (known and n == _YAW_INERTIA))
+
+    @property
+    def candidates(self) -> tuple[Effect, ...]:
+        """Effects of the catalogue that could be added."""
+        unknown_inertia = self.vehicle.yaw_inertia_kgm2 is None
+        return tuple(
+            e
+            for e in catalogue()
+            if e.id not in self.effects and not (unknown_inertia and e.id == "yaw_inertia")
+        )
+
+    def bounds(self, name: str) -> tuple[float, float]:
+        """Lower and upper bound of a parameter."""
+        p = self.parameters[name]
+        if name == _YAW_INERTIA:
+            guess = self._inertia_guess()
+            return 0.2 * guess, 5.0 * guess
+        return p.lower, p.upper
+
+    def value(self, name: str) -> float:
+        """The value a parameter has in this model."""
+        if name in self.values:
+            return float(self.values[name])
+        if name == _YAW_INERTIA:
+            given = self.vehicle.yaw_inertia_kgm2
+            return given if given is not None else self._inertia_guess()
+        if "." in name:
+            return self.parameters[name].null_value
+        letter, axle = name.split("_")
+        return float(getattr(self.tyre_of_vehicle(axle), letter))
+
+    def tyre_of_vehicle(self, axle: str) -> Tyre:
+        """Starting values of the tyre of an axle, `front` or `rear`."""
+        return self.vehicle.tyre_front if axle == "front" else self.vehicle.tyre_rear
+
+    def _inertia_guess(self) -> float:
+        # I_z = m l_f l_r is the usual first guess: Milliken & Milliken, ch. 5.
+        return self.vehicle.mass_kg * self.vehicle.lf_m * self.vehicle.lr_m
+
+    def vector(self) -> FloatArray:
+        """The core's parameter vector; effects that do not act stand at their null values."""
+        p = np.zeros(_core.PARAMETERS)
+        for e in catalogue():
+            for parameter in e.parameters:
+                p[parameter.column] = parameter.null_value
+        for name, parameter in self.parameters.items():
+            p[parameter.column] = self.value(name)
+        return p
+
+    def from_vector(self, p: FloatArray) -> Model:
+        """This model with the free parameters taken from a core vector."""
+        columns = self.parameters
+        return self.with_values({n: float(p[columns[n].column]) for n in self.free_names})
+
+    def core(self, *, force_known: bool = True, also: Iterable[Effect] = ()) -> _core.SingleTrack:
+        """The compiled model, with effects `also` switched on."""
+        v = self.vehicle
+        data = _core.VehicleData()
+        for name in (
+            "mass_kg",
+            "lf_m",
+            "lr_m",
+            "cg_height_m",
+            "drag_area_m2",
+            "air_density_kgpm3",
+            "brake_front_share",
+            "drive_front_share",
+        ):
+            setattr(data, name, getattr(v, name))
+        mask = 0
+        for e in (*self.parts, *also):
+            mask |= e.bit
+        return _core.SingleTrack(data, mask, force_known)
+
+    def __str__(self) -> str:
+        what = ", ".join(self.effects) if self.effects else "baseline"
+        lines = [f"{self.vehicle.name}: single track with Magic Formula tyres, {what}"]
+        free = set(self.free_names)
+        for name, p in self.parameters.items():
+            note = "" if name in free else "  (given)"
+            lines.append(f"  {name:34s} {self.value(name):12.6g} {p.unit}{note}")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"

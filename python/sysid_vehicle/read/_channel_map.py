@@ -1,0 +1,164 @@
+"""The channel map: how the columns of a foreign log become canonical channels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .._files import read_toml, refuse_unknown
+from ..errors import InvalidInput, near_names
+from ..log import CHANNELS
+from ._csv import Table
+
+_SOURCE_KEYS = ("column", "factor", "offset", "despike")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a canonical channel comes from: ``value = factor * column + offset``."""
+
+    column: str
+    factor: float = 1.0
+    offset: float = 0.0
+    despike: bool = False
+
+
+@dataclass(frozen=True)
+class ChannelMap:
+    """Source column, factor and offset of each canonical channel.
+
+    Channels that are not named are taken from the column of the same name.
+
+    Attributes
+    ----------
+    sources : mapping of str to Source
+        By canonical channel.
+    absent : tuple of str
+        Canonical channels to ignore although a column has their name.
+    rate_hz : float or None
+        Sample rate of a file without a time column.
+    """
+
+    sources: Mapping[str, Source]
+    absent: tuple[str, ...] = ()
+    rate_hz: float | None = None
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> ChannelMap:
+        """Read a channel map, a TOML file with the table ``[channels]``.
+
+        Each entry is the name of the source column, a table with ``column``, ``factor`` (1),
+        ``offset`` (0) and ``despike`` (false), or ``false`` to ignore the channel;
+        ``time_s = { rate_hz = 100 }`` numbers the rows of a file without time.
+
+        Raises
+        ------
+        InvalidInput
+            If the file cannot be read or holds an unknown key or a value of the wrong kind.
+        """
+        content = read_toml(path)
+        refuse_unknown(content, ("channels",), str(path))
+        table = content.get("channels")
+        if not isinstance(table, dict):
+            raise InvalidInput(f"{path}: the table [channels] is missing; add it")
+        return cls.from_dict(table, where=str(path))
+
+    @classmethod
+    def from_dict(cls, table: Mapping[str, Any], where: str = "channel map") -> ChannelMap:
+        """Build a channel map from the content of a ``[channels]`` table.
+
+        Raises
+        ------
+        InvalidInput
+            As :meth:`from_toml`; the message begins with `where`.
+        """
+        if set(table) == {"channels"} and isinstance(table["channels"], Mapping):
+            table = table["channels"]
+        refuse_unknown(table, CHANNELS, where)
+        sources: dict[str, Source] = {}
+        absent: list[str] = []
+        rate_hz = None
+        for channel, entry in table.items():
+            if isinstance(entry, str):
+                sources[channel] = Source(entry)
+            elif entry is False:
+                absent.append(channel)
+            elif not isinstance(entry, Mapping):
+                raise InvalidInput(
+                    f"{where}: {channel} = {entry!r}; give a column name or a table such as "
+                    f'{{ column = "name", factor = 1.0 }}'
+                )
+            elif channel == "time_s" and "rate_hz" in entry:
+                refuse_unknown(entry, ("rate_hz",), f"{where}, time_s with rate_hz")
+                rate_hz = _number(entry, "rate_hz", 0.0, f"{where}, {channel}")
+                if rate_hz <= 0.0:
+                    raise InvalidInput(f"{where}: rate_hz = {rate_hz:g}; give a positive rate")
+            else:
+                sources[channel] = _source(entry, channel, f"{where}, {channel}")
+        for channel in absent:
+            if CHANNELS[channel].required:
+                raise InvalidInput(f"{where}: {channel} = false, but every log needs it; map it")
+        return cls(sources, tuple(absent), rate_hz)
+
+    @property
+    def despiked(self) -> tuple[str, ...]:
+        """Canonical channels whose one-sample spikes are to be removed."""
+        return tuple(channel for channel, source in self.sources.items() if source.despike)
+
+    def apply(self, table: Table) -> dict[str, npt.NDArray[np.float64]]:
+        """Return the canonical channels of `table`, then its other numeric columns.
+
+        Raises
+        ------
+        InvalidInput
+            If a source column is not in the table (near names are given) or not numeric.
+        """
+        result: dict[str, npt.NDArray[np.float64]] = {}
+        for channel, source in self.sources.items():
+            if source.column not in table.names:
+                hint = near_names(source.column, table.names)
+                raise InvalidInput(
+                    f"{channel}: the channel map names column '{source.column}', which is not in "
+                    f"the file{hint}; columns are {', '.join(table.names)}"
+                )
+            result[channel] = source.factor * table.column(source.column) + source.offset
+        if self.rate_hz is not None:
+            result["time_s"] = np.arange(table.n) / self.rate_hz
+        used = {source.column for source in self.sources.values()}
+        for name in table.names:
+            if name in result or name in self.absent:
+                continue
+            if name in CHANNELS:
+                result[name] = table.column(name)
+            elif name not in used and table.names.count(name) == 1 and name in table.columns:
+                result[name] = table.columns[name]
+        return result
+
+
+def _source(entry: Mapping[str, Any], channel: str, where: str) -> Source:
+    refuse_unknown(
+        entry, (*_SOURCE_KEYS, "rate_hz") if channel == "time_s" else _SOURCE_KEYS, where
+    )
+    column = entry.get("column", channel)
+    if not isinstance(column, str):
+        raise InvalidInput(f"{where}: column = {column!r}; give the name of the source column")
+    despike = entry.get("despike", False)
+    if not isinstance(despike, bool):
+        raise InvalidInput(f"{where}: despike = {despike!r}; give true or false")
+    factor = _number(entry, "factor", 1.0, where)
+    if factor == 0.0:
+        raise InvalidInput(f"{where}: factor = 0 would erase the channel; give its unit factor")
+    return Source(column, factor, _number(entry, "offset", 0.0, where), despike)
+
+
+def _number(entry: Mapping[str, Any], key: str, default: float, where: str) -> float:
+    value = entry.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise InvalidInput(f"{where}: {key} = {value!r} is not a number; give a plain number")
+    return float(value)

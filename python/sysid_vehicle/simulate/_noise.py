@@ -1,0 +1,104 @@
+"""What sensors add to a drive, and what the road does to the car."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from .._arrays import FloatArray, as_float64
+from ..errors import InvalidInput
+
+__all__ = ["RoadDisturbance", "SensorNoise"]
+
+
+def _refuse_negative(thing: object) -> None:
+    for field in fields(thing):  # type: ignore[arg-type]
+        value = getattr(thing, field.name)
+        if not 0.0 <= value < float("inf"):
+            raise InvalidInput(
+                f"{type(thing).__name__}: {field.name} = {value!r}; give zero or a positive number"
+            )
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Standard deviations of white Gaussian noise on the measured channels.
+
+    Parameters
+    ----------
+    vx_mps, vy_mps, yaw_rate_radps, ax_mps2, ay_mps2, steer_rad : float
+        Standard deviation, in the unit of the channel. The wheel force `fx_n` is commanded, not
+        measured, and carries none.
+
+    Raises
+    ------
+    InvalidInput
+        If one is negative.
+    """
+
+    vx_mps: float = 0.03
+    vy_mps: float = 0.03
+    yaw_rate_radps: float = 0.0025
+    ax_mps2: float = 0.06
+    ay_mps2: float = 0.06
+    steer_rad: float = 2e-4
+
+    def __post_init__(self) -> None:
+        _refuse_negative(self)
+
+    @classmethod
+    def none(cls) -> SensorNoise:
+        """Sensors without noise."""
+        return cls(**{field.name: 0.0 for field in fields(cls)})
+
+    def scaled(self, factor: float) -> SensorNoise:
+        """The same sensors with `factor` times the noise."""
+        return SensorNoise(**{f.name: factor * getattr(self, f.name) for f in fields(self)})
+
+
+@dataclass(frozen=True)
+class RoadDisturbance:
+    """Forces and a moment that change at random and that no model knows.
+
+    Each is an Ornstein-Uhlenbeck process, Gaussian with this standard deviation and correlation
+    ``exp(-|t| / correlation_time_s)``, and begins in its stationary state.
+
+    Parameters
+    ----------
+    fx_n, fy_n : float
+        Standard deviation of the forces on the body [N].
+    mz_nm : float
+        Standard deviation of the yaw moment [N m].
+    correlation_time_s : float
+        Correlation time, more than zero.
+
+    Raises
+    ------
+    InvalidInput
+        If one is negative, or the correlation time is not positive.
+    """
+
+    fx_n: float = 0.0
+    fy_n: float = 0.0
+    mz_nm: float = 0.0
+    correlation_time_s: float = 0.3
+
+    def __post_init__(self) -> None:
+        _refuse_negative(self)
+        if self.correlation_time_s == 0.0:
+            raise InvalidInput("RoadDisturbance: correlation_time_s must be more than zero")
+
+    def sample(self, n: int, rate_hz: float, rng: np.random.Generator) -> FloatArray:
+        """Draw `n` samples of F_x [N], F_y [N] and M_z [N m]: an array of shape (n, 3).
+
+        Notes
+        -----
+        Exact sampling of the process: D. T. Gillespie, Phys. Rev. E 54 (1996), 2084-2091.
+        """
+        keep = float(np.exp(-1.0 / (self.correlation_time_s * rate_hz)))
+        fresh = rng.standard_normal((n, 3))
+        fresh[1:] *= np.sqrt(1.0 - keep**2)
+        for k in range(1, n):
+            fresh[k] += keep * fresh[k - 1]
+        return as_float64(fresh * np.array([self.fx_n, self.fy_n, self.mz_nm]))

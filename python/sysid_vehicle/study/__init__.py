@@ -1,0 +1,6 @@
+"""Studies: the whole loop from a log to a better model."""
+
+from .improve import improve
+from .study import AddedEffect, Study, Verdict
+
+__all__ = ["AddedEffect", "Study", "Verdict", "improve"]

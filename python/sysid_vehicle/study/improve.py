@@ -1,0 +1,182 @@
+"""The whole loop: fit, see where it fails, find what is missing, add it, see the error fall."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..compare import Comparison, compare
+from ..diagnose import Candidate, Diagnosis, diagnose, omnibus
+from ..errors import InvalidInput, warn
+from ..estimate import Driving
+from ..identify import Fit, identify, refine
+from ..log import Log
+from ..model import Model
+from .held_out import gain_in_log_likelihood, hold_out
+from .study import AddedEffect, Study, Verdict
+
+__all__ = ["improve"]
+
+_IDLE = 2.6  # an added effect within so many standard errors of nothing is dropped again
+_AT_FLOOR = 1.10  # of the noise floor, one step ahead, in training
+_OMNIBUS = 0.01
+
+
+def improve(
+    model: Model,
+    train: Log | Sequence[Log],
+    test: Log | Sequence[Log] | None = None,
+    *,
+    most_effects: int = 4,
+    alpha: float = 0.05,
+    candidates: Sequence[str] | None = None,
+    starts: int = 8,
+    seed: int = 0,
+    progress: bool = False,
+    tell: Callable[[str], None] | None = None,
+) -> Study:
+    """Improve a model step by step until nothing more is missing that the driving can show.
+
+    Each step scores all effects, refits the best few with their exact dynamics, and adds the best one
+    that also predicts the held-out driving better. An effect that became idle is dropped again.
+
+    Parameters
+    ----------
+    model : Model
+        The baseline.
+    train, test : Log or sequence of Log
+        What to fit to, and driving the fit never sees. Without `test` the last 30 % of the training
+        driving are held out.
+    most_effects : int
+        Stop after so many.
+    alpha : float
+        Rate of false claims accepted, over all effects together, per step.
+    candidates : sequence of str, optional
+        Effects to consider.
+    tell : callable, optional
+        Called with a sentence about each step.
+
+    Returns
+    -------
+    Study
+    """
+    if most_effects < 0:
+        raise InvalidInput("most_effects must not be negative")
+    began = time.perf_counter()
+    say = tell if tell is not None else _silent
+    train_driving, test_driving = hold_out(train, test)
+    baseline = identify(model, train_driving, starts=starts, seed=seed, progress=progress)
+    say(f"Fitted the baseline to {train_driving}.")
+    fit = baseline
+    diagnoses: list[Diagnosis] = []
+    fits = [baseline]
+    p_values: dict[str, float] = {}
+    while True:
+        dx = diagnose(fit, candidates=candidates, alpha=alpha, seed=seed, progress=progress)
+        diagnoses.append(dx)
+        if len(fit.model.effects) >= most_effects:
+            break
+        chosen = _first_that_holds(dx, fit, test_driving)
+        if chosen is None:
+            break
+        assert chosen.fit is not None
+        p_values[chosen.id] = chosen.p_value
+        fit = _without_idle(chosen.fit)
+        if chosen.id not in fit.model.effects or any(f.model.effects == fit.model.effects for f in fits):
+            fit = fits[-1]
+            break
+        fits.append(fit)
+        say(f"Added {chosen.id}: {chosen.size}.")
+    # Effects that were dropped on the way are no part of the story.
+    fits = [f for f in fits if set(f.model.effects) <= set(fit.model.effects)]
+    if fits[-1] is not fit:
+        fits.append(fit)
+    floor = fit.noise
+    on_train = [compare(f, train_driving, noise=floor) for f in fits]
+    on_test = [compare(f, test_driving, noise=floor) for f in fits]
+    left = omnibus(fit, train_driving)
+    verdict = _verdict(fit, diagnoses[-1], on_train[-1], left.p_value)
+    return Study(
+        verdict=verdict,
+        fits=tuple(fits),
+        diagnoses=tuple(diagnoses),
+        train=tuple(on_train),
+        test=tuple(on_test),
+        added=_added(fits, on_test, p_values),
+        omnibus=left,
+        warnings=_warnings(fit, train_driving),
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _silent(_: str) -> None:
+    pass
+
+
+def _first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> Candidate | None:
+    """The likeliest candidate that fits better and predicts the held-out driving better."""
+    for c in dx.significant[:3]:
+        if c.fit is None or c.statistic < 2.0 * np.log(c.fit.driving.samples):
+            continue
+        gain, error = gain_in_log_likelihood(fit, c.fit, test)
+        if gain > error:
+            return c
+    return None
+
+
+def _without_idle(fit: Fit) -> Fit:
+    """The fit without effects whose parameters have all become indistinguishable from nothing."""
+    while True:
+        idle = [e for e in fit.model.parts if _strength(fit, e.id) < _IDLE]
+        if not idle:
+            return fit
+        weakest = min(idle, key=lambda e: _strength(fit, e.id))
+        fit = refine(fit.model.drop(weakest), fit.driving, fit.noise)
+
+
+def _strength(fit: Fit, name: str) -> float:
+    """Largest distance of the effect's parameters from their null values, in standard errors."""
+    parameters = fit.model.parameters
+    found = [e for e in fit.estimates if e.name.startswith(f"{name}.")]
+    return max(
+        abs(e.value - parameters[e.name].null_value) / e.std if np.isfinite(e.std) else np.inf
+        for e in found
+    )
+
+
+def _verdict(fit: Fit, last: Diagnosis, score: Comparison, p_left: float) -> Verdict:
+    found = bool(fit.model.effects)
+    complete = p_left > _OMNIBUS and score.error < _AT_FLOOR
+    if not found:
+        return "adequate" if p_left > _OMNIBUS and not last.significant else "unknown"
+    return "explained" if complete else "partly_explained"
+
+
+def _added(
+    fits: list[Fit], on_test: list[Comparison], p_values: dict[str, float]
+) -> tuple[AddedEffect, ...]:
+    added = []
+    final = fits[-1]
+    for before, after, fit_before, fit_after in zip(
+        on_test[:-1], on_test[1:], fits[:-1], fits[1:], strict=True
+    ):
+        new = [e for e in fit_after.model.effects if e not in fit_before.model.effects]
+        for name in new:
+            estimates = tuple(e for e in final.estimates if e.name.startswith(f"{name}."))
+            added.append(
+                AddedEffect(name, estimates, before.error, after.error, p_values.get(name, np.nan))
+            )
+    return tuple(added)
+
+
+def _warnings(fit: Fit, driving: Driving) -> tuple[str, ...]:
+    found = []
+    for log in driving.logs:
+        found += [f"{log.name}: {text}" for text in log.missing().values()]
+    found += [f"{e.name}: {e.note} with this driving" for e in fit.estimates if e.note]
+    if not fit.converged:
+        found.append("the final fit did not converge; its intervals may be too short")
+        warn(found[-1])
+    return tuple(dict.fromkeys(found))

@@ -1,0 +1,212 @@
+"""What a study found."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from .._files import write_text
+from .._text import html_table, number, text_table
+from ..compare import Comparison
+from ..diagnose import Candidate, Diagnosis, Omnibus
+from ..identify import Estimate, Fit
+from ..model import Model
+
+__all__ = ["AddedEffect", "Study", "Verdict"]
+
+Verdict = Literal["adequate", "explained", "partly_explained", "unknown"]
+
+_MEANING = {
+    "adequate": "nothing is missing that this driving can show",
+    "explained": "the effects found explain the driving down to the noise floor",
+    "partly_explained": "the effects found explain part of it; something else is missing",
+    "unknown": "something is missing and no effect of the catalogue explains it",
+}
+
+
+@dataclass(frozen=True)
+class AddedEffect:
+    """An effect that was added.
+
+    Attributes
+    ----------
+    parameters : tuple of Estimate
+        In the final model.
+    error_before, error_after : float
+        On the held-out driving, in units of the noise floor.
+    p_value : float
+        Of the model without it being complete.
+    """
+
+    id: str
+    parameters: tuple[Estimate, ...]
+    error_before: float
+    error_after: float
+    p_value: float
+
+    def __str__(self) -> str:
+        size = ", ".join(
+            f"{e.name.split('.')[1]} {number(e.value, 3)} +- {number(e.std, 2)} {e.unit}"
+            for e in self.parameters
+        )
+        return f"{self.id}: {size}"
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """The way from a baseline to a better model.
+
+    Attributes
+    ----------
+    verdict : str
+        `adequate`, `explained`, `partly_explained` or `unknown`.
+    fits : tuple of Fit
+        The baseline, then one for each effect added.
+    diagnoses : tuple of Diagnosis
+        One before each step, and the last one, which found nothing more to add.
+    train, test : tuple of Comparison
+        For each fit, all against the noise floor of the final one.
+    added : tuple of AddedEffect
+    omnibus : Omnibus
+        Whether the final model leaves anything that depends on the driving.
+    seconds : float
+        Wall time.
+    """
+
+    verdict: Verdict
+    fits: tuple[Fit, ...]
+    diagnoses: tuple[Diagnosis, ...]
+    train: tuple[Comparison, ...]
+    test: tuple[Comparison, ...]
+    added: tuple[AddedEffect, ...]
+    omnibus: Omnibus
+    warnings: tuple[str, ...]
+    seconds: float
+
+    @property
+    def fit(self) -> Fit:
+        """The final fit."""
+        return self.fits[-1]
+
+    @property
+    def model(self) -> Model:
+        """The improved model."""
+        return self.fit.model
+
+    @property
+    def meaning(self) -> str:
+        """The verdict in words."""
+        return _MEANING[self.verdict]
+
+    _HEAD = ("step", "train error", "held-out error")
+
+    def _rows(self) -> list[list[str]]:
+        labels = ["baseline", *(f"+ {a.id}" for a in self.added)]
+        return [
+            [label, f"{a.error:.3f}", f"{b.error:.3f}"]
+            for label, a, b in zip(labels, self.train, self.test, strict=False)
+        ] + [["noise floor", "1.000", "1.000"]]
+
+    def __str__(self) -> str:
+        lines = [f"Verdict: {self.verdict} - {self.meaning}."]
+        lines += [f"  {a}" for a in self.added]
+        lines.append(text_table(self._HEAD, self._rows()))
+        lines.append(f"In the end: {self.omnibus}.")
+        lines += [f"Warning: {w}" for w in self.warnings]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        effects = "".join(f"<li>{a}</li>" for a in self.added)
+        return (
+            f"<p><b>{self.verdict}</b>: {self.meaning}.</p><ul>{effects}</ul>"
+            + html_table(self._HEAD, self._rows())
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, ready for JSON."""
+        return {
+            "verdict": self.verdict,
+            "effects": [_effect(a) for a in self.added],
+            "ranking": [_candidate(c) for c in self.diagnoses[0].ranking],
+            "channels": {
+                "before": {"train": _channels(self.train[0]), "test": _channels(self.test[0])},
+                "after": {"train": _channels(self.train[-1]), "test": _channels(self.test[-1])},
+            },
+            "regions": [
+                {
+                    "speed_mps": list(r.speed_mps),
+                    "lateral_acceleration_mps2": list(r.lateral_mps2),
+                    "share": r.share,
+                }
+                for r in self.test[0].regions
+            ],
+            "errors": {
+                "train": [c.error for c in self.train],
+                "test": [c.error for c in self.test],
+            },
+            "parameters": {
+                e.name: _estimate(e) for e in (*self.fit.estimates, *self.fit.derived)
+            },
+            "warnings": list(self.warnings),
+        }
+
+    def to_json(self, path: str | Path) -> None:
+        """Write all figures to a JSON file, whole or not at all."""
+        write_text(Path(path), json.dumps(_plain(self.to_dict()), indent=2, allow_nan=False) + "\n")
+
+    def report(self, path: str | Path) -> None:
+        """Write the study as one self-contained HTML file."""
+        # Drawing is the last stage; it is imported only where somebody asks for it.
+        from ..report import write_report
+
+        write_report(self, Path(path))
+
+
+def _plain(x: Any) -> Any:
+    """The same with NaN and infinity as null: JSON has neither."""
+    if isinstance(x, dict):
+        return {k: _plain(v) for k, v in x.items()}
+    if isinstance(x, list | tuple):
+        return [_plain(v) for v in x]
+    if isinstance(x, float):
+        return x if np.isfinite(x) else None
+    return x
+
+
+def _estimate(e: Estimate) -> dict[str, Any]:
+    return {"value": e.value, "std": e.std, "unit": e.unit}
+
+
+def _effect(a: AddedEffect) -> dict[str, Any]:
+    return {
+        "id": a.id,
+        "parameters": {e.name.split(".")[1]: _estimate(e) for e in a.parameters},
+        "error_before": a.error_before,
+        "error_after": a.error_after,
+        "p_value": a.p_value,
+    }
+
+
+def _candidate(c: Candidate) -> dict[str, Any]:
+    return {
+        "id": c.id,
+        "statistic": c.statistic,
+        "p_value": c.p_value,
+        "predicted_error": c.predicted_error,
+        "indistinguishable_from": list(c.indistinguishable_from),
+        "parameters": {
+            p.name: {"value": v, "std": s, "unit": p.unit}
+            for p, v, s in zip(c.effect.parameters, c.value, c.std, strict=True)
+        },
+    }
+
+
+def _channels(c: Comparison) -> dict[str, Any]:
+    return {
+        name: {"rmse": s.rmse, "noise_floor": s.noise_floor, "nrmse": s.nrmse, "r2": s.r2}
+        for name, s in c.channels.items()
+    }

@@ -1,0 +1,293 @@
+"""The car's own numbers (mass, geometry, starting tyre) and their TOML file."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ._files import read_toml, refuse_unknown, write_text
+from .errors import InvalidInput, warn
+
+__all__ = ["Tyre", "Vehicle"]
+
+
+@dataclass(frozen=True)
+class _Range:
+    """Closed range of a key (`above` makes the lower end open), and what to check outside it."""
+
+    low: float
+    high: float
+    meaning: str
+    above: bool = False
+
+    def complaint(self, key: str, value: object) -> str | None:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return f"{key} = {value!r} is not a number; give the {self.meaning} as a plain number"
+        low_ok = value > self.low if self.above else value >= self.low
+        if low_ok and value <= self.high:
+            return None
+        sign = ">" if self.above else ">="
+        return (
+            f"{key} = {value:g} is out of range ({sign} {self.low:g} and <= {self.high:g}); "
+            f"give the {self.meaning}"
+        )
+
+
+_TYRE_RANGES = {
+    "B": _Range(0.0, 200.0, "stiffness factor of the magic formula in 1/rad", above=True),
+    "C": _Range(0.0, 4.0, "shape factor of the magic formula, about 1.4", above=True),
+    "D": _Range(0.0, 5.0, "peak friction coefficient, about 1.0 on dry asphalt", above=True),
+    "E": _Range(-50.0, 1.0, "curvature factor of the magic formula, at most 1"),
+}
+
+_VEHICLE_RANGES = {
+    "mass_kg": _Range(1.0, 50000.0, "total mass in kilograms, driver and fuel included"),
+    "yaw_inertia_kgm2": _Range(0.0, 1e7, "yaw inertia in kg m^2", above=True),
+    "lf_m": _Range(0.0, 20.0, "distance CG to front axle in metres", above=True),
+    "lr_m": _Range(0.0, 20.0, "distance CG to rear axle in metres", above=True),
+    "cg_height_m": _Range(0.0, 5.0, "height of the CG above the road in metres"),
+    "track_front_m": _Range(0.0, 5.0, "front track width in metres", above=True),
+    "track_rear_m": _Range(0.0, 5.0, "rear track width in metres", above=True),
+    "drag_area_m2": _Range(0.0, 50.0, "drag coefficient times frontal area in m^2"),
+    "air_density_kgpm3": _Range(0.0, 2.0, "air density in kg/m^3, 1.225 at sea level", above=True),
+    "brake_front_share": _Range(0.0, 1.0, "front axle's share of the brake force, 0 to 1"),
+    "drive_front_share": _Range(0.0, 1.0, "front axle's share of the drive force, 0 to 1"),
+}
+
+_OPTIONAL = ("yaw_inertia_kgm2", "air_density_kgpm3")
+_TYRE_TABLES = ("front", "rear")
+
+
+def _check_ranges(ranges: Mapping[str, _Range], values: Mapping[str, object], where: str) -> None:
+    """Raise one :class:`InvalidInput` that lists every value of `values` outside its range."""
+    found = (ranges[key].complaint(key, value) for key, value in values.items())
+    complaints = [text for text in found if text is not None]
+    if complaints:
+        raise InvalidInput(f"{where}: " + "; ".join(complaints))
+
+
+@dataclass(frozen=True)
+class Tyre:
+    """Magic-formula tyre of one axle: ``F_y = D F_z sin(C atan(Ba - E (Ba - atan(Ba))))``.
+
+    Parameters
+    ----------
+    B : float
+        Stiffness factor [1/rad].
+    C, D, E : float
+        Shape factor, peak friction coefficient, curvature factor [-].
+
+    Raises
+    ------
+    InvalidInput
+        If a coefficient is out of its range (B, C, D > 0, E <= 1).
+
+    Notes
+    -----
+    H. B. Pacejka, *Tire and Vehicle Dynamics*, eq. (4.6), without shifts; ``Ba`` is B times the
+    slip angle in radians.
+    """
+
+    B: float = 10.0
+    C: float = 1.4
+    D: float = 1.0
+    E: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_ranges(_TYRE_RANGES, dataclasses.asdict(self), "tyre")
+        for key in _TYRE_RANGES:
+            object.__setattr__(self, key, float(getattr(self, key)))
+
+    @property
+    def cornering_stiffness_per_load(self) -> float:
+        """Cornering stiffness per vertical load, ``B C D`` [1/rad]."""
+        return self.B * self.C * self.D
+
+    def replace(self, **changes: float) -> Tyre:
+        """Return a copy with some coefficients changed."""
+        refuse_unknown(changes, _TYRE_RANGES, "tyre")
+        return dataclasses.replace(self, **changes)
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """Parameters of the car that are known before any identification (ISO 8855, SI).
+
+    Parameters
+    ----------
+    mass_kg : float
+        Total mass as driven.
+    lf_m, lr_m : float
+        Distance from the CG to the front and the rear axle.
+    cg_height_m : float
+        Height of the CG above the road.
+    track_front_m, track_rear_m : float
+        Track widths.
+    drag_area_m2 : float
+        Drag coefficient times frontal area.
+    brake_front_share, drive_front_share : float
+        Share of the brake and of the drive force that the front axle transmits, 0 to 1.
+    tyre_front, tyre_rear : Tyre
+        Starting tyres of the axles.
+    yaw_inertia_kgm2 : float or None
+        Yaw inertia; None makes it a parameter to identify.
+    air_density_kgpm3 : float
+        Density of the air.
+    name : str
+        Name for titles and reports.
+
+    Raises
+    ------
+    InvalidInput
+        If values are out of range; the message names every such key and what it should hold.
+    """
+
+    mass_kg: float
+    lf_m: float
+    lr_m: float
+    cg_height_m: float
+    track_front_m: float
+    track_rear_m: float
+    drag_area_m2: float
+    brake_front_share: float
+    drive_front_share: float
+    tyre_front: Tyre = Tyre()
+    tyre_rear: Tyre = Tyre()
+    yaw_inertia_kgm2: float | None = None
+    air_density_kgpm3: float = 1.225
+    name: str = "vehicle"
+
+    def __post_init__(self) -> None:
+        numbers = {key: getattr(self, key) for key in _VEHICLE_RANGES}
+        if self.yaw_inertia_kgm2 is None:
+            del numbers["yaw_inertia_kgm2"]
+        _check_ranges(_VEHICLE_RANGES, numbers, f"vehicle '{self.name}'")
+        for key, value in numbers.items():
+            object.__setattr__(self, key, float(value))
+        if self.yaw_inertia_kgm2 is not None:
+            typical = self.mass_kg * self.lf_m * self.lr_m
+            if not 0.1 <= self.yaw_inertia_kgm2 / typical <= 10.0:
+                raise InvalidInput(
+                    f"vehicle '{self.name}': yaw_inertia_kgm2 = {self.yaw_inertia_kgm2:g} does not "
+                    f"fit the mass and the wheelbase: cars lie near mass_kg * lf_m * lr_m = "
+                    f"{typical:.4g} kg m^2; correct the unit, or leave the key out to identify it"
+                )
+
+    @property
+    def wheelbase_m(self) -> float:
+        """Distance between the axles, ``lf_m + lr_m``."""
+        return self.lf_m + self.lr_m
+
+    def replace(self, **changes: Any) -> Vehicle:
+        """Return a copy with some fields changed.
+
+        Raises
+        ------
+        InvalidInput
+            If a field is unknown (near names are given) or a value is out of range.
+        """
+        fields = [field.name for field in dataclasses.fields(self)]
+        refuse_unknown(changes, fields, f"vehicle '{self.name}'")
+        return dataclasses.replace(self, **changes)
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Vehicle:
+        """Read a vehicle file.
+
+        Parameters
+        ----------
+        path : str or Path
+            TOML file with the fields of this class as keys and the tables ``[tyre.front]`` and
+            ``[tyre.rear]`` with B, C, D, E. ``air_density_kgpm3``, ``yaw_inertia_kgm2`` and
+            ``name`` may be left out.
+
+        Raises
+        ------
+        InvalidInput
+            If the file cannot be read, a key is unknown, keys are missing (all are named) or a
+            value is out of range.
+
+        Warns
+        -----
+        SysidWarning
+            If ``yaw_inertia_kgm2`` is absent, because it then has to be identified.
+        """
+        content = read_toml(path)
+        where = str(path)
+        name = content.pop("name", Path(path).name.split(".")[0])
+        if not isinstance(name, str):
+            raise InvalidInput(f"{where}: name = {name!r} is not a text; put it in quotes")
+        tyre_tables = content.pop("tyre", {})
+        if not isinstance(tyre_tables, dict):
+            raise InvalidInput(f"{where}: 'tyre' must be two tables, [tyre.front] and [tyre.rear]")
+        values = {key: content.get(key) for key in _VEHICLE_RANGES}
+        missing = [key for key, value in values.items() if value is None and key not in _OPTIONAL]
+        refuse_unknown(content, _VEHICLE_RANGES, where, likely=missing)
+        refuse_unknown(tyre_tables, _TYRE_TABLES, f"{where}, [tyre]")
+        for axle in _TYRE_TABLES:
+            table = tyre_tables.get(axle, {})
+            if not isinstance(table, dict):
+                raise InvalidInput(f"{where}: 'tyre.{axle}' must be a table [tyre.{axle}]")
+            refuse_unknown(table, _TYRE_RANGES, f"{where}, [tyre.{axle}]")
+            missing += [f"tyre.{axle}.{key}" for key in _TYRE_RANGES if key not in table]
+        if missing:
+            raise InvalidInput(f"{where}: missing keys: {', '.join(missing)}; add them to the file")
+        for axle in _TYRE_TABLES:
+            _check_ranges(_TYRE_RANGES, tyre_tables[axle], f"{where}, [tyre.{axle}]")
+        given = {key: value for key, value in values.items() if value is not None}
+        _check_ranges(_VEHICLE_RANGES, given, where)
+        try:
+            vehicle = cls(
+                **given,
+                tyre_front=Tyre(**tyre_tables["front"]),
+                tyre_rear=Tyre(**tyre_tables["rear"]),
+                name=name,
+            )
+        except InvalidInput as error:
+            raise InvalidInput(f"{where}: {error}") from error
+        if vehicle.yaw_inertia_kgm2 is None:
+            warn(
+                f"{where}: yaw_inertia_kgm2 is absent, so it becomes a parameter to identify; "
+                f"add it if it was measured"
+            )
+        return vehicle
+
+    def to_toml(self, path: str | Path) -> None:
+        """Write the vehicle file that :meth:`from_toml` reads; complete or not at all."""
+        # The escapes of a JSON string are also those of a TOML string.
+        lines = [f"name = {json.dumps(self.name, ensure_ascii=False)}"]
+        for key in _VEHICLE_RANGES:
+            value = getattr(self, key)
+            if value is not None:
+                lines.append(f"{key} = {value!r}")
+        for axle, tyre in zip(_TYRE_TABLES, (self.tyre_front, self.tyre_rear), strict=True):
+            lines += ["", f"[tyre.{axle}]"]
+            lines += [f"{key} = {getattr(tyre, key)!r}" for key in _TYRE_RANGES]
+        write_text(path, "\n".join(lines) + "\n")
+
+    def _rows(self) -> list[tuple[str, str]]:
+        rows = []
+        for key in _VEHICLE_RANGES:
+            value = getattr(self, key)
+            rows.append((key, "to identify" if value is None else f"{value:.6g}"))
+        for axle, tyre in zip(_TYRE_TABLES, (self.tyre_front, self.tyre_rear), strict=True):
+            numbers = ", ".join(f"{key} {getattr(tyre, key):.6g}" for key in _TYRE_RANGES)
+            rows.append((f"tyre {axle}", numbers))
+        return rows
+
+    def __str__(self) -> str:
+        rows = self._rows()
+        width = max(len(key) for key, _ in rows)
+        return "\n".join([self.name, *(f"  {key:<{width}}  {text}" for key, text in rows)])
+
+    def _repr_html_(self) -> str:
+        cells = "".join(
+            f"<tr><th>{html.escape(key)}</th><td>{html.escape(text)}</td></tr>"
+            for key, text in self._rows()
+        )
+        return f"<table><caption>{html.escape(self.name)}</caption>{cells}</table>"

@@ -1,0 +1,155 @@
+// The filter against a textbook Kalman filter and against the joint density of all measurements.
+#include "sysid/estimate/kalman.hpp"
+
+#include "helpers.hpp"
+
+namespace sysid::test {
+namespace {
+
+TEST(Kalman, EqualsTheTextbookFilter) {
+    // Missing rows left out, gain by inversion, P = (I - K H) P: Anderson & Moore, Optimal
+    // Filtering, ch. 3.
+    const Small s = small_system(40);
+    Eigen::VectorXd x = kSmallMean;
+    Eigen::MatrixXd P = small_covariance();
+    std::size_t samples = 0;
+    extended_kalman_filter<3, 2>(
+        s, kSmallMean, small_covariance(), [&](std::size_t k, const FilterStep<3, 2>& step) {
+            if (k > 0) {
+                x = s.A * x + s.b[k];
+                P = s.A * P * s.A.transpose() + s.Q;
+            }
+            EXPECT_LT((step.predicted_mean - x).norm(), 1e-12);
+            EXPECT_LT((step.predicted_covariance - P).norm(), 1e-12);
+            std::vector<int> there;
+            for (int i = 0; i < 2; ++i)
+                if (!std::isnan(s.y[k][i])) there.push_back(i);
+            const Eigen::VectorXd all = s.y[k] - s.H * x - s.d[k];
+            const Eigen::VectorXd e = all(there);
+            const Eigen::MatrixXd H = s.H(there, Eigen::all);
+            const Eigen::MatrixXd S = H * P * H.transpose() + s.R(there, there);
+            const Eigen::MatrixXd K = P * H.transpose() * S.inverse();
+            x += K * e;
+            P = (Eigen::MatrixXd::Identity(3, 3) - K * H) * P;
+            EXPECT_LT((step.mean - x).norm(), 1e-12) << k;
+            EXPECT_LT((step.covariance - P).norm(), 1e-12) << k;
+            EXPECT_EQ(step.update.observed, static_cast<int>(there.size()));
+            for (std::size_t j = 0; j < there.size(); ++j) {
+                const int i = there[j];
+                EXPECT_NEAR(step.update.innovation[i], e[static_cast<int>(j)], 1e-12);
+                EXPECT_LT((step.update.gain.col(i) - K.col(static_cast<int>(j))).norm(), 1e-12);
+            }
+            ++samples;
+        });
+    EXPECT_EQ(samples, s.size());
+}
+
+TEST(Kalman, LogLikelihoodIsTheDensityOfAllMeasurements) {
+    const Small s = small_system(30);
+    const double filtered = extended_kalman_filter<3, 2>(s, kSmallMean, small_covariance(),
+                                                         [](std::size_t, const auto&) {});
+    const Stacked all = stack(s, kSmallMean, small_covariance());
+    const Eigen::LLT<Eigen::MatrixXd> factor(all.covariance);
+    const Eigen::VectorXd white = factor.matrixL().solve(all.measured - all.mean);
+    const Eigen::VectorXd diagonal = Eigen::MatrixXd(factor.matrixL()).diagonal();
+    const double direct = -0.5 * white.squaredNorm() - diagonal.array().log().sum() -
+                          0.5 * static_cast<double>(all.measured.size()) * kLogTwoPi;
+    EXPECT_NEAR(filtered, direct, 1e-10 * std::abs(direct));
+}
+
+TEST(Kalman, MissingEverythingOnlyPredicts) {
+    const Small s = small_system(6);
+    ASSERT_TRUE(s.y[3].array().isNaN().all());
+    extended_kalman_filter<3, 2>(s, kSmallMean, small_covariance(),
+                                 [&](std::size_t k, const auto& step) {
+                                     if (k != 3) return;
+                                     EXPECT_EQ(step.mean, step.predicted_mean);
+                                     EXPECT_EQ(step.covariance, step.predicted_covariance);
+                                     EXPECT_EQ(step.update.log_likelihood, 0.0);
+                                     EXPECT_EQ(step.update.observed, 0);
+                                 });
+}
+
+TEST(Kalman, PredictFirstBeginsOneSampleEarlier) {
+    const Small s = small_system(10);
+    // Predicting by hand, then filtering as usual.
+    const Vec<3> x = s.A * kSmallMean + s.b[0];
+    const Mat<3, 3> P = s.A * small_covariance() * s.A.transpose() + s.Q;
+    const auto ignore = [](std::size_t, const auto&) {};
+    const double by_hand = extended_kalman_filter<3, 2>(s, x, P, ignore);
+    const double by_flag =
+        extended_kalman_filter<3, 2>(s, kSmallMean, small_covariance(), ignore, true);
+    EXPECT_NEAR(by_flag, by_hand, 1e-12 * std::abs(by_hand));
+}
+
+TEST(Kalman, CovarianceStaysPositiveDefiniteWhenIllConditioned) {
+    // A sensor a million times better than the other, states of very different size, hardly any
+    // process noise.
+    LinearSystem<3, 2> s;
+    s.A << 1.0, 0.01, 0.0, 0.0, 1.0, 0.01, 0.0, 0.0, 0.999;
+    s.Q = Vec<3>(1e-16, 1e-14, 1e-10).asDiagonal();
+    s.H << 1.0, 0.0, 0.0, 1.0, 1e-3, 0.0;
+    s.R = Vec<2>(1e-10, 1e2).asDiagonal();
+    const std::size_t samples = 100000;
+    s.b.assign(samples, Vec<3>::Zero());
+    s.d.assign(samples, Vec<2>::Zero());
+    s.y.assign(samples, Vec<2>::Zero());
+    const Mat<3, 3> P = Vec<3>(1e6, 1e4, 1e2).asDiagonal();
+    double smallest = 1.0;
+    double unsymmetric = 0.0;
+    std::size_t failed = 0;
+    extended_kalman_filter<3, 2>(
+        s, Vec<3>(10.0, -1.0, 0.1), P, [&](std::size_t, const FilterStep<3, 2>& step) {
+            unsymmetric = std::max(unsymmetric,
+                                   (step.covariance - step.covariance.transpose()).norm());
+            // Scaled to a correlation, so that the sizes of the states do not decide.
+            const Vec<3> scale = step.covariance.diagonal().cwiseSqrt().cwiseInverse();
+            const Mat<3, 3> correlation =
+                scale.asDiagonal() * step.covariance * scale.asDiagonal();
+            if (Eigen::LLT<Mat<3, 3>>(correlation).info() != Eigen::Success ||
+                !correlation.allFinite())
+                ++failed;
+            smallest = std::min(smallest, correlation.determinant());
+        });
+    EXPECT_EQ(unsymmetric, 0.0);
+    EXPECT_EQ(failed, 0U);
+    EXPECT_GT(smallest, 0.0);
+}
+
+TEST(Kalman, NotPositiveDefiniteNoiseNamesTheSample) {
+    struct Broken : Small {
+        Mat<2, 2> measurement_noise(std::size_t k) const {
+            return k == 7 ? Mat<2, 2>(-100.0 * Mat<2, 2>::Identity()) : R;
+        }
+    };
+    Broken s;
+    static_cast<Small&>(s) = small_system(20);
+    std::size_t kept = 0;
+    try {
+        extended_kalman_filter<3, 2>(s, kSmallMean, small_covariance(),
+                                     [&](std::size_t, const auto&) { ++kept; });
+        FAIL() << "nothing was thrown";
+    } catch (const NumericalFailure& failure) {
+        EXPECT_NE(std::string(failure.what()).find("sample 7"), std::string::npos)
+            << failure.what();
+    }
+    EXPECT_EQ(kept, 7U);
+}
+
+TEST(Kalman, InfiniteMeasurementOrPredictionNamesTheSample) {
+    for (double bad : {INFINITY, -INFINITY}) {
+        Small s = small_system(20);
+        s.y[4][1] = bad;
+        const auto filter = [&] {
+            extended_kalman_filter<3, 2>(s, kSmallMean, small_covariance(),
+                                         [](std::size_t, const auto&) {});
+        };
+        EXPECT_THROW(filter(), NumericalFailure);
+        s = small_system(20);
+        s.b[4][1] = bad;
+        EXPECT_THROW(filter(), NumericalFailure);
+    }
+}
+
+}  // namespace
+}  // namespace sysid::test

@@ -1,0 +1,73 @@
+// The smoother against the joint posterior of all states, computed in one go.
+#include "sysid/estimate/smoother.hpp"
+
+#include "helpers.hpp"
+
+namespace sysid::test {
+namespace {
+
+template <int NX, int NY>
+std::vector<FilterStep<NX, NY>> filtered(const LinearSystem<NX, NY>& s, const Vec<NX>& x,
+                                         const Mat<NX, NX>& P) {
+    std::vector<FilterStep<NX, NY>> steps;
+    extended_kalman_filter<NX, NY>(s, x, P,
+                                   [&](std::size_t, const auto& step) { steps.push_back(step); });
+    return steps;
+}
+
+template <int NX, int NY>
+void expect_batch_posterior(const LinearSystem<NX, NY>& s, const Vec<NX>& x,
+                            const Mat<NX, NX>& P) {
+    const auto smoothed = smooth<NX, NY>(filtered(s, x, P));
+    const Stacked all = stack(s, x, P);
+    const Eigen::MatrixXd cross = all.state_covariance * all.H.transpose();
+    const Eigen::LLT<Eigen::MatrixXd> factor(all.covariance);
+    const Eigen::VectorXd mean = all.states + cross * factor.solve(all.measured - all.mean);
+    const Eigen::MatrixXd covariance =
+        all.state_covariance - cross * factor.solve(cross.transpose());
+    ASSERT_EQ(smoothed.size(), s.size());
+    for (std::size_t k = 0; k < s.size(); ++k) {
+        const auto at = static_cast<int>(k) * NX;
+        EXPECT_LT((smoothed[k].mean - mean.segment<NX>(at)).norm(), 1e-10) << k;
+        EXPECT_LT((smoothed[k].covariance - covariance.block<NX, NX>(at, at)).norm(), 1e-10) << k;
+        if (k > 0) {
+            EXPECT_LT((smoothed[k].lag_one - covariance.block<NX, NX>(at, at - NX)).norm(), 1e-10)
+                << k;
+        } else {
+            EXPECT_EQ(smoothed[k].lag_one.norm(), 0.0);
+        }
+    }
+}
+
+TEST(Smoother, EqualsTheBatchPosterior) {
+    expect_batch_posterior(small_system(25), kSmallMean, small_covariance());
+}
+
+TEST(Smoother, StandsStatesWithoutNoise) {
+    // A constant that is known, and one that is not: predicted covariances are singular.
+    Small s = small_system(15);
+    s.A << 0.9, 0.2, 0.1, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0;
+    s.Q = Vec<3>(0.05, 0.0, 0.0).asDiagonal();
+    const Mat<3, 3> P = Vec<3>(1.0, 0.5, 0.0).asDiagonal();
+    expect_batch_posterior(s, kSmallMean, P);
+}
+
+TEST(Smoother, NeverLessCertainThanTheFilter) {
+    const Small s = small_system(25);
+    const auto steps = filtered(s, kSmallMean, small_covariance());
+    const auto smoothed = smooth<3, 2>(steps);
+    for (std::size_t k = 0; k + 1 < steps.size(); ++k) {
+        const Mat<3, 3> gained = steps[k].covariance - smoothed[k].covariance;
+        const Vec<3> sizes = gained.selfadjointView<Eigen::Lower>().eigenvalues();
+        EXPECT_GT(sizes.minCoeff(), -1e-12) << k;
+        EXPECT_GT(sizes.maxCoeff(), 1e-4) << k;
+    }
+    EXPECT_EQ(smoothed.back().mean, steps.back().mean);
+}
+
+TEST(Smoother, NothingComesOfNothing) {
+    EXPECT_TRUE((smooth<3, 2>({}).empty()));
+}
+
+}  // namespace
+}  // namespace sysid::test

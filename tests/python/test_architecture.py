@@ -1,0 +1,169 @@
+"""The shape of the source tree: who may import whom, how long a file may be."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+REPO = Path(__file__).resolve().parents[2]
+PACKAGE = REPO / "python" / "sysid_vehicle"
+MAX_LINES = 400
+
+# A module imports from its own layer and from the layers above it in this list, never from below.
+PYTHON_LAYERS = [
+    {"errors", "_arrays", "_core", "_files", "_style", "vehicle", "effects", "model"},
+    {"log"},
+    {"read"},
+    {"manoeuvres"},
+    {"simulate"},
+    {"estimate"},
+    {"identify"},
+    {"compare"},
+    {"diagnose"},
+    {"study"},
+    {"plot"},
+    {"report"},
+    {"demo"},
+    {"cli"},
+    {"__main__"},
+]
+CPP_LAYERS = ["math", "model", "effects", "simulate", "estimate", "identify"]
+
+RANK = {module: rank for rank, layer in enumerate(PYTHON_LAYERS) for module in layer}
+PYTHON_FILES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
+CPP_FILES = sorted(
+    path for root in ("cpp/include/sysid", "cpp/src") for path in (REPO / root).rglob("*.[ch]pp")
+)
+
+
+def name(path: Path) -> str:
+    return str(path.relative_to(REPO))
+
+
+def own_module(path: Path) -> str:
+    """Give the module directly under the package that this file belongs to."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imported_modules(path: Path, text: str) -> Iterator[tuple[int, str]]:
+    """Yield line and module under the package for each import, inside functions too."""
+    folder = ("sysid_vehicle", *path.relative_to(PACKAGE).parts[:-1])
+    for node in ast.walk(ast.parse(text)):
+        targets: list[tuple[str, ...]] = []
+        if isinstance(node, ast.Import):
+            targets = [tuple(alias.name.split(".")) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            start = folder[: len(folder) - node.level + 1] if node.level else ()
+            base = (*start, *(node.module.split(".") if node.module else ()))
+            targets = [(*base, alias.name) for alias in node.names]
+        for target in targets:
+            if target[0] == "sysid_vehicle":
+                yield node.lineno, target[1] if len(target) > 1 else "__init__"
+
+
+def python_violations(path: Path, text: str) -> list[str]:
+    module = own_module(path)
+    found = []
+    for line, target in sorted(set(imported_modules(path, text))):
+        if target == module:
+            continue
+        where = f"{name(path)}:{line}"
+        if target not in RANK:
+            found.append(f"{where} imports {target}: name the module that defines it")
+        elif RANK[target] > RANK[module]:
+            found.append(f"{where} {module} imports {target}, which comes after it")
+    return found
+
+
+def cpp_violations(path: Path, text: str) -> list[str]:
+    own = own_cpp_layer(path)
+    found = []
+    for match in re.finditer(r'^\s*#\s*include\s+["<]sysid/(\w+)/', text, re.MULTILINE):
+        target = match[1]
+        line = text.count("\n", 0, match.start(1)) + 1
+        if target not in CPP_LAYERS:
+            found.append(f"{name(path)}:{line} includes the unknown layer {target}")
+        elif CPP_LAYERS.index(target) > CPP_LAYERS.index(own):
+            found.append(f"{name(path)}:{line} {own} includes {target}, which comes after it")
+    return found
+
+
+def own_cpp_layer(path: Path) -> str:
+    root = REPO / "cpp" / ("src" if path.is_relative_to(REPO / "cpp/src") else "include/sysid")
+    return path.relative_to(root).parts[0]
+
+
+def test_there_are_files_to_check() -> None:
+    assert len(PYTHON_FILES) > 5
+    assert len(CPP_FILES) > 5
+
+
+def test_every_python_module_has_a_layer() -> None:
+    assert {own_module(path) for path in PYTHON_FILES} - set(RANK) == set()
+
+
+@pytest.mark.parametrize("path", PYTHON_FILES, ids=name)
+def test_python_imports_point_forward(path: Path) -> None:
+    assert python_violations(path, path.read_text(encoding="utf-8")) == []
+
+
+def test_python_modules_of_one_layer_form_no_circle() -> None:
+    edges: dict[str, set[str]] = {}
+    for path in PYTHON_FILES:
+        targets = {target for _, target in imported_modules(path, path.read_text("utf-8"))}
+        edges.setdefault(own_module(path), set()).update(targets - {own_module(path)})
+    while leaves := {module for module, targets in edges.items() if not targets & set(edges)}:
+        for module in leaves:
+            del edges[module]
+    assert edges == {}, "these modules import each other in a circle"
+
+
+@pytest.mark.parametrize(
+    ("module", "text", "expected"),
+    [
+        ("log/log.py", "from sysid_vehicle.read import read_log", "log imports read"),
+        ("log/log.py", "from ..read.csv import rows", "log imports read"),
+        ("vehicle.py", "def f():\n    from . import log", "vehicle imports log"),
+        ("vehicle.py", "import sysid_vehicle.cli", "vehicle imports cli"),
+        ("vehicle.py", "import sysid_vehicle", "imports __init__"),
+        ("vehicle.py", "from sysid_vehicle import Log", "imports Log"),
+    ],
+)
+def test_the_check_sees_an_import_that_points_back(module: str, text: str, expected: str) -> None:
+    violations = python_violations(PACKAGE / module, text)
+    assert len(violations) == 1
+    assert expected in violations[0]
+
+
+def test_the_check_lets_forward_imports_pass() -> None:
+    text = "from ..log import Log\nfrom .. import _core\nfrom .rows import row\nimport numpy"
+    assert python_violations(PACKAGE / "read" / "csv.py", text) == []
+
+
+@pytest.mark.parametrize("path", CPP_FILES, ids=name)
+def test_cpp_includes_point_forward(path: Path) -> None:
+    assert own_cpp_layer(path) in CPP_LAYERS
+    assert cpp_violations(path, path.read_text(encoding="utf-8")) == []
+
+
+def test_the_check_sees_an_include_that_points_back() -> None:
+    header = REPO / "cpp/include/sysid/model/tyre.hpp"
+    back = cpp_violations(header, '#include <cmath>\n#include "sysid/estimate/filter.hpp"\n')
+    assert back == [
+        "cpp/include/sysid/model/tyre.hpp:2 model includes estimate, which comes after it"
+    ]
+    assert cpp_violations(header, '#include "sysid/math/dual.hpp"\n') == []
+
+
+def test_no_file_is_too_long_to_read() -> None:
+    suffixes = {".py", ".pyi", ".cpp", ".hpp", ".cmake"}
+    lines = {
+        name(path): len(path.read_text(encoding="utf-8").splitlines())
+        for folder in ("cpp", "python", "tests", "benchmarks")
+        for path in (REPO / folder).rglob("*")
+        if path.suffix in suffixes
+    }
+    assert lines, "no source file was found"
+    assert {path: count for path, count in lines.items() if count > MAX_LINES} == {}
