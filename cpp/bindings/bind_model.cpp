@@ -62,8 +62,10 @@ Array evaluate(const SingleTrack& model, const Array& p, const Array& motion, do
                                   values, rate.data(), rate.data() + kMotionStates);
     Array out = empty(1, 11);
     double* o = out.mutable_data();
-    const std::array<double, 11> all{rate[0],   rate[1], rate[2], w.a_x,  w.a_y, w.alpha_f,
-                                     w.alpha_r, w.fz_f,  w.fz_r,  w.fy_f, w.fy_r};
+    const std::array<double, 11> all{
+        rate[0],   rate[1], rate[2], w.a_x,  w.a_y,  w.alpha_f,
+        w.alpha_r, w.fz_f,  w.fz_r,  w.fy_f, w.fy_r,
+    };
     std::copy(all.begin(), all.end(), o);
     return out;
 }

@@ -100,7 +100,7 @@ double score_run(const Problem& problem, const Run& run, const double* p, const 
                     const auto a = static_cast<std::size_t>(i);
                     const auto b = static_cast<std::size_t>(j);
                     const double info =
-                        0.5 * (dS[a].cwiseProduct(dS[b].transpose())).sum() + de[a].dot(de[b]);
+                        0.5 * dS[a].cwiseProduct(dS[b].transpose()).sum() + de[a].dot(de[b]);
                     information(i, j) += info;
                     if (i != j) information(j, i) += info;
                 }

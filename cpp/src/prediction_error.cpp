@@ -35,9 +35,7 @@ template <class S, class T, class Disturb, class Shift, class Keep>
 void run_frozen(const SingleTrack& model, const Run& run, const double* p_values, const T* p,
                 const std::vector<FrozenStep>& steps, double correlation_time, Disturb&& disturb,
                 Shift&& shift, Keep&& keep) {
-    const ModelState<double> start = initial_state(model, run, p_values);
-    ModelState<S> x;
-    for (std::size_t i = 0; i < kModelStates; ++i) x[i] = S(start[i]);
+    ModelState<S> x = initial_state<S>(model, run, p);
     std::array<S, kMotionStates> wander;
     wander.fill(S(0.0));
     const double forget = std::exp(-run.dt / correlation_time);

@@ -30,7 +30,8 @@ class Hands {
         return {
             towards(now.steer_rad, steer(now, ahead, seen), driver_.steer_rate_limit_radps * dt_),
             towards(now.longitudinal, force(ahead, acceleration, seen),
-                    driver_.force_rate_limit_nps * dt_)};
+                    driver_.force_rate_limit_nps * dt_),
+        };
     }
 
   private:
@@ -79,7 +80,8 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
     x[0] = initial_speed;
     Input u{
         references.front().steer_rad,
-        0.5 * model.car.air_density_kgpm3 * model.car.drag_area_m2 * initial_speed * initial_speed};
+        0.5 * model.car.air_density_kgpm3 * model.car.drag_area_m2 * initial_speed * initial_speed,
+    };
     std::array<double, kPushes> push{};
     settle_auxiliary(model, x, push.data(), u, p);
     const std::size_t last = references.size() - 1;
@@ -93,7 +95,9 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
         out.states.insert(out.states.end(), x.begin(), x.end());
         out.outputs.insert(out.outputs.end(), y.begin(), y.end());
         // Written so that a state that is not a number counts as lost.
-        if (!(x[0] >= kLowestSpeed && std::abs(std::atan2(x[1], x[0])) <= kLostSideslip)) {
+        const bool under_control =
+            x[0] >= kLowestSpeed && std::abs(std::atan2(x[1], x[0])) <= kLostSideslip;
+        if (!under_control) {
             out.lost_at = k;
             break;
         }

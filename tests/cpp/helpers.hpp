@@ -81,8 +81,7 @@ struct Evaluation {
 };
 
 inline Evaluation evaluate(const SingleTrack& model, const ModelState<double>& x, const Input& u,
-                           const Parameters& p,
-                           const std::array<double, kPushes>& push = kCalm) {
+                           const Parameters& p, const std::array<double, kPushes>& push = kCalm) {
     Evaluation e;
     e.w = model.evaluate(x.data(), push.data(), x.data() + kMotionStates, u, p.data(),
                          e.rate.data(), e.rate.data() + kMotionStates);

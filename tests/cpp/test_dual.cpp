@@ -1,7 +1,6 @@
 // Every operation of the dual numbers against central differences.
-#include "sysid/math/dual.hpp"
-
 #include "helpers.hpp"
+#include "sysid/math/dual.hpp"
 
 namespace sysid::test {
 namespace {

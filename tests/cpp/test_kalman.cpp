@@ -1,7 +1,6 @@
 // The filter against a textbook Kalman filter and against the joint density of all measurements.
-#include "sysid/estimate/kalman.hpp"
-
 #include "helpers.hpp"
+#include "sysid/estimate/kalman.hpp"
 
 namespace sysid::test {
 namespace {
@@ -100,12 +99,11 @@ TEST(Kalman, CovarianceStaysPositiveDefiniteWhenIllConditioned) {
     std::size_t failed = 0;
     extended_kalman_filter<3, 2>(
         s, Vec<3>(10.0, -1.0, 0.1), P, [&](std::size_t, const FilterStep<3, 2>& step) {
-            unsymmetric = std::max(unsymmetric,
-                                   (step.covariance - step.covariance.transpose()).norm());
+            unsymmetric =
+                std::max(unsymmetric, (step.covariance - step.covariance.transpose()).norm());
             // Scaled to a correlation, so that the sizes of the states do not decide.
             const Vec<3> scale = step.covariance.diagonal().cwiseSqrt().cwiseInverse();
-            const Mat<3, 3> correlation =
-                scale.asDiagonal() * step.covariance * scale.asDiagonal();
+            const Mat<3, 3> correlation = scale.asDiagonal() * step.covariance * scale.asDiagonal();
             if (Eigen::LLT<Mat<3, 3>>(correlation).info() != Eigen::Success ||
                 !correlation.allFinite())
                 ++failed;

@@ -1,7 +1,6 @@
 // Prediction errors with frozen gains, and their derivatives.
-#include "sysid/identify/prediction_error.hpp"
-
 #include "helpers.hpp"
+#include "sysid/identify/prediction_error.hpp"
 
 namespace sysid::test {
 namespace {
@@ -92,16 +91,15 @@ TEST(PredictionError, ResidualsAreTheFiltersWhitenedInnovations) {
 }
 
 class Sensitivities : public testing::TestWithParam<std::pair<EffectMask, bool>> {};
-INSTANTIATE_TEST_SUITE_P(
-    Models, Sensitivities,
-    testing::Values(std::pair{kPlain, true}, std::pair{kLagging, true}, std::pair{kPlain, false},
-                    std::pair{kAllEffects, true}),
-    [](const auto& it) {
-        return (it.param.first == kPlain     ? std::string("Motion")
-                : it.param.first == kLagging ? std::string("Lagging")
-                                             : std::string("All")) +
-               (it.param.second ? "ByForce" : "ByAcceleration");
-    });
+INSTANTIATE_TEST_SUITE_P(Models, Sensitivities,
+                         testing::Values(std::pair{kPlain, true}, std::pair{kLagging, true},
+                                         std::pair{kPlain, false}, std::pair{kAllEffects, true}),
+                         [](const auto& it) {
+                             return (it.param.first == kPlain     ? std::string("Motion")
+                                     : it.param.first == kLagging ? std::string("Lagging")
+                                                                  : std::string("All")) +
+                                    (it.param.second ? "ByForce" : "ByAcceleration");
+                         });
 
 TEST_P(Sensitivities, AreTheDerivativesOfTheResiduals) {
     const auto [effects, force_known] = GetParam();
@@ -158,8 +156,8 @@ TEST(PredictionError, NormalEquationsAreProducts) {
     const auto n = static_cast<int>(columns.size());
     Eigen::VectorXd gradient(n);
     Table information(n, n);
-    const double cost = normal_equations(problem, p.data(), filter, columns, gradient.data(),
-                                         information.data());
+    const double cost =
+        normal_equations(problem, p.data(), filter, columns, gradient.data(), information.data());
     const Eigen::VectorXd e = residuals_of(problem, p, filter);
     const Table G = sensitivities_of(problem, p, filter, columns);
     EXPECT_NEAR(cost, 0.5 * e.squaredNorm(), 1e-12 * cost);
@@ -183,10 +181,9 @@ TEST(PredictionError, ConstantSignalsAnswerLikeTheEffectsThatAreConstant) {
     const std::vector<int> targets{kForceY, kMomentZ, kGravityX, kPushes + kYawRate};
     const Table ones = Table::Ones(static_cast<int>(problem.samples()), 4);
     const Table answers = signals_of(problem, p, filter, ones, targets);
-    const Table G =
-        sensitivities_of(problem, p, filter,
-                         {column_of("side_wind", 0), column_of("side_wind", 1),
-                          column_of("road_grade"), column_of("gyro_bias")});
+    const Table G = sensitivities_of(problem, p, filter,
+                                     {column_of("side_wind", 0), column_of("side_wind", 1),
+                                      column_of("road_grade"), column_of("gyro_bias")});
     const double slope = -kGravity * std::cos(p[parameter_of("road_grade")]);
     const std::array<double, 4> factor{1.0, 1.0, slope, 1.0};
     for (int j = 0; j < 4; ++j) {
@@ -223,8 +220,7 @@ TEST(PredictionError, SignalOnAReadingIsTakenOffTheMeasurement) {
                 for (auto& y : run.measurements) y[j % kChannels] -= sign * signals(k++, j);
             return residuals_of(moved, p, filter);
         };
-        const Eigen::VectorXd difference =
-            0.5 * (residuals_lowered(1.0) - residuals_lowered(-1.0));
+        const Eigen::VectorXd difference = 0.5 * (residuals_lowered(1.0) - residuals_lowered(-1.0));
         EXPECT_LT((answers.col(j) + difference).norm(), 1e-5 * difference.norm()) << j;
         EXPECT_GT(difference.norm(), 1e-3) << j;
     }

@@ -1,7 +1,6 @@
 // The equations of the single-track model: balance, symmetry, steady cornering, axle loads.
-#include "sysid/dynamics/single_track.hpp"
-
 #include "helpers.hpp"
+#include "sysid/dynamics/single_track.hpp"
 
 namespace sysid::test {
 namespace {
@@ -12,8 +11,8 @@ Parameters mirror_symmetric_parameters() {
     for (const char* id : {"steer_offset", "road_bank", "gyro_bias"}) p[parameter_of(id)] = 0.0;
     p[parameter_of("side_wind", 0)] = 0.0;
     p[parameter_of("side_wind", 1)] = 0.0;
-    p[parameter_of("drive_yaw_moment", 0)] = 0.0;   // constant pull to one side
-    p[parameter_of("imu_lever_arm", 1)] = 0.0;      // mounted to the left
+    p[parameter_of("drive_yaw_moment", 0)] = 0.0;    // constant pull to one side
+    p[parameter_of("imu_lever_arm", 1)] = 0.0;       // mounted to the left
     p[parameter_of("accelerometer_bias", 1)] = 0.0;  // lateral
     return p;
 }
@@ -57,8 +56,8 @@ TEST(SingleTrack, NewtonAndEulerHoldAtRandomPoints) {
         const double drag = 0.5 * 1.225 * car.drag_area_m2 * vx * vx;
         const double x_sum = fx_f * c - e.w.fy_f * s + fx_r - drag + push[kForceX];
         const double y_sum = e.w.fy_f * c + fx_f * s + e.w.fy_r + push[kForceY];
-        const double z_sum = car.lf_m * (e.w.fy_f * c + fx_f * s) - car.lr_m * e.w.fy_r +
-                             push[kMomentZ];
+        const double z_sum =
+            car.lf_m * (e.w.fy_f * c + fx_f * s) - car.lr_m * e.w.fy_r + push[kMomentZ];
         EXPECT_NEAR(e.y[kAx], x_sum / car.mass_kg, 1e-11);
         EXPECT_NEAR(e.y[kAy], y_sum / car.mass_kg, 1e-11);
         EXPECT_NEAR(e.rate[0], x_sum / car.mass_kg + vy * r + push[kGravityX], 1e-11);
@@ -108,17 +107,17 @@ TEST(SingleTrack, SteadyYawRateOfTheLinearBicycle) {
             const ModelState<D> x{D(v), D::seeded(vy, 0), D::seeded(r, 1)};
             const std::array<D, kPushes> calm{};
             ModelState<D> rate;
-            model.evaluate(x.data(), calm.data(), x.data() + kMotionStates, {steer, 0.0},
-                           p.data(), rate.data(), rate.data() + kMotionStates);
+            model.evaluate(x.data(), calm.data(), x.data() + kMotionStates, {steer, 0.0}, p.data(),
+                           rate.data(), rate.data() + kMotionStates);
             const double det = rate[1].d[0] * rate[2].d[1] - rate[1].d[1] * rate[2].d[0];
             vy -= (rate[1].v * rate[2].d[1] - rate[2].v * rate[1].d[1]) / det;
             r -= (rate[2].v * rate[1].d[0] - rate[1].v * rate[2].d[0]) / det;
         }
         EXPECT_NEAR(r / steer, v / (wheelbase + understeer * v * v), 1e-6 * v / wheelbase);
         // Sideslip of the linear bicycle: beta = l_r/L delta-part minus what the rear slip takes.
-        const double beta =
-            steer * (car.lr_m - car.lf_m * car.mass_kg * v * v / (c_r * wheelbase)) /
-            (wheelbase + understeer * v * v);
+        const double beta = steer *
+                            (car.lr_m - car.lf_m * car.mass_kg * v * v / (c_r * wheelbase)) /
+                            (wheelbase + understeer * v * v);
         EXPECT_NEAR(vy / v, beta, 1e-6 * steer);
     }
 }
@@ -179,8 +178,7 @@ TEST(SingleTrack, MeasuredAccelerationStandsInForTheForce) {
 
 TEST(SingleTrack, ReadsBackTheMeasuredAccelerationWhateverTheSensorErrors) {
     // Bias, scale and a lever arm forward are undone on the way in and redone on the way out.
-    const EffectMask mask =
-        mask_of({"accelerometer_bias", "accelerometer_scale", "imu_lever_arm"});
+    const EffectMask mask = mask_of({"accelerometer_bias", "accelerometer_scale", "imu_lever_arm"});
     Parameters p = typical_parameters();
     p[parameter_of("imu_lever_arm", 1)] = 0.0;
     const auto e = evaluate({saloon(), mask, false}, {25.0, 0.3, 0.4}, {0.05, -3.0}, p);
@@ -206,8 +204,7 @@ TEST(SingleTrack, FastestRateBoundsTheEigenvaluesOfTheMotion) {
         Mat<3, 3> jacobian;
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j)
-                jacobian(i, j) =
-                    rate[static_cast<std::size_t>(i)].d[static_cast<std::size_t>(j)];
+                jacobian(i, j) = rate[static_cast<std::size_t>(i)].d[static_cast<std::size_t>(j)];
         const double fastest = jacobian.eigenvalues().cwiseAbs().maxCoeff();
         const double claimed = model.fastest_rate(p.data(), v);
         // RK4 stays stable up to 2.8, and the steps are chosen for 0.6.

@@ -1,7 +1,6 @@
 // The smoother against the joint posterior of all states, computed in one go.
-#include "sysid/estimate/smoother.hpp"
-
 #include "helpers.hpp"
+#include "sysid/estimate/smoother.hpp"
 
 namespace sysid::test {
 namespace {
@@ -16,8 +15,7 @@ std::vector<FilterStep<NX, NY>> filtered(const LinearSystem<NX, NY>& s, const Ve
 }
 
 template <int NX, int NY>
-void expect_batch_posterior(const LinearSystem<NX, NY>& s, const Vec<NX>& x,
-                            const Mat<NX, NX>& P) {
+void expect_batch_posterior(const LinearSystem<NX, NY>& s, const Vec<NX>& x, const Mat<NX, NX>& P) {
     const auto smoothed = smooth<NX, NY>(filtered(s, x, P));
     const Stacked all = stack(s, x, P);
     const Eigen::MatrixXd cross = all.state_covariance * all.H.transpose();
@@ -65,9 +63,7 @@ TEST(Smoother, NeverLessCertainThanTheFilter) {
     EXPECT_EQ(smoothed.back().mean, steps.back().mean);
 }
 
-TEST(Smoother, NothingComesOfNothing) {
-    EXPECT_TRUE((smooth<3, 2>({}).empty()));
-}
+TEST(Smoother, NothingComesOfNothing) { EXPECT_TRUE((smooth<3, 2>({}).empty())); }
 
 }  // namespace
 }  // namespace sysid::test

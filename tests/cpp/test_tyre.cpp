@@ -1,8 +1,7 @@
 // The Magic Formula: zero, slope, symmetry, peak and what lies beyond it.
-#include "sysid/model/tyre.hpp"
-
 #include "helpers.hpp"
 #include "sysid/math/dual.hpp"
+#include "sysid/model/tyre.hpp"
 
 namespace sysid::test {
 namespace {

@@ -2,12 +2,16 @@
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
+
+from sysid_vehicle import Fit, Log, Model, Tyre, Vehicle, drive, example_vehicle, identify
+from sysid_vehicle import manoeuvres as drives
 
 os.environ["MPLBACKEND"] = "Agg"  # before anything imports pyplot: tests open no window
 
@@ -44,3 +48,69 @@ def _close_figures() -> Iterator[None]:
     yield
     if "matplotlib.pyplot" in sys.modules:
         sys.modules["matplotlib.pyplot"].close("all")
+
+
+@pytest.fixture(scope="session")
+def car() -> Vehicle:
+    """The car that is driven."""
+    return example_vehicle()
+
+
+@pytest.fixture(scope="session")
+def truth(car: Vehicle) -> Model:
+    """The model that is driven, complete without effects."""
+    return Model(car)
+
+
+@pytest.fixture(scope="session")
+def start(car: Vehicle) -> Model:
+    """The baseline of somebody who does not know the tyres."""
+    return Model(car.replace(tyre_front=Tyre(), tyre_rear=Tyre()))
+
+
+@pytest.fixture(scope="session")
+def lap(truth: Model) -> Log:
+    """Driving to fit to."""
+    return drive(truth, drives.lap(40.0), seed=1)
+
+
+@pytest.fixture(scope="session")
+def course(truth: Model) -> Log:
+    """Other driving of the same car."""
+    return drive(truth, drives.handling_course(30.0, lateral_mps2=7.5), seed=2)
+
+
+@pytest.fixture(scope="session")
+def fit(start: Model, lap: Log) -> Fit:
+    """The complete model fitted to the lap."""
+    return identify(start, lap, starts=3)
+
+
+@pytest.fixture(scope="session")
+def complete_fits(truth: Model, start: Model) -> tuple[Fit, ...]:
+    """Fits of the complete model to drives that differ in their noise alone."""
+    logs = [drive(truth, drives.lap(30.0), seed=seed) for seed in (11, 12, 13, 14)]
+    return tuple(identify(start, log, starts=1) for log in logs)
+
+
+@pytest.fixture(scope="session")
+def hidden_fit(truth: Model, start: Model) -> Callable[[str, float], Fit]:
+    """Give the baseline fitted to a drive of a car with a parameter of an effect, by full name."""
+
+    @cache
+    def fitted(name: str, value: float) -> Fit:
+        car = truth.add(name.split(".")[0]).with_values({name: value})
+        return identify(start, drive(car, drives.lap(40.0), seed=5), starts=1)
+
+    return fitted
+
+
+@pytest.fixture(scope="session")
+def altered() -> Callable[..., Log]:
+    """Make a log without some channels (`without`) and with some replaced, by name."""
+
+    def make(log: Log, without: Sequence[str] = (), **columns: np.ndarray) -> Log:
+        data = {c: log[c] for c in log.channels if c not in without}
+        return Log.from_arrays({**data, **columns}, name=log.name, check=False)
+
+    return make

@@ -162,7 +162,8 @@ def compare(
         spread = float(np.var(driving.measured[there, i]))
         scores[c] = ChannelScore(
             float(np.sqrt(np.mean(e**2))),
-            float(np.sqrt(np.mean(trace["spread"][there, i] ** 2))),
+            # Not the mean: the filter's ignorance at the first samples is no noise of the sensor.
+            float(np.median(trace["spread"][there, i])),
             float(np.sqrt(np.mean(normalised[there, i] ** 2))),
             float(1.0 - np.mean(e**2) / spread) if spread > 0 else float("nan"),
         )

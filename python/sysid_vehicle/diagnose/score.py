@@ -244,4 +244,4 @@ def _variance_ratio(R: FloatArray, e: FloatArray, inverse: FloatArray) -> float:
     ratio = float(np.max(long_run / np.maximum(naive, 1e-300)))
     # An estimate from so many lags scatters: what it cannot tell from 1 counts as 1.
     uncertainty = np.sqrt(4.0 * lags / (3.0 * n))
-    return ratio / (1.0 + 2.0 * uncertainty)
+    return ratio / (1.0 + 2.0 * float(uncertainty))

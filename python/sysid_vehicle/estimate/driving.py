@@ -108,8 +108,8 @@ class Driving:
     @property
     def present(self) -> tuple[str, ...]:
         """Measured channels that there are to predict."""
-        there = np.isfinite(self.measured).any(axis=0)
-        return tuple(c for c, yes in zip(MEASURED, there, strict=True) if yes)
+        there = np.isfinite(self.measured)
+        return tuple(c for i, c in enumerate(MEASURED) if there[:, i].any())
 
     def problem(self, model: Model, *, most_samples: int | None = None) -> _core.Problem:
         """The core's problem for a model; of at most so many samples, if that is asked for."""

@@ -114,7 +114,7 @@ class Fit:
         for n, x in zip(names, values, strict=True):
             if n in where:
                 gradient[where.index(n)] = stiffness / x
-        std = float(np.sqrt(max(gradient @ self.covariance @ gradient, 0.0)))
+        std = float(np.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0)))
         return Estimate(f"cornering stiffness {axle}", stiffness, std, "N/rad")
 
     def _rows(self) -> list[list[str]]:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares, lsq_linear
 
 from .. import _core
 from .._arrays import FloatArray
 
 __all__ = ["METHODS", "Box", "Outcome", "minimise"]
+
+_TRUSTED = 1e-2  # damping below which a step is that of Gauss and Newton
 
 
 @dataclass(frozen=True)
@@ -63,37 +67,60 @@ def _gauss_newton(
     rounds: int,
     tolerance: float,
 ) -> Outcome:
-    """Levenberg-Marquardt with projection onto the box."""
+    """Levenberg-Marquardt whose every step is the best one within the box."""
     x = np.clip(p[box.columns], box.lower, box.upper)
     cost, gradient, information = problem.normal_equations(_filled(p, box, x), frozen, box.columns)
     damping = 1e-3
     for _ in range(rounds):
         if not np.isfinite(cost):
             return Outcome(x, np.inf, False)
-        free = ~(((x <= box.lower) & (gradient < 0)) | ((x >= box.upper) & (gradient > 0)))
-        scale = np.sqrt(np.maximum(np.diag(information), 1e-12))
-        if not free.any():
-            return Outcome(x, cost, True)
-        gained = None
-        for _ in range(8):
-            normal = information[np.ix_(free, free)] / np.outer(scale[free], scale[free])
-            step = np.zeros_like(x)
-            damped = normal + damping * np.eye(int(free.sum()))
-            step[free] = np.linalg.solve(damped, gradient[free] / scale[free]) / scale[free]
-            trial = np.clip(x + step, box.lower, box.upper)
+        gained, eager = 0.0, False
+        for _ in range(10):
+            trial = _step(x, gradient, information, damping, box)
             trial_cost = problem.half_sum_of_squares(_filled(p, box, trial), frozen)
             if trial_cost < cost:
-                gained = cost - trial_cost
-                x = trial
+                gained, eager = cost - trial_cost, damping < _TRUSTED
+                x, cost = trial, trial_cost
                 damping = max(damping / 8.0, 1e-9)
                 break
             damping *= 6.0
-        if gained is None or gained < tolerance:
-            return Outcome(x, cost if gained is None else cost - gained, True)
+        # A small gain of a step that damping had shortened does not mean that there is no more.
+        if gained == 0.0 or (gained < tolerance and eager):
+            return Outcome(x, cost, True)
         cost, gradient, information = problem.normal_equations(
             _filled(p, box, x), frozen, box.columns
         )
     return Outcome(x, cost, False)
+
+
+def _step(
+    x: FloatArray, gradient: FloatArray, information: FloatArray, damping: float, box: Box
+) -> FloatArray:
+    """Minimum of the damped quadratic model over the box.
+
+    Cutting the unbounded minimum at the box is not enough: where parameters can copy each other, as
+    B, C, D and E can, the cut step may lead uphill however much is to be gained inside. Positive
+    parameters move on a logarithmic scale, on which the valley of equal cornering stiffness, B C D,
+    is straight.
+    """
+    positive = box.lower > 0.0
+    unit = np.where(positive, x, 1.0)
+    lower, upper = box.lower - x, box.upper - x
+    lower[positive] = np.log(box.lower[positive] / x[positive])
+    upper[positive] = np.log(box.upper[positive] / x[positive])
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-12)) * unit
+    normal = information * np.outer(unit, unit) / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(normal + damping * np.eye(len(x)))
+    root = np.sqrt(np.maximum(values, 1e-12))
+    found = lsq_linear(
+        root[:, None] * vectors.T,
+        (vectors.T @ (gradient * unit / scale)) / root,
+        bounds=(lower * scale, upper * scale),
+        method="bvls",
+    )
+    step = found.x / scale
+    there: FloatArray = np.where(positive, x * np.exp(np.where(positive, step, 0.0)), x + step)
+    return np.clip(there, box.lower, box.upper)
 
 
 def _nlopt(
@@ -118,7 +145,7 @@ def _nlopt(
         if not np.isfinite(cost):
             cost, g = 1e12, np.zeros_like(x)
         if gradient.size:
-            # The core's gradient is that of half the sum of squares, with the sign of a descent step.
+            # The core gives the direction of descent of half the sum of squares.
             gradient[:] = -g * width
         if cost < best.cost:
             best = Outcome(x.copy(), float(cost), False)
@@ -130,10 +157,8 @@ def _nlopt(
     search.set_upper_bounds(np.ones(len(width)))
     search.set_ftol_abs(0.1 * tolerance)
     search.set_maxeval(4 * rounds)
-    try:
+    with suppress(nlopt.RoundoffLimited):  # the best point so far stands
         search.optimize(np.clip((best.x - box.lower) / width, 0.0, 1.0))
-    except nlopt.RoundoffLimited:
-        pass  # the best point so far stands
     settled = search.last_optimize_result() in (nlopt.FTOL_REACHED, nlopt.XTOL_REACHED)
     return Outcome(best.x, best.cost, settled)
 
@@ -147,8 +172,6 @@ def _scipy(
     tolerance: float,
 ) -> Outcome:
     """Trust-region reflective least squares of SciPy."""
-    from scipy.optimize import least_squares
-
     inside = np.clip(p[box.columns], box.lower + 1e-9, box.upper - 1e-9)
     found = least_squares(
         lambda x: problem.residuals(_filled(p, box, x), frozen).ravel(),

@@ -41,8 +41,8 @@ __all__ = [
 ]
 
 
-def all() -> dict[str, Manoeuvre]:  # noqa: A001 - read as `manoeuvres.all()`
-    """Every manoeuvre of the package with its default parameters, by name."""
+def all() -> dict[str, Manoeuvre]:
+    """Make every manoeuvre of the package with its default parameters, by name."""
     made = (
         lap(),
         handling_course(),

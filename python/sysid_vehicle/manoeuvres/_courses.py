@@ -1,9 +1,8 @@
-"""Courses like laps: corners one after the other, driven with braking into and power out of them."""
+"""Courses like laps: corners one after the other, braked into and powered out of."""
 
 from __future__ import annotations
 
-from ..errors import InvalidInput
-from ._curves import Knots
+from ._curves import Knots, check_positive
 from ._manoeuvre import Manoeuvre
 
 __all__ = ["handling_course", "lap"]
@@ -108,10 +107,8 @@ def _course(
     lateral_mps2: float,
     top_speed_mps: float,
 ) -> Manoeuvre:
-    if not 0.0 < duration_s < 1e5:
-        raise InvalidInput(
-            f"{name}: duration_s = {duration_s!r}; give a positive number of seconds"
-        )
+    sizes = {"lateral_mps2": lateral_mps2, "top_speed_mps": top_speed_mps}
+    check_positive(name, duration_s=duration_s, **sizes)
     round_s = rows[-1][0]
     rounds = int(duration_s // round_s) + 1
     # One round before and one after: the curve shall not begin or end at the start line.
@@ -128,7 +125,7 @@ def _course(
 
 
 def lap(
-    duration_s: float = 60.0, lateral_mps2: float = 8.4, top_speed_mps: float = 34.0
+    duration_s: float = 60.0, lateral_mps2: float = 9.2, top_speed_mps: float = 34.0
 ) -> Manoeuvre:
     """Corners to both sides, some braked into, some powered out of; 60 s a round.
 
@@ -152,7 +149,7 @@ def lap(
 
 
 def handling_course(
-    duration_s: float = 60.0, lateral_mps2: float = 8.4, top_speed_mps: float = 34.5
+    duration_s: float = 60.0, lateral_mps2: float = 8.5, top_speed_mps: float = 34.5
 ) -> Manoeuvre:
     """Other corners than :func:`lap` in another order, to validate on; parameters as there."""
     return _course(

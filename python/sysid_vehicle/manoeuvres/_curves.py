@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -11,7 +12,23 @@ from scipy.interpolate import PchipInterpolator
 from .._arrays import FloatArray
 from ..errors import InvalidInput
 
-__all__ = ["Curvature", "Curve", "Knots", "Pulse", "Pulses", "Sweep", "constant"]
+__all__ = ["Curvature", "Curve", "Knots", "Pulse", "Pulses", "Sweep", "check_positive", "constant"]
+
+
+def check_positive(where: str, **values: float | Sequence[float]) -> None:
+    """Refuse arguments that are not positive numbers, or sequences that hold none.
+
+    Raises
+    ------
+    InvalidInput
+        The message names the first such argument.
+    """
+    for name, given in values.items():
+        numbers = np.atleast_1d(np.asarray(given, dtype=float))
+        if numbers.size == 0:
+            raise InvalidInput(f"{where}: {name} is empty; give one value or more")
+        if not ((numbers > 0.0) & (numbers < np.inf)).all():
+            raise InvalidInput(f"{where}: {name} = {given!r}; give positive numbers")
 
 
 class Curve(Protocol):
@@ -58,7 +75,7 @@ class Knots:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sine whose frequency rises exponentially, so that every octave takes the same time.
+    """A sine whose frequency changes exponentially, so that every octave takes the same time.
 
     ``y = A sin(2 pi f0 T / ln(f1/f0) ((f1/f0)^(t/T) - 1))`` for ``t = time_s - start_s``, then 0.
 
@@ -78,6 +95,30 @@ class Sweep:
     from_hz: float
     to_hz: float
 
+    def __post_init__(self) -> None:
+        check_positive("Sweep", duration_s=self.duration_s, from_hz=self.from_hz, to_hz=self.to_hz)
+
+    @classmethod
+    def of_whole_periods(
+        cls, amplitude: float, start_s: float, longest_s: float, from_hz: float, to_hz: float
+    ) -> Sweep:
+        """Make the longest sweep within `longest_s` that ends where it began, at zero.
+
+        Raises
+        ------
+        InvalidInput
+            If there is no room for one period, or a frequency is not positive.
+        """
+        check_positive("Sweep", from_hz=from_hz, to_hz=to_hz)
+        mean = _mean_frequency(from_hz, to_hz)
+        periods = np.floor(longest_s * mean + 1e-9)
+        if not periods >= 1.0:
+            raise InvalidInput(
+                f"a sine from {from_hz:g} to {to_hz:g} Hz needs {1.0 / mean:.3g} s for one period, "
+                f"there are {longest_s:.3g} s; make the manoeuvre longer"
+            )
+        return cls(amplitude, start_s, float(periods / mean), from_hz, to_hz)
+
     def __call__(self, time_s: FloatArray) -> FloatArray:
         """Values at these times."""
         t = time_s - self.start_s
@@ -86,6 +127,11 @@ class Sweep:
         turns = part if abs(rise) < 1e-9 else np.expm1(rise * part) / rise
         value = self.amplitude * np.sin(2.0 * np.pi * self.from_hz * self.duration_s * turns)
         return np.where((t >= 0.0) & (t <= self.duration_s), value, 0.0)
+
+
+def _mean_frequency(from_hz: float, to_hz: float) -> float:
+    rise = float(np.log(to_hz / from_hz))
+    return from_hz if abs(rise) < 1e-9 else (to_hz - from_hz) / rise
 
 
 @dataclass(frozen=True)
@@ -146,5 +192,5 @@ class Curvature:
 
 
 def constant(value: float, duration_s: float) -> Knots:
-    """A value that stays."""
+    """Hold a value."""
     return Knots((0.0, duration_s), (value, value))

@@ -74,7 +74,7 @@ class Manoeuvre:
             )
 
     def _times(self, rate_hz: float) -> FloatArray:
-        return np.arange(int(round(self.duration_s * rate_hz)) + 1) / rate_hz
+        return np.arange(round(self.duration_s * rate_hz) + 1) / rate_hz
 
     def references(self, vehicle: Vehicle, rate_hz: float) -> FloatArray:
         """Speed [m/s], path curvature [1/m] and open-loop steering angle [rad] at a rate.
@@ -118,7 +118,7 @@ class Manoeuvre:
         return as_float64(np.column_stack([speed, np.zeros_like(speed), steer]))
 
     def driver(self, vehicle: Vehicle) -> _core.Driver:
-        """The driver who does it with this vehicle."""
+        """Make the driver who does it with this vehicle."""
         driver = _core.Driver()
         driver.tracks_path = self.tracks_path
         driver.understeer_radps2pm = understeer_gradient(vehicle)

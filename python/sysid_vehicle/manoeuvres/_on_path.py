@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ._curves import Curvature, Knots, Pulse, Pulses, Sweep, constant
+from ..errors import InvalidInput
+from ._curves import Curvature, Knots, Pulse, Pulses, Sweep, check_positive, constant
 from ._manoeuvre import Manoeuvre
 
 __all__ = [
@@ -28,7 +29,7 @@ def slalom(
     Parameters
     ----------
     duration_s : float
-        Length, one second of straight running at either end included.
+        Length, a second or more of straight running at either end included.
     speed_mps : float
         Speed.
     lateral_mps2 : float
@@ -36,14 +37,16 @@ def slalom(
     spacing_m : float
         Distance between the cones, half a period of the path.
     """
+    check_positive("slalom", speed_mps=speed_mps, lateral_mps2=lateral_mps2, spacing_m=spacing_m)
     frequency = speed_mps / (2.0 * spacing_m)
-    periods = math.floor((duration_s - 2.0) * frequency)
     return Manoeuvre(
         name="slalom",
         purpose="around cones in a row",
         duration_s=duration_s,
         speed_mps=constant(speed_mps, duration_s),
-        lateral_mps2=Sweep(lateral_mps2, 1.0, periods / frequency, frequency, frequency),
+        lateral_mps2=Sweep.of_whole_periods(
+            lateral_mps2, 1.0, duration_s - 2.0, frequency, frequency
+        ),
     )
 
 
@@ -69,6 +72,13 @@ def double_lane_change(
     A full sine of the lateral acceleration with peak ``A`` and period ``T`` ends
     ``A T^2 / (2 pi)`` beside the old lane, parallel to it.
     """
+    check_positive(
+        "double_lane_change",
+        speeds_mps=speeds_mps,
+        offset_m=offset_m,
+        change_m=change_m,
+        between_m=between_m,
+    )
     now, pulses = 1.0, []
     speed = [(0.0, speeds_mps[0])]
     for v in speeds_mps:
@@ -99,7 +109,7 @@ def double_lane_change(
 def constant_radius(
     radius_m: float = 60.0, lateral_mps2: float = 8.4, duration_s: float = 60.0
 ) -> Manoeuvre:
-    """A circle to the left, then one to the right, each with slowly rising speed, as in ISO 4138.
+    """Go round to the left, then to the right, each with slowly rising speed, as in ISO 4138.
 
     Parameters
     ----------
@@ -110,6 +120,12 @@ def constant_radius(
     duration_s : float
         Length of both together.
     """
+    check_positive("constant_radius", radius_m=radius_m, lateral_mps2=lateral_mps2)
+    if not duration_s > 24.0:
+        raise InvalidInput(
+            f"constant_radius: duration_s = {duration_s!r} is too short for slowly rising speed; "
+            f"give more than 24 s"
+        )
     top = math.sqrt(lateral_mps2 * radius_m)
     half = 0.5 * duration_s
     # At the limit the car leaves the circle before it brakes.
@@ -147,6 +163,9 @@ def brake_in_turn(
     brake_mps2 : sequence of float
         Decelerations, one after the other.
     """
+    check_positive(
+        "brake_in_turn", radius_m=radius_m, lateral_mps2=lateral_mps2, brake_mps2=brake_mps2
+    )
     fast = math.sqrt(lateral_mps2 * radius_m)
     slow = 0.6 * fast
     bend = 1.0 / radius_m
@@ -188,6 +207,7 @@ def straight_acceleration(
     low_speed_mps, top_speed_mps : float
         Speeds between which the car goes.
     """
+    check_positive("straight_acceleration", duration_s=duration_s)
     rows = (
         (0.0, 0.0),
         (0.025, 0.0),

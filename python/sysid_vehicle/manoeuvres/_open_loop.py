@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ._curves import Knots, Pulse, Pulses, Sweep, constant
+from ._curves import Knots, Pulse, Pulses, Sweep, check_positive, constant
 from ._manoeuvre import Manoeuvre
 
 __all__ = ["ramp_steer", "sine_sweep", "sine_with_dwell", "step_steer"]
@@ -61,7 +61,7 @@ def step_steer(
     rise_s: float = 0.2,
     hold_s: float = 1.8,
 ) -> Manoeuvre:
-    """Steps of the steering angle to both sides, as in ISO 7401.
+    """Step the steering angle to both sides, as in ISO 7401.
 
     Parameters
     ----------
@@ -73,6 +73,8 @@ def step_steer(
     rise_s, hold_s : float
         How long the steering takes to get there, and how long it stays.
     """
+    sizes = {"speeds_mps": speeds_mps, "lateral_mps2": lateral_mps2}
+    check_positive("step_steer", **sizes, rise_s=rise_s, hold_s=hold_s)
     track = _Track(speeds_mps[0])
     for speed in speeds_mps:
         track.change_speed(speed)
@@ -86,10 +88,10 @@ def step_steer(
 
 def ramp_steer(
     speeds_mps: Sequence[float] = (18.0, 27.0),
-    lateral_mps2: float = 8.8,
+    lateral_mps2: float = 9.2,
     rise_s: float = 8.0,
 ) -> Manoeuvre:
-    """Slow ramps of the steering angle to both sides towards the limit, as in ISO 13674-2.
+    """Steer slow ramps to both sides towards the limit, as in ISO 13674-2.
 
     Parameters
     ----------
@@ -100,6 +102,7 @@ def ramp_steer(
     rise_s : float
         Length of a ramp; the steering comes back in a third of it.
     """
+    check_positive("ramp_steer", speeds_mps=speeds_mps, lateral_mps2=lateral_mps2, rise_s=rise_s)
     track = _Track(speeds_mps[0])
     for speed in speeds_mps:
         track.change_speed(speed)
@@ -117,12 +120,12 @@ def sine_sweep(
     from_hz: float = 0.2,
     to_hz: float = 3.0,
 ) -> Manoeuvre:
-    """A sine of the steering angle with rising frequency, as in ISO 7401.
+    """Steer a sine with rising frequency, as in ISO 7401.
 
     Parameters
     ----------
     duration_s : float
-        Length, one second of straight running at either end included.
+        Length, a second or more of straight running at either end included.
     speed_mps : float
         Speed.
     lateral_mps2 : float
@@ -130,12 +133,13 @@ def sine_sweep(
     from_hz, to_hz : float
         First and last frequency.
     """
+    check_positive("sine_sweep", speed_mps=speed_mps, lateral_mps2=lateral_mps2)
     return Manoeuvre(
         name="sine_sweep",
         purpose="a sine of the steering angle with rising frequency",
         duration_s=duration_s,
         speed_mps=constant(speed_mps, duration_s),
-        lateral_mps2=Sweep(lateral_mps2, 1.0, duration_s - 2.0, from_hz, to_hz),
+        lateral_mps2=Sweep.of_whole_periods(lateral_mps2, 1.0, duration_s - 2.0, from_hz, to_hz),
         tracks_path=False,
     )
 
@@ -146,7 +150,7 @@ def sine_with_dwell(
     frequency_hz: float = 0.7,
     dwell_s: float = 0.5,
 ) -> Manoeuvre:
-    """A sine of the steering angle that rests at its second peak, as in ISO 19365.
+    """Steer sines that rest at their second peak, as in ISO 19365.
 
     Parameters
     ----------
@@ -158,6 +162,12 @@ def sine_with_dwell(
     frequency_hz, dwell_s : float
         Frequency of the sine, and how long it rests.
     """
+    check_positive(
+        "sine_with_dwell",
+        speed_mps=speed_mps,
+        lateral_mps2=lateral_mps2,
+        frequency_hz=frequency_hz,
+    )
     now, pulses = 1.0, []
     for size in lateral_mps2:
         for side in (1.0, -1.0):

@@ -76,7 +76,7 @@ def steady_steer(
 
     Notes
     -----
-    Rajamani, *Vehicle Dynamics and Control* (2nd ed.), ch. 3, with the tyres' full curves instead of stiffnesses.
+    Rajamani, *Vehicle Dynamics and Control* (2nd ed.), ch. 3, on the tyres' full curves.
     """
     speed, lateral = (np.asarray(a, dtype=float) for a in (speed_mps, lateral_mps2))
     most, peak = float(np.max(np.abs(lateral))), peak_lateral_mps2(vehicle)

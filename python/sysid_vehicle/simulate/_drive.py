@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray
-from ..errors import NumericalError
+from ..errors import InvalidInput, NumericalError
 from ..log import Log
 from ..manoeuvres import Manoeuvre
 from ..model import Model
@@ -107,7 +107,7 @@ def drive_truth(
     -------
     Drive
     """
-    rng = np.random.default_rng(seed)
+    rng = _generator(seed)
     references = manoeuvre.references(model.vehicle, rate_hz)
     n = len(references)
     push = (disturbance or RoadDisturbance()).sample(n, rate_hz, rng)
@@ -179,7 +179,8 @@ def drive(
     Raises
     ------
     InvalidInput
-        If the manoeuvre asks for more than the vehicle's tyres can give.
+        If the manoeuvre asks for more than the vehicle's tyres can give, or `seed` is neither a
+        whole number from zero up nor a generator.
     NumericalError
         If the car spun or stopped; the message names the time.
     """
@@ -192,6 +193,15 @@ def drive(
         rate_hz=rate_hz,
         name=name,
     ).log
+
+
+def _generator(seed: object) -> np.random.Generator:
+    if isinstance(seed, np.random.Generator):
+        return seed
+    # Nothing, which numpy takes for "never the same twice", must not get through.
+    if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool) and seed >= 0:
+        return np.random.default_rng(int(seed))
+    raise InvalidInput(f"seed = {seed!r}; give a whole number from zero up, or a numpy generator")
 
 
 def _how_it_was_lost(manoeuvre: Manoeuvre, state: FloatArray, time_s: float) -> str:

@@ -8,7 +8,7 @@ __all__ = ["example_vehicle"]
 
 
 def example_vehicle() -> Vehicle:
-    """A plausible sports saloon with rear-wheel drive that understeers."""
+    """Make a plausible sports saloon with rear-wheel drive that understeers."""
     return Vehicle(
         name="sports saloon",
         mass_kg=1250.0,

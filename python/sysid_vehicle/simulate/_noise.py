@@ -53,7 +53,7 @@ class SensorNoise:
         return cls(**{field.name: 0.0 for field in fields(cls)})
 
     def scaled(self, factor: float) -> SensorNoise:
-        """The same sensors with `factor` times the noise."""
+        """Return the same sensors with `factor` times the noise."""
         return SensorNoise(**{f.name: factor * getattr(self, f.name) for f in fields(self)})
 
 

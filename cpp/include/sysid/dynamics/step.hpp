@@ -19,8 +19,10 @@ template <class S>
 using ModelState = std::array<S, kModelStates>;
 
 inline Input between(const Input& a, const Input& b, double part) {
-    return {a.steer_rad + part * (b.steer_rad - a.steer_rad),
-            a.longitudinal + part * (b.longitudinal - a.longitudinal)};
+    return {
+        a.steer_rad + part * (b.steer_rad - a.steer_rad),
+        a.longitudinal + part * (b.longitudinal - a.longitudinal),
+    };
 }
 
 /// Speeds below this are treated as this in the slip angles' denominator [m/s].
@@ -44,7 +46,6 @@ ModelState<S> model_rate(const SingleTrack& model, const ModelState<S>& x, const
 template <class S, class T>
 void advance(const SingleTrack& model, ModelState<S>& x, const S* push, const Input& from,
              const Input& to, const T* p, double dt, int substeps) {
-    // Auxiliary states that no active effect drives would only cost time.
     const double h = dt / substeps;
     const auto moved = [](const ModelState<S>& a, const ModelState<S>& k, double by) {
         ModelState<S> b;
@@ -77,16 +78,17 @@ std::array<S, kChannels> sense(const SingleTrack& model, const ModelState<S>& x,
 }
 
 /// Auxiliary states that have settled: the lagging quantities equal what they follow.
-inline void settle_auxiliary(const SingleTrack& model, ModelState<double>& x, const double* push,
-                             const Input& u, const double* p) {
+template <class S, class T>
+void settle_auxiliary(const SingleTrack& model, ModelState<S>& x, const S* push, const Input& u,
+                      const T* p) {
     for (int repeat = 0; repeat < 2; ++repeat) {  // the slip angles follow the lagged steering
         const auto rate = model_rate(model, x, push, u, p);
         for (std::size_t i = kMotionStates; i < kModelStates; ++i) {
-            if (rate[i] == 0.0) continue;
             // All auxiliary states are first-order lags: rate = (target - state) / time constant.
-            ModelState<double> nudged = x;
+            ModelState<S> nudged = x;
             nudged[i] += 1e-6;
-            const double slope = (model_rate(model, nudged, push, u, p)[i] - rate[i]) / 1e-6;
+            const S slope = (model_rate(model, nudged, push, u, p)[i] - rate[i]) / 1e-6;
+            if (value_of(slope) == 0.0) continue;  // no active effect drives this state
             x[i] -= rate[i] / slope;
         }
     }

@@ -14,8 +14,11 @@ struct AccelerometerBias : Effect {
         "standstill on level ground, or both directions of the same road",
         "ax_mps2, ay_mps2",
         2,
-        {{"ax_mps2", "m/s2", 0.0, 0.15, 0.03, -5.0, 5.0},
-         {"ay_mps2", "m/s2", 0.0, 0.25, 0.03, -5.0, 5.0}}};
+        {
+            {"ax_mps2", "m/s2", 0.0, 0.15, 0.03, -5.0, 5.0},
+            {"ay_mps2", "m/s2", 0.0, 0.25, 0.03, -5.0, 5.0},
+        },
+    };
 
     template <class T, class S>
     static void input(const T* p, Workings<S>& w) {

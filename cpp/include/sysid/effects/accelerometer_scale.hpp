@@ -6,15 +6,19 @@ namespace sysid {
 
 /// Scale error of the accelerometer; body roll and pitch act like one.
 struct AccelerometerScale : Effect {
-    static constexpr EffectInfo info{"accelerometer_scale",
-                                     "scale error of the accelerometer, or body roll and pitch",
-                                     "a_x *= 1 + s_x, a_y *= 1 + s_y",
-                                     "Klein & Morelli, Aircraft System Identification, ch. 10",
-                                     "a ramp to the limit, hard braking",
-                                     "ay_mps2, ax_mps2",
-                                     2,
-                                     {{"ax_error", "1", 0.0, 0.05, 0.01, -0.5, 0.5},
-                                      {"ay_error", "1", 0.0, 0.05, 0.01, -0.5, 0.5}}};
+    static constexpr EffectInfo info{
+        "accelerometer_scale",
+        "scale error of the accelerometer, or body roll and pitch",
+        "a_x *= 1 + s_x, a_y *= 1 + s_y",
+        "Klein & Morelli, Aircraft System Identification, ch. 10",
+        "a ramp to the limit, hard braking",
+        "ay_mps2, ax_mps2",
+        2,
+        {
+            {"ax_error", "1", 0.0, 0.05, 0.01, -0.5, 0.5},
+            {"ay_error", "1", 0.0, 0.05, 0.01, -0.5, 0.5},
+        },
+    };
 
     template <class T, class S>
     static void input(const T* p, Workings<S>& w) {

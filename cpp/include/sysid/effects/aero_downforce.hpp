@@ -6,15 +6,19 @@ namespace sysid {
 
 /// Vertical aerodynamic load on each axle.
 struct AeroDownforce : Effect {
-    static constexpr EffectInfo info{"aero_downforce",
-                                     "aerodynamic downforce on the front and rear axle",
-                                     "F_z,i += 1/2 rho C_lA,i v_x^2",
-                                     "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 15",
-                                     "the same lateral acceleration at three or more speeds",
-                                     "ay_mps2, yaw_rate_radps",
-                                     2,
-                                     {{"cl_a_front_m2", "m2", 0.0, 0.9, 0.1, -3.0, 6.0},
-                                      {"cl_a_rear_m2", "m2", 0.0, 1.3, 0.1, -3.0, 6.0}}};
+    static constexpr EffectInfo info{
+        "aero_downforce",
+        "aerodynamic downforce on the front and rear axle",
+        "F_z,i += 1/2 rho C_lA,i v_x^2",
+        "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 15",
+        "the same lateral acceleration at three or more speeds",
+        "ay_mps2, yaw_rate_radps",
+        2,
+        {
+            {"cl_a_front_m2", "m2", 0.0, 0.9, 0.1, -3.0, 6.0},
+            {"cl_a_rear_m2", "m2", 0.0, 1.3, 0.1, -3.0, 6.0},
+        },
+    };
 
     template <class T, class S>
     static void loads(const T* p, Workings<S>& w) {

@@ -6,16 +6,18 @@ namespace sysid {
 
 /// Drag area that the vehicle file does not know of.
 struct AeroDrag : Effect {
-    static constexpr EffectInfo info{"aero_drag",
-                                     "drag area beyond the vehicle file",
-                                     "F_x -= 1/2 rho Delta(C_dA) v_x^2",
-                                     "Rajamani, Vehicle Dynamics and Control, eq. (4.2)",
-                                     "coasting and full throttle over a wide range of speed",
-                                     "vx_mps, ax_mps2",
-                                     1,
-                                     {{"drag_area_m2", "m2", 0.0, 0.45, 0.05, -2.0, 4.0}},
-                                     false,
-                                     true};
+    static constexpr EffectInfo info{
+        "aero_drag",
+        "drag area beyond the vehicle file",
+        "F_x -= 1/2 rho Delta(C_dA) v_x^2",
+        "Rajamani, Vehicle Dynamics and Control, eq. (4.2)",
+        "coasting and full throttle over a wide range of speed",
+        "vx_mps, ax_mps2",
+        1,
+        {{"drag_area_m2", "m2", 0.0, 0.45, 0.05, -2.0, 4.0}},
+        false,
+        true,
+    };
 
     template <class T, class S>
     static void vehicle(const T* p, Workings<S>& w) {

@@ -8,14 +8,16 @@ namespace sysid {
 /// Friction ellipse: longitudinal force takes lateral force away. The parameter is the square of
 /// the usual shape factor, so that the derivative at zero exists.
 struct CombinedSlip : Effect {
-    static constexpr EffectInfo info{"combined_slip",
-                                     "combined slip: drive and brake force cost lateral force",
-                                     "F_y *= sqrt(1 - p (F_x / (D F_z))^2)",
-                                     "Pacejka, Tire and Vehicle Dynamics (3rd ed.), ch. 4",
-                                     "braking and accelerating while cornering",
-                                     "ay_mps2, yaw_rate_radps",
-                                     1,
-                                     {{"ellipse", "1", 0.0, 1.0, 0.2, 0.0, 1.5}}};
+    static constexpr EffectInfo info{
+        "combined_slip",
+        "combined slip: drive and brake force cost lateral force",
+        "F_y *= sqrt(1 - p (F_x / (D F_z))^2)",
+        "Pacejka, Tire and Vehicle Dynamics (3rd ed.), ch. 4",
+        "braking and accelerating while cornering",
+        "ay_mps2, yaw_rate_radps",
+        1,
+        {{"ellipse", "1", 0.0, 1.0, 0.2, 0.0, 1.5}},
+    };
 
     template <class T, class S>
     static void grip(const T* p, Workings<S>& w) {

@@ -6,14 +6,16 @@ namespace sysid {
 
 /// Constant error of the yaw-rate sensor.
 struct GyroBias : Effect {
-    static constexpr EffectInfo info{"gyro_bias",
-                                     "bias of the yaw-rate sensor",
-                                     "r += b_r",
-                                     "Klein & Morelli, Aircraft System Identification, ch. 10",
-                                     "standstill, straight driving",
-                                     "yaw_rate_radps",
-                                     1,
-                                     {{"bias_radps", "rad/s", 0.0, 0.006, 0.001, -0.5, 0.5}}};
+    static constexpr EffectInfo info{
+        "gyro_bias",
+        "bias of the yaw-rate sensor",
+        "r += b_r",
+        "Klein & Morelli, Aircraft System Identification, ch. 10",
+        "standstill, straight driving",
+        "yaw_rate_radps",
+        1,
+        {{"bias_radps", "rad/s", 0.0, 0.006, 0.001, -0.5, 0.5}},
+    };
 
     template <class T, class S>
     static void sensors(const T* p, const Workings<S>& /*w*/, S* y) {

@@ -7,15 +7,19 @@ namespace sysid {
 
 /// Unequal loads left and right cost an axle grip, through the tyre's load sensitivity.
 struct LateralLoadTransfer : Effect {
-    static constexpr EffectInfo info{"lateral_load_transfer",
-                                     "grip lost to lateral load transfer",
-                                     "F_y,i *= 1 - kappa_i (v_x r / g)^2",
-                                     "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 18",
-                                     "a slow ramp to the limit of grip",
-                                     "ay_mps2, yaw_rate_radps",
-                                     2,
-                                     {{"loss_front", "1", 0.0, 0.08, 0.02, -0.3, 0.6},
-                                      {"loss_rear", "1", 0.0, 0.08, 0.02, -0.3, 0.6}}};
+    static constexpr EffectInfo info{
+        "lateral_load_transfer",
+        "grip lost to lateral load transfer",
+        "F_y,i *= 1 - kappa_i (v_x r / g)^2",
+        "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 18",
+        "a slow ramp to the limit of grip",
+        "ay_mps2, yaw_rate_radps",
+        2,
+        {
+            {"loss_front", "1", 0.0, 0.08, 0.02, -0.3, 0.6},
+            {"loss_rear", "1", 0.0, 0.08, 0.02, -0.3, 0.6},
+        },
+    };
 
     template <class T, class S>
     static void grip(const T* p, Workings<S>& w) {

@@ -15,7 +15,8 @@ struct RoadBank : Effect {
         "the same road in both directions, with measured sideslip",
         "vy_mps",
         1,
-        {{"bank_rad", "rad", 0.0, 0.05, 0.01, -0.8, 0.8}}};
+        {{"bank_rad", "rad", 0.0, 0.05, 0.01, -0.8, 0.8}},
+    };
 
     template <class T, class S>
     static void body(const T* p, Workings<S>& w) {

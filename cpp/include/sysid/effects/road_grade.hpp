@@ -7,14 +7,16 @@ namespace sysid {
 
 /// The road climbs; positive uphill.
 struct RoadGrade : Effect {
-    static constexpr EffectInfo info{"road_grade",
-                                     "road grade, positive uphill",
-                                     "dv_x/dt -= g sin(theta)",
-                                     "Rajamani, Vehicle Dynamics and Control, eq. (4.1)",
-                                     "the same road out and back",
-                                     "vx_mps",
-                                     1,
-                                     {{"grade_rad", "rad", 0.0, 0.03, 0.005, -0.5, 0.5}}};
+    static constexpr EffectInfo info{
+        "road_grade",
+        "road grade, positive uphill",
+        "dv_x/dt -= g sin(theta)",
+        "Rajamani, Vehicle Dynamics and Control, eq. (4.1)",
+        "the same road out and back",
+        "vx_mps",
+        1,
+        {{"grade_rad", "rad", 0.0, 0.03, 0.005, -0.5, 0.5}},
+    };
 
     template <class T, class S>
     static void body(const T* p, Workings<S>& w) {

@@ -15,7 +15,8 @@ struct SteerCompliance : Effect {
         "a ramp at constant speed together with slow tight circles",
         "yaw_rate_radps, ay_mps2",
         1,
-        {{"compliance_radpn", "rad/N", 0.0, 1.5e-6, 3.0e-7, -1.0e-5, 2.0e-5}}};
+        {{"compliance_radpn", "rad/N", 0.0, 1.5e-6, 3.0e-7, -1.0e-5, 2.0e-5}},
+    };
 
     template <class T, class S>
     static void steering(const T* p, Workings<S>& w, const S* /*aux*/, S* /*aux_rate*/) {

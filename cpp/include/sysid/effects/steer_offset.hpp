@@ -6,14 +6,16 @@ namespace sysid {
 
 /// The logged steering angle is not zero when the wheels point straight ahead.
 struct SteerOffset : Effect {
-    static constexpr EffectInfo info{"steer_offset",
-                                     "offset of the logged steering angle",
-                                     "delta += delta_0",
-                                     "Gillespie, Fundamentals of Vehicle Dynamics, ch. 8",
-                                     "straight driving and corners in both directions",
-                                     "ay_mps2, yaw_rate_radps",
-                                     1,
-                                     {{"offset_rad", "rad", 0.0, 0.006, 0.001, -0.2, 0.2}}};
+    static constexpr EffectInfo info{
+        "steer_offset",
+        "offset of the logged steering angle",
+        "delta += delta_0",
+        "Gillespie, Fundamentals of Vehicle Dynamics, ch. 8",
+        "straight driving and corners in both directions",
+        "ay_mps2, yaw_rate_radps",
+        1,
+        {{"offset_rad", "rad", 0.0, 0.006, 0.001, -0.2, 0.2}},
+    };
 
     template <class T, class S>
     static void steering(const T* p, Workings<S>& w, const S* /*aux*/, S* /*aux_rate*/) {

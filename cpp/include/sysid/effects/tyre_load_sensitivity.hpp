@@ -14,7 +14,8 @@ struct TyreLoadSensitivity : Effect {
         "braking and driving while cornering, downforce at several speeds",
         "ay_mps2, yaw_rate_radps",
         1,
-        {{"sensitivity", "1", 0.0, 0.25, 0.05, -1.0, 1.0}}};
+        {{"sensitivity", "1", 0.0, 0.25, 0.05, -1.0, 1.0}},
+    };
 
     template <class T, class S>
     static void grip(const T* p, Workings<S>& w) {

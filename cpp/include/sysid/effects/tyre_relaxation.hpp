@@ -7,15 +7,17 @@ namespace sysid {
 
 /// The slip angle that makes the force follows the geometric one over a rolled distance.
 struct TyreRelaxation : Effect {
-    static constexpr EffectInfo info{"tyre_relaxation",
-                                     "tyre relaxation length",
-                                     "(sigma / v_x) d(alpha')/dt + alpha' = alpha",
-                                     "Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (7.18)",
-                                     "steps and sweeps of the steering at low and high speed",
-                                     "ay_mps2, yaw_rate_radps",
-                                     1,
-                                     {{"relaxation_length_m", "m", 0.0, 0.45, 0.1, 0.0, 3.0}},
-                                     true};
+    static constexpr EffectInfo info{
+        "tyre_relaxation",
+        "tyre relaxation length",
+        "(sigma / v_x) d(alpha')/dt + alpha' = alpha",
+        "Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (7.18)",
+        "steps and sweeps of the steering at low and high speed",
+        "ay_mps2, yaw_rate_radps",
+        1,
+        {{"relaxation_length_m", "m", 0.0, 0.45, 0.1, 0.0, 3.0}},
+        true,
+    };
 
     template <class T, class S>
     static void slip(const T* p, Workings<S>& w, const S* aux, S* aux_rate) {

@@ -6,14 +6,16 @@ namespace sysid {
 
 /// The yaw inertia differs from the vehicle file.
 struct YawInertia : Effect {
-    static constexpr EffectInfo info{"yaw_inertia",
-                                     "yaw inertia differs from the vehicle file",
-                                     "I_z *= 1 + e",
-                                     "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 5",
-                                     "steering sweeps at 2 Hz and faster, steps",
-                                     "yaw_rate_radps",
-                                     1,
-                                     {{"relative_error", "1", 0.0, 0.25, 0.05, -0.8, 3.0}}};
+    static constexpr EffectInfo info{
+        "yaw_inertia",
+        "yaw inertia differs from the vehicle file",
+        "I_z *= 1 + e",
+        "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 5",
+        "steering sweeps at 2 Hz and faster, steps",
+        "yaw_rate_radps",
+        1,
+        {{"relative_error", "1", 0.0, 0.25, 0.05, -0.8, 3.0}},
+    };
 
     template <class T, class S>
     static void vehicle(const T* p, Workings<S>& w) {

@@ -57,11 +57,11 @@ double noise_score(const Problem& problem, const double* p, const Noise& noise, 
 
 /// Everything the filter, or the smoother, says of each sample.
 struct Trace {
-    std::vector<double> innovation;  // samples x kChannels; NaN where missing
-    std::vector<double> spread;      // its expected standard deviation
-    std::vector<double> whitened;    // zero where missing
+    std::vector<double> innovation;   // samples x kChannels; NaN where missing
+    std::vector<double> spread;       // its expected standard deviation
+    std::vector<double> whitened;     // zero where missing
     std::vector<double> log_density;  // -1/2 log det S, per sample
-    std::vector<double> state;       // samples x kStatesFull, filtered or smoothed
+    std::vector<double> state;        // samples x kStatesFull, filtered or smoothed
     std::vector<double> state_std;
     double log_likelihood = 0.0;
 };

@@ -62,17 +62,18 @@ inline bool has_own_states(EffectMask mask) {
 }
 
 /// Where a run starts: the measured motion where there is one, settled auxiliary states.
-inline ModelState<double> initial_state(const SingleTrack& model, const Run& run, const double* p) {
+template <class S = double, class T>
+ModelState<S> initial_state(const SingleTrack& model, const Run& run, const T* p) {
     const auto first = [&](int channel, double otherwise) {
         for (std::size_t k = 0; k < run.size() && k < 50; ++k)
             if (!std::isnan(run.measurements[k][channel])) return run.measurements[k][channel];
         return otherwise;
     };
-    ModelState<double> x{};
-    x[0] = first(kVx, 10.0);
-    x[1] = first(kVy, 0.0);
-    x[2] = first(kYawRate, 0.0);
-    const std::array<double, kPushes> calm{};
+    ModelState<S> x{};
+    x[0] = S(first(kVx, 10.0));
+    x[1] = S(first(kVy, 0.0));
+    x[2] = S(first(kYawRate, 0.0));
+    const std::array<S, kPushes> calm{};
     settle_auxiliary(model, x, calm.data(), run.inputs.front(), p);
     return x;
 }

@@ -35,7 +35,7 @@ class RunSystem {
         Vec<NX> x = Vec<NX>::Zero();
         for (int i = 0; i < kMotionStates; ++i) x[i] = start_[static_cast<std::size_t>(i)];
         for (int i = kStatesPlain; i < NX; ++i)
-            x[i] = start_[static_cast<std::size_t>(i - kStatesPlain + kMotionStates)];
+            x[i] = start_[static_cast<std::size_t>(i) - kMotionStates];
         return x;
     }
 

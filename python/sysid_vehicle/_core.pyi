@@ -1,0 +1,102 @@
+from collections.abc import Sequence
+from typing import Any, NoReturn, TypedDict, type_check_only
+
+import numpy as np
+import numpy.typing as npt
+
+_Array = npt.NDArray[np.float64]
+
+__version__: str
+CHANNELS: int
+NOISE_PARAMETERS: int
+PARAMETERS: int
+PUSHES: int
+
+class NumericalFailure(ArithmeticError): ...
+
+@type_check_only
+class _Bound(type): ...
+
+@type_check_only
+class _Trace(TypedDict):
+    innovation: _Array
+    spread: _Array
+    whitened: _Array
+    log_density: _Array
+    state: _Array
+    state_std: _Array
+    log_likelihood: float
+
+class VehicleData(metaclass=_Bound):
+    mass_kg: float
+    lf_m: float
+    lr_m: float
+    cg_height_m: float
+    drag_area_m2: float
+    air_density_kgpm3: float
+    brake_front_share: float
+    drive_front_share: float
+    def __init__(self) -> None: ...
+
+class SingleTrack(metaclass=_Bound):
+    def __init__(self, car: VehicleData, effects: int, force_known: bool) -> None: ...
+    def evaluate(
+        self, parameters: _Array, motion: _Array, steer: float, longitudinal: float
+    ) -> _Array: ...
+
+class FrozenFilter(metaclass=_Bound):
+    # Only `Problem.freeze` makes one.
+    def __init__(self, *args: NoReturn, **kwargs: NoReturn) -> None: ...
+    @property
+    def log_likelihood(self) -> float: ...
+    @property
+    def observed(self) -> int: ...
+
+class Problem(metaclass=_Bound):
+    def __init__(self, model: SingleTrack) -> None: ...
+    @property
+    def samples(self) -> int: ...
+    def add_run(self, dt: float, inputs: _Array, measurements: _Array) -> None: ...
+    def with_model(self, model: SingleTrack) -> Problem: ...
+    def freeze(self, parameters: _Array, noise: _Array) -> FrozenFilter: ...
+    def residuals(self, parameters: _Array, filter: FrozenFilter) -> _Array: ...
+    def half_sum_of_squares(self, parameters: _Array, filter: FrozenFilter) -> float: ...
+    def sensitivities(
+        self, parameters: _Array, filter: FrozenFilter, columns: Sequence[int]
+    ) -> _Array: ...
+    def normal_equations(
+        self, parameters: _Array, filter: FrozenFilter, columns: Sequence[int]
+    ) -> tuple[float, _Array, _Array]: ...
+    def signal_sensitivities(
+        self, parameters: _Array, filter: FrozenFilter, signals: _Array, targets: Sequence[int]
+    ) -> _Array: ...
+    def noise_score(self, parameters: _Array, noise: _Array) -> tuple[float, _Array, _Array]: ...
+    def trace(self, parameters: _Array, noise: _Array, smoothed: bool) -> _Trace: ...
+    def look_ahead(self, parameters: _Array, noise: _Array, ahead: int) -> _Array: ...
+
+class Driver(metaclass=_Bound):
+    reaction_s: float
+    yaw_rate_gain: float
+    yaw_rate_integral_ps: float
+    understeer_radps2pm: float
+    speed_gain_ps: float
+    steer_limit_rad: float
+    steer_rate_limit_radps: float
+    drive_limit_n: float
+    brake_limit_n: float
+    power_limit_w: float
+    force_rate_limit_nps: float
+    tracks_path: bool
+    def __init__(self) -> None: ...
+
+def base_parameters() -> list[dict[str, Any]]: ...
+def effects() -> list[dict[str, Any]]: ...
+def simulate(
+    model: SingleTrack,
+    parameters: _Array,
+    dt: float,
+    references: _Array,
+    driver: Driver,
+    disturbance: _Array,
+    initial_speed: float,
+) -> tuple[_Array, _Array, _Array, int]: ...

@@ -1,0 +1,5 @@
+"""The command line: `sysid-vehicle`."""
+
+from .main import main
+
+__all__ = ["main"]

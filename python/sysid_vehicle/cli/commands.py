@@ -1,0 +1,159 @@
+"""What each command does; errors are left to `main`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from .._files import write_text
+from ..compare import Comparison, compare
+from ..demo import run_demo
+from ..effects import catalogue
+from ..errors import warn
+from ..identify import Fit, identify
+from ..log import Log
+from ..model import Model
+from ..read import ChannelMap, read_log
+from ..report import summary, write_report
+from ..study import Study, improve
+from ..study.study import _estimate, _plain
+from ..vehicle import Vehicle
+from .outputs import refuse_unwritable
+
+__all__ = ["COMMANDS"]
+
+Warnings = list[str]
+
+
+def _demo(args: argparse.Namespace, heard: Warnings) -> None:
+    refuse_unwritable([args.report, args.json], inputs=[])
+    shown = run_demo(
+        args.hidden,
+        seed=args.seed,
+        report=args.report,
+        tell=lambda text: print(text, end="\n\n", flush=True),
+        progress=_on_terminal(),
+    )
+    if args.json is not None:
+        content = _with_warnings(shown.study, heard).to_dict()
+        truth = shown.truth
+        content["hidden"] = {
+            "id": truth.effects[0],
+            "parameters": {n.split(".")[1]: truth.value(n) for n in truth.names if "." in n},
+            "found": shown.found,
+        }
+        _write_json(content, args.json)
+
+
+def _compare(args: argparse.Namespace, heard: Warnings) -> None:
+    refuse_unwritable([args.json], inputs=_inputs(args))
+    model = Model(Vehicle.from_toml(args.vehicle), args.effects)
+    logs = _read(args.logs, args.channels)
+    fit = identify(model, logs, progress=_on_terminal())
+    comparison = compare(fit, logs)
+    print(comparison)
+    print(fit)
+    if args.json is not None:
+        _write_json(_comparison(comparison, fit, heard), args.json)
+
+
+def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
+    refuse_unwritable([args.json], inputs=_inputs(args))
+    study = _study(args, heard)
+    print(study.test[0])
+    print()
+    print(study.diagnoses[0])
+    print()
+    print(" ".join(summary(study)))
+    if args.json is not None:
+        study.to_json(args.json)
+
+
+def _improve(args: argparse.Namespace, heard: Warnings) -> None:
+    refuse_unwritable([args.report, args.json], inputs=_inputs(args))
+    study = _study(args, heard)
+    # The warnings have gone to the error stream.
+    print(replace(study, warnings=()))
+    print(study.fit)
+    if args.json is not None:
+        study.to_json(args.json)
+    write_report(study, args.report)
+    print(f"Report: {args.report}")
+
+
+def _effects(args: argparse.Namespace, heard: Warnings) -> None:
+    print("\n\n".join(str(e) for e in catalogue()))
+
+
+COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
+    "demo": _demo,
+    "compare": _compare,
+    "diagnose": _diagnose,
+    "improve": _improve,
+    "effects": _effects,
+}
+
+
+def _study(args: argparse.Namespace, heard: Warnings) -> Study:
+    model = Model(Vehicle.from_toml(args.vehicle))
+    train = _read(args.logs, args.channels)
+    test = _read(args.test, args.channels) if args.test else None
+    for path in {p.resolve() for p in args.logs} & {p.resolve() for p in args.test}:
+        warn(f"{path.name} is both fitted and held out; the held-out error then proves nothing")
+    study = improve(
+        model,
+        train,
+        test,
+        tell=lambda text: print(text, file=sys.stderr, flush=True),
+        progress=_on_terminal(),
+    )
+    return _with_warnings(study, heard)
+
+
+def _with_warnings(study: Study, heard: Warnings) -> Study:
+    """Give the study all warnings of the run, and issue those it kept to itself."""
+    for text in study.warnings:
+        if text not in heard:
+            warn(text)
+    return replace(study, warnings=tuple(heard))
+
+
+def _read(paths: list[Path], channels: Path | None) -> list[Log]:
+    mapping = None if channels is None else ChannelMap.from_toml(channels)
+    return [read_log(path, mapping) for path in paths]
+
+
+def _inputs(args: argparse.Namespace) -> list[Path]:
+    given = [*args.logs, args.vehicle, args.channels, *getattr(args, "test", [])]
+    return [path for path in given if path is not None]
+
+
+def _on_terminal() -> bool:
+    return sys.stderr.isatty()
+
+
+def _comparison(c: Comparison, fit: Fit, heard: Warnings) -> dict[str, Any]:
+    return {
+        "effects": list(fit.model.effects),
+        "error": c.error,
+        "channels": {name: asdict(score) for name, score in c.channels.items()},
+        "regions": [
+            {
+                "speed_mps": list(r.speed_mps),
+                "lateral_acceleration_mps2": list(r.lateral_mps2),
+                "share": r.share,
+            }
+            for r in c.regions
+        ],
+        "parameters": {e.name: _estimate(e) for e in (*fit.estimates, *fit.derived)},
+        "warnings": list(heard),
+    }
+
+
+def _write_json(content: dict[str, Any], path: Path) -> None:
+    write_text(path, json.dumps(_plain(content), indent=2, allow_nan=False) + "\n")

@@ -1,0 +1,79 @@
+"""From the command line to an exit status."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TextIO
+
+from .. import _core
+from ..errors import SysidError
+from .commands import COMMANDS
+from .parser import parse
+
+__all__ = ["main"]
+
+_FAILED = 2
+_INTERRUPTED = 130  # what shells report for Ctrl-C
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run a command.
+
+    Parameters
+    ----------
+    argv : list of str, optional
+        Arguments; those of the process if left out.
+
+    Returns
+    -------
+    int
+        Exit status: 0, 2 for input that cannot be used, 130 after Ctrl-C.
+    """
+    args = parse(argv)
+    try:
+        with _warnings_as_lines() as heard:
+            COMMANDS[args.command](args, heard)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader, such as `head`, has seen enough. Python would complain once more at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except (SysidError, _core.NumericalFailure, OSError) as error:
+        print(f"sysid-vehicle: error: {_one_line(str(error))}", file=sys.stderr)
+        return _FAILED
+    except KeyboardInterrupt:
+        print("sysid-vehicle: interrupted", file=sys.stderr)
+        return _INTERRUPTED
+    return 0
+
+
+@contextmanager
+def _warnings_as_lines() -> Iterator[list[str]]:
+    """Print each warning once, as one line, and collect the texts."""
+    heard: list[str] = []
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        text = _one_line(str(message))
+        if text not in heard:
+            heard.append(text)
+            print(f"sysid-vehicle: warning: {text}", file=sys.stderr, flush=True)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        warnings.showwarning = show
+        yield heard
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

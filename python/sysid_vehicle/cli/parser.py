@@ -1,0 +1,110 @@
+"""What may be typed."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .. import _core
+from ..demo import DEFAULT, RANDOM
+
+__all__ = ["parse"]
+
+
+def parse(argv: list[str] | None) -> argparse.Namespace:
+    """Read the arguments; ends the program with status 2 on those that make no sense."""
+    parser = argparse.ArgumentParser(
+        prog="sysid-vehicle",
+        description="Compare a single-track car model with driving logs, find the missing effect, "
+        "add it.",
+    )
+    parser.add_argument("--version", action="version", version=_core.__version__)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    demo = commands.add_parser(
+        "demo", help="hide an effect in a simulated car, find it, tell the story"
+    )
+    demo.add_argument(
+        "--hidden",
+        default=DEFAULT,
+        metavar="ID",
+        help=f"effect to hide, or '{RANDOM}' to draw one (default: %(default)s)",
+    )
+    demo.add_argument(
+        "--seed", type=_seed, default=0, metavar="N", help="of all that is drawn (default: 0)"
+    )
+    demo.add_argument(
+        "--report",
+        type=Path,
+        default=Path("report.html"),
+        metavar="HTML",
+        help="report to write (default: %(default)s)",
+    )
+    _json(demo)
+
+    compare = commands.add_parser("compare", help="fit the model to logs, see where it fails")
+    _driving(compare)
+    compare.add_argument(
+        "--effects",
+        type=_names,
+        default=(),
+        metavar="A,B",
+        help="effects that the model has from the start",
+    )
+    _json(compare)
+
+    diagnose = commands.add_parser("diagnose", help="learn which physical effect is missing")
+    _driving(diagnose)
+    _held_out(diagnose)
+    _json(diagnose)
+
+    improve = commands.add_parser("improve", help="add what is missing, write a report")
+    _driving(improve)
+    _held_out(improve)
+    improve.add_argument(
+        "--report", type=Path, required=True, metavar="HTML", help="report to write"
+    )
+    _json(improve)
+
+    commands.add_parser("effects", help="the catalogue of effects")
+    return parser.parse_args(argv)
+
+
+def _driving(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="CSV file of one run")
+    parser.add_argument(
+        "--vehicle", type=Path, required=True, metavar="TOML", help="the car's own numbers"
+    )
+    parser.add_argument(
+        "--channels", type=Path, metavar="TOML", help="channel map, for other column names or units"
+    )
+
+
+def _held_out(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--test",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="LOG",
+        help="runs kept out of the fit (default: the last log, or the last 30 %% of the only one)",
+    )
+
+
+def _json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+
+
+def _seed(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise ValueError
+    return value
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name for name in (part.strip() for part in text.split(",")) if name)
+
+
+# argparse says "invalid NAME value".
+_seed.__name__ = "seed (0 or more)"

@@ -1,0 +1,21 @@
+"""Reports: a study as one HTML file."""
+
+from .figures import errors_by_step, evidence, failure_maps, overlay, residuals, sizes, tyre_curve
+from .tyres import TyreCurve, identified_curves, model_curves
+from .words import summary
+from .write import write_report
+
+__all__ = [
+    "TyreCurve",
+    "errors_by_step",
+    "evidence",
+    "failure_maps",
+    "identified_curves",
+    "model_curves",
+    "overlay",
+    "residuals",
+    "sizes",
+    "summary",
+    "tyre_curve",
+    "write_report",
+]

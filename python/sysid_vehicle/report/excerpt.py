@@ -1,0 +1,93 @@
+"""The few seconds in which the baseline failed most."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import FloatArray
+from ..estimate import MEASURED
+from ..identify import Fit
+from ..study import Study
+from .words import stages
+
+__all__ = ["Excerpt", "worst_excerpt"]
+
+_SHOWN = ("yaw_rate_radps", "ay_mps2")
+
+
+@dataclass(frozen=True, eq=False)
+class Excerpt:
+    """Measured channels over some seconds, and how far each model's predictions were off.
+
+    Attributes
+    ----------
+    log : str
+        Name of the log.
+    horizon_s : float
+        How far ahead was predicted, from what the filter knew by then and the inputs since.
+    channels : tuple of str
+    time_s : array, shape (n,)
+    measured : array, shape (n, channels)
+    errors : dict of array, shape (n, channels)
+        Measurement less prediction, by model.
+    """
+
+    log: str
+    horizon_s: float
+    channels: tuple[str, ...]
+    time_s: FloatArray
+    measured: FloatArray
+    errors: dict[str, FloatArray]
+
+
+def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5) -> Excerpt | None:
+    """Find the part of the training driving in which the baseline predicted worst.
+
+    Returns None if no stretch is long enough to predict that far.
+    """
+    driving = study.fit.driving
+    channels = tuple(c for c in _SHOWN if c in driving.present)
+    columns = [MEASURED.index(c) for c in channels]
+    errors = {
+        title: _errors(study.fits[i], study.fit, horizon_s)[:, columns]
+        for title, i in stages(study)
+    }
+    measured = driving.measured[:, columns]
+    scale = np.nanstd(measured, axis=0)
+    badness = np.nansum((errors["baseline"] / np.where(scale > 0.0, scale, 1.0)) ** 2, axis=1)
+    best: tuple[float, slice, str] | None = None
+    begin = 0
+    for s in driving.stretches:
+        log = driving.logs[s.log]
+        n = s.where.stop - s.where.start
+        first = begin + round(horizon_s * log.rate_hz)
+        end, begin = begin + n, begin + n
+        width = min(int(seconds * log.rate_hz), end - first)
+        # So many samples ahead are the horizon only at the first log's rate.
+        if width < 2 or log.rate_hz != driving.logs[0].rate_hz:
+            continue
+        total = np.convolve(badness[first:end], np.ones(width), "valid")
+        at = first + int(np.argmax(total))
+        if best is None or total.max() > best[0]:
+            best = (float(total.max()), slice(at, at + width), log.name)
+    if best is None or not channels:
+        return None
+    _, where, name = best
+    return Excerpt(
+        name,
+        horizon_s,
+        channels,
+        driving.channel("time_s")[where],
+        measured[where],
+        {title: e[where] for title, e in errors.items()},
+    )
+
+
+def _errors(fit: Fit, judge: Fit, horizon_s: float) -> FloatArray:
+    """Prediction errors that far ahead, samples x 5, by filters with the same noise for all."""
+    driving = fit.driving
+    ahead = round(horizon_s * driving.logs[0].rate_hz)
+    problem = driving.problem(fit.model)
+    return problem.look_ahead(fit.model.vector(), judge.noise.floor().vector(), max(ahead, 1))

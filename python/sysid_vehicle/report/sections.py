@@ -1,0 +1,244 @@
+"""The sections of a report, each from a study to HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from .._style import new_figure
+from .._text import number
+from ..estimate import UNITS
+from ..model import Model
+from ..study import Study
+from . import figures
+from .excerpt import worst_excerpt
+from .page import bullets, heading, paragraph, picture, table
+from .tyres import AXLES, identified_curves, model_curves
+from .words import RANKING_HEAD, interval, quantity, ranking_rows, stages, summary, unit
+
+__all__ = ["SECTIONS"]
+
+
+def _verdict(study: Study, truth: Model | None) -> list[str]:
+    figure = new_figure(7.0, 3.0)
+    figures.errors_by_step(study, figure.add_subplot())
+    return [
+        paragraph(" ".join(summary(study)), "lead"),
+        picture(
+            figure,
+            "One-step-ahead error of each model, all channels together. 1 is the noise floor: what "
+            "sensors and an uneven road alone would leave.",
+        ),
+    ]
+
+
+def _where(study: Study, truth: Model | None) -> list[str]:
+    shown = [(title, study.test[i]) for title, i in stages(study)]
+    first = study.test[0]
+    head = ["channel", "unit", "noise floor"]
+    for what in ("rmse", "normalised", "R²"):
+        head += [f"{what}, {title}" for title, _ in shown]
+    rows = []
+    for name, floor in study.test[-1].channels.items():
+        scores = [c.channels[name] for _, c in shown]
+        rows.append(
+            [
+                name,
+                UNITS[name],
+                number(floor.noise_floor, 3),
+                *(number(s.rmse, 3) for s in scores),
+                *(f"{s.nrmse:.2f}" for s in scores),
+                *(f"{s.r2:.4f}" for s in scores),
+            ]
+        )
+    figure = new_figure(4.5 * len(shown), 3.4)
+    axes = figure.subplots(1, len(shown), sharey=True, squeeze=False)
+    figures.failure_maps(study, list(axes[0]))
+    parts = [
+        heading("Errors on held-out driving"),
+        table(head, rows),
+        paragraph(
+            "One step ahead. Normalised errors are in units of the spread that the noise model "
+            "expects of each prediction, so that 1 is the noise floor."
+        ),
+        picture(
+            figure,
+            "Error over speed and lateral acceleration, on one colour scale. Grey: hardly any "
+            "driving there.",
+        ),
+    ]
+    if first.regions:
+        parts.append(paragraph("The baseline fails most at"))
+        parts.append(bullets(str(r) for r in first.regions))
+    return parts
+
+
+def _which(study: Study, truth: Model | None) -> list[str]:
+    parts = [heading("Which effect is missing")]
+    for i, dx in enumerate(study.diagnoses):
+        if len(study.diagnoses) > 1:
+            have = ", ".join(dx.fit.model.effects)
+            parts.append(heading(f"With {have}" if i else "To the baseline", 3))
+        shown = min(len(dx.ranking), 10)
+        if shown == 0:
+            parts.append(paragraph("There was no candidate to test."))
+            continue
+        figure = new_figure(7.0, 0.9 + 0.25 * shown)
+        figures.evidence(dx, figure.add_subplot())
+        n = len(dx.significant)
+        parts += [
+            picture(
+                figure,
+                f"Evidence for each effect; {n} of {len(dx.ranking)} significant at {dx.alpha:g} "
+                "over all of them together.",
+            ),
+            table(RANKING_HEAD, _with_minus_signs(ranking_rows(dx)), "ranking"),
+        ]
+    parts.append(
+        paragraph(
+            "Each candidate was refitted or scored as if it alone were missing, so sizes of rivals "
+            "are not to be added up. 'error with it' is the error that would remain, in units of "
+            "what the noise of the model without it expects; 'cannot tell from' names effects that "
+            "would explain this driving as well."
+        )
+    )
+    return parts
+
+
+def _with_minus_signs(rows: list[list[str]]) -> list[list[str]]:
+    # A line may break after a hyphen, in the middle of a number; not after a minus sign.
+    return [[row[0], *(cell.replace("-", "\u2212") for cell in row[1:-1]), row[-1]] for row in rows]
+
+
+def _parameters(study: Study, truth: Model | None) -> list[str]:
+    fit = study.fit
+    real = {} if truth is None else {n: quantity(truth.value(n)) for n in truth.names}
+    if truth is not None:
+        real |= {e.name: quantity(e.value) for e in replace(fit, model=truth).derived}
+    rows = []
+    for e in (*fit.estimates, *fit.derived):
+        row = [e.name, quantity(e.value), interval(e), unit(e.unit).strip(), e.note or "-"]
+        rows.append(row if truth is None else [*row, real.get(e.name, "-")])
+    head = ["parameter", "value", "95 % interval", "unit", "note"]
+    parts = [
+        heading("Parameters of the final model"),
+        table(head if truth is None else [*head, "truth"], rows),
+    ]
+    if study.added:
+        count = sum(len(a.parameters) for a in study.added)
+        figure = new_figure(7.0, 1.0 + 0.35 * count)
+        figures.sizes(study, figure.add_subplot(), truth)
+        text = "Size of the added effects with 95 % intervals"
+        parts.append(picture(figure, f"{text}; green: the truth." if truth else f"{text}."))
+    return parts + _tyres(study, truth)
+
+
+def _tyres(study: Study, truth: Model | None) -> list[str]:
+    curves = identified_curves(study.fit)
+    slip = curves[0].slip_rad
+    start = model_curves(Model(study.model.vehicle), slip)
+    real = (None, None) if truth is None else model_curves(truth, slip)
+    figure = new_figure(8.0, 3.4)
+    axes = figure.subplots(1, len(AXLES), sharey=True)
+    for i, ax in enumerate(axes):
+        figures.tyre_curve(curves[i], ax, start=start[i], truth=real[i])
+        ax.label_outer()
+    axes[0].set_ylim(0.0, 1.15e-3 * max(float(c.force_n.max()) for c in (*curves, *start)))
+    caption = (
+        "Tyre curves at static load, without effects. Hatched: slip angles that this driving did "
+        "not reach; the curve there is extrapolated."
+    )
+    return [picture(figure, caption)]
+
+
+def _excerpt(study: Study, truth: Model | None) -> list[str]:
+    excerpt = worst_excerpt(study)
+    if excerpt is None:
+        return []
+    n = len(excerpt.channels)
+    figure = new_figure(9.0, 2.6 * n)
+    axes = figure.subplots(2 * n, 1, sharex=True, height_ratios=[2.0, 1.0] * n)
+    figures.overlay(excerpt, list(axes))
+    return [
+        heading("Where the baseline failed most"),
+        picture(
+            figure,
+            f"{excerpt.log}, training driving, predicted {excerpt.horizon_s:g} s ahead from what "
+            "was known by then and the steering and force since.",
+        ),
+    ]
+
+
+def _remains(study: Study, truth: Model | None) -> list[str]:
+    noise = study.fit.noise
+    count = len(stages(study))
+    figure = new_figure(9.0, 2.1 * count + 0.2)
+    axes = figure.subplots(count, 1, sharex=True, sharey=True, squeeze=False)
+    figures.residuals(study, list(axes[:, 0]))
+    sensors = [
+        [c, number(s, 3), UNITS[c]]
+        for c, s in zip(UNITS, noise.sensor, strict=True)
+        if c in study.fit.driving.present
+    ]
+    x, y, moment = noise.wander
+    parts = [
+        heading("What remains"),
+        paragraph(f"In the end: {study.omnibus}."),
+        picture(figure, "Residuals on held-out driving, running root mean square per channel."),
+        heading("Noise model", 3),
+        table(("sensor", "white noise", "unit"), sensors),
+        paragraph(
+            "Beyond its equations the final model still needs a wandering force of "
+            f"{number(x, 2)} N forward and {number(y, 2)} N sideways and a yaw moment of "
+            f"{number(moment, 2)} N m (standard deviations; correlation time "
+            f"{number(noise.correlation_time_s, 2)} s)."
+        ),
+    ]
+    if study.warnings:
+        parts += [heading("Warnings", 3), bullets(study.warnings, "warning")]
+    return parts
+
+
+_METHOD = (
+    "The model is a single track with three degrees of freedom and load transfer (Rajamani, "
+    "Vehicle Dynamics and Control, 2nd ed., ch. 2 and 4) on Magic Formula tyres (Pacejka, Tire "
+    "and Vehicle Dynamics, 3rd ed., eq. 4.6), in ISO 8855 axes. An extended Kalman filter "
+    "predicts each measurement one step ahead; parameters and noise are those of maximum "
+    "likelihood of the prediction errors (Ljung, System Identification, 2nd ed., sec. 7.2 and "
+    "7.4). Effects are ranked by score tests of the whitened residuals after projection on the "
+    "fitted parameters (Basseville, Automatica 1998; Bera & Bilias, J. Statistical Planning and "
+    "Inference 2001), the best ones refitted with their exact dynamics. An effect is added only "
+    "if it also predicts the held-out driving better. Whether anything is left is decided by a "
+    "score test against unknown forces that depend on the driving (Lin, Biometrika 1997). All "
+    "models are judged with the noise of the final one."
+)
+
+
+def _method(study: Study, truth: Model | None) -> list[str]:
+    starts = study.fits[0].starts
+    held_out = study.test[0].title.split(" on ", 1)[1]
+    parts = [
+        heading("How it was computed"),
+        paragraph(f"Fitted to {study.fit.driving}. Held out: {held_out}."),
+        paragraph(_METHOD),
+        paragraph(
+            f"{sum(s.agrees for s in starts)} of {len(starts)} starts of the search for the "
+            f"baseline ended at the same optimum. The study took {study.seconds:.0f} s."
+        ),
+    ]
+    if study.model.parts:
+        parts.append(heading("Equations of the added effects", 3))
+        parts.append(bullets(f"{e.id}: {e.equation} ({e.source})" for e in study.model.parts))
+    return parts
+
+
+SECTIONS: tuple[Callable[[Study, Model | None], list[str]], ...] = (
+    _verdict,
+    _where,
+    _which,
+    _parameters,
+    _excerpt,
+    _remains,
+    _method,
+)
+"""In the order of the page."""

@@ -1,0 +1,33 @@
+"""From a study to a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .._files import write_text
+from ..model import Model
+from ..study import Study
+from .page import page
+from .sections import SECTIONS
+
+__all__ = ["write_report"]
+
+
+def write_report(study: Study, path: str | Path, *, truth: Model | None = None) -> None:
+    """Write a study as one self-contained HTML file, whole or not at all.
+
+    Parameters
+    ----------
+    study : Study
+    path : str or Path
+        An existing file is replaced.
+    truth : Model, optional
+        The car that was simulated, where it is known: its values stand beside the identified ones.
+
+    Raises
+    ------
+    InvalidInput
+        If the folder does not exist or is not writable.
+    """
+    title = f"Study of {study.model.vehicle.name}"
+    write_text(path, page(title, [text for make in SECTIONS for text in make(study, truth)]))

@@ -1,0 +1,104 @@
+// What the filter and the smoother say of each sample, and prediction further ahead.
+#include "helpers.hpp"
+#include "sysid/identify/prediction_error.hpp"
+
+namespace sysid::test {
+namespace {
+
+const auto kLagging = mask_of({"steer_lag", "tyre_relaxation"});
+
+Problem one_run(EffectMask effects) {
+    const SingleTrack model{saloon(), effects};
+    Problem problem{model, {noisy_run(model, typical_parameters(), 200, 0.01, 7)}};
+    problem.runs[0].measurements[10][kAy] = std::nan("");
+    return problem;
+}
+
+TEST(Trace, SmoothingGainsCertaintyAndKeepsTheEnd) {
+    for (EffectMask effects : {EffectMask{0}, kLagging}) {
+        const Problem problem = one_run(effects);
+        const Parameters p = typical_parameters();
+        const Trace filtered = trace(problem, p.data(), ordinary_noise(), false);
+        const Trace smoothed = trace(problem, p.data(), ordinary_noise(), true);
+        EXPECT_EQ(filtered.log_likelihood, smoothed.log_likelihood);
+        ASSERT_EQ(filtered.state_std.size(), problem.samples() * kStatesFull);
+        ASSERT_EQ(smoothed.state_std.size(), filtered.state_std.size());
+        const std::size_t last = filtered.state.size() - kStatesFull;
+        const std::size_t states = effects == 0 ? kStatesPlain : kStatesFull;
+        for (std::size_t n = 0; n < filtered.state.size(); ++n) {
+            if (n % kStatesFull >= states) {
+                EXPECT_TRUE(std::isnan(filtered.state[n]));
+                EXPECT_TRUE(std::isnan(smoothed.state_std[n]));
+                continue;
+            }
+            EXPECT_LE(smoothed.state_std[n], filtered.state_std[n] * (1.0 + 1e-6) + 1e-12);
+            if (n >= last) {
+                EXPECT_EQ(smoothed.state[n], filtered.state[n]);
+            }
+        }
+        // In the middle of the record the sideslip is known much better afterwards.
+        EXPECT_LT(smoothed.state_std[100 * kStatesFull + 1],
+                  0.95 * filtered.state_std[100 * kStatesFull + 1]);
+    }
+}
+
+TEST(Trace, MissingMeasurementsLeaveGaps) {
+    const Trace t = trace(one_run(0), typical_parameters().data(), ordinary_noise(), false);
+    for (std::size_t n = 0; n < t.innovation.size(); ++n) {
+        const bool missing = n == 10 * kChannels + kAy;
+        EXPECT_EQ(std::isnan(t.innovation[n]), missing) << n;
+        EXPECT_EQ(std::isnan(t.spread[n]), missing) << n;
+        EXPECT_FALSE(std::isnan(t.whitened[n])) << n;
+    }
+    EXPECT_EQ(t.whitened[10 * kChannels + kAy], 0.0);
+}
+
+TEST(Trace, FirstWhitenedElementIsInnovationOverSpread) {
+    // The Cholesky factor is triangular: the first channel is scaled by its own spread only.
+    const Trace t = trace(one_run(0), typical_parameters().data(), ordinary_noise(), false);
+    for (std::size_t n = 0; n < t.innovation.size(); n += kChannels)
+        EXPECT_NEAR(t.whitened[n], t.innovation[n] / t.spread[n],
+                    1e-10 * (1.0 + std::abs(t.whitened[n])));
+}
+
+TEST(LookAhead, PerfectModelAndDataLeaveNoError) {
+    for (EffectMask effects : {EffectMask{0}, kLagging}) {
+        const SingleTrack model{saloon(), effects};
+        const Parameters p = typical_parameters();
+        Problem problem{model, {}};
+        sysid::Run run;  // gtest has a Run of its own
+        for (int k = 0; k < 100; ++k) run.inputs.push_back(lively(0.01 * k));
+        run.measurements = drive(model, p, run.inputs, 0.01, 20.0);
+        problem.runs = {run, run};
+        for (std::size_t ahead : {1U, 20U}) {
+            std::vector<double> errors(problem.samples() * kChannels);
+            look_ahead(problem, p.data(), ordinary_noise(), ahead, errors.data());
+            for (std::size_t n = 0; n < errors.size(); ++n) {
+                const std::size_t k = n / kChannels % run.size();
+                if (k < ahead) {
+                    EXPECT_TRUE(std::isnan(errors[n])) << n;
+                } else {
+                    EXPECT_NEAR(errors[n], 0.0, 1e-9) << n;
+                }
+            }
+        }
+    }
+}
+
+TEST(LookAhead, ErrorOfAWrongModelGrowsWithTheHorizon) {
+    const Problem problem = one_run(0);
+    Parameters p = typical_parameters();
+    p[kBRear] *= 0.7;
+    const auto yaw_rate_error = [&](std::size_t ahead) {
+        std::vector<double> errors(problem.samples() * kChannels);
+        look_ahead(problem, p.data(), ordinary_noise(), ahead, errors.data());
+        double sum = 0.0;
+        for (std::size_t k = 60; k < problem.samples(); ++k)
+            sum += std::pow(errors[k * kChannels + kYawRate], 2);
+        return std::sqrt(sum);
+    };
+    EXPECT_GT(yaw_rate_error(30), 1.5 * yaw_rate_error(3));
+}
+
+}  // namespace
+}  // namespace sysid::test

@@ -1,0 +1,364 @@
+"""The command line: what it prints, what it writes, and how it fails."""
+
+import json
+import os
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle.cli import commands, main
+
+TRUTH = (
+    sv.Model(sv.example_vehicle()).add("steer_lag").with_values({"steer_lag.time_constant_s": 0.06})
+)
+VERDICTS = {"adequate", "explained", "partly_explained", "unknown"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A vehicle file and two short logs."""
+    path = tmp_path_factory.mktemp("cli")
+    TRUTH.vehicle.to_toml(path / "car.toml")
+    train = sv.drive(TRUTH, sv.manoeuvres.lap(25.0), seed=1, rate_hz=50.0)
+    test = sv.drive(TRUTH, sv.manoeuvres.handling_course(20.0), seed=2, rate_hz=50.0)
+    train.to_csv(path / "lap.csv")
+    test.to_csv(path / "course.csv")
+    return path
+
+
+@pytest.fixture
+def arguments(folder: Path) -> list[str]:
+    return [str(folder / "lap.csv"), "--vehicle", str(folder / "car.toml")]
+
+
+@pytest.fixture(scope="module")
+def improved(folder: Path) -> tuple[Path, dict[str, Any]]:
+    """Folder and JSON of one `improve` run."""
+    status = main(
+        [
+            "improve",
+            str(folder / "lap.csv"),
+            *("--vehicle", str(folder / "car.toml")),
+            *("--test", str(folder / "course.csv")),
+            *("--report", str(folder / "out.html")),
+            *("--json", str(folder / "out.json")),
+        ]
+    )
+    assert status == 0
+    return folder, json.loads((folder / "out.json").read_text(encoding="utf-8"))
+
+
+def fails(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
+    """Run a command that must fail, and give its one line."""
+    assert main(list(argv)) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    lines = err.splitlines()
+    assert len(lines) == 1, err
+    assert lines[0].startswith("sysid-vehicle: error: ")
+    return lines[0]
+
+
+def test_improve_finds_the_effect_and_writes_json_and_report(
+    improved: tuple[Path, dict[str, Any]],
+) -> None:
+    folder, result = improved
+    assert set(result) >= {"verdict", "effects", "ranking", "channels", "regions", "warnings"}
+    assert result["verdict"] in VERDICTS
+    assert [e["id"] for e in result["effects"]] == ["steer_lag"]
+    found = result["effects"][0]
+    assert set(found) == {"id", "parameters", "error_before", "error_after", "p_value"}
+    lag = found["parameters"]["time_constant_s"]
+    assert lag["unit"] == "s"
+    assert abs(lag["value"] - 0.06) < 4.0 * lag["std"]
+    assert found["error_after"] < found["error_before"]
+    assert result["ranking"][0]["id"] == "steer_lag"
+    for candidate in result["ranking"]:
+        assert set(candidate) >= {
+            "id",
+            "statistic",
+            "p_value",
+            "predicted_error",
+            "indistinguishable_from",
+        }
+    for when in ("before", "after"):
+        for where in ("train", "test"):
+            scores = result["channels"][when][where]
+            assert set(scores) == {"vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2"}
+            for score in scores.values():
+                assert set(score) == {"rmse", "noise_floor", "nrmse", "r2"}
+    assert (folder / "out.html").read_text(encoding="utf-8").endswith("</html>\n")
+    assert not list(folder.glob(".*")), "temporary files are left"
+
+
+def test_diagnose_prints_the_ranking_and_has_the_keys_of_improve(
+    improved: tuple[Path, dict[str, Any]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, result = improved
+    capsys.readouterr()
+    status = main(
+        [
+            "diagnose",
+            str(folder / "lap.csv"),
+            *("--vehicle", str(folder / "car.toml")),
+            *("--test", str(folder / "course.csv")),
+            *("--json", str(folder / "diagnosis.json")),
+        ]
+    )
+    assert status == 0
+    again = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+    assert again == result
+    out = capsys.readouterr().out
+    assert "most likely missing: steering lag" in out
+    assert result["verdict"] in out.lower().replace(" ", "_")
+
+
+def test_compare_fits_with_the_effects_that_are_named(
+    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    errors = []
+    for effects in ([], ["--effects", "steer_lag, mass"]):
+        path = tmp_path / "out.json"
+        assert main(["compare", *arguments, *effects, "--json", str(path)]) == 0
+        result = json.loads(path.read_text(encoding="utf-8"))
+        assert set(result) >= {"channels", "regions", "parameters", "warnings"}
+        assert set(result["channels"]["ay_mps2"]) == {"rmse", "noise_floor", "nrmse", "r2"}
+        errors.append(result["error"])
+        out = capsys.readouterr().out
+        assert "noise floor" in out
+        assert "B_front" in out
+    assert errors[1] < errors[0]
+    lag = result["parameters"]["steer_lag.time_constant_s"]
+    assert abs(lag["value"] - 0.06) < 4.0 * lag["std"]
+    assert result["effects"] == ["steer_lag", "mass"]
+
+
+def test_a_channel_map_is_used(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (folder / "lap.csv").read_text(encoding="utf-8")
+    log, mapping = tmp_path / "log.csv", tmp_path / "map.toml"
+    log.write_text(text.replace("yaw_rate_radps", "gyro_z", 1), encoding="utf-8")
+    car = str(folder / "car.toml")
+    assert "yaw_rate_radps" in fails(capsys, "compare", str(log), "--vehicle", car)
+    mapping.write_text('[channels]\nyaw_rate_radps = "gyro_z"\n', encoding="utf-8")
+    assert main(["compare", str(log), "--vehicle", car, "--channels", str(mapping)]) == 0
+
+
+def test_effects_lists_the_whole_catalogue(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["effects"]) == 0
+    out = capsys.readouterr().out
+    for e in sv.catalogue():
+        assert f"{e.id}: {e.title}" in out
+        assert e.excited_by in out
+        for p in e.parameters:
+            assert f"{p.name} [{p.unit}]" in out
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (["compare", "none.csv", "--vehicle", "{car}"], "none.csv: cannot be read"),
+        (["compare", "{log}", "--vehicle", "none.toml"], "none.toml: cannot be read"),
+        (["compare", "{log}", "--vehicle", "{log}"], "not a TOML file"),
+        (["compare", "{car}", "--vehicle", "{car}"], "car"),
+        (
+            ["compare", "{log}", "--vehicle", "{car}", "--effects", "drag"],
+            "did you mean 'aero_drag'",
+        ),
+        (["compare", "{log}", "--vehicle", "{car}", "--effects", "mass,mass"], "named twice"),
+        (["compare", "{log}", "--vehicle", "{car}", "--channels", "no.toml"], "no.toml: cannot be"),
+        (["diagnose", "{log}", "--vehicle", "{car}", "--test", "no.csv"], "no.csv: cannot be read"),
+        (["improve", "{log}", "--vehicle", "{car}", "--report", "no/r.html"], "does not exist"),
+        (["improve", "{log}", "--vehicle", "{car}", "--report", "."], "is a folder"),
+        (["compare", "{log}", "--vehicle", "{car}", "--json", "{log}"], "is also an input"),
+        (
+            ["improve", "{log}", "--vehicle", "{car}", "--report", "a", "--json", "a"],
+            "is also another output",
+        ),
+        (["demo", "--hidden", "steer_lg"], "did you mean 'steer_lag'"),
+        (["demo", "--report", "no/r.html"], "does not exist"),
+    ],
+)
+def test_what_cannot_be_used_is_one_line_and_status_2(
+    argv: list[str],
+    message: str,
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = (folder / "lap.csv").read_bytes()
+    names = {"log": folder / "lap.csv", "car": folder / "car.toml"}
+    assert message in fails(capsys, *(a.format(**names) for a in argv))
+    assert list(tmp_path.iterdir()) == []
+    assert (folder / "lap.csv").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        [],
+        ["fly"],
+        ["compare"],
+        ["improve", "log.csv", "--vehicle", "car.toml"],
+        ["demo", "--seed", "-1"],
+        ["demo", "--seed", "two"],
+    ],
+)
+def test_wrong_usage_is_status_2(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(argv)
+    assert stopped.value.code == 2
+    assert "usage:" in capsys.readouterr().err
+
+
+def test_a_log_that_breaks_in_the_middle_leaves_no_output(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = (folder / "lap.csv").read_text(encoding="utf-8").splitlines()
+    lines[700] = lines[700].replace(lines[700].split(",")[0], "zero", 1)
+    log = tmp_path / "broken.csv"
+    log.write_text("\n".join(lines), encoding="utf-8")
+    out = tmp_path / "out.json"
+    line = fails(
+        capsys, "compare", str(log), "--vehicle", str(folder / "car.toml"), "--json", str(out)
+    )
+    assert "broken" in line
+    assert not out.exists()
+
+
+def test_warnings_are_single_lines_on_the_error_stream_and_in_the_json(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    car = tmp_path / "car.toml"
+    lines = (folder / "car.toml").read_text(encoding="utf-8").splitlines()
+    car.write_text("\n".join(x for x in lines if "inertia" not in x), encoding="utf-8")
+    path = tmp_path / "out.json"
+    argv = ["compare", str(folder / "lap.csv"), "--vehicle", str(car), "--json", str(path)]
+    assert main(argv) == 0
+    out, err = capsys.readouterr()
+    said = [x for x in err.splitlines() if "yaw_inertia_kgm2 is absent" in x]
+    assert len(said) == 1
+    assert said[0].startswith("sysid-vehicle: warning: ")
+    assert "is absent" not in out
+    collected = json.loads(path.read_text(encoding="utf-8"))["warnings"]
+    assert any("yaw_inertia_kgm2 is absent" in text for text in collected)
+
+
+def test_warnings_of_a_study_come_once_and_reach_the_json(
+    improved: tuple[Path, dict[str, Any]],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    folder, _ = improved
+    study: list[sv.Study] = []
+    real = commands.improve
+
+    def short(*args: Any, **keywords: Any) -> sv.Study:
+        study.append(real(*args, **{**keywords, "starts": 1, "candidates": ["steer_lag"]}))
+        return study[0]
+
+    monkeypatch.setattr(commands, "improve", short)
+    path = folder / "one_log.json"
+    argv = ["diagnose", str(folder / "lap.csv"), "--vehicle", str(folder / "car.toml")]
+    capsys.readouterr()
+    assert main([*argv, "--json", str(path)]) == 0
+    out, err = capsys.readouterr()
+    collected = json.loads(path.read_text(encoding="utf-8"))["warnings"]
+    assert any("no test log was given" in text for text in collected)
+    assert set(study[0].warnings) <= set(collected)
+    for text in collected:
+        assert err.count(text) == 1
+        assert text not in out
+
+
+def test_a_log_that_is_both_fitted_and_held_out_is_noticed(
+    arguments: list[str],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def stop(*_: Any, **__: Any) -> None:
+        raise sv.NumericalError("far enough")
+
+    monkeypatch.setattr(commands, "improve", stop)
+    assert main(["diagnose", *arguments, "--test", arguments[0]]) == 2
+    err = capsys.readouterr().err.splitlines()
+    assert "lap.csv is both fitted and held out" in err[0]
+    assert err[1] == "sysid-vehicle: error: far enough"
+
+
+def test_ctrl_c_is_status_130(
+    arguments: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(commands, "improve", interrupted)
+    path = tmp_path / "out.html"
+    assert main(["improve", *arguments, "--report", str(path)]) == 130
+    assert capsys.readouterr().err == "sysid-vehicle: interrupted\n"
+    assert not path.exists()
+
+
+def test_the_process_leaves_warning_filters_as_they_were(arguments: list[str]) -> None:
+    before, show = list(warnings.filters), warnings.showwarning
+    assert main(["compare", *arguments]) == 0
+    assert list(warnings.filters) == before
+    assert warnings.showwarning is show
+
+
+def run(*argv: str, **keywords: Any) -> "subprocess.CompletedProcess[str]":
+    package = Path(sv.__file__).parents[1]
+    path = os.pathsep.join([str(package), os.environ.get("PYTHONPATH", "")])
+    return subprocess.run(
+        [sys.executable, "-m", "sysid_vehicle", *argv],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        **keywords,
+    )
+
+
+def test_python_m_runs_the_same_program(tmp_path: Path) -> None:
+    done = run("--version")
+    assert (done.returncode, done.stdout.strip()) == (0, sv.__version__)
+    done = run("compare", "none.csv", "--vehicle", "none.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1
+    assert "Traceback" not in done.stderr
+
+
+def test_progress_bars_stay_away_from_files(arguments: list[str]) -> None:
+    done = run("compare", *arguments)
+    assert done.returncode == 0
+    assert "\r" not in done.stdout + done.stderr
+    assert "starts:" not in done.stderr
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the shell's pipes are those of Unix")
+def test_a_closed_pipe_is_no_error() -> None:
+    package = Path(sv.__file__).parents[1]
+    path = os.pathsep.join([str(package), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        ["sh", "-c", f'"{sys.executable}" -u -m sysid_vehicle effects | head -n 1'],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.stdout.count("\n") == 1
+    assert done.stderr == ""

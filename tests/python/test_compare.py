@@ -1,0 +1,118 @@
+"""The one-step error of a model, by channel and by where it drives."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from matplotlib import pyplot
+
+from sysid_vehicle import Comparison, Driving, Fit, Log, Model, compare, drive, manoeuvres
+from sysid_vehicle.compare import FailureMap
+from sysid_vehicle.estimate import MEASURED
+
+
+@pytest.fixture(scope="module")
+def held_out(fit: Fit, course: Log) -> Comparison:
+    return compare(fit, course)
+
+
+@pytest.fixture(scope="module")
+def dragged(fit: Fit, truth: Model) -> Comparison:
+    """The complete model against a car with more drag than it knows."""
+    car = truth.add("aero_drag").with_values({"aero_drag.drag_area_m2": 0.45})
+    log = drive(car, manoeuvres.handling_course(30.0, lateral_mps2=7.5), seed=2)
+    return compare(fit, log)
+
+
+def test_a_complete_model_is_at_the_noise_floor(held_out: Comparison) -> None:
+    assert held_out.error == pytest.approx(1.0, abs=0.03)
+    for score in held_out.channels.values():
+        assert score.nrmse == pytest.approx(1.0, abs=0.05)
+        assert score.rmse == pytest.approx(score.noise_floor, rel=0.05)
+        assert score.r2 > 0.99
+
+
+def test_it_is_there_on_the_driving_it_was_fitted_to_as_well(fit: Fit) -> None:
+    assert compare(fit, fit.driving).error == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_hidden_effect_is_above_the_floor(dragged: Comparison) -> None:
+    assert dragged.error > 1.2
+    nrmse = {c: s.nrmse for c, s in dragged.channels.items()}
+    assert max(nrmse, key=lambda c: nrmse[c]) in ("vx_mps", "ax_mps2")
+    assert nrmse["yaw_rate_radps"] < 0.1 * nrmse["vx_mps"]
+
+
+def test_regions_lie_where_the_effect_acts(fit: Fit, truth: Model) -> None:
+    car = truth.add("lateral_load_transfer")
+    names = [n for n in car.names if n.startswith("lateral_load_transfer.")]
+    hidden = car.with_values({n: 2.0 * car.parameters[n].typical for n in names})
+    log = drive(hidden, manoeuvres.handling_course(30.0, lateral_mps2=7.5), seed=2)
+    regions = compare(fit, log).regions
+    assert regions
+    # It grows with the square of the lateral acceleration.
+    assert all(abs(sum(r.lateral_mps2) / 2) > 2.0 for r in regions)
+    assert all(r.error > 1.1 for r in regions)
+    shares = [r.share for r in regions]
+    assert shares == sorted(shares, reverse=True)
+    assert 0.0 < sum(shares) <= 1.0 + 1e-12
+
+
+def test_every_measured_channel_has_a_score(held_out: Comparison) -> None:
+    assert tuple(held_out.channels) == MEASURED
+
+
+def test_channels_that_were_not_measured_have_none(
+    fit: Fit, course: Log, altered: Callable[..., Log]
+) -> None:
+    blind = compare(fit, altered(course, without=["vy_mps"]))
+    assert tuple(blind.channels) == tuple(c for c in MEASURED if c != "vy_mps")
+    assert np.isnan(blind.residual[:, MEASURED.index("vy_mps")]).all()
+    assert blind.error == pytest.approx(1.0, abs=0.03)
+    no_force = compare(fit, altered(course, without=["fx_n"]))
+    assert "ax_mps2" not in no_force.channels
+
+
+def test_samples_keep_their_place(held_out: Comparison, fit: Fit, course: Log) -> None:
+    assert np.array_equal(held_out.time_s, course["time_s"])
+    assert held_out.residual.shape == (course.n, 5)
+    both = compare(fit, [course, course])
+    assert both.log_number.tolist() == [0.0] * course.n + [1.0] * course.n
+    assert np.array_equal(both.residual[: course.n], both.residual[course.n :])
+    assert both.error == pytest.approx(held_out.error, rel=1e-12)
+    assert both.log_likelihood == pytest.approx(2.0 * held_out.log_likelihood, rel=1e-12)
+
+
+def test_louder_noise_makes_the_same_error_smaller(fit: Fit, course: Log) -> None:
+    louder = type(fit.noise).from_vector(2.0 * fit.noise.vector())
+    assert compare(fit, course, noise=louder).error == pytest.approx(0.5, abs=0.05)
+
+
+def test_the_map_counts_excess_and_leaves_empty_cells_out(fit: Fit, course: Log) -> None:
+    driving = Driving.of(course)
+    white = np.ones((driving.samples, 5))
+    fast = course["vx_mps"] > np.percentile(course["vx_mps"], 70.0)
+    white[fast] = 3.0
+    found = FailureMap.of(driving, white)
+    assert found.error.shape == (len(found.speed_mps) - 1, len(found.lateral_mps2) - 1)
+    assert np.isnan(found.error).any()
+    assert np.nanmin(found.error) == pytest.approx(1.0)
+    assert np.nanmax(found.error) == pytest.approx(3.0)
+    edge = np.percentile(course["vx_mps"], 70.0)
+    assert all(r.speed_mps[1] > edge for r in found.worst())
+    assert FailureMap.of(driving, 0.9 * np.ones((driving.samples, 5))).worst() == ()
+
+
+def test_it_prints_and_draws(held_out: Comparison, dragged: Comparison) -> None:
+    for text in (str(dragged), dragged._repr_html_()):
+        assert "vx_mps" in text
+        assert f"{dragged.error:.3f} of the noise floor" in text
+        assert str(dragged.regions[0]) in text
+    _, (left, right) = pyplot.subplots(1, 2)
+    assert dragged.plot(left) is left
+    assert left.get_ylabel() == "speed [m/s]"
+    assert held_out.plot_residuals(right) is right
+    drawn = {line.get_label() for line in right.get_lines()}
+    assert set(MEASURED) <= drawn
+    assert held_out.plot() is not None
+    assert held_out.plot_residuals() is not None

@@ -1,0 +1,206 @@
+"""The boundary of the compiled core: what it refuses, and that it runs beside Python."""
+
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Driving, Fit, Log, Model, _core
+from sysid_vehicle._arrays import as_float64
+
+N = 50
+
+
+@pytest.fixture(scope="module")
+def driving(lap: Log) -> Driving:
+    return Driving.of(lap.between(0.0, 10.0))
+
+
+@pytest.fixture
+def problem(truth: Model) -> _core.Problem:
+    found = _core.Problem(truth.core())
+    found.add_run(0.01, np.zeros((N, 2)), np.tile([20.0, 0.0, 0.0, 0.0, 0.0], (N, 1)))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("inputs", "measurements", "message"),
+    [
+        (np.zeros((N, 3)), np.zeros((N, 5)), r"inputs: expected shape \(50, 2\)"),
+        (np.zeros((N, 2)), np.zeros((N, 4)), r"measurements: expected shape \(50, 5\)"),
+        (np.zeros((N, 2)), np.zeros((N - 1, 5)), r"measurements: expected shape \(50, 5\)"),
+        (np.zeros(2 * N), np.zeros((N, 5)), "inputs: expected shape"),
+        (np.zeros((1, 2)), np.zeros((1, 5)), "inputs: expected two samples or more"),
+    ],
+)
+def test_wrong_shapes_of_a_run_are_refused(
+    inputs: np.ndarray, measurements: np.ndarray, message: str, problem: _core.Problem
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        problem.add_run(0.01, inputs, measurements)
+    assert problem.samples == N
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("column", [0, 1])
+def test_an_input_that_is_no_number_is_named(
+    bad: float, column: int, problem: _core.Problem
+) -> None:
+    inputs = np.zeros((N, 2))
+    inputs[17, column] = bad
+    with pytest.raises(ValueError, match="inputs: not finite at sample 17"):
+        problem.add_run(0.01, inputs, np.zeros((N, 5)))
+
+
+def test_wrong_sizes_of_vectors_are_refused(problem: _core.Problem, fit: Fit) -> None:
+    p, noise = fit.model.vector(), fit.noise.vector()
+    expected = f"parameters: expected {_core.PARAMETERS} values, got {_core.PARAMETERS - 1}"
+    with pytest.raises(ValueError, match=expected):
+        problem.freeze(p[:-1], noise)
+    with pytest.raises(ValueError, match=f"noise: expected {_core.NOISE_PARAMETERS} values"):
+        problem.freeze(p, np.append(noise, 1.0))
+    with pytest.raises(ValueError, match="motion: expected 3 values, got 2"):
+        fit.model.core().evaluate(p, np.zeros(2), 0.0, 0.0)
+    frozen = problem.freeze(p, noise)
+    with pytest.raises(ValueError, match=r"signals: expected shape \(50, 1\)"):
+        problem.signal_sensitivities(p, frozen, np.zeros((N - 1, 1)), [0])
+
+
+@pytest.mark.parametrize("column", [-1, _core.PARAMETERS])
+def test_a_parameter_that_is_not_there_is_refused(
+    column: int, problem: _core.Problem, fit: Fit
+) -> None:
+    p = fit.model.vector()
+    frozen = problem.freeze(p, fit.noise.vector())
+    with pytest.raises(ValueError, match=f"columns: no parameter {column}"):
+        problem.sensitivities(p, frozen, [0, column])
+    with pytest.raises(ValueError, match=f"columns: no parameter {column}"):
+        problem.normal_equations(p, frozen, [column])
+
+
+def test_a_simulation_needs_matching_arrays(truth: Model) -> None:
+    core, p, driver = truth.core(), truth.vector(), _core.Driver()
+    wanted = np.tile([20.0, 0.0, 0.0], (N, 1))
+    with pytest.raises(ValueError, match=r"disturbance: expected shape \(50, 3\)"):
+        _core.simulate(core, p, 0.01, wanted, driver, np.zeros((N - 1, 3)), 20.0)
+    with pytest.raises(ValueError, match="references: expected two samples or more"):
+        _core.simulate(core, p, 0.01, wanted[:1], driver, np.zeros((1, 3)), 20.0)
+    inputs, states, outputs, lost_at = _core.simulate(
+        core, p, 0.01, wanted, driver, np.zeros((N, 3)), 20.0
+    )
+    assert (len(inputs), len(states), len(outputs), lost_at) == (N, N, N, N)
+
+
+def test_parameters_that_are_no_numbers_fail_with_the_sample(
+    problem: _core.Problem, fit: Fit
+) -> None:
+    with pytest.raises(_core.NumericalFailure, match="at sample 0"):
+        problem.freeze(np.full(_core.PARAMETERS, np.nan), fit.noise.vector())
+    assert issubclass(_core.NumericalFailure, ArithmeticError)
+
+
+def test_only_numbers_are_taken(problem: _core.Problem) -> None:
+    with pytest.raises(TypeError):
+        problem.add_run(0.01, np.zeros((N, 2), dtype=complex), np.zeros((N, 5)))  # type: ignore[arg-type]
+    with pytest.raises(TypeError):
+        _core.FrozenFilter()
+    with pytest.raises(TypeError):
+        _core.SingleTrack(_core.VehicleData(), -1, True)
+
+
+@pytest.mark.parametrize(
+    "layout",
+    [
+        np.asfortranarray,
+        lambda a: np.repeat(a, 2, axis=0)[::2],
+        lambda a: np.hstack([a, a])[:, : a.shape[1]],
+        lambda a: a[::-1].copy()[::-1],
+    ],
+    ids=["fortran", "every second row", "left columns", "backwards"],
+)
+def test_another_memory_layout_is_never_misread(
+    layout: Callable[[np.ndarray], np.ndarray], driving: Driving, fit: Fit
+) -> None:
+    log = driving.logs[0]
+    inputs = as_float64(np.column_stack([log["steer_rad"], log["fx_n"]]))
+    p, noise = fit.model.vector(), fit.noise.vector()
+    values = []
+    for u, y in ((inputs, driving.measured), (layout(inputs), layout(driving.measured))):
+        run = _core.Problem(fit.model.core())
+        run.add_run(0.01, as_float64(u), as_float64(y))
+        values.append(run.freeze(p, noise).log_likelihood)
+    assert values[0] == values[1]
+    raw = _core.Problem(fit.model.core())
+    try:
+        raw.add_run(0.01, layout(inputs), layout(driving.measured))
+    except TypeError:
+        return
+    assert raw.freeze(p, noise).log_likelihood == values[0]
+
+
+def test_single_precision_is_converted_once_on_the_python_side() -> None:
+    values = np.linspace(0.0, 1.0, 7)
+    assert as_float64(values) is values
+    single = as_float64(values.astype(np.float32))
+    assert single.dtype == np.float64
+    np.testing.assert_allclose(single, values, atol=1e-7)
+    strided = as_float64(np.arange(10.0)[::2])
+    assert strided.flags.c_contiguous
+    assert strided.tolist() == [0.0, 2.0, 4.0, 6.0, 8.0]
+
+
+def test_threads_get_the_same_answers_as_one_after_the_other(driving: Driving, fit: Fit) -> None:
+    problem, noise = driving.problem(fit.model), fit.noise.vector()
+    parameters = []
+    for k in range(8):
+        p = fit.model.vector()
+        p[0] *= 1.0 + 0.01 * k
+        parameters.append(p)
+    columns = list(range(8))
+
+    def work(p: np.ndarray) -> tuple[float, bytes, bytes]:
+        frozen = problem.freeze(p, noise)
+        cost, gradient, information = problem.normal_equations(p, frozen, columns)
+        return cost, gradient.tobytes(), information.tobytes()
+
+    alone = [work(p) for p in parameters]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(work, parameters))
+    assert together == alone
+    assert len(set(alone)) == 8
+
+
+def test_python_runs_while_a_kernel_runs(driving: Driving, fit: Fit) -> None:
+    problem = driving.problem(fit.model)
+    p, noise = fit.model.vector(), fit.noise.vector()
+    began = threading.Event()
+    ended = []
+
+    def kernel() -> None:
+        began.set()
+        problem.look_ahead(p, noise, 400)
+        ended.append(time.perf_counter())
+
+    ticks = []
+    thread = threading.Thread(target=kernel)
+    thread.start()
+    began.wait()
+    while thread.is_alive():
+        ticks.append(time.perf_counter())
+        time.sleep(1e-3)
+    thread.join()
+    # With the interpreter locked, the first tick would come after the end.
+    assert sum(t < ended[0] for t in ticks) >= 20
+
+
+def test_the_answer_does_not_depend_on_the_order_of_runs(lap: Log, fit: Fit) -> None:
+    a, b = lap.between(0.0, 8.0), lap.between(20.0, 28.0)
+    p, noise = fit.model.vector(), fit.noise.vector()
+    there = Driving.of([a, b]).problem(fit.model)
+    back = Driving.of([b, a]).problem(fit.model)
+    e, f = (x.residuals(p, x.freeze(p, noise)) for x in (there, back))
+    assert np.array_equal(e[: a.n], f[b.n :])
+    assert np.array_equal(e[a.n :], f[: b.n])

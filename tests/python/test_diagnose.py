@@ -1,0 +1,123 @@
+"""The missing effect is ranked first, and nothing is claimed where nothing is missing."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from matplotlib import pyplot
+
+from sysid_vehicle import (
+    Diagnosis,
+    Fit,
+    InvalidInput,
+    Model,
+    catalogue,
+    diagnose,
+    drive,
+    identify,
+    manoeuvres,
+)
+
+Hidden = Callable[[str, float], Fit]
+OFFSET = "steer_offset.offset_rad", 0.002
+
+
+@pytest.fixture(scope="module")
+def found(hidden_fit: Hidden) -> Diagnosis:
+    return diagnose(hidden_fit(*OFFSET))
+
+
+def test_the_hidden_effect_is_first(found: Diagnosis) -> None:
+    first = found.ranking[0]
+    assert found.best.id == first.id == "steer_offset"
+    assert first.p_value < 1e-6
+    assert first.indistinguishable_from == ()
+    assert first in found.significant
+    assert found.omnibus.p_value < 1e-3
+
+
+def test_its_size_is_that_of_the_refit(found: Diagnosis) -> None:
+    first = found.ranking[0]
+    assert first.fit is not None
+    estimate = first.fit[OFFSET[0]]
+    assert (first.value, first.std) == ((estimate.value,), (estimate.std,))
+    assert abs(estimate.value - OFFSET[1]) < 4.0 * estimate.std
+    gain = 2.0 * (first.fit.log_likelihood - found.fit.log_likelihood)
+    assert first.statistic == pytest.approx(gain, rel=1e-12)
+    assert first.predicted_error < 1.02
+
+
+def test_every_candidate_is_ranked_once(found: Diagnosis) -> None:
+    ids = [c.id for c in found.ranking]
+    assert len(set(ids)) == len(ids)
+    assert set(ids) <= {e.id for e in catalogue()}
+    assert len(ids) > 15
+    assert all(c.fit is None for c in found.ranking if c not in found.significant)
+
+
+def test_nothing_is_claimed_of_a_complete_model(complete_fits: tuple[Fit, ...]) -> None:
+    for fit in complete_fits:
+        dx = diagnose(fit)
+        assert dx.significant == ()
+        assert dx.ranking
+        with pytest.raises(InvalidInput, match="no effect of the catalogue is missing"):
+            _ = dx.best
+        assert "no effect of the catalogue is missing; nothing left" in str(dx)
+
+
+def test_scores_alone_need_no_refit(hidden_fit: Hidden, found: Diagnosis) -> None:
+    quick = diagnose(hidden_fit(*OFFSET), refits=0)
+    assert quick.best.id == "steer_offset"
+    assert all(c.fit is None for c in quick.ranking)
+    assert quick.ranking[0].value[0] == pytest.approx(found.ranking[0].value[0], rel=0.2)
+
+
+def test_only_the_candidates_asked_for_are_considered(hidden_fit: Hidden) -> None:
+    fit = hidden_fit(*OFFSET)
+    few = diagnose(fit, candidates=["aero_drag", "steer_offset"], refits=0)
+    assert [c.id for c in few.ranking] == ["steer_offset", "aero_drag"]
+    with pytest.raises(InvalidInput, match="no effect is called 'stear_offset'"):
+        diagnose(fit, candidates=["stear_offset"])
+    none = diagnose(fit, candidates=[])
+    assert none.ranking == none.significant == ()
+
+
+def test_an_effect_in_the_model_is_no_candidate(found: Diagnosis) -> None:
+    inside = found.ranking[0].fit
+    assert inside is not None
+    dx = diagnose(inside)
+    assert "steer_offset" not in [c.id for c in dx.ranking]
+    assert dx.significant == ()
+
+
+def test_the_same_seed_gives_the_same_diagnosis(complete_fits: tuple[Fit, ...]) -> None:
+    fit = complete_fits[0]
+    one, same, other = (diagnose(fit, refits=0, seed=seed) for seed in (5, 5, 6))
+    assert [(c.id, c.p_value) for c in one.ranking] == [(c.id, c.p_value) for c in same.ranking]
+    assert [c.p_value for c in one.ranking] != [c.p_value for c in other.ranking]
+
+
+def test_effects_that_look_alike_at_constant_speed_are_named(truth: Model, start: Model) -> None:
+    name = "rolling_resistance.coefficient"
+    hidden = truth.add("rolling_resistance")
+    car = hidden.with_values({name: hidden.parameters[name].typical})
+    log = drive(car, manoeuvres.slalom(25.0), seed=9)
+    dx = diagnose(identify(start, log, starts=1))
+    alike = {dx.best.id, *dx.ranking[0].indistinguishable_from}
+    assert {"rolling_resistance", "aero_drag"} <= alike
+    # The accelerometer feels a force and does not feel gravity along the road.
+    assert "road_grade" not in alike
+    assert "cannot tell it from" in str(dx)
+
+
+def test_it_prints_and_draws(found: Diagnosis) -> None:
+    assert str(found).startswith("most likely missing: offset of the logged steering angle")
+    for text in (str(found), found._repr_html_()):
+        assert "offset_rad 0.002 +- " in text
+    ax = pyplot.subplots()[1]
+    assert found.plot(ax, most=6) is ax
+    assert len(ax.patches) == 6
+    widths = [bar.get_width() for bar in ax.patches]
+    assert widths[-1] == max(widths) == pytest.approx(found.ranking[0].statistic)
+    assert np.isfinite(widths).all()
+    assert found.plot() is not ax

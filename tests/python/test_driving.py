@@ -1,0 +1,91 @@
+"""Logs made ready for the core: what is usable, and what stands in for what is missing."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Driving, InvalidInput, Log, Model, SysidWarning
+from sysid_vehicle.estimate import MEASURED
+
+
+@pytest.fixture
+def short(lap: Log) -> Log:
+    return lap.between(0.0, 10.0)
+
+
+def test_driving_is_made_of_one_log_or_several(short: Log, course: Log) -> None:
+    one = Driving.of(short)
+    assert one.samples == short.n
+    assert Driving.of(one) is one
+    two = Driving.of([short, course])
+    assert two.samples == short.n + course.n
+    assert two.log_number.tolist() == [0.0] * short.n + [1.0] * course.n
+    assert np.array_equal(two.channel("vx_mps"), np.r_[short["vx_mps"], course["vx_mps"]])
+    assert "40.0 s usable in 2 stretch(es)" in str(two)
+
+
+def test_no_log_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="no log was given; pass one Log or a list"):
+        Driving.of([])
+
+
+def test_a_log_too_slow_to_use_is_refused(short: Log, altered: Callable[..., Log]) -> None:
+    slow = altered(short, vx_mps=np.full(short.n, 2.0))
+    with pytest.raises(InvalidInput, match=r"lap .*no stretch of 1 s or more at 3 m/s or faster"):
+        Driving.of(slow)
+
+
+def test_slow_parts_are_left_out(short: Log, truth: Model, altered: Callable[..., Log]) -> None:
+    vx = short["vx_mps"].copy()
+    vx[400:600] = 1.0
+    driving = Driving.of(altered(short, vx_mps=vx))
+    assert [(s.where.start, s.where.stop) for s in driving.stretches] == [(0, 400), (600, short.n)]
+    assert driving.problem(truth).samples == driving.samples == short.n - 200
+
+
+def test_without_force_the_acceleration_becomes_an_input(
+    short: Log, truth: Model, altered: Callable[..., Log]
+) -> None:
+    driving = Driving.of(altered(short, without=["fx_n"]))
+    assert not driving.force_known
+    assert driving.present == ("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2")
+    assert np.isnan(driving.measured[:, MEASURED.index("ax_mps2")]).all()
+    assert driving.problem(truth).samples == short.n
+
+
+def test_one_log_without_force_decides_for_all(
+    short: Log, course: Log, altered: Callable[..., Log]
+) -> None:
+    driving = Driving.of([altered(short, without=["fx_n"]), course])
+    assert not driving.force_known
+    assert np.isnan(driving.measured[:, MEASURED.index("ax_mps2")]).all()
+
+
+def test_an_absent_channel_is_missing_only_where_it_is_absent(
+    short: Log, course: Log, altered: Callable[..., Log]
+) -> None:
+    driving = Driving.of([altered(short, without=["vy_mps"]), course])
+    known = np.isfinite(driving.measured[:, MEASURED.index("vy_mps")])
+    assert known.tolist() == [False] * short.n + [True] * course.n
+    assert driving.present == MEASURED
+
+
+def test_missing_measurements_leave_the_others_in(short: Log, altered: Callable[..., Log]) -> None:
+    ay = short["ay_mps2"].copy()
+    ay[200:300] = np.nan
+    with pytest.warns(SysidWarning, match="ay_mps2: no values at samples 200 to 299"):
+        log = altered(short, ay_mps2=ay)
+    driving = Driving.of(log)
+    assert driving.samples == short.n
+    assert np.isnan(driving.measured[:, MEASURED.index("ay_mps2")]).sum() == 100
+
+
+def test_a_thinned_problem_keeps_windows_from_everywhere(lap: Log, truth: Model) -> None:
+    driving = Driving.of(lap)
+    thin = driving.problem(truth, most_samples=1500)
+    assert 0.8 * 1500 < thin.samples < 1.2 * 1500
+    assert driving.problem(truth, most_samples=10**6).samples == driving.samples
+    starts = [where.start for _, where in driving._pieces(1500)]
+    assert starts[0] == 0
+    assert starts[-1] > 0.6 * driving.samples

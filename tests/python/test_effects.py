@@ -1,0 +1,93 @@
+"""The catalogue of effects: what it says of itself, and that null values change nothing."""
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Effect, Fit, InvalidInput, Log, Model, _core, catalogue, effect
+from sysid_vehicle.effects import base_parameters
+from sysid_vehicle.estimate import Driving
+
+ALL = pytest.mark.parametrize("e", catalogue(), ids=lambda e: e.id)
+
+
+def test_the_catalogue_fills_the_core_vector_without_overlap() -> None:
+    columns = [p.column for p in base_parameters()]
+    for e in catalogue():
+        columns += e.columns
+    assert columns == list(range(_core.PARAMETERS))
+    assert [e.bit for e in catalogue()] == [1 << i for i in range(len(catalogue()))]
+    assert len({e.id for e in catalogue()}) == len(catalogue())
+
+
+@ALL
+def test_an_effect_says_what_it_is(e: Effect) -> None:
+    text = str(e)
+    for part in (e.id, e.title, e.equation, e.source, e.excited_by, e.moves):
+        assert part
+        assert part in text
+    assert e._repr_html_().startswith("<pre>")
+    assert "<" not in e._repr_html_().removeprefix("<pre>").removesuffix("</pre>")
+    for p in e.parameters:
+        assert p.unit
+        assert p.name in text
+        assert p.lower <= p.null_value <= p.upper
+        assert p.lower <= p.typical <= p.upper
+        assert 0.0 < p.matters <= abs(p.typical - p.null_value)
+        assert p.one_sided == (p.null_value in (p.lower, p.upper))
+
+
+def test_an_effect_is_found_by_name() -> None:
+    assert effect("steer_lag").id == "steer_lag"
+    assert effect(effect("mass")) is effect("mass")
+
+
+def test_a_wrong_name_is_answered_with_near_ones() -> None:
+    with pytest.raises(InvalidInput, match=r"no effect is called 'ster_lag'.*'steer_lag'"):
+        effect("ster_lag")
+
+
+@pytest.fixture(scope="module")
+def short(lap: Log) -> Driving:
+    return Driving.of(lap.between(0.0, 8.0))
+
+
+@ALL
+def test_null_values_change_no_bit(e: Effect, short: Driving, fit: Fit) -> None:
+    model = fit.model
+    noise = fit.noise.vector()
+    plain = short.problem(model)
+    filter_ = plain.freeze(model.vector(), noise)
+    without = plain.residuals(model.vector(), filter_)
+    added = model.add(e)
+    with_it = plain.with_model(added.core())
+    assert np.array_equal(with_it.residuals(added.vector(), filter_), without)
+    assert with_it.freeze(added.vector(), noise).log_likelihood == pytest.approx(
+        filter_.log_likelihood, rel=1e-9
+    )
+
+
+@ALL
+def test_a_typical_size_is_seen(e: Effect, short: Driving, fit: Fit) -> None:
+    added = fit.model.add(e)
+    typical = added.with_values({f"{e.id}.{p.name}": p.typical for p in e.parameters})
+    problem = short.problem(added)
+    filter_ = problem.freeze(added.vector(), fit.noise.vector())
+    null = problem.residuals(added.vector(), filter_)
+    moved = problem.residuals(typical.vector(), filter_) - null
+    assert np.isfinite(moved).all()
+    # In standard deviations of the noise, over all samples and channels.
+    assert np.linalg.norm(moved) > 3.0
+
+
+def test_a_model_at_typical_values_is_another_one(short: Driving, fit: Fit) -> None:
+    model = fit.model.add("aero_drag")
+    p = model.vector()
+    motion = np.array([30.0, 0.0, 0.0])
+    drag = model.with_values({"aero_drag.drag_area_m2": 0.45}).vector()
+    slower = model.core().evaluate(drag, motion, 0.0, 0.0)[0, 0]
+    usual = model.core().evaluate(p, motion, 0.0, 0.0)[0, 0]
+    car = model.vehicle
+    force = 0.5 * car.air_density_kgpm3 * 0.45 * 30.0**2
+    assert usual - slower == pytest.approx(force / car.mass_kg, rel=1e-12)
+    plain: Model = fit.model
+    assert plain.core().evaluate(drag, motion, 0.0, 0.0)[0, 0] == usual

@@ -1,0 +1,252 @@
+"""Parameters and noise come back from drives of a known car."""
+
+import re
+from collections.abc import Callable
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import (
+    Fit,
+    InvalidInput,
+    Log,
+    Model,
+    NoiseModel,
+    SensorNoise,
+    SysidWarning,
+    Tyre,
+    Vehicle,
+    drive,
+    identify,
+    manoeuvres,
+)
+from sysid_vehicle.identify import METHODS, refine, refit
+
+G = 9.80665
+SPREAD = 4.0  # standard errors
+
+
+def true_stiffness(car: Vehicle) -> tuple[float, float]:
+    per_metre = car.mass_kg * G / car.wheelbase_m
+    return (
+        car.tyre_front.cornering_stiffness_per_load * per_metre * car.lr_m,
+        car.tyre_rear.cornering_stiffness_per_load * per_metre * car.lf_m,
+    )
+
+
+def assert_stiffness_found(found: Fit, car: Vehicle) -> None:
+    for estimate, true in zip(found.derived, true_stiffness(car), strict=True):
+        assert abs(estimate.value - true) < SPREAD * estimate.std
+        assert 0.0 < estimate.std < 0.1 * true
+
+
+def test_the_cornering_stiffness_is_found(fit: Fit, car: Vehicle, start: Model) -> None:
+    assert fit.converged
+    assert_stiffness_found(fit, car)
+    front = fit.derived[0]
+    begun = start.value("B_front") * start.value("C_front") * start.value("D_front")
+    # The start lies outside what the estimate allows, or the test would tell nothing.
+    assert abs(begun / car.tyre_front.cornering_stiffness_per_load - 1.0) * front.value > (
+        SPREAD * front.std
+    )
+
+
+def test_every_determined_tyre_coefficient_is_found(fit: Fit, truth: Model) -> None:
+    determined = [e for e in fit.estimates if not e.note]
+    assert len(determined) >= 3
+    for e in determined:
+        assert abs(e.value - truth.value(e.name)) < SPREAD * e.std
+
+
+def test_the_noise_is_found(fit: Fit) -> None:
+    true = SensorNoise()
+    for found, field in zip(fit.noise.sensor, fields(true)[:5], strict=True):
+        assert found == pytest.approx(getattr(true, field.name), rel=0.15), field.name
+
+
+def test_residuals_are_white(fit: Fit) -> None:
+    problem, p = fit.driving.problem(fit.model), fit.model.vector()
+    e = problem.residuals(p, problem.freeze(p, fit.noise.vector()))
+    n = len(e)
+    together = np.sum(e[1:] * e[:-1], axis=0) / np.sum(e**2, axis=0)
+    assert np.abs(together).max() < SPREAD / np.sqrt(n)
+    assert np.abs(e.var(axis=0) - 1.0).max() < SPREAD * np.sqrt(2.0 / n)
+    assert np.abs(e.mean(axis=0)).max() < SPREAD / np.sqrt(n)
+    across = np.corrcoef(e.T)[np.triu_indices(5, 1)]
+    assert np.abs(across).max() < SPREAD / np.sqrt(n)
+
+
+def test_all_methods_end_at_the_same_likelihood(fit: Fit, start: Model, lap: Log) -> None:
+    assert set(METHODS) == {"gauss-newton", "nlopt", "scipy"}
+    ends = [fit.log_likelihood]
+    for method in ("nlopt", "scipy"):
+        found = identify(start, lap, starts=1, method=method)
+        assert found.converged
+        ends.append(found.log_likelihood)
+        assert found.derived[0].value == pytest.approx(fit.derived[0].value, rel=0.01)
+    # In nats, of 46 000: far less than one standard error of any of the eight parameters.
+    assert max(ends) - min(ends) < 2.0
+
+
+def test_starting_at_the_truth_would_lead_no_higher(
+    complete_fits: tuple[Fit, ...], truth: Model
+) -> None:
+    # B, C, D and E can copy each other: a search that stops in their valley ends many nats below.
+    for found in complete_fits:
+        best = refine(truth, found.driving, found.noise)
+        assert best.log_likelihood - found.log_likelihood < 2.0
+
+
+def test_an_unknown_method_is_refused(start: Model, lap: Log) -> None:
+    with pytest.raises(InvalidInput, match="'simplex'; there are gauss-newton, nlopt, scipy"):
+        identify(start, lap, method="simplex")
+
+
+def test_starts_agree(fit: Fit, start: Model) -> None:
+    assert len(fit.starts) == 3
+    assert all(s.agrees for s in fit.starts)
+    begins = [tuple(s.begin.values()) for s in fit.starts]
+    assert len(set(begins)) == 3
+    assert fit.starts[0].begin == {n: start.value(n) for n in start.free_names}
+    assert "3 of 3 starts agree" in str(fit)
+
+
+def test_the_same_seed_gives_the_same_answer(start: Model, lap: Log) -> None:
+    short = lap.between(0.0, 15.0)
+    one = identify(start, short, starts=2, seed=3)
+    same = identify(start, short, starts=2, seed=3, workers=1)
+    assert one.log_likelihood == same.log_likelihood
+    assert one.estimates == same.estimates
+    assert one.noise == same.noise
+    other = identify(start, short, starts=2, seed=4)
+    assert other.starts[1].begin != one.starts[1].begin
+
+
+def test_an_unknown_yaw_inertia_is_found(car: Vehicle, lap: Log) -> None:
+    unknown = car.replace(yaw_inertia_kgm2=None, tyre_front=Tyre(), tyre_rear=Tyre())
+    found = identify(Model(unknown), lap, starts=1)["yaw_inertia_kgm2"]
+    assert car.yaw_inertia_kgm2 is not None
+    guess = Model(unknown).value("yaw_inertia_kgm2")
+    assert abs(guess - car.yaw_inertia_kgm2) > 10.0 * found.std
+    assert abs(found.value - car.yaw_inertia_kgm2) < SPREAD * found.std
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("steer_lag.time_constant_s", 0.06),
+        ("aero_drag.drag_area_m2", 0.45),
+        ("steer_offset.offset_rad", -0.006),
+        ("gyro_bias.bias_radps", 0.01),
+        ("tyre_relaxation.relaxation_length_m", 0.45),
+    ],
+)
+def test_the_size_of_an_effect_is_found(
+    name: str, value: float, truth: Model, start: Model
+) -> None:
+    effect = name.split(".")[0]
+    log = drive(truth.add(effect).with_values({name: value}), manoeuvres.lap(30.0), seed=6)
+    found = identify(start.add(effect), log, starts=1)[name]
+    assert found.note == ""
+    assert abs(found.value - value) < SPREAD * found.std
+    assert abs(value) > 10.0 * found.std
+
+
+def test_an_absent_lateral_speed_is_no_obstacle(
+    start: Model, car: Vehicle, lap: Log, altered: Callable[..., Log]
+) -> None:
+    blind = altered(lap, without=["vy_mps"])
+    assert "vy_mps" in blind.missing()
+    found = identify(start, blind, starts=1)
+    assert found.driving.present == ("vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+    assert_stiffness_found(found, car)
+
+
+def test_an_absent_force_is_no_obstacle(
+    start: Model, car: Vehicle, lap: Log, altered: Callable[..., Log]
+) -> None:
+    blind = altered(lap, without=["fx_n"])
+    assert "fx_n" in blind.missing()
+    assert_stiffness_found(identify(start, blind, starts=1), car)
+
+
+def test_an_effect_that_needs_the_force_is_named_without_it(
+    start: Model, lap: Log, altered: Callable[..., Log]
+) -> None:
+    blind = altered(lap, without=["fx_n"]).between(0.0, 15.0)
+    with pytest.warns(SysidWarning, match="without fx_n the log cannot show aero_drag"):
+        drag = identify(start.add("aero_drag"), blind, starts=1)["aero_drag.drag_area_m2"]
+    # What the driven wheels need for it reaches the lateral motion, but it tells next to nothing.
+    assert drag.std > 0.1
+    assert abs(drag.value) < SPREAD * drag.std
+
+
+def test_holes_are_no_obstacle(
+    start: Model, car: Vehicle, lap: Log, altered: Callable[..., Log]
+) -> None:
+    ay, vy, steer = (lap[c].copy() for c in ("ay_mps2", "vy_mps", "steer_rad"))
+    ay[500:900] = np.nan
+    vy[800:2000] = np.nan
+    steer[2500:2600] = np.nan
+    with pytest.warns(SysidWarning) as told:
+        holed = altered(lap, ay_mps2=ay, vy_mps=vy, steer_rad=steer)
+    said = "\n".join(str(w.message) for w in told)
+    for channel, samples in (
+        ("ay_mps2", "500 to 899"),
+        ("vy_mps", "800 to 1999"),
+        ("steer_rad", "2500 to 2599"),
+    ):
+        assert f"{channel}: no values at samples {samples}" in said
+    found = identify(start, holed, starts=1)
+    assert found.driving.samples == lap.n - 100
+    assert "in 2 stretch(es)" in str(found)
+    assert_stiffness_found(found, car)
+
+
+def test_what_gentle_driving_cannot_tell_is_named(start: Model, truth: Model) -> None:
+    gentle = drive(truth, manoeuvres.lap(30.0, lateral_mps2=2.5), seed=8)
+    found = identify(start, gentle, starts=2)
+    # Far below the peak only the stiffness B C D shows.
+    assert {"D_front", "D_rear", "E_front", "E_rear"} <= set(found.undetermined)
+    for n in found.undetermined:
+        assert re.search(rf"{n} .*(not determined|at bound)", str(found))
+    assert_stiffness_found(found, truth.vehicle)
+
+
+def test_straight_driving_warns(start: Model, truth: Model) -> None:
+    straight = drive(truth, manoeuvres.straight_acceleration(20.0), seed=8)
+    with pytest.warns(SysidWarning, match="straight_acceleration"):
+        found = identify(start, straight, starts=1)
+    assert "D_front" in found.undetermined
+
+
+def test_going_on_from_a_fit_changes_nothing(fit: Fit) -> None:
+    again = refine(fit.model, fit.driving, fit.noise)
+    assert abs(again.log_likelihood - fit.log_likelihood) < 1.0
+    assert again.starts == ()
+    fixed = refit(fit.model, fit.driving, fit.noise)
+    assert fixed.noise == fit.noise
+    assert fixed.log_likelihood >= fit.log_likelihood - 1e-6
+
+
+def test_a_fit_tells_its_figures(fit: Fit) -> None:
+    e = fit["B_front"]
+    assert (e.name, e.unit) == ("B_front", "1/rad")
+    assert e.interval == pytest.approx((e.value - 1.96 * e.std, e.value + 1.96 * e.std))
+    assert fit.model.value("B_front") == e.value
+    with pytest.raises(KeyError, match="B_middle"):
+        fit["B_middle"]
+    assert fit.covariance.shape == (8, 8)
+    np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), [e.std for e in fit.estimates])
+    assert isinstance(fit.noise, NoiseModel)
+    for text in (str(fit), fit._repr_html_()):
+        assert "cornering stiffness front" in text
+        assert "95 % interval" in text
+
+
+def test_more_noise_gives_wider_intervals(fit: Fit, start: Model, truth: Model) -> None:
+    noisy = drive(truth, manoeuvres.lap(40.0), seed=1, noise=SensorNoise().scaled(3.0))
+    found = identify(start, noisy, starts=1)
+    ratio = found.derived[0].std / fit.derived[0].std
+    assert 2.0 < ratio < 5.0

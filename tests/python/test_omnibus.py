@@ -1,0 +1,49 @@
+"""Whether anything is left that depends on the driving."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Fit
+from sysid_vehicle.diagnose import Omnibus, omnibus
+from sysid_vehicle.identify import refine
+
+
+def test_nothing_is_left_of_a_complete_model(complete_fits: tuple[Fit, ...]) -> None:
+    found = [omnibus(f, f.driving) for f in complete_fits]
+    p_values = [o.p_value for o in found]
+    assert min(p_values) > 0.001
+    assert max(p_values) > 0.05
+    for o in found:
+        # Mean and standard deviation of a chi-squared variable.
+        assert abs(o.statistic - o.degrees) < 4.0 * np.sqrt(2.0 * o.degrees)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "shown_by"),
+    [
+        ("aero_drag.drag_area_m2", 0.45, {"F_x", "dv_x/dt"}),
+        ("steer_offset.offset_rad", 0.006, {"F_y", "M_z", "dv_y/dt"}),
+        ("gyro_bias.bias_radps", 0.01, {"r", "M_z", "dv_y/dt"}),
+    ],
+)
+def test_a_hidden_effect_is_left(
+    name: str, value: float, shown_by: set[str], hidden_fit: Callable[[str, float], Fit]
+) -> None:
+    fit = hidden_fit(name, value)
+    before = omnibus(fit, fit.driving)
+    assert before.p_value < 1e-6
+    assert before.strongest in shown_by
+    added = fit.model.add(name.split(".")[0]).with_values({name: 0.8 * value})
+    after = refine(added, fit.driving, fit.noise.floor())
+    assert omnibus(after, after.driving).p_value > 0.001
+
+
+def test_it_speaks_plainly() -> None:
+    assert str(Omnibus(40.0, 40, 0.47, "r")) == (
+        "nothing left that depends on the driving (p = 0.47)"
+    )
+    assert str(Omnibus(400.0, 40, 1e-9, "F_x")) == (
+        "something is left that depends on the driving, mostly in F_x (p = 1e-09)"
+    )

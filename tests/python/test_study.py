@@ -1,0 +1,259 @@
+"""The whole loop: the missing effect is added, and the error falls on driving nobody fitted."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import (
+    Fit,
+    InvalidInput,
+    Log,
+    Model,
+    Study,
+    SysidWarning,
+    catalogue,
+    drive,
+    improve,
+    manoeuvres,
+)
+from sysid_vehicle.study.held_out import gain_in_log_likelihood, hold_out
+
+LAG = "steer_lag.time_constant_s", 0.06
+LOOKS_LIKE_LAG = {"steer_lag", "tyre_relaxation", "yaw_inertia", "steer_compliance"}
+Drives = Callable[[Model, int], tuple[Log, Log]]
+
+
+@pytest.fixture(scope="module")
+def drives() -> Drives:
+    def make(car: Model, seed: int) -> tuple[Log, Log]:
+        train = drive(car, manoeuvres.lap(30.0), seed=seed)
+        test = drive(car, manoeuvres.handling_course(30.0, lateral_mps2=7.5), seed=seed + 1)
+        return train, test
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def lagging(truth: Model, drives: Drives) -> tuple[Log, Log]:
+    return drives(truth.add("steer_lag").with_values(dict([LAG])), 21)
+
+
+@pytest.fixture(scope="module")
+def told() -> list[str]:
+    return []
+
+
+@pytest.fixture(scope="module")
+def study(start: Model, lagging: tuple[Log, Log], told: list[str]) -> Study:
+    return improve(start, *lagging, starts=1, tell=told.append)
+
+
+def test_the_hidden_effect_is_added_first(study: Study) -> None:
+    assert study.verdict == "explained"
+    assert study.diagnoses[0].ranking[0].id == "steer_lag"
+    assert [a.id for a in study.added] == ["steer_lag"]
+    assert study.model.effects == ("steer_lag",)
+    (estimate,) = study.added[0].parameters
+    assert abs(estimate.value - LAG[1]) < 4.0 * estimate.std
+    assert study.added[0].p_value < 1e-6
+
+
+def test_the_held_out_error_falls_to_the_noise_floor(study: Study) -> None:
+    assert study.test[0].error > 1.2
+    assert study.test[-1].error <= 1.05
+    assert study.train[-1].error == pytest.approx(1.0, abs=0.02)
+    added = study.added[0]
+    assert (added.error_before, added.error_after) == (study.test[0].error, study.test[-1].error)
+    assert study.omnibus.p_value > 0.01
+
+
+def test_the_steps_belong_together(study: Study) -> None:
+    assert [f.model.effects for f in study.fits] == [(), ("steer_lag",)]
+    assert study.fit is study.fits[-1]
+    assert len(study.train) == len(study.test) == len(study.fits)
+    assert len(study.diagnoses) == 2
+    assert study.diagnoses[1].significant == ()
+    assert study.seconds > 0.0
+
+
+def test_it_tells_what_it_does(study: Study, told: list[str]) -> None:
+    assert told[0].startswith("Fitted the baseline to lap")
+    assert [t for t in told if t.startswith("Added steer_lag: time_constant_s 0.0")]
+
+
+def test_a_study_prints(study: Study) -> None:
+    for text in (str(study), study._repr_html_()):
+        assert "explained" in text
+        assert study.meaning in text
+        assert "+ steer_lag" in text
+        assert f"{study.test[-1].error:.3f}" in text
+    assert str(study).startswith("Verdict: explained")
+
+
+def refuse_constant(name: str) -> None:
+    raise AssertionError(f"{name} is not JSON")
+
+
+def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
+    path = tmp_path / "study.json"
+    study.to_json(path)
+    told = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse_constant)
+    assert sorted(told) == [
+        "channels",
+        "effects",
+        "errors",
+        "parameters",
+        "ranking",
+        "regions",
+        "verdict",
+        "warnings",
+    ]
+    assert told["verdict"] == "explained"
+    (added,) = told["effects"]
+    assert sorted(added) == ["error_after", "error_before", "id", "p_value", "parameters"]
+    assert added["parameters"]["time_constant_s"]["unit"] == "s"
+    assert added["parameters"]["time_constant_s"]["value"] == study.model.value(LAG[0])
+    first = told["ranking"][0]
+    assert sorted(first) == [
+        "id",
+        "indistinguishable_from",
+        "p_value",
+        "parameters",
+        "predicted_error",
+        "statistic",
+    ]
+    assert first["id"] == "steer_lag"
+    for when in ("before", "after"):
+        for where in ("train", "test"):
+            channels = told["channels"][when][where]
+            assert list(channels) == list(study.test[0].channels)
+            for figures in channels.values():
+                assert sorted(figures) == ["noise_floor", "nrmse", "r2", "rmse"]
+    assert told["channels"]["after"]["test"]["ay_mps2"]["nrmse"] < 1.1
+    assert told["regions"]
+    for region in told["regions"]:
+        assert sorted(region) == ["lateral_acceleration_mps2", "share", "speed_mps"]
+        assert region["speed_mps"][0] < region["speed_mps"][1]
+    assert told["errors"]["test"] == [c.error for c in study.test]
+    assert set(told["parameters"]) >= {"B_front", LAG[0], "cornering stiffness rear"}
+    assert told["warnings"] == list(study.warnings)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_infinite_figures_become_null(study: Study, tmp_path: Path) -> None:
+    names = [e.name for e in study.fit.estimates if not np.isfinite(e.std)]
+    told = study.to_dict()["parameters"]
+    assert all(np.isinf(told[n]["std"]) for n in names)
+    path = tmp_path / "study.json"
+    study.to_json(path)
+    written = json.loads(path.read_text(encoding="utf-8"))["parameters"]
+    assert [n for n, e in written.items() if e["std"] is None] == names
+
+
+def test_undetermined_parameters_are_among_the_warnings(study: Study) -> None:
+    for name in study.fit.undetermined:
+        assert any(w.startswith(f"{name}: ") for w in study.warnings)
+
+
+def test_a_complete_model_is_adequate(start: Model, truth: Model, drives: Drives) -> None:
+    found = improve(start, *drives(truth, 31), starts=1)
+    assert found.verdict == "adequate"
+    assert found.added == ()
+    assert found.to_dict()["effects"] == []
+    assert len(found.fits) == 1
+    assert found.test[0].error == pytest.approx(1.0, abs=0.04)
+    assert "nothing left" in str(found)
+
+
+def test_what_no_candidate_explains_is_not_explained(
+    start: Model, lagging: tuple[Log, Log]
+) -> None:
+    others = [e.id for e in catalogue() if e.id not in LOOKS_LIKE_LAG]
+    found = improve(start, *lagging, starts=1, candidates=others)
+    assert found.verdict in ("unknown", "partly_explained")
+    assert not set(found.model.effects) & LOOKS_LIKE_LAG
+    assert found.omnibus.p_value < 0.01 or found.train[-1].error > 1.1
+
+
+def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: Drives) -> None:
+    hidden = {"aero_drag.drag_area_m2": 0.45, "steer_offset.offset_rad": 0.006}
+    car = truth.add("aero_drag", "steer_offset").with_values(hidden)
+    found = improve(start, *drives(car, 41), starts=1)
+    assert found.verdict == "explained"
+    assert set(found.model.effects) == {"aero_drag", "steer_offset"}
+    errors = [c.error for c in found.test]
+    assert errors == sorted(errors, reverse=True)
+    for name, value in hidden.items():
+        assert abs(found.fit[name].value - value) < 4.0 * found.fit[name].std
+
+
+def test_it_stops_at_the_most_effects_allowed(start: Model, lagging: tuple[Log, Log]) -> None:
+    short = [log.between(0.0, 15.0) for log in lagging]
+    none = improve(start, *short, starts=1, most_effects=0)
+    assert none.added == ()
+    assert none.verdict == "unknown"
+    with pytest.raises(InvalidInput, match="most_effects must not be negative"):
+        improve(start, *short, most_effects=-1)
+
+
+def test_several_logs_are_fitted_together(start: Model, lap: Log, course: Log) -> None:
+    train = [lap.between(0.0, 10.0), lap.between(20.0, 30.0)]
+    found = improve(start, train, [course], starts=1, most_effects=0)
+    assert len(found.fit.driving.logs) == 2
+    assert set(found.train[0].log_number) == {0.0, 1.0}
+    assert set(found.test[0].log_number) == {0.0}
+
+
+def test_absent_channels_are_among_the_warnings(
+    start: Model, lap: Log, course: Log, altered: Callable[..., Log]
+) -> None:
+    train = altered(lap.between(0.0, 12.0), without=["vy_mps"])
+    found = improve(start, train, course, starts=1, most_effects=0)
+    assert [w for w in found.warnings if w.startswith("lap") and train.missing()["vy_mps"] in w]
+
+
+def test_the_end_of_the_only_log_is_held_out(lap: Log) -> None:
+    with pytest.warns(SysidWarning, match="'lap' is fitted up to 28.0 s and the rest is held out"):
+        train, test = hold_out(lap, None)
+    assert train.logs[0]["time_s"][-1] == pytest.approx(28.0)
+    assert test.logs[0]["time_s"][-1] == lap["time_s"][-1]
+    assert abs(train.samples + test.samples - lap.n) <= 1
+
+
+def test_the_last_of_several_logs_is_held_out(lap: Log, course: Log) -> None:
+    with pytest.warns(SysidWarning, match="'handling_course' is held out"):
+        train, test = hold_out([lap, course], None)
+    assert train.logs == (lap,)
+    assert test.logs == (course,)
+
+
+def test_logs_given_are_taken_as_they_are(lap: Log, course: Log) -> None:
+    train, test = hold_out([lap], course)
+    assert (train.logs, test.logs) == ((lap,), (course,))
+    with pytest.raises(InvalidInput, match="no log was given"):
+        hold_out([], None)
+
+
+def test_held_out_driving_tells_the_richer_model(study: Study, lagging: tuple[Log, Log]) -> None:
+    test = hold_out(*lagging)[1]
+    poorer, richer = study.fits
+    gain, error = gain_in_log_likelihood(poorer, richer, test)
+    assert gain > 2.0 * error > 0.0
+    back, _ = gain_in_log_likelihood(richer, poorer, test)
+    assert back == pytest.approx(-gain)
+    assert gain_in_log_likelihood(richer, richer, test) == (0.0, 0.0)
+    exact = [test.problem(f.model).freeze(f.model.vector(), f.noise.vector()) for f in study.fits]
+    difference = exact[1].log_likelihood - exact[0].log_likelihood
+    assert gain == pytest.approx(difference, rel=1e-9)
+
+
+def test_a_model_that_fails_on_held_out_driving_gains_nothing(fit: Fit, course: Log) -> None:
+    test = hold_out([course], course)[1]
+    broken = Fit(
+        fit.model.with_values({"B_front": float("nan")}),
+        *(getattr(fit, f) for f in list(Fit.__dataclass_fields__)[1:]),
+    )
+    assert gain_in_log_likelihood(fit, broken, test) == (-np.inf, 0.0)
