@@ -1,6 +1,5 @@
-// The single place where NumPy arrays cross into C++. Arrays must already be float64 and
-// contiguous: the Python side converts, so that nothing is copied or reshaped behind the user's
-// back.
+// The single place where NumPy arrays cross into C++. What is not float64 and contiguous is copied
+// on the way in; shapes are never changed.
 #pragma once
 
 #include <pybind11/numpy.h>

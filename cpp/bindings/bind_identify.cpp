@@ -12,6 +12,7 @@ void add_run(Problem& problem, double dt, const Array& inputs, const Array& meas
     const double* u = matrix(inputs, n, 2, "inputs");
     const double* y = matrix(measurements, n, kChannels, "measurements");
     if (n < 2) throw std::invalid_argument("inputs: expected two samples or more");
+    if (!(dt > 0.0) || !std::isfinite(dt)) throw std::invalid_argument("dt: expected above zero");
     Run run;
     run.dt = dt;
     run.inputs.resize(static_cast<std::size_t>(n));
@@ -21,6 +22,8 @@ void add_run(Problem& problem, double dt, const Array& inputs, const Array& meas
         if (!std::isfinite(u[2 * k]) || !std::isfinite(u[2 * k + 1]))
             throw std::invalid_argument("inputs: not finite at sample " + std::to_string(k));
         run.measurements[k] = Eigen::Map<const Vec<kChannels>>(y + kChannels * k);
+        if (run.measurements[k].array().isInf().any())
+            throw std::invalid_argument("measurements: infinite at sample " + std::to_string(k));
     }
     problem.runs.push_back(std::move(run));
 }
@@ -37,10 +40,21 @@ Noise to_noise(const Array& values) {
 
 const double* values_of(const Array& p) { return vector(p, kParameterCount, "parameters"); }
 
-void check(const std::vector<int>& columns) {
-    for (int c : columns)
-        if (c < 0 || c >= static_cast<int>(kParameterCount))
-            throw std::invalid_argument("columns: no parameter " + std::to_string(c));
+void check(const std::vector<int>& numbers, int count, const char* name) {
+    for (int c : numbers)
+        if (c < 0 || c >= count)
+            throw std::invalid_argument(std::string(name) + ": there is no " + std::to_string(c));
+}
+
+void check_columns(const std::vector<int>& columns) {
+    check(columns, static_cast<int>(kParameterCount), "columns");
+}
+
+void check(const Problem& problem, const FrozenFilter& filter) {
+    bool fits = filter.runs.size() == problem.runs.size();
+    for (std::size_t i = 0; fits && i < filter.runs.size(); ++i)
+        fits = filter.runs[i].size() == problem.runs[i].size();
+    if (!fits) throw std::invalid_argument("filter: was made from other runs");
 }
 
 }  // namespace
@@ -73,6 +87,7 @@ void register_identify(py::module_& m) {
         .def(
             "residuals",
             [](const Problem& self, const Array& p, const FrozenFilter& filter) {
+                check(self, filter);
                 const double* values = values_of(p);
                 Array out = empty(self.samples(), kChannels);
                 double* to = out.mutable_data();
@@ -83,6 +98,7 @@ void register_identify(py::module_& m) {
         .def(
             "half_sum_of_squares",
             [](const Problem& self, const Array& p, const FrozenFilter& filter) {
+                check(self, filter);
                 const double* values = values_of(p);
                 return unlocked([&] { return half_sum_of_squares(self, values, filter); });
             },
@@ -91,7 +107,8 @@ void register_identify(py::module_& m) {
             "sensitivities",
             [](const Problem& self, const Array& p, const FrozenFilter& filter,
                const std::vector<int>& columns) {
-                check(columns);
+                check_columns(columns);
+                check(self, filter);
                 const double* values = values_of(p);
                 Array out = empty(self.samples() * kChannels, columns.size());
                 double* to = out.mutable_data();
@@ -103,7 +120,8 @@ void register_identify(py::module_& m) {
             "normal_equations",
             [](const Problem& self, const Array& p, const FrozenFilter& filter,
                const std::vector<int>& columns) {
-                check(columns);
+                check_columns(columns);
+                check(self, filter);
                 const double* values = values_of(p);
                 Array gradient(static_cast<py::ssize_t>(columns.size()));
                 Array information = empty(columns.size(), columns.size());
@@ -118,6 +136,8 @@ void register_identify(py::module_& m) {
             "signal_sensitivities",
             [](const Problem& self, const Array& p, const FrozenFilter& filter,
                const Array& signals, const std::vector<int>& targets) {
+                check(self, filter);
+                check(targets, kPushes + kChannels, "targets");
                 const double* values = values_of(p);
                 const double* s = matrix(signals, static_cast<py::ssize_t>(self.samples()),
                                          static_cast<py::ssize_t>(targets.size()), "signals");

@@ -85,6 +85,9 @@ void register_model(py::module_& m) {
         .def_readwrite("drive_front_share", &VehicleData::drive_front_share);
     py::class_<SingleTrack>(m, "SingleTrack")
         .def(py::init([](const VehicleData& car, EffectMask effects, bool force_known) {
+                 if (effects >> kEffectCount != 0)
+                     throw std::invalid_argument(
+                         "effects: the mask names effects there are none of");
                  return SingleTrack{car, effects, force_known};
              }),
              py::arg("car"), py::arg("effects"), py::arg("force_known"))

@@ -79,7 +79,7 @@ class Effect:
 
     @property
     def bit(self) -> int:
-        """This effect in the core's mask."""
+        """The effect's bit in the core's mask."""
         return 1 << self.index
 
     @property

@@ -33,8 +33,8 @@ class Model:
     effects : tuple of str
         Ids of the effects that act.
     values : mapping of str to float
-        Values of parameters, by full name (`B_front`, `steer_lag.time_constant_s`), where they differ
-        from the vehicle's, or from the null values of effects.
+        Values of parameters by full name (`B_front`, `steer_lag.time_constant_s`), where they
+        differ from the vehicle's, or from the null values of effects.
     """
 
     vehicle: Vehicle
@@ -49,7 +49,9 @@ class Model:
         known = self.names
         for name in self.values:
             if name not in known:
-                raise InvalidInput(f"the model has no parameter '{name}'; it has {', '.join(known)}")
+                raise InvalidInput(
+                    f"the model has no parameter '{name}'; it has {', '.join(known)}"
+                )
 
     def add(self, *names: str | Effect) -> Model:
         """The same model with more effects, at their null values."""
@@ -139,7 +141,7 @@ class Model:
         return p
 
     def from_vector(self, p: FloatArray) -> Model:
-        """This model with the free parameters taken from a core vector."""
+        """The model with the free parameters taken from a core vector."""
         columns = self.parameters
         return self.with_values({n: float(p[columns[n].column]) for n in self.free_names})
 

@@ -23,13 +23,27 @@ PYTHON_LAYERS = [
     {"compare"},
     {"diagnose"},
     {"study"},
+    {"lab"},
+    {"online"},
+    {"twin"},
     {"plot"},
     {"report"},
     {"demo"},
     {"cli"},
     {"__main__"},
 ]
-CPP_LAYERS = ["math", "model", "effects", "dynamics", "simulate", "estimate", "identify"]
+CPP_LAYERS = [
+    "math",
+    "model",
+    "effects",
+    "dynamics",
+    "simulate",
+    "estimate",
+    "identify",
+    "lab",
+    "online",
+    "twin",
+]
 
 # `Study.report` writes the report of itself, a convenience; it imports only when it is called.
 EXCEPTIONS = {("study/study.py", "report")}

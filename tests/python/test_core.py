@@ -75,10 +75,74 @@ def test_a_parameter_that_is_not_there_is_refused(
 ) -> None:
     p = fit.model.vector()
     frozen = problem.freeze(p, fit.noise.vector())
-    with pytest.raises(ValueError, match=f"columns: no parameter {column}"):
+    with pytest.raises(ValueError, match=f"columns: there is no {column}"):
         problem.sensitivities(p, frozen, [0, column])
-    with pytest.raises(ValueError, match=f"columns: no parameter {column}"):
+    with pytest.raises(ValueError, match=f"columns: there is no {column}"):
         problem.normal_equations(p, frozen, [column])
+
+
+@pytest.mark.parametrize("dt", [0.0, -0.01, np.nan, np.inf])
+def test_an_interval_that_is_none_is_refused(dt: float, problem: _core.Problem) -> None:
+    with pytest.raises(ValueError, match="dt: expected above zero"):
+        problem.add_run(dt, np.zeros((N, 2)), np.zeros((N, 5)))
+
+
+def test_a_missing_measurement_is_fine_an_infinite_one_is_not(problem: _core.Problem) -> None:
+    measurements = np.zeros((N, 5))
+    measurements[3, 1] = np.nan
+    problem.add_run(0.01, np.zeros((N, 2)), measurements)
+    measurements[5, 2] = np.inf
+    with pytest.raises(ValueError, match="measurements: infinite at sample 5"):
+        problem.add_run(0.01, np.zeros((N, 2)), measurements)
+    assert problem.samples == 2 * N
+
+
+def test_a_filter_of_other_runs_is_refused(problem: _core.Problem, fit: Fit) -> None:
+    p = fit.model.vector()
+    frozen = problem.freeze(p, fit.noise.vector())
+    longer = _core.Problem(fit.model.core())
+    longer.add_run(0.01, np.zeros((2 * N, 2)), np.tile([20.0, 0.0, 0.0, 0.0, 0.0], (2 * N, 1)))
+    uses = [
+        lambda: longer.residuals(p, frozen),
+        lambda: longer.half_sum_of_squares(p, frozen),
+        lambda: longer.sensitivities(p, frozen, [0]),
+        lambda: longer.normal_equations(p, frozen, [0]),
+        lambda: longer.signal_sensitivities(p, frozen, np.zeros((2 * N, 1)), [0]),
+    ]
+    for use in uses:
+        with pytest.raises(ValueError, match="filter: was made from other runs"):
+            use()
+
+
+@pytest.mark.parametrize("target", [-1, _core.PUSHES + _core.CHANNELS])
+def test_a_target_that_is_not_there_is_refused(
+    target: int, problem: _core.Problem, fit: Fit
+) -> None:
+    p = fit.model.vector()
+    frozen = problem.freeze(p, fit.noise.vector())
+    with pytest.raises(ValueError, match=f"targets: there is no {target}"):
+        problem.signal_sensitivities(p, frozen, np.zeros((N, 1)), [target])
+
+
+def test_effects_that_are_not_there_are_refused() -> None:
+    with pytest.raises(ValueError, match="effects: the mask names effects there are none of"):
+        _core.SingleTrack(_core.VehicleData(), 1 << 40, True)
+
+
+@pytest.mark.parametrize(
+    ("name", "shortest"),
+    [("steer_lag.time_constant_s", 1e-6), ("tyre_relaxation.relaxation_length_m", 1e-5)],
+)
+def test_a_lag_too_short_to_resolve_acts_like_none(
+    name: str, shortest: float, fit: Fit, driving: Driving
+) -> None:
+    def log_density(model: Model) -> np.ndarray:
+        trace = driving.problem(model).trace(model.vector(), fit.noise.vector(), False)
+        each = trace["log_density"] - 0.5 * np.sum(trace["whitened"] ** 2, axis=1)
+        return each[5:]  # before that the filter has yet to learn where the lagging state stands
+
+    lagging = fit.model.add(name.split(".")[0]).with_values({name: shortest})
+    assert log_density(lagging).sum() == pytest.approx(log_density(fit.model).sum(), abs=0.5)
 
 
 def test_a_simulation_needs_matching_arrays(truth: Model) -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from .._files import write_text
+from .._files import write_json
 from ..compare import Comparison, compare
 from ..demo import run_demo
 from ..effects import catalogue
@@ -21,7 +20,6 @@ from ..model import Model
 from ..read import ChannelMap, read_log
 from ..report import summary, write_report
 from ..study import Study, improve
-from ..study.study import _estimate, _plain
 from ..vehicle import Vehicle
 from .outputs import refuse_unwritable
 
@@ -47,7 +45,7 @@ def _demo(args: argparse.Namespace, heard: Warnings) -> None:
             "parameters": {n.split(".")[1]: truth.value(n) for n in truth.names if "." in n},
             "found": shown.found,
         }
-        _write_json(content, args.json)
+        write_json(args.json, content)
 
 
 def _compare(args: argparse.Namespace, heard: Warnings) -> None:
@@ -59,7 +57,7 @@ def _compare(args: argparse.Namespace, heard: Warnings) -> None:
     print(comparison)
     print(fit)
     if args.json is not None:
-        _write_json(_comparison(comparison, fit, heard), args.json)
+        write_json(args.json, _comparison(comparison, fit, heard))
 
 
 def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
@@ -150,10 +148,6 @@ def _comparison(c: Comparison, fit: Fit, heard: Warnings) -> dict[str, Any]:
             }
             for r in c.regions
         ],
-        "parameters": {e.name: _estimate(e) for e in (*fit.estimates, *fit.derived)},
+        "parameters": {e.name: e.to_dict() for e in (*fit.estimates, *fit.derived)},
         "warnings": list(heard),
     }
-
-
-def _write_json(content: dict[str, Any], path: Path) -> None:
-    write_text(path, json.dumps(_plain(content), indent=2, allow_nan=False) + "\n")

@@ -94,9 +94,7 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         where = "".join(f"<li>{r}</li>" for r in self.regions)
-        return (
-            f"<p>{self._headline()}</p>{html_table(self._HEAD, self._rows())}<ul>{where}</ul>"
-        )
+        return f"<p>{self._headline()}</p>{html_table(self._HEAD, self._rows())}<ul>{where}</ul>"
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """The map of where the model fails."""
@@ -123,7 +121,9 @@ def _running_rms(e: FloatArray, log_number: FloatArray, width: int) -> FloatArra
     count = np.isfinite(e).astype(float)
     box = np.ones(width)
     with np.errstate(invalid="ignore", divide="ignore"):
-        out: FloatArray = np.sqrt(np.convolve(square, box, "same") / np.convolve(count, box, "same"))
+        out: FloatArray = np.sqrt(
+            np.convolve(square, box, "same") / np.convolve(count, box, "same")
+        )
     out[np.flatnonzero(np.diff(log_number))] = np.nan  # breaks the line between logs
     return out
 

@@ -1,4 +1,4 @@
-"""Which physical effect is a fitted model missing?"""
+"""Name the physical effect that a fitted model is missing."""
 
 from __future__ import annotations
 
@@ -133,15 +133,14 @@ class Diagnosis:
         ]
 
     def _headline(self) -> str:
-        n = len(self.significant)
-        if n == 0:
-            what = "no effect of the catalogue is missing"
-        else:
-            what = f"most likely missing: {self.ranking[0].effect.title}"
-            if self.ranking[0].indistinguishable_from:
-                twins = ", ".join(self.ranking[0].indistinguishable_from)
-                what += f" (this driving cannot tell it from {twins})"
-        return f"{what}; {self.omnibus}"
+        if not self.significant:
+            return f"no effect of the catalogue is missing; {self.omnibus}"
+        what = f"most likely missing: {self.ranking[0].effect.title}"
+        if self.ranking[0].indistinguishable_from:
+            twins = ", ".join(self.ranking[0].indistinguishable_from)
+            what += f" (this driving cannot tell it from {twins})"
+        # The test against unknown forces is blunter than that of one effect: its silence is none.
+        return f"{what}; {self.omnibus}" if self.omnibus.rejects else what
 
     def __str__(self) -> str:
         return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
@@ -158,7 +157,9 @@ class Diagnosis:
         shown = self.ranking[:most][::-1]
         colours = ["tab:red" if c.p_value < self.alpha else "0.7" for c in shown]
         ax.barh([c.id for c in shown], [max(c.statistic, 0.1) for c in shown], color=colours)
-        ax.set(xscale="log", xlabel="evidence (score statistic; refitted: 2 x gain in log-likelihood)")
+        ax.set(
+            xscale="log", xlabel="evidence (score statistic; refitted: 2 x gain in log-likelihood)"
+        )
         return ax
 
 
@@ -175,7 +176,7 @@ def diagnose(
 ) -> Diagnosis:
     """Rank the effects a fitted model may lack.
 
-    All candidates are scored at once (`score.py`); the best few are refitted with their exact dynamics
+    All candidates are scored at once (`score.py`); the best few are refitted with exact dynamics
     and ordered by likelihood.
 
     Parameters
@@ -206,7 +207,9 @@ def diagnose(
             family[s.effect.id],
             s.value,
             s.std,
-            float(np.sqrt(max(remaining - s.statistic * max(s.variance_ratio, 1.0), 0.0) / present)),
+            float(
+                np.sqrt(max(remaining - s.statistic * max(s.variance_ratio, 1.0), 0.0) / present)
+            ),
             s.retained,
             s.variance_ratio,
             _score_twins(board, s),
@@ -305,9 +308,7 @@ def _starts(c: Candidate) -> list[dict[str, float]]:
 
 def _with_refit_twins(c: Candidate, all_: list[Candidate]) -> Candidate:
     """Among refitted effects the likelihood itself says which cannot be told apart."""
-    near = tuple(
-        o.id for o in all_ if o is not c and abs(o.statistic - c.statistic) < _TELLS_APART
-    )
+    near = tuple(o.id for o in all_ if o is not c and abs(o.statistic - c.statistic) < _TELLS_APART)
     refitted = {o.id for o in all_}
     twins = (*near, *(t for t in c.indistinguishable_from if t not in refitted))
     return replace(c, indistinguishable_from=twins)

@@ -2,8 +2,8 @@
 
 Signals of speed, acceleration and steering, as virtual forces, moments, accelerations and sensor
 shifts, are scored together after projection on all the model can already do (a portmanteau score
-test; Lin, Biometrika 1997). Signals are built from what was known one sample earlier: the noise of a
-measurement must not enter its own prediction.
+test; Lin, Biometrika 1997). Signals are built from what was known one sample earlier: the noise of
+a measurement must not enter its own prediction.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from ..identify import Fit
 from .score import _basis, _pseudo_inverse, _variance_ratio
 
 __all__ = ["Omnibus", "omnibus"]
+
+_LEVEL = 0.01
 
 # Targets in the core's order: pushes F_x, F_y, M_z, then accelerations, then sensor readings.
 _TARGETS = {"F_x": 0, "F_y": 1, "M_z": 2, "dv_x/dt": 3, "dv_y/dt": 4}
@@ -43,8 +45,13 @@ class Omnibus:
     p_value: float
     strongest: str
 
+    @property
+    def rejects(self) -> bool:
+        """Whether the model is shown to be incomplete, at 1 %."""
+        return not self.p_value > _LEVEL
+
     def __str__(self) -> str:
-        if self.p_value > 0.01:
+        if not self.rejects:
             return f"nothing left that depends on the driving (p = {self.p_value:.2g})"
         return (
             f"something is left that depends on the driving, mostly in {self.strongest} "
@@ -60,7 +67,9 @@ def omnibus(fit: Fit, driving: Driving) -> Omnibus:
     frozen = problem.freeze(p, noise)
     e = problem.residuals(p, frozen).ravel()
     known = fit.model.parameters
-    basis = _basis(problem.sensitivities(p, frozen, [known[n].column for n in fit.model.free_names]))
+    basis = _basis(
+        problem.sensitivities(p, frozen, [known[n].column for n in fit.model.free_names])
+    )
     names, signals, targets = _virtual(problem, p, noise, driving)
     G = problem.signal_sensitivities(p, frozen, as_float64(signals), targets)
     R = G - basis @ (basis.T @ G)
@@ -68,9 +77,7 @@ def omnibus(fit: Fit, driving: Driving) -> Omnibus:
     R, names = R[:, kept], [n for n, k in zip(names, kept, strict=True) if k]
     e = e - basis @ (basis.T @ e)
     statistic, degrees = _statistic(R, e)
-    by_target = {
-        t: _statistic(R[:, [n == t for n in names]], e)[0] for t in dict.fromkeys(names)
-    }
+    by_target = {t: _statistic(R[:, [n == t for n in names]], e)[0] for t in dict.fromkeys(names)}
     return Omnibus(
         statistic,
         degrees,

@@ -228,8 +228,8 @@ def _p_value(effect: Effect, statistic: FloatArray, value: FloatArray, rank: int
 def _variance_ratio(R: FloatArray, e: FloatArray, inverse: FloatArray) -> float:
     """Long-run over naive variance of the score, the effect's own explanation taken out.
 
-    Bartlett weights over 100 samples (Newey & West, Econometrica 1987); the largest over the effect's
-    parameters.
+    Bartlett weights over 100 samples (Newey & West, Econometrica 1987); the largest over the
+    effect's parameters.
     """
     channels = _core.CHANNELS
     terms = (R * e[:, None]).reshape(-1, channels, R.shape[1]).sum(axis=1)

@@ -140,6 +140,8 @@ class Driving:
         return pieces
 
     def __str__(self) -> str:
-        seconds = sum((s.where.stop - s.where.start) / self.logs[s.log].rate_hz for s in self.stretches)
+        seconds = sum(
+            (s.where.stop - s.where.start) / self.logs[s.log].rate_hz for s in self.stretches
+        )
         names = ", ".join(log.name for log in self.logs)
         return f"{names}: {seconds:.1f} s usable in {len(self.stretches)} stretch(es)"

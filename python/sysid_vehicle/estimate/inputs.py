@@ -2,10 +2,11 @@
 
 Noise on the steering angle enters the predicted acceleration. A model that lags, filters that noise
 and predicts better for the wrong reason: on complete data it is found as a false relaxation length.
-So the noise is taken out where the signal is smooth enough to tell: each sample is a local quadratic
-over the longest symmetric window that agrees with all shorter ones (intersection of confidence
-intervals; Goldenshluger & Nemirovski, Mathematical Methods of Statistics 1997; Katkovnik, IEEE
-Transactions on Signal Processing 1999). At a corner the window shrinks to the sample itself.
+So the noise is taken out where the signal is smooth enough to tell: each sample is a local
+quadratic over the longest symmetric window that agrees with all shorter ones (intersection of
+confidence intervals; Goldenshluger & Nemirovski, Mathematical Methods of Statistics 1997;
+Katkovnik, IEEE Transactions on Signal Processing 1999). At a corner the window shrinks to the
+sample itself.
 """
 
 from __future__ import annotations

@@ -93,7 +93,9 @@ def _limits(vehicle: Vehicle) -> tuple[FloatArray, FloatArray]:
 
 def first_guess(driving: Driving, vehicle: Vehicle) -> NoiseModel:
     """A generous start: sensors from their fast scatter, the motion free to follow them."""
-    sensors = [max(white_noise_std(y), s) for y, s in zip(driving.measured.T, _SMALLEST, strict=True)]
+    sensors = [
+        max(white_noise_std(y), s) for y, s in zip(driving.measured.T, _SMALLEST, strict=True)
+    ]
     weight = vehicle.mass_kg * 9.81
     wander = (0.02 * weight, 0.04 * weight, 0.02 * weight * vehicle.wheelbase_m / 2.0)
     return NoiseModel(tuple(sensors), (0.02, 0.02, 0.01), wander, 0.3)
@@ -104,8 +106,8 @@ def learn_noise(
 ) -> tuple[NoiseModel, float]:
     """Noise of maximum likelihood at fixed model parameters, and the log-likelihood.
 
-    Fisher scoring with Levenberg's damping on the logarithms of the noise parameters; the likelihood
-    never falls.
+    Fisher scoring with Levenberg's damping on the logarithms of the noise parameters; the
+    likelihood never falls.
     """
     low, high = _limits(vehicle)
     eta = np.clip(np.log(np.maximum(start.vector(), 1e-12)), low, high)

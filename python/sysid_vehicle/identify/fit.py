@@ -37,6 +37,10 @@ class Estimate:
         """95 % interval."""
         return self.value - 1.96 * self.std, self.value + 1.96 * self.std
 
+    def to_dict(self) -> dict[str, float | str]:
+        """Value, standard error and unit, ready for JSON."""
+        return {"value": self.value, "std": self.std, "unit": self.unit}
+
     def __str__(self) -> str:
         return f"{self.name} = {number(self.value)} +- {number(self.std, 2)} {self.unit}"
 
@@ -95,7 +99,7 @@ class Fit:
 
     @property
     def derived(self) -> tuple[Estimate, ...]:
-        """What the tyre coefficients mean together: cornering stiffness, and slip angle at the peak.
+        """What the tyre coefficients mean together: cornering stiffness and slip at the peak.
 
         Driving that never reaches the peak determines these, or only the stiffness, long before it
         determines B, C, D and E one by one.

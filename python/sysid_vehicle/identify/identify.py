@@ -96,8 +96,8 @@ def identify(
     costs = np.array([cost for _, cost in ends])
     if not np.isfinite(costs).any():
         raise NumericalError(
-            f"{driving}: no start led to a finite likelihood; check the units and signs of the log, "
-            "and the starting tyre values of the vehicle file"
+            f"{driving}: no start led to a finite likelihood; check the units and signs of the "
+            "log, and the starting tyre values of the vehicle file"
         )
     best = int(np.nanargmin(costs))
     table = tuple(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import FloatArray
-from ..estimate import MEASURED
+from ..estimate import MEASURED, Driving
 from ..identify import Fit
 from ..study import Study
 from .words import stages
@@ -43,15 +43,15 @@ class Excerpt:
 
 
 def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5) -> Excerpt | None:
-    """Find the part of the training driving in which the baseline predicted worst.
+    """Find the part of the held-out driving in which the baseline predicted worst.
 
     Returns None if no stretch is long enough to predict that far.
     """
-    driving = study.fit.driving
+    driving = study.held_out
     channels = tuple(c for c in _SHOWN if c in driving.present)
     columns = [MEASURED.index(c) for c in channels]
     errors = {
-        title: _errors(study.fits[i], study.fit, horizon_s)[:, columns]
+        title: _errors(study.fits[i], study.fit, driving, horizon_s)[:, columns]
         for title, i in stages(study)
     }
     measured = driving.measured[:, columns]
@@ -85,9 +85,8 @@ def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5)
     )
 
 
-def _errors(fit: Fit, judge: Fit, horizon_s: float) -> FloatArray:
+def _errors(fit: Fit, judge: Fit, driving: Driving, horizon_s: float) -> FloatArray:
     """Prediction errors that far ahead, samples x 5, by filters with the same noise for all."""
-    driving = fit.driving
     ahead = round(horizon_s * driving.logs[0].rate_hz)
     problem = driving.problem(fit.model)
     return problem.look_ahead(fit.model.vector(), judge.noise.floor().vector(), max(ahead, 1))

@@ -163,7 +163,7 @@ def _excerpt(study: Study, truth: Model | None) -> list[str]:
         heading("Where the baseline failed most"),
         picture(
             figure,
-            f"{excerpt.log}, training driving, predicted {excerpt.horizon_s:g} s ahead from what "
+            f"{excerpt.log}, held-out driving, predicted {excerpt.horizon_s:g} s ahead from what "
             "was known by then and the steering and force since.",
         ),
     ]

@@ -21,7 +21,7 @@ _BLOCK_S = 5.0
 def hold_out(
     train: Log | Sequence[Log], test: Log | Sequence[Log] | None
 ) -> tuple[Driving, Driving]:
-    """Training and held-out driving. Without `test`: the last log, or the last 30 % of the only one."""
+    """Training and held-out driving; without `test`: the last log, or 30 % of the only one."""
     logs = [train] if isinstance(train, Log) else list(train)
     if test is not None:
         return Driving.of(logs), Driving.of(test)
@@ -33,8 +33,8 @@ def hold_out(
     log = logs[0]
     cut = float(log["time_s"][int((1.0 - _SHARE) * log.n)])
     warn(
-        f"no test log was given: '{log.name}' is fitted up to {cut:.1f} s and the rest is held out; "
-        "another manoeuvre would tell more"
+        f"no test log was given: '{log.name}' is fitted up to {cut:.1f} s and the rest is "
+        "held out; another manoeuvre would tell more"
     )
     return Driving.of(log.between(-np.inf, cut)), Driving.of(log.between(cut, np.inf))
 
@@ -42,8 +42,8 @@ def hold_out(
 def gain_in_log_likelihood(poorer: Fit, richer: Fit, test: Driving) -> tuple[float, float]:
     """What the richer model gains on held-out driving, and the standard error of that, in nats.
 
-    Each model predicts with its own noise; the error comes from blocks of 5 s. A model that fails on
-    the held-out driving gains minus infinity.
+    Each model predicts with its own noise; the error comes from blocks of 5 s. A model that fails
+    on the held-out driving gains minus infinity.
     """
     pieces = []
     for fit in (poorer, richer):

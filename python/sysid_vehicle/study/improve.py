@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..compare import Comparison, compare
-from ..diagnose import Candidate, Diagnosis, diagnose, omnibus
+from ..diagnose import Candidate, Diagnosis, Omnibus, diagnose, omnibus
 from ..errors import InvalidInput, warn
 from ..estimate import Driving
 from ..identify import Fit, identify, refine
@@ -21,7 +21,6 @@ __all__ = ["improve"]
 
 _IDLE = 2.6  # an added effect within so many standard errors of nothing is dropped again
 _AT_FLOOR = 1.10  # of the noise floor, one step ahead, in training
-_OMNIBUS = 0.01
 
 
 def improve(
@@ -39,8 +38,8 @@ def improve(
 ) -> Study:
     """Improve a model step by step until nothing more is missing that the driving can show.
 
-    Each step scores all effects, refits the best few with their exact dynamics, and adds the best one
-    that also predicts the held-out driving better. An effect that became idle is dropped again.
+    Each step scores all effects, refits the best few with their exact dynamics, and adds the best
+    one that also predicts the held-out driving better. An effect that became idle is dropped again.
 
     Parameters
     ----------
@@ -84,7 +83,9 @@ def improve(
         assert chosen.fit is not None
         p_values[chosen.id] = chosen.p_value
         fit = _without_idle(chosen.fit)
-        if chosen.id not in fit.model.effects or any(f.model.effects == fit.model.effects for f in fits):
+        if chosen.id not in fit.model.effects or any(
+            f.model.effects == fit.model.effects for f in fits
+        ):
             fit = fits[-1]
             break
         fits.append(fit)
@@ -97,13 +98,14 @@ def improve(
     on_train = [compare(f, train_driving, noise=floor) for f in fits]
     on_test = [compare(f, test_driving, noise=floor) for f in fits]
     left = omnibus(fit, train_driving)
-    verdict = _verdict(fit, diagnoses[-1], on_train[-1], left.p_value)
+    verdict = _verdict(fit, diagnoses[-1], on_train[-1], left)
     return Study(
         verdict=verdict,
         fits=tuple(fits),
         diagnoses=tuple(diagnoses),
         train=tuple(on_train),
         test=tuple(on_test),
+        held_out=test_driving,
         added=_added(fits, on_test, p_values),
         omnibus=left,
         warnings=_warnings(fit, train_driving),
@@ -146,11 +148,11 @@ def _strength(fit: Fit, name: str) -> float:
     )
 
 
-def _verdict(fit: Fit, last: Diagnosis, score: Comparison, p_left: float) -> Verdict:
+def _verdict(fit: Fit, last: Diagnosis, score: Comparison, left: Omnibus) -> Verdict:
     found = bool(fit.model.effects)
-    complete = p_left > _OMNIBUS and score.error < _AT_FLOOR
+    complete = not left.rejects and score.error < _AT_FLOOR
     if not found:
-        return "adequate" if p_left > _OMNIBUS and not last.significant else "unknown"
+        return "adequate" if not left.rejects and not last.significant else "unknown"
     return "explained" if complete else "partly_explained"
 
 

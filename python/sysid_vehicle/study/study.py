@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
-from .._files import write_text
+from .._files import write_json
 from .._text import html_table, number, text_table
 from ..compare import Comparison
 from ..diagnose import Candidate, Diagnosis, Omnibus
+from ..estimate import Driving
 from ..identify import Estimate, Fit
 from ..model import Model
 
@@ -70,6 +68,8 @@ class Study:
         One before each step, and the last one, which found nothing more to add.
     train, test : tuple of Comparison
         For each fit, all against the noise floor of the final one.
+    held_out : Driving
+        The driving the fits never saw.
     added : tuple of AddedEffect
     omnibus : Omnibus
         Whether the final model leaves anything that depends on the driving.
@@ -82,6 +82,7 @@ class Study:
     diagnoses: tuple[Diagnosis, ...]
     train: tuple[Comparison, ...]
     test: tuple[Comparison, ...]
+    held_out: Driving
     added: tuple[AddedEffect, ...]
     omnibus: Omnibus
     warnings: tuple[str, ...]
@@ -121,9 +122,8 @@ class Study:
 
     def _repr_html_(self) -> str:
         effects = "".join(f"<li>{a}</li>" for a in self.added)
-        return (
-            f"<p><b>{self.verdict}</b>: {self.meaning}.</p><ul>{effects}</ul>"
-            + html_table(self._HEAD, self._rows())
+        return f"<p><b>{self.verdict}</b>: {self.meaning}.</p><ul>{effects}</ul>" + html_table(
+            self._HEAD, self._rows()
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -148,15 +148,13 @@ class Study:
                 "train": [c.error for c in self.train],
                 "test": [c.error for c in self.test],
             },
-            "parameters": {
-                e.name: _estimate(e) for e in (*self.fit.estimates, *self.fit.derived)
-            },
+            "parameters": {e.name: e.to_dict() for e in (*self.fit.estimates, *self.fit.derived)},
             "warnings": list(self.warnings),
         }
 
     def to_json(self, path: str | Path) -> None:
         """Write all figures to a JSON file, whole or not at all."""
-        write_text(Path(path), json.dumps(_plain(self.to_dict()), indent=2, allow_nan=False) + "\n")
+        write_json(path, self.to_dict())
 
     def report(self, path: str | Path) -> None:
         """Write the study as one self-contained HTML file."""
@@ -166,25 +164,10 @@ class Study:
         write_report(self, Path(path))
 
 
-def _plain(x: Any) -> Any:
-    """The same with NaN and infinity as null: JSON has neither."""
-    if isinstance(x, dict):
-        return {k: _plain(v) for k, v in x.items()}
-    if isinstance(x, list | tuple):
-        return [_plain(v) for v in x]
-    if isinstance(x, float):
-        return x if np.isfinite(x) else None
-    return x
-
-
-def _estimate(e: Estimate) -> dict[str, Any]:
-    return {"value": e.value, "std": e.std, "unit": e.unit}
-
-
 def _effect(a: AddedEffect) -> dict[str, Any]:
     return {
         "id": a.id,
-        "parameters": {e.name.split(".")[1]: _estimate(e) for e in a.parameters},
+        "parameters": {e.name.split(".")[1]: e.to_dict() for e in a.parameters},
         "error_before": a.error_before,
         "error_after": a.error_after,
         "p_value": a.p_value,

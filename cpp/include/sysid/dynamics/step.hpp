@@ -30,7 +30,7 @@ constexpr double kLowestSpeed = 1.0;
 
 inline int substeps_for(const SingleTrack& model, const double* p, double v_x, double dt) {
     const double rate = model.fastest_rate(p, std::max(v_x, kLowestSpeed));
-    return static_cast<int>(std::clamp(std::ceil(dt * rate / 0.8), 1.0, 60.0));
+    return static_cast<int>(std::clamp(std::ceil(dt * rate / 0.8), 1.0, 250.0));
 }
 
 template <class S, class T>

@@ -39,6 +39,10 @@ struct EffectInfo {
     bool needs_force = false;
 };
 
+/// Lags act no faster than this [1/s]: minutes of driving hardly resolve a quarter of a millisecond,
+/// and integration would need ever shorter steps.
+constexpr double kFastestLag = 4000.0;
+
 struct Effect {
     template <class T, class S>
     static void vehicle(const T* /*p*/, Workings<S>& /*w*/) {}

@@ -22,6 +22,7 @@ struct ImuLeverArm : Effect {
 
     template <class T, class S>
     static void input(const T* p, Workings<S>& w) {
+        // l_y dr/dt is left out: the yaw acceleration follows from the forces, which come later.
         w.ax_input += p[0] * (w.r * w.r);
     }
     template <class T, class S>

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+
 #include "sysid/effects/effect.hpp"
 #include "sysid/math/dual.hpp"
 
@@ -22,10 +24,13 @@ struct SteerLag : Effect {
     template <class T, class S>
     static void steering(const T* p, Workings<S>& w, const S* aux, S* aux_rate) {
         if (!(value_of(p[0]) > 0.0)) return;
-        aux_rate[kSteerLagged] = (w.delta - aux[kSteerLagged]) / p[0];
+        const T time_constant = value_of(p[0]) > 1.0 / kFastestLag ? p[0] : T(1.0 / kFastestLag);
+        aux_rate[kSteerLagged] = (w.delta - aux[kSteerLagged]) / time_constant;
         w.delta = aux[kSteerLagged];
     }
-    static double rate(const double* p, double /*v_x*/) { return p[0] > 0.0 ? 1.0 / p[0] : 0.0; }
+    static double rate(const double* p, double /*v_x*/) {
+        return p[0] > 0.0 ? std::min(1.0 / p[0], kFastestLag) : 0.0;
+    }
 };
 
 }  // namespace sysid

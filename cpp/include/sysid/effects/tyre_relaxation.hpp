@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+
 #include "sysid/effects/effect.hpp"
 #include "sysid/math/dual.hpp"
 
@@ -22,13 +24,16 @@ struct TyreRelaxation : Effect {
     template <class T, class S>
     static void slip(const T* p, Workings<S>& w, const S* aux, S* aux_rate) {
         if (!(value_of(p[0]) > 0.0)) return;
-        const S rate = w.v_x / p[0];
+        S rate = w.v_x / p[0];
+        if (value_of(rate) > kFastestLag) rate = S(kFastestLag);
         aux_rate[kSlipFrontLagged] = rate * (w.alpha_f - aux[kSlipFrontLagged]);
         aux_rate[kSlipRearLagged] = rate * (w.alpha_r - aux[kSlipRearLagged]);
         w.alpha_f = aux[kSlipFrontLagged];
         w.alpha_r = aux[kSlipRearLagged];
     }
-    static double rate(const double* p, double v_x) { return p[0] > 0.0 ? v_x / p[0] : 0.0; }
+    static double rate(const double* p, double v_x) {
+        return p[0] > 0.0 ? std::min(v_x / p[0], kFastestLag) : 0.0;
+    }
 };
 
 }  // namespace sysid

@@ -20,6 +20,7 @@ struct FrozenStep {
     Mat<kChannels, kChannels> whitener;
 };
 
+/// Belongs to problems with the runs it was made from, whatever their model.
 struct FrozenFilter {
     std::vector<std::vector<FrozenStep>> runs;
     double correlation_time_s = 0.5;

@@ -1,0 +1,259 @@
+// Extended-state observer: a linear-tyre single-track model whose unknown forces are states.
+//
+//   x = v_x, v_y [m/s], r [rad/s], xi_x, xi_y [N], xi_psi [N m]     y = v_x, v_y, r, a_y
+//   m v_x' = m v_y r - c v_x + F_x + xi_x
+//   m v_y' = Y - m v_x r + xi_y           Y = -(C_f + C_r) v_y/s - (C_f l_f - C_r l_r) r/s + C_f d
+//   I r'   = N + xi_psi        N = -(C_f l_f - C_r l_r) v_y/s - (C_f l_f^2 + C_r l_r^2) r/s
+//                                  + C_f l_f d
+//   a_y    = (Y + xi_y) / m               s = max(v_x, 1)
+//
+// The xi wander freely: they are what the sensors say and the model does not, a virtual force
+// sensor (Han, IEEE Trans. Ind. Electron. 2009).
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "sysid/estimate/kalman.hpp"
+#include "sysid/math/exponential.hpp"
+
+namespace sysid::lab {
+
+constexpr int kObserverStates = 6;
+constexpr int kObserverMeasurements = 4;
+using ObserverVec = Vec<kObserverStates>;
+using ObserverMat = Mat<kObserverStates, kObserverStates>;
+using ObserverReading = Vec<kObserverMeasurements>;  // v_x, v_y, r, a_y; NaN where missing
+using ObserverRow = Mat<kObserverMeasurements, kObserverStates>;
+
+/// Which model of the two the filter uses, feature by feature; the default has all of them mended.
+struct ObserverForm {
+    bool feed_through = true;     // the steering angle enters a_y at once
+    bool input_before = true;     // x(k) follows from the inputs of k-1, not of k
+    bool exact_sampling = true;   // inputs held and dynamics sampled exactly, not by Euler's rule
+    bool coupling = true;         // v_y r in the v_x equation and the full Jacobian
+    bool speed_predicted = true;  // a_y with the predicted speed, not the estimate before it
+
+    static ObserverForm mended() { return {}; }
+    static ObserverForm published() { return {false, false, false, false, false}; }
+};
+
+/// What the observer believes of the car.
+struct ObserverCar {
+    double mass_kg = 780.0;
+    double yaw_inertia_kgm2 = 1000.0;
+    double lf_m = 1.4;
+    double lr_m = 1.6;
+    double drag_nspm = 0.3;  // linear in v_x
+};
+
+/// Inputs of one sample; the stiffness is that of the axle, nominal value times load.
+struct ObserverInput {
+    double force_x_n = 0.0;
+    double steer_rad = 0.0;
+    double stiffness_front_nprad = 0.0;
+    double stiffness_rear_nprad = 0.0;
+};
+
+struct ObserverNoise {
+    ObserverMat process = ObserverMat::Identity();
+    Mat<kObserverMeasurements, kObserverMeasurements> sensors =
+        Mat<kObserverMeasurements, kObserverMeasurements>::Identity();
+};
+
+/// The equations alone.
+class ObserverModel {
+  public:
+    ObserverModel(ObserverCar car, ObserverForm form, double dt)
+        : car_(car),
+          form_(form),
+          dt_(dt),
+          per_mass_(1.0 / car.mass_kg),
+          per_inertia_(1.0 / car.yaw_inertia_kgm2) {}
+
+    const ObserverForm& form() const { return form_; }
+    const ObserverCar& car() const { return car_; }
+
+    /// State one sample after `x`, and the Jacobian `A` that leads there.
+    ObserverVec predict(const ObserverVec& x, const ObserverInput& before, const ObserverInput& now,
+                        ObserverMat& A) const {
+        const ObserverInput& u = form_.input_before ? before : now;
+        const Lateral c = lateral(x[0], u);
+        Mat<3, 3> J;
+        J << -car_.drag_nspm * per_mass_, 0.0, 0.0, 0.0, c.y_v, c.y_r - x[0], 0.0, c.n_v, c.n_r;
+        Vec<3> rate = J * x.head<3>();
+        rate[0] += (u.force_x_n + x[3]) * per_mass_;
+        rate[1] += (u.stiffness_front_nprad * u.steer_rad + x[4]) * per_mass_;
+        rate[2] += (u.stiffness_front_nprad * car_.lf_m * u.steer_rad + x[5]) * per_inertia_;
+        if (form_.coupling) {
+            rate[0] += x[1] * x[2];
+            J(0, 1) = x[2];
+            J(0, 2) = x[1];
+            J(1, 0) = c.slope * (c.y_v * x[1] + c.y_r * x[2]) - x[2];
+            J(2, 0) = c.slope * (c.n_v * x[1] + c.n_r * x[2]);
+        }
+        // Local linearisation (Ozaki, Statistica Sinica 1992): the rate's own Jacobian is what is
+        // sampled exactly. It stays stable at walking pace, where Euler's rule does not.
+        const Mat<3, 3> response = form_.exact_sampling ? held_response<3>(J, dt_)
+                                                        : Mat<3, 3>(dt_ * Mat<3, 3>::Identity());
+        A.setIdentity();
+        A.topLeftCorner<3, 3>() += J * response;
+        A.col(3).head<3>() = response.col(0) * per_mass_;
+        A.col(4).head<3>() = response.col(1) * per_mass_;
+        A.col(5).head<3>() = response.col(2) * per_inertia_;
+        ObserverVec next = x;
+        next.head<3>() += response * rate;
+        return next;
+    }
+
+    /// Expected reading in state `x` and its Jacobian `H`, with the coefficients of speed `v_x`.
+    ObserverReading observe(double v_x, const ObserverVec& x, const ObserverInput& now,
+                            ObserverRow& H) const {
+        const Lateral c = lateral(v_x, now);
+        H.setZero();
+        H.topLeftCorner<3, 3>().setIdentity();
+        H(3, 1) = c.y_v;
+        H(3, 2) = c.y_r;
+        H(3, 4) = per_mass_;
+        ObserverReading y;
+        y.head<3>() = x.head<3>();
+        y[3] = c.y_v * x[1] + c.y_r * x[2] + per_mass_ * x[4];
+        if (form_.coupling) H(3, 0) = c.slope * (c.y_v * x[1] + c.y_r * x[2]);
+        if (form_.feed_through) y[3] += now.stiffness_front_nprad * now.steer_rad * per_mass_;
+        return y;
+    }
+
+  private:
+    // Tyre forces per mass, moments per inertia, per unit of v_y and r; all go with 1/s.
+    struct Lateral {
+        double y_v, y_r, n_v, n_r;
+        double slope;  // derivative by v_x of each, relative to itself
+    };
+    Lateral lateral(double v_x, const ObserverInput& u) const {
+        const double per_speed = 1.0 / std::max(v_x, 1.0);
+        const double f = u.stiffness_front_nprad * per_speed;
+        const double r = u.stiffness_rear_nprad * per_speed;
+        const double turn = f * car_.lf_m - r * car_.lr_m;
+        return {-(f + r) * per_mass_, -turn * per_mass_, -turn * per_inertia_,
+                -(f * car_.lf_m * car_.lf_m + r * car_.lr_m * car_.lr_m) * per_inertia_,
+                v_x > 1.0 ? -per_speed : 0.0};
+    }
+
+    ObserverCar car_;
+    ObserverForm form_;
+    double dt_;
+    double per_mass_, per_inertia_;
+};
+
+/// What the observer starts from. `one_before`: it belongs to the sample before the first.
+struct ObserverStart {
+    ObserverVec mean = ObserverVec::Zero();
+    ObserverMat covariance = ObserverMat::Zero();
+    bool one_before = false;
+
+    /// Standstill-free start of the published form: 5 m/s, certain.
+    static ObserverStart published() {
+        ObserverStart start;
+        start.mean[0] = 5.0;
+        start.one_before = true;
+        return start;
+    }
+
+    /// From the first reading alone: what it lacks is widely uncertain, as are the forces.
+    static ObserverStart from_reading(const ObserverReading& y, const ObserverNoise& noise,
+                                      const ObserverCar& car) {
+        constexpr double kGravity = 9.81;
+        const double weight = kGravity * car.mass_kg;
+        ObserverStart start;
+        const double wide[] = {10.0, 1.0, 0.5};  // m/s, m/s, rad/s
+        for (int i = 0; i < 3; ++i) {
+            const bool there = !std::isnan(y[i]);
+            start.mean[i] = there ? y[i] : 0.0;
+            start.covariance(i, i) = there ? noise.sensors(i, i) : wide[i] * wide[i];
+        }
+        const double force = 0.3 * weight;
+        const double moment = force * 0.5 * (car.lf_m + car.lr_m);
+        start.covariance(3, 3) = start.covariance(4, 4) = force * force;
+        start.covariance(5, 5) = moment * moment;
+        return start;
+    }
+};
+
+/// A log as the `System` of `extended_kalman_filter`.
+class ObserverSystem {
+  public:
+    ObserverSystem(const ObserverModel& model, const std::vector<ObserverInput>& inputs,
+                   const std::vector<ObserverReading>& readings, ObserverNoise noise)
+        : model_(&model), inputs_(&inputs), readings_(&readings), noise_(std::move(noise)) {}
+
+    std::size_t size() const { return readings_->size(); }
+    ObserverVec predict(std::size_t k, const ObserverVec& x, ObserverMat& A, ObserverMat& Q) const {
+        Q = noise_.process;
+        speed_ = x[0];
+        return model_->predict(x, (*inputs_)[k > 0 ? k - 1 : 0], (*inputs_)[k], A);
+    }
+    ObserverReading observe(std::size_t k, const ObserverVec& x, ObserverRow& H) const {
+        const bool early = !model_->form().speed_predicted && !std::isnan(speed_);
+        return model_->observe(early ? speed_ : x[0], x, (*inputs_)[k], H);
+    }
+    const ObserverReading& measurement(std::size_t k) const { return (*readings_)[k]; }
+    const Mat<kObserverMeasurements, kObserverMeasurements>& measurement_noise(std::size_t) const {
+        return noise_.sensors;
+    }
+
+  private:
+    const ObserverModel* model_;
+    const std::vector<ObserverInput>* inputs_;
+    const std::vector<ObserverReading>* readings_;
+    ObserverNoise noise_;
+    mutable double speed_ = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// The same filter, one sample at a time, for use inside a control loop.
+class Observer {
+  public:
+    Observer(const ObserverModel& model, ObserverNoise noise, ObserverStart start)
+        : model_(model),
+          noise_(std::move(noise)),
+          start_(std::move(start)),
+          x_(start_.mean),
+          P_(start_.covariance) {}
+
+    /// Uses the reading and the inputs of the present sample. Returns the new estimate.
+    const ObserverVec& step(const ObserverInput& now, const ObserverReading& y) {
+        double speed = x_[0];
+        if (samples_ > 0 || start_.one_before) {
+            ObserverMat A;
+            x_ = model_.predict(x_, samples_ > 0 ? before_ : now, now, A);
+            P_ = (A * P_ * A.transpose() + noise_.process).eval();
+            symmetrise(P_);
+        }
+        if (model_.form().speed_predicted) speed = x_[0];
+        ObserverRow H;
+        const ObserverReading expected = model_.observe(speed, x_, now, H);
+        log_likelihood_ += measurement_update<kObserverStates, kObserverMeasurements>(
+                               x_, P_, y, expected, H, noise_.sensors, samples_)
+                               .log_likelihood;
+        before_ = now;
+        ++samples_;
+        return x_;
+    }
+
+    const ObserverVec& state() const { return x_; }
+    const ObserverMat& covariance() const { return P_; }
+    double log_likelihood() const { return log_likelihood_; }
+
+  private:
+    ObserverModel model_;
+    ObserverNoise noise_;
+    ObserverStart start_;
+    ObserverVec x_;
+    ObserverMat P_;
+    ObserverInput before_;
+    std::size_t samples_ = 0;
+    double log_likelihood_ = 0.0;
+};
+
+}  // namespace sysid::lab
