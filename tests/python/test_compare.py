@@ -40,7 +40,7 @@ def test_a_hidden_effect_is_above_the_floor(dragged: Comparison) -> None:
     assert dragged.error > 1.2
     nrmse = {c: s.nrmse for c, s in dragged.channels.items()}
     assert max(nrmse, key=lambda c: nrmse[c]) in ("vx_mps", "ax_mps2")
-    assert nrmse["yaw_rate_radps"] < 0.1 * nrmse["vx_mps"]
+    assert nrmse["yaw_rate_radps"] < 0.5 * nrmse["vx_mps"]
 
 
 def test_regions_lie_where_the_effect_acts(fit: Fit, truth: Model) -> None:

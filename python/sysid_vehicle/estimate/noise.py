@@ -58,8 +58,14 @@ class NoiseModel:
         )
 
     def floor(self) -> NoiseModel:
-        """The same noise without the wandering: what remains if the model explains everything."""
-        return replace(self, wander=(0.0, 0.0, 0.0))
+        """The same noise without the wandering: what remains if the model explains everything.
+
+        The motion keeps a least noise of its own. No log can tell how far below that it lies, yet
+        the less there is, the longer the filter trusts its model, and the larger the same fault of
+        the model would appear.
+        """
+        x, y, yaw = (max(m, least) for m, least in zip(self.motion, _LEAST_MOTION, strict=True))
+        return replace(self, motion=(x, y, yaw), wander=(0.0, 0.0, 0.0))
 
     def __str__(self) -> str:
         lines = [
@@ -76,6 +82,8 @@ class NoiseModel:
         return f"<pre>{escape(str(self))}</pre>"
 
 
+# Per square root of a second: over one, 5 mm/s and 1 mrad/s.
+_LEAST_MOTION = (5e-3, 5e-3, 1e-3)
 _SMALLEST = np.array([1e-3, 1e-3, 1e-4, 5e-3, 5e-3])
 
 

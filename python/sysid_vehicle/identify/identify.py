@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from scipy.stats import qmc
-from tqdm.auto import tqdm
+from tqdm import tqdm
 
 from .. import _core
 from .._arrays import FloatArray
