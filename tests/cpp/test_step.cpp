@@ -57,7 +57,7 @@ TEST(Step, SubstepsGrowWithTheFastestRateWithinLimits) {
     EXPECT_GT(substeps_for(plain, p.data(), 2.0, 0.01), substeps_for(plain, p.data(), 40.0, 0.01));
     EXPECT_EQ(substeps_for(plain, p.data(), 0.0, 0.01),
               substeps_for(plain, p.data(), kLowestSpeed, 0.01));
-    EXPECT_EQ(substeps_for(plain, p.data(), 0.0, 100.0), 60);
+    EXPECT_EQ(substeps_for(plain, p.data(), 0.0, 100.0), kMostSubsteps);
     Parameters quick = p;
     for (double tau : {0.05, 0.01, 0.002}) {
         // Well inside the stability limit of 2.8, and not shorter than that needs.

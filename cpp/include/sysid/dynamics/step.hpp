@@ -28,9 +28,12 @@ inline Input between(const Input& a, const Input& b, double part) {
 /// Speeds below this are treated as this in the slip angles' denominator [m/s].
 constexpr double kLowestSpeed = 1.0;
 
+/// However stiff or long the interval, it is cut into no more parts than this.
+constexpr int kMostSubsteps = 250;
+
 inline int substeps_for(const SingleTrack& model, const double* p, double v_x, double dt) {
     const double rate = model.fastest_rate(p, std::max(v_x, kLowestSpeed));
-    return static_cast<int>(std::clamp(std::ceil(dt * rate / 0.8), 1.0, 250.0));
+    return static_cast<int>(std::clamp(std::ceil(dt * rate / 0.8), 1.0, 1.0 * kMostSubsteps));
 }
 
 template <class S, class T>
