@@ -39,8 +39,8 @@ struct EffectInfo {
     bool needs_force = false;
 };
 
-/// Lags act no faster than this [1/s]: minutes of driving hardly resolve a quarter of a millisecond,
-/// and integration would need ever shorter steps.
+/// Lags act no faster than this [1/s]: minutes of driving hardly resolve a quarter of a
+/// millisecond, and integration would need ever shorter steps.
 constexpr double kFastestLag = 4000.0;
 
 struct Effect {
