@@ -79,7 +79,7 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
     ModelState<double> x{};
     x[0] = initial_speed;
     Input u{
-        references.front().steer_rad,
+        std::clamp(references.front().steer_rad, -driver.steer_limit_rad, driver.steer_limit_rad),
         0.5 * model.car.air_density_kgpm3 * model.car.drag_area_m2 * initial_speed * initial_speed,
     };
     std::array<double, kPushes> push{};

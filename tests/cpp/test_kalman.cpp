@@ -138,14 +138,19 @@ TEST(Kalman, InfiniteMeasurementOrPredictionNamesTheSample) {
     for (double bad : {INFINITY, -INFINITY}) {
         Small s = small_system(20);
         s.y[4][1] = bad;
-        const auto filter = [&] {
-            extended_kalman_filter<3, 2>(s, kSmallMean, small_covariance(),
-                                         [](std::size_t, const auto&) {});
+        const auto message = [&]() -> std::string {
+            try {
+                extended_kalman_filter<3, 2>(s, kSmallMean, small_covariance(),
+                                             [](std::size_t, const auto&) {});
+            } catch (const NumericalFailure& failure) {
+                return failure.what();
+            }
+            return "nothing was thrown";
         };
-        EXPECT_THROW(filter(), NumericalFailure);
+        EXPECT_NE(message().find("sample 4"), std::string::npos) << message();
         s = small_system(20);
         s.b[4][1] = bad;
-        EXPECT_THROW(filter(), NumericalFailure);
+        EXPECT_NE(message().find("sample 4"), std::string::npos) << message();
     }
 }
 

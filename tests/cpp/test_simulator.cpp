@@ -63,12 +63,12 @@ TEST(Simulator, HandsAndFeetAreLimited) {
     driver.brake_limit_n = 1500.0;
     driver.force_rate_limit_nps = 5000.0;
     std::vector<Reference> references(400, {40.0, 0.0, 0.5});
-    references[0].steer_rad = 0.0;  // a drive begins with the steering asked for
     for (std::size_t k = 200; k < 400; ++k) references[k] = {5.0, 0.0, -0.5};
     const Drive drive = drive_along(references, driver, 20.0);
     double most_steer = 0.0;
     double most_drive = 0.0;
     double most_brake = 0.0;
+    EXPECT_EQ(drive.inputs[0], 0.03);  // begins with the steering asked for, within the limit
     for (std::size_t k = 1; k < samples(drive); ++k) {
         const double steer = drive.inputs[2 * k];
         const double force = drive.inputs[2 * k + 1];

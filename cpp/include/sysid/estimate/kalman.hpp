@@ -99,10 +99,10 @@ double extended_kalman_filter(const System& system, Vec<NX> x, Mat<NX, NX> P, Ke
         step.mean = x;
         step.covariance = P;
         log_likelihood += step.update.log_likelihood;
+        if (!std::isfinite(log_likelihood))
+            throw NumericalFailure("the log-likelihood is not finite", k);
         keep(k, step);
     }
-    if (!std::isfinite(log_likelihood))
-        throw NumericalFailure("the log-likelihood is not finite", system.size());
     return log_likelihood;
 }
 
