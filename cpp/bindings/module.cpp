@@ -10,4 +10,5 @@ PYBIND11_MODULE(_core, m) {
     register_model(m);
     register_simulate(m);
     register_identify(m);
+    register_lab_observer(m);
 }

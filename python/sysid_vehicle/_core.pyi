@@ -100,3 +100,77 @@ def simulate(
     disturbance: _Array,
     initial_speed: float,
 ) -> tuple[_Array, _Array, _Array, int]: ...
+
+# --- lab observer
+
+@type_check_only
+class _ObserverTrace(TypedDict):
+    log_likelihood: float
+    state: _Array
+    covariance: _Array
+    reading: _Array
+    reading_std: _Array
+    innovation: _Array
+    innovation_std: _Array
+
+@type_check_only
+class _ObserverEm(TypedDict):
+    process: _Array
+    sensors: _Array
+    log_likelihood: list[float]
+    converged: bool
+    shortened: int
+    fell: int
+    leaps: int
+
+class ObserverLog(metaclass=_Bound):
+    def __init__(
+        self,
+        car: _Array,
+        form: Sequence[bool],
+        dt: float,
+        inputs: _Array,
+        readings: _Array,
+        mean: _Array,
+        covariance: _Array,
+        one_before: bool,
+    ) -> None: ...
+    @property
+    def samples(self) -> int: ...
+    def log_likelihood(self, process: _Array, sensors: _Array) -> float: ...
+    def trace(self, process: _Array, sensors: _Array, smoothed: bool) -> _ObserverTrace: ...
+
+class Observer(metaclass=_Bound):
+    def __init__(
+        self,
+        car: _Array,
+        form: Sequence[bool],
+        dt: float,
+        process: _Array,
+        sensors: _Array,
+        mean: _Array,
+        covariance: _Array,
+        one_before: bool,
+    ) -> None: ...
+    def step(self, input: _Array, reading: _Array) -> _Array: ...
+    @property
+    def covariance(self) -> _Array: ...
+    @property
+    def log_likelihood(self) -> float: ...
+
+def observer_start(car: _Array, reading: _Array, sensors: _Array) -> tuple[_Array, _Array]: ...
+def learn_observer_noise(
+    logs: Sequence[ObserverLog],
+    process: _Array,
+    sensors: _Array,
+    process_scale: Sequence[int],
+    process_block: Sequence[int],
+    process_floor: _Array,
+    sensor_scale: Sequence[int],
+    sensor_block: Sequence[int],
+    sensor_floor: _Array,
+    most_iterations: int,
+    tolerance: float,
+    never_fall: bool,
+    accelerate: bool,
+) -> _ObserverEm: ...

@@ -75,6 +75,7 @@ class ObserverModel {
 
     const ObserverForm& form() const { return form_; }
     const ObserverCar& car() const { return car_; }
+    ObserverModel with_form(const ObserverForm& form) const { return {car_, form, dt_}; }
 
     /// State one sample after `x`, and the Jacobian `A` that leads there.
     ObserverVec predict(const ObserverVec& x, const ObserverInput& before, const ObserverInput& now,

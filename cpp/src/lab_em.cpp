@@ -1,0 +1,134 @@
+#include "sysid/lab/lab_em.hpp"
+
+#include <cmath>
+
+namespace sysid::lab {
+
+namespace {
+
+constexpr int NX = kObserverStates;
+constexpr int NY = kObserverMeasurements;
+using Step = FilterStep<NX, NY>;
+
+template <class Derived>
+void append(std::vector<double>& to, const Eigen::MatrixBase<Derived>& values) {
+    for (const double v : values.reshaped()) to.push_back(v);
+}
+
+void add_sample(const ObserverLog& log, std::size_t k, const ObserverVec& mean,
+                const ObserverMat& covariance, ObserverTrace& out) {
+    append(out.state, mean);
+    append(out.covariance, covariance);
+    ObserverRow H;
+    append(out.reading, log.model.observe(mean[0], mean, log.inputs[k], H));
+    append(out.reading_std, (H * covariance * H.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt());
+}
+
+void add_innovation(const ObserverReading& y, const Step& step, ObserverTrace& out) {
+    ObserverReading innovation = step.update.innovation;
+    ObserverReading spread = step.update.lower.rowwise().norm();
+    for (int i = 0; i < NY; ++i)
+        if (std::isnan(y[i])) innovation[i] = spread[i] = y[i];
+    append(out.innovation, innovation);
+    append(out.innovation_std, spread);
+}
+
+bool is_published(const ObserverForm& form) {
+    return !form.feed_through && !form.input_before && !form.exact_sampling && !form.coupling &&
+           !form.speed_predicted;
+}
+
+class PublishedExpectation {
+  public:
+    explicit PublishedExpectation(const std::vector<ObserverLog>& logs)
+        : logs_(logs), steps_(logs.size()) {}
+
+    double log_likelihood(const ObserverNoisePair& noise) {
+        noise_ = {noise.process, noise.sensors};
+        double sum = 0.0;
+        for (std::size_t i = 0; i < logs_.size(); ++i) {
+            const ObserverLog& log = logs_[i];
+            auto& steps = steps_[i];
+            steps.resize(log.size());
+            const ObserverSystem system(log.model, log.inputs, log.readings, noise_);
+            sum += extended_kalman_filter<NX, NY>(
+                system, log.start.mean, log.start.covariance,
+                [&](std::size_t k, const Step& step) { steps[k] = step; }, log.start.one_before);
+        }
+        return sum;
+    }
+
+    NoiseMoments<NX, NY> moments() const {
+        constexpr double kRidge = 1e-9;
+        NoiseMoments<NX, NY> out;
+        for (std::size_t i = 0; i < logs_.size(); ++i) {
+            const ObserverLog& log = logs_[i];
+            std::vector<Step> late = steps_[i];
+            for (std::size_t k = late.size() - 1; k > 0; --k)
+                late[k].transition = late[k - 1].transition;
+            ObserverForm form = log.model.form();
+            form.input_before = form.speed_predicted = true;
+            const ObserverModel model = log.model.with_form(form);
+            add_smoothed_moments<NX, NY>(ObserverSystem(model, log.inputs, log.readings, noise_),
+                                         smooth(late, kRidge), out);
+        }
+        return out;
+    }
+
+  private:
+    const std::vector<ObserverLog>& logs_;
+    std::vector<std::vector<Step>> steps_;
+    ObserverNoise noise_;
+};
+
+}  // namespace
+
+double log_likelihood(const ObserverLog& log, const ObserverNoise& noise) {
+    const ObserverSystem system(log.model, log.inputs, log.readings, noise);
+    return extended_kalman_filter<NX, NY>(
+        system, log.start.mean, log.start.covariance, [](std::size_t, const Step&) {},
+        log.start.one_before);
+}
+
+ObserverTrace trace(const ObserverLog& log, const ObserverNoise& noise, bool smoothed) {
+    const ObserverSystem system(log.model, log.inputs, log.readings, noise);
+    ObserverTrace out;
+    std::vector<Step> steps;
+    if (smoothed) steps.reserve(log.size());
+    out.log_likelihood = extended_kalman_filter<NX, NY>(
+        system, log.start.mean, log.start.covariance,
+        [&](std::size_t k, const Step& step) {
+            add_innovation(log.readings[k], step, out);
+            if (smoothed)
+                steps.push_back(step);
+            else
+                add_sample(log, k, step.mean, step.covariance, out);
+        },
+        log.start.one_before);
+    const auto states = smooth(steps);
+    for (std::size_t k = 0; k < states.size(); ++k)
+        add_sample(log, k, states[k].mean, states[k].covariance, out);
+    return out;
+}
+
+ObserverEm learn(const std::vector<ObserverLog>& logs, const ObserverNoise& start,
+                 const NoiseStructure<NX>& process, const NoiseStructure<NY>& sensors,
+                 const EmOptions& options) {
+    const ObserverNoisePair noise{start.process, start.sensors};
+    if (is_published(logs.at(0).model.form())) {
+        PublishedExpectation expectation(logs);
+        return learn_noise<NX, NY>(expectation, noise, process, sensors, options);
+    }
+    std::vector<ObserverSystem> systems;
+    std::vector<EmRecord<ObserverSystem, NX>> records;
+    systems.reserve(logs.size());
+    for (const ObserverLog& log : logs) {
+        systems.emplace_back(log.model, log.inputs, log.readings, start);
+        records.push_back(
+            {&systems.back(), log.start.mean, log.start.covariance, log.start.one_before});
+    }
+    FilteredExpectation<NX, NY, ObserverSystem> expectation(records);
+    return learn_noise<NX, NY>(expectation, noise, process, sensors, options);
+}
+
+}  // namespace sysid::lab
