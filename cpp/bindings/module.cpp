@@ -11,4 +11,5 @@ PYBIND11_MODULE(_core, m) {
     register_simulate(m);
     register_identify(m);
     register_lab_observer(m);
+    register_lab_loop(m);
 }

@@ -89,6 +89,87 @@ class Driver(metaclass=_Bound):
     tracks_path: bool
     def __init__(self) -> None: ...
 
+# --- lab loop
+@type_check_only
+class _LoopRecord(TypedDict):
+    truth: _Array
+    sensed: _Array
+    estimate: _Array
+    reference: _Array
+    inputs: _Array
+    limits: npt.NDArray[np.uint32]
+    lost_at: int
+
+class LabCar(metaclass=_Bound):
+    mass_kg: float
+    yaw_inertia_kgm2: float
+    lf_m: float
+    lr_m: float
+    cg_height_m: float
+    gravity_mps2: float
+    drag_nspm: float
+    stiffness_front: float
+    stiffness_rear: float
+    # Only `LabLoop` holds one.
+    def __init__(self, *args: NoReturn, **kwargs: NoReturn) -> None: ...
+
+class LabController(metaclass=_Bound):
+    speed_gain_ps: float
+    yaw_rate_gain_ps: float
+    heading_gain_ps: float
+    yaw_rate_limit_radps: float
+    yaw_acceleration_limit_radps2: float
+    lateral_limit_mps2: float
+    slip_limit_rad: float
+    brakes_from_mps2: float
+    feed_forward: bool
+    coupling: bool
+    lowest_speed_mps: float
+    added_speed_mps: float
+    # Only `LabLoop` holds one.
+    def __init__(self, *args: NoReturn, **kwargs: NoReturn) -> None: ...
+
+class LabLoop(metaclass=_Bound):
+    dt: float
+    steer_by: int
+    def __init__(self) -> None: ...
+    @property
+    def car(self) -> LabCar: ...
+    @property
+    def controller(self) -> LabController: ...
+    def set_force(self, least_most_rate_lag: Sequence[float]) -> None: ...
+    def set_steer(self, least_most_rate_lag: Sequence[float]) -> None: ...
+    def set_sensors(self, sensors: _Array) -> None: ...
+    def set_noise(self, process: _Array, sensors: _Array) -> None: ...
+    def set_track(self, points: _Array, metres: float, seconds: float) -> None: ...
+    def set_published_form(self, published: bool) -> None: ...
+    def set_habits(
+        self,
+        pose_gain: float,
+        load_sensors: bool,
+        late_feedback: bool,
+        first_late_load_n: float,
+        certain_start: bool,
+    ) -> None: ...
+    def set_plant(
+        self,
+        load_share: float,
+        late_loads: bool,
+        air_speed_of_both: bool,
+        steps: int,
+        tolerance: float,
+        gravity_mps2: float,
+    ) -> None: ...
+    def set_start(self, speed_mps: float, x_m: float, y_m: float) -> None: ...
+    def run(
+        self,
+        model: SingleTrack,
+        parameters: _Array,
+        wanted: _Array,
+        normal: _Array,
+        push: _Array,
+    ) -> _LoopRecord: ...
+
 def base_parameters() -> list[dict[str, Any]]: ...
 def effects() -> list[dict[str, Any]]: ...
 def simulate(

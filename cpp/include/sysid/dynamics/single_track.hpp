@@ -28,11 +28,19 @@ struct Input {
 /// What disturbs the motion: forces and a moment, and accelerations that no accelerometer feels.
 enum Push : int { kForceX, kForceY, kMomentZ, kGravityX, kGravityY, kPushes };
 
+/// Axle loads that the tyres feel instead of those of the motion: a simulator that closes the
+/// loop between force and load over a sample has them from the sample before.
+struct HeldLoads {
+    bool on = false;
+    double front_n = 0.0, rear_n = 0.0;
+};
+
 /// A car with its effects; the parameters' values stay outside, so that they can carry derivatives.
 struct SingleTrack {
     VehicleData car;
     EffectMask effects = 0;
     bool force_known = true;  // false: `Input::longitudinal` is the measured acceleration
+    HeldLoads held{};
 
     /// Evaluates (1) to (5). `motion` = v_x, v_y, r; `push` = disturbance, see
     /// `Push`; `aux` = auxiliary states; `rate` receives the derivatives of motion and aux.
@@ -58,8 +66,8 @@ struct SingleTrack {
         w.mu_peak_f = S(p[kDFront]);
         w.mu_peak_r = S(p[kDRear]);
         each([&](auto e, const T* own) { e.grip(own, w); });
-        w.fy_f = w.fz_f * mu_f * w.grip_f;
-        w.fy_r = w.fz_r * mu_r * w.grip_r;
+        w.fy_f = (held.on ? S(held.front_n) : w.fz_f) * mu_f * w.grip_f;
+        w.fy_r = (held.on ? S(held.rear_n) : w.fz_r) * mu_r * w.grip_r;
         balance(w);
         rate[0] = w.a_x + w.v_y * w.r + w.gravity_x;
         rate[1] = w.a_y - w.v_x * w.r + w.gravity_y;
@@ -81,7 +89,7 @@ struct SingleTrack {
 
     /// Fastest rate [1/s] of the motion and of the active effects, for choosing integration steps.
     double fastest_rate(const double* p, double v_x) const {
-        const double load = car.mass_kg * kGravity / (car.lf_m + car.lr_m);
+        const double load = car.mass_kg * car.gravity_mps2 / (car.lf_m + car.lr_m);
         const double c_f = p[kBFront] * p[kCFront] * p[kDFront] * load * car.lr_m;
         const double c_r = p[kBRear] * p[kCRear] * p[kDRear] * load * car.lf_m;
         const double yaw = (c_f * car.lf_m * car.lf_m + c_r * car.lr_m * car.lr_m) / p[kYawInertia];
@@ -152,7 +160,7 @@ struct SingleTrack {
         using std::cos;
         using std::sin;
         const S wheelbase = w.l_f + w.l_r;
-        const S weight = w.m * kGravity;
+        const S weight = w.m * car.gravity_mps2;
         w.fz0_f = weight * w.l_r / wheelbase;
         w.fz0_r = weight * w.l_f / wheelbase;
         const S c = cos(w.delta);
@@ -162,7 +170,8 @@ struct SingleTrack {
         if (force_known) {
             split_force(w);
             const S rest = w.fx_f * c + w.fx_r + w.force_x;
-            const S front = (w.fz0_f - lever * rest) / (1.0 - lever * (mu_f * s));
+            const S front =
+                held.on ? S(held.front_n) : (w.fz0_f - lever * rest) / (1.0 - lever * (mu_f * s));
             pull = rest - front * (mu_f * s);
         } else {
             pull = w.m * w.ax_input;

@@ -16,6 +16,7 @@ struct VehicleData {
     double air_density_kgpm3 = 1.225;
     double brake_front_share = 0.5;
     double drive_front_share = 0.0;
+    double gravity_mps2 = kGravity;  // behind the static axle loads
 };
 
 }  // namespace sysid

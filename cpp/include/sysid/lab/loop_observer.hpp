@@ -1,0 +1,59 @@
+// The extended-state observer as the closed loop calls it.
+#pragma once
+
+#include <optional>
+
+#include "sysid/lab/adrc.hpp"
+#include "sysid/lab/observer.hpp"
+
+namespace sysid::lab {
+
+struct LoopObserverData {
+    ObserverForm form;
+    ObserverNoise noise;
+    bool certain_start = false;  // begin at `first_speed_mps`, certain; else from the first reading
+    double first_speed_mps = 5.0;
+};
+
+class LoopObserver {
+  public:
+    LoopObserver(const LoopObserverData& data, const NominalCar& car, double dt)
+        : data_(data),
+          car_(car),
+          believed_car_{car.mass_kg, car.yaw_inertia_kgm2, car.lf_m, car.lr_m, car.drag_nspm},
+          model_(believed_car_, data.form, dt) {
+        if (!data.certain_start) return;
+        ObserverStart start = ObserverStart::published();
+        start.mean[0] = data.first_speed_mps;
+        observer_.emplace(model_, data_.noise, start);
+        state_ = start.mean;
+    }
+
+    void step(double force_n, double steer_rad, const AxleLoads& loads, const Vec<4>& y) {
+        const double front = car_.stiffness_front * loads.front_n;
+        last_ = {force_n, steer_rad, front, car_.stiffness_rear * loads.rear_n};
+        if (!observer_)
+            observer_.emplace(model_, data_.noise,
+                              ObserverStart::from_reading(y, data_.noise, believed_car_));
+        state_ = observer_->step(last_, y);
+    }
+
+    /// After the last step; before it the certain start, if there is one.
+    const Estimate& state() const { return state_; }
+
+    Estimate ahead() const {
+        ObserverMat ignored;
+        return model_.predict(state_, last_, last_, ignored);
+    }
+
+  private:
+    LoopObserverData data_;
+    NominalCar car_;
+    ObserverCar believed_car_;
+    ObserverModel model_;
+    std::optional<Observer> observer_;
+    ObserverInput last_;
+    Estimate state_ = Estimate::Zero();
+};
+
+}  // namespace sysid::lab

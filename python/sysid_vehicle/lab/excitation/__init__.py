@@ -1,0 +1,27 @@
+"""What the closed loop is asked to do: published trajectories, multi-sines, and manoeuvres."""
+
+from __future__ import annotations
+
+from ...manoeuvres import all as _manoeuvres
+from ._driven import Driven, OnManoeuvre, multi_sine, speed_ramp
+from ._excitation import Excitation
+from ._multisine import MultiSine
+from ._published import Identification, Oval
+
+__all__ = [
+    "Driven",
+    "Excitation",
+    "Identification",
+    "MultiSine",
+    "OnManoeuvre",
+    "Oval",
+    "all",
+    "multi_sine",
+    "speed_ramp",
+]
+
+
+def all() -> dict[str, Excitation]:
+    """Make every excitation of the package with its default parameters, by name."""
+    own = (Identification(), Oval(), speed_ramp(), multi_sine())
+    return {e.name: e for e in (*own, *map(OnManoeuvre, _manoeuvres().values()))}
