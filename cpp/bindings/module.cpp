@@ -12,4 +12,5 @@ PYBIND11_MODULE(_core, m) {
     register_identify(m);
     register_lab_observer(m);
     register_lab_loop(m);
+    register_lab_tyres(m);
 }

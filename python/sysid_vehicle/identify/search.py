@@ -157,7 +157,8 @@ def _nlopt(
     search.set_upper_bounds(np.ones(len(width)))
     search.set_ftol_abs(0.1 * tolerance)
     search.set_maxeval(4 * rounds)
-    with suppress(nlopt.RoundoffLimited):  # the best point so far stands
+    # Whatever stops it, the best point so far stands.
+    with suppress(nlopt.RoundoffLimited, nlopt.runtime_error):
         search.optimize(np.clip((best.x - box.lower) / width, 0.0, 1.0))
     settled = search.last_optimize_result() in (nlopt.FTOL_REACHED, nlopt.XTOL_REACHED)
     return Outcome(best.x, best.cost, settled)

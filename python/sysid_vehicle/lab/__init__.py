@@ -3,19 +3,29 @@
 from . import excitation
 from .em import EMResult, NoiseStructure, learn_observer_noise
 from .loop import ClosedLoop, run_closed_loop
+from .motion import TyreMotion
 from .observed import READINGS, STATES, StateEstimate
 from .observer import Observer, ObserverCar, ObserverForm, ObserverNoise, ObserverRecord
 from .parts import Actuator, Controller, Nominal, Online, Sensor, Sensors, Simulator
+from .regression import PUBLISHED_BOX, PUBLISHED_START, TyreRegression, regress_tyres
 from .saturation import Saturation
 from .setup import Setup
+from .tyre_data import GreyBoxVehicle, TyreLog
+from .tyre_drive import PUBLISHED_SENSORS, drive_tyres
+from .tyre_fit import TyreFit
+from .tyres import identify_tyres
 
 __all__ = [
+    "PUBLISHED_BOX",
+    "PUBLISHED_SENSORS",
+    "PUBLISHED_START",
     "READINGS",
     "STATES",
     "Actuator",
     "ClosedLoop",
     "Controller",
     "EMResult",
+    "GreyBoxVehicle",
     "NoiseStructure",
     "Nominal",
     "Observer",
@@ -30,7 +40,14 @@ __all__ = [
     "Setup",
     "Simulator",
     "StateEstimate",
+    "TyreFit",
+    "TyreLog",
+    "TyreMotion",
+    "TyreRegression",
+    "drive_tyres",
     "excitation",
+    "identify_tyres",
     "learn_observer_noise",
+    "regress_tyres",
     "run_closed_loop",
 ]

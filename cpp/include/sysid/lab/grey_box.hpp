@@ -1,0 +1,143 @@
+// The grey-box car whose tyres are to be identified: a single track with logged inputs.
+//
+//   dv_x/dt = v_y r + (F_x - F_yf sin(delta) - 1/2 rho C_dA V^2)/m                        (1)
+//   a_y     = (F_yf cos(delta) + F_yr)/m + P_1 v_x^2 + P_2 v_y + P_3 r                    (2)
+//   dv_y/dt = a_y - v_x r,   dr/dt = (l_f F_yf cos(delta) - l_r F_yr)/I_z                 (3)
+//   F_y = F_z mu(alpha),  alpha_f = delta - atan((v_y + l_f r)/v_x), rear without delta   (4)
+// with mu the Magic Formula of `model/tyre.hpp`. Written once for any scalar, and once more with
+// its derivatives by hand, which is what the searches spend their time in; tests hold the two
+// together.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "sysid/math/dual.hpp"
+#include "sysid/model/tyre.hpp"
+
+namespace sysid::lab {
+
+/// Mass and yaw inertia are factors on the given ones, so that a prior can be put on them.
+enum TyreParameter : int {
+    kFront = 0,  // B, C, D, E
+    kRear = 4,   // B, C, D, E
+    kP1 = 8,
+    kP2 = 9,
+    kP3 = 10,
+    kMassFactor = 11,
+    kInertiaFactor = 12,
+    kDragArea = 13,  // C_d A [m2]
+    kTyreParameters = 14,
+};
+
+struct GreyBoxCar {
+    double mass_kg = 0.0;
+    double yaw_inertia_kgm2 = 0.0;
+    double lf_m = 0.0;
+    double lr_m = 0.0;
+    double air_density_kgpm3 = 1.225;
+    double slowest_mps = 1.0;  // slip angles are those at this speed below it
+};
+
+/// What acts during one sampling interval.
+struct GreyBoxInput {
+    double fx_n = 0.0;
+    double steer_rad = 0.0;
+    double sin_steer = 0.0;
+    double cos_steer = 1.0;
+    double fz_front_n = 0.0;
+    double fz_rear_n = 0.0;
+};
+
+constexpr int kGreyStates = 3;  // v_x, v_y, r
+
+/// Rates of v_x, v_y, r, and a_y.
+template <class S, class T>
+std::array<S, kGreyStates + 1> grey_box(const GreyBoxCar& car, const std::array<S, kGreyStates>& x,
+                                        const GreyBoxInput& u, const T* p) {
+    using std::atan;
+    const S speed = value_of(x[0]) > car.slowest_mps ? x[0] : S(car.slowest_mps);
+    const S alpha_f = u.steer_rad - atan((x[1] + car.lf_m * x[2]) / speed);
+    const S alpha_r = -atan((x[1] - car.lr_m * x[2]) / speed);
+    const TyreCoefficients<T> front{p[kFront], p[kFront + 1], p[kFront + 2], p[kFront + 3]};
+    const TyreCoefficients<T> rear{p[kRear], p[kRear + 1], p[kRear + 2], p[kRear + 3]};
+    const S force_f = u.fz_front_n * magic_formula(alpha_f, front);
+    const S force_r = u.fz_rear_n * magic_formula(alpha_r, rear);
+    const T mass = car.mass_kg * p[kMassFactor];
+    const T inertia = car.yaw_inertia_kgm2 * p[kInertiaFactor];
+    const S squared = x[0] * x[0] + x[1] * x[1];
+    const S drag = 0.5 * car.air_density_kgpm3 * (p[kDragArea] * squared);
+    const S a_y = (u.cos_steer * force_f + force_r) / mass + p[kP1] * (x[0] * x[0]) +
+                  p[kP2] * x[1] + p[kP3] * x[2];
+    return {
+        x[1] * x[2] + (u.fx_n - u.sin_steer * force_f - drag) / mass,
+        a_y - x[0] * x[2],
+        (car.lf_m * u.cos_steer * force_f - car.lr_m * force_r) / inertia,
+        a_y,
+    };
+}
+
+/// The Magic Formula and its derivatives by alpha, B, C, D, E.
+struct TyreSlope {
+    double value, by_alpha, by_b, by_c, by_d, by_e;
+};
+
+inline TyreSlope magic_formula_slope(double alpha, const double* bcde) {
+    const double x = bcde[0] * alpha;
+    const double lag = x - std::atan(x);
+    const double w = x - bcde[3] * lag;
+    const double angle = std::atan(w);
+    const double s = std::sin(bcde[1] * angle);
+    const double slope = bcde[2] * std::cos(bcde[1] * angle);
+    const double by_w = slope * bcde[1] / (1.0 + w * w);
+    const double by_x = by_w * (1.0 - bcde[3] * x * x / (1.0 + x * x));
+    return {bcde[2] * s, by_x * bcde[0], by_x * alpha, slope * angle, s, -by_w * lag};
+}
+
+/// `grey_box` with its derivatives by state and by parameter, row by row.
+struct GreyBoxSlope {
+    std::array<double, kGreyStates + 1> value;
+    std::array<std::array<double, kGreyStates>, kGreyStates + 1> by_state;
+    std::array<std::array<double, kTyreParameters>, kGreyStates + 1> by_parameter;
+};
+
+void grey_box_slope(const GreyBoxCar& car, const std::array<double, kGreyStates>& x,
+                    const GreyBoxInput& u, const double* p, bool with_parameters,
+                    GreyBoxSlope& out);
+
+/// Sub-steps of the Runge-Kutta rule that keep the fastest motion stable.
+inline int grey_box_substeps(const GreyBoxCar& car, const GreyBoxInput& u, const double* p,
+                             double v_x, double dt) {
+    const double front = std::abs(p[kFront] * p[kFront + 1] * p[kFront + 2]) * u.fz_front_n;
+    const double rear = std::abs(p[kRear] * p[kRear + 1] * p[kRear + 2]) * u.fz_rear_n;
+    const double mass = car.mass_kg * p[kMassFactor];
+    const double inertia = car.yaw_inertia_kgm2 * p[kInertiaFactor];
+    const double rate =
+        std::max((front + rear) / mass,
+                 (front * car.lf_m * car.lf_m + rear * car.lr_m * car.lr_m) / inertia) /
+        std::max(v_x, car.slowest_mps);
+    return static_cast<int>(std::clamp(std::ceil(dt * rate / 1.5), 1.0, 24.0));
+}
+
+/// Classical Runge-Kutta over `dt`; the input is held, as a digital controller holds it.
+template <class S, class T>
+void grey_box_step(const GreyBoxCar& car, std::array<S, kGreyStates>& x, const GreyBoxInput& u,
+                   const T* p, double dt, int substeps) {
+    const double h = dt / substeps;
+    const auto moved = [](const std::array<S, kGreyStates>& a,
+                          const std::array<S, kGreyStates + 1>& k, double by) {
+        return std::array<S, kGreyStates>{a[0] + by * k[0], a[1] + by * k[1], a[2] + by * k[2]};
+    };
+    for (int n = 0; n < substeps; ++n) {
+        const auto k1 = grey_box(car, x, u, p);
+        const auto k2 = grey_box(car, moved(x, k1, 0.5 * h), u, p);
+        const auto k3 = grey_box(car, moved(x, k2, 0.5 * h), u, p);
+        const auto k4 = grey_box(car, moved(x, k3, h), u, p);
+        for (std::size_t i = 0; i < kGreyStates; ++i)
+            x[i] += (h / 6.0) * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+    }
+}
+
+}  // namespace sysid::lab

@@ -1,0 +1,256 @@
+"""Intervals from the profile likelihood: how far a value may move before the data object.
+
+The other parameters are fitted anew at every value (Raue et al., Bioinformatics 25, 2009). Where
+B, C, D and E copy each other along a bent valley the information matrix, which sees only its
+direction at the optimum, promises far too much; the profile follows the valley.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from .._style import AFTER, FLOOR, axes_or_new, tidy
+from .._text import number
+from ..identify.search import Box
+from .descent import minimum
+from .likelihood import Likelihood
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["Profile", "Quantity", "profile"]
+
+_LEVEL = 1.96  # root of the 95 % quantile of chi-square with one degree of freedom
+_CLOSE = 0.04  # of the level
+_POINTS = 14  # on each side
+_ROUNDS = 20
+_STIFF = 30.0  # how much harder the wish pulls than the data
+_BETTER = 0.1  # nats
+_STEP = 3.0  # most by which the distance grows from one point to the next
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What is profiled: a parameter or a function of parameters.
+
+    Parameters
+    ----------
+    name : str
+    of : callable
+        From all parameters to the value.
+    slope : callable
+        From all parameters to its gradient.
+    column : int, optional
+        The parameter that it is.
+    """
+
+    name: str
+    of: Callable[[FloatArray], float]
+    slope: Callable[[FloatArray], FloatArray]
+    column: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Profile likelihood of one quantity.
+
+    Attributes
+    ----------
+    name : str
+    values : array, shape (n,)
+        Where it was worked out, ascending.
+    lost : array, shape (n,)
+        Log-likelihood lost there.
+    low, high : float
+        Ends of the 95 % interval.
+    open_below, open_above : bool
+        The likelihood does not fall enough on that side before the search box or the model ends.
+    """
+
+    name: str
+    values: FloatArray
+    lost: FloatArray
+    low: float
+    high: float
+    open_below: bool
+    open_above: bool
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval."""
+        return self.low, self.high
+
+    def __str__(self) -> str:
+        low = f"below {number(self.low, 5)}" if self.open_below else number(self.low, 5)
+        high = f"above {number(self.high, 5)}" if self.open_above else number(self.high, 5)
+        return f"{self.name}: {low} .. {high}"
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the log-likelihood lost over the value, and the 95 % level.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        ax = axes_or_new(ax, 4.5, 3.2)
+        ax.plot(self.values, self.lost, "o-", color=AFTER, markersize=3)
+        ax.axhline(0.5 * _LEVEL**2, color=FLOOR, linestyle="--", linewidth=0.8)
+        ax.axvspan(self.low, self.high, color=AFTER, alpha=0.12, linewidth=0)
+        ax.set_ylim(0.0, 1.5 * _LEVEL**2)
+        return tidy(ax, xlabel=self.name, ylabel="log-likelihood lost")
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    values: list[float]
+    lost: list[float]
+    end: float
+    unbounded: bool
+    better: FloatArray | None
+
+
+def profile(
+    objective: Likelihood,
+    p: FloatArray,
+    gains: _core.FrozenGains,
+    box: Box,
+    covariance: FloatArray,
+    what: Quantity,
+) -> tuple[Profile, FloatArray | None]:
+    """Profile one quantity around the optimum `p`.
+
+    Returns
+    -------
+    profile : Profile
+    better : array, shape (parameters,), or None
+        A point of higher likelihood, where one was come upon.
+    """
+    best = objective.half_sum_of_squares(p, gains)
+    sides = [_side(objective, p, gains, box, covariance, what, best, s) for s in (-1.0, 1.0)]
+    centre = what.of(p)
+    values = np.array([*sides[0].values, centre, *sides[1].values])
+    lost = np.array([*sides[0].lost, 0.0, *sides[1].lost])
+    order = np.argsort(values)
+    found = Profile(
+        what.name,
+        as_float64(values[order]),
+        as_float64(lost[order]),
+        sides[0].end,
+        sides[1].end,
+        sides[0].unbounded,
+        sides[1].unbounded,
+    )
+    return found, next((s.better for s in sides if s.better is not None), None)
+
+
+def _side(
+    objective: Likelihood,
+    p: FloatArray,
+    gains: _core.FrozenGains,
+    box: Box,
+    covariance: FloatArray,
+    what: Quantity,
+    best: float,
+    sign: float,
+) -> _Side:
+    centre = what.of(p)
+    gradient = what.slope(p)[box.columns]
+    across = covariance @ gradient
+    variance = float(gradient @ across)
+    side = _Side([], [], centre, True, None)
+    if not (np.isfinite(centre) and np.isfinite(variance) and variance > 0.0):
+        return side
+    limit = sign * np.inf
+    if what.column is not None:
+        i = box.columns.index(what.column)
+        limit = box.upper[i] if sign > 0.0 else box.lower[i]
+    std = np.sqrt(variance)
+    furthest = abs(limit - centre) if np.isfinite(limit) else max(20.0 * std, 3.0 * abs(centre))
+    if furthest <= 1e-9 * max(abs(centre), 1.0):
+        return side
+    distance = min(_LEVEL * std, furthest)
+    inside, outside = (0.0, 0.0, p), (np.inf, np.inf)
+    for _ in range(_POINTS):
+        # From the nearest point that is known, along the direction that costs least.
+        start = inside[2].copy()
+        start[box.columns] += across * (sign * (distance - inside[0]) / variance)
+        start[box.columns] = np.clip(start[box.columns], box.lower, box.upper)
+        there, loss = _pinned(
+            objective, start, gains, box, what, centre + sign * distance, std, best
+        )
+        if loss < -_BETTER:
+            return replace(side, better=there)
+        distance = sign * (what.of(there) - centre)
+        if not np.isfinite(loss) or not np.isfinite(distance) or distance <= 0.0:
+            break
+        root = np.sqrt(2.0 * max(loss, 0.0))
+        side.values.append(centre + sign * distance)
+        side.lost.append(max(loss, 0.0))
+        if abs(root - _LEVEL) < _CLOSE * _LEVEL:
+            # The last step is small: along a straight root.
+            distance *= _LEVEL / root if inside[0] == 0.0 else 1.0
+            return replace(side, end=centre + sign * distance, unbounded=False)
+        if root < _LEVEL:
+            if distance <= inside[0]:
+                break  # the wish is not heard any more
+            inside = (distance, root, there)
+            if distance >= furthest * (1.0 - 1e-9):
+                break
+        else:
+            outside = (distance, root)
+        distance = min(_next(inside, outside), furthest)
+    if np.isfinite(outside[0]):
+        end = np.interp(_LEVEL, [inside[1], outside[1]], [inside[0], outside[0]])
+        return replace(side, end=centre + sign * float(end), unbounded=False)
+    return replace(side, end=centre + sign * (furthest if np.isfinite(limit) else inside[0]))
+
+
+def _next(inside: tuple[float, float, FloatArray], outside: tuple[float, float]) -> float:
+    """Distance at which to look next for the level."""
+    if np.isinf(outside[0]):
+        return float(inside[0] * np.clip(_LEVEL / max(inside[1], 1e-9), 1.15, _STEP))
+    share = (_LEVEL - inside[1]) / (outside[1] - inside[1])
+    return float(inside[0] + np.clip(share, 0.1, 0.9) * (outside[0] - inside[0]))
+
+
+def _pinned(
+    objective: Likelihood,
+    start: FloatArray,
+    gains: _core.FrozenGains,
+    box: Box,
+    what: Quantity,
+    target: float,
+    std: float,
+    best: float,
+) -> tuple[FloatArray, float]:
+    """Best other parameters with the quantity held at `target`, and the likelihood lost."""
+    there = start.copy()
+    if what.column is not None:
+        i = box.columns.index(what.column)
+        target = float(np.clip(target, box.lower[i], box.upper[i]))
+        others = [j for j in range(len(box.columns)) if j != i]
+        there[what.column] = target
+        inner = Box([box.columns[j] for j in others], box.lower[others], box.upper[others])
+        found = minimum(objective, there, gains, inner, rounds=_ROUNDS)
+        there[inner.columns] = found.x
+        return there, found.cost - best
+    weight = _STIFF / std
+
+    def wish(p: FloatArray) -> tuple[float, FloatArray]:
+        return weight * (what.of(p) - target), weight * what.slope(p)
+
+    found = minimum(
+        replace(objective, soft=(*objective.soft, wish)), there, gains, box, rounds=_ROUNDS
+    )
+    there[box.columns] = found.x
+    return there, objective.half_sum_of_squares(there, gains) - best

@@ -1,0 +1,256 @@
+"""What tyre identification starts from: a log of one drive, and what is known of the car."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from ..errors import InvalidInput
+
+__all__ = ["READINGS", "GreyBoxVehicle", "TyreLog", "tyre_problem"]
+
+READINGS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2")
+"""Predicted readings, in the core's order."""
+
+_INPUTS = ("fx_n", "steer_rad", "fz_front_n", "fz_rear_n")
+_SHORTEST = 100
+_SETTLES_S = 1.0
+
+
+@dataclass(frozen=True)
+class GreyBoxVehicle:
+    """What is known of the car besides its tyres, and how well.
+
+    Parameters
+    ----------
+    mass_kg, yaw_inertia_kgm2, lf_m, lr_m : float
+        Mass, yaw inertia, distances of the axles from the centre of gravity.
+    air_density_kgpm3 : float
+    mass_tolerance, yaw_inertia_tolerance : float
+        Relative standard deviation of the mass and of the yaw inertia; 0 where they are exact. A
+        tolerance makes them unknowns with that prior, and every interval carries the doubt.
+    """
+
+    mass_kg: float
+    yaw_inertia_kgm2: float
+    lf_m: float
+    lr_m: float
+    air_density_kgpm3: float = 1.225
+    mass_tolerance: float = 0.0
+    yaw_inertia_tolerance: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m", "air_density_kgpm3"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise InvalidInput(f"{name} is {value}; give a positive number in SI units")
+        for name in ("mass_tolerance", "yaw_inertia_tolerance"):
+            value = getattr(self, name)
+            if not 0.0 <= value < 0.5:
+                raise InvalidInput(
+                    f"{name} is {value}; give a relative standard deviation from 0 to below 0.5"
+                )
+
+    def core(self) -> _core.GreyBoxCar:
+        """For the compiled core."""
+        car = _core.GreyBoxCar()
+        for name in ("mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m", "air_density_kgpm3"):
+            setattr(car, name, getattr(self, name))
+        return car
+
+
+@dataclass(frozen=True, eq=False)
+class TyreLog:
+    """One uninterrupted drive.
+
+    Parameters
+    ----------
+    step_s : float
+        Sampling interval.
+    measurements : array, shape (n, 4)
+        v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2]; NaN where missing. v_y may be missing
+        throughout.
+    inputs : array, shape (n, 4)
+        Longitudinal force [N], road-wheel angle [rad], axle loads front and rear [N], each held
+        from its sample to the next.
+    name : str
+
+    Raises
+    ------
+    InvalidInput
+        Wrong shape, too short, an input that is not finite, a load below zero, or no yaw rate or
+        lateral acceleration at all.
+    """
+
+    step_s: float
+    measurements: FloatArray
+    inputs: FloatArray
+    name: str = "log"
+
+    def __post_init__(self) -> None:
+        y, u = as_float64(self.measurements), as_float64(self.inputs)
+        object.__setattr__(self, "measurements", y)
+        object.__setattr__(self, "inputs", u)
+        if not (np.isfinite(self.step_s) and self.step_s > 0.0):
+            raise InvalidInput(f"{self.name}: step_s is {self.step_s}; give seconds per sample")
+        for what, a in (("measurements", y), ("inputs", u)):
+            if a.ndim != 2 or a.shape[1] != 4 or len(a) != len(y):
+                raise InvalidInput(f"{self.name}: {what} has shape {a.shape}; expected (n, 4)")
+        if len(y) < _SHORTEST:
+            raise InvalidInput(f"{self.name}: {len(y)} samples; {_SHORTEST} or more are needed")
+        bad = ~np.isfinite(u)
+        bad[:, 2:] |= u[:, 2:] < 0.0
+        if bad.any():
+            k, i = map(int, np.argwhere(bad)[0])
+            raise InvalidInput(
+                f"{self.name}: {_INPUTS[i]} is {u[k, i]} at sample {k} ({k * self.step_s:.2f} s); "
+                "cut the log there or fill the gap"
+            )
+        infinite = np.isinf(y)
+        if infinite.any():
+            k, i = map(int, np.argwhere(infinite)[0])
+            raise InvalidInput(
+                f"{self.name}: {READINGS[i]} is infinite at sample {k} ({k * self.step_s:.2f} s); "
+                "put NaN where a reading is missing"
+            )
+        there = np.asarray(np.isfinite(y).any(axis=0))
+        for i in (0, 2, 3):
+            if not there[i]:
+                raise InvalidInput(
+                    f"{self.name}: {READINGS[i]} is missing throughout; tyre forces cannot be told "
+                    "without it"
+                )
+
+    @classmethod
+    def of(
+        cls,
+        step_s: float,
+        measurements: npt.ArrayLike,
+        force_and_steer: npt.ArrayLike,
+        loads: npt.ArrayLike,
+        *,
+        load_delay_samples: int = 0,
+        name: str = "log",
+    ) -> TyreLog:
+        """From arrays as a simulation logs them.
+
+        Parameters
+        ----------
+        step_s : float
+        measurements : array, shape (n, 4)
+        force_and_steer : array, shape (n, 2)
+            Longitudinal force [N] and road-wheel angle [rad].
+        loads : array, shape (n, 2)
+            Axle loads [N], front and rear.
+        load_delay_samples : int
+            Samples by which the loads act later than they are logged.
+        name : str
+
+        Returns
+        -------
+        TyreLog
+        """
+        u, f = as_float64(force_and_steer), as_float64(loads)
+        if load_delay_samples > 0:
+            f = np.vstack([np.repeat(f[:1], load_delay_samples, axis=0), f[:-load_delay_samples]])
+        return cls(step_s, as_float64(measurements), as_float64(np.column_stack([u, f])), name)
+
+    @property
+    def n(self) -> int:
+        """Number of samples."""
+        return len(self.measurements)
+
+    @cached_property
+    def time_s(self) -> FloatArray:
+        """Time of each sample."""
+        return as_float64(np.arange(self.n) * self.step_s)
+
+    @property
+    def sideslip_measured(self) -> bool:
+        """Whether there is any v_y."""
+        return bool(np.isfinite(self.measurements[:, 1]).any())
+
+    def without_sideslip(self) -> TyreLog:
+        """The same drive without its v_y."""
+        y = self.measurements.copy()
+        y[:, 1] = np.nan
+        return TyreLog(self.step_s, y, self.inputs, self.name)
+
+    def with_kinematic_sideslip(self, window_s: float = 10.0) -> TyreLog:
+        """The same drive with v_y from integrating a_y - v_x r, without what drifts.
+
+        Good enough to begin a search with, where v_y was not measured.
+        """
+        y = self.measurements.copy()
+        k = np.arange(self.n)
+        v_x, r, a_y = (
+            np.interp(k, k[np.isfinite(y[:, i])], y[np.isfinite(y[:, i]), i]) for i in (0, 2, 3)
+        )
+        v_y = np.cumsum(a_y - v_x * r) * self.step_s
+        half = min(int(0.5 * window_s / self.step_s), (self.n - 1) // 2)
+        window = np.ones(2 * half + 1)
+        drift = np.convolve(v_y, window, "same") / np.convolve(np.ones(self.n), window, "same")
+        y[:, 1] = v_y - drift
+        return TyreLog(self.step_s, y, self.inputs, self.name)
+
+    def cut(self, first: int, last: int) -> TyreLog:
+        """Samples `first` up to, not including, `last`."""
+        return TyreLog(
+            self.step_s, self.measurements[first:last], self.inputs[first:last], self.name
+        )
+
+    def __str__(self) -> str:
+        v_x, a_y = self.measurements[:, 0], self.measurements[:, 3]
+        return (
+            f"{self.name}: {self.n * self.step_s:.1f} s at {1.0 / self.step_s:g} Hz, "
+            f"{np.nanmin(v_x):.0f} to {np.nanmax(v_x):.0f} m/s, lateral acceleration up to "
+            f"{np.nanmax(np.abs(a_y)):.1f} m/s2"
+            + ("" if self.sideslip_measured else ", v_y not measured")
+        )
+
+
+def tyre_problem(
+    vehicle: GreyBoxVehicle,
+    logs: Sequence[TyreLog],
+    *,
+    most_samples: int | None = None,
+    window_s: float = 5.0,
+) -> _core.TyreProblem:
+    """The core's problem; of about so many samples, if that is asked.
+
+    Half of those are the windows of the hardest cornering, where tyres show their peak, half are
+    spread evenly over the rest.
+    """
+    problem = _core.TyreProblem(vehicle.core())
+    total = sum(log.n for log in logs)
+    for log in logs:
+        windows = [slice(0, log.n)]
+        if most_samples is not None and total > most_samples:
+            length = min(max(int(window_s / log.step_s), _SHORTEST), log.n)
+            windows = _telling(log, length, max(2, round(most_samples * log.n / total / length)))
+        for window in windows:
+            y = log.measurements[window].copy()
+            if not log.sideslip_measured:
+                # The first v_y is anyone's guess, and a filter that starts from a wrong one on
+                # saturated tyres is led astray. A car forgets it within a second.
+                y[: int(_SETTLES_S / log.step_s), 2:] = np.nan
+            problem.add_run(log.step_s, log.inputs[window], as_float64(y))
+    return problem
+
+
+def _telling(log: TyreLog, length: int, count: int) -> list[slice]:
+    tiles = [slice(k, k + length) for k in range(0, log.n - length + 1, length)]
+    if count >= len(tiles):
+        return tiles
+    a_y = np.nan_to_num(np.abs(log.measurements[:, 3]))
+    hard = [-float(np.percentile(a_y[t], 95.0)) for t in tiles]
+    first = [int(i) for i in np.argsort(hard)[: count // 2]]
+    rest = [i for i in range(len(tiles)) if i not in first]
+    spread = np.linspace(0, len(rest) - 1, count - len(first)).round().astype(int)
+    return [tiles[i] for i in sorted({*first, *(rest[k] for k in spread)})]

@@ -1,0 +1,74 @@
+"""Drives of the grey-box car itself, to try an experiment or an estimator on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from ..errors import InvalidInput
+from .box import first_point
+from .tyre_data import READINGS, GreyBoxVehicle, TyreLog
+
+__all__ = ["PUBLISHED_SENSORS", "drive_tyres"]
+
+PUBLISHED_SENSORS = (0.1, 3.16e-3, 3.16e-3, 3.16e-3)
+"""Standard deviations of v_x, v_y [m/s], yaw rate [rad/s] and a_y [m/s2]."""
+
+
+def drive_tyres(
+    vehicle: GreyBoxVehicle,
+    tyres: Mapping[str, float],
+    inputs: FloatArray,
+    *,
+    step_s: float = 0.01,
+    begin: tuple[float, float, float] = (25.0, 0.0, 0.0),
+    sensors: tuple[float, float, float, float] = PUBLISHED_SENSORS,
+    seed: int | np.random.Generator = 0,
+    name: str = "simulated drive",
+) -> TyreLog:
+    """Drive the grey-box car open loop and read its sensors.
+
+    Parameters
+    ----------
+    vehicle : GreyBoxVehicle
+    tyres : mapping
+        Values of some of `lab.tyre_fit.PARAMETERS`.
+    inputs : array, shape (n, 4)
+        As in `TyreLog`.
+    step_s : float
+    begin : tuple of 3 floats
+        v_x, v_y [m/s], yaw rate [rad/s] at the first sample.
+    sensors : tuple of 4 floats
+        Standard deviations of the sensors' white noise.
+    seed : int or numpy.random.Generator
+    name : str
+
+    Returns
+    -------
+    TyreLog
+
+    Raises
+    ------
+    InvalidInput
+        The car spins or stops: the motion leaves what the model is made for.
+    """
+    u = as_float64(inputs)
+    told = np.full((len(u), 4), np.nan)
+    told[0, :3] = begin
+    problem = _core.TyreProblem(vehicle.core())
+    problem.add_run(step_s, u, told)
+    p = first_point(tyres)
+    gains = problem.freeze(p, as_float64([1e-6, 1e-6, 1e-6, 1.0, 1e-6, 1e-6, 1e-6]))
+    y = problem.look_ahead(p, gains, 0)
+    lost = ~np.isfinite(y).all(axis=1) | (y[:, 0] < 1.0) | (np.abs(y[:, 1]) > y[:, 0])
+    if lost.any():
+        k = int(np.argmax(lost))
+        raise InvalidInput(
+            f"{name}: the car spins or stops at sample {k} ({k * step_s:.2f} s; "
+            f"{READINGS[0]} {y[k, 0]:.3g}, {READINGS[1]} {y[k, 1]:.3g}); steer or brake less"
+        )
+    noise = np.random.default_rng(seed).normal(size=y.shape) * np.asarray(sensors)
+    return TyreLog(step_s, as_float64(y + noise), u, name)

@@ -1,0 +1,331 @@
+"""What tyre identification returns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .._arrays import FloatArray, as_float64
+from .._style import AFTER, BEFORE, axes_or_new, tidy
+from .._text import html_table, number, text_table
+from ..identify import Estimate
+from .likelihood import NOISES
+from .multistart import Ends
+from .profile import Profile
+from .tyre_data import GreyBoxVehicle, TyreLog
+from .tyre_shape import COMBINATIONS, friction, peak_slip, slope_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["AXLES", "PARAMETERS", "UNITS", "TyreBand", "TyreFit"]
+
+AXLES = ("front", "rear")
+PARAMETERS = (
+    *(f"{letter}_{axle}" for axle in AXLES for letter in "BCDE"),
+    "P1",
+    "P2",
+    "P3",
+    "mass_factor",
+    "yaw_inertia_factor",
+    "drag_area_m2",
+)
+"""All parameters of the grey-box car, in the core's order."""
+
+UNITS = dict.fromkeys(PARAMETERS, "1") | {
+    "B_front": "1/rad",
+    "B_rear": "1/rad",
+    "P1": "1/m",
+    "P2": "1/s",
+    "P3": "m/s",
+    "drag_area_m2": "m2",
+}
+_CHI_SQUARE = 3.84  # 95 % quantile, one degree of freedom
+_KNOWN_WELL = 0.05  # relative standard error
+
+
+@dataclass(frozen=True, eq=False)
+class TyreBand:
+    """Friction of one axle over its slip angle, with its standard error.
+
+    Attributes
+    ----------
+    axle : str
+    slip_rad, friction, std : array, shape (n,)
+        Lateral force over load.
+    driven_rad : float
+        Slip angle that one sample in 200 exceeds; beyond, the curve is extrapolated.
+    """
+
+    axle: str
+    slip_rad: FloatArray
+    friction: FloatArray
+    std: FloatArray
+    driven_rad: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Another optimum that the data cannot rule out.
+
+    Attributes
+    ----------
+    parameters : array, shape (14,)
+    lost : float
+        By how much it is less likely than the best, in nats.
+    covariance : array, shape (free, free)
+        Around it.
+    """
+
+    parameters: FloatArray
+    lost: float
+    covariance: FloatArray
+
+    def interval(self, function: Callable[[FloatArray], float], slope: FloatArray) -> FloatArray:
+        """What of the 95 % interval of a function of the parameters lies around this optimum."""
+        variance = max(float(slope @ self.covariance @ slope), 0.0)
+        reach = np.sqrt(max(_CHI_SQUARE - 2.0 * self.lost, 0.0) * variance)
+        centre = function(self.parameters)
+        return as_float64([centre - reach, centre + reach])
+
+
+@dataclass(frozen=True, eq=False)
+class TyreFit:
+    """Tyre coefficients identified from driving.
+
+    Attributes
+    ----------
+    vehicle : GreyBoxVehicle
+    logs : tuple of TyreLog
+    parameters : array, shape (14,)
+        All of `PARAMETERS`, free and fixed.
+    estimates : tuple of Estimate
+        The free ones.
+    covariance : array, shape (free, free)
+    noise : array, shape (7,)
+        In the order of `lab.likelihood.NOISES`.
+    log_likelihood : float
+    starts : Ends
+        On the thinned data that decide between starts.
+    driven_rad : tuple of 2 floats
+        Slip angles, front and rear, that one sample in 200 exceeds.
+    profiles : tuple of Profile
+        Profile likelihoods of estimates and combinations; empty where none were asked for.
+    rivals : tuple of Rival
+        Other optima within the 95 % region, most often tyres of another curvature.
+    """
+
+    vehicle: GreyBoxVehicle
+    logs: tuple[TyreLog, ...]
+    parameters: FloatArray
+    estimates: tuple[Estimate, ...]
+    covariance: FloatArray
+    noise: FloatArray
+    log_likelihood: float
+    starts: Ends
+    driven_rad: tuple[float, float]
+    profiles: tuple[Profile, ...] = ()
+    rivals: tuple[Rival, ...] = ()
+
+    def __getitem__(self, name: str) -> Estimate:
+        for e in (*self.estimates, *self.combinations):
+            if e.name == name:
+                return e
+        known = ", ".join(e.name for e in (*self.estimates, *self.combinations))
+        raise KeyError(f"'{name}'; there are {known}")
+
+    def profile(self, name: str) -> Profile:
+        """Profile likelihood of an estimate or a combination."""
+        for found in self.profiles:
+            if found.name == name:
+                return found
+        known = ", ".join(f.name for f in self.profiles) or "none; identify with profiles=True"
+        raise KeyError(f"'{name}'; there are {known}")
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """95 % interval: of the profile likelihood, or of the information matrix without one.
+
+        It reaches over all `rivals`.
+        """
+        low, high = next((f.interval for f in self.profiles if f.name == name), self[name].interval)
+        for rival in self.rivals:
+            there = rival.interval(*self._function(name, rival.parameters))
+            low, high = min(low, float(there[0])), max(high, float(there[1]))
+        return (low if np.isfinite(low) else -np.inf), (high if np.isfinite(high) else np.inf)
+
+    def _function(
+        self, name: str, p: FloatArray
+    ) -> tuple[Callable[[FloatArray], float], FloatArray]:
+        """Value of an estimate or combination as a function of all parameters, and its gradient.
+
+        The gradient is by the free parameters, at `p`.
+        """
+        names = [e.name for e in self.estimates]
+        slope = np.zeros(len(names))
+        if name in names:
+            slope[names.index(name)] = 1.0
+            return lambda q: float(q[PARAMETERS.index(name)]), slope
+        kind, axle = name.rsplit("_", 1)
+        function, first = COMBINATIONS[kind][0], 4 * AXLES.index(axle)
+        where = [names.index(f"{letter}_{axle}") for letter in "BCDE"]
+        slope[where] = np.nan_to_num(slope_of(function, p[first : first + 4]))
+        return lambda q: function(q[first : first + 4]), slope
+
+    def tyre(self, axle: str) -> FloatArray:
+        """B, C, D, E of an axle, `front` or `rear`."""
+        first = 4 * AXLES.index(axle)
+        return as_float64(self.parameters[first : first + 4])
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation of the estimates, shape (free, free)."""
+        std = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
+        return as_float64(self.covariance / np.outer(std, std))
+
+    @property
+    def combinations(self) -> tuple[Estimate, ...]:
+        """Cornering stiffness B C D over load, highest friction, and slip angle of the peak."""
+        names = [e.name for e in self.estimates]
+        found = []
+        for i, axle in enumerate(AXLES):
+            bcde = self.tyre(axle)
+            where = [names.index(f"{letter}_{axle}") for letter in "BCDE"]
+            block = self.covariance[np.ix_(where, where)]
+            peak = peak_slip(bcde)
+            for name, (function, unit) in COMBINATIONS.items():
+                slope = slope_of(function, bcde)
+                variance = float(slope @ block @ slope) if np.isfinite(slope).all() else np.inf
+                # Nobody has seen a peak that was not driven to.
+                beyond = name != "BCD" and self.driven_rad[i] < peak
+                note = "beyond the driven slip" if beyond else ""
+                std = float(np.sqrt(max(variance, 0.0)))
+                found.append(Estimate(f"{name}_{axle}", function(bcde), std, unit, note))
+        return tuple(found)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Parameters that this driving does not determine."""
+        return tuple(e.name for e in self.estimates if e.note)
+
+    @property
+    def determined(self) -> tuple[str, ...]:
+        """Coefficients and combinations known to 5 % or better."""
+        return tuple(
+            e.name
+            for e in (*self.estimates, *self.combinations)
+            if not e.note and self._half_width(e.name) < 2.0 * _KNOWN_WELL * abs(e.value)
+        )
+
+    def _half_width(self, name: str) -> float:
+        low, high = self.interval(name)
+        return max(high - self[name].value, self[name].value - low)
+
+    def curve(self, axle: str, slip_rad: FloatArray | None = None) -> TyreBand:
+        """Tyre curve of an axle with its standard error, by the delta method."""
+        i = AXLES.index(axle)
+        bcde = self.tyre(axle)
+        if slip_rad is None:
+            slip_rad = np.linspace(0.0, max(1.5 * self.driven_rad[i], 0.02), 81)
+        names = [e.name for e in self.estimates]
+        where = [names.index(f"{letter}_{axle}") for letter in "BCDE"]
+        slopes = np.empty((len(slip_rad), 4))
+        for j in range(4):
+            step = 1e-5 * max(abs(float(bcde[j])), 0.1)
+            high, low = bcde.copy(), bcde.copy()
+            high[j] += step
+            low[j] -= step
+            slopes[:, j] = (friction(slip_rad, high) - friction(slip_rad, low)) / (2.0 * step)
+        variance = np.einsum("nj,jk,nk->n", slopes, self.covariance[np.ix_(where, where)], slopes)
+        std = np.sqrt(np.maximum(variance, 0.0))
+        return TyreBand(axle, slip_rad, friction(slip_rad, bcde), std, self.driven_rad[i])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw both tyre curves with 95 % bands; dotted beyond the driven slip.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        ax = axes_or_new(ax, 6.0, 3.8)
+        for axle, colour in zip(AXLES, (AFTER, BEFORE), strict=True):
+            band = self.curve(axle)
+            seen = band.slip_rad <= band.driven_rad
+            ax.plot(band.slip_rad[seen], band.friction[seen], color=colour, label=axle)
+            ax.plot(band.slip_rad[~seen], band.friction[~seen], ":", color=colour)
+            low, high = band.friction - 1.96 * band.std, band.friction + 1.96 * band.std
+            ax.fill_between(band.slip_rad, low, high, color=colour, alpha=0.2, linewidth=0)
+        ax.set_ylim(0.0, 1.3 * max(float(self.curve(a).friction.max()) for a in AXLES))
+        ax.legend()
+        return tidy(ax, xlabel="slip angle [rad]", ylabel="lateral force / load")
+
+    @property
+    def _head(self) -> tuple[str, ...]:
+        kind = "profile" if self.profiles else "information"
+        return ("parameter", "value", "std", f"95 % interval ({kind})", "unit", "note")
+
+    def _rows(self) -> list[list[str]]:
+        rows = []
+        for e in (*self.estimates, *self.combinations):
+            interval = self._interval_text(e)
+            rows.append([e.name, number(e.value, 5), number(e.std, 2), interval, e.unit, e.note])
+        return rows
+
+    def _interval_text(self, e: Estimate) -> str:
+        low, high = (number(x, 5) if np.isfinite(x) else "?" for x in self.interval(e.name))
+        for found in self.profiles:
+            if found.name == e.name:
+                low, high = ("?" if found.open_below else low), ("?" if found.open_above else high)
+        return f"{low} .. {high}"
+
+    def _headline(self) -> str:
+        return (
+            f"Tyres from {'; '.join(map(str, self.logs))}\n"
+            f"log-likelihood {self.log_likelihood:.1f}; {self.starts}"
+        )
+
+    def _closing(self) -> str:
+        noise = ", ".join(
+            f"{name} {number(s, 3)}" for name, s in zip(NOISES, self.noise, strict=True)
+        )
+        lines = [f"Noise learned: {noise}"]
+        for rival in self.rivals:
+            values = ", ".join(
+                f"{e.name} {number(rival.parameters[PARAMETERS.index(e.name)], 5)}"
+                for e in self.estimates[:8]
+            )
+            lines.append(f"As likely to {number(rival.lost, 2)} nats: {values}")
+        if self.undetermined:
+            lines.append(
+                f"Not determined by this driving: {', '.join(self.undetermined)}; known to "
+                f"{100 * _KNOWN_WELL:g} % or better: {', '.join(self.determined) or 'none'}"
+            )
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        return f"{self._headline()}\n{text_table(self._head, self._rows())}\n{self._closing()}"
+
+    def _repr_html_(self) -> str:
+        return (
+            f"<p>{self._headline()}</p>{html_table(self._head, self._rows())}"
+            f"<p>{self._closing()}</p>"
+        )
+
+
+def strongest_correlations(fit: TyreFit, count: int = 5) -> Sequence[tuple[str, str, float]]:
+    """The pairs of estimates that the driving tells apart worst.
+
+    Returns
+    -------
+    sequence of (name, name, correlation)
+    """
+    names = [e.name for e in fit.estimates]
+    table = fit.correlation
+    pairs = [(names[i], names[j], float(table[i, j])) for i in range(len(names)) for j in range(i)]
+    return sorted(pairs, key=lambda pair: -abs(pair[2]))[:count]

@@ -1,0 +1,98 @@
+"""What the Magic Formula's coefficients mean together, with derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .._arrays import FloatArray, as_float64
+
+__all__ = ["COMBINATIONS", "friction", "look_alike", "peak_slip", "slope_of", "stiffness", "top"]
+
+_PEAKLESS = 1.0 + 1e-6
+
+
+def friction(slip_rad: FloatArray, bcde: FloatArray) -> FloatArray:
+    """Lateral force over load; shape of `slip_rad`.
+
+    Pacejka, Tire and Vehicle Dynamics, 3rd ed., eq. (4.6) without shifts.
+    """
+    b, c, d, e = bcde
+    x = b * slip_rad
+    return as_float64(d * np.sin(c * np.arctan(x - e * (x - np.arctan(x)))))
+
+
+def stiffness(bcde: FloatArray) -> float:
+    """Cornering stiffness over load, B C D [1/rad]."""
+    return float(bcde[0] * bcde[1] * bcde[2])
+
+
+def top(bcde: FloatArray) -> float:
+    """Highest friction, D (below it, where C is too small for a peak)."""
+    return float(bcde[2] * np.sin(0.5 * np.pi * min(bcde[1], 1.0)))
+
+
+def peak_slip(bcde: FloatArray) -> float:
+    """Slip angle of the peak [rad]; infinite where there is none."""
+    b, c, _, e = map(float, bcde)
+    if c <= _PEAKLESS:
+        return np.inf
+    wanted = np.tan(0.5 * np.pi / c)
+    # x - E (x - atan x) = wanted; for E below 1 it grows without end and has one root.
+    low, high = 0.0, 1.0
+    while high - e * (high - np.arctan(high)) < wanted:
+        high *= 2.0
+        if high > 1e9:
+            return np.inf
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        if middle - e * (middle - np.arctan(middle)) < wanted:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high) / b
+
+
+def look_alike(bcde: FloatArray, e: float) -> FloatArray:
+    """The tyre of curvature factor `e` that has the same stiffness, the same peak at the same slip.
+
+    B, C, D, E copy each other along these. Where no such tyre exists B, C and D stay.
+    """
+    b, c, d, _ = map(float, bcde)
+    wanted = peak_slip(bcde)
+    low, high = _PEAKLESS + 1e-3, 3.0
+
+    def peak_at(shape: float) -> float:
+        return peak_slip(np.array([b * c / shape, shape, d, e])) - wanted
+
+    if not np.isfinite(wanted) or not peak_at(low) > 0.0 > peak_at(high):
+        return np.array([b, c, d, e])
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if peak_at(middle) > 0.0:
+            low = middle
+        else:
+            high = middle
+    return np.array([b * c / low, low, d, e])
+
+
+COMBINATIONS: dict[str, tuple[Callable[[FloatArray], float], str]] = {
+    "BCD": (stiffness, "1/rad"),
+    "peak": (top, "1"),
+    "peak_slip": (peak_slip, "rad"),
+}
+"""Name, function of B, C, D, E, and unit."""
+
+
+def slope_of(function: Callable[[FloatArray], float], bcde: FloatArray) -> FloatArray:
+    """Central differences of a combination; NaN where it does not exist."""
+    out = np.empty(4)
+    for i in range(4):
+        step = 1e-5 * max(abs(float(bcde[i])), 0.1)
+        high, low = bcde.copy(), bcde.copy()
+        high[i] += step
+        low[i] -= step
+        with np.errstate(invalid="ignore"):
+            out[i] = (function(high) - function(low)) / (2.0 * step)
+    return out

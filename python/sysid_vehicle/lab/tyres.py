@@ -1,0 +1,183 @@
+"""Identification of the grey-box car's tyres by maximum likelihood, from many starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from .._arrays import FloatArray, as_float64
+from ..errors import InvalidInput, warn
+from ..estimate.inputs import white_noise_std
+from ..identify import METHODS
+from .box import box_of, first_point
+from .descent import descend, settle
+from .likelihood import Likelihood
+from .motion import TyreMotion
+from .multistart import multistart, start_points
+from .regression import descend_regression
+from .summary import summary, with_profiles, with_rivals
+from .tyre_data import GreyBoxVehicle, TyreLog, tyre_problem
+from .tyre_fit import PARAMETERS, TyreFit
+
+__all__ = ["identify_tyres"]
+
+_THINNED = 3200  # samples that decide between starts
+_BETTER_FOUND = 4  # times that profiling may lead to a better optimum
+_KINEMATIC_VY = 0.1  # how far integrated accelerations may be off [m/s]
+
+
+def identify_tyres(
+    vehicle: GreyBoxVehicle,
+    logs: TyreLog | Sequence[TyreLog],
+    *,
+    start: Mapping[str, float] | None = None,
+    residual_terms: bool = False,
+    starts: int = 16,
+    profiles: bool = True,
+    method: str = "gauss-newton",
+    seed: int = 0,
+    workers: int = 2,
+    progress: bool = False,
+) -> TyreFit:
+    """Identify B, C, D, E of both axles, and the noise, from driving.
+
+    The likelihood is that of one-step-ahead prediction errors of v_x, v_y, yaw rate and lateral
+    acceleration together, of a filter whose noise is learned: nothing smoothed is taken as exact.
+
+    Parameters
+    ----------
+    vehicle : GreyBoxVehicle
+        A tolerance of its mass or yaw inertia makes that an unknown too.
+    logs : TyreLog or sequence of TyreLog
+        Drives of one car. v_y may be missing.
+    start : mapping, optional
+        Starting values of some of `PARAMETERS`.
+    residual_terms : bool
+        Also fit P1, P2, P3 of a_y = ... + P1 v_x^2 + P2 v_y + P3 r.
+    starts : int
+        The given point, and others that fill the whole `BOX` evenly.
+    profiles : bool
+        Take intervals from the profile likelihood, which follows bent valleys; otherwise from the
+        information matrix alone, which is quicker.
+    method : str
+        Local optimiser: `gauss-newton`, `nlopt` or `scipy`.
+    seed : int
+        Of the start points.
+    workers : int
+        Threads.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    TyreFit
+
+    Raises
+    ------
+    InvalidInput
+        No log, an unknown method or parameter, less than one start.
+    NumericalError
+        No start led anywhere.
+    """
+    several = (logs,) if isinstance(logs, TyreLog) else tuple(logs)
+    _check(several, method, starts)
+    free = list(PARAMETERS[:8])
+    if residual_terms:
+        free += ["P1", "P2", "P3"]
+    per_std = np.zeros(len(PARAMETERS))
+    for name, tolerance in (
+        ("mass_factor", vehicle.mass_tolerance),
+        ("yaw_inertia_factor", vehicle.yaw_inertia_tolerance),
+    ):
+        if tolerance > 0.0:
+            free.append(name)
+            per_std[PARAMETERS.index(name)] = 1.0 / tolerance
+    free.append("drag_area_m2")
+    p = first_point(start or {})
+    box = box_of(free, {})
+    columns = box.columns
+    centre = p.copy()
+    centre[[PARAMETERS.index("mass_factor"), PARAMETERS.index("yaw_inertia_factor")]] = 1.0
+
+    def objective(of: Sequence[TyreLog], most: int | None) -> Likelihood:
+        return Likelihood(tyre_problem(vehicle, of, most_samples=most), centre, per_std)
+
+    begins = start_points(p[columns], box, list(range(8)), starts, seed)
+    told = [g if g.sideslip_measured else g.with_kinematic_sideslip() for g in several]
+    p, noise, ends, others = multistart(
+        objective(several, _THINNED),
+        objective(told, _THINNED),
+        _regression(vehicle, told),
+        p,
+        box,
+        begins,
+        tuple(free),
+        _loose(several),
+        method=method,
+        workers=workers,
+        progress=progress,
+    )
+    whole = objective(several, None)
+    p, noise, value = settle(whole, p, noise, box, method=method)
+    rivals: list[FloatArray] = []
+    for other in others:
+        end, there = descend(whole, other, noise, box)
+        if there > value:
+            rivals.append(p)
+            p, value = end, there
+        else:
+            rivals.append(end)
+    for _ in range(_BETTER_FOUND):
+        p, noise, value = settle(whole, p, noise, box, method=method)
+        fit = summary(vehicle, several, whole, p, noise, box, tuple(free), ends)
+        fit = with_rivals(fit, whole, rivals, box)
+        if not profiles:
+            return fit
+        fit, better = with_profiles(fit, whole, box, workers=workers, progress=progress)
+        if better is None:
+            break
+        p = better  # a profile came upon it
+    return fit
+
+
+def _check(logs: tuple[TyreLog, ...], method: str, starts: int) -> None:
+    if not logs:
+        raise InvalidInput("no log was given; pass one TyreLog or a list of them")
+    if method not in METHODS:
+        raise InvalidInput(f"no optimiser is called '{method}'; there are {', '.join(METHODS)}")
+    if starts < 1:
+        raise InvalidInput(f"starts is {starts}; at least one is needed")
+    blind = [log.name for log in logs if not log.sideslip_measured]
+    if blind:
+        warn(
+            f"{', '.join(blind)}: v_y is not measured; coefficients that only it tells have wide "
+            "intervals"
+        )
+
+
+def _regression(
+    vehicle: GreyBoxVehicle, logs: Sequence[TyreLog]
+) -> Callable[[FloatArray], tuple[FloatArray, float]]:
+    """Search of B, C, D, E on the smoothed motion of all logs."""
+    motions = [TyreMotion.from_log(log) for log in logs]
+    total = sum(m.n for m in motions)
+    motion = TyreMotion.joined([m.thinned(max(1, _THINNED * m.n // total)) for m in motions])
+    box = box_of(PARAMETERS[:8], {})
+
+    def search(p: FloatArray) -> tuple[FloatArray, float]:
+        end, loss = descend_regression(vehicle, motion, p, p[box.columns], box, "joint")
+        return end, -0.5 * loss
+
+    return search
+
+
+def _loose(logs: Sequence[TyreLog]) -> FloatArray:
+    """Noise under which a filter follows the readings, whatever the tyres."""
+    sensors = []
+    for i, least in enumerate((0.02, 0.005, 0.002, 0.02)):
+        seen = [white_noise_std(log.measurements[:, i]) for log in logs]
+        sensors.append(max(max(seen), least))
+    if not all(log.sideslip_measured for log in logs):
+        sensors[1] = _KINEMATIC_VY
+    return as_float64([*sensors, 0.03, 0.05, 0.05])
