@@ -255,6 +255,7 @@ def learn_observer_noise(
     never_fall: bool,
     accelerate: bool,
 ) -> _ObserverEm: ...
+
 # --- lab tyres
 class GreyBoxCar(metaclass=_Bound):
     mass_kg: float
