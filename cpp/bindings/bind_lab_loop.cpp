@@ -98,6 +98,8 @@ void register_lab_loop(py::module_& m) {
         .def_readwrite("yaw_acceleration_limit_radps2", &AdrcData::yaw_acceleration_limit_radps2)
         .def_readwrite("lateral_limit_mps2", &AdrcData::lateral_limit_mps2)
         .def_readwrite("slip_limit_rad", &AdrcData::slip_limit_rad)
+        .def_readwrite("rear_slip_limit_rad", &AdrcData::rear_slip_limit_rad)
+        .def_readwrite("rear_slip_gain_ps", &AdrcData::rear_slip_gain_ps)
         .def_readwrite("brakes_from_mps2", &AdrcData::brakes_from_mps2)
         .def_readwrite("feed_forward", &AdrcData::feed_forward)
         .def_readwrite("coupling", &AdrcData::coupling)
@@ -142,15 +144,16 @@ void register_lab_loop(py::module_& m) {
         .def(
             "set_habits",
             [](LabLoop& s, double pose_gain, bool load_sensors, bool late_feedback,
-               double first_late_load_n, bool certain_start) {
+               double first_late_load_n, bool certain_start, bool inputs_linear) {
                 s.loop.pose_gain = pose_gain;
                 s.loop.load_sensors = load_sensors;
                 s.loop.late_feedback = late_feedback;
                 s.loop.first_late_load_n = first_late_load_n;
                 s.observer.certain_start = certain_start;
+                s.loop.inputs_linear = inputs_linear;
             },
             py::arg("pose_gain"), py::arg("load_sensors"), py::arg("late_feedback"),
-            py::arg("first_late_load_n"), py::arg("certain_start"))
+            py::arg("first_late_load_n"), py::arg("certain_start"), py::arg("inputs_linear"))
         .def(
             "set_plant",
             [](LabLoop& s, double load_share, bool late_loads, bool air_speed_of_both, int steps,

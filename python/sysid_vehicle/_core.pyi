@@ -121,6 +121,8 @@ class LabController(metaclass=_Bound):
     yaw_acceleration_limit_radps2: float
     lateral_limit_mps2: float
     slip_limit_rad: float
+    rear_slip_limit_rad: float
+    rear_slip_gain_ps: float
     brakes_from_mps2: float
     feed_forward: bool
     coupling: bool
@@ -150,6 +152,7 @@ class LabLoop(metaclass=_Bound):
         late_feedback: bool,
         first_late_load_n: float,
         certain_start: bool,
+        inputs_linear: bool,
     ) -> None: ...
     def set_plant(
         self,

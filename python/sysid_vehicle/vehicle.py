@@ -10,6 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from ._arrays import FloatArray
 from ._files import read_toml, refuse_unknown, write_text
 from .errors import InvalidInput, warn
 
@@ -59,6 +63,7 @@ _VEHICLE_RANGES = {
     "drive_front_share": _Range(0.0, 1.0, "front axle's share of the drive force, 0 to 1"),
 }
 
+_CURVE_POINTS = 3001
 _OPTIONAL = ("yaw_inertia_kgm2", "air_density_kgpm3")
 _TYRE_TABLES = ("front", "rear")
 
@@ -107,6 +112,18 @@ class Tyre:
     def cornering_stiffness_per_load(self) -> float:
         """Cornering stiffness per vertical load, ``B C D`` [1/rad]."""
         return self.B * self.C * self.D
+
+    def friction(self, slip_rad: npt.ArrayLike) -> FloatArray:
+        """Lateral force per vertical load [-] at slip angles [rad]."""
+        x = self.B * np.asarray(slip_rad, dtype=float)
+        return np.asarray(
+            self.D * np.sin(self.C * np.arctan(x - self.E * (x - np.arctan(x)))), dtype=float
+        )
+
+    def peak_slip_rad(self, largest_rad: float = 0.6) -> float:
+        """Slip angle of the curve's peak [rad], at most `largest_rad`."""
+        slip = np.linspace(0.0, largest_rad, _CURVE_POINTS)
+        return float(slip[int(np.argmax(self.friction(slip)))])
 
     def replace(self, **changes: float) -> Tyre:
         """Return a copy with some coefficients changed."""

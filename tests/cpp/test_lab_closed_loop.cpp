@@ -96,6 +96,30 @@ TEST(LabLoop, ObserverAndInputsFollowFromReadingsAlone) {
     }
 }
 
+TEST(LabLoop, TheSameDriveWithInputsThatMoveEvenly) {
+    // Half a sample earlier, and no more: the drives stay near each other.
+    LoopData data = loop_data();
+    const LoopRecord held = drive(data, swinging(0.1, 20.0));
+    data.inputs_linear = true;
+    const LoopRecord even = drive(data, swinging(0.1, 20.0));
+    ASSERT_EQ(even.lost_at, kSamples);
+    double apart = 0.0;
+    for (std::size_t k = 500; k < kSamples; ++k)
+        apart = std::max(apart, std::abs(truth(held, k, 5) - truth(even, k, 5)));
+    EXPECT_GT(apart, 1e-6);
+    EXPECT_LT(apart, 5e-3);
+    // Moving evenly from one sample's input to the next's repeats the drive.
+    Plant plant({saloon(), 0}, plain_parameters().data(), {});
+    PlantState x = plant.at_rest(data.first_speed_mps);
+    const Plant::Pushes calm{};
+    for (std::size_t k = 0; k + 1 < kSamples; ++k) {
+        const double* now = &even.inputs[LoopRecord::kInputs * k];
+        const double* next = now + LoopRecord::kInputs;
+        plant.advance(x, {now[1], now[0]}, {next[1], next[0]}, calm, data.dt);
+        ASSERT_NEAR(x[2], truth(even, k + 1, 2), 1e-9) << k;
+    }
+}
+
 TEST(LabLoop, ABiasedSensorDeceivesTheController) {
     LoopData data = loop_data();
     data.sensors[kSenseVx].bias = 2.0;

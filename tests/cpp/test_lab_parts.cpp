@@ -143,6 +143,28 @@ TEST(LabController, LimitsAreKeptAndTold) {
     EXPECT_TRUE(limits & kYawRateLimited);
 }
 
+TEST(LabController, TheRearTyreComesNoNearerToItsLimitThanTheBarrierLets) {
+    AdrcData data;
+    data.rear_slip_limit_rad = 0.1;
+    data.rear_slip_gain_ps = 10.0;
+    const Adrc adrc(data, nominal());
+    const AxleLoads loads{4000.0, 4000.0};
+    Estimate x = Estimate::Zero();
+    x[kEstVx] = 20.0;
+    std::uint32_t limits = 0;
+    EXPECT_EQ(adrc.guarded(0.9, x, 0.0, loads, limits), 0.9);
+    EXPECT_EQ(limits, 0U);
+    // Nose turned in by 0.15 rad: no force but that of the rear tyre, which pushes to the left.
+    x[kEstVy] = -3.0;
+    const double front = 0.15;  // steered along the way the car goes, it has none
+    const double slip = std::atan2(3.0, 20.0);
+    const double pushed = 50.0 * 4000.0 * 0.15 / (800.0 * 20.0);
+    EXPECT_NEAR(adrc.guarded(9.0, x, -front, loads, limits), pushed - 10.0 * (slip - 0.1), 1e-9);
+    EXPECT_EQ(limits, static_cast<std::uint32_t>(kRearSlipLimited));
+    x[kEstVy] = 3.0;
+    EXPECT_NEAR(adrc.guarded(-9.0, x, front, loads, limits), -pushed + 10.0 * (slip - 0.1), 1e-9);
+}
+
 TEST(LabController, TurnsTheShorterWay) {
     Adrc adrc({}, nominal());
     std::uint32_t limits = 0;

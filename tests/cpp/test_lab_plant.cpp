@@ -15,7 +15,8 @@ constexpr double kStep = 0.01;
 PlantState driven(Plant plant, int samples, double steer_rad, double force_n) {
     PlantState x = plant.at_rest(25.0);
     for (int k = 0; k < samples; ++k)
-        plant.advance(x, {steer_rad * std::sin(0.05 * k), force_n}, kCalm, kStep);
+        plant.advance(x, {steer_rad * std::sin(0.05 * k), force_n},
+                      {steer_rad * std::sin(0.05 * k), force_n}, kCalm, kStep);
     return x;
 }
 
@@ -63,8 +64,8 @@ TEST(LabPlant, StepsRefineWhereTheCarIsQuick) {
     Plant automatic(model, p.data(), {}), precise(model, p.data(), exact);
     PlantState a = automatic.at_rest(1.2), b = a;
     for (int k = 0; k < 50; ++k) {
-        automatic.advance(a, {0.1, 100.0}, kCalm, kStep);
-        precise.advance(b, {0.1, 100.0}, kCalm, kStep);
+        automatic.advance(a, {0.1, 100.0}, {0.1, 100.0}, kCalm, kStep);
+        precise.advance(b, {0.1, 100.0}, {0.1, 100.0}, kCalm, kStep);
     }
     for (std::size_t i = 0; i < kPlantStates; ++i) EXPECT_NEAR(a[i], b[i], 2e-3) << i;
 }
@@ -75,10 +76,10 @@ TEST(LabPlant, ACircleClosesOnTheGround) {
     Plant plant(model, p.data(), {});
     PlantState x = plant.at_rest(10.0);
     const Input u{0.05, 30.0};
-    for (int k = 0; k < 500; ++k) plant.advance(x, u, kCalm, kStep);
+    for (int k = 0; k < 500; ++k) plant.advance(x, u, u, kCalm, kStep);
     const double radius = std::hypot(x[0], x[1]) / x[2];
     const PlantState begin = x;
-    for (int k = 0; k < 500; ++k) plant.advance(x, u, kCalm, kStep);
+    for (int k = 0; k < 500; ++k) plant.advance(x, u, u, kCalm, kStep);
     const double turned = x[kHeading] - begin[kHeading];
     const double chord = std::hypot(x[kPlaceX] - begin[kPlaceX], x[kPlaceY] - begin[kPlaceY]);
     EXPECT_NEAR(chord, 2.0 * radius * std::sin(0.5 * turned), 0.02 * chord);
@@ -118,7 +119,7 @@ TEST(LabPlant, LateLoadsAreThoseOfTheSampleBefore) {
     EXPECT_NEAR(first.load_rear, at_once.load_rear, 1e-9);
     const double load = first.load_rear;
     PlantState y = x;
-    plant.advance(y, brake, kCalm, kStep);
+    plant.advance(y, brake, brake, kCalm, kStep);
     EXPECT_NEAR(plant.look(x, brake, kCalm).force_rear, per_load * load, 1e-9);
 }
 
@@ -129,8 +130,8 @@ TEST(LabPlant, EffectsAct) {
     Plant prompt({saloon(), 0}, p.data(), {});
     PlantState a = lagging.at_rest(20.0), b = prompt.at_rest(20.0);
     for (int k = 0; k < 5; ++k) {
-        lagging.advance(a, {0.02, 0.0}, kCalm, kStep);
-        prompt.advance(b, {0.02, 0.0}, kCalm, kStep);
+        lagging.advance(a, {0.02, 0.0}, {0.02, 0.0}, kCalm, kStep);
+        prompt.advance(b, {0.02, 0.0}, {0.02, 0.0}, kCalm, kStep);
     }
     EXPECT_LT(a[2], 0.7 * b[2]);
     EXPECT_GT(a[2], 0.0);

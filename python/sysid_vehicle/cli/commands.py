@@ -21,6 +21,7 @@ from ..read import ChannelMap, read_log
 from ..report import summary, write_report
 from ..study import Study, improve
 from ..vehicle import Vehicle
+from . import lab
 from .outputs import refuse_unwritable
 
 __all__ = ["COMMANDS"]
@@ -94,6 +95,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
     "diagnose": _diagnose,
     "improve": _improve,
     "effects": _effects,
+    "lab": lab.run,
 }
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from .. import _core
 from ..demo import DEFAULT, RANDOM
+from . import lab
 
 __all__ = ["parse"]
 
@@ -67,6 +68,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     _json(improve)
 
     commands.add_parser("effects", help="the catalogue of effects")
+    lab.add_parser(commands)
     return parser.parse_args(argv)
 
 

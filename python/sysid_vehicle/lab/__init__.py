@@ -1,12 +1,16 @@
 """The closed-loop laboratory: drive, observe, learn the noise, identify the tyres."""
 
 from . import excitation
+from .design import Design, Limits, design_excitation
 from .em import EMResult, NoiseStructure, learn_observer_noise
+from .information import information
 from .loop import ClosedLoop, run_closed_loop
 from .motion import TyreMotion
 from .observed import READINGS, STATES, StateEstimate
 from .observer import Observer, ObserverCar, ObserverForm, ObserverNoise, ObserverRecord
 from .parts import Actuator, Controller, Nominal, Online, Sensor, Sensors, Simulator
+from .pictures import overview
+from .preview import Coverage, Expected, Preview, preview
 from .regression import PUBLISHED_BOX, PUBLISHED_START, TyreRegression, regress_tyres
 from .saturation import Saturation
 from .setup import Setup
@@ -24,8 +28,12 @@ __all__ = [
     "Actuator",
     "ClosedLoop",
     "Controller",
+    "Coverage",
+    "Design",
     "EMResult",
+    "Expected",
     "GreyBoxVehicle",
+    "Limits",
     "NoiseStructure",
     "Nominal",
     "Observer",
@@ -34,6 +42,7 @@ __all__ = [
     "ObserverNoise",
     "ObserverRecord",
     "Online",
+    "Preview",
     "Saturation",
     "Sensor",
     "Sensors",
@@ -44,10 +53,14 @@ __all__ = [
     "TyreLog",
     "TyreMotion",
     "TyreRegression",
+    "design_excitation",
     "drive_tyres",
     "excitation",
     "identify_tyres",
+    "information",
     "learn_observer_noise",
+    "overview",
+    "preview",
     "regress_tyres",
     "run_closed_loop",
 ]

@@ -125,7 +125,8 @@ class ClosedLoop:
         Log
             The canonical channels, and as further columns the sensed ``heading_rad``, ``x_m``,
             ``y_m``, ``fz_front_n`` and ``fz_rear_n``. No truth. Wheel force and steering angle are
-            held from one sample to the next.
+            held from one sample to the next, unless `Simulator.inputs_linear` is on; the rest of
+            the package takes them as linear in between.
         """
         return Log.from_arrays(
             {"time_s": self.time_s, **self.sensed}, name=name or self.excitation.name, check=False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -38,12 +38,15 @@ class Sensor:
         Age of what is read.
     rate_hz : float
         Readings per second; 0 means one at every sample. In between there is none (NaN).
+    present : bool
+        False: it reads nothing at all.
     """
 
     noise_std: float = 0.0
     bias: float = 0.0
     delay_s: float = 0.0
     rate_hz: float = 0.0
+    present: bool = True
 
     def __post_init__(self) -> None:
         for name in ("noise_std", "delay_s", "rate_hz"):
@@ -96,7 +99,12 @@ class Sensors:
 
     def table(self) -> FloatArray:
         """Return noise, bias, delay and rate of every sensor, shape (12, 4)."""
-        return as_float64([astuple(getattr(self, name)) for name in self.names()])
+        rows = []
+        for name in self.names():
+            s: Sensor = getattr(self, name)
+            # A reading with noise that is no number is none.
+            rows.append([s.noise_std if s.present else np.nan, s.bias, s.delay_s, s.rate_hz])
+        return as_float64(rows)
 
     def normal(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Draw standard normal numbers for `n` samples, shape (n, 12)."""
@@ -184,6 +192,9 @@ class Controller:
         Limits of the wanted yaw rate, of its change, and of its product with the speed.
     slip_limit_rad : float
         The steering angle keeps the estimated front slip angle below this.
+    rear_slip_limit_rad, rear_slip_gain_ps : float
+        The wanted yaw rate is given up where it would bring the estimated rear slip angle nearer
+        to this limit than the gain [1/s] times what is left.
     brakes_from_mps2 : float
         Decelerations below this are left to drag.
     feed_forward : bool
@@ -200,7 +211,9 @@ class Controller:
     yaw_rate_limit_radps: float = 1.2
     yaw_acceleration_limit_radps2: float = 6.0
     lateral_limit_mps2: float = _INF
-    slip_limit_rad: float = 0.25
+    slip_limit_rad: float = 0.15
+    rear_slip_limit_rad: float = 0.12
+    rear_slip_gain_ps: float = 10.0
     brakes_from_mps2: float = 0.0
     feed_forward: bool = True
     coupling: bool = True
@@ -213,7 +226,7 @@ class Controller:
     @classmethod
     def published(cls) -> Controller:
         """Return the published gains and limits."""
-        return cls(4.0, 30.0, 12.0, 0.3, 1.0, _INF, _INF, 1.0, False, False, 1e-6, 1e-6)
+        return cls(4.0, 30.0, 12.0, 0.3, 1.0, _INF, _INF, _INF, 10.0, 1.0, False, False, 1e-6, 1e-6)
 
 
 @dataclass(frozen=True)
@@ -280,6 +293,9 @@ class Simulator:
         What stands for the loads before there are any.
     load_sensors : bool
         Observer and controller take the loads from sensors, not from the car's own numbers.
+    inputs_linear : bool
+        Wheel force and steering angle move evenly from each sample to the next, as the rest of the
+        package takes logs to be. Otherwise they jump at each sample and hold until the next.
     """
 
     load_share: float = 1.0
@@ -291,9 +307,14 @@ class Simulator:
     late_feedback: bool = False
     first_late_load_n: float = 0.0
     load_sensors: bool = False
+    inputs_linear: bool = False
 
     def __post_init__(self) -> None:
         _refuse_negative(self)
+        if self.inputs_linear and self.late_feedback:
+            raise InvalidInput(
+                "Simulator: inputs_linear needs the next command early; switch late_feedback off"
+            )
         if not (0.0 < self.load_share <= 1.0 and 0 <= self.steps <= 1000):
             raise InvalidInput(
                 f"Simulator: load_share = {self.load_share!r}, steps = {self.steps!r}; give a "

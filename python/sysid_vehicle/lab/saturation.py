@@ -22,6 +22,7 @@ _LIMITS = (
     ("change of the wanted yaw rate cut", 0.05),
     ("steering held back for the front tyre", 0.01),
     ("left to roll instead of braking", 1.0),
+    ("yaw rate given up for the rear tyre", 0.01),
 )
 
 
@@ -33,6 +34,8 @@ class Saturation:
     ----------
     what : str
         The limit, in words.
+    bit : int
+        Its bit in the samples' `limits`.
     share : float
         Part of the samples at which it was met.
     first_s, longest_s : float
@@ -42,6 +45,7 @@ class Saturation:
     """
 
     what: str
+    bit: int
     share: float
     first_s: float
     longest_s: float
@@ -69,5 +73,5 @@ def saturation(limits: npt.NDArray[np.uint32], rate_hz: float) -> tuple[Saturati
         edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]])))
         longest = float((edges[1::2] - edges[::2]).max()) / rate_hz
         first = float(np.argmax(on)) / rate_hz
-        met.append(Saturation(what, float(on.mean()), first, longest, tolerated))
+        met.append(Saturation(what, 1 << bit, float(on.mean()), first, longest, tolerated))
     return tuple(met)

@@ -148,7 +148,12 @@ class Setup:
         loop.set_noise(np.diag(o.process).astype(float), np.diag(o.sensors).astype(float))
         loop.set_published_form(o.published_form)
         loop.set_habits(
-            self.pose_gain, s.load_sensors, s.late_feedback, s.first_late_load_n, o.certain_start
+            self.pose_gain,
+            s.load_sensors,
+            s.late_feedback,
+            s.first_late_load_n,
+            o.certain_start,
+            s.inputs_linear,
         )
         loop.set_plant(
             s.load_share, s.late_loads, s.air_speed_of_both, s.steps, s.tolerance, s.gravity_mps2

@@ -20,8 +20,7 @@ _LARGEST_SLIP_RAD = 0.6
 def _curve(tyre: Tyre) -> tuple[FloatArray, FloatArray]:
     """Slip angle and force per load of the rising branch of :class:`Tyre`'s curve."""
     alpha = np.linspace(0.0, _LARGEST_SLIP_RAD, 3001)
-    x = tyre.B * alpha
-    mu = tyre.D * np.sin(tyre.C * np.arctan(x - tyre.E * (x - np.arctan(x))))
+    mu = tyre.friction(alpha)
     top = int(np.argmax(mu)) + 1
     return alpha[:top], mu[:top]
 

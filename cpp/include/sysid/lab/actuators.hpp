@@ -20,6 +20,7 @@ enum Limit : std::uint32_t {
     kYawAccelerationLimited = 128U,  // and so does its change
     kSlipLimited = 256U,             // steering held back to keep the front tyre on its curve
     kBrakesIdle = 512U,              // a little too fast, and left to roll
+    kRearSlipLimited = 1024U,        // yaw rate given up to keep the rear tyre on its curve
 };
 
 struct Actuator {

@@ -4,8 +4,12 @@
 //   F_x   = m (K_v (v_ref - v_x) + dv_ref/dt - v_y r) + C_d v_x - xi_x                          (1)
 //   delta = I_z / (C_f l_f) (K_r (r_ref - r) - N_v v_y - N_r r - xi_psi / I_z)                  (2)
 //   r_ref = K_psi (psi_ref - psi) + dpsi_ref/dt, limited in rate and size                       (3)
+//   |r_ref - a_y / v_x + K_a alpha_r| <= K_a alpha_max,  alpha_r = -atan2(v_y - l_r r, v_x)     (5)
 //   N_v = -(C_f l_f - C_r l_r) / (I_z v_x),  N_r = -(C_f l_f^2 + C_r l_r^2) / (I_z v_x)         (4)
-// J. Han, From PID to Active Disturbance Rejection Control, IEEE Trans. Ind. Electron. 56 (2009).
+// (5): the rear slip angle changes by about r - a_y / v_x, and may come nearer to its limit no
+// faster than K_a times what is left; a yaw rate alone says nothing of how far the car has come
+// round (control barrier: Ames et al., IEEE Trans. Autom. Control 62 (2017)). J. Han, From PID to
+// Active Disturbance Rejection Control, IEEE Trans. Ind. Electron. 56 (2009).
 #pragma once
 
 #include <algorithm>
@@ -54,8 +58,10 @@ struct AdrcData {
     double heading_gain_ps = 12.0;
     double yaw_rate_limit_radps = 0.3;
     double yaw_acceleration_limit_radps2 = 1.0;
-    double lateral_limit_mps2 = std::numeric_limits<double>::infinity();  // of v_x r_ref
-    double slip_limit_rad = std::numeric_limits<double>::infinity();      // of the front tyre
+    double lateral_limit_mps2 = std::numeric_limits<double>::infinity();   // of v_x r_ref
+    double slip_limit_rad = std::numeric_limits<double>::infinity();       // of the front tyre
+    double rear_slip_limit_rad = std::numeric_limits<double>::infinity();  // of the rear tyre
+    double rear_slip_gain_ps = 10.0;
     double brakes_from_mps2 = 0.0;  // below this deceleration the car is left to roll
     bool feed_forward = true;       // the derivatives of the references in (1) and (3)
     bool coupling = true;           // the term v_y r of (1)
@@ -102,6 +108,22 @@ class Adrc {
             std::min(data_.yaw_rate_limit_radps, data_.lateral_limit_mps2 / std::max(v_x, 1.0));
         if (std::abs(rate) > most) limits |= kYawRateLimited;
         return std::clamp(rate, -most, most);
+    }
+
+    /// Equation (5); `steer_rad` is the angle that acts on the state `x`.
+    double guarded(double yaw_rate, const Estimate& x, double steer_rad, const AxleLoads& loads,
+                   std::uint32_t& limits) const {
+        const double v = std::max(x[kEstVx], 1.0);
+        const double slip = -std::atan2(x[kEstVy] - car_.lr_m * x[kEstYawRate], v);
+        const double front = steer_rad - (x[kEstVy] + car_.lf_m * x[kEstYawRate]) / v;
+        const double rear = -(x[kEstVy] - car_.lr_m * x[kEstYawRate]) / v;
+        const double force = car_.stiffness_front * loads.front_n * front +
+                             car_.stiffness_rear * loads.rear_n * rear + x[kEstXiY];
+        const double middle = force / (car_.mass_kg * v) - data_.rear_slip_gain_ps * slip;
+        const double room = data_.rear_slip_gain_ps * data_.rear_slip_limit_rad;
+        const double kept = std::clamp(yaw_rate, middle - room, middle + room);
+        if (kept != yaw_rate) limits |= kRearSlipLimited;
+        return kept;
     }
 
     /// Equation (2).

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <vector>
 
 #include "sysid/lab/adrc.hpp"
@@ -37,6 +38,9 @@ struct LoopData {
     // The order of a simulator without prediction: the command rests on the estimate and the loads
     // of the sample before, and the observer moves on with the input of its own sample.
     bool late_feedback = false;
+    // The actuators move evenly from a sample to the next, as decided for it. Otherwise they jump
+    // and hold, which late feedback always does.
+    bool inputs_linear = false;
     double first_late_load_n = 0.0;
     double slowest_mps = 0.3;        // the drive ends below this speed
     double most_sideslip_rad = 0.7;  // and beyond this sideslip angle
@@ -99,13 +103,21 @@ class ClosedLoop {
         for (std::size_t k = 0; k < wanted.size(); ++k) {
             Plant::Pushes outside{};
             std::copy(push + 3 * k, push + 3 * k + 3, outside.begin());
-            step(wanted[k], x, outside, normal + k * kSensorCount, k, out);
+            perfect_.push_back(readings(x, outside));
+            if (data_.late_feedback) {
+                place_.correct(sensors_.read(perfect_, normal + k * kSensorCount), 1.0);
+                believed_ = observer_.state();
+            }
+            if (data_.late_feedback || k == 0) decide(wanted[k], k);
+            const Input acts = next_.acts;
+            measure(x, outside, normal + k * kSensorCount, k, out);
             if (lost(x)) {
                 out.lost_at = k;
                 break;
             }
+            if (!data_.late_feedback && k + 1 < wanted.size()) decide(wanted[k + 1], k + 1);
             try {
-                plant_.advance(x, input_, outside, data_.dt);
+                plant_.advance(x, acts, data_.inputs_linear ? next_.acts : acts, outside, data_.dt);
             } catch (const NumericalFailure&) {
                 out.lost_at = k;
                 break;
@@ -115,27 +127,54 @@ class ClosedLoop {
     }
 
   private:
-    void step(Wanted wanted, const PlantState& x, const Plant::Pushes& push, const double* normal,
-              std::size_t k, LoopRecord& out) {
-        perfect_.push_back(readings(x, push));
-        if (data_.late_feedback) {
-            place_.correct(sensors_.read(perfect_, normal), 1.0);
-            believed_ = observer_.state();
-        } else if (k > 0) {
+    /// What is done at a sample, and why.
+    struct Decision {
+        Wanted wanted;
+        double yaw_rate_radps = 0.0, left_of_track_m = 0.0;
+        Input commanded, acts;
+        std::uint32_t limits = 0;
+    };
+
+    /// Decides on sample `k`, from readings of earlier samples alone unless feedback is late.
+    void decide(Wanted wanted, std::size_t k) {
+        if (!data_.late_feedback && k > 0) {
             place_.move(observer_.state(), data_.dt);
             believed_ = observer_.ahead();
         }
-        std::uint32_t limits = 0;
-        double beside = 0.0;
+        const Input before = next_.acts;
+        next_ = {};
+        next_.acts = before;
         if (data_.steer_by == SteerBy::kTrack) {
             const TrackDriver::Sight sight =
                 driver_.look(place_.x_m, place_.y_m, place_.heading_rad, wanted.speed_mps);
             wanted.heading_rad = sight.heading_rad;
-            beside = sight.left_of_track_m;
+            next_.left_of_track_m = sight.left_of_track_m;
         }
+        next_.wanted = wanted;
+        next_.yaw_rate_radps = wanted.yaw_rate_radps;
         // Without a prediction there is nothing to act on before the first reading.
-        const double yaw_rate =
-            k > 0 || data_.late_feedback ? command(wanted, limits) : wanted.yaw_rate_radps;
+        if (k > 0 || data_.late_feedback) command(next_);
+    }
+
+    void command(Decision& d) {
+        const Estimate& e = believed_;
+        d.commanded.steer_rad = d.wanted.steer_rad;
+        if (data_.steer_by != SteerBy::kAngle) {
+            d.yaw_rate_radps =
+                controller_.yaw_rate(d.wanted, place_.heading_rad, e[kEstVx], data_.dt, d.limits);
+            d.yaw_rate_radps =
+                controller_.guarded(d.yaw_rate_radps, e, d.acts.steer_rad, loads_, d.limits);
+            d.commanded.steer_rad = controller_.steer(d.yaw_rate_radps, e, loads_, d.limits);
+        }
+        d.commanded.longitudinal = controller_.force(d.wanted, e, d.limits);
+        d.acts.longitudinal = follow(data_.force, d.acts.longitudinal, d.commanded.longitudinal,
+                                     data_.dt, kForceLimits, d.limits);
+        d.acts.steer_rad = follow(data_.steer, d.acts.steer_rad, d.commanded.steer_rad, data_.dt,
+                                  kSteerLimits, d.limits);
+    }
+
+    void measure(const PlantState& x, const Plant::Pushes& push, const double* normal,
+                 std::size_t k, LoopRecord& out) {
         perfect_.back() = readings(x, push);  // now with the input that acts
         const Readings y = sensors_.read(perfect_, normal);
         if (!std::isnan(y[kSenseForce])) known_.longitudinal = y[kSenseForce];
@@ -148,25 +187,7 @@ class ClosedLoop {
         } else {
             place_.correct(y, k > 0 ? data_.pose_gain : 1.0);
         }
-        record(wanted, x, push, y, {yaw_rate, beside}, limits, out);
-    }
-
-    /// Sets `input_` and `commanded_`; returns the yaw rate that is wanted.
-    double command(const Wanted& wanted, std::uint32_t& limits) {
-        const Estimate& e = believed_;
-        double yaw_rate = wanted.yaw_rate_radps;
-        commanded_.steer_rad = wanted.steer_rad;
-        if (data_.steer_by != SteerBy::kAngle) {
-            yaw_rate =
-                controller_.yaw_rate(wanted, place_.heading_rad, e[kEstVx], data_.dt, limits);
-            commanded_.steer_rad = controller_.steer(yaw_rate, e, loads_, limits);
-        }
-        commanded_.longitudinal = controller_.force(wanted, e, limits);
-        input_.longitudinal = follow(data_.force, input_.longitudinal, commanded_.longitudinal,
-                                     data_.dt, kForceLimits, limits);
-        input_.steer_rad = follow(data_.steer, input_.steer_rad, commanded_.steer_rad, data_.dt,
-                                  kSteerLimits, limits);
-        return yaw_rate;
+        record(x, push, y, out);
     }
 
     void next_loads(const Readings& y) {
@@ -179,48 +200,33 @@ class ClosedLoop {
     }
 
     Readings readings(const PlantState& x, const Plant::Pushes& push) const {
-        const auto y = plant_.sensed(x, input_, push);
-        const PlantTruth t = plant_.look(x, input_, push);
+        const Input& u = next_.acts;
+        const auto y = plant_.sensed(x, u, push);
+        const PlantTruth t = plant_.look(x, u, push);
         return {
-            y[kVx],       y[kVy],      y[kYawRate],         y[kAx],
-            y[kAy],       x[kHeading], x[kPlaceX],          x[kPlaceY],
-            t.load_front, t.load_rear, input_.longitudinal, input_.steer_rad,
+            y[kVx],     y[kVy],     y[kYawRate],  y[kAx],      y[kAy],         x[kHeading],
+            x[kPlaceX], x[kPlaceY], t.load_front, t.load_rear, u.longitudinal, u.steer_rad,
         };
     }
 
-    void record(const Wanted& wanted, const PlantState& x, const Plant::Pushes& push,
-                const Readings& y, const std::array<double, 2>& reference, std::uint32_t limits,
+    void record(const PlantState& x, const Plant::Pushes& push, const Readings& y,
                 LoopRecord& out) const {
-        const PlantTruth t = plant_.look(x, input_, push);
-        out.truth.insert(out.truth.end(), {
-                                              x[0],
-                                              x[1],
-                                              x[2],
-                                              x[kPlaceX],
-                                              x[kPlaceY],
-                                              x[kHeading],
-                                              t.a_x,
-                                              t.a_y,
-                                              t.yaw_acceleration,
-                                              t.slip_front,
-                                              t.slip_rear,
-                                              t.force_front,
-                                              t.force_rear,
-                                              t.load_front,
-                                              t.load_rear,
-                                          });
+        const Decision& d = next_;
+        const PlantTruth t = plant_.look(x, d.acts, push);
+        const auto add = [](std::vector<double>& to, std::initializer_list<double> values) {
+            to.insert(to.end(), values);
+        };
+        add(out.truth, {x[0], x[1], x[2], x[kPlaceX], x[kPlaceY], x[kHeading]});
+        add(out.truth, {t.a_x, t.a_y, t.yaw_acceleration, t.slip_front, t.slip_rear});
+        add(out.truth, {t.force_front, t.force_rear, t.load_front, t.load_rear});
         out.sensed.insert(out.sensed.end(), y.begin(), y.end());
         const Estimate& e = observer_.state();
         out.estimate.insert(out.estimate.end(), e.data(), e.data() + kEstimated);
-        out.reference.insert(out.reference.end(),
-                             {wanted.speed_mps, wanted.heading_rad, reference[0], reference[1]});
-        out.inputs.insert(out.inputs.end(), {
-                                                input_.longitudinal,
-                                                input_.steer_rad,
-                                                commanded_.longitudinal,
-                                                commanded_.steer_rad,
-                                            });
-        out.limits.push_back(limits);
+        add(out.reference,
+            {d.wanted.speed_mps, d.wanted.heading_rad, d.yaw_rate_radps, d.left_of_track_m});
+        add(out.inputs, {d.acts.longitudinal, d.acts.steer_rad});
+        add(out.inputs, {d.commanded.longitudinal, d.commanded.steer_rad});
+        out.limits.push_back(d.limits);
     }
 
     // Written so that a state that is not a number counts as lost.
@@ -240,7 +246,8 @@ class ClosedLoop {
     Reckoning place_;
     Estimate believed_ = Estimate::Zero();
     AxleLoads loads_;
-    Input input_, commanded_, known_;
+    Decision next_;
+    Input known_;
 };
 
 /// The loop around the extended-state observer.

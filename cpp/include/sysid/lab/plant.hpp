@@ -93,15 +93,15 @@ class Plant {
         return y;
     }
 
-    /// Moves `x` over one sample, the inputs held.
-    void advance(PlantState& x, const Input& u, const Pushes& push, double dt) {
+    /// Moves `x` over one sample, the inputs going evenly from `from` to `to`.
+    void advance(PlantState& x, const Input& from, const Input& to, const Pushes& push, double dt) {
         HeldLoads next = model_.held;
         if (options_.late_loads) {
-            const Workings<double> w = workings(x, u, push);
+            const Workings<double> w = workings(x, from, push);
             next = {true, w.fz_f, w.fz_r};
         }
-        const auto rate = [&](double /*part*/, const PlantState& at) {
-            return derivative(at, u, push);
+        const auto rate = [&](double part, const PlantState& at) {
+            return derivative(at, between(from, to, part), push);
         };
         if (options_.tolerance > 0.0) {
             dormand_prince(x, dt, options_.tolerance, rate);

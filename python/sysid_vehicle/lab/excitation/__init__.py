@@ -7,6 +7,7 @@ from ._driven import Driven, OnManoeuvre, multi_sine, speed_ramp
 from ._excitation import Excitation
 from ._multisine import MultiSine
 from ._published import Identification, Oval
+from ._weaving import Weaving
 
 __all__ = [
     "Driven",
@@ -15,6 +16,7 @@ __all__ = [
     "MultiSine",
     "OnManoeuvre",
     "Oval",
+    "Weaving",
     "all",
     "multi_sine",
     "speed_ramp",
@@ -23,5 +25,5 @@ __all__ = [
 
 def all() -> dict[str, Excitation]:
     """Make every excitation of the package with its default parameters, by name."""
-    own = (Identification(), Oval(), speed_ramp(), multi_sine())
+    own = (Identification(), Oval(), speed_ramp(), multi_sine(), Weaving())
     return {e.name: e for e in (*own, *map(OnManoeuvre, _manoeuvres().values()))}

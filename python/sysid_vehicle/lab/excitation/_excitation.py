@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from html import escape
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from ...vehicle import Vehicle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from ..preview import Preview
+    from ..setup import Setup
 
 __all__ = ["Excitation", "derivative", "sample_times"]
 
@@ -108,6 +111,12 @@ class Excitation(ABC):
                 ]
             )
         )
+
+    def preview(self, setup: Setup | None = None, **options: Any) -> Preview:
+        """What it will teach; see :func:`sysid_vehicle.lab.preview`."""
+        from ..preview import preview
+
+        return preview(self, setup, **options)
 
     def __str__(self) -> str:
         time_s = sample_times(self.duration_s, 20.0)

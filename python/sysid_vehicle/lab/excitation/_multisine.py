@@ -85,6 +85,14 @@ class MultiSine:
             value += np.cos(2.0 * np.pi * h * time_s / self.period_s + phase)
         return as_float64(self._size * value)
 
+    def integral(self, time_s: FloatArray) -> FloatArray:
+        """Integral over time, with mean zero over a period."""
+        value = np.zeros_like(time_s)
+        for h, phase in zip(self.harmonics, self._phase, strict=True):
+            omega = 2.0 * np.pi * h / self.period_s
+            value += np.sin(omega * time_s + phase) / omega
+        return as_float64(self._size * value)
+
 
 def _low_crest(harmonics: np.ndarray) -> tuple[FloatArray, float]:
     """Phases of lines of size one that keep the peak low, and that peak."""

@@ -1,0 +1,185 @@
+"""`sysid-vehicle lab`: the closed-loop laboratory from the command line.
+
+A subcommand is a `Subcommand` in `SUBCOMMANDS`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from .._files import write_json, write_text
+from .._style import svg
+from ..errors import InvalidInput, near_names
+from ..lab import (
+    ClosedLoop,
+    Preview,
+    Setup,
+    design_excitation,
+    excitation,
+    overview,
+    preview,
+    run_closed_loop,
+)
+from ..model import Model
+from ..vehicle import Vehicle
+from .outputs import refuse_unwritable
+
+__all__ = ["add_parser", "run"]
+
+_DESIGNED = "designed"
+_PRESETS = {"default": Setup.default, "published": Setup.published}
+
+
+@dataclass(frozen=True)
+class Subcommand:
+    """One subcommand of `lab`: its name, its line of help, its arguments, and what it does."""
+
+    name: str
+    help: str
+    arguments: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace, list[str]], None]
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `lab` and its subcommands to the program's commands."""
+    lab = commands.add_parser("lab", help="drive a simulated car in closed loop to learn its tyres")
+    inner = lab.add_subparsers(dest="lab_command", required=True, metavar="SUBCOMMAND")
+    for sub in SUBCOMMANDS:
+        sub.arguments(inner.add_parser(sub.name, help=sub.help))
+
+
+def run(args: argparse.Namespace, heard: list[str]) -> None:
+    """Do the subcommand that was asked for."""
+    next(sub for sub in SUBCOMMANDS if sub.name == args.lab_command).run(args, heard)
+
+
+def _run_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--excitation",
+        default="identification",
+        metavar="NAME",
+        help=f"what is driven: '{_DESIGNED}' to have one designed for this car, or one of "
+        f"{', '.join(excitation.all())} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--preset",
+        choices=tuple(_PRESETS),
+        default="default",
+        help="laboratory: as mended, or with all habits of the published one (default: mended)",
+    )
+    parser.add_argument(
+        "--vehicle", type=Path, metavar="TOML", help="the car (default: the published one)"
+    )
+    parser.add_argument(
+        "--effects",
+        default="",
+        metavar="A,B",
+        help="effects that the car has too, each at its typical size",
+    )
+    parser.add_argument(
+        "--duration",
+        type=float,
+        metavar="S",
+        help="length, where the excitation has a choice (default: its own; 60 if designed)",
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the sensors' noise")
+    parser.add_argument("--preview", action="store_true", help="also say what it will teach")
+    parser.add_argument("--log", type=Path, metavar="CSV", help="log to write")
+    parser.add_argument("--plot", type=Path, metavar="SVG", help="picture to write")
+    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+
+
+def _run(args: argparse.Namespace, heard: list[str]) -> None:
+    inputs = [args.vehicle] if args.vehicle is not None else []
+    refuse_unwritable([args.log, args.plot, args.json], inputs=inputs)
+    if args.seed < 0:
+        raise InvalidInput(f"--seed {args.seed}: give a whole number from zero up")
+    setup = _setup(args)
+    seen: Preview | None = None
+    if args.excitation == _DESIGNED:
+        length = {} if args.duration is None else {"duration_s": args.duration}
+        design = design_excitation(setup, seed=args.seed, progress=sys.stderr.isatty(), **length)
+        print(design, end="\n\n")
+        driven: excitation.Excitation = design.excitation
+        setup, seen = design.setup, design.preview
+    else:
+        driven = _excitation(args)
+        if args.preview:
+            seen = preview(driven, setup, seed=args.seed)
+            print(seen, end="\n\n")
+    drive = run_closed_loop(driven, setup, seed=args.seed)
+    print(drive)
+    if args.log is not None:
+        drive.to_log().to_csv(args.log)
+        print(f"Log: {args.log}")
+    if args.plot is not None:
+        write_text(args.plot, svg(overview(drive)).decode())
+        print(f"Picture: {args.plot}")
+    if args.json is not None:
+        write_json(args.json, {**_figures(drive, seen), "warnings": heard})
+
+
+def _setup(args: argparse.Namespace) -> Setup:
+    setup = _PRESETS[args.preset]()
+    if args.vehicle is not None:
+        if args.preset != "default":
+            raise InvalidInput(f"--preset {args.preset} has a car of its own; leave --vehicle out")
+        setup = Setup.of(Model(Vehicle.from_toml(args.vehicle)))
+    for name in (part.strip() for part in args.effects.split(",")):
+        if not name:
+            continue
+        plant = setup.plant if name in setup.plant.effects else setup.plant.add(name)
+        typical = {
+            n: p.null_value + p.typical
+            for n, p in plant.parameters.items()
+            if n.startswith(f"{name}.")
+        }
+        setup = replace(setup, plant=plant.with_values(typical))
+    return setup
+
+
+def _excitation(args: argparse.Namespace) -> excitation.Excitation:
+    known = excitation.all()
+    if args.excitation not in known:
+        raise InvalidInput(
+            f"--excitation: nothing is called '{args.excitation}'"
+            f"{near_names(args.excitation, known)}; there are {_DESIGNED}, {', '.join(known)}"
+        )
+    chosen = known[args.excitation]
+    if args.duration is None:
+        return chosen
+    if not isinstance(chosen, excitation.Identification | excitation.Oval | excitation.Weaving):
+        raise InvalidInput(f"--duration: {chosen.name} has a length of its own; leave it out")
+    return replace(chosen, duration_s=args.duration)
+
+
+def _figures(drive: ClosedLoop, seen: Preview | None) -> dict[str, Any]:
+    figures: dict[str, Any] = {
+        "excitation": drive.excitation.name,
+        "setup": drive.setup.name,
+        "duration_s": float(drive.time_s[-1]),
+        "lost_s": drive.lost_s,
+        "too_hard": drive.too_hard,
+        "tracking_rms": drive.tracking,
+        "observer_rms": drive.observer_error,
+        "limits": {
+            s.what: {"share": s.share, "first_s": s.first_s, "longest_s": s.longest_s}
+            for s in drive.saturation
+        },
+    }
+    if seen is not None:
+        figures["expected"] = {
+            e.name: {"value": e.value, "std": e.std, "relative": e.relative} for e in seen.expected
+        }
+        figures["slip_over_peak"] = {c.axle: c.reached for c in seen.coverage}
+    return figures
+
+
+SUBCOMMANDS: tuple[Subcommand, ...] = (
+    Subcommand("run", "drive an excitation, write its log", _run_arguments, _run),
+)

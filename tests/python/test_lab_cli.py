@@ -1,0 +1,65 @@
+"""`sysid-vehicle lab run`."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sysid_vehicle import example_vehicle, read_log
+from sysid_vehicle.cli import main
+
+
+def test_it_drives_previews_and_writes_all_that_was_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = {key: tmp_path / f"out.{key}" for key in ("csv", "svg", "json")}
+    status = main(
+        [
+            *("lab", "run", "--excitation", "weaving", "--duration", "12", "--preview"),
+            *("--effects", "gyro_bias", "--log", str(files["csv"]), "--plot", str(files["svg"])),
+            *("--json", str(files["json"])),
+        ]
+    )
+    assert status == 0
+    shown = capsys.readouterr().out
+    assert "What weaving will teach" in shown
+    assert "weaving in 'laboratory': 12 s" in shown
+    log = read_log(files["csv"])
+    assert log.duration_s == pytest.approx(12.0)
+    assert log["yaw_rate_radps"].mean() == pytest.approx(0.006, abs=0.004)
+    assert files["svg"].read_text().lstrip().startswith("<?xml")
+    figures = json.loads(files["json"].read_text())
+    assert figures["excitation"] == "weaving"
+    assert len(figures["expected"]) == 8
+
+
+def test_it_drives_the_published_laboratory(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["lab", "run", "--preset", "published", "--duration", "20"]) == 0
+    assert "identification in 'published': 20 s" in capsys.readouterr().out
+
+
+def test_it_drives_a_car_from_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "car.toml"
+    example_vehicle().replace(yaw_inertia_kgm2=1750.0).to_toml(path)
+    assert main(["lab", "run", "--excitation", "lap", "--vehicle", str(path), "--seed", "3"]) == 0
+    assert "lap in 'laboratory': 60 s" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--excitation", "weavin"], "did you mean 'weaving'?"),
+        (["--excitation", "slalom", "--duration", "5"], "has a length of its own"),
+        (["--effects", "steer_lagg"], "steer_lag"),
+        (["--seed", "-1"], "--seed -1"),
+        (["--log", "/nowhere/at/all.csv"], "does not exist"),
+        (["--preset", "published", "--vehicle", "car.toml"], "leave --vehicle out"),
+    ],
+)
+def test_what_makes_no_sense_is_one_line_and_status_2(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["lab", "run", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
