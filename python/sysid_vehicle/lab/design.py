@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Design", "Limits", "Trial", "design_excitation"]
 
-_FRONT_SLIP_SHARE = 2.0  # of the slip angle at the peak, where the controller holds the tyre
-_REAR_SLIP_SHARE = 1.5
+_FRONT_SLIP_SHARE = 1.5  # of the slip angle at the peak, where the controller holds the tyre
+_REAR_SLIP_SHARE = 1.25
 _MOST_SWING_MPS = 12.0
 _AT_ONCE = 4  # trials around one best, whatever the number of threads
 _FIRST_SPREAD, _LAST_SPREAD = 0.25, 0.05  # of the box, for the trials around the best so far

@@ -211,9 +211,9 @@ class Controller:
     yaw_rate_limit_radps: float = 1.2
     yaw_acceleration_limit_radps2: float = 6.0
     lateral_limit_mps2: float = _INF
-    slip_limit_rad: float = 0.15
-    rear_slip_limit_rad: float = 0.12
-    rear_slip_gain_ps: float = 10.0
+    slip_limit_rad: float = 0.12
+    rear_slip_limit_rad: float = 0.1
+    rear_slip_gain_ps: float = 4.0
     brakes_from_mps2: float = 0.0
     feed_forward: bool = True
     coupling: bool = True

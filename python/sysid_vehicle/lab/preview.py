@@ -176,7 +176,9 @@ class Preview:
         widest = 1.05 * max(max(c.largest_rad, c.peak_rad) for c in self.coverage)
         slip = np.linspace(-widest, widest, 401)
         bins = np.linspace(-widest, widest, 81)
-        for c, colour in zip(self.coverage, (BEFORE, AFTER), strict=True):
+        # Curves that are alike lie on each other; dashes let both be seen.
+        looks = ((BEFORE, "-"), (AFTER, "--"))
+        for c, (colour, line) in zip(self.coverage, looks, strict=True):
             visited = self.drive.truth[f"slip_{c.axle}_rad"]
             seconds = np.full(visited.size, 1.0 / self.drive.setup.rate_hz)
             ax.hist(
@@ -188,7 +190,7 @@ class Preview:
                 label=c.axle,
             )
             curve = tyre_of(self.believed, c.axle).friction(slip)
-            right.plot(slip, curve, color=colour, linewidth=1.2)
+            right.plot(slip, curve, line, color=colour, linewidth=1.2)
             for side in (-c.peak_rad, c.peak_rad):
                 ax.axvline(side, color=FLOOR, linewidth=0.7, linestyle=":")
         ax.set_yscale("log")

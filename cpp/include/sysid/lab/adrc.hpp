@@ -61,7 +61,7 @@ struct AdrcData {
     double lateral_limit_mps2 = std::numeric_limits<double>::infinity();   // of v_x r_ref
     double slip_limit_rad = std::numeric_limits<double>::infinity();       // of the front tyre
     double rear_slip_limit_rad = std::numeric_limits<double>::infinity();  // of the rear tyre
-    double rear_slip_gain_ps = 10.0;
+    double rear_slip_gain_ps = 4.0;
     double brakes_from_mps2 = 0.0;  // below this deceleration the car is left to roll
     bool feed_forward = true;       // the derivatives of the references in (1) and (3)
     bool coupling = true;           // the term v_y r of (1)
