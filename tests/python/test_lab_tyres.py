@@ -1,11 +1,15 @@
 """Identification of tyres: recovery, intervals, rivals, what is missing, the golden logs."""
 
+import argparse
+import json
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from sysid_vehicle import Log
+from sysid_vehicle.cli import lab_identify
 from sysid_vehicle.errors import InvalidInput
 from sysid_vehicle.lab import (
     GreyBoxVehicle,
@@ -276,3 +280,64 @@ def test_peak_from_the_drive_that_reaches_it(shared_data: Path) -> None:
     low, high = fit.interval("E_rear")
     assert low < 0.1
     assert high > 0.8
+
+
+def as_log(log: TyreLog, *, sideslip: bool = True) -> Log:
+    columns = {
+        "time_s": log.time_s,
+        "vx_mps": log.measurements[:, 0],
+        "yaw_rate_radps": log.measurements[:, 2],
+        "ay_mps2": log.measurements[:, 3],
+        "fx_n": log.inputs[:, 0],
+        "steer_rad": log.inputs[:, 1],
+        "fz_front_n": log.inputs[:, 2],
+        "fz_rear_n": log.inputs[:, 3],
+    }
+    if sideslip:
+        columns["vy_mps"] = log.measurements[:, 1]
+    return Log.from_arrays(columns, check=False)
+
+
+def test_reads_a_driving_log() -> None:
+    drive = driven(seconds=5.0)
+    (same,) = TyreLog.from_log(as_log(drive), CAR)
+    assert same.inputs == pytest.approx(drive.inputs)
+    assert same.measurements == pytest.approx(drive.measurements)
+    (blind,) = TyreLog.from_log(as_log(drive, sideslip=False), CAR)
+    assert not blind.sideslip_measured
+    # Without load columns: those at rest, and what braking moves forwards.
+    plain = {
+        "time_s": drive.time_s,
+        "vx_mps": drive.measurements[:, 0],
+        "yaw_rate_radps": drive.measurements[:, 2],
+        "ay_mps2": drive.measurements[:, 3],
+        "ax_mps2": np.full(drive.n, -2.0),
+        "steer_rad": drive.inputs[:, 1],
+    }
+    (braked,) = TyreLog.from_log(Log.from_arrays(plain, check=False), CAR, cg_height_m=0.3)
+    moved = 780.0 * 2.0 * 0.3 / 3.0
+    assert braked.inputs[0] == pytest.approx(
+        [
+            -1560.0,
+            drive.inputs[0, 1],
+            780.0 * 9.80665 * 1.6 / 3.0 + moved,
+            780.0 * 9.80665 * 1.4 / 3.0 - moved,
+        ]
+    )
+
+
+def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    as_log(driven(seconds=10.0)).to_csv(tmp_path / "drive.csv")
+    parser = argparse.ArgumentParser()
+    lab_identify.add_parser(parser.add_subparsers())
+    picture, figures = tmp_path / "curves.svg", tmp_path / "figures.json"
+    words = ["identify", str(tmp_path / "drive.csv"), "--starts", "2", "--fast", "--unchecked"]
+    args = parser.parse_args([*words, "--plot", str(picture), "--json", str(figures)])
+    lab_identify.run(args, ["a warning"])
+    said = capsys.readouterr().out
+    assert "starts end at the best optimum" in said
+    assert picture.read_text().startswith("<?xml")
+    told = json.loads(figures.read_text())
+    assert told["warnings"] == ["a warning"]
+    assert told["estimates"]["BCD_rear"]["value"] == pytest.approx(63.36, rel=0.01)
+    assert len(told["starts"]) == 2

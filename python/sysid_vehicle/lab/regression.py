@@ -44,6 +44,7 @@ _PRIOR_WEIGHT = 0.1
 _PRIOR_OF_RESIDUAL_TERMS = 0.1  # relative to that of the tyres
 _SIMILARITY_WEIGHT = 1000.0
 _FLOOR = 1e-6  # of the variance of a_y [m2/s4]
+_COARSE = 800  # samples of a first search
 _PASSES = 3  # over the sizes of the errors, joint loss
 
 
@@ -185,8 +186,14 @@ def descend_regression(
     p : array, shape (parameters,)
     loss : float
     """
-    p = p.copy()
-    p[box.columns] = begin
+    start = p.copy()
+    start[box.columns] = begin
+    p = start.copy()
+    if motion.n > 2 * _COARSE:
+        # The way to the valley needs few samples, the place in it all of them.
+        p, _ = descend_regression(
+            vehicle, motion.thinned(_COARSE), p, begin, box, loss, projection, method
+        )
     kept = [not projection or PARAMETERS[c][0] in "BCE" for c in box.columns]
     inner = Box(
         [c for c, k in zip(box.columns, kept, strict=True) if k], box.lower[kept], box.upper[kept]
@@ -194,7 +201,7 @@ def descend_regression(
     worked_out = [not k for k in kept]
     linear = [c for c, k in zip(box.columns, kept, strict=True) if not k]
     ay, yaw = _first_weights(motion, loss)
-    soft = _wishes(p) if loss == "regularised" else SoftRows.none(len(p))
+    soft = _wishes(start) if loss == "regularised" else SoftRows.none(len(p))
     value = np.inf
     for _ in range(_PASSES if loss == "joint" else 1):
         problem = Regression(

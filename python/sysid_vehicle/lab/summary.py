@@ -25,7 +25,7 @@ __all__ = ["box_covariance", "quantities", "summary", "with_profiles", "with_riv
 _SPREAD_OF_BOX = np.sqrt(1.0 / 12.0)  # standard deviation of a uniform over a box of width 1
 _UNKNOWN = 0.2  # of the width
 _LEVEL_NATS = 1.92  # half the 95 % quantile of chi-square with one degree of freedom
-_APART = 0.02  # of the width
+_BEYOND = 25.0  # squared distance in standard deviations
 _WIDE = 0.5  # of the width, for an interval
 
 
@@ -77,8 +77,10 @@ def with_rivals(
     best = fit.log_likelihood - objective.prior_cost(fit.parameters)
     for p in rivals:
         there, value = descend(objective, p, fit.noise, box)
-        apart = np.abs(there - fit.parameters)[box.columns] / (box.upper - box.lower)
-        if value > best - _LEVEL_NATS and np.any(apart > _APART):
+        apart = (there - fit.parameters)[box.columns]
+        # What lies on the same slope is in the interval already.
+        beyond = float(apart @ np.linalg.solve(fit.covariance, apart)) > _BEYOND
+        if value > best - _LEVEL_NATS and beyond:
             gains = objective.problem.freeze(there, fit.noise)
             _, _, information = objective.normal_equations(there, gains, box.columns)
             kept.append(Rival(there, best - value, box_covariance(information, box)))

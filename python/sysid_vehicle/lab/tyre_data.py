@@ -12,6 +12,7 @@ import numpy.typing as npt
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
+from ..log import Log
 
 __all__ = ["READINGS", "GreyBoxVehicle", "TyreLog", "tyre_problem"]
 
@@ -21,6 +22,7 @@ READINGS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2")
 _INPUTS = ("fx_n", "steer_rad", "fz_front_n", "fz_rear_n")
 _SHORTEST = 100
 _SETTLES_S = 1.0
+_GRAVITY = 9.80665
 
 
 @dataclass(frozen=True)
@@ -161,6 +163,59 @@ class TyreLog:
             f = np.vstack([np.repeat(f[:1], load_delay_samples, axis=0), f[:-load_delay_samples]])
         return cls(step_s, as_float64(measurements), as_float64(np.column_stack([u, f])), name)
 
+    @classmethod
+    def from_log(
+        cls, log: Log, vehicle: GreyBoxVehicle, *, cg_height_m: float = 0.0
+    ) -> tuple[TyreLog, ...]:
+        """From a driving log: one for each stretch in which the car drives, its inputs known.
+
+        Axle loads are the columns ``fz_front_n`` and ``fz_rear_n`` where the log has them, else
+        those at rest with what `cg_height_m` and the longitudinal acceleration move between them.
+
+        Parameters
+        ----------
+        log : Log
+        vehicle : GreyBoxVehicle
+        cg_height_m : float
+
+        Returns
+        -------
+        tuple of TyreLog
+
+        Raises
+        ------
+        InvalidInput
+            No stretch is long enough.
+        """
+        a_x = log["ax_mps2"] if log.has("ax_mps2") else np.zeros(log.n)
+        force = log["fx_n"] if log.has("fx_n") else vehicle.mass_kg * a_x
+        v_y = log["vy_mps"] if log.has("vy_mps") else np.full(log.n, np.nan)
+        if log.has("fz_front_n") and log.has("fz_rear_n"):
+            loads = [np.maximum(log[n], 0.0) for n in ("fz_front_n", "fz_rear_n")]
+        else:
+            base = vehicle.lf_m + vehicle.lr_m
+            shift = vehicle.mass_kg * np.nan_to_num(a_x) * cg_height_m / base
+            weight = vehicle.mass_kg * _GRAVITY / base
+            loads = [
+                np.maximum(weight * vehicle.lr_m - shift, 0.0),
+                np.maximum(weight * vehicle.lf_m + shift, 0.0),
+            ]
+        y = np.column_stack([log["vx_mps"], v_y, log["yaw_rate_radps"], log["ay_mps2"]])
+        u = np.column_stack([force, log["steer_rad"], *loads])
+        # A car at walking pace tells nothing of its tyres, and its slip angles are ill-defined.
+        parts = [s for s in log.stretches() if s.stop - s.start >= _SHORTEST]
+        if not parts:
+            raise InvalidInput(
+                f"{log.name}: no stretch of {_SHORTEST} samples in which the car drives and its "
+                "steering and force are known; give a longer log"
+            )
+        step = 1.0 / log.rate_hz
+        several = len(parts) > 1
+        return tuple(
+            cls(step, as_float64(y[s]), as_float64(u[s]), _part(log.name, i, several))
+            for i, s in enumerate(parts, 1)
+        )
+
     @property
     def n(self) -> int:
         """Number of samples."""
@@ -213,6 +268,10 @@ class TyreLog:
             f"{np.nanmax(np.abs(a_y)):.1f} m/s2"
             + ("" if self.sideslip_measured else ", v_y not measured")
         )
+
+
+def _part(name: str, number: int, several: bool) -> str:
+    return f"{name}, part {number}" if several else name
 
 
 def tyre_problem(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -222,6 +222,33 @@ class TyreFit:
     def _half_width(self, name: str) -> float:
         low, high = self.interval(name)
         return max(high - self[name].value, self[name].value - low)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, ready for JSON."""
+        return {
+            "logs": [str(log) for log in self.logs],
+            "log_likelihood": self.log_likelihood,
+            "estimates": {
+                e.name: {**e.to_dict(), "interval": list(self.interval(e.name)), "note": e.note}
+                for e in (*self.estimates, *self.combinations)
+            },
+            "noise": dict(zip(NOISES, map(float, self.noise), strict=True)),
+            "undetermined": list(self.undetermined),
+            "correlation": {
+                "names": [e.name for e in self.estimates],
+                "matrix": self.correlation.tolist(),
+            },
+            "starts": [
+                {"begin": b, "end": e, "log_likelihood": float(v)}
+                for b, e, v in zip(
+                    self.starts.begin.tolist(),
+                    self.starts.end.tolist(),
+                    self.starts.log_likelihood,
+                    strict=True,
+                )
+            ],
+            "rivals": [{"parameters": r.parameters.tolist(), "lost": r.lost} for r in self.rivals],
+        }
 
     def curve(self, axle: str, slip_rad: FloatArray | None = None) -> TyreBand:
         """Tyre curve of an axle with its standard error, by the delta method."""

@@ -1,0 +1,115 @@
+"""`sysid-vehicle lab identify`: tyres from logs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from .._files import write_json, write_text
+from .._style import new_figure, svg
+from ..identify import METHODS
+from ..lab import GreyBoxVehicle, TyreLog, identify_tyres
+from ..read import read_log
+from ..vehicle import Vehicle
+from .outputs import refuse_unwritable
+
+__all__ = ["NAME", "SUMMARY", "add_arguments", "add_parser", "run"]
+
+NAME = "identify"
+SUMMARY = "identify the tyres of both axles from logs"
+
+
+def add_parser(subcommands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `identify` to the subcommands of `lab`."""
+    add_arguments(subcommands.add_parser(NAME, help=SUMMARY))
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Say what may be typed."""
+    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="CSV file of one run")
+    parser.add_argument(
+        "--vehicle", type=Path, metavar="TOML", help="the car (default: the published one)"
+    )
+    parser.add_argument("--channels", type=Path, metavar="TOML", help="channel map")
+    parser.add_argument(
+        "--unchecked",
+        action="store_true",
+        help="take the logs as they are: a car beyond its peak looks like wrong units or signs",
+    )
+    parser.add_argument(
+        "--no-sideslip", action="store_true", help="do without the v_y that the logs have"
+    )
+    parser.add_argument(
+        "--mass-tolerance",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="how well the mass is known, as a relative standard deviation (default: exactly)",
+    )
+    parser.add_argument(
+        "--residual-terms", action="store_true", help="also fit P1, P2 and P3 of a_y"
+    )
+    parser.add_argument(
+        "--starts", type=int, default=16, metavar="N", help="searches (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--method", choices=tuple(METHODS), default="gauss-newton", help="local optimiser"
+    )
+    parser.add_argument(
+        "--fast", action="store_true", help="intervals from the information matrix alone"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the start points")
+    parser.add_argument("--plot", type=Path, metavar="SVG", help="tyre curves to write")
+    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+
+
+def run(args: argparse.Namespace, heard: list[str]) -> None:
+    """Identify, print, and write what was asked for."""
+    given = [*args.logs, *(p for p in (args.vehicle, args.channels) if p is not None)]
+    refuse_unwritable([args.plot, args.json], inputs=given)
+    car, height = _vehicle(args.vehicle, args.mass_tolerance)
+    read = [read_log(path, args.channels, check=not args.unchecked) for path in args.logs]
+    logs = [part for log in read for part in TyreLog.from_log(log, car, cg_height_m=height)]
+    if args.no_sideslip:
+        logs = [log.without_sideslip() for log in logs]
+    fit = identify_tyres(
+        car,
+        logs,
+        residual_terms=args.residual_terms,
+        starts=args.starts,
+        method=args.method,
+        profiles=not args.fast,
+        seed=args.seed,
+        progress=sys.stderr.isatty(),
+    )
+    print(fit)
+    if args.plot is not None:
+        figure = new_figure(6.0, 3.8)
+        fit.plot(figure.add_subplot())
+        write_text(args.plot, svg(figure).decode())
+        print(f"Picture: {args.plot}")
+    if args.json is not None:
+        write_json(args.json, {**fit.to_dict(), "warnings": heard})
+
+
+def _vehicle(path: Path | None, tolerance: float) -> tuple[GreyBoxVehicle, float]:
+    """Read the car and the height of its centre of gravity."""
+    if path is None:
+        published = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6, 1.2929, mass_tolerance=tolerance)
+        return published, 0.35
+    known = Vehicle.from_toml(path)
+    inertia = known.yaw_inertia_kgm2
+    return (
+        GreyBoxVehicle(
+            known.mass_kg,
+            inertia if inertia is not None else known.mass_kg * known.lf_m * known.lr_m,
+            known.lf_m,
+            known.lr_m,
+            known.air_density_kgpm3,
+            tolerance,
+            # What most cars have, where it is not given: good to a tenth.
+            0.0 if inertia is not None else 0.1,
+        ),
+        known.cg_height_m,
+    )
