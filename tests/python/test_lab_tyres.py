@@ -54,7 +54,7 @@ def driven(seed: int = 0, steer_rad: float = 0.08, seconds: float = 30.0) -> Tyr
 
 @cache
 def found() -> TyreFit:
-    return identify_tyres(CAR, driven(), starts=4)
+    return identify_tyres(CAR, driven(seconds=25.0), starts=3)
 
 
 @cache
@@ -88,7 +88,7 @@ def test_recovers_all_tyre_coefficients() -> None:
 
 def test_every_start_ends_at_the_best_optimum() -> None:
     ends = found().starts
-    assert len(ends.begin) == 4
+    assert len(ends.begin) == 3
     assert ends.share == 1.0
     assert ends.names[:2] == ("B_front", "C_front")
     assert np.ptp(ends.begin[:, 0]) > 10.0
@@ -145,7 +145,7 @@ def test_a_second_tyre_that_fits_as_well_is_told() -> None:
 
 
 def test_without_measured_sideslip() -> None:
-    log = driven(1, seconds=15.0).without_sideslip()
+    log = driven(1, seconds=10.0).without_sideslip()
     with pytest.warns(UserWarning, match="v_y is not measured"):
         fit = identify_tyres(CAR, log, starts=1, profiles=False)
     assert not misses(fit, TRUTH | COMBINED)
@@ -154,7 +154,7 @@ def test_without_measured_sideslip() -> None:
 
 def test_wrong_mass_is_found_where_it_may_be_wrong() -> None:
     wrong = GreyBoxVehicle(858.0, 1000.0, 1.4, 1.6, mass_tolerance=0.1)
-    fit = identify_tyres(wrong, driven(2, seconds=12.0), starts=1, profiles=False)
+    fit = identify_tyres(wrong, driven(2, seconds=8.0), starts=1, profiles=False)
     low, high = fit.interval("mass_factor")
     assert low <= 1.0 / 1.1 <= high
     assert not misses(fit, TRUTH | COMBINED)
@@ -165,30 +165,28 @@ def test_start_of_half_and_double_stiffness(factor: float) -> None:
     start = {"B_front": 22.0 * factor, "B_rear": 22.0 * factor}
     if factor > 1.0:
         start = dict.fromkeys(start, BOX["B_front"][1])
-    fit = identify_tyres(CAR, driven(3, seconds=12.0), start=start, starts=1, profiles=False)
+    fit = identify_tyres(CAR, driven(3, seconds=8.0), start=start, starts=1, profiles=False)
     assert fit["BCD_front"].value == pytest.approx(COMBINED["BCD_front"], rel=2e-3)
     assert fit["D_rear"].value == pytest.approx(1.6, rel=2e-3)
 
 
 @pytest.mark.parametrize("method", ["nlopt", "scipy"])
 def test_other_optimisers_end_at_the_same_optimum(method: str) -> None:
-    log = driven(4, seconds=12.0)
+    log = driven(4, seconds=3.0)
     here = identify_tyres(CAR, log, starts=1, profiles=False)
     there = identify_tyres(CAR, log, starts=1, profiles=False, method=method)
     assert there.log_likelihood == pytest.approx(here.log_likelihood, abs=1.0)
 
 
 def test_residual_terms_are_nothing_where_there_are_none() -> None:
-    fit = identify_tyres(
-        CAR, driven(5, seconds=12.0), residual_terms=True, starts=1, profiles=False
-    )
+    fit = identify_tyres(CAR, driven(5, seconds=8.0), residual_terms=True, starts=1, profiles=False)
     assert not misses(fit, {"P1": 0.0, "P2": 0.0, "P3": 0.0} | TRUTH)
 
 
 def test_two_logs_tell_more_than_one() -> None:
-    one = identify_tyres(CAR, driven(6, seconds=12.0), starts=1, profiles=False)
+    one = identify_tyres(CAR, driven(6, seconds=8.0), starts=1, profiles=False)
     two = identify_tyres(
-        CAR, [driven(6, seconds=12.0), driven(7, seconds=12.0)], starts=1, profiles=False
+        CAR, [driven(6, seconds=8.0), driven(7, seconds=8.0)], starts=1, profiles=False
     )
     assert two["B_rear"].std < 0.8 * one["B_rear"].std
 
@@ -216,7 +214,7 @@ def test_band_covers_the_true_curve() -> None:
 def test_result_prints_and_draws() -> None:
     fit = found()
     text = str(fit)
-    assert "4 of 4 starts end at the best optimum" in text
+    assert "3 of 3 starts end at the best optimum" in text
     assert "95 % interval (profile)" in text
     assert "<table" in fit._repr_html_()
     ax = fit.plot()
@@ -229,7 +227,7 @@ def test_result_prints_and_draws() -> None:
 
 
 def test_repeats_exactly() -> None:
-    log = driven(8, seconds=10.0)
+    log = driven(8, seconds=6.0)
     one, two = (identify_tyres(CAR, log, starts=2, seed=3, profiles=False) for _ in range(2))
     assert np.array_equal(one.parameters, two.parameters)
     assert np.array_equal(one.starts.end, two.starts.end)
@@ -327,7 +325,7 @@ def test_reads_a_driving_log() -> None:
 
 
 def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    as_log(driven(seconds=10.0)).to_csv(tmp_path / "drive.csv")
+    as_log(driven(seconds=6.0)).to_csv(tmp_path / "drive.csv")
     parser = argparse.ArgumentParser()
     lab_identify.add_parser(parser.add_subparsers())
     picture, figures = tmp_path / "curves.svg", tmp_path / "figures.json"
