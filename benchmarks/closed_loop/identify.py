@@ -145,7 +145,9 @@ def judged(seed: int, *, sideslip: bool, mass_error: float) -> dict[str, tuple[b
     if mass_error:
         # A weighbridge that is 10 % off at one standard deviation, and a draw of its error.
         error = mass_error * np.random.default_rng(seed).normal()
-        car = GreyBoxVehicle(780.0 * (1.0 + error), 1000.0, 1.4, 1.6, 1.2929, mass_error)
+        car = GreyBoxVehicle(
+            780.0 * (1.0 + error), 1000.0, 1.4, 1.6, 1.2929, mass_tolerance=mass_error
+        )
         truth = truth | {"mass_factor": 1.0 / (1.0 + error)}
     log = driven(10_000 + seed)
     with warnings.catch_warnings():

@@ -220,6 +220,7 @@ void register_lab_tyres(py::module_& m) {
         .def_readwrite("lf_m", &GreyBoxCar::lf_m)
         .def_readwrite("lr_m", &GreyBoxCar::lr_m)
         .def_readwrite("air_density_kgpm3", &GreyBoxCar::air_density_kgpm3)
+        .def_readwrite("cg_height_m", &GreyBoxCar::cg_height_m)
         .def_readwrite("slowest_mps", &GreyBoxCar::slowest_mps);
     register_problem(m);
     register_loss(m);

@@ -266,6 +266,7 @@ class GreyBoxCar(metaclass=_Bound):
     lf_m: float
     lr_m: float
     air_density_kgpm3: float
+    cg_height_m: float
     slowest_mps: float
     def __init__(self) -> None: ...
 

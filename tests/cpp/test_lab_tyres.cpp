@@ -16,6 +16,7 @@ GreyBoxCar racer() {
     car.yaw_inertia_kgm2 = 1000.0;
     car.lf_m = 1.4;
     car.lr_m = 1.6;
+    car.cg_height_m = 0.35;
     return car;
 }
 
@@ -50,29 +51,57 @@ TyreRun weave(std::size_t n, unsigned seed) {
 const std::array<double, kGreyNoises> kNoise{0.05, 0.01, 0.003, 0.03, 0.02, 0.03, 0.01};
 
 TEST(GreyBox, DerivativesByHandAreThoseOfDualNumbers) {
-    using D = Dual<kGreyStates + kTyreParameters>;
+    using D = Dual<kGreyStates + kTyreParameters + 1>;
     const Tyres p = tyres();
     for (const double speed : {20.0, 0.5})  // below 1 m/s the slip angles are those at 1 m/s
-        for (const double steer : {-0.15, 0.0, 0.08}) {
-            const std::array<double, kGreyStates> x{speed, 0.4, -0.3};
-            GreyBoxSlope slope;
-            grey_box_slope(racer(), x, input(steer), p.data(), true, slope);
-            std::array<D, kGreyStates> xd;
-            std::array<D, kTyreParameters> pd;
-            int seed = 0;
-            for (std::size_t i = 0; i < x.size(); ++i) xd[i] = D::seeded(x[i], seed++);
-            for (std::size_t i = 0; i < p.size(); ++i) pd[i] = D::seeded(p[i], seed++);
-            const auto f = grey_box(racer(), xd, input(steer), pd.data());
-            for (std::size_t i = 0; i < f.size(); ++i) {
-                EXPECT_NEAR(slope.value[i], f[i].v, 1e-12 * (1.0 + std::abs(f[i].v)));
-                for (std::size_t j = 0; j < kGreyStates + kTyreParameters; ++j) {
-                    const double by = j < kGreyStates ? slope.by_state[i][j]
-                                                      : slope.by_parameter[i][j - kGreyStates];
-                    EXPECT_NEAR(by, f[i].d[j], 1e-10 * (1.0 + std::abs(f[i].d[j])))
-                        << "row " << i << ", column " << j;
+        for (const double steer : {-0.15, 0.0, 0.08})
+            for (const bool moves : {false, true}) {
+                const std::array<double, kGreyStates> x{speed, 0.4, -0.3};
+                const LoadsSince<double> since{moves, 130.0};
+                GreyBoxSlope slope;
+                grey_box_slope(racer(), x, input(steer), p.data(), true, slope, since);
+                std::array<D, kGreyStates> xd;
+                std::array<D, kTyreParameters> pd;
+                int seed = 0;
+                for (std::size_t i = 0; i < x.size(); ++i) xd[i] = D::seeded(x[i], seed++);
+                for (std::size_t i = 0; i < p.size(); ++i) pd[i] = D::seeded(p[i], seed++);
+                const LoadsSince<D> since_d{moves, D::seeded(130.0, seed)};
+                const auto f = grey_box(racer(), xd, input(steer), pd.data(), since_d);
+                for (std::size_t i = 0; i < f.size(); ++i) {
+                    EXPECT_NEAR(slope.value[i], f[i].v, 1e-12 * (1.0 + std::abs(f[i].v)));
+                    for (std::size_t j = 0; j < kGreyStates + kTyreParameters + 1; ++j) {
+                        double by = slope.by_drawn[i];
+                        if (j < kGreyStates)
+                            by = slope.by_state[i][j];
+                        else if (j < kGreyStates + kTyreParameters)
+                            by = slope.by_parameter[i][j - kGreyStates];
+                        EXPECT_NEAR(by, f[i].d[j], 1e-10 * (1.0 + std::abs(f[i].d[j])))
+                            << "row " << i << ", column " << j;
+                    }
                 }
             }
-        }
+}
+
+TEST(GreyBox, LoadsMoveWithinASampleOnlyByWhatIsDrawnSince) {
+    const Tyres p = tyres();
+    const std::array<double, kGreyStates> x{25.0, 0.5, 0.4};
+    const GreyBoxInput u = input(0.1);
+    const auto held = grey_box(racer(), x, u, p.data());
+    const double drawn = drawn_along(racer(), x, u, p.data(), held);
+    const auto at_once = grey_box(racer(), x, u, p.data(), LoadsSince<double>{true, drawn});
+    const auto later = grey_box(racer(), x, u, p.data(), LoadsSince<double>{true, drawn - 500.0});
+    // 500 N drawn since then: 500 h/L newtons more in front, as many fewer behind.
+    GreyBoxInput moved = u;
+    for (int i = 0; i < 4; ++i) EXPECT_NEAR(at_once[i], held[i], 1e-9);
+    double shift = 500.0 * 0.35 / 3.0;
+    for (int again = 0; again < 30; ++again) {  // the front force itself draws, until it agrees
+        moved.fz_front_n = u.fz_front_n + shift;
+        moved.fz_rear_n = u.fz_rear_n - shift;
+        const auto now = grey_box(racer(), x, moved, p.data());
+        shift = (drawn_along(racer(), x, moved, p.data(), now) - drawn + 500.0) * 0.35 / 3.0;
+    }
+    const auto agreed = grey_box(racer(), x, moved, p.data());
+    for (int i = 0; i < 4; ++i) EXPECT_NEAR(later[i], agreed[i], 1e-9);
 }
 
 TEST(GreyBox, SubstepsKeepSlowDrivingStable) {

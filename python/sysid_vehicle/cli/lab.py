@@ -27,6 +27,7 @@ from ..lab import (
 )
 from ..model import Model
 from ..vehicle import Vehicle
+from . import lab_identify
 from .outputs import refuse_unwritable
 
 __all__ = ["add_parser", "run"]
@@ -182,4 +183,10 @@ def _figures(drive: ClosedLoop, seen: Preview | None) -> dict[str, Any]:
 
 SUBCOMMANDS: tuple[Subcommand, ...] = (
     Subcommand("run", "drive an excitation, write its log", _run_arguments, _run),
+    Subcommand(
+        "identify",
+        "identify the tyres of both axles from logs",
+        lab_identify.add_arguments,
+        lab_identify.run,
+    ),
 )

@@ -14,15 +14,7 @@ from ..read import read_log
 from ..vehicle import Vehicle
 from .outputs import refuse_unwritable
 
-__all__ = ["NAME", "SUMMARY", "add_arguments", "add_parser", "run"]
-
-NAME = "identify"
-SUMMARY = "identify the tyres of both axles from logs"
-
-
-def add_parser(subcommands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add `identify` to the subcommands of `lab`."""
-    add_arguments(subcommands.add_parser(NAME, help=SUMMARY))
+__all__ = ["add_arguments", "run"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,9 +60,9 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Identify, print, and write what was asked for."""
     given = [*args.logs, *(p for p in (args.vehicle, args.channels) if p is not None)]
     refuse_unwritable([args.plot, args.json], inputs=given)
-    car, height = _vehicle(args.vehicle, args.mass_tolerance)
+    car = _vehicle(args.vehicle, args.mass_tolerance)
     read = [read_log(path, args.channels, check=not args.unchecked) for path in args.logs]
-    logs = [part for log in read for part in TyreLog.from_log(log, car, cg_height_m=height)]
+    logs = [part for log in read for part in TyreLog.from_log(log, car)]
     if args.no_sideslip:
         logs = [log.without_sideslip() for log in logs]
     fit = identify_tyres(
@@ -93,23 +85,19 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
         write_json(args.json, {**fit.to_dict(), "warnings": heard})
 
 
-def _vehicle(path: Path | None, tolerance: float) -> tuple[GreyBoxVehicle, float]:
-    """Read the car and the height of its centre of gravity."""
+def _vehicle(path: Path | None, tolerance: float) -> GreyBoxVehicle:
     if path is None:
-        published = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6, 1.2929, mass_tolerance=tolerance)
-        return published, 0.35
+        return GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6, 1.2929, 0.35, tolerance)
     known = Vehicle.from_toml(path)
     inertia = known.yaw_inertia_kgm2
-    return (
-        GreyBoxVehicle(
-            known.mass_kg,
-            inertia if inertia is not None else known.mass_kg * known.lf_m * known.lr_m,
-            known.lf_m,
-            known.lr_m,
-            known.air_density_kgpm3,
-            tolerance,
-            # What most cars have, where it is not given: good to a tenth.
-            0.0 if inertia is not None else 0.1,
-        ),
+    return GreyBoxVehicle(
+        known.mass_kg,
+        inertia if inertia is not None else known.mass_kg * known.lf_m * known.lr_m,
+        known.lf_m,
+        known.lr_m,
+        known.air_density_kgpm3,
         known.cg_height_m,
+        tolerance,
+        # What most cars have, where it is not given: good to a tenth.
+        0.0 if inertia is not None else 0.1,
     )

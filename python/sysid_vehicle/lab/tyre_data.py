@@ -34,6 +34,9 @@ class GreyBoxVehicle:
     mass_kg, yaw_inertia_kgm2, lf_m, lr_m : float
         Mass, yaw inertia, distances of the axles from the centre of gravity.
     air_density_kgpm3 : float
+    cg_height_m : float
+        Height of the centre of gravity, by which load moves between the axles within a sample; 0
+        where loads are held from sample to sample.
     mass_tolerance, yaw_inertia_tolerance : float
         Relative standard deviation of the mass and of the yaw inertia; 0 where they are exact. A
         tolerance makes them unknowns with that prior, and every interval carries the doubt.
@@ -44,6 +47,7 @@ class GreyBoxVehicle:
     lf_m: float
     lr_m: float
     air_density_kgpm3: float = 1.225
+    cg_height_m: float = 0.0
     mass_tolerance: float = 0.0
     yaw_inertia_tolerance: float = 0.0
 
@@ -52,6 +56,8 @@ class GreyBoxVehicle:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise InvalidInput(f"{name} is {value}; give a positive number in SI units")
+        if not 0.0 <= self.cg_height_m < 3.0:
+            raise InvalidInput(f"cg_height_m is {self.cg_height_m}; give 0 to 3 m above the road")
         for name in ("mass_tolerance", "yaw_inertia_tolerance"):
             value = getattr(self, name)
             if not 0.0 <= value < 0.5:
@@ -64,6 +70,7 @@ class GreyBoxVehicle:
         car = _core.GreyBoxCar()
         for name in ("mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m", "air_density_kgpm3"):
             setattr(car, name, getattr(self, name))
+        car.cg_height_m = self.cg_height_m
         return car
 
 
@@ -164,19 +171,17 @@ class TyreLog:
         return cls(step_s, as_float64(measurements), as_float64(np.column_stack([u, f])), name)
 
     @classmethod
-    def from_log(
-        cls, log: Log, vehicle: GreyBoxVehicle, *, cg_height_m: float = 0.0
-    ) -> tuple[TyreLog, ...]:
+    def from_log(cls, log: Log, vehicle: GreyBoxVehicle) -> tuple[TyreLog, ...]:
         """From a driving log: one for each stretch in which the car drives, its inputs known.
 
         Axle loads are the columns ``fz_front_n`` and ``fz_rear_n`` where the log has them, else
-        those at rest with what `cg_height_m` and the longitudinal acceleration move between them.
+        those at rest with what the height of the centre of gravity and the longitudinal
+        acceleration move between them.
 
         Parameters
         ----------
         log : Log
         vehicle : GreyBoxVehicle
-        cg_height_m : float
 
         Returns
         -------
@@ -194,7 +199,7 @@ class TyreLog:
             loads = [np.maximum(log[n], 0.0) for n in ("fz_front_n", "fz_rear_n")]
         else:
             base = vehicle.lf_m + vehicle.lr_m
-            shift = vehicle.mass_kg * np.nan_to_num(a_x) * cg_height_m / base
+            shift = vehicle.mass_kg * np.nan_to_num(a_x) * vehicle.cg_height_m / base
             weight = vehicle.mass_kg * _GRAVITY / base
             loads = [
                 np.maximum(weight * vehicle.lr_m - shift, 0.0),
