@@ -137,9 +137,13 @@ class ObserverModel {
         const double f = u.stiffness_front_nprad * per_speed;
         const double r = u.stiffness_rear_nprad * per_speed;
         const double turn = f * car_.lf_m - r * car_.lr_m;
-        return {-(f + r) * per_mass_, -turn * per_mass_, -turn * per_inertia_,
-                -(f * car_.lf_m * car_.lf_m + r * car_.lr_m * car_.lr_m) * per_inertia_,
-                v_x > 1.0 ? -per_speed : 0.0};
+        return {
+            -(f + r) * per_mass_,
+            -turn * per_mass_,
+            -turn * per_inertia_,
+            -(f * car_.lf_m * car_.lf_m + r * car_.lr_m * car_.lr_m) * per_inertia_,
+            v_x > 1.0 ? -per_speed : 0.0,
+        };
     }
 
     ObserverCar car_;

@@ -15,7 +15,7 @@ Mat<N, N> held_response(const Mat<N, N>& J, double h) {
     double part = h;
     // The row-sum norm bounds the spectral radius; 0.25^9 / 10! is far below rounding.
     const double size = J.cwiseAbs().rowwise().sum().maxCoeff() * h;
-    for (double s = size; s > 0.25 && doublings < 60; s *= 0.5) {
+    while (size * part > 0.25 * h && doublings < 60) {
         ++doublings;
         part *= 0.5;
     }
