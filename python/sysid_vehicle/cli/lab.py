@@ -27,7 +27,7 @@ from ..lab import (
 )
 from ..model import Model
 from ..vehicle import Vehicle
-from . import lab_identify
+from . import lab_identify, lab_validate
 from .outputs import refuse_unwritable
 
 __all__ = ["add_parser", "run"]
@@ -188,5 +188,11 @@ SUBCOMMANDS: tuple[Subcommand, ...] = (
         "identify the tyres of both axles from logs",
         lab_identify.add_arguments,
         lab_identify.run,
+    ),
+    Subcommand(
+        "validate",
+        "predict driving that was not used with the tyres identified",
+        lab_validate.add_arguments,
+        lab_validate.run,
     ),
 )

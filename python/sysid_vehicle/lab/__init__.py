@@ -18,6 +18,7 @@ from .tyre_data import GreyBoxVehicle, TyreLog
 from .tyre_drive import PUBLISHED_SENSORS, drive_tyres
 from .tyre_fit import TyreFit
 from .tyres import identify_tyres
+from .validate import IdentifiedCar, Validation, validate_tyres
 
 __all__ = [
     "PUBLISHED_BOX",
@@ -33,6 +34,7 @@ __all__ = [
     "EMResult",
     "Expected",
     "GreyBoxVehicle",
+    "IdentifiedCar",
     "Limits",
     "NoiseStructure",
     "Nominal",
@@ -53,6 +55,7 @@ __all__ = [
     "TyreLog",
     "TyreMotion",
     "TyreRegression",
+    "Validation",
     "design_excitation",
     "drive_tyres",
     "excitation",
@@ -63,4 +66,5 @@ __all__ = [
     "preview",
     "regress_tyres",
     "run_closed_loop",
+    "validate_tyres",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -227,6 +227,8 @@ class TyreFit:
         """All figures, ready for JSON."""
         return {
             "logs": [str(log) for log in self.logs],
+            "vehicle": asdict(self.vehicle),
+            "parameters": dict(zip(PARAMETERS, map(float, self.parameters), strict=True)),
             "log_likelihood": self.log_likelihood,
             "estimates": {
                 e.name: {**e.to_dict(), "interval": list(self.interval(e.name)), "note": e.note}

@@ -1,0 +1,216 @@
+"""Identified tyres on driving that was not used: one step, one second and a whole drive ahead."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._arrays import FloatArray, as_float64
+from .._files import read_text
+from .._style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
+from .._text import html_table, number, text_table
+from ..errors import InvalidInput
+from .likelihood import NOISES
+from .tyre_data import READINGS, GreyBoxVehicle, TyreLog, tyre_problem
+from .tyre_fit import PARAMETERS, TyreFit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["IdentifiedCar", "Validation", "validate_tyres"]
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedCar:
+    """What of an identification is needed to predict driving.
+
+    Parameters
+    ----------
+    vehicle : GreyBoxVehicle
+    parameters : array, shape (14,)
+        In the order of `lab.tyre_fit.PARAMETERS`.
+    noise : array, shape (7,)
+        In the order of `lab.likelihood.NOISES`.
+    """
+
+    vehicle: GreyBoxVehicle
+    parameters: FloatArray
+    noise: FloatArray
+
+    @classmethod
+    def of(cls, fit: TyreFit) -> IdentifiedCar:
+        """Take it from a fit."""
+        return cls(fit.vehicle, fit.parameters, fit.noise)
+
+    @classmethod
+    def from_json(cls, path: str | Path) -> IdentifiedCar:
+        """Read what `TyreFit.to_dict` was written to.
+
+        Raises
+        ------
+        InvalidInput
+            The file is not such a one.
+        """
+        try:
+            told = json.loads(read_text(path))
+            return cls(
+                GreyBoxVehicle(**told["vehicle"]),
+                as_float64([told["parameters"][name] for name in PARAMETERS]),
+                as_float64([told["noise"][name] for name in NOISES]),
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise InvalidInput(
+                f"{path} does not hold identified tyres ({type(error).__name__}: {error}); write "
+                "it with `sysid-vehicle lab identify LOG --json FILE`"
+            ) from None
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """Prediction errors of one drive.
+
+    Attributes
+    ----------
+    log : TyreLog
+    horizons : tuple of str
+        How far ahead was predicted; the last one is the whole drive from its first sample.
+    predicted : array, shape (horizons, n, 4)
+        v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2]; NaN before the horizon.
+    noise : array, shape (4,)
+        Standard deviations of the readings' own noise, below which no rms error can be.
+    """
+
+    log: TyreLog
+    horizons: tuple[str, ...]
+    predicted: FloatArray
+    noise: FloatArray
+
+    @property
+    def rms(self) -> FloatArray:
+        """Rms error by horizon and reading, shape (horizons, 4); NaN where nothing is measured.
+
+        Infinite where the simulated car was lost.
+        """
+        there = np.isfinite(self.log.measurements)
+        with np.errstate(invalid="ignore", over="ignore"):
+            square = (self.log.measurements - self.predicted) ** 2
+        out = np.full((len(self.horizons), len(READINGS)), np.nan)
+        for h, begin in enumerate(self._begins):
+            for c in range(len(READINGS)):
+                seen = there[begin:, c]
+                if seen.any():
+                    of = square[h, begin:, c][seen]
+                    out[h, c] = np.sqrt(np.mean(of)) if np.isfinite(of).all() else np.inf
+        return out
+
+    @property
+    def _begins(self) -> tuple[int, ...]:
+        """First sample that each horizon reaches."""
+        ahead = [int(np.argmax(np.isfinite(p[:, 0]))) for p in self.predicted]
+        return tuple(ahead)
+
+    def _rows(self) -> list[list[str]]:
+        rows = [
+            [horizon, *(number(float(v), 3) for v in row)]
+            for horizon, row in zip(self.horizons, self.rms, strict=True)
+        ]
+        return [*rows, ["noise of the reading", *(number(float(v), 3) for v in self.noise)]]
+
+    def _title(self) -> str:
+        return f"Rms prediction errors on {self.log}"
+
+    def __str__(self) -> str:
+        return f"{self._title()}\n{text_table(('ahead', *READINGS), self._rows())}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(self._title())}</p>{html_table(('ahead', *READINGS), self._rows())}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, ready for JSON."""
+        return {
+            "log": str(self.log),
+            "rms": {
+                horizon: dict(zip(READINGS, map(float, row), strict=True))
+                for horizon, row in zip(self.horizons, self.rms, strict=True)
+            },
+            "noise": dict(zip(READINGS, map(float, self.noise), strict=True)),
+        }
+
+    def plot(self, ax: Axes | None = None, *, reading: str = "vy_mps") -> Axes:
+        """Draw a reading, and what was predicted of it.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; a new figure is made without it.
+        reading : str
+            One of `READINGS`.
+
+        Returns
+        -------
+        matplotlib Axes
+
+        Raises
+        ------
+        InvalidInput
+            An unknown reading.
+        """
+        if reading not in READINGS:
+            raise InvalidInput(f"no reading {reading!r}; there are {', '.join(READINGS)}")
+        c = READINGS.index(reading)
+        axes = axes_or_new(ax, 7.0, 3.0)
+        t = self.log.time_s
+        axes.plot(t, self.log.measurements[:, c], color=TRUTH, lw=0.8, label="measured")
+        for h, colour in ((-2, AFTER), (-1, BEFORE)):
+            label = f"predicted, {self.horizons[h]}"
+            axes.plot(t, self.predicted[h, :, c], color=colour, lw=1.0, label=label)
+        return tidy(axes, xlabel="time [s]", ylabel=reading, title=self.log.name)
+
+
+def validate_tyres(
+    car: TyreFit | IdentifiedCar, logs: TyreLog | Sequence[TyreLog], *, horizon_s: float = 1.0
+) -> tuple[Validation, ...]:
+    """Predict drives with identified tyres: one sample, `horizon_s` and the whole drive ahead.
+
+    Parameters
+    ----------
+    car : TyreFit or IdentifiedCar
+    logs : TyreLog or sequence of TyreLog
+        Drives that the identification did not use.
+    horizon_s : float
+
+    Returns
+    -------
+    tuple of Validation
+        One for each log.
+
+    Raises
+    ------
+    InvalidInput
+        No log, or one shorter than the horizon.
+    """
+    several = (logs,) if isinstance(logs, TyreLog) else tuple(logs)
+    if not several:
+        raise InvalidInput("no log was given; pass one TyreLog or a list of them")
+    known = IdentifiedCar.of(car) if isinstance(car, TyreFit) else car
+    return tuple(_validation(known, log, horizon_s) for log in several)
+
+
+def _validation(car: IdentifiedCar, log: TyreLog, horizon_s: float) -> Validation:
+    ahead = round(horizon_s / log.step_s)
+    if not 1 < ahead < log.n:
+        raise InvalidInput(
+            f"{log.name}: {horizon_s:g} s ahead in a drive of {log.n * log.step_s:g} s, sampled "
+            f"every {log.step_s:g} s; choose a horizon in between"
+        )
+    problem = tyre_problem(car.vehicle, [log])
+    gains = problem.freeze(car.parameters, car.noise)
+    predicted = np.stack([problem.look_ahead(car.parameters, gains, n) for n in (1, ahead, 0)])
+    horizons = ("one sample", f"{horizon_s:g} s", "the whole drive")
+    return Validation(log, horizons, predicted, as_float64(car.noise[: len(READINGS)]))
