@@ -29,7 +29,9 @@ Array to_array(const Mat<R, C>& m) {
 
 ObserverModel to_model(const Array& car, const std::array<bool, 5>& form, double dt) {
     const double* c = vector(car, 5, "car");
-    return {{c[0], c[1], c[2], c[3], c[4]}, {form[0], form[1], form[2], form[3], form[4]}, dt};
+    const ObserverCar believed{c[0], c[1], c[2], c[3], c[4]};
+    const ObserverForm equations{form[0], form[1], form[2], form[3], form[4]};
+    return {believed, equations, dt};
 }
 
 ObserverNoise to_noise(const Array& process, const Array& sensors) {
@@ -37,8 +39,11 @@ ObserverNoise to_noise(const Array& process, const Array& sensors) {
 }
 
 ObserverStart to_start(const Array& mean, const Array& covariance, bool one_before) {
-    return {to_vector<6>(mean, "start mean"), to_matrix<6, 6>(covariance, "start covariance"),
-            one_before};
+    return {
+        to_vector<6>(mean, "start mean"),
+        to_matrix<6, 6>(covariance, "start covariance"),
+        one_before,
+    };
 }
 
 ObserverInput to_input(const double* u) { return {u[0], u[1], u[2], u[3]}; }

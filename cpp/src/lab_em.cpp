@@ -51,9 +51,15 @@ class PublishedExpectation {
             auto& steps = steps_[i];
             steps.resize(log.size());
             const ObserverSystem system(log.model, log.inputs, log.readings, noise_);
+            ObserverMat before;
             sum += extended_kalman_filter<NX, NY>(
                 system, log.start.mean, log.start.covariance,
-                [&](std::size_t k, const Step& step) { steps[k] = step; }, log.start.one_before);
+                [&](std::size_t k, const Step& step) {
+                    steps[k] = step;
+                    if (k > 0) steps[k].transition = before;
+                    before = step.transition;
+                },
+                log.start.one_before);
         }
         return sum;
     }
@@ -63,21 +69,18 @@ class PublishedExpectation {
         NoiseMoments<NX, NY> out;
         for (std::size_t i = 0; i < logs_.size(); ++i) {
             const ObserverLog& log = logs_[i];
-            std::vector<Step> late = steps_[i];
-            for (std::size_t k = late.size() - 1; k > 0; --k)
-                late[k].transition = late[k - 1].transition;
             ObserverForm form = log.model.form();
             form.input_before = form.speed_predicted = true;
             const ObserverModel model = log.model.with_form(form);
             add_smoothed_moments<NX, NY>(ObserverSystem(model, log.inputs, log.readings, noise_),
-                                         smooth(late, kRidge), out);
+                                         smooth(steps_[i], kRidge), out);
         }
         return out;
     }
 
   private:
     const std::vector<ObserverLog>& logs_;
-    std::vector<std::vector<Step>> steps_;
+    std::vector<std::vector<StateStep<NX>>> steps_;  // with the transition of the step before
     ObserverNoise noise_;
 };
 

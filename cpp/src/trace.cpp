@@ -40,7 +40,7 @@ void trace_run(const Problem& problem, const Run& run, const double* p, const No
                 store_state<NX>(out.state, out.state_std, s.mean, s.covariance);
         });
     if (!smoothed) return;
-    for (const auto& s : smooth<NX, kChannels>(steps))
+    for (const auto& s : smooth(steps))
         store_state<NX>(out.state, out.state_std, s.mean, s.covariance);
 }
 

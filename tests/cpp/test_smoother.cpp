@@ -16,7 +16,7 @@ std::vector<FilterStep<NX, NY>> filtered(const LinearSystem<NX, NY>& s, const Ve
 
 template <int NX, int NY>
 void expect_batch_posterior(const LinearSystem<NX, NY>& s, const Vec<NX>& x, const Mat<NX, NX>& P) {
-    const auto smoothed = smooth<NX, NY>(filtered(s, x, P));
+    const auto smoothed = smooth(filtered(s, x, P));
     const Stacked all = stack(s, x, P);
     const Eigen::MatrixXd cross = all.state_covariance * all.H.transpose();
     const Eigen::LLT<Eigen::MatrixXd> factor(all.covariance);
@@ -53,7 +53,7 @@ TEST(Smoother, StandsStatesWithoutNoise) {
 TEST(Smoother, NeverLessCertainThanTheFilter) {
     const Small s = small_system(25);
     const auto steps = filtered(s, kSmallMean, small_covariance());
-    const auto smoothed = smooth<3, 2>(steps);
+    const auto smoothed = smooth(steps);
     for (std::size_t k = 0; k + 1 < steps.size(); ++k) {
         const Mat<3, 3> gained = steps[k].covariance - smoothed[k].covariance;
         const Vec<3> sizes = gained.selfadjointView<Eigen::Lower>().eigenvalues();
@@ -63,7 +63,9 @@ TEST(Smoother, NeverLessCertainThanTheFilter) {
     EXPECT_EQ(smoothed.back().mean, steps.back().mean);
 }
 
-TEST(Smoother, NothingComesOfNothing) { EXPECT_TRUE((smooth<3, 2>({}).empty())); }
+TEST(Smoother, NothingComesOfNothing) {
+    EXPECT_TRUE(smooth(std::vector<FilterStep<3, 2>>{}).empty());
+}
 
 }  // namespace
 }  // namespace sysid::test

@@ -1,13 +1,16 @@
 """The extended-state observer, its smoother and the noise it learns."""
 
+import argparse
 import dataclasses
+import json
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sysid_vehicle import InvalidInput, NumericalError, Vehicle
+from sysid_vehicle import InvalidInput, Model, NumericalError, Vehicle, drive, manoeuvres
+from sysid_vehicle.cli import lab_em
 from sysid_vehicle.lab import (
     EMResult,
     NoiseStructure,
@@ -338,3 +341,49 @@ def test_car_from_a_vehicle(car: Vehicle) -> None:
         ObserverCar.of(car.replace(yaw_inertia_kgm2=None))
     with pytest.raises(InvalidInput, match="mass_kg"):
         ObserverCar(0.0, 1000.0, 1.4, 1.6)
+
+
+class TestCommand:
+    @pytest.fixture
+    def files(self, tmp_path: Path, car: Vehicle) -> tuple[Path, Path]:
+        car.to_toml(tmp_path / "car.toml")
+        log = drive(Model(car), manoeuvres.lap(20.0), seed=1, rate_hz=50.0)
+        log.to_csv(tmp_path / "lap.csv")
+        return tmp_path / "car.toml", tmp_path / "lap.csv"
+
+    def test_learns_from_a_file(
+        self, files: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        vehicle, log = files
+        out, figure = tmp_path / "em.json", tmp_path / "em.svg"
+        given = [str(log), "--vehicle", str(vehicle), "--correlated"]
+        wanted = ["--json", str(out), "--figure", str(figure), "--iterations", "40"]
+        lab_em.run(parsed([*given, *wanted]), ["heard before"])
+        printed = capsys.readouterr().out
+        assert "sensor ay_mps2" in printed
+        assert "smoothed state" in printed
+        content = json.loads(out.read_text(encoding="utf-8"))
+        assert content["warnings"] == ["heard before"]
+        assert (np.diff(content["log_likelihood"]) >= 0.0).all()
+        sensors = np.array(content["noise"]["sensors"])
+        assert sensors[2, 3] != 0.0
+        assert sensors[0, 1] == 0.0
+        assert figure.read_text(encoding="utf-8").rstrip().endswith("</svg>")
+
+    def test_names_what_a_log_lacks(self, files: tuple[Path, Path], tmp_path: Path) -> None:
+        vehicle, log = files
+        rows = [line.split(",") for line in log.read_text(encoding="utf-8").splitlines()]
+        at = rows[0].index("fx_n")
+        text = "\n".join(",".join(row[:at] + row[at + 1 :]) for row in rows)
+        (tmp_path / "coasting.csv").write_text(text, encoding="utf-8")
+        given = [str(tmp_path / "coasting.csv"), "--vehicle", str(vehicle)]
+        with pytest.raises(InvalidInput, match="no fx_n; the observer needs the wheel force"):
+            lab_em.run(parsed(given), [])
+        with pytest.raises(InvalidInput, match="also an input"):
+            lab_em.run(parsed([*given, "--json", str(vehicle)]), [])
+
+
+def parsed(argv: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    lab_em.add_parser(parser.add_subparsers())
+    return parser.parse_args(["em", *argv])

@@ -7,10 +7,11 @@ from .information import information
 from .loop import ClosedLoop, run_closed_loop
 from .motion import TyreMotion
 from .observed import READINGS, STATES, StateEstimate
-from .observer import Observer, ObserverCar, ObserverForm, ObserverNoise, ObserverRecord
+from .observer import Observer, ObserverForm, ObserverNoise
 from .parts import Actuator, Controller, Nominal, Online, Sensor, Sensors, Simulator
 from .pictures import overview
 from .preview import Coverage, Expected, Preview, preview
+from .record import ObserverCar, ObserverRecord
 from .regression import PUBLISHED_BOX, PUBLISHED_START, TyreRegression, regress_tyres
 from .saturation import Saturation
 from .setup import Setup

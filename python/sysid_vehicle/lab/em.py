@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from .._style import AFTER, BEFORE, FLOOR, axes_or_new, tidy
 from .._text import html_table, number, text_table
 from ..errors import InvalidInput, NumericalError, near_names
 from .observed import READINGS, STATES
-from .observer import Observer, ObserverNoise, ObserverRecord
+from .observer import Observer, ObserverNoise
+from .record import ObserverRecord
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -155,6 +156,25 @@ class EMResult:
         """Correlation of the sensors' noise, shape (4, 4)."""
         std = np.sqrt(np.diag(self.noise.sensors))
         return np.asarray(self.noise.sensors / np.outer(std, std))
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, for a JSON file."""
+        return {
+            "log_likelihood": self.log_likelihood.tolist(),
+            "converged": self.converged,
+            "samples": self.samples,
+            "unmeasured": list(self.unmeasured),
+            "states": list(STATES),
+            "readings": list(READINGS),
+            "start": {
+                "process": self.start.process.tolist(),
+                "sensors": self.start.sensors.tolist(),
+            },
+            "noise": {
+                "process": self.noise.process.tolist(),
+                "sensors": self.noise.sensors.tolist(),
+            },
+        }
 
     def plot(self, *, ax: Axes | None = None) -> Axes:
         """Draw the log-likelihood over the iterations."""

@@ -18,12 +18,11 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
 from ..estimate.inputs import white_noise_std
-from ..vehicle import Vehicle
 from .observed import READINGS, STATES, StateEstimate
+from .record import GRAVITY, ObserverCar, ObserverRecord
 
-__all__ = ["Observer", "ObserverCar", "ObserverForm", "ObserverNoise", "ObserverRecord"]
+__all__ = ["Observer", "ObserverForm", "ObserverNoise"]
 
-_GRAVITY = 9.81
 _T = TypeVar("_T")
 
 
@@ -55,167 +54,6 @@ class ObserverForm:
     def published(cls) -> ObserverForm:
         """Give the observer as published, with its defects, to reproduce its numbers."""
         return cls(False, False, False, False, False)
-
-
-@dataclass(frozen=True)
-class ObserverCar:
-    """What the observer believes of the car.
-
-    Attributes
-    ----------
-    mass_kg, yaw_inertia_kgm2, lf_m, lr_m : float
-        Mass, yaw inertia, distances from the centre of gravity to the axles.
-    drag_nspm : float
-        Drag force per speed [N s/m].
-    """
-
-    mass_kg: float
-    yaw_inertia_kgm2: float
-    lf_m: float
-    lr_m: float
-    drag_nspm: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m"):
-            if not getattr(self, name) > 0.0:
-                raise InvalidInput(f"{name} = {getattr(self, name)} must be a number above zero")
-
-    @classmethod
-    def of(cls, vehicle: Vehicle, *, drag_nspm: float = 0.0) -> ObserverCar:
-        """Take the numbers of a vehicle.
-
-        Raises
-        ------
-        InvalidInput
-            The vehicle's yaw inertia is not known.
-        """
-        inertia = vehicle.yaw_inertia_kgm2
-        if inertia is None:
-            raise InvalidInput("yaw_inertia_kgm2 is not known; set it in the vehicle first")
-        return cls(vehicle.mass_kg, inertia, vehicle.lf_m, vehicle.lr_m, drag_nspm)
-
-    def vector(self) -> FloatArray:
-        """In the core's order."""
-        return as_float64(dataclasses.astuple(self))
-
-    def static_loads_n(self) -> tuple[float, float]:
-        """Axle loads at rest, front and rear [N]."""
-        per_metre = self.mass_kg * _GRAVITY / (self.lf_m + self.lr_m)
-        return per_metre * self.lr_m, per_metre * self.lf_m
-
-
-@dataclass(frozen=True, eq=False)
-class ObserverRecord:
-    """One log made ready for the observer.
-
-    Attributes
-    ----------
-    rate_hz : float
-        Sample rate.
-    force_x_n, steer_rad : ndarray of shape (n,)
-        Longitudinal force and road-wheel steering angle, held over each sample.
-    stiffness_front_nprad, stiffness_rear_nprad : ndarray of shape (n,)
-        Nominal cornering stiffness of the axles; a stiffness per load times the load.
-    readings : ndarray of shape (n, 4)
-        Speed ahead and sideways [m/s], yaw rate [rad/s], lateral acceleration [m/s2]; NaN where
-        missing.
-    name : str
-        Name in messages.
-    """
-
-    rate_hz: float
-    force_x_n: FloatArray
-    steer_rad: FloatArray
-    stiffness_front_nprad: FloatArray
-    stiffness_rear_nprad: FloatArray
-    readings: FloatArray
-    name: str = "log"
-
-    @classmethod
-    def from_arrays(
-        cls,
-        *,
-        rate_hz: float,
-        force_x_n: npt.ArrayLike,
-        steer_rad: npt.ArrayLike,
-        stiffness_front_nprad: npt.ArrayLike,
-        stiffness_rear_nprad: npt.ArrayLike,
-        readings: npt.ArrayLike,
-        name: str = "log",
-    ) -> ObserverRecord:
-        """Check and convert; a single number stands for a constant input.
-
-        Raises
-        ------
-        InvalidInput
-            Shapes that do not fit, an input that is not finite, a stiffness not above zero, an
-            infinite reading, or no reading of the speed.
-        """
-        y = as_float64(readings)
-        if y.ndim != 2 or y.shape[1] != len(READINGS) or len(y) < 2:
-            raise InvalidInput(
-                f"{name}: readings have shape {y.shape}; give samples x 4: {', '.join(READINGS)}"
-            )
-        if not (np.isfinite(rate_hz) and rate_hz > 0.0):
-            raise InvalidInput(f"{name}: rate_hz = {rate_hz} must be a number above zero")
-        given = {
-            "force_x_n": force_x_n,
-            "steer_rad": steer_rad,
-            "stiffness_front_nprad": stiffness_front_nprad,
-            "stiffness_rear_nprad": stiffness_rear_nprad,
-        }
-        inputs = {}
-        for key, values in given.items():
-            u = np.asarray(values, dtype=np.float64)
-            if u.shape not in ((), (len(y),)):
-                raise InvalidInput(f"{name}: {key} has shape {u.shape}; give {len(y)} values")
-            inputs[key] = u = as_float64(np.broadcast_to(u, len(y)))
-            bad = ~np.isfinite(u)
-            if key.startswith("stiffness"):
-                bad |= ~(u > 0.0)
-            _refuse(bad, u, key, name, rate_hz, "fill or cut it: the observer needs every input")
-        for i, key in enumerate(READINGS):
-            remedy = "mark a missing reading by NaN"
-            _refuse(np.isinf(y[:, i]), y[:, i], key, name, rate_hz, remedy)
-        if not np.isfinite(y[:, 0]).any():
-            raise InvalidInput(f"{name}: no reading of vx_mps; the observer needs the speed")
-        return cls(rate_hz=float(rate_hz), readings=y, name=name, **inputs)
-
-    @property
-    def time_s(self) -> FloatArray:
-        """Time of each sample [s]."""
-        return np.arange(len(self.readings), dtype=np.float64) / self.rate_hz
-
-    def inputs(self) -> FloatArray:
-        """In the core's order, samples x 4."""
-        return np.column_stack(
-            [
-                self.force_x_n,
-                self.steer_rad,
-                self.stiffness_front_nprad,
-                self.stiffness_rear_nprad,
-            ]
-        )
-
-    def without(self, *channels: str) -> ObserverRecord:
-        """Give the same record with the readings of some channels missing."""
-        y = self.readings.copy()
-        for channel in channels:
-            if channel not in READINGS:
-                raise InvalidInput(f"no reading {channel!r}; there are {', '.join(READINGS)}")
-            y[:, READINGS.index(channel)] = np.nan
-        return dataclasses.replace(self, readings=y)
-
-
-def _refuse(
-    bad: npt.NDArray[np.bool_], u: FloatArray, key: str, name: str, rate_hz: float, remedy: str
-) -> None:
-    if bad.any():
-        k = int(np.argmax(bad))
-        raise InvalidInput(
-            f"{name}: {key} = {u[k]} at sample {k} ({k / rate_hz:.2f} s) and {bad.sum() - 1} "
-            f"others; {remedy}"
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,7 +102,7 @@ class ObserverNoise:
         scatter = np.array([white_noise_std(y) for y in record.readings.T])
         sensors = np.maximum(scatter, smallest) ** 2
         dt = 1.0 / record.rate_hz
-        force = 0.02 * car.mass_kg * _GRAVITY
+        force = 0.02 * car.mass_kg * GRAVITY
         wander = np.array([force, force, 0.5 * force * (car.lf_m + car.lr_m)])
         motion = np.array([0.05, 0.05, 0.05])
         return cls.from_variances(dt * np.concatenate([motion, wander]) ** 2, sensors)

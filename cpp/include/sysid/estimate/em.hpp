@@ -17,6 +17,19 @@
 
 namespace sysid {
 
+/// A' N A of a symmetric N, where only the first M rows of A differ from the unit matrix.
+template <int M, int NX>
+Mat<NX, NX> pulled_back(const Mat<NX, NX>& A, const Mat<NX, NX>& N) {
+    if constexpr (M == NX) {
+        return A.transpose() * N * A;
+    } else {
+        Mat<M, NX> change = A.template topRows<M>();
+        change.diagonal().array() -= 1.0;
+        const Mat<NX, NX> halfway = N + N.template leftCols<M>() * change;
+        return halfway + change.transpose() * halfway.template topRows<M>();
+    }
+}
+
 template <int NX, int NY>
 struct NoisePair {
     Mat<NX, NX> process = Mat<NX, NX>::Identity();
@@ -28,6 +41,9 @@ template <class System, int NX, int NY>
 struct WithNoise {
     const System& system;
     const NoisePair<NX, NY>& noise;
+
+    static constexpr int kMovingStates = MovingStates<System, NX>::value;
+    static constexpr int kDirectReadings = DirectReadings<System>::value;
 
     std::size_t size() const { return system.size(); }
     Vec<NX> predict(std::size_t k, const Vec<NX>& x, Mat<NX, NX>& A, Mat<NX, NX>& Q) const {
@@ -74,17 +90,14 @@ class FilteredExpectation {
             const WithNoise<System, NX, NY> system{*record.system, noise_};
             auto& steps = steps_[i];
             steps.resize(system.size());
-            const Mat<NY, NY> I = Mat<NY, NY>::Identity();
             sum += extended_kalman_filter<NX, NY>(
                 system, record.mean, record.covariance,
                 [&](std::size_t k, const FilterStep<NX, NY>& step) {
                     Kept& kept = steps[k];
-                    const auto lower = step.update.lower.template triangularView<Eigen::Lower>();
                     kept.transition = step.transition;
                     kept.observation = step.update.observation;
                     kept.gain = step.update.gain;
-                    const Mat<NY, NY> whitening = lower.solve(I);
-                    kept.information = whitening.transpose() * whitening;
+                    kept.information = step.update.information;
                     kept.weighted = kept.information * step.update.innovation;
                 },
                 record.predict_first);
@@ -111,6 +124,8 @@ class FilteredExpectation {
         Vec<NY> weighted;         // the innovation times it
     };
 
+    static constexpr int kDirect = DirectReadings<System>::value;
+
     // Adjoint recursion: `r` and `N` are gradient and curvature of the log-density of what follows,
     // by the predicted state. The expected square of a disturbance is Q + Q (r r' - N) Q; only the
     // brackets are summed here.
@@ -122,29 +137,37 @@ class FilteredExpectation {
         for (std::size_t k = steps.size(); k-- > 0;) {
             const Kept& now = steps[k];
             Mat<NY, NY> information = now.information;
-            const Vec<NY> y = record.system->measurement(k);
+            const Vec<NY>& y = record.system->measurement(k);
+            bool whole = true;
             for (int j = 0; j < NY; ++j) {
-                if (std::isnan(y[j]))
+                if (std::isnan(y[j])) {
                     information(j, j) = 0.0;
-                else
+                    whole = false;
+                } else {
                     out.sensors.count[j] += 1.0;
+                }
             }
             out.sensors.samples += 1.0;
             if (k + 1 < steps.size()) {
                 const auto& A = steps[k + 1].transition;
                 r = (A.transpose() * r).eval();
-                N = (A.transpose() * N * A).eval();
+                N = pulled_back<MovingStates<System, NX>::value>(A, N);
             }
             const Mat<NX, NY> NK = N * now.gain;
             const Vec<NY> u = now.weighted - now.gain.transpose() * r;
             const Mat<NY, NY> D = information + now.gain.transpose() * NK;
             out.sensors.sum += u * u.transpose() - D;
             r += now.observation.transpose() * u;
-            const Mat<NX, NX> mixed = NK * now.observation;
-            N += now.observation.transpose() * D * now.observation - mixed - mixed.transpose();
+            const auto back = [&](const auto& X) {
+                return whole ? carried_back<kDirect>(X, now.observation)
+                             : carried_back<0>(X, now.observation);
+            };
+            const Mat<NX, NX> mixed = back(NK);
+            const Mat<NX, NY> halfway = back(D).transpose();
+            N += back(halfway) - mixed - mixed.transpose();
             symmetrise(N);
             if (k > 0 || record.predict_first) {
-                out.process.sum += r * r.transpose() - N;
+                out.process.sum.noalias() += r * r.transpose() - N;
                 out.process.add_count();
             }
         }
@@ -172,7 +195,7 @@ void add_smoothed_moments(const System& system, const std::vector<SmoothedStep<N
                                A * before.covariance * A.transpose() - mixed - mixed.transpose();
             out.process.add_count();
         }
-        const Vec<NY> y = system.measurement(k);
+        const Vec<NY>& y = system.measurement(k);
         Vec<NY> e = y - system.observe(k, now.mean, H);
         for (int j = 0; j < NY; ++j) {
             if (std::isnan(y[j])) {
@@ -226,8 +249,10 @@ class NoiseLeap {
     Pair landing(const NoiseStructure<NX>& process, const NoiseStructure<NY>& sensors,
                  const Pair& now) const {
         const double n = length();
-        return {process.admitted(process_.at(n), now.process),
-                sensors.admitted(sensors_.at(n), now.sensors)};
+        return {
+            process.admitted(process_.at(n), now.process),
+            sensors.admitted(sensors_.at(n), now.sensors),
+        };
     }
 
   private:
@@ -273,8 +298,10 @@ EmOutcome<NX, NY> learn_noise(Expectation& expectation, const NoisePair<NX, NY>&
                               const EmOptions& options) {
     using Pair = NoisePair<NX, NY>;
     EmOutcome<NX, NY> out;
-    out.noise = {process.admitted(start.process, start.process),
-                 sensors.admitted(start.sensors, start.sensors)};
+    out.noise = {
+        process.admitted(start.process, start.process),
+        sensors.admitted(start.sensors, start.sensors),
+    };
     double value = expectation.log_likelihood(out.noise);
     double gain_before = 0.0, value_at_leap = value;
     std::vector<Pair> path{out.noise};  // since the last leap

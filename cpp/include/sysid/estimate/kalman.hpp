@@ -7,9 +7,14 @@
 //   Vec<NY> observe(k, x, H) const       expected measurement; fills its Jacobian H
 //   Vec<NY> measurement(k) const         NaN marks a missing element
 //   Mat<NY, NY> measurement_noise(k) const
+//
+// For speed it may promise, as static constexpr int:
+//   kMovingStates    only so many first states change by themselves: A's other rows are the unit's
+//   kDirectReadings  so many first readings are the states of the same number
 #pragma once
 
 #include <cmath>
+#include <type_traits>
 
 #include "sysid/math/errors.hpp"
 #include "sysid/math/linear.hpp"
@@ -18,22 +23,83 @@ namespace sysid {
 
 constexpr double kLogTwoPi = 1.8378770664093454836;
 
+template <class System, int NX, class = void>
+struct MovingStates : std::integral_constant<int, NX> {};
+template <class System, int NX>
+struct MovingStates<System, NX, std::void_t<decltype(System::kMovingStates)>>
+    : std::integral_constant<int, System::kMovingStates> {};
+
+template <class System, class = void>
+struct DirectReadings : std::integral_constant<int, 0> {};
+template <class System>
+struct DirectReadings<System, std::void_t<decltype(System::kDirectReadings)>>
+    : std::integral_constant<int, System::kDirectReadings> {};
+
+/// A P A' of a symmetric P, where only the first M rows of A differ from the unit matrix.
+template <int M, int NX>
+Mat<NX, NX> propagated(const Mat<NX, NX>& A, const Mat<NX, NX>& P) {
+    if constexpr (M == NX) {
+        Mat<NX, NX> out = A * P * A.transpose();
+        symmetrise(out);
+        return out;
+    } else {
+        const Mat<NX, M> halfway = P * A.template topRows<M>().transpose();
+        const Mat<NX, M> moved = A * halfway;
+        Mat<NX, NX> out = P;
+        Mat<M, M> corner = moved.template topRows<M>();
+        symmetrise(corner);
+        out.template leftCols<M>() = moved;
+        out.template topLeftCorner<M, M>() = corner;
+        out.template topRightCorner<M, NX - M>() = moved.template bottomRows<NX - M>().transpose();
+        return out;
+    }
+}
+
+/// X H', where the first D rows of H are those of the unit matrix.
+template <int D, int R, int NX, int NY>
+Mat<R, NY> seen_by(const Mat<R, NX>& X, const Mat<NY, NX>& H) {
+    if constexpr (D == 0) {
+        return X * H.transpose();
+    } else {
+        Mat<R, NY> out;
+        out.template leftCols<D>() = X.template leftCols<D>();
+        out.template rightCols<NY - D>().noalias() =
+            X * H.template bottomRows<NY - D>().transpose();
+        return out;
+    }
+}
+
+/// X H of the same H.
+template <int D, int R, int NX, int NY>
+Mat<R, NX> carried_back(const Mat<R, NY>& X, const Mat<NY, NX>& H) {
+    if constexpr (D == 0) {
+        return X * H;
+    } else {
+        Mat<R, NX> out;
+        out.noalias() = X.template rightCols<NY - D>() * H.template bottomRows<NY - D>();
+        out.template leftCols<D>() += X.template leftCols<D>();
+        return out;
+    }
+}
+
 template <int NX, int NY>
 struct Update {
     Vec<NY> innovation;  // zero where the measurement is missing
     Mat<NY, NY> lower;   // Cholesky factor of the innovation covariance; 1 on missing diagonals
-    Mat<NX, NY> gain;    // zero columns for missing measurements
+    Mat<NY, NY> information;  // inverse covariance of the innovation
+    Mat<NX, NY> gain;         // zero columns for missing measurements
     Mat<NY, NX> observation;  // zero rows for missing measurements
     int observed = 0;
     double log_likelihood = 0.0;
 };
 
-/// Updates mean and covariance with the elements of `y` that are there (Joseph form).
-template <int NX, int NY>
-Update<NX, NY> measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y,
-                                  const Vec<NY>& expected, const Mat<NY, NX>& H,
-                                  const Mat<NY, NY>& R, std::size_t sample) {
-    Update<NX, NY> u;
+/// Updates mean and covariance with the elements of `y` that are there (Joseph form). The first `D`
+/// readings are states.
+template <int NX, int NY, int D = 0>
+void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<NY>& expected,
+                        const Mat<NY, NX>& H, const Mat<NY, NY>& R, std::size_t sample,
+                        Update<NX, NY>& u) {
+    u.observed = 0;
     u.innovation = y - expected;
     u.observation = H;
     Mat<NY, NY> noise = R;
@@ -48,29 +114,39 @@ Update<NX, NY> measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y,
             ++u.observed;
         }
     }
-    const Mat<NX, NY> cross = P * u.observation.transpose();
-    const Mat<NY, NY> S = u.observation * cross + noise;
-    const Eigen::LLT<Mat<NY, NY>> factor(S);
-    if (factor.info() != Eigen::Success || !u.innovation.allFinite())
+    const bool whole = u.observed == NY;
+    const auto seen = [&](const auto& X) {
+        return whole ? seen_by<D>(X, u.observation) : seen_by<0>(X, u.observation);
+    };
+    const Mat<NX, NY> cross = seen(P);
+    const Mat<NY, NX> crossed = cross.transpose();
+    const Mat<NY, NY> S = seen(crossed) + noise;
+    Mat<NY, NY> whitening;
+    if (!u.innovation.allFinite() || !cholesky<NY>(S, u.lower, whitening))
         throw NumericalFailure("the innovation covariance is not positive definite", sample);
-    u.lower = factor.matrixL();
-    u.gain = factor.solve(cross.transpose()).transpose();
-    const Vec<NY> whitened = u.lower.template triangularView<Eigen::Lower>().solve(u.innovation);
+    u.information.noalias() = whitening.transpose() * whitening;
+    u.gain.noalias() = cross * u.information;
+    const Vec<NY> whitened = whitening * u.innovation;
     u.log_likelihood = -0.5 * (whitened.squaredNorm() + u.observed * kLogTwoPi) -
-                       u.lower.diagonal().array().log().sum();
+                       std::log(u.lower.diagonal().prod());
     x += u.gain * u.innovation;
-    Mat<NX, NX> keep = Mat<NX, NX>::Identity();
-    keep.noalias() -= u.gain * u.observation;
-    P = (keep * P * keep.transpose() + u.gain * noise * u.gain.transpose()).eval();
+    // (I - K H) P (I - K H)' + K R K', multiplied from the left, then from the right.
+    const Mat<NX, NX> left = P - u.gain * crossed;
+    const Mat<NX, NY> rest = seen(left) - u.gain * noise;
+    P.noalias() = left - rest * u.gain.transpose();
     symmetrise(P);
-    return u;
 }
 
-/// What is known after a sample has been used; `A` led to it from the sample before.
-template <int NX, int NY>
-struct FilterStep {
+/// What is known before and after a sample has been used; `transition` led to it from the sample
+/// before.
+template <int NX>
+struct StateStep {
     Vec<NX> predicted_mean, mean;
     Mat<NX, NX> predicted_covariance, covariance, transition;
+};
+
+template <int NX, int NY>
+struct FilterStep : StateStep<NX> {
     Update<NX, NY> update;
 };
 
@@ -88,14 +164,13 @@ double extended_kalman_filter(const System& system, Vec<NX> x, Mat<NX, NX> P, Ke
     for (std::size_t k = 0; k < system.size(); ++k) {
         if (k > 0 || predict_first) {
             x = system.predict(k, x, step.transition, Q);
-            P = (step.transition * P * step.transition.transpose() + Q).eval();
-            symmetrise(P);
+            P = propagated<MovingStates<System, NX>::value>(step.transition, P) + Q;
         }
         step.predicted_mean = x;
         step.predicted_covariance = P;
         const Vec<NY> expected = system.observe(k, x, H);
-        step.update = measurement_update<NX, NY>(x, P, system.measurement(k), expected, H,
-                                                 system.measurement_noise(k), k);
+        measurement_update<NX, NY, DirectReadings<System>::value>(
+            x, P, system.measurement(k), expected, H, system.measurement_noise(k), k, step.update);
         step.mean = x;
         step.covariance = P;
         log_likelihood += step.update.log_likelihood;

@@ -97,14 +97,20 @@ class ObserverModel {
         }
         // Local linearisation (Ozaki, Statistica Sinica 1992): the rate's own Jacobian is what is
         // sampled exactly. It stays stable at walking pace, where Euler's rule does not.
-        const Mat<3, 3> response = form_.exact_sampling ? held_response<3>(J, dt_)
-                                                        : Mat<3, 3>(dt_ * Mat<3, 3>::Identity());
         A.setIdentity();
+        ObserverVec next = x;
+        if (!form_.exact_sampling) {
+            A.topLeftCorner<3, 3>() += dt_ * J;
+            A(0, 3) = A(1, 4) = dt_ * per_mass_;
+            A(2, 5) = dt_ * per_inertia_;
+            next.head<3>() += dt_ * rate;
+            return next;
+        }
+        const Mat<3, 3> response = held_response<3>(J, dt_);
         A.topLeftCorner<3, 3>() += J * response;
         A.col(3).head<3>() = response.col(0) * per_mass_;
         A.col(4).head<3>() = response.col(1) * per_mass_;
         A.col(5).head<3>() = response.col(2) * per_inertia_;
-        ObserverVec next = x;
         next.head<3>() += response * rate;
         return next;
     }
@@ -189,6 +195,9 @@ struct ObserverStart {
 /// A log as the `System` of `extended_kalman_filter`.
 class ObserverSystem {
   public:
+    static constexpr int kMovingStates = 3;
+    static constexpr int kDirectReadings = 3;
+
     ObserverSystem(const ObserverModel& model, const std::vector<ObserverInput>& inputs,
                    const std::vector<ObserverReading>& readings, ObserverNoise noise)
         : model_(&model), inputs_(&inputs), readings_(&readings), noise_(std::move(noise)) {}
@@ -232,15 +241,15 @@ class Observer {
         if (samples_ > 0 || start_.one_before) {
             ObserverMat A;
             x_ = model_.predict(x_, samples_ > 0 ? before_ : now, now, A);
-            P_ = (A * P_ * A.transpose() + noise_.process).eval();
-            symmetrise(P_);
+            P_ = propagated<ObserverSystem::kMovingStates>(A, P_) + noise_.process;
         }
         if (model_.form().speed_predicted) speed = x_[0];
         ObserverRow H;
         const ObserverReading expected = model_.observe(speed, x_, now, H);
-        log_likelihood_ += measurement_update<kObserverStates, kObserverMeasurements>(
-                               x_, P_, y, expected, H, noise_.sensors, samples_)
-                               .log_likelihood;
+        Update<kObserverStates, kObserverMeasurements> update;
+        measurement_update<kObserverStates, kObserverMeasurements, ObserverSystem::kDirectReadings>(
+            x_, P_, y, expected, H, noise_.sensors, samples_, update);
+        log_likelihood_ += update.log_likelihood;
         before_ = now;
         ++samples_;
         return x_;

@@ -1,0 +1,109 @@
+"""`sysid-vehicle lab em`: learn the observer's noise from logs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from .._files import write_json, write_text
+from .._style import new_figure, svg
+from ..lab import (
+    EMResult,
+    NoiseStructure,
+    Observer,
+    ObserverCar,
+    ObserverNoise,
+    ObserverRecord,
+    StateEstimate,
+    learn_observer_noise,
+)
+from ..read import ChannelMap, read_log
+from ..vehicle import Vehicle
+from .outputs import refuse_unwritable
+
+__all__ = ["add_parser", "run"]
+
+
+def add_parser(subcommands: Any) -> argparse.ArgumentParser:
+    """Add the subcommand `em` to what `ArgumentParser.add_subparsers` gave."""
+    parser: argparse.ArgumentParser = subcommands.add_parser(
+        "em", help="learn the noise of sensors and disturbances, estimate the unexplained forces"
+    )
+    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="CSV file of one run")
+    parser.add_argument(
+        "--vehicle", type=Path, required=True, metavar="TOML", help="the car's own numbers"
+    )
+    parser.add_argument(
+        "--channels", type=Path, metavar="TOML", help="channel map, for other column names or units"
+    )
+    parser.add_argument(
+        "--stiffness",
+        nargs=2,
+        type=float,
+        metavar=("FRONT", "REAR"),
+        help="nominal cornering stiffness per load in 1/rad (default: the vehicle's tyres)",
+    )
+    parser.add_argument(
+        "--drag", type=float, default=0.0, metavar="C", help="drag per speed in N s/m (default: 0)"
+    )
+    parser.add_argument(
+        "--correlated",
+        action="store_true",
+        help="let the noise of the yaw rate and of the lateral acceleration be correlated",
+    )
+    parser.add_argument(
+        "--iterations",
+        type=int,
+        default=300,
+        metavar="N",
+        help="at most so many (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--figure", type=Path, metavar="SVG", help="log-likelihood, noise, and forces of each log"
+    )
+    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+    return parser
+
+
+def run(args: argparse.Namespace, heard: list[str]) -> None:
+    """Learn, print, and write what was asked for; `heard` are the warnings so far."""
+    inputs = [*args.logs, args.vehicle, args.channels]
+    refuse_unwritable([args.json, args.figure], inputs=[path for path in inputs if path])
+    vehicle = Vehicle.from_toml(args.vehicle)
+    car = ObserverCar.of(vehicle, drag_nspm=args.drag)
+    tyres = (vehicle.tyre_front, vehicle.tyre_rear)
+    front, rear = args.stiffness or [tyre.cornering_stiffness_per_load for tyre in tyres]
+    mapping = None if args.channels is None else ChannelMap.from_toml(args.channels)
+    records = [
+        ObserverRecord.from_log(read_log(path, mapping), car, (front, rear)) for path in args.logs
+    ]
+    pair = (("yaw_rate_radps", "ay_mps2"),) if args.correlated else ()
+    result = learn_observer_noise(
+        Observer(car, ObserverNoise.first_guess(records[0], car)),
+        records,
+        sensors=NoiseStructure(correlated=pair),
+        most_iterations=args.iterations,
+    )
+    observer = Observer(car, result.noise)
+    estimates = [observer.smoothed(record) for record in records]
+    print(result)
+    for estimate in estimates:
+        print()
+        print(estimate)
+    if args.figure is not None:
+        write_text(args.figure, _figure(result, estimates))
+    if args.json is not None:
+        write_json(args.json, {**result.to_dict(), "warnings": list(heard)})
+
+
+def _figure(result: EMResult, estimates: list[StateEstimate]) -> str:
+    rows = 1 + len(estimates)
+    figure = new_figure(10.0, 3.2 * rows)
+    grid = figure.add_gridspec(rows, 2)
+    result.plot(ax=figure.add_subplot(grid[0, 0]))
+    result.plot_noise(ax=figure.add_subplot(grid[0, 1]))
+    for row, estimate in enumerate(estimates, start=1):
+        ax = estimate.plot_forces(ax=figure.add_subplot(grid[row, :]))
+        ax.set_title(estimate.name)
+    return svg(figure).decode("utf-8")
