@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from sysid_vehicle.lab import ObserverCar, ObserverRecord
 
-FOLDER = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "golden_closed_loop"
 CAR = ObserverCar(mass_kg=780.0, yaw_inertia_kgm2=1000.0, lf_m=1.4, lr_m=1.6, drag_nspm=0.3)
 NOMINAL_STIFFNESS_PRAD = 63.36  # per load
 
@@ -23,13 +22,11 @@ class Golden:
     truth: npt.NDArray[np.float64]
 
 
-def golden(
-    amplitude: str = "035", stiffness_prad: float | tuple[float, float] | None = None
-) -> Golden:
-    """Read a log; `stiffness_prad` is that of the axles per load, front and rear."""
-    path = FOLDER / f"identification_amp{amplitude}.npz"
+def golden(folder: Path, stiffness_prad: float | tuple[float, float] | None = None) -> Golden:
+    """Read the gentle log; `stiffness_prad` is that of the axles per load, front and rear."""
+    path = folder / "identification_amp035.npz"
     if not path.is_file():
-        raise SystemExit(f"the log is not at {path}; put the shared data beside the repository")
+        raise SystemExit(f"there is no {path}; give the folder of the closed-loop logs")
     front, rear = np.broadcast_to(stiffness_prad or NOMINAL_STIFFNESS_PRAD, 2)
     with np.load(path) as data:
         record = ObserverRecord.from_arrays(

@@ -1,8 +1,8 @@
 """How well, how surely and how fast tyres are identified.
 
-    python benchmarks/closed_loop/identify.py [--quick] [--repeats N] [--starts N] [--golden FOLDER]
+    python benchmarks/closed_loop/identify.py [LOGS] [--quick] [--repeats N] [--starts N]
 
-Logs of the published closed-loop drive, where the folder is there: cornering stiffness from the
+Logs of the published closed-loop drive, where their folder is given: cornering stiffness from the
 gentle one, peak friction from the one that reaches it, and how many starts over the whole box end
 at the best optimum. The time of one published identification beside that of plain NumPy. Then
 simulated drives: how often the 95 % intervals hold the truth, and what happens with a wrong start,
@@ -212,20 +212,15 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=200)
     parser.add_argument("--starts", type=int, default=64)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument(
-        "--golden",
-        type=Path,
-        default=Path(__file__).resolve().parents[3] / "shared/data/golden_closed_loop",
-    )
+    parser.add_argument("logs", nargs="?", type=Path, help="folder of the closed-loop logs")
     args = parser.parse_args()
     repeats = 20 if args.quick else args.repeats
     starts = 8 if args.quick else args.starts
-    if args.golden.is_dir():
-        accuracy(args.golden, starts)
-        speed(TyreMotion.from_log(golden(args.golden, "035")))
-        without_sideslip(args.golden)
+    if args.logs is not None:
+        accuracy(args.logs, starts)
+        speed(TyreMotion.from_log(golden(args.logs, "035")))
+        without_sideslip(args.logs)
     else:
-        print(f"the closed-loop logs are not at {args.golden}: left out")
         speed(TyreMotion.from_log(driven(0)))
     wrong_starts()
     run = partial(coverage, repeats, args.workers)

@@ -1,4 +1,4 @@
-"""Filter, smoother and learned noise on the closed-loop log: `python reproduce.py [--quick]`.
+"""Filter, smoother and learned noise on the closed-loop log: `python reproduce.py LOGS [--quick]`.
 
 Prints the published figures, what must be reached, and what is reached. Leaves with an error where
 something is missed. `--stiffness F R` gives a stiffness per load identified elsewhere.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 from golden import CAR, Golden, golden
@@ -113,16 +114,17 @@ def mended_rows(log: Golden, title: str, sensors: NoiseStructure = FLOOR) -> Ite
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("logs", type=Path, help="folder of the closed-loop logs")
     parser.add_argument("--quick", action="store_true", help="the log of small amplitude alone")
     parser.add_argument("--stiffness", nargs=2, type=float, metavar=("F", "R"))
     options = parser.parse_args()
-    log = golden()
+    log = golden(options.logs)
     rows = [*published_rows(log), *mended_rows(log, "mended, nominal stiffness")]
     both = NoiseStructure(correlated=(("yaw_rate_radps", "ay_mps2"),), floor=1e-9)
     if not options.quick:
         rows += mended_rows(log, "yaw rate and ay correlated", both)
     if options.stiffness:
-        other = golden(stiffness_prad=tuple(options.stiffness))
+        other = golden(options.logs, tuple(options.stiffness))
         rows += mended_rows(other, "mended, identified stiffness")
     head = ("what", "published", "must reach", "reached", "")
     table = [head, *((*r[:4], "" if not r[2] else "met" if r[4] else "MISSED") for r in rows)]

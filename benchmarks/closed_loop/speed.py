@@ -1,4 +1,4 @@
-"""Time of a filter pass and of an EM iteration: `python speed.py [--quick]`.
+"""Time of a filter pass and of an EM iteration: `python speed.py LOGS [--quick]`.
 
 The yardstick is the same computation in plain NumPy, in the same run; the published times are those
 of GNU Octave on another machine. Times are of the processor, smallest of several.
@@ -10,6 +10,7 @@ import argparse
 import dataclasses
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from golden import CAR, golden
@@ -86,9 +87,11 @@ def compare(record: ObserverRecord, form: ObserverForm, title: str) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("logs", type=Path, help="folder of the closed-loop logs")
     parser.add_argument("--quick", action="store_true", help="1500 samples instead of 14501")
-    record = golden().record
-    if parser.parse_args().quick:
+    options = parser.parse_args()
+    record = golden(options.logs).record
+    if options.quick:
         keys = [f.name for f in dataclasses.fields(record) if f.name not in ("rate_hz", "name")]
         record = dataclasses.replace(record, **{key: getattr(record, key)[:1500] for key in keys})
     print(f"{len(record.readings)} samples")

@@ -11,6 +11,7 @@ import pytest
 
 from sysid_vehicle import InvalidInput, Model, NumericalError, Vehicle, drive, manoeuvres
 from sysid_vehicle.cli import lab_em
+from sysid_vehicle.cli.parser import parse
 from sysid_vehicle.lab import (
     EMResult,
     NoiseStructure,
@@ -357,7 +358,7 @@ class TestCommand:
         vehicle, log = files
         out, figure = tmp_path / "em.json", tmp_path / "em.svg"
         given = [str(log), "--vehicle", str(vehicle), "--correlated"]
-        wanted = ["--json", str(out), "--figure", str(figure), "--iterations", "40"]
+        wanted = ["--json", str(out), "--plot", str(figure), "--iterations", "40"]
         lab_em.run(parsed([*given, *wanted]), ["heard before"])
         printed = capsys.readouterr().out
         assert "sensor ay_mps2" in printed
@@ -384,6 +385,4 @@ class TestCommand:
 
 
 def parsed(argv: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser()
-    lab_em.add_parser(parser.add_subparsers())
-    return parser.parse_args(["em", *argv])
+    return parse(["lab", "em", *argv])

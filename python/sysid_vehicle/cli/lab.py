@@ -27,7 +27,7 @@ from ..lab import (
 )
 from ..model import Model
 from ..vehicle import Vehicle
-from . import lab_identify, lab_validate
+from . import lab_em, lab_identify, lab_validate
 from .outputs import refuse_unwritable
 
 __all__ = ["add_parser", "run"]
@@ -183,6 +183,12 @@ def _figures(drive: ClosedLoop, seen: Preview | None) -> dict[str, Any]:
 
 SUBCOMMANDS: tuple[Subcommand, ...] = (
     Subcommand("run", "drive an excitation, write its log", _run_arguments, _run),
+    Subcommand(
+        "em",
+        "learn the noise of sensors and disturbances, estimate the unexplained forces",
+        lab_em.add_arguments,
+        lab_em.run,
+    ),
     Subcommand(
         "identify",
         "identify the tyres of both axles from logs",

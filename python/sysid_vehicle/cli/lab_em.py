@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from .._files import write_json, write_text
 from .._style import new_figure, svg
@@ -18,25 +17,16 @@ from ..lab import (
     StateEstimate,
     learn_observer_noise,
 )
-from ..read import ChannelMap, read_log
-from ..vehicle import Vehicle
+from .lab_inputs import add_log_arguments, add_vehicle_argument, files_of, logs_of, vehicle_of
 from .outputs import refuse_unwritable
 
-__all__ = ["add_parser", "run"]
+__all__ = ["add_arguments", "run"]
 
 
-def add_parser(subcommands: Any) -> argparse.ArgumentParser:
-    """Add the subcommand `em` to what `ArgumentParser.add_subparsers` gave."""
-    parser: argparse.ArgumentParser = subcommands.add_parser(
-        "em", help="learn the noise of sensors and disturbances, estimate the unexplained forces"
-    )
-    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="CSV file of one run")
-    parser.add_argument(
-        "--vehicle", type=Path, required=True, metavar="TOML", help="the car's own numbers"
-    )
-    parser.add_argument(
-        "--channels", type=Path, metavar="TOML", help="channel map, for other column names or units"
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Say what may be typed."""
+    add_log_arguments(parser)
+    add_vehicle_argument(parser)
     parser.add_argument(
         "--stiffness",
         nargs=2,
@@ -60,24 +50,19 @@ def add_parser(subcommands: Any) -> argparse.ArgumentParser:
         help="at most so many (default: %(default)s)",
     )
     parser.add_argument(
-        "--figure", type=Path, metavar="SVG", help="log-likelihood, noise, and forces of each log"
+        "--plot", type=Path, metavar="SVG", help="log-likelihood, noise, and forces of each log"
     )
     parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
-    return parser
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Learn, print, and write what was asked for; `heard` are the warnings so far."""
-    inputs = [*args.logs, args.vehicle, args.channels]
-    refuse_unwritable([args.json, args.figure], inputs=[path for path in inputs if path])
-    vehicle = Vehicle.from_toml(args.vehicle)
+    refuse_unwritable([args.plot, args.json], inputs=files_of(args))
+    vehicle = vehicle_of(args)
     car = ObserverCar.of(vehicle, drag_nspm=args.drag)
     tyres = (vehicle.tyre_front, vehicle.tyre_rear)
     front, rear = args.stiffness or [tyre.cornering_stiffness_per_load for tyre in tyres]
-    mapping = None if args.channels is None else ChannelMap.from_toml(args.channels)
-    records = [
-        ObserverRecord.from_log(read_log(path, mapping), car, (front, rear)) for path in args.logs
-    ]
+    records = [ObserverRecord.from_log(log, car, (front, rear)) for log in logs_of(args)]
     pair = (("yaw_rate_radps", "ay_mps2"),) if args.correlated else ()
     result = learn_observer_noise(
         Observer(car, ObserverNoise.first_guess(records[0], car)),
@@ -91,8 +76,9 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     for estimate in estimates:
         print()
         print(estimate)
-    if args.figure is not None:
-        write_text(args.figure, _figure(result, estimates))
+    if args.plot is not None:
+        write_text(args.plot, _figure(result, estimates))
+        print(f"Picture: {args.plot}")
     if args.json is not None:
         write_json(args.json, {**result.to_dict(), "warnings": list(heard)})
 

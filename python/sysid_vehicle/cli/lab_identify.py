@@ -10,8 +10,7 @@ from .._files import write_json, write_text
 from .._style import new_figure, svg
 from ..identify import METHODS
 from ..lab import GreyBoxVehicle, TyreLog, identify_tyres
-from ..read import read_log
-from ..vehicle import Vehicle
+from .lab_inputs import add_log_arguments, add_vehicle_argument, files_of, logs_of, vehicle_of
 from .outputs import refuse_unwritable
 
 __all__ = ["add_arguments", "run"]
@@ -19,16 +18,8 @@ __all__ = ["add_arguments", "run"]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Say what may be typed."""
-    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="CSV file of one run")
-    parser.add_argument(
-        "--vehicle", type=Path, metavar="TOML", help="the car (default: the published one)"
-    )
-    parser.add_argument("--channels", type=Path, metavar="TOML", help="channel map")
-    parser.add_argument(
-        "--unchecked",
-        action="store_true",
-        help="take the logs as they are: a car beyond its peak looks like wrong units or signs",
-    )
+    add_log_arguments(parser)
+    add_vehicle_argument(parser)
     parser.add_argument(
         "--no-sideslip", action="store_true", help="do without the v_y that the logs have"
     )
@@ -58,11 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Identify, print, and write what was asked for."""
-    given = [*args.logs, *(p for p in (args.vehicle, args.channels) if p is not None)]
-    refuse_unwritable([args.plot, args.json], inputs=given)
-    car = _vehicle(args.vehicle, args.mass_tolerance)
-    read = [read_log(path, args.channels, check=not args.unchecked) for path in args.logs]
-    logs = [part for log in read for part in TyreLog.from_log(log, car)]
+    refuse_unwritable([args.plot, args.json], inputs=files_of(args))
+    car = GreyBoxVehicle.of(vehicle_of(args), mass_tolerance=args.mass_tolerance)
+    logs = [part for log in logs_of(args) for part in TyreLog.from_log(log, car)]
     if args.no_sideslip:
         logs = [log.without_sideslip() for log in logs]
     fit = identify_tyres(
@@ -83,21 +72,3 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
         print(f"Picture: {args.plot}")
     if args.json is not None:
         write_json(args.json, {**fit.to_dict(), "warnings": heard})
-
-
-def _vehicle(path: Path | None, tolerance: float) -> GreyBoxVehicle:
-    if path is None:
-        return GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6, 1.2929, 0.35, tolerance)
-    known = Vehicle.from_toml(path)
-    inertia = known.yaw_inertia_kgm2
-    return GreyBoxVehicle(
-        known.mass_kg,
-        inertia if inertia is not None else known.mass_kg * known.lf_m * known.lr_m,
-        known.lf_m,
-        known.lr_m,
-        known.air_density_kgpm3,
-        known.cg_height_m,
-        tolerance,
-        # What most cars have, where it is not given: good to a tenth.
-        0.0 if inertia is not None else 0.1,
-    )

@@ -9,7 +9,7 @@ from .._files import write_json, write_text
 from .._style import new_figure, svg
 from ..lab import IdentifiedCar, TyreLog, validate_tyres
 from ..lab.tyre_data import READINGS
-from ..read import read_log
+from .lab_inputs import add_log_arguments, files_of, logs_of
 from .outputs import refuse_unwritable
 
 __all__ = ["add_arguments", "run"]
@@ -17,19 +17,13 @@ __all__ = ["add_arguments", "run"]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Say what may be typed."""
-    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="CSV file of one run")
+    add_log_arguments(parser)
     parser.add_argument(
         "--tyres",
         type=Path,
         required=True,
         metavar="JSON",
         help="what `lab identify --json` wrote, from other logs",
-    )
-    parser.add_argument("--channels", type=Path, metavar="TOML", help="channel map")
-    parser.add_argument(
-        "--unchecked",
-        action="store_true",
-        help="take the logs as they are: a car beyond its peak looks like wrong units or signs",
     )
     parser.add_argument(
         "--horizon",
@@ -44,11 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Predict, print, and write what was asked for."""
-    given = [*args.logs, args.tyres, *([] if args.channels is None else [args.channels])]
-    refuse_unwritable([args.plot, args.json], inputs=given)
+    refuse_unwritable([args.plot, args.json], inputs=[*files_of(args), args.tyres])
     car = IdentifiedCar.from_json(args.tyres)
-    read = [read_log(path, args.channels, check=not args.unchecked) for path in args.logs]
-    logs = [part for log in read for part in TyreLog.from_log(log, car.vehicle)]
+    logs = [part for log in logs_of(args) for part in TyreLog.from_log(log, car.vehicle)]
     found = validate_tyres(car, logs, horizon_s=args.horizon)
     print("\n\n".join(map(str, found)))
     if args.plot is not None:

@@ -13,6 +13,7 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..log import Log
+from ..vehicle import Vehicle
 
 __all__ = ["READINGS", "GreyBoxVehicle", "TyreLog", "tyre_problem"]
 
@@ -64,6 +65,25 @@ class GreyBoxVehicle:
                 raise InvalidInput(
                     f"{name} is {value}; give a relative standard deviation from 0 to below 0.5"
                 )
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, *, mass_tolerance: float = 0.0) -> GreyBoxVehicle:
+        """Take what a vehicle file says.
+
+        A yaw inertia that it does not say is taken as m l_f l_r, good to a tenth for most cars.
+        """
+        known = vehicle.yaw_inertia_kgm2
+        usual = vehicle.mass_kg * vehicle.lf_m * vehicle.lr_m
+        return cls(
+            vehicle.mass_kg,
+            usual if known is None else known,
+            vehicle.lf_m,
+            vehicle.lr_m,
+            vehicle.air_density_kgpm3,
+            vehicle.cg_height_m,
+            mass_tolerance,
+            0.1 if known is None else 0.0,
+        )
 
     def core(self) -> _core.GreyBoxCar:
         """For the compiled core."""

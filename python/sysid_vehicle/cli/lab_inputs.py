@@ -1,0 +1,49 @@
+"""What the subcommands of `lab` that read logs have in common."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..lab import Setup
+from ..log import Log
+from ..read import read_log
+from ..vehicle import Vehicle
+
+__all__ = ["add_log_arguments", "add_vehicle_argument", "files_of", "logs_of", "vehicle_of"]
+
+
+def add_log_arguments(parser: argparse.ArgumentParser) -> None:
+    """Ask for logs and how to read them."""
+    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="CSV file of one run")
+    parser.add_argument("--channels", type=Path, metavar="TOML", help="channel map")
+    parser.add_argument(
+        "--unchecked",
+        action="store_true",
+        help="take the logs as they are: a car beyond its peak looks like wrong units or signs",
+    )
+
+
+def add_vehicle_argument(parser: argparse.ArgumentParser) -> None:
+    """Ask for the car."""
+    parser.add_argument(
+        "--vehicle", type=Path, metavar="TOML", help="the car (default: the published one)"
+    )
+
+
+def files_of(args: argparse.Namespace) -> list[Path]:
+    """Every file that is read, none of which may be written to."""
+    others = [args.channels, getattr(args, "vehicle", None)]
+    return [*args.logs, *(path for path in others if path is not None)]
+
+
+def logs_of(args: argparse.Namespace) -> list[Log]:
+    """Read the logs."""
+    return [read_log(path, args.channels, check=not args.unchecked) for path in args.logs]
+
+
+def vehicle_of(args: argparse.Namespace) -> Vehicle:
+    """Read the car, or take the one that the laboratory drives."""
+    if args.vehicle is None:
+        return Setup.default().plant.vehicle
+    return Vehicle.from_toml(args.vehicle)
