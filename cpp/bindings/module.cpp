@@ -13,4 +13,5 @@ PYBIND11_MODULE(_core, m) {
     register_lab_observer(m);
     register_lab_loop(m);
     register_lab_tyres(m);
+    register_online_mu_slip(m);
 }

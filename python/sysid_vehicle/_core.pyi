@@ -4,6 +4,14 @@ from typing import Any, NoReturn, TypedDict, type_check_only
 import numpy as np
 import numpy.typing as npt
 
+from ._core_mu_slip import MagicFormulaCurve as MagicFormulaCurve
+from ._core_mu_slip import MagicFormulaFilter as MagicFormulaFilter
+from ._core_mu_slip import TwoParameterCurve as TwoParameterCurve
+from ._core_mu_slip import TwoParameterFilter as TwoParameterFilter
+from ._core_mu_slip import _Curve as _Curve
+from ._core_mu_slip import _CurveFilter as _CurveFilter
+from ._core_mu_slip import magic_formula_coefficients as magic_formula_coefficients
+
 _Array = npt.NDArray[np.float64]
 
 __version__: str

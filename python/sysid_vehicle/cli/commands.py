@@ -21,7 +21,7 @@ from ..read import ChannelMap, read_log
 from ..report import summary, write_report
 from ..study import Study, improve
 from ..vehicle import Vehicle
-from . import lab
+from . import lab, mu_slip
 from .outputs import refuse_unwritable
 
 __all__ = ["COMMANDS"]
@@ -96,6 +96,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
     "improve": _improve,
     "effects": _effects,
     "lab": lab.run,
+    "mu-slip": mu_slip.run,
 }
 
 

@@ -1,0 +1,95 @@
+"""`sysid-vehicle mu-slip DATA`: the friction curve behind readings of friction over slip."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from .._files import write_json, write_text
+from .._style import svg
+from ..errors import InvalidInput
+from ..online import (
+    MAGIC_FORMULA,
+    TWO_PARAMETER,
+    MuSlipComparison,
+    MuSlipData,
+    animate_mu_slip,
+    compare_mu_slip,
+    mu_slip_ekf,
+    mu_slip_overview,
+    save_animation,
+)
+from .outputs import refuse_unwritable
+
+__all__ = ["add_parser", "run"]
+
+_CURVES = {curve.name: curve for curve in (TWO_PARAMETER, MAGIC_FORMULA)}
+_CONTRACT = """\
+DATA is a CSV file whose first line names the columns; these two are read, others are ignored:
+  slip  braking slip (v - v_wheel) / v, a ratio: 0 rolling, 1 locked
+  mu    braking force over vertical load; an empty cell is a missing reading
+Rows stand in the order in which the readings were taken."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the `commands` of the parser."""
+    parser = commands.add_parser(
+        "mu-slip",
+        help="peak friction and its slip from readings of friction over slip",
+        description=_CONTRACT,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("data", type=Path, metavar="DATA", help="CSV file: columns slip and mu")
+    parser.add_argument(
+        "--curve", choices=sorted(_CURVES), default=TWO_PARAMETER.name, help="default: %(default)s"
+    )
+    parser.add_argument(
+        "--noise-std",
+        type=float,
+        metavar="X",
+        help="standard deviation of a mu reading (default: learnt from the readings)",
+    )
+    parser.add_argument("--figure", type=Path, metavar="SVG", help="file for the figures")
+    parser.add_argument("--animation", type=Path, metavar="GIF", help="file for the convergence")
+    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all numbers")
+
+
+def run(args: argparse.Namespace, heard: list[str]) -> None:
+    """Estimate with every method, print them, and write what was asked for."""
+    for path, suffix in ((args.figure, ".svg"), (args.animation, ".gif")):
+        if path is not None and path.suffix.lower() != suffix:
+            raise InvalidInput(f"{path}: the file will be {suffix}; end the name in {suffix}")
+    refuse_unwritable([args.figure, args.animation, args.json], inputs=[args.data])
+    curve = _CURVES[args.curve]
+    comparison = compare_mu_slip(MuSlipData.from_csv(args.data, args.noise_std), curve=curve)
+    print(comparison)
+    print()
+    print(f"Recommended: {comparison.best}")
+    filtered = mu_slip_ekf(comparison.data, curve=curve)
+    if args.figure is not None:
+        write_text(args.figure, svg(mu_slip_overview(filtered)).decode())
+    if args.animation is not None:
+        save_animation(animate_mu_slip(filtered), args.animation)
+    if args.json is not None:
+        write_json(args.json, _plain(comparison, heard))
+
+
+def _plain(comparison: MuSlipComparison, heard: list[str]) -> dict[str, Any]:
+    return {
+        "curve": comparison.best.curve.name,
+        "noise_std": comparison.data.noise_std,
+        "recommended": comparison.best.method,
+        "estimates": [
+            {
+                "method": e.method,
+                "parameters": {
+                    name: {"value": float(x), "std": float(s)}
+                    for name, x, s in zip(e.curve.parameters, e.values, e.std, strict=True)
+                },
+                "notes": list(e.notes),
+            }
+            for e in comparison.estimates
+        ],
+        "warnings": list(heard),
+    }

@@ -1,0 +1,50 @@
+"""Estimators that run while driving, one reading at a time."""
+
+from .mu_slip_compare import MuSlipComparison, compare_mu_slip
+from .mu_slip_curve import (
+    MAGIC_FORMULA,
+    TWO_PARAMETER,
+    MuSlipCurve,
+    MuSlipPrior,
+    magic_formula_coefficients,
+)
+from .mu_slip_data import MuSlipData, simulate_mu_slip
+from .mu_slip_figures import (
+    MuSlipFrame,
+    animate_mu_slip,
+    draw_mu_slip_convergence,
+    draw_mu_slip_observability,
+    draw_mu_slip_signal,
+    mu_slip_overview,
+    save_animation,
+)
+from .mu_slip_filter import MuSlipFilter, mu_slip_ekf, mu_slip_smooth
+from .mu_slip_least_squares import mu_slip_cramer_rao, mu_slip_fit
+from .mu_slip_results import MuSlipEstimate, MuSlipRun, MuSlipSmoothed
+
+__all__ = [
+    "MAGIC_FORMULA",
+    "TWO_PARAMETER",
+    "MuSlipComparison",
+    "MuSlipCurve",
+    "MuSlipData",
+    "MuSlipEstimate",
+    "MuSlipFilter",
+    "MuSlipFrame",
+    "MuSlipPrior",
+    "MuSlipRun",
+    "MuSlipSmoothed",
+    "animate_mu_slip",
+    "compare_mu_slip",
+    "draw_mu_slip_convergence",
+    "draw_mu_slip_observability",
+    "draw_mu_slip_signal",
+    "magic_formula_coefficients",
+    "mu_slip_cramer_rao",
+    "mu_slip_ekf",
+    "mu_slip_fit",
+    "mu_slip_overview",
+    "mu_slip_smooth",
+    "save_animation",
+    "simulate_mu_slip",
+]

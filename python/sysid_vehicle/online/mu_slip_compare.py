@@ -1,0 +1,95 @@
+"""All estimators of the friction curve on the same readings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from html import escape
+from typing import Any
+
+from .._text import text_table
+from ..errors import InvalidInput
+from .mu_slip_curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
+from .mu_slip_data import MuSlipData
+from .mu_slip_filter import mu_slip_ekf, mu_slip_smooth
+from .mu_slip_least_squares import counted, mu_slip_fit, noise_of
+from .mu_slip_results import MuSlipEstimate
+
+__all__ = ["MuSlipComparison", "compare_mu_slip"]
+
+_ITERATIONS = 10
+
+
+@dataclass(frozen=True)
+class MuSlipComparison:
+    """All estimators on the same readings.
+
+    Attributes
+    ----------
+    data : MuSlipData
+        The readings, with the noise that was learnt where none was told.
+    estimates : tuple of MuSlipEstimate
+        One per estimator, the recommended one last.
+    notes : tuple of str
+        Which estimators failed.
+    """
+
+    data: MuSlipData
+    estimates: tuple[MuSlipEstimate, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def best(self) -> MuSlipEstimate:
+        """The recommended one, which is the last."""
+        return self.estimates[-1]
+
+    def __str__(self) -> str:
+        names = self.best.curve.parameters
+        rows = [
+            [e.method, *(f"{x:.5f} ± {s:.5f}" for x, s in zip(e.values, e.std, strict=True))]
+            for e in self.estimates
+        ]
+        table = text_table([f"{self.best.curve.name} curve", *names], rows)
+        notes = (f"  note: {note}" for note in (*self.notes, *self.best.notes))
+        return "\n".join([str(self.data), table, *notes])
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+
+def compare_mu_slip(data: MuSlipData, *, curve: MuSlipCurve = TWO_PARAMETER) -> MuSlipComparison:
+    """Run every estimator: filters, smoother, and least squares of 1, 2, 5 and all iterations.
+
+    The recommended one is last: least squares with its bias removed for the two-parameter curve;
+    for the Magic Formula the iterated smoother, whose prior holds shape and slope where the
+    readings say little of them.
+    """
+    data = replace(data, noise_std=noise_of(data, curve))
+    found = [
+        mu_slip_ekf(data, curve=curve).estimate,
+        mu_slip_ekf(data, curve=curve, passes=2).estimate,
+        mu_slip_ekf(data, curve=curve, iterations=_ITERATIONS).estimate,
+    ]
+    notes: list[str] = []
+
+    def fit(method: str, **options: Any) -> None:
+        try:
+            found.append(replace(mu_slip_fit(data, curve=curve, **options), method=method))
+        except InvalidInput:
+            notes.append(f"{method}: left out, the readings do not determine the curve")
+
+    for most in (1, 2, 5):
+        fit(
+            f"least squares, {counted(most)}",
+            start=curve.prior.mean,
+            bounds=curve.fit_bounds,
+            max_iterations=most,
+        )
+    smoothed = mu_slip_smooth(data, curve=curve).estimate
+    if curve is MAGIC_FORMULA:
+        fit("least squares")
+        found.append(smoothed)
+    else:
+        found.append(smoothed)
+        fit("least squares")
+        fit("least squares, corrected", corrected=True)
+    return MuSlipComparison(data, tuple(found), tuple(notes))

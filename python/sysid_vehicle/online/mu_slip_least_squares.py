@@ -1,0 +1,149 @@
+"""Least squares on all friction readings at once, what they can tell at best, and their noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from .._arrays import FloatArray, as_float64
+from ..errors import InvalidInput
+from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
+from .mu_slip_data import MuSlipData, at_least_one, check_noise, check_values
+from .mu_slip_results import MuSlipEstimate
+
+__all__ = ["mu_slip_cramer_rao", "mu_slip_fit", "noise_of"]
+
+
+def mu_slip_fit(
+    data: MuSlipData,
+    *,
+    curve: MuSlipCurve = TWO_PARAMETER,
+    start: npt.ArrayLike | None = None,
+    bounds: tuple[Sequence[float], Sequence[float]] | None = None,
+    max_iterations: int = 100,
+    corrected: bool = False,
+) -> MuSlipEstimate:
+    """Nonlinear least squares on all readings at once.
+
+    Parameters
+    ----------
+    start : array_like, optional
+        Where to begin. If left out the better of two results is given: from the mean of the
+        curve's prior, and from the highest readings.
+    bounds : tuple, optional
+        Lower and upper limits; those within which the formula holds if left out.
+    max_iterations : int
+        Linearisations (Gauss-Newton, damped where that does not lower the sum of squares).
+    corrected : bool
+        Subtract the bias of second order (Box, J. R. Statist. Soc. B 33, 1971, p. 171).
+
+    Raises
+    ------
+    InvalidInput
+        If start or bounds make no sense, or the readings do not determine the parameters.
+    """
+    low, high = (
+        curve.vector(b, "bounds") for b in bounds or (curve.kernels.LOWER, curve.kernels.UPPER)
+    )
+    if not (low < high).all():
+        raise InvalidInput("bounds: a lower limit is not below its upper one; exchange them")
+    prior = as_float64(curve.prior.mean)
+    starts = [_highest(data, prior), prior] if start is None else [curve.vector(start, "start")]
+    most = at_least_one("max_iterations", max_iterations)
+    results = [curve.kernels.fit(data.slip, data.mu, s, low, high, most) for s in starts]
+    results = [r for r in results if r["determined"]]
+    if not results:
+        raise InvalidInput(
+            f"mu: the readings do not determine the {curve.name} curve; take readings on both "
+            "sides of the peak"
+        )
+    found = min(results, key=lambda r: r["sum_of_squares"])
+    freedom = max(1, int(found["used"]) - len(low))
+    variance = found["sum_of_squares"] / freedom if data.noise_std is None else data.noise_std**2
+    notes = [] if found["converged"] else [f"stopped after {counted(found['iterations'])}"]
+    values = found["mean"]
+    notes += [
+        f"{name} rests at its bound {x:g}"
+        for name, x, lo, hi in zip(curve.parameters, values, low, high, strict=True)
+        if x in (lo, hi)
+    ]
+    largest = np.abs(data.slip[np.isfinite(data.mu)]).max()
+    if largest < values[1]:
+        notes.append(f"readings end at slip {largest:.3g}, before the peak: it is extrapolated")
+    if corrected:
+        values = values - variance * found["bias"]
+    return MuSlipEstimate(
+        "least squares, corrected" if corrected else "least squares",
+        curve,
+        values,
+        variance * found["covariance"],
+        tuple(notes),
+    )
+
+
+def mu_slip_cramer_rao(
+    slip: npt.ArrayLike,
+    values: npt.ArrayLike,
+    noise_std: float,
+    *,
+    curve: MuSlipCurve = TWO_PARAMETER,
+) -> FloatArray:
+    """Smallest covariance (p, p) that an unbiased estimator of the parameters can have.
+
+    Raises
+    ------
+    InvalidInput
+        If a slip or the noise cannot be, or readings at these slips do not determine the
+        parameters at all.
+    """
+    at = as_float64(np.atleast_1d(slip))
+    check_values("slip", at)
+    gradient = curve.points(at, values)[1]
+    information = gradient.T @ gradient / check_noise(noise_std) ** 2
+    scale = np.sqrt(np.diag(information))
+    if (scale == 0.0).any() or np.linalg.cond(information / np.outer(scale, scale)) > 1e14:
+        raise InvalidInput(
+            "slip: readings at these slips do not determine the parameters; take readings on both "
+            "sides of the peak"
+        )
+    return as_float64(np.linalg.inv(information))
+
+
+def noise_of(data: MuSlipData, curve: MuSlipCurve) -> float:
+    """Give the noise of a reading: as told, else from the residuals of a least-squares fit."""
+    if data.noise_std is not None:
+        return data.noise_std
+    try:
+        found = mu_slip_fit(data, curve=curve)
+    except InvalidInput as failure:
+        raise InvalidInput(
+            f"noise_std: cannot be learnt, the readings do not determine the {curve.name} curve; "
+            "give its value"
+        ) from failure
+    error = data.mu - curve.mu(data.slip, found.values)
+    freedom = int(np.isfinite(error).sum()) - len(found.values)
+    std = math.sqrt(float(np.nansum(error**2)) / max(freedom, 1))
+    if freedom < 1 or std < 1e-9:
+        raise InvalidInput(
+            "noise_std: cannot be learnt, the curve goes through all readings; give its value"
+        )
+    return std
+
+
+def counted(iterations: int) -> str:
+    """Say how many iterations."""
+    return f"{iterations} iteration{'' if iterations == 1 else 's'}"
+
+
+def _highest(data: MuSlipData, prior: FloatArray) -> FloatArray:
+    """Start at the middle of the highest tenth of the readings."""
+    there = np.flatnonzero(np.isfinite(data.mu))
+    order = np.argsort(-np.abs(data.mu[there]))
+    top = there[order[: max(3, len(there) // 10)]]
+    start = prior.copy()
+    start[0] = max(float(np.median(np.abs(data.mu[top]))), 1e-3)
+    start[1] = min(max(float(np.median(np.abs(data.slip[top]))), 5e-3), 1.0)
+    return start

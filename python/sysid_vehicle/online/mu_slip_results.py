@@ -1,0 +1,163 @@
+"""What the estimators of friction over slip return."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .._arrays import FloatArray
+from .._style import AFTER, MEASURED, axes_or_new, tidy
+from .._text import text_table
+from .mu_slip_curve import MuSlipCurve, magic_formula_coefficients
+from .mu_slip_data import MuSlipData
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["MuSlipEstimate", "MuSlipRun", "MuSlipSmoothed"]
+
+
+@dataclass(frozen=True)
+class MuSlipEstimate:
+    """Parameters of a curve with their uncertainty.
+
+    Attributes
+    ----------
+    method : str
+        How they were found.
+    curve : MuSlipCurve
+        What they belong to.
+    values : ndarray, shape (p,)
+        The parameters.
+    covariance : ndarray, shape (p, p)
+        As the estimator believes it.
+    notes : tuple of str
+        What the reader should know before using the values.
+    """
+
+    method: str
+    curve: MuSlipCurve
+    values: FloatArray
+    covariance: FloatArray
+    notes: tuple[str, ...] = ()
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviation of each parameter."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def band(self, slip: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Friction at each slip and its standard deviation (delta method)."""
+        mu, gradient, _ = self.curve.points(slip, self.values)
+        variance = np.einsum("ki,ij,kj->k", gradient, self.covariance, gradient)
+        return mu, np.sqrt(np.maximum(variance, 0.0))
+
+    def __str__(self) -> str:
+        rows = [
+            [name, f"{x:.5g}", f"{s:.2g}"]
+            for name, x, s in zip(self.curve.parameters, self.values, self.std, strict=True)
+        ]
+        text = f"{self.method}\n" + text_table(["parameter", "value", "std"], rows)
+        if len(self.values) == 4:
+            letters = zip("BCDE", magic_formula_coefficients(list(self.values)), strict=True)
+            text += "\n  " + ", ".join(f"{name} {x:.4g}" for name, x in letters)
+        return "\n".join([text, *(f"  note: {note}" for note in self.notes)])
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def plot(self, data: MuSlipData, ax: Axes | None = None) -> Axes:
+        """Draw the readings, the curve and its 2-sigma band onto `ax`."""
+        ax = axes_or_new(ax, 6.0, 4.0)
+        slip = np.linspace(min(0.0, data.slip.min()), max(data.slip.max(), 0.1), 300)
+        mu, std = self.band(slip)
+        ax.fill_between(
+            slip, mu - 2 * std, mu + 2 * std, color=AFTER, alpha=0.2, linewidth=0, label="2 sigma"
+        )
+        ax.plot(slip, mu, color=AFTER, label="estimated")
+        ax.plot(data.slip, data.mu, ".", color=MEASURED, markersize=4, label="measured")
+        ax.legend(frameon=False)
+        return tidy(ax, xlabel="slip ratio", ylabel="friction", title=self.method)
+
+
+@dataclass(frozen=True)
+class MuSlipRun:
+    """A filter's way through the readings; `n` readings, `p` parameters.
+
+    Attributes
+    ----------
+    method, curve, data :
+        What was run, on what.
+    start : tuple
+        Mean (p,) and covariance (p, p) before the first reading.
+    mean, covariance : ndarray, shapes (n, p), (n, p, p)
+        After each reading.
+    innovation, innovation_variance : ndarray, shape (n,)
+        Reading less expectation, and the variance the filter gave it.
+    noise_variance : ndarray, shape (n,)
+        Of a reading as the filter took it, pseudo-noise included.
+    signal_before, signal_after : ndarray, shape (n,)
+        Variance of the expected friction, H P H', before and after the reading.
+    """
+
+    method: str
+    curve: MuSlipCurve
+    data: MuSlipData
+    start: tuple[FloatArray, FloatArray]
+    mean: FloatArray
+    covariance: FloatArray
+    innovation: FloatArray
+    innovation_variance: FloatArray
+    noise_variance: FloatArray
+    signal_before: FloatArray
+    signal_after: FloatArray
+
+    @property
+    def estimate(self) -> MuSlipEstimate:
+        """After the last reading."""
+        return MuSlipEstimate(self.method, self.curve, self.mean[-1], self.covariance[-1])
+
+    def __str__(self) -> str:
+        return str(self.estimate)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+
+@dataclass(frozen=True)
+class MuSlipSmoothed:
+    """Parameters at each reading, given all readings.
+
+    Attributes
+    ----------
+    mean, covariance : ndarray, shapes (n, p), (n, p, p)
+        Equal at all readings unless the parameters may drift.
+    rounds : int
+        Passes of filter and smoother.
+    converged : bool
+        Whether a further pass would change nothing.
+    """
+
+    curve: MuSlipCurve
+    data: MuSlipData
+    mean: FloatArray
+    covariance: FloatArray
+    rounds: int
+    converged: bool
+
+    @property
+    def estimate(self) -> MuSlipEstimate:
+        """At the last reading."""
+        notes = () if self.converged else (f"not at rest after {self.rounds} rounds",)
+        return MuSlipEstimate(
+            "iterated smoother", self.curve, self.mean[-1], self.covariance[-1], notes
+        )
+
+    def __str__(self) -> str:
+        return str(self.estimate)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
