@@ -150,8 +150,13 @@ def test_the_noise_is_learnt_where_it_is_not_told() -> None:
 
 def test_readings_that_end_before_the_peak_are_noted() -> None:
     data = simulate_mu_slip(slip=np.linspace(0.0, 0.1, 60), noise_std=0.002, seed=1)
+    whole = simulate_mu_slip(seed=1)
     assert any("before the peak" in note for note in mu_slip_fit(data).notes)
-    assert mu_slip_fit(simulate_mu_slip(seed=1)).notes == ()
+    assert any("before the peak" in note for note in mu_slip_smooth(data).estimate.notes)
+    assert any("before the peak" in note for note in mu_slip_ekf(data).estimate.notes)
+    assert mu_slip_fit(whole).notes == ()
+    assert mu_slip_smooth(whole).estimate.notes == ()
+    assert mu_slip_ekf(whole).estimate.notes == ()
 
 
 @pytest.mark.parametrize(

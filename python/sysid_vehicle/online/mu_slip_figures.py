@@ -165,13 +165,14 @@ def draw_mu_slip_convergence(run: MuSlipRun, ax: Axes | None = None) -> Axes:
     P, P0, slip = run.covariance, run.start[1], run.data.slip
     colours = (AFTER, BEFORE, TRUTH, FLOOR)
     for i, name in enumerate(run.curve.parameters):
-        label = f"variance of {name}, relative"
+        label = f"variance of {name}"
         ax.plot(slip, P[:, i, i] / P0[i, i], color=colours[i], label=label)
     correlation = P[:, 0, 1] / np.sqrt(P[:, 0, 0] * P[:, 1, 1])
-    ax.plot(slip, correlation, color=MEASURED, label="correlation of peak and its slip")
+    ax.plot(slip, correlation, color=MEASURED, label="correlation of the first two")
     ax.set_ylim(-1.0, 1.05)
-    ax.legend(frameon=False)
-    return tidy(ax, xlabel="slip ratio", title="Convergence of the covariance")
+    ax.legend(frameon=False, ncols=2, fontsize="small", loc="lower center")
+    ylabel = "share of the first variance"
+    return tidy(ax, xlabel="slip ratio", ylabel=ylabel, title="Convergence of the covariance")
 
 
 def draw_mu_slip_signal(run: MuSlipRun, ax: Axes | None = None) -> Axes:

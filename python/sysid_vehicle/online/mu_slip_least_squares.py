@@ -12,7 +12,7 @@ from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
 from .mu_slip_data import MuSlipData, at_least_one, check_noise, check_values
-from .mu_slip_results import MuSlipEstimate
+from .mu_slip_results import MuSlipEstimate, cautions
 
 __all__ = ["mu_slip_cramer_rao", "mu_slip_fit", "noise_of"]
 
@@ -65,14 +65,7 @@ def mu_slip_fit(
     variance = found["sum_of_squares"] / freedom if data.noise_std is None else data.noise_std**2
     notes = [] if found["converged"] else [f"stopped after {counted(found['iterations'])}"]
     values = found["mean"]
-    notes += [
-        f"{name} rests at its bound {x:g}"
-        for name, x, lo, hi in zip(curve.parameters, values, low, high, strict=True)
-        if x in (lo, hi)
-    ]
-    largest = np.abs(data.slip[np.isfinite(data.mu)]).max()
-    if largest < values[1]:
-        notes.append(f"readings end at slip {largest:.3g}, before the peak: it is extrapolated")
+    notes += cautions(curve, data, values, low, high)
     if corrected:
         values = values - variance * found["bias"]
     return MuSlipEstimate(

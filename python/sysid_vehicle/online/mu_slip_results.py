@@ -83,6 +83,21 @@ class MuSlipEstimate:
         return tidy(ax, xlabel="slip ratio", ylabel="friction", title=self.method)
 
 
+def cautions(
+    curve: MuSlipCurve, data: MuSlipData, values: FloatArray, low: FloatArray, high: FloatArray
+) -> tuple[str, ...]:
+    """Say where values are not what the readings alone tell."""
+    notes = [
+        f"{name} rests at its bound {x:g}"
+        for name, x, lowest, highest in zip(curve.parameters, values, low, high, strict=True)
+        if x in (lowest, highest)
+    ]
+    largest = np.abs(data.slip[np.isfinite(data.mu)]).max()
+    if largest < values[1]:
+        notes.append(f"readings end at slip {largest:.3g}, before the peak: it is extrapolated")
+    return tuple(notes)
+
+
 @dataclass(frozen=True)
 class MuSlipRun:
     """A filter's way through the readings; `n` readings, `p` parameters.
@@ -118,7 +133,9 @@ class MuSlipRun:
     @property
     def estimate(self) -> MuSlipEstimate:
         """After the last reading."""
-        return MuSlipEstimate(self.method, self.curve, self.mean[-1], self.covariance[-1])
+        kernels, values = self.curve.kernels, self.mean[-1]
+        notes = cautions(self.curve, self.data, values, kernels.LOWER, kernels.UPPER)
+        return MuSlipEstimate(self.method, self.curve, values, self.covariance[-1], notes)
 
     def __str__(self) -> str:
         return str(self.estimate)
@@ -151,10 +168,11 @@ class MuSlipSmoothed:
     @property
     def estimate(self) -> MuSlipEstimate:
         """At the last reading."""
-        notes = () if self.converged else (f"not at rest after {self.rounds} rounds",)
-        return MuSlipEstimate(
-            "iterated smoother", self.curve, self.mean[-1], self.covariance[-1], notes
-        )
+        kernels, values = self.curve.kernels, self.mean[-1]
+        notes = cautions(self.curve, self.data, values, kernels.LOWER, kernels.UPPER)
+        if not self.converged:
+            notes = (f"not at rest after {self.rounds} rounds", *notes)
+        return MuSlipEstimate("iterated smoother", self.curve, values, self.covariance[-1], notes)
 
     def __str__(self) -> str:
         return str(self.estimate)
