@@ -41,13 +41,24 @@ def test_canonical_file(tmp_path: Path) -> None:
         [HEADER.replace(",", "\t"), *(row.replace(",", "\t") for row in ROWS)],
         ["\ufeff" + HEADER, *ROWS],
         [line + "\r" for line in (HEADER, *ROWS)],
+        ["\r".join((HEADER, *ROWS))],
         [
             '"' + HEADER.replace(",", '","') + '"',
             *('"' + r.replace(",", '","') + '"' for r in ROWS),
         ],
         [HEADER + ",note", *(row + ",fine" for row in ROWS)],
     ],
-    ids=["blank lines", "spaces", "decimal comma", "tabs", "BOM", "CRLF", "quotes", "text column"],
+    ids=[
+        "blank lines",
+        "spaces",
+        "decimal comma",
+        "tabs",
+        "BOM",
+        "CRLF",
+        "CR",
+        "quotes",
+        "text column",
+    ],
 )
 def test_other_ways_to_write_the_same(tmp_path: Path, variant: list[str]) -> None:
     plain = read(write(tmp_path, HEADER, *ROWS))
@@ -76,6 +87,7 @@ def test_empty_cells_are_missing_measurements(tmp_path: Path, cell: str) -> None
         ([HEADER, "", "", ROWS[0], "0.01,20,0,0,x,0"], ["ay_mps2", "'x'", "line 5", "sample 1"]),
         ([HEADER, "s,m/s,rad/s,m/s2,m/s2,rad", *ROWS], ["time_s", "'s'", "line 2", "sample 0"]),
         ([HEADER, *ROWS, "0.03,20"], ["line 5", "2 cells", "header has 6", "delete the line"]),
+        ([HEADER, ROWS[0], '0.01,"' + 140000 * "x"], ["line 3", "not a CSV row", "quotes"]),
         ([HEADER], ["no rows"]),
         ([""], ["first line is empty", "column names"]),
         (ROWS, ["first line holds numbers", "column names"]),

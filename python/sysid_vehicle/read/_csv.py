@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,10 +53,11 @@ def read_table(path: str | Path) -> Table:
     InvalidInput
         If the file cannot be read, has no header or no rows, or a row has the wrong length.
     """
-    text = read_text(path)
+    text = read_text(path).replace("\r\n", "\n").replace("\r", "\n")
     header, _, body = text.partition("\n")
     delimiter = max(",;\t", key=header.count)
-    names = tuple(name.strip() for name in next(csv.reader([header], delimiter=delimiter), []))
+    _, cells = next(_rows(header, delimiter, 1), (1, []))
+    names = tuple(name.strip() for name in cells)
     if not any(names):
         raise InvalidInput("the first line is empty; it must hold the column names")
     if all(_is_number(name) for name in names):
@@ -99,14 +100,25 @@ def _read_fast(body: str, delimiter: str, names: tuple[str, ...]) -> Table | Non
     return Table(names, columns, {}, values.shape[0])
 
 
+def _rows(text: str, delimiter: str, first_line: int) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of each row; `first_line` is the number of the first line in a file."""
+    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
+    try:
+        for row in reader:
+            yield reader.line_num + first_line - 1, row
+    except csv.Error as error:
+        raise InvalidInput(
+            f"line {reader.line_num + first_line - 1}: not a CSV row ({error}); close its quotes, "
+            f"or export the file as text"
+        ) from error
+
+
 def _read_slow(body: str, delimiter: str, names: tuple[str, ...]) -> Table:
-    reader = csv.reader(io.StringIO(body), delimiter=delimiter)
     rows: list[list[str]] = []
     lines: list[int] = []
-    for row in reader:
+    for line, row in _rows(body, delimiter, 2):
         if not row or not any(cell.strip() for cell in row):
             continue
-        line = reader.line_num + 1
         if len(row) != len(names):
             raise InvalidInput(
                 f"line {line} has {len(row)} cells, the header has {len(names)}; "
