@@ -122,7 +122,7 @@ CurveSmoothed<Curve> smooth_curve(const CurveReadings& readings, const CurvePrio
     for (auto& step : filter_curve<Curve>(readings, prior, settings)) steps.push_back(step.filter);
     CurveSmoothed<Curve> out;
     out.rounds = 1;
-    take<Curve>(smooth<n, 1>(steps), out.mean, out.covariance);
+    take<Curve>(smooth(steps), out.mean, out.covariance);
     double cost = cost_of<Curve>(out.mean, readings, prior, settings);
     std::vector<CurveVec<Curve>> next;
     for (; out.rounds < max_rounds && !out.converged; ++out.rounds) {
@@ -130,7 +130,7 @@ CurveSmoothed<Curve> smooth_curve(const CurveReadings& readings, const CurvePrio
         extended_kalman_filter<n, 1>(
             LinearisedReadings<Curve>{readings, out.mean, settings}, prior.mean, prior.covariance,
             [&](std::size_t, const FilterStep<n, 1>& step) { steps.push_back(step); });
-        take<Curve>(smooth<n, 1>(steps), next, out.covariance);
+        take<Curve>(smooth(steps), next, out.covariance);
         double lower = cost_of<Curve>(next, readings, prior, settings);
         for (int halving = 0; lower > cost && halving < 20; ++halving) {
             for (std::size_t k = 0; k < next.size(); ++k)

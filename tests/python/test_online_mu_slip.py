@@ -292,7 +292,7 @@ def test_the_command_prints_and_writes(
     curve: str, csv: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     figure, numbers = tmp_path / "f.svg", tmp_path / "n.json"
-    outputs = ["--figure", str(figure), "--json", str(numbers)]
+    outputs = ["--plot", str(figure), "--json", str(numbers)]
     status = main(["mu-slip", str(csv), "--curve", curve, "--noise-std", "0.04", *outputs])
     assert status == 0
     out = capsys.readouterr().out
@@ -322,7 +322,7 @@ def test_the_command_names_what_is_wrong_with_a_file(
     assert "is also an input" in capsys.readouterr().err
     assert main(["mu-slip", str(csv), "--noise-std", "-1"]) == 2
     assert "noise_std" in capsys.readouterr().err
-    for option, name in (("--figure", "f.png"), ("--animation", "a.mp4")):
+    for option, name in (("--plot", "f.png"), ("--animation", "a.mp4")):
         assert main(["mu-slip", str(csv), "--json", str(out), option, str(tmp_path / name)]) == 2
         assert "end the name in" in capsys.readouterr().err
     assert not out.exists()

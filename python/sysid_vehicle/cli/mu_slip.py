@@ -50,25 +50,25 @@ def add_parser(commands: Any) -> None:
         metavar="X",
         help="standard deviation of a mu reading (default: learnt from the readings)",
     )
-    parser.add_argument("--figure", type=Path, metavar="SVG", help="file for the figures")
+    parser.add_argument("--plot", type=Path, metavar="SVG", help="file for the figures")
     parser.add_argument("--animation", type=Path, metavar="GIF", help="file for the convergence")
     parser.add_argument("--json", type=Path, metavar="JSON", help="file for all numbers")
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Estimate with every method, print them, and write what was asked for."""
-    for path, suffix in ((args.figure, ".svg"), (args.animation, ".gif")):
+    for path, suffix in ((args.plot, ".svg"), (args.animation, ".gif")):
         if path is not None and path.suffix.lower() != suffix:
             raise InvalidInput(f"{path}: the file will be {suffix}; end the name in {suffix}")
-    refuse_unwritable([args.figure, args.animation, args.json], inputs=[args.data])
+    refuse_unwritable([args.plot, args.animation, args.json], inputs=[args.data])
     curve = _CURVES[args.curve]
     comparison = compare_mu_slip(MuSlipData.from_csv(args.data, args.noise_std), curve=curve)
     print(comparison)
     print()
     print(f"Recommended: {comparison.best}")
     filtered = mu_slip_ekf(comparison.data, curve=curve)
-    if args.figure is not None:
-        write_text(args.figure, svg(mu_slip_overview(filtered)).decode())
+    if args.plot is not None:
+        write_text(args.plot, svg(mu_slip_overview(filtered)).decode())
     if args.animation is not None:
         save_animation(animate_mu_slip(filtered), args.animation)
     if args.json is not None:

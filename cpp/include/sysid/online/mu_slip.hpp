@@ -151,8 +151,8 @@ class CurveFilter {
             CurveVec<Curve> next = mean_;
             CurveMat<Curve> covariance = P;
             const Vec<1> expected(at.mu + at.gradient.dot(mean_ - x));
-            step.update = measurement_update<n, 1>(next, covariance, Vec<1>(mu), expected,
-                                                   at.gradient.transpose(), R, readings_);
+            measurement_update<n, 1>(next, covariance, Vec<1>(mu), expected,
+                                     at.gradient.transpose(), R, readings_, step.update);
             step.covariance = covariance;
             keep_inside<Curve>(next);
             if (i > 0) next = shortened(x, next, P, slip, mu, R(0, 0));
