@@ -40,8 +40,12 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 
 def axes_or_new(ax: Axes | None, width_in: float, height_in: float) -> Axes:
-    """Return `ax`, or the axes of a new figure where it is None."""
-    return ax if ax is not None else new_figure(width_in, height_in).add_subplot()
+    """Return `ax`, or where it is None the axes of a new figure that pyplot shows."""
+    if ax is not None:
+        return ax
+    from matplotlib import pyplot
+
+    return pyplot.figure(figsize=(width_in, height_in), layout="constrained").add_subplot()
 
 
 def tidy(ax: Axes, **labels: Any) -> Axes:

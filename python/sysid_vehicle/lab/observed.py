@@ -129,7 +129,7 @@ class StateEstimate:
             value, half = self.force[:, i], 1.96 * self.force_std[:, i]
             ax.fill_between(self.time_s, value - half, value + half, color=color, alpha=0.2, lw=0)
             ax.plot(self.time_s, value, color=color, lw=1.0, label=label)
-        ax.legend(loc="upper right", frameon=False, ncols=3)
+        ax.legend(frameon=False, ncols=3)
         return tidy(ax, xlabel="time [s]", ylabel=f"unexplained force, {self._kind} [N]")
 
     @property

@@ -170,7 +170,9 @@ class Validation:
         for h, colour in ((-2, AFTER), (-1, BEFORE)):
             label = f"predicted, {self.horizons[h]}"
             axes.plot(t, self.predicted[h, :, c], color=colour, lw=1.0, label=label)
-        return tidy(axes, xlabel="time [s]", ylabel=reading, title=self.log.name)
+        tidy(axes, xlabel="time [s]", ylabel=reading, title=self.log.name)
+        axes.legend(loc="upper right", ncols=3, fontsize="small")
+        return axes
 
 
 def validate_tyres(
