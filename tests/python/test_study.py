@@ -19,7 +19,7 @@ from sysid_vehicle import (
     improve,
     manoeuvres,
 )
-from sysid_vehicle.study.held_out import gain_in_log_likelihood, hold_out
+from sysid_vehicle.study.held_out import error_falls, gain_in_log_likelihood, hold_out
 
 LAG = "steer_lag.time_constant_s", 0.06
 LOOKS_LIKE_LAG = {"steer_lag", "tyre_relaxation", "yaw_inertia", "steer_compliance"}
@@ -257,3 +257,10 @@ def test_a_model_that_fails_on_held_out_driving_gains_nothing(fit: Fit, course: 
         *(getattr(fit, f) for f in list(Fit.__dataclass_fields__)[1:]),
     )
     assert gain_in_log_likelihood(fit, broken, test) == (-np.inf, 0.0)
+
+
+def test_what_is_added_lowers_the_error_by_the_richer_models_own_measure(study: Study) -> None:
+    baseline, found = study.fits
+    assert error_falls(baseline, found, study.held_out)
+    assert not error_falls(found, baseline, study.held_out)
+    assert not error_falls(found, found, study.held_out)

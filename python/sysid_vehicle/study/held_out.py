@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import _core
+from ..compare import compare
 from ..errors import InvalidInput, warn
 from ..estimate import Driving
 from ..identify import Fit
 from ..log import Log
 
-__all__ = ["gain_in_log_likelihood", "hold_out"]
+__all__ = ["error_falls", "gain_in_log_likelihood", "hold_out"]
 
 _SHARE = 0.3
 _BLOCK_S = 5.0
@@ -59,3 +60,11 @@ def gain_in_log_likelihood(poorer: Fit, richer: Fit, test: Driving) -> tuple[flo
     blocks = [difference[i : i + length].sum() for i in range(0, len(difference), length)]
     gain = float(np.sum(difference))
     return gain, float(np.std(blocks) * np.sqrt(len(blocks)))
+
+
+def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:
+    """Whether the richer model errs less on held-out driving, both measured by its noise floor.
+
+    Noise of its own can make a model likelier whose forces explain less than before.
+    """
+    return compare(richer, test).error < compare(poorer, test, noise=richer.noise).error

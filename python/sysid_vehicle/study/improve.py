@@ -14,7 +14,7 @@ from ..estimate import Driving
 from ..identify import Fit, identify, refine
 from ..log import Log
 from ..model import Model
-from .held_out import gain_in_log_likelihood, hold_out
+from .held_out import error_falls, gain_in_log_likelihood, hold_out
 from .study import AddedEffect, Study, Verdict
 
 __all__ = ["improve"]
@@ -123,7 +123,7 @@ def _first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> Candidate | Non
         if c.fit is None or c.statistic < 2.0 * np.log(c.fit.driving.samples):
             continue
         gain, error = gain_in_log_likelihood(fit, c.fit, test)
-        if gain > error:
+        if gain > error and error_falls(fit, c.fit, test):
             return c
     return None
 
