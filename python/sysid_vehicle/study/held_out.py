@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import _core
-from ..compare import compare
+from ..compare.compare import compare
 from ..errors import InvalidInput, warn
 from ..estimate import Driving
 from ..identify import Fit
