@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,9 +23,9 @@ _FINE_HZ = 200.0
 class _ByLateral(Excitation):
     """The heading follows from speed and lateral acceleration: ``psi = integral of a_y / v``."""
 
+    @abstractmethod
     def lateral_mps2(self, time_s: FloatArray) -> FloatArray:
         """Wanted lateral acceleration at these times [m/s2]."""
-        raise NotImplementedError
 
     @cached_property
     def _heading(self) -> tuple[FloatArray, FloatArray]:
