@@ -29,6 +29,7 @@ from sysid_vehicle.lab import (
     TyreLog,
     TyreMotion,
     drive_tyres,
+    hold_value,
     identify_tyres,
     regress_tyres,
 )
@@ -140,7 +141,11 @@ def speed(motion: TyreMotion) -> None:
 
 
 def judged(seed: int, *, sideslip: bool, mass_error: float) -> dict[str, tuple[bool, bool]]:
-    """Say which truths lie in their interval, and which would in that of the information matrix."""
+    """Say which truths lie in their interval, and which would in that of the information matrix.
+
+    A value lies in the profile's interval where holding it costs less than the 95 % level: one
+    search in place of the whole interval.
+    """
     car, truth = CAR, TRUTH | COMBINED
     if mass_error:
         # A weighbridge that is 10 % off at one standard deviation, and a draw of its error.
@@ -152,13 +157,15 @@ def judged(seed: int, *, sideslip: bool, mass_error: float) -> dict[str, tuple[b
     log = driven(10_000 + seed)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fit = identify_tyres(car, log if sideslip else log.without_sideslip(), starts=1, workers=1)
+        fit = identify_tyres(
+            car, log if sideslip else log.without_sideslip(), starts=1, workers=1, profiles=False
+        )
 
     def holds(interval: tuple[float, float], value: float) -> bool:
         return interval[0] <= value <= interval[1]
 
     return {
-        name: (holds(fit.interval(name), value), holds(fit[name].interval, value))
+        name: (hold_value(fit, name, value).accepted, holds(fit[name].interval, value))
         for name, value in truth.items()
     }
 
@@ -176,7 +183,7 @@ def coverage(repeats: int, workers: int, what: str, **how: object) -> None:
         print(f"  {name:<18} {first:>10.1f} % {second:>24.1f} %")
     low, high = min(shares.values()), max(shares.values())
     row(
-        "coverage of 95 % intervals",
+        f"coverage of 95 % intervals, {what}",
         f"{low:.1f} to {high:.1f} %",
         "92 to 98 %",
         low >= 92.0 and high <= 98.0,
@@ -223,11 +230,10 @@ def main() -> None:
     else:
         speed(TyreMotion.from_log(driven(0)))
     wrong_starts()
-    run = partial(coverage, repeats, args.workers)
-    run("all as it should be", sideslip=True, mass_error=0.0)
-    few = partial(coverage, max(repeats // 5, 4), args.workers)
-    few("no v_y", sideslip=False, mass_error=0.0)
-    few("mass known to 10 %", sideslip=True, mass_error=0.1)
+    cover = partial(coverage, repeats, args.workers)
+    cover("all as it should be", sideslip=True, mass_error=0.0)
+    cover("no v_y", sideslip=False, mass_error=0.0)
+    cover("mass known to 10 %", sideslip=True, mass_error=0.1)
 
 
 if __name__ == "__main__":

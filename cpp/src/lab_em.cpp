@@ -88,9 +88,13 @@ class PublishedExpectation {
 
 double log_likelihood(const ObserverLog& log, const ObserverNoise& noise) {
     const ObserverSystem system(log.model, log.inputs, log.readings, noise);
-    return extended_kalman_filter<NX, NY>(
-        system, log.start.mean, log.start.covariance, [](std::size_t, const Step&) {},
-        log.start.one_before);
+    const auto pass = [&](auto form) {
+        return extended_kalman_filter<NX, NY, decltype(form)>(
+            system, log.start.mean, log.start.covariance, [](std::size_t, const auto&) {},
+            log.start.one_before);
+    };
+    return noise.sensors.isDiagonal(0.0) ? pass(SequentialUpdate<NX, NY>())
+                                         : pass(Update<NX, NY>());
 }
 
 ObserverTrace trace(const ObserverLog& log, const ObserverNoise& noise, bool smoothed) {
@@ -130,8 +134,12 @@ ObserverEm learn(const std::vector<ObserverLog>& logs, const ObserverNoise& star
         records.push_back(
             {&systems.back(), log.start.mean, log.start.covariance, log.start.one_before});
     }
-    FilteredExpectation<NX, NY, ObserverSystem> expectation(records);
-    return learn_noise<NX, NY>(expectation, noise, process, sensors, options);
+    const auto learn_by = [&](auto form) {
+        FilteredExpectation<NX, NY, ObserverSystem, decltype(form)> expectation(records);
+        return learn_noise<NX, NY>(expectation, noise, process, sensors, options);
+    };
+    return sensors.uncorrelated() ? learn_by(SequentialUpdate<NX, NY>())
+                                  : learn_by(Update<NX, NY>());
 }
 
 }  // namespace sysid::lab

@@ -199,6 +199,16 @@ inline Small small_system(std::size_t samples) {
     return s;
 }
 
+/// The same with uncorrelated sensors, of which `Direct` are states.
+template <int Direct>
+struct Uncorrelated : Small {
+    static constexpr int kDirectReadings = Direct;
+    explicit Uncorrelated(Small s) : Small(std::move(s)) {
+        H.topRows<Direct>() = Mat<2, 3>::Identity().template topRows<Direct>();
+        R = R.diagonal().asDiagonal();
+    }
+};
+
 const Vec<3> kSmallMean{0.5, -0.3, 0.2};
 inline Mat<3, 3> small_covariance() {
     Mat<3, 3> P;

@@ -94,6 +94,27 @@ TEST(Em, BothExpectationsAgreeOnALinearModel) {
     EXPECT_EQ(adjoint.sensors.samples, smoothed.sensors.samples);
 }
 
+template <int Direct>
+void moments_are_the_same_one_reading_after_the_other() {
+    using System = Uncorrelated<Direct>;
+    const System s(made(40, 6));
+    const std::vector<EmRecord<System, 3>> records{{&s, kSmallMean, small_covariance(), true}};
+    FilteredExpectation<3, 2, System> together(records);
+    FilteredExpectation<3, 2, System, SequentialUpdate<3, 2>> sequential(records);
+    EXPECT_NEAR(sequential.log_likelihood({s.Q, s.R}), together.log_likelihood({s.Q, s.R}), 1e-10);
+    const auto joint = together.moments();
+    const auto one_by_one = sequential.moments();
+    EXPECT_EQ(one_by_one.sensors.count, joint.sensors.count);
+    EXPECT_LT((one_by_one.process.sum - joint.process.sum).norm(), 1e-10);
+    EXPECT_LT((one_by_one.sensors.sum - joint.sensors.sum).diagonal().norm(), 1e-10);
+}
+
+TEST(Em, MomentsAreTheSameOneReadingAfterTheOther) {
+    moments_are_the_same_one_reading_after_the_other<0>();
+    moments_are_the_same_one_reading_after_the_other<1>();
+    moments_are_the_same_one_reading_after_the_other<2>();
+}
+
 TEST(Em, NeverFallsWhateverTheStructure) {
     const Small s = made(300, 6);
     const SmallNoise start{Vec<3>(1.0, 0.001, 0.3).asDiagonal(), Vec<2>(0.01, 2.0).asDiagonal()};

@@ -43,6 +43,29 @@ TEST(Kalman, EqualsTheTextbookFilter) {
     EXPECT_EQ(samples, s.size());
 }
 
+template <int Direct>
+void one_reading_after_the_other_is_the_same() {
+    const Uncorrelated<Direct> s(small_system(40));
+    std::vector<FilterStep<3, 2>> together;
+    const double joint = extended_kalman_filter<3, 2>(
+        s, kSmallMean, small_covariance(),
+        [&](std::size_t, const auto& step) { together.push_back(step); });
+    const double sequential = extended_kalman_filter<3, 2, SequentialUpdate<3, 2>>(
+        s, kSmallMean, small_covariance(), [&](std::size_t k, const auto& step) {
+            EXPECT_LT((step.mean - together[k].mean).norm(), 1e-12) << k;
+            EXPECT_LT((step.covariance - together[k].covariance).norm(), 1e-12) << k;
+            EXPECT_EQ(step.update.observed, together[k].update.observed);
+            EXPECT_NEAR(step.update.log_likelihood, together[k].update.log_likelihood, 1e-12);
+        });
+    EXPECT_NEAR(sequential, joint, 1e-10);
+}
+
+TEST(Kalman, OneReadingAfterTheOtherIsTheSame) {
+    one_reading_after_the_other_is_the_same<0>();
+    one_reading_after_the_other_is_the_same<1>();
+    one_reading_after_the_other_is_the_same<2>();
+}
+
 TEST(Kalman, LogLikelihoodIsTheDensityOfAllMeasurements) {
     const Small s = small_system(30);
     const double filtered = extended_kalman_filter<3, 2>(s, kSmallMean, small_covariance(),

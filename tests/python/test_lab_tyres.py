@@ -16,6 +16,7 @@ from sysid_vehicle.lab import (
     TyreFit,
     TyreLog,
     drive_tyres,
+    hold_value,
     identify_tyres,
 )
 from sysid_vehicle.lab.box import BOX
@@ -128,6 +129,23 @@ def test_profile_agrees_with_information_where_all_is_well_known() -> None:
         lost = fit.profile(name).lost
         assert lost.min() == 0.0
         assert lost.max() > 1.5
+
+
+def test_holding_a_value_asks_what_the_profile_answers() -> None:
+    fit = found()
+    for name in ("C_front", "BCD_rear", "peak_front"):
+        low, high = fit.profile(name).interval
+        assert hold_value(fit, name, fit[name].value).lost < 0.01
+        for end in (low, high):
+            assert hold_value(fit, name, end).lost == pytest.approx(1.92, abs=0.25)
+        reach = high - low
+        assert hold_value(fit, name, low + 0.2 * reach).accepted
+        assert not hold_value(fit, name, high + 0.3 * reach).accepted
+    assert "refused at 95 %" in str(hold_value(fit, "D_rear", 1.5))
+    with pytest.raises(InvalidInput, match="no estimate 'C_frnt'"):
+        hold_value(fit, "C_frnt", 1.0)
+    with pytest.raises(InvalidInput, match=r"C_front = 7 is outside 0\.5 \.\. 3"):
+        hold_value(fit, "C_front", 7.0)
 
 
 def test_a_second_tyre_that_fits_as_well_is_told() -> None:

@@ -3,6 +3,7 @@
 from . import excitation
 from .design import Design, Limits, design_excitation
 from .em import EMResult, NoiseStructure, learn_observer_noise
+from .hold import HeldValue, hold_value
 from .information import information
 from .loop import ClosedLoop, run_closed_loop
 from .motion import TyreMotion
@@ -35,6 +36,7 @@ __all__ = [
     "EMResult",
     "Expected",
     "GreyBoxVehicle",
+    "HeldValue",
     "IdentifiedCar",
     "Limits",
     "NoiseStructure",
@@ -60,6 +62,7 @@ __all__ = [
     "design_excitation",
     "drive_tyres",
     "excitation",
+    "hold_value",
     "identify_tyres",
     "information",
     "learn_observer_noise",

@@ -24,9 +24,11 @@ from .likelihood import Likelihood
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Profile", "Quantity", "profile"]
+__all__ = ["LEVEL", "Profile", "Quantity", "lost_at", "profile"]
 
-_LEVEL = 1.96  # root of the 95 % quantile of chi-square with one degree of freedom
+LEVEL = 1.96
+"""Root of the 95 % quantile of chi-square with one degree of freedom."""
+
 _CLOSE = 0.04  # of the level
 _POINTS = 14  # on each side
 _ROUNDS = 20
@@ -104,9 +106,9 @@ class Profile:
         """
         ax = axes_or_new(ax, 4.5, 3.2)
         ax.plot(self.values, self.lost, "o-", color=AFTER, markersize=3)
-        ax.axhline(0.5 * _LEVEL**2, color=FLOOR, linestyle="--", linewidth=0.8)
+        ax.axhline(0.5 * LEVEL**2, color=FLOOR, linestyle="--", linewidth=0.8)
         ax.axvspan(self.low, self.high, color=AFTER, alpha=0.12, linewidth=0)
-        ax.set_ylim(0.0, 1.5 * _LEVEL**2)
+        ax.set_ylim(0.0, 1.5 * LEVEL**2)
         return tidy(ax, xlabel=self.name, ylabel="log-likelihood lost")
 
 
@@ -178,13 +180,10 @@ def _side(
     furthest = abs(limit - centre) if np.isfinite(limit) else max(20.0 * std, 3.0 * abs(centre))
     if furthest <= 1e-9 * max(abs(centre), 1.0):
         return side
-    distance = min(_LEVEL * std, furthest)
+    distance = min(LEVEL * std, furthest)
     inside, outside = (0.0, 0.0, p), (np.inf, np.inf)
     for _ in range(_POINTS):
-        # From the nearest point that is known, along the direction that costs least.
-        start = inside[2].copy()
-        start[box.columns] += across * (sign * (distance - inside[0]) / variance)
-        start[box.columns] = np.clip(start[box.columns], box.lower, box.upper)
+        start = _moved(inside[2], box, across * (sign * (distance - inside[0]) / variance))
         there, loss = _pinned(
             objective, start, gains, box, what, centre + sign * distance, std, best
         )
@@ -196,11 +195,11 @@ def _side(
         root = np.sqrt(2.0 * max(loss, 0.0))
         side.values.append(centre + sign * distance)
         side.lost.append(max(loss, 0.0))
-        if abs(root - _LEVEL) < _CLOSE * _LEVEL:
+        if abs(root - LEVEL) < _CLOSE * LEVEL:
             # The last step is small: along a straight root.
-            distance *= _LEVEL / root if inside[0] == 0.0 else 1.0
+            distance *= LEVEL / root if inside[0] == 0.0 else 1.0
             return replace(side, end=centre + sign * distance, unbounded=False)
-        if root < _LEVEL:
+        if root < LEVEL:
             if distance <= inside[0]:
                 break  # the wish is not heard any more
             inside = (distance, root, there)
@@ -210,16 +209,46 @@ def _side(
             outside = (distance, root)
         distance = min(_next(inside, outside), furthest)
     if np.isfinite(outside[0]):
-        end = np.interp(_LEVEL, [inside[1], outside[1]], [inside[0], outside[0]])
+        end = np.interp(LEVEL, [inside[1], outside[1]], [inside[0], outside[0]])
         return replace(side, end=centre + sign * float(end), unbounded=False)
     return replace(side, end=centre + sign * (furthest if np.isfinite(limit) else inside[0]))
+
+
+def lost_at(
+    objective: Likelihood,
+    p: FloatArray,
+    gains: _core.FrozenGains,
+    box: Box,
+    covariance: FloatArray,
+    what: Quantity,
+    value: float,
+    best: float,
+) -> float:
+    """Log-likelihood lost where the quantity is held at `value`, searched for from `p`.
+
+    `best` is half the sum of squares at the optimum.
+    """
+    gradient = what.slope(p)[box.columns]
+    across = covariance @ gradient
+    variance = float(gradient @ across)
+    if not (np.isfinite(variance) and variance > 0.0):
+        return np.inf
+    start = _moved(p, box, across * ((value - what.of(p)) / variance))
+    return _pinned(objective, start, gains, box, what, value, float(np.sqrt(variance)), best)[1]
+
+
+def _moved(p: FloatArray, box: Box, step: FloatArray) -> FloatArray:
+    """From a point that is known, along the direction that costs least."""
+    start = p.copy()
+    start[box.columns] = np.clip(p[box.columns] + step, box.lower, box.upper)
+    return start
 
 
 def _next(inside: tuple[float, float, FloatArray], outside: tuple[float, float]) -> float:
     """Distance at which to look next for the level."""
     if np.isinf(outside[0]):
-        return float(inside[0] * np.clip(_LEVEL / max(inside[1], 1e-9), 1.15, _STEP))
-    share = (_LEVEL - inside[1]) / (outside[1] - inside[1])
+        return float(inside[0] * np.clip(LEVEL / max(inside[1], 1e-9), 1.15, _STEP))
+    share = (LEVEL - inside[1]) / (outside[1] - inside[1])
     return float(inside[0] + np.clip(share, 0.1, 0.9) * (outside[0] - inside[0]))
 
 

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-import numpy as np
-
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..identify import METHODS
 from .box import box_of, first_point
 from .descent import descend, settle
-from .likelihood import Likelihood
 from .motion import TyreMotion
 from .multistart import multistart, start_points
 from .regression import descend_regression
 from .summary import summary, with_profiles, with_rivals
-from .tyre_data import GreyBoxVehicle, TyreLog, tyre_problem
+from .tyre_data import GreyBoxVehicle, TyreLog
 from .tyre_fit import PARAMETERS, TyreFit
+from .tyre_objective import free_parameters, objective_of
 
 __all__ = ["identify_tyres"]
 
@@ -82,43 +80,25 @@ def identify_tyres(
     """
     several = (logs,) if isinstance(logs, TyreLog) else tuple(logs)
     _check(several, method, starts)
-    free = list(PARAMETERS[:8])
-    if residual_terms:
-        free += ["P1", "P2", "P3"]
-    per_std = np.zeros(len(PARAMETERS))
-    for name, tolerance in (
-        ("mass_factor", vehicle.mass_tolerance),
-        ("yaw_inertia_factor", vehicle.yaw_inertia_tolerance),
-    ):
-        if tolerance > 0.0:
-            free.append(name)
-            per_std[PARAMETERS.index(name)] = 1.0 / tolerance
-    free.append("drag_area_m2")
+    free = free_parameters(vehicle, residual_terms=residual_terms)
     p = first_point(start or {})
     box = box_of(free, {})
-    columns = box.columns
-    centre = p.copy()
-    centre[[PARAMETERS.index("mass_factor"), PARAMETERS.index("yaw_inertia_factor")]] = 1.0
-
-    def objective(of: Sequence[TyreLog], most: int | None) -> Likelihood:
-        return Likelihood(tyre_problem(vehicle, of, most_samples=most), centre, per_std)
-
-    begins = start_points(p[columns], box, list(range(8)), starts, seed)
+    begins = start_points(p[box.columns], box, list(range(8)), starts, seed)
     told = [g if g.sideslip_measured else g.with_kinematic_sideslip() for g in several]
     p, noise, ends, others = multistart(
-        objective(several, _THINNED),
-        objective(told, _THINNED),
+        objective_of(vehicle, several, _THINNED),
+        objective_of(vehicle, told, _THINNED),
         _regression(vehicle, told),
         p,
         box,
         begins,
-        tuple(free),
+        free,
         _loose(several),
         method=method,
         workers=workers,
         progress=progress,
     )
-    whole = objective(several, None)
+    whole = objective_of(vehicle, several)
     p, noise, value = settle(whole, p, noise, box, method=method)
     rivals: list[FloatArray] = []
     for other in others:
@@ -130,7 +110,7 @@ def identify_tyres(
             rivals.append(end)
     for _ in range(_BETTER_FOUND):
         p, noise, value = settle(whole, p, noise, box, method=method)
-        fit = summary(vehicle, several, whole, p, noise, box, tuple(free), ends)
+        fit = summary(vehicle, several, whole, p, noise, box, free, ends)
         fit = with_rivals(fit, whole, rivals, box)
         if not profiles:
             return fit

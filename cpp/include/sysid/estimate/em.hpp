@@ -75,8 +75,57 @@ struct NoiseMoments {
     SquareSum<NY> sensors;
 };
 
-/// Expectations at the filter's own linearisation: exact where the model is linear.
-template <int NX, int NY, class System>
+/// What a sample's readings do to `r` and `N`, gradient and negative curvature by the state of the
+/// log-density of all that follows; adds the brackets of `FilteredExpectation`. The first `D`
+/// readings are states.
+template <int D, int NX, int NY>
+void step_back(const Update<NX, NY>& now, const Vec<NY>& y, Vec<NX>& r, Mat<NX, NX>& N,
+               SquareSum<NY>& sensors) {
+    Mat<NY, NY> information = now.information;
+    for (int j = 0; j < NY; ++j)
+        if (std::isnan(y[j])) information(j, j) = 0.0;
+    const Mat<NX, NY> NK = N * now.gain;
+    const Vec<NY> u = now.information * now.innovation - now.gain.transpose() * r;
+    const Mat<NY, NY> bracket = information + now.gain.transpose() * NK;
+    sensors.sum += u * u.transpose() - bracket;
+    r += now.observation.transpose() * u;
+    const auto back = [&](const auto& X) {
+        return now.observed == NY ? carried_back<D>(X, now.observation)
+                                  : carried_back<0>(X, now.observation);
+    };
+    const Mat<NX, NX> mixed = back(NK);
+    const Mat<NX, NY> halfway = back(bracket).transpose();
+    N += back(halfway) - mixed - mixed.transpose();
+}
+
+/// The same, one reading after the other, the last one first; only the diagonal of the sum.
+template <int D, int NX, int NY>
+void step_back(const SequentialUpdate<NX, NY>& now, const Vec<NY>& y, Vec<NX>& r, Mat<NX, NX>& N,
+               SquareSum<NY>& sensors) {
+    for (int j = NY; j-- > 0;) {
+        if (std::isnan(y[j])) continue;
+        const Vec<NX> gain = now.gain.col(j);
+        Vec<NX> mixed = N * gain;
+        const double u = now.information[j] * now.innovation[j] - gain.dot(r);
+        const double bracket = now.information[j] + gain.dot(mixed);
+        sensors.sum(j, j) += u * u - bracket;
+        if (j < D) {
+            r[j] += u;
+            mixed[j] -= 0.5 * bracket;
+            N.col(j) -= mixed;
+            N.row(j) -= mixed.transpose();
+        } else {
+            const Vec<NX> h = now.observation.row(j).transpose();
+            r += u * h;
+            mixed -= 0.5 * bracket * h;
+            N -= mixed * h.transpose() + h * mixed.transpose();
+        }
+    }
+}
+
+/// Expectations at the filter's own linearisation: exact where the model is linear. `Form` as in
+/// `extended_kalman_filter`; what is learnt with `SequentialUpdate` has uncorrelated sensors.
+template <int NX, int NY, class System, class Form = Update<NX, NY>>
 class FilteredExpectation {
   public:
     explicit FilteredExpectation(std::vector<EmRecord<System, NX>> records)
@@ -90,15 +139,11 @@ class FilteredExpectation {
             const WithNoise<System, NX, NY> system{*record.system, noise_};
             auto& steps = steps_[i];
             steps.resize(system.size());
-            sum += extended_kalman_filter<NX, NY>(
+            sum += extended_kalman_filter<NX, NY, Form>(
                 system, record.mean, record.covariance,
-                [&](std::size_t k, const FilterStep<NX, NY>& step) {
-                    Kept& kept = steps[k];
-                    kept.transition = step.transition;
-                    kept.observation = step.update.observation;
-                    kept.gain = step.update.gain;
-                    kept.information = step.update.information;
-                    kept.weighted = kept.information * step.update.innovation;
+                [&](std::size_t k, const FilterStep<NX, NY, Form>& step) {
+                    steps[k].transition = step.transition;
+                    steps[k].update = step.update;
                 },
                 record.predict_first);
         }
@@ -118,16 +163,10 @@ class FilteredExpectation {
   private:
     struct Kept {
         Mat<NX, NX> transition;
-        Mat<NY, NX> observation;
-        Mat<NX, NY> gain;
-        Mat<NY, NY> information;  // inverse covariance of the innovation
-        Vec<NY> weighted;         // the innovation times it
+        Form update;
     };
 
-    static constexpr int kDirect = DirectReadings<System>::value;
-
-    // Adjoint recursion: `r` and `N` are gradient and curvature of the log-density of what follows,
-    // by the predicted state. The expected square of a disturbance is Q + Q (r r' - N) Q; only the
+    // Adjoint recursion. The expected square of a disturbance is Q + Q (r r' - N) Q; only the
     // brackets are summed here.
     void add_record(std::size_t i, NoiseMoments<NX, NY>& out) const {
         const auto& record = records_[i];
@@ -135,36 +174,16 @@ class FilteredExpectation {
         Vec<NX> r = Vec<NX>::Zero();
         Mat<NX, NX> N = Mat<NX, NX>::Zero();
         for (std::size_t k = steps.size(); k-- > 0;) {
-            const Kept& now = steps[k];
-            Mat<NY, NY> information = now.information;
             const Vec<NY>& y = record.system->measurement(k);
-            bool whole = true;
-            for (int j = 0; j < NY; ++j) {
-                if (std::isnan(y[j])) {
-                    information(j, j) = 0.0;
-                    whole = false;
-                } else {
-                    out.sensors.count[j] += 1.0;
-                }
-            }
+            for (int j = 0; j < NY; ++j)
+                if (!std::isnan(y[j])) out.sensors.count[j] += 1.0;
             out.sensors.samples += 1.0;
             if (k + 1 < steps.size()) {
                 const auto& A = steps[k + 1].transition;
                 r = (A.transpose() * r).eval();
                 N = pulled_back<MovingStates<System, NX>::value>(A, N);
             }
-            const Mat<NX, NY> NK = N * now.gain;
-            const Vec<NY> u = now.weighted - now.gain.transpose() * r;
-            const Mat<NY, NY> D = information + now.gain.transpose() * NK;
-            out.sensors.sum += u * u.transpose() - D;
-            r += now.observation.transpose() * u;
-            const auto back = [&](const auto& X) {
-                return whole ? carried_back<kDirect>(X, now.observation)
-                             : carried_back<0>(X, now.observation);
-            };
-            const Mat<NX, NX> mixed = back(NK);
-            const Mat<NX, NY> halfway = back(D).transpose();
-            N += back(halfway) - mixed - mixed.transpose();
+            step_back<DirectReadings<System>::value>(steps[k].update, y, r, N, out.sensors);
             symmetrise(N);
             if (k > 0 || record.predict_first) {
                 out.process.sum.noalias() += r * r.transpose() - N;

@@ -44,13 +44,13 @@ Mat<NX, NX> propagated(const Mat<NX, NX>& A, const Mat<NX, NX>& P) {
         return out;
     } else {
         const Mat<NX, M> halfway = P * A.template topRows<M>().transpose();
-        const Mat<NX, M> moved = A * halfway;
-        Mat<NX, NX> out = P;
-        Mat<M, M> corner = moved.template topRows<M>();
+        Mat<M, M> corner = A.template topRows<M>() * halfway;
         symmetrise(corner);
-        out.template leftCols<M>() = moved;
+        Mat<NX, NX> out = P;
         out.template topLeftCorner<M, M>() = corner;
-        out.template topRightCorner<M, NX - M>() = moved.template bottomRows<NX - M>().transpose();
+        out.template bottomLeftCorner<NX - M, M>() = halfway.template bottomRows<NX - M>();
+        out.template topRightCorner<M, NX - M>() =
+            halfway.template bottomRows<NX - M>().transpose();
         return out;
     }
 }
@@ -137,6 +137,66 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
     symmetrise(P);
 }
 
+/// An update with one reading after the other, which gives the same where their noise is not
+/// correlated (Durbin & Koopman, Time Series Analysis by State Space Methods, 2012, sec. 6.4).
+/// Column j and element j are those of the state that has seen the readings before j.
+template <int NX, int NY>
+struct SequentialUpdate {
+    Vec<NY> innovation;       // zero where the measurement is missing
+    Vec<NY> information;      // inverse variance of the innovation; zero where missing
+    Mat<NX, NY> gain;         // zero columns for missing measurements
+    Mat<NY, NX> observation;  // zero rows for missing measurements
+    int observed = 0;
+    double log_likelihood = 0.0;
+};
+
+/// Updates as above, for a diagonal `R`; several times faster, for nothing is factorised.
+template <int NX, int NY, int D = 0>
+void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<NY>& expected,
+                        const Mat<NY, NX>& H, const Mat<NY, NY>& R, std::size_t sample,
+                        SequentialUpdate<NX, NY>& u) {
+    const Vec<NX> before = x;
+    u.observed = 0;
+    u.observation = H;
+    double squares = 0.0, variances = 1.0;
+    for (int j = 0; j < NY; ++j) {
+        if (std::isnan(y[j])) {
+            u.innovation[j] = u.information[j] = 0.0;
+            u.gain.col(j).setZero();
+            u.observation.row(j).setZero();
+            continue;
+        }
+        ++u.observed;
+        Vec<NX> cross;
+        double variance = R(j, j), innovation = y[j] - expected[j];
+        if (j < D) {
+            cross = P.col(j);
+            variance += cross[j];
+            innovation -= x[j] - before[j];
+        } else {
+            cross.noalias() = P * H.row(j).transpose();
+            variance += H.row(j) * cross;
+            innovation -= H.row(j) * (x - before);
+        }
+        if (!std::isfinite(innovation) || !(variance > 0.0))
+            throw NumericalFailure("the innovation covariance is not positive definite", sample);
+        const double information = 1.0 / variance;
+        const Vec<NX> gain = cross * information;
+        // (I - k h') P (I - k h')' + R k k': the two products of the Joseph form share their
+        // factors.
+        const Vec<NX> rest = cross - variance * gain;
+        P -= gain * cross.transpose() + rest * gain.transpose();
+        x += gain * innovation;
+        squares += innovation * innovation * information;
+        variances *= variance;
+        u.innovation[j] = innovation;
+        u.information[j] = information;
+        u.gain.col(j) = gain;
+    }
+    symmetrise(P);
+    u.log_likelihood = -0.5 * (squares + u.observed * kLogTwoPi + std::log(variances));
+}
+
 /// What is known before and after a sample has been used; `transition` led to it from the sample
 /// before.
 template <int NX>
@@ -145,34 +205,39 @@ struct StateStep {
     Mat<NX, NX> predicted_covariance, covariance, transition;
 };
 
-template <int NX, int NY>
+template <int NX, int NY, class Form = Update<NX, NY>>
 struct FilterStep : StateStep<NX> {
-    Update<NX, NY> update;
+    Form update;
 };
 
 /// Extended Kalman filter over a whole record; `keep(k, step)` receives every sample. Returns the
-/// log-likelihood. The first sample is updated from (x, P) without a prediction, unless
-/// `predict_first` says that (x, P) belongs one sample earlier.
-template <int NX, int NY, class System, class Keep>
-double extended_kalman_filter(const System& system, Vec<NX> x, Mat<NX, NX> P, Keep&& keep,
+/// log-likelihood. The first sample is updated from (mean, covariance) without a
+/// prediction, unless `predict_first` says that these belong one sample earlier. `Form` is
+/// `Update`, or `SequentialUpdate` where the measurement noise is diagonal.
+template <int NX, int NY, class Form = Update<NX, NY>, class System, class Keep>
+double extended_kalman_filter(const System& system, const Vec<NX>& mean,
+                              const Mat<NX, NX>& covariance, Keep&& keep,
                               bool predict_first = false) {
     double log_likelihood = 0.0;
-    FilterStep<NX, NY> step;
+    FilterStep<NX, NY, Form> step;
+    Vec<NX>& x = step.mean;
+    Mat<NX, NX>& P = step.covariance;
     Mat<NX, NX> Q;
     Mat<NY, NX> H;
     step.transition.setIdentity();
+    step.predicted_mean = x = mean;
+    step.predicted_covariance = P = covariance;
     for (std::size_t k = 0; k < system.size(); ++k) {
         if (k > 0 || predict_first) {
-            x = system.predict(k, x, step.transition, Q);
-            P = propagated<MovingStates<System, NX>::value>(step.transition, P) + Q;
+            step.predicted_mean = system.predict(k, x, step.transition, Q);
+            step.predicted_covariance =
+                propagated<MovingStates<System, NX>::value>(step.transition, P) + Q;
         }
-        step.predicted_mean = x;
-        step.predicted_covariance = P;
+        x = step.predicted_mean;
+        P = step.predicted_covariance;
         const Vec<NY> expected = system.observe(k, x, H);
         measurement_update<NX, NY, DirectReadings<System>::value>(
             x, P, system.measurement(k), expected, H, system.measurement_noise(k), k, step.update);
-        step.mean = x;
-        step.covariance = P;
         log_likelihood += step.update.log_likelihood;
         if (!std::isfinite(log_likelihood))
             throw NumericalFailure("the log-likelihood is not finite", k);

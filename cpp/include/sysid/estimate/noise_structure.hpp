@@ -47,6 +47,12 @@ struct NoiseStructure {
         return s;
     }
 
+    bool uncorrelated() const {
+        for (int i = 0; i < N; ++i)
+            if (!alone(i)) return false;
+        return true;
+    }
+
     /// `C` without the correlations that this form does not have, lifted to the floor, and with the
     /// fixed variances of `now`.
     Mat<N, N> admitted(Mat<N, N> C, const Mat<N, N>& now) const {

@@ -14,7 +14,8 @@ using Mat = Eigen::Matrix<double, R, C>;
 /// Rounding makes a covariance slightly unsymmetric; left alone it grows.
 template <int N>
 void symmetrise(Mat<N, N>& P) {
-    P = (0.5 * (P + P.transpose())).eval();
+    for (int j = 1; j < N; ++j)
+        for (int i = 0; i < j; ++i) P(i, j) = P(j, i) = 0.5 * (P(i, j) + P(j, i));
 }
 
 /// Cholesky factor of `S` and the inverse of the factor; false where `S` is not positive definite.
