@@ -40,7 +40,7 @@ def test_noise_falls_to_less_than_half(true: np.ndarray, rng: np.random.Generato
     assert np.sqrt(np.mean((quiet(y) - true) ** 2)) < 0.5 * NOISE
 
 
-# However steep the corner: a window is taken only if it agrees within two deviations.
+# However steep the corner: a window is taken only if it agrees within 1.8 deviations.
 @pytest.mark.parametrize(("height", "most"), [(0.03, 2.0), (0.5, 2.5)])
 def test_corners_stay(height: float, most: float, rng: np.random.Generator) -> None:
     true = trapezoids(height)

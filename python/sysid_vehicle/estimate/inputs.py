@@ -3,10 +3,13 @@
 Noise on the steering angle enters the predicted acceleration. A model that lags, filters that noise
 and predicts better for the wrong reason: on complete data it is found as a false relaxation length.
 So the noise is taken out where the signal is smooth enough to tell: each sample is a local
-quadratic over the longest symmetric window that agrees with all shorter ones (intersection of
+polynomial over the longest symmetric window that agrees with all shorter ones (intersection of
 confidence intervals; Goldenshluger & Nemirovski, Mathematical Methods of Statistics 1997;
 Katkovnik, IEEE Transactions on Signal Processing 1999). At a corner the window shrinks to the
 sample itself.
+
+The polynomial is of sixth degree: one of second degree flattens the crests of a fast sweep by less
+than it can notice in one place, but everywhere alike, and a test over the whole drive notices.
 """
 
 from __future__ import annotations
@@ -18,8 +21,9 @@ from .._arrays import FloatArray
 
 __all__ = ["quiet", "white_noise_std"]
 
-_HALF_WIDTHS = (2, 4, 7, 11)
-_AGREES = 2.0  # standard deviations
+_HALF_WIDTHS = (4, 6, 9, 12)
+_DEGREE = 6
+_AGREES = 1.8  # standard deviations
 
 
 def white_noise_std(y: FloatArray) -> float:
@@ -46,7 +50,7 @@ def quiet(y: FloatArray) -> FloatArray:
     for half in _HALF_WIDTHS:
         if len(y) <= 2 * half:
             break
-        weights = savgol_coeffs(2 * half + 1, 2)
+        weights = savgol_coeffs(2 * half + 1, _DEGREE)
         local = np.convolve(y, weights, "valid")
         spread = _AGREES * noise * float(np.linalg.norm(weights))
         inner = slice(half, len(y) - half)
