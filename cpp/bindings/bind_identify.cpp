@@ -7,7 +7,8 @@ namespace sysid::bindings {
 
 namespace {
 
-void add_run(Problem& problem, double dt, const Array& inputs, const Array& measurements) {
+void add_run(Problem& problem, double dt, const Array& inputs, const Array& measurements,
+             double start) {
     const auto n = inputs.ndim() == 2 ? inputs.shape(0) : 0;
     const double* u = matrix(inputs, n, 2, "inputs");
     const double* y = matrix(measurements, n, kChannels, "measurements");
@@ -18,7 +19,7 @@ void add_run(Problem& problem, double dt, const Array& inputs, const Array& meas
     run.inputs.resize(static_cast<std::size_t>(n));
     run.measurements.resize(static_cast<std::size_t>(n));
     for (std::size_t k = 0; k < run.size(); ++k) {
-        run.inputs[k] = {u[2 * k], u[2 * k + 1]};
+        run.inputs[k] = {u[2 * k], u[2 * k + 1], start + static_cast<double>(k) * dt};
         if (!std::isfinite(u[2 * k]) || !std::isfinite(u[2 * k + 1]))
             throw std::invalid_argument("inputs: not finite at sample " + std::to_string(k));
         run.measurements[k] = Eigen::Map<const Vec<kChannels>>(y + kChannels * k);
@@ -70,7 +71,8 @@ void register_identify(py::module_& m) {
     py::class_<Problem>(m, "Problem")
         .def(py::init([](const SingleTrack& model) { return Problem{model, {}}; }),
              py::arg("model"))
-        .def("add_run", &add_run, py::arg("dt"), py::arg("inputs"), py::arg("measurements"))
+        .def("add_run", &add_run, py::arg("dt"), py::arg("inputs"), py::arg("measurements"),
+             py::arg("start") = 0.0)
         .def(
             "with_model",
             [](const Problem& self, const SingleTrack& model) { return Problem{model, self.runs}; },

@@ -16,7 +16,22 @@ py::dict describe(const ParameterInfo& info) {
     d["matters"] = info.matters;
     d["lower"] = info.lower;
     d["upper"] = info.upper;
+    d["typical_low"] = info.typical_low;
+    d["typical_high"] = info.typical_high;
+    d["mirrored"] = info.mirrored;
+    d["scan"] = info.scan == Scan::kTime ? "time" : info.scan == Scan::kRange ? "range" : "";
     return d;
+}
+
+/// The names between the commas of a list.
+py::tuple names(const std::string& list) {
+    py::list all;
+    for (std::size_t at = 0; at < list.size();) {
+        const std::size_t end = std::min(list.find(", ", at), list.size());
+        all.append(list.substr(at, end - at));
+        at = end + 2;
+    }
+    return py::tuple(all);
 }
 
 py::list base_parameters() {
@@ -36,6 +51,10 @@ py::list effects() {
         d["source"] = info.source;
         d["excited_by"] = info.excited_by;
         d["moves"] = info.moves;
+        d["needs"] = names(info.needs);
+        d["twins"] = names(info.twins);
+        d["through"] = info.through;
+        d["states"] = detail::kEffectStateCounts[i];
         d["scored_at_typical"] = info.scored_at_typical;
         d["needs_force"] = info.needs_force;
         d["offset"] = kBaseParameterCount + effect_offset(i);

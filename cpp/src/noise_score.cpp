@@ -54,60 +54,59 @@ double score_run(const Problem& problem, const Run& run, const double* p, const 
     using Square = Mat<kChannels, kChannels>;
     std::array<Square, kNoiseParameters> dS;
     std::array<Vec<kChannels>, kNoiseParameters> de;
-    return extended_kalman_filter<NX, kChannels>(
-        system, mean, covariance, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
-            const auto lower = s.update.lower.template triangularView<Eigen::Lower>();
-            const Mat<kChannels, NX>& H = s.update.observation;
-            const Mat<NX, NX> keep = Mat<NX, NX>::Identity() - s.update.gain * H;
-            const Vec<kChannels> white = lower.solve(s.update.innovation);
-            const Vec<kChannels> weighed = lower.transpose().solve(white);
-            Square inverse = lower.solve(Square::Identity());  // L^-1
-            Square present = Square::Identity();
-            for (int i = 0; i < kChannels; ++i)
-                if (std::isnan(run.measurements[k][i])) present(i, i) = 0.0;
-            for (int j = 0; j < kNoiseParameters; ++j) {
-                const auto n = static_cast<std::size_t>(j);
-                Direction<NX>& d = all[n];
-                if (k > 0) {
-                    Vec<NX> moved = s.transition * d.mean;
-                    Mat<NX, NX> spread = s.transition * d.covariance * s.transition.transpose();
-                    if (d.forget != 0.0) {
-                        // The transition's own diagonal for the wandering states depends on tau.
-                        Mat<NX, NX> turn = Mat<NX, NX>::Zero();
-                        for (int i = kMotionStates; i < kStatesPlain; ++i) turn(i, i) = d.forget;
-                        moved += turn * mean;
-                        const Mat<NX, NX> half = turn * covariance * s.transition.transpose();
-                        spread += half + half.transpose();
-                    }
-                    d.mean = moved;
-                    d.covariance = spread + d.process;
+    return filter_run<NX>(system, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
+        const auto lower = s.update.lower.template triangularView<Eigen::Lower>();
+        const Mat<kChannels, NX>& H = s.update.observation;
+        const Mat<NX, NX> keep = Mat<NX, NX>::Identity() - s.update.gain * H;
+        const Vec<kChannels> white = lower.solve(s.update.innovation);
+        const Vec<kChannels> weighed = lower.transpose().solve(white);
+        Square inverse = lower.solve(Square::Identity());  // L^-1
+        Square present = Square::Identity();
+        for (int i = 0; i < kChannels; ++i)
+            if (std::isnan(run.measurements[k][i])) present(i, i) = 0.0;
+        for (int j = 0; j < kNoiseParameters; ++j) {
+            const auto n = static_cast<std::size_t>(j);
+            Direction<NX>& d = all[n];
+            if (k > 0) {
+                Vec<NX> moved = s.transition * d.mean;
+                Mat<NX, NX> spread = s.transition * d.covariance * s.transition.transpose();
+                if (d.forget != 0.0) {
+                    // The transition's own diagonal for the wandering states depends on tau.
+                    Mat<NX, NX> turn = Mat<NX, NX>::Zero();
+                    for (int i = kMotionStates; i < kStatesPlain; ++i) turn(i, i) = d.forget;
+                    moved += turn * mean;
+                    const Mat<NX, NX> half = turn * covariance * s.transition.transpose();
+                    spread += half + half.transpose();
                 }
-                const Mat<NX, kChannels> cross = d.covariance * H.transpose();
-                const Square change = H * cross + present * d.sensor * present;
-                const Vec<kChannels> shift = -H * d.mean;
-                dS[n] = inverse * change * inverse.transpose();
-                de[n] = lower.solve(shift);
-                gradient[j] += 0.5 * (white.dot(dS[n] * white) - dS[n].trace()) - white.dot(de[n]);
-                // P+ = (I - K H) P-:  dP+ = (I-KH) dP- (I-KH)^T + K dR K^T
-                const Mat<NX, kChannels> gain_change =
-                    keep * cross - s.update.gain * present * d.sensor;
-                d.mean = keep * d.mean + gain_change * weighed;
-                d.covariance = keep * d.covariance * keep.transpose() +
-                               s.update.gain * present * d.sensor * s.update.gain.transpose();
+                d.mean = moved;
+                d.covariance = spread + d.process;
             }
-            for (int i = 0; i < kNoiseParameters; ++i) {
-                for (int j = 0; j <= i; ++j) {
-                    const auto a = static_cast<std::size_t>(i);
-                    const auto b = static_cast<std::size_t>(j);
-                    const double info =
-                        0.5 * dS[a].cwiseProduct(dS[b].transpose()).sum() + de[a].dot(de[b]);
-                    information(i, j) += info;
-                    if (i != j) information(j, i) += info;
-                }
+            const Mat<NX, kChannels> cross = d.covariance * H.transpose();
+            const Square change = H * cross + present * d.sensor * present;
+            const Vec<kChannels> shift = -H * d.mean;
+            dS[n] = inverse * change * inverse.transpose();
+            de[n] = lower.solve(shift);
+            gradient[j] += 0.5 * (white.dot(dS[n] * white) - dS[n].trace()) - white.dot(de[n]);
+            // P+ = (I - K H) P-:  dP+ = (I-KH) dP- (I-KH)^T + K dR K^T
+            const Mat<NX, kChannels> gain_change =
+                keep * cross - s.update.gain * present * d.sensor;
+            d.mean = keep * d.mean + gain_change * weighed;
+            d.covariance = keep * d.covariance * keep.transpose() +
+                           s.update.gain * present * d.sensor * s.update.gain.transpose();
+        }
+        for (int i = 0; i < kNoiseParameters; ++i) {
+            for (int j = 0; j <= i; ++j) {
+                const auto a = static_cast<std::size_t>(i);
+                const auto b = static_cast<std::size_t>(j);
+                const double info =
+                    0.5 * dS[a].cwiseProduct(dS[b].transpose()).sum() + de[a].dot(de[b]);
+                information(i, j) += info;
+                if (i != j) information(j, i) += info;
             }
-            mean = s.mean;
-            covariance = s.covariance;
-        });
+        }
+        mean = s.mean;
+        covariance = s.covariance;
+    });
 }
 
 }  // namespace

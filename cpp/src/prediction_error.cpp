@@ -14,11 +14,14 @@ void freeze_run(const Problem& problem, const Run& run, const double* p, const N
                 std::vector<FrozenStep>& steps, FrozenFilter& filter) {
     const RunSystem<NX> system(problem.model, run, p, noise);
     steps.resize(run.size());
-    filter.log_likelihood += extended_kalman_filter<NX, kChannels>(
-        system, system.initial_mean(), system.initial_covariance(),
-        [&](std::size_t k, const auto& s) {
+    filter.log_likelihood +=
+        filter_run<NX>(system, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
             steps[k].gain.setZero();
-            steps[k].gain.template topRows<NX>() = s.update.gain;
+            steps[k].gain.template topRows<kStatesPlain>() =
+                s.update.gain.template topRows<kStatesPlain>();
+            for (std::size_t i = 0; i < system.own().count; ++i)
+                steps[k].gain.row(kMotionStates + static_cast<int>(system.place(i))) =
+                    s.update.gain.row(system.packed(i));
             Mat<kChannels, kChannels> present = Mat<kChannels, kChannels>::Identity();
             for (int i = 0; i < kChannels; ++i)
                 if (std::isnan(run.measurements[k][i])) present(i, i) = 0.0;
@@ -35,6 +38,7 @@ template <class S, class T, class Disturb, class Shift, class Keep>
 void run_frozen(const SingleTrack& model, const Run& run, const double* p_values, const T* p,
                 const std::vector<FrozenStep>& steps, double correlation_time, Disturb&& disturb,
                 Shift&& shift, Keep&& keep) {
+    const ActiveStates own = active_states(model.effects);
     ModelState<S> x = initial_state<S>(model, run, p);
     std::array<S, kMotionStates> wander;
     wander.fill(S(0.0));
@@ -70,18 +74,17 @@ void run_frozen(const SingleTrack& model, const Run& run, const double* p_values
             white[static_cast<std::size_t>(i)] = sum;
         }
         keep(k, white);
-        for (int i = 0; i < kStatesFull; ++i) {
+        const auto correct = [&](int row, S& state) {
             S correction(0.0);
             for (int j = 0; j < kChannels; ++j)
-                correction += step.gain(i, j) * error[static_cast<std::size_t>(j)];
-            const auto n = static_cast<std::size_t>(i);
-            if (i < kMotionStates)
-                x[n] += correction;
-            else if (i < kStatesPlain)
-                wander[n - kMotionStates] += correction;
-            else
-                x[n - kMotionStates] += correction;
+                correction += step.gain(row, j) * error[static_cast<std::size_t>(j)];
+            state += correction;
+        };
+        for (int i = 0; i < kMotionStates; ++i) {
+            correct(i, x[static_cast<std::size_t>(i)]);
+            correct(kMotionStates + i, wander[static_cast<std::size_t>(i)]);
         }
+        for (std::size_t i : own) correct(kStatesPlain + static_cast<int>(i), x[kMotionStates + i]);
     }
 }
 

@@ -89,6 +89,7 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
     // Half of the reaction time is made up for by looking ahead; open-loop steering keeps its time.
     const std::size_t preview = driver.tracks_path ? 1 + delay / 2 : 1;
     for (std::size_t k = 0; k < references.size(); ++k) {
+        u.time_s = static_cast<double>(k) * dt;
         for (std::size_t i = 0; i < kMotionStates; ++i) push[i] = disturbance[3 * k + i];
         const auto y = sense(model, x, push.data(), u, p);
         out.inputs.insert(out.inputs.end(), {u.steer_rad, u.longitudinal});
@@ -106,8 +107,9 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
         const std::size_t ahead = std::min(k + preview, last);
         const double acceleration =
             ahead > 0 ? (references[ahead].speed_mps - references[ahead - 1].speed_mps) / dt : 0.0;
-        const Input next =
+        Input next =
             hands.next(u, references[ahead], acceleration, {state[0], state[2], references[then]});
+        next.time_s = u.time_s + dt;
         const int substeps = std::max(kSubsteps, substeps_for(model, p, x[0], dt));
         advance(model, x, push.data(), u, next, p, dt, substeps);
         u = next;

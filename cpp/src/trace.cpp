@@ -7,12 +7,18 @@ namespace sysid {
 namespace {
 
 template <int NX>
-void store_state(std::vector<double>& mean_out, std::vector<double>& std_out, const Vec<NX>& mean,
+void store_state(const RunSystem<NX>& system, Trace& out, const Vec<NX>& mean,
                  const Mat<NX, NX>& covariance) {
-    for (int i = 0; i < kStatesFull; ++i) {
-        mean_out.push_back(i < NX ? mean[i] : std::nan(""));
-        std_out.push_back(i < NX ? std::sqrt(std::max(covariance(i, i), 0.0)) : std::nan(""));
-    }
+    const std::size_t begin = out.state.size();
+    out.state.resize(begin + kStatesFull, std::nan(""));
+    out.state_std.resize(begin + kStatesFull, std::nan(""));
+    const auto store = [&](std::size_t to, int from) {
+        out.state[begin + to] = mean[from];
+        out.state_std[begin + to] = std::sqrt(std::max(covariance(from, from), 0.0));
+    };
+    for (int i = 0; i < kStatesPlain; ++i) store(static_cast<std::size_t>(i), i);
+    for (std::size_t i = 0; i < system.own().count; ++i)
+        store(kMotionStates + system.place(i), system.packed(i));
 }
 
 template <int NX>
@@ -21,9 +27,8 @@ void trace_run(const Problem& problem, const Run& run, const double* p, const No
     const RunSystem<NX> system(problem.model, run, p, noise);
     std::vector<FilterStep<NX, kChannels>> steps;
     if (smoothed) steps.reserve(run.size());
-    out.log_likelihood += extended_kalman_filter<NX, kChannels>(
-        system, system.initial_mean(), system.initial_covariance(),
-        [&](std::size_t k, const auto& s) {
+    out.log_likelihood +=
+        filter_run<NX>(system, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
             const Mat<kChannels, kChannels> S = s.update.lower * s.update.lower.transpose();
             const Vec<kChannels> white =
                 s.update.lower.template triangularView<Eigen::Lower>().solve(s.update.innovation);
@@ -37,11 +42,10 @@ void trace_run(const Problem& problem, const Run& run, const double* p, const No
             if (smoothed)
                 steps.push_back(s);
             else
-                store_state<NX>(out.state, out.state_std, s.mean, s.covariance);
+                store_state<NX>(system, out, s.mean, s.covariance);
         });
     if (!smoothed) return;
-    for (const auto& s : smooth(steps))
-        store_state<NX>(out.state, out.state_std, s.mean, s.covariance);
+    for (const auto& s : smooth(steps)) store_state<NX>(system, out, s.mean, s.covariance);
 }
 
 template <int NX>
@@ -49,17 +53,15 @@ void look_ahead_run(const Problem& problem, const Run& run, const double* p, con
                     std::size_t ahead, double* errors) {
     const RunSystem<NX> system(problem.model, run, p, noise);
     std::vector<Vec<NX>> means(run.size());
-    extended_kalman_filter<NX, kChannels>(system, system.initial_mean(),
-                                          system.initial_covariance(),
-                                          [&](std::size_t k, const auto& s) { means[k] = s.mean; });
+    filter_run<NX>(system,
+                   [&](std::size_t k, const FilterStep<NX, kChannels>& s) { means[k] = s.mean; });
     std::fill(errors, errors + run.size() * kChannels, std::nan(""));
     const std::array<double, kPushes> calm{};
     for (std::size_t k = 0; k + ahead < run.size(); ++k) {
         ModelState<double> x = system.start();
-        for (int i = 0; i < NX; ++i) {
-            if (i < kMotionStates) x[static_cast<std::size_t>(i)] = means[k][i];
-            if (i >= kStatesPlain) x[static_cast<std::size_t>(i - kMotionStates)] = means[k][i];
-        }
+        for (int i = 0; i < kMotionStates; ++i) x[static_cast<std::size_t>(i)] = means[k][i];
+        for (std::size_t i = 0; i < system.own().count; ++i)
+            x[system.place(i)] = means[k][system.packed(i)];
         for (std::size_t n = k + 1; n <= k + ahead; ++n) {
             const int substeps = substeps_for(problem.model, p, x[0], run.dt);
             advance(problem.model, x, calm.data(), run.inputs[n - 1], run.inputs[n], p, run.dt,

@@ -11,7 +11,10 @@ from functools import cache
 from html import escape
 from typing import Any
 
+import numpy as np
+
 from . import _core
+from ._arrays import FloatArray, as_float64
 from .errors import InvalidInput, near_names
 
 __all__ = ["Effect", "Parameter", "base_parameters", "catalogue", "effect"]
@@ -31,6 +34,13 @@ class Parameter:
         Bounds of the search.
     column : int
         Place in the core's parameter vector.
+    typical_low, typical_high : float
+        Where most cars lie that have the effect.
+    mirrored : bool
+        Whether it changes its sign in a mirror that swaps left and right.
+    scan : str
+        Of a parameter that means nothing while the effect is null: sought over the `time` of the
+        log, or over its typical `range`. Otherwise empty.
     """
 
     name: str
@@ -40,12 +50,23 @@ class Parameter:
     matters: float
     lower: float
     upper: float
+    typical_low: float
+    typical_high: float
+    mirrored: bool
+    scan: str
     column: int
 
     @property
     def one_sided(self) -> bool:
         """Whether the null value lies on a bound, so that only one sign is possible."""
         return self.null_value in (self.lower, self.upper)
+
+    def grid(self, duration_s: float) -> FloatArray:
+        """Values at which a scanned parameter is tried in a log of this duration."""
+        if self.scan == "time":
+            return as_float64(duration_s * np.arange(1, 8) / 8.0)
+        ratio = self.typical_high / self.typical_low
+        return as_float64(self.typical_low * ratio ** np.array([0.0, 0.5, 1.0]))
 
 
 @dataclass(frozen=True)
@@ -64,6 +85,14 @@ class Effect:
         The derivative at the null value does not exist; scored at the typical size.
     needs_force : bool
         Visible only where the total wheel force was logged.
+    needs : tuple of str
+        Channels without which a log cannot show it.
+    twins : tuple of str
+        Effects that act alike in most driving; each names the other.
+    through : str
+        Effect through which it chiefly acts, if any: weak in a model without that.
+    states : int
+        How many states of its own it adds to the model.
     """
 
     id: str
@@ -76,6 +105,10 @@ class Effect:
     index: int
     scored_at_typical: bool
     needs_force: bool
+    needs: tuple[str, ...]
+    twins: tuple[str, ...]
+    through: str
+    states: int
 
     @property
     def bit(self) -> int:
@@ -87,6 +120,20 @@ class Effect:
         """Places of its parameters in the core's parameter vector."""
         return [p.column for p in self.parameters]
 
+    @property
+    def scanned(self) -> Parameter | None:
+        """Its parameter that means nothing while the effect is null, if there is one."""
+        return next((p for p in self.parameters if p.scan), None)
+
+    @property
+    def form(self) -> str:
+        """How it is scored without a refit; a refit always has the equation as it stands."""
+        if self.scored_at_typical:
+            return "scored by a step to the typical size: no derivative at the null value"
+        if self.scanned is not None:
+            return f"scored by its derivative at the null value, over a grid of {self.scanned.name}"
+        return "scored by its derivative at the null value"
+
     def __str__(self) -> str:
         lines = [
             f"{self.id}: {self.title}",
@@ -94,11 +141,21 @@ class Effect:
             f"  source      {self.source}",
         ]
         lines += [
-            f"  parameter   {p.name} [{p.unit}], typically {p.typical:g}, "
-            f"searched from {p.lower:g} to {p.upper:g}"
+            f"  parameter   {p.name} [{p.unit}], typically {p.typical:g} "
+            f"({p.typical_low:g} to {p.typical_high:g}), matters from {p.matters:g}, "
+            f"searched from {p.lower:g} to {p.upper:g}, none at {p.null_value:g}"
             for p in self.parameters
         ]
-        lines += [f"  excited by  {self.excited_by}", f"  moves first {self.moves}"]
+        lines += [
+            f"  form        {self.form}",
+            f"  excited by  {self.excited_by}",
+            f"  moves first {self.moves}",
+            f"  needs       {', '.join(self.needs)}",
+        ]
+        if self.twins:
+            lines.append(f"  acts like   {', '.join(self.twins)}")
+        if self.through:
+            lines.append(f"  through     {self.through}")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

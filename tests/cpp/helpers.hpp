@@ -71,6 +71,16 @@ inline Parameters typical_parameters() {
     return p;
 }
 
+/// Position in the model's state of state number `which` of an effect.
+inline std::size_t state_of(const std::string& effect, std::size_t which = 0) {
+    return kMotionStates + effect_state_offset(effect_index(effect)) + which;
+}
+
+/// The motion's part of the derivatives: what effects with states of their own leave alone at null.
+inline std::array<double, kMotionStates> motion_of(const ModelState<double>& rate) {
+    return {rate[0], rate[1], rate[2]};
+}
+
 constexpr std::array<double, kPushes> kCalm{};
 
 /// One evaluation: the workings, the derivatives of the state, the readings.
@@ -85,14 +95,14 @@ inline Evaluation evaluate(const SingleTrack& model, const ModelState<double>& x
     Evaluation e;
     e.w = model.evaluate(x.data(), push.data(), x.data() + kMotionStates, u, p.data(),
                          e.rate.data(), e.rate.data() + kMotionStates);
-    model.sense(e.w, p.data(), e.y.data());
+    model.sense(e.w, p.data(), x.data() + kMotionStates, e.y.data());
     return e;
 }
 
 /// Steering and force of a lively but smooth drive at time `t`.
 inline Input lively(double t) {
     return {0.04 * std::sin(3.0 * t) + 0.01 * std::sin(11.0 * t) + 0.004,
-            1500.0 * std::cos(1.7 * t) + 500.0};
+            1500.0 * std::cos(1.7 * t) + 500.0, t};
 }
 
 /// The readings along `inputs`, free of noise.

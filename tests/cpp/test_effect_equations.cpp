@@ -1,26 +1,8 @@
 // Each effect against its own equation, written down a second time by hand.
-#include "helpers.hpp"
+#include "effect_pair.hpp"
 
 namespace sysid::test {
 namespace {
-
-const ModelState<double> kCornering{25.0, 0.5, 0.35};
-const Input kBraking{0.06, -4000.0};
-const Input kDriving{0.06, 3000.0};
-
-/// One effect at a size of its own, and the same instant without it.
-struct Pair {
-    Evaluation on, off;
-    Parameters p;
-
-    Pair(const std::string& id, const std::vector<double>& size, const ModelState<double>& x,
-         const Input& u, bool force_known = true)
-        : p(plain_parameters()) {
-        for (std::size_t j = 0; j < size.size(); ++j) p[parameter_of(id, j)] = size[j];
-        on = evaluate({saloon(), mask_of({id}), force_known}, x, u, p);
-        off = evaluate({saloon(), 0, force_known}, x, u, p);
-    }
-};
 
 TEST(EffectEquation, AeroDrag) {
     const Pair it("aero_drag", {0.4}, {30.0}, {0.0, 1000.0});
@@ -30,8 +12,8 @@ TEST(EffectEquation, AeroDrag) {
 }
 
 TEST(EffectEquation, RollingResistance) {
-    const Pair it("rolling_resistance", {0.012}, {30.0}, {0.0, 1000.0});
-    EXPECT_NEAR(it.on.w.a_x - it.off.w.a_x, -0.012 * kGravity, 1e-13);
+    const Pair it("rolling_resistance", {0.012, 2e-4}, {30.0}, {0.0, 1000.0});
+    EXPECT_NEAR(it.on.w.a_x - it.off.w.a_x, -(0.012 + 2e-4 * 30.0) * kGravity, 1e-13);
 }
 
 TEST(EffectEquation, AeroDownforce) {
@@ -152,7 +134,7 @@ TEST(EffectEquation, OffsetAndRatioComeBeforeTheLag) {
     const SingleTrack model{saloon(), mask_of({"steer_offset", "steer_ratio", "steer_lag"})};
     ModelState<double> x{20.0};
     settle_auxiliary(model, x, kCalm.data(), {0.03, 0.0}, p.data());
-    EXPECT_NEAR(x[kMotionStates + kSteerLagged], (0.03 + 0.01) * 1.1, 1e-9);
+    EXPECT_NEAR(x[state_of("steer_lag")], (0.03 + 0.01) * 1.1, 1e-9);
 }
 
 TEST(EffectEquation, SteerLagReaches63PercentAfterOneTimeConstant) {
@@ -163,9 +145,9 @@ TEST(EffectEquation, SteerLagReaches63PercentAfterOneTimeConstant) {
     ModelState<double> x{20.0};
     const Input step{0.05, 0.0};
     advance(model, x, kCalm.data(), step, step, p.data(), tau, 50);
-    EXPECT_NEAR(x[kMotionStates + kSteerLagged], 0.05 * (1.0 - std::exp(-1.0)), 1e-9);
+    EXPECT_NEAR(x[state_of("steer_lag")], 0.05 * (1.0 - std::exp(-1.0)), 1e-9);
     const auto e = evaluate(model, x, step, p);
-    EXPECT_EQ(e.w.delta, x[kMotionStates + kSteerLagged]);
+    EXPECT_EQ(e.w.delta, x[state_of("steer_lag")]);
 }
 
 TEST(EffectEquation, RelaxationReaches63PercentAfterOneLength) {
@@ -182,15 +164,15 @@ TEST(EffectEquation, RelaxationReaches63PercentAfterOneLength) {
         const int steps = 20000;
         for (int n = 0; n < steps; ++n) {
             const auto e = evaluate(model, x, steer, p);
-            for (std::size_t i = kMotionStates; i < kModelStates; ++i)
+            for (std::size_t i : {state_of("tyre_relaxation", 0), state_of("tyre_relaxation", 1)})
                 x[i] += sigma / v / steps * e.rate[i];
         }
         const double part = 1.0 - std::exp(-1.0);
-        EXPECT_NEAR(x[kMotionStates + kSlipFrontLagged] / front, part, 1e-4);
-        EXPECT_NEAR(x[kMotionStates + kSlipRearLagged] / rear, part, 1e-4);
+        EXPECT_NEAR(x[state_of("tyre_relaxation", 0)] / front, part, 1e-4);
+        EXPECT_NEAR(x[state_of("tyre_relaxation", 1)] / rear, part, 1e-4);
         const auto e = evaluate(model, x, steer, p);
-        EXPECT_EQ(e.w.alpha_f, x[kMotionStates + kSlipFrontLagged]);
-        EXPECT_EQ(e.w.alpha_r, x[kMotionStates + kSlipRearLagged]);
+        EXPECT_EQ(e.w.alpha_f, x[state_of("tyre_relaxation", 0)]);
+        EXPECT_EQ(e.w.alpha_r, x[state_of("tyre_relaxation", 1)]);
     }
 }
 
@@ -224,8 +206,13 @@ TEST(EffectEquation, SensorErrorsAreTakenOffTheMeasuredAcceleration) {
     EXPECT_NEAR(bias.on.w.a_x, 2.0 - 0.15, 1e-14);
     const Pair scale("accelerometer_scale", {0.05, 0.0}, kCornering, measured, false);
     EXPECT_NEAR(scale.on.w.a_x, 2.0 / 1.05, 1e-14);
-    const Pair lever("imu_lever_arm", {0.5, 0.0}, kCornering, measured, false);
-    EXPECT_NEAR(lever.on.w.a_x, 2.0 + 0.5 * 0.35 * 0.35, 1e-14);
+    const Pair lever("imu_lever_arm", {0.5, 0.3}, kCornering, measured, false);
+    const double yaw = lever.on.rate[2];
+    ASSERT_GT(std::abs(yaw), 0.1);
+    EXPECT_NEAR(lever.on.w.a_x, 2.0 + 0.5 * 0.35 * 0.35 + 0.3 * yaw, 1e-5);
+    EXPECT_NEAR(lever.on.y[kAx], 2.0, 1e-5);
+    const Pair lean("body_attitude", {0.04, 0.0}, kCornering, measured, false);
+    EXPECT_NEAR(lean.on.w.a_x + kGravity * std::sin(0.04 * lean.on.w.a_x / kGravity), 2.0, 1e-13);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@ import pytest
 from sysid_vehicle import Effect, Fit, InvalidInput, Log, Model, _core, catalogue, effect
 from sysid_vehicle.effects import base_parameters
 from sysid_vehicle.estimate import Driving
+from sysid_vehicle.estimate.driving import MEASURED
 
 ALL = pytest.mark.parametrize("e", catalogue(), ids=lambda e: e.id)
 
@@ -32,8 +33,35 @@ def test_an_effect_says_what_it_is(e: Effect) -> None:
         assert p.name in text
         assert p.lower <= p.null_value <= p.upper
         assert p.lower <= p.typical <= p.upper
-        assert 0.0 < p.matters <= abs(p.typical - p.null_value)
+        assert p.matters > 0.0
+        assert p.scan or p.matters <= abs(p.typical - p.null_value)
+        assert p.lower <= p.typical_low <= p.typical <= p.typical_high <= p.upper
         assert p.one_sided == (p.null_value in (p.lower, p.upper))
+
+
+def test_twins_name_each_other_and_needs_are_channels() -> None:
+    for e in catalogue():
+        assert e.needs
+        assert set(e.needs) <= {*MEASURED, "steer_rad", "fx_n"}
+        assert ("fx_n" in e.needs) >= e.needs_force
+        for twin in e.twins:
+            assert e.id in effect(twin).twins
+            assert twin in str(e)
+        assert not e.through or effect(e.through).id in str(e)
+
+
+def test_a_scanned_parameter_is_tried_over_the_log_or_its_range() -> None:
+    at = effect("friction_change").scanned
+    assert at is not None
+    assert at.name == "at_s"
+    assert np.allclose(np.diff(at.grid(80.0)), 10.0)
+    assert at.grid(80.0)[0] == 10.0
+    slow = effect("tyre_temperature").scanned
+    assert slow is not None
+    assert slow.grid(80.0)[[0, -1]] == pytest.approx([slow.typical_low, slow.typical_high])
+    assert effect("mass").scanned is None
+    assert "grid of at_s" in effect("friction_change").form
+    assert "step" in effect("steer_delay").form
 
 
 def test_an_effect_is_found_by_name() -> None:
@@ -68,8 +96,15 @@ def test_null_values_change_no_bit(e: Effect, short: Driving, fit: Fit) -> None:
 
 @ALL
 def test_a_typical_size_is_seen(e: Effect, short: Driving, fit: Fit) -> None:
-    added = fit.model.add(e)
-    typical = added.with_values({f"{e.id}.{p.name}": p.typical for p in e.parameters})
+    base = fit.model
+    if e.through:
+        through = effect(e.through)
+        base = base.add(through)
+        base = base.with_values({f"{through.id}.{p.name}": p.typical for p in through.parameters})
+    added = base.add(e)
+    # The drive is too short for slow ones at their typical pace.
+    sizes = {p.name: p.typical_low if p.scan == "range" else p.typical for p in e.parameters}
+    typical = added.with_values({f"{e.id}.{name}": value for name, value in sizes.items()})
     problem = short.problem(added)
     filter_ = problem.freeze(added.vector(), fit.noise.vector())
     null = problem.residuals(added.vector(), filter_)

@@ -296,7 +296,7 @@ def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:
 def _starts(c: Candidate) -> list[dict[str, float]]:
     predicted = {}
     for p, v in zip(c.effect.parameters, c.value, strict=True):
-        reach = _BEYOND * p.typical
+        reach = np.inf if p.scan else _BEYOND * p.typical
         value = float(np.clip(v, p.null_value - reach, p.null_value + reach))
         predicted[f"{c.id}.{p.name}"] = float(np.clip(value, p.lower, p.upper))
     starts = [predicted]

@@ -25,6 +25,7 @@ from ..identify import Fit
 
 __all__ = ["Score", "ScoreBoard", "score_board"]
 
+_AT_ONCE = 8  # directions that the core differentiates in one pass
 _INVISIBLE = 1e-3  # share of an effect's sensitivity that the fitted parameters cannot copy
 
 
@@ -144,7 +145,7 @@ def score_board(
         if retained < _INVISIBLE:
             continue
         directions[effect.id] = R
-        scores.append(_score(effect, R, e_left, retained))
+        scores.append(_score(effect, R, e_left, retained, _duration(driving)))
     scores.sort(key=lambda s: (s.p_value, -s.statistic))
     return ScoreBoard(tuple(scores), directions, e_left)
 
@@ -158,26 +159,56 @@ def _sensitivities(
     frozen: _core.FrozenFilter,
     e: FloatArray,
 ) -> dict[str, FloatArray]:
-    regular = tuple(c for c in candidates if not c.scored_at_typical)
+    regular = tuple(c for c in candidates if not c.scored_at_typical and c.scanned is None)
     known = driving.force_known
     found: dict[str, FloatArray] = {}
-    if regular:
-        wide = base.with_model(fit.model.core(force_known=known, also=regular))
-        all_columns = wide.sensitivities(p, frozen, [i for c in regular for i in c.columns])
+    for few in _groups(regular):
+        wide = base.with_model(fit.model.core(force_known=known, also=few))
+        all_columns = wide.sensitivities(p, frozen, [i for c in few for i in c.columns])
         at = 0
-        for c in regular:
+        for c in few:
             found[c.id] = all_columns[:, at : at + len(c.columns)]
             at += len(c.columns)
     for c in candidates:
-        if not c.scored_at_typical:
+        if c in regular:
             continue
-        # No derivative at zero: the finite step to the typical size is the direction.
         one = base.with_model(fit.model.core(force_known=known, also=(c,)))
-        there = p.copy()
-        typical = c.parameters[0].typical
-        there[c.columns[0]] = typical
-        found[c.id] = ((e - one.residuals(there, frozen).ravel()) / typical)[:, None]
+        if c.scored_at_typical:
+            # No derivative at zero: the finite steps to the typical sizes are the directions.
+            steps = []
+            for parameter in c.parameters:
+                there = p.copy()
+                there[parameter.column] = parameter.typical
+                steps.append((e - one.residuals(there, frozen).ravel()) / parameter.typical)
+            found[c.id] = np.column_stack(steps)
+        elif c.scanned is not None:
+            # At its null value the effect knows nothing of this parameter: one column for each
+            # value of a grid. Their joint test needs no supremum.
+            first = c.parameters[0]
+            step = 0.1 * first.matters  # small enough to stand for the derivative
+            columns = []
+            for value in c.scanned.grid(_duration(driving)):
+                there = p.copy()
+                there[c.scanned.column] = value
+                there[first.column] = first.null_value + step
+                columns.append((e - one.residuals(there, frozen).ravel()) / step)
+            found[c.id] = np.column_stack(columns)
     return found
+
+
+def _groups(effects: tuple[Effect, ...]) -> list[tuple[Effect, ...]]:
+    """Effects that the core differentiates in one pass: the others need not act meanwhile."""
+    groups: list[list[Effect]] = [[]]
+    for effect in effects:
+        if sum(len(e.columns) for e in (*groups[-1], effect)) > _AT_ONCE:
+            groups.append([])
+        groups[-1].append(effect)
+    return [tuple(g) for g in groups if g]
+
+
+def _duration(driving: Driving) -> float:
+    """Of the longest log [s]."""
+    return max(float(s.where.stop / driving.logs[s.log].rate_hz) for s in driving.stretches)
 
 
 def _basis(G: FloatArray) -> FloatArray:
@@ -204,12 +235,21 @@ def _quadratic(R: FloatArray, e: FloatArray) -> tuple[float, FloatArray, FloatAr
     return float(S @ value), value, inverse, rank
 
 
-def _score(effect: Effect, R: FloatArray, e: FloatArray, retained: float) -> Score:
+def _score(
+    effect: Effect, R: FloatArray, e: FloatArray, retained: float, duration_s: float
+) -> Score:
     statistic, value, covariance, rank = _quadratic(R, e)
     ratio = _variance_ratio(R, e - R @ value, covariance)
     statistic /= max(ratio, 1.0)
     p = float(_p_value(effect, np.array([statistic]), value[:1], rank)[0])
     std = np.sqrt(np.maximum(np.diag(covariance) * max(ratio, 1.0), 0.0))
+    if effect.scanned is not None:
+        # The best of the grid, known as closely as the grid is fine.
+        grid = effect.scanned.grid(duration_s)
+        squares = np.maximum((R**2).sum(axis=0), 1e-300)
+        best = int(np.argmax((R.T @ e) ** 2 / squares))
+        value = np.array([(R[:, best] @ e) / squares[best], grid[best]])
+        std = np.array([np.sqrt(max(ratio, 1.0) / squares[best]), float(np.gradient(grid)[best])])
     return Score(
         effect, statistic, p, tuple(map(float, value)), tuple(map(float, std)), retained, ratio
     )

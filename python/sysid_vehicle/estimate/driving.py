@@ -121,7 +121,8 @@ class Driving:
             for i, c in enumerate(MEASURED):
                 if log.has(c) and (self.force_known or c != "ax_mps2"):
                     y[:, i] = log[c][where]
-            problem.add_run(1.0 / log.rate_hz, as_float64(inputs), as_float64(y))
+            began = where.start / log.rate_hz
+            problem.add_run(1.0 / log.rate_hz, as_float64(inputs), as_float64(y), began)
         return problem
 
     def _pieces(self, most_samples: int | None) -> list[tuple[Log, slice]]:

@@ -141,7 +141,9 @@ def _without_idle(fit: Fit) -> Fit:
 def _strength(fit: Fit, name: str) -> float:
     """Largest distance of the effect's parameters from their null values, in standard errors."""
     parameters = fit.model.parameters
-    found = [e for e in fit.estimates if e.name.startswith(f"{name}.")]
+    found = [
+        e for e in fit.estimates if e.name.startswith(f"{name}.") and not parameters[e.name].scan
+    ]
     return max(
         abs(e.value - parameters[e.name].null_value) / e.std if np.isfinite(e.std) else np.inf
         for e in found

@@ -22,7 +22,8 @@ namespace sysid {
 struct Input {
     double steer_rad = 0.0;
     double longitudinal =
-        0.0;  // total wheel force [N], or measured a_x [m/s2] where that is unknown
+        0.0;              // total wheel force [N], or measured a_x [m/s2] where that is unknown
+    double time_s = 0.0;  // since the log began
 };
 
 /// What disturbs the motion: forces and a moment, and accelerations that no accelerometer feels.
@@ -47,28 +48,14 @@ struct SingleTrack {
     template <class S, class T>
     Workings<S> evaluate(const S* motion, const S* push, const S* aux, const Input& u, const T* p,
                          S* rate, S* aux_rate) const {
-        Workings<S> w = begin(motion, u, p);
-        const T* q = p + kBaseParameterCount;
-        const auto each = [&](auto&& visit) { for_each_active(effects, q, visit); };
-        each([&](auto e, const T* own) { e.vehicle(own, w); });
-        // Backwards: what the sensors did last to the acceleration is undone first.
-        for_each_active_backwards(effects, q, [&](auto e, const T* own) { e.input(own, w); });
         for (int i = 0; i < kAuxiliaryStates; ++i) aux_rate[i] = S(0.0);
-        each([&](auto e, const T* own) { e.steering(own, w, aux, aux_rate); });
-        settle_outside_forces(w, push);
-        each([&](auto e, const T* own) { e.body(own, w); });
-        slip_angles(w);
-        each([&](auto e, const T* own) { e.slip(own, w, aux, aux_rate); });
-        const S mu_f = magic_formula(w.alpha_f, front_tyre(p));
-        const S mu_r = magic_formula(w.alpha_r, rear_tyre(p));
-        axle_loads(w, mu_f);
-        each([&](auto e, const T* own) { e.loads(own, w); });
-        w.mu_peak_f = S(p[kDFront]);
-        w.mu_peak_r = S(p[kDRear]);
-        each([&](auto e, const T* own) { e.grip(own, w); });
-        w.fy_f = (held.on ? S(held.front_n) : w.fz_f) * mu_f * w.grip_f;
-        w.fy_r = (held.on ? S(held.rear_n) : w.fz_r) * mu_r * w.grip_r;
-        balance(w);
+        // An accelerometer beside the centre of gravity makes the measured a_x, which stands for
+        // the force, depend on the yaw acceleration it brings about. Each pass shrinks the error
+        // by l_y dr/dt per a_x, a few hundredths.
+        const int passes = !force_known && (effects & kReadYawAcceleration) != 0 ? 4 : 1;
+        Workings<S> w;
+        w.r_dot = S(0.0);
+        for (int i = 0; i < passes; ++i) once(w, motion, push, aux, u, p, aux_rate);
         rate[0] = w.a_x + w.v_y * w.r + w.gravity_x;
         rate[1] = w.a_y - w.v_x * w.r + w.gravity_y;
         rate[2] = w.r_dot;
@@ -77,14 +64,15 @@ struct SingleTrack {
 
     /// What the sensors read: v_x, v_y, r, a_x, a_y.
     template <class S, class T>
-    void sense(const Workings<S>& w, const T* p, S* y) const {
+    void sense(const Workings<S>& w, const T* p, const S* aux, S* y) const {
         y[kVx] = w.v_x;
         y[kVy] = w.v_y;
         y[kYawRate] = w.r;
         y[kAx] = w.a_x;
         y[kAy] = w.a_y;
-        for_each_active(effects, p + kBaseParameterCount,
-                        [&](auto e, const T* own) { e.sensors(own, w, y); });
+        for_each_active(
+            effects, p + kBaseParameterCount,
+            [&](auto e, const T* own, std::size_t at) { return e.sensors(own, w, aux + at, y); });
     }
 
     /// Fastest rate [1/s] of the motion and of the active effects, for choosing integration steps.
@@ -94,9 +82,10 @@ struct SingleTrack {
         const double c_r = p[kBRear] * p[kCRear] * p[kDRear] * load * car.lf_m;
         const double yaw = (c_f * car.lf_m * car.lf_m + c_r * car.lr_m * car.lr_m) / p[kYawInertia];
         double fastest = std::max(yaw, (c_f + c_r) / car.mass_kg) / v_x;
-        for_each_active(effects, p + kBaseParameterCount, [&](auto e, const double* own) {
-            fastest = std::max(fastest, e.rate(own, v_x));
-        });
+        for_each_active(effects, p + kBaseParameterCount,
+                        [&](auto e, const double* own, std::size_t /*state*/) {
+                            fastest = std::max(fastest, e.rate(own, v_x));
+                        });
         return fastest;
     }
 
@@ -110,16 +99,54 @@ struct SingleTrack {
         return {p[kBRear], p[kCRear], p[kDRear], p[kERear]};
     }
 
+    // `w.r_dot` is the yaw acceleration as far as it is known.
     template <class S, class T>
-    Workings<S> begin(const S* motion, const Input& u, const T* p) const {
-        Workings<S> w;
+    void once(Workings<S>& w, const S* motion, const S* push, const S* aux, const Input& u,
+              const T* p, S* aux_rate) const {
+        begin(w, motion, u, p);
+        const T* q = p + kBaseParameterCount;
+        const auto each = [&](auto&& visit) { for_each_active(effects, q, visit); };
+        using At = std::size_t;
+        each([&](auto e, const T* own, At) { return e.vehicle(own, w); });
+        // Backwards: what the sensors did last to the acceleration is undone first.
+        for_each_active_backwards(effects, q,
+                                  [&](auto e, const T* own, At) { return e.input(own, w); });
+        each([&](auto e, const T* own, At at) {
+            return e.steering(own, w, aux + at, aux_rate + at);
+        });
+        settle_outside_forces(w, push);
+        each([&](auto e, const T* own, At) { return e.body(own, w); });
+        slip_angles(w);
+        each([&](auto e, const T* own, At at) { return e.slip(own, w, aux + at, aux_rate + at); });
+        const S mu_f = magic_formula(w.alpha_f, front_tyre(p));
+        const S mu_r = magic_formula(w.alpha_r, rear_tyre(p));
+        axle_loads(w, mu_f);
+        each([&](auto e, const T* own, At) { return e.loads(own, w); });
+        each([&](auto e, const T* own, At at) { return e.grip(own, w, aux + at); });
+        w.fy_f = (held.on ? S(held.front_n) : w.fz_f) * mu_f * w.grip_f;
+        w.fy_r = (held.on ? S(held.rear_n) : w.fz_r) * mu_r * w.grip_r;
+        each([&](auto e, const T* own, At) { return e.forces(own, w); });
+        balance(w);
+        each(
+            [&](auto e, const T* own, At at) { return e.follow(own, w, aux + at, aux_rate + at); });
+    }
+
+    template <class S, class T>
+    void begin(Workings<S>& w, const S* motion, const Input& u, const T* p) const {
         w.m = S(car.mass_kg);
         w.I_z = S(p[kYawInertia]);
         w.l_f = S(car.lf_m);
         w.l_r = S(car.lr_m);
-        w.h = car.cg_height_m;
+        w.h = S(car.cg_height_m);
         w.rho = car.air_density_kgpm3;
         w.drag_area = S(car.drag_area_m2);
+        w.brake_front = S(car.brake_front_share);
+        w.drive_front = S(car.drive_front_share);
+        w.B_f = S(p[kBFront]);
+        w.B_r = S(p[kBRear]);
+        w.mu_peak_f = S(p[kDFront]);
+        w.mu_peak_r = S(p[kDRear]);
+        w.time_s = u.time_s;
         w.v_x = motion[0];
         w.v_y = motion[1];
         w.r = motion[2];
@@ -127,7 +154,6 @@ struct SingleTrack {
         w.fx = S(force_known ? u.longitudinal : 0.0);
         w.ax_input = S(force_known ? 0.0 : u.longitudinal);
         w.grip_f = w.grip_r = S(1.0);
-        return w;
     }
 
     template <class S>
@@ -177,7 +203,7 @@ struct SingleTrack {
             pull = w.m * w.ax_input;
             const S front = w.fz0_f - lever * pull;
             const S along = pull - w.force_x + front * (mu_f * s);  // F_xf cos(delta) + F_xr
-            const double share = front_share(along);
+            const S& share = front_share(w, along);
             w.fx = along / (share * c + (1.0 - share));
             split_force(w);
         }
@@ -186,13 +212,13 @@ struct SingleTrack {
     }
 
     template <class S>
-    double front_share(const S& force) const {
-        return value_of(force) < 0.0 ? car.brake_front_share : car.drive_front_share;
+    static const S& front_share(const Workings<S>& w, const S& force) {
+        return value_of(force) < 0.0 ? w.brake_front : w.drive_front;
     }
 
     template <class S>
-    void split_force(Workings<S>& w) const {
-        const double front = front_share(w.fx);
+    static void split_force(Workings<S>& w) {
+        const S& front = front_share(w, w.fx);
         w.fx_f = front * w.fx;
         w.fx_r = (1.0 - front) * w.fx;
     }

@@ -22,6 +22,7 @@ inline Input between(const Input& a, const Input& b, double part) {
     return {
         a.steer_rad + part * (b.steer_rad - a.steer_rad),
         a.longitudinal + part * (b.longitudinal - a.longitudinal),
+        a.time_s + part * (b.time_s - a.time_s),
     };
 }
 
@@ -50,9 +51,12 @@ template <class S, class T>
 void advance(const SingleTrack& model, ModelState<S>& x, const S* push, const Input& from,
              const Input& to, const T* p, double dt, int substeps) {
     const double h = dt / substeps;
-    const auto moved = [](const ModelState<S>& a, const ModelState<S>& k, double by) {
+    const ActiveStates own = active_states(model.effects);
+    const auto moved = [&](const ModelState<S>& a, const ModelState<S>& k, double by) {
         ModelState<S> b;
-        for (std::size_t i = 0; i < kModelStates; ++i) b[i] = a[i] + by * k[i];
+        for (std::size_t i = 0; i < kMotionStates; ++i) b[i] = a[i] + by * k[i];
+        for (std::size_t i : own)
+            b[kMotionStates + i] = a[kMotionStates + i] + by * k[kMotionStates + i];
         return b;
     };
     for (int n = 0; n < substeps; ++n) {
@@ -63,8 +67,11 @@ void advance(const SingleTrack& model, ModelState<S>& x, const S* push, const In
         const auto k2 = model_rate(model, moved(x, k1, 0.5 * h), push, u1, p);
         const auto k3 = model_rate(model, moved(x, k2, 0.5 * h), push, u1, p);
         const auto k4 = model_rate(model, moved(x, k3, h), push, u2, p);
-        for (std::size_t i = 0; i < kModelStates; ++i)
+        const auto move = [&](std::size_t i) {
             x[i] += (h / 6.0) * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+        };
+        for (std::size_t i = 0; i < kMotionStates; ++i) move(i);
+        for (std::size_t i : own) move(kMotionStates + i);
     }
 }
 
@@ -76,7 +83,7 @@ std::array<S, kChannels> sense(const SingleTrack& model, const ModelState<S>& x,
     const auto w = model.evaluate(x.data(), push, x.data() + kMotionStates, u, p, rate.data(),
                                   rate.data() + kMotionStates);
     std::array<S, kChannels> y;
-    model.sense(w, p, y.data());
+    model.sense(w, p, x.data() + kMotionStates, y.data());
     return y;
 }
 
@@ -84,9 +91,12 @@ std::array<S, kChannels> sense(const SingleTrack& model, const ModelState<S>& x,
 template <class S, class T>
 void settle_auxiliary(const SingleTrack& model, ModelState<S>& x, const S* push, const Input& u,
                       const T* p) {
-    for (int repeat = 0; repeat < 2; ++repeat) {  // the slip angles follow the lagged steering
+    const ActiveStates own = active_states(model.effects);
+    // Some follow others: as many rounds as there are states settle any chain of them.
+    for (std::size_t repeat = 0; repeat < own.count; ++repeat) {
         const auto rate = model_rate(model, x, push, u, p);
-        for (std::size_t i = kMotionStates; i < kModelStates; ++i) {
+        for (std::size_t place : own) {
+            const std::size_t i = kMotionStates + place;
             // All auxiliary states are first-order lags: rate = (target - state) / time constant.
             ModelState<S> nudged = x;
             nudged[i] += 1e-6;

@@ -13,10 +13,12 @@ struct AccelerometerBias : Effect {
         "Klein & Morelli, Aircraft System Identification, ch. 10",
         "standstill on level ground, or both directions of the same road",
         "ax_mps2, ay_mps2",
+        "ax_mps2, ay_mps2",
+        "side_wind, road_bank, road_grade",
         2,
         {
-            {"ax_mps2", "m/s2", 0.0, 0.15, 0.03, -5.0, 5.0},
-            {"ay_mps2", "m/s2", 0.0, 0.25, 0.03, -5.0, 5.0},
+            {"ax_mps2", "m/s2", 0.0, 0.15, 0.03, -5.0, 5.0, 0.05, 0.2},
+            {"ay_mps2", "m/s2", 0.0, 0.25, 0.03, -5.0, 5.0, 0.05, 0.3, true},
         },
     };
 
@@ -25,7 +27,7 @@ struct AccelerometerBias : Effect {
         w.ax_input = w.ax_input - p[0];
     }
     template <class T, class S>
-    static void sensors(const T* p, const Workings<S>& /*w*/, S* y) {
+    static void sensors(const T* p, const Workings<S>& /*w*/, const S* /*state*/, S* y) {
         y[kAx] += p[0];
         y[kAy] += p[1];
     }

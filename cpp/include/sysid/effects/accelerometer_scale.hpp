@@ -13,10 +13,12 @@ struct AccelerometerScale : Effect {
         "Klein & Morelli, Aircraft System Identification, ch. 10",
         "a ramp to the limit, hard braking",
         "ay_mps2, ax_mps2",
+        "ax_mps2, ay_mps2",
+        "body_attitude, gyro_scale",
         2,
         {
-            {"ax_error", "1", 0.0, 0.05, 0.01, -0.5, 0.5},
-            {"ay_error", "1", 0.0, 0.05, 0.01, -0.5, 0.5},
+            {"ax_error", "1", 0.0, 0.05, 0.01, -0.5, 0.5, 0.01, 0.05},
+            {"ay_error", "1", 0.0, 0.05, 0.01, -0.5, 0.5, 0.01, 0.05},
         },
     };
 
@@ -25,7 +27,7 @@ struct AccelerometerScale : Effect {
         w.ax_input = w.ax_input / (1.0 + p[0]);
     }
     template <class T, class S>
-    static void sensors(const T* p, const Workings<S>& /*w*/, S* y) {
+    static void sensors(const T* p, const Workings<S>& /*w*/, const S* /*state*/, S* y) {
         y[kAx] *= 1.0 + p[0];
         y[kAy] *= 1.0 + p[1];
     }

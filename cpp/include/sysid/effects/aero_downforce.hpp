@@ -13,10 +13,12 @@ struct AeroDownforce : Effect {
         "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 15",
         "the same lateral acceleration at three or more speeds",
         "ay_mps2, yaw_rate_radps",
+        "steer_rad, vx_mps, yaw_rate_radps",
+        "friction_change, tyre_temperature, tyre_load_sensitivity",
         2,
         {
-            {"cl_a_front_m2", "m2", 0.0, 0.9, 0.1, -3.0, 6.0},
-            {"cl_a_rear_m2", "m2", 0.0, 1.3, 0.1, -3.0, 6.0},
+            {"cl_a_front_m2", "m2", 0.0, 0.9, 0.1, -3.0, 6.0, 0.0, 1.5},
+            {"cl_a_rear_m2", "m2", 0.0, 1.3, 0.1, -3.0, 6.0, 0.0, 2.5},
         },
     };
 

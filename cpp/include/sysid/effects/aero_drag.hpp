@@ -13,8 +13,10 @@ struct AeroDrag : Effect {
         "Rajamani, Vehicle Dynamics and Control, eq. (4.2)",
         "coasting and full throttle over a wide range of speed",
         "vx_mps, ax_mps2",
+        "fx_n, vx_mps",
+        "rolling_resistance, road_grade, head_wind, force_gain",
         1,
-        {{"drag_area_m2", "m2", 0.0, 0.45, 0.05, -2.0, 4.0}},
+        {{"drag_area_m2", "m2", 0.0, 0.45, 0.05, -2.0, 4.0, -0.3, 0.6}},
         false,
         true,
     };

@@ -4,39 +4,63 @@
 #include <array>
 #include <cstdint>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "sysid/effects/accelerometer_bias.hpp"
 #include "sysid/effects/accelerometer_scale.hpp"
 #include "sysid/effects/aero_downforce.hpp"
 #include "sysid/effects/aero_drag.hpp"
+#include "sysid/effects/aligning_moment.hpp"
+#include "sysid/effects/body_attitude.hpp"
 #include "sysid/effects/cg_position.hpp"
 #include "sysid/effects/combined_slip.hpp"
 #include "sysid/effects/drive_yaw_moment.hpp"
+#include "sysid/effects/force_gain.hpp"
+#include "sysid/effects/force_split.hpp"
+#include "sysid/effects/friction_change.hpp"
 #include "sysid/effects/gyro_bias.hpp"
+#include "sysid/effects/gyro_scale.hpp"
+#include "sysid/effects/head_wind.hpp"
 #include "sysid/effects/imu_lever_arm.hpp"
 #include "sysid/effects/lateral_load_transfer.hpp"
+#include "sysid/effects/limited_slip_differential.hpp"
+#include "sysid/effects/locked_differential.hpp"
+#include "sysid/effects/longitudinal_load_transfer.hpp"
 #include "sysid/effects/mass.hpp"
+#include "sysid/effects/rear_toe.hpp"
 #include "sysid/effects/road_bank.hpp"
 #include "sysid/effects/road_grade.hpp"
 #include "sysid/effects/rolling_resistance.hpp"
+#include "sysid/effects/sensor_delay.hpp"
 #include "sysid/effects/side_wind.hpp"
+#include "sysid/effects/speed_sensor_lever_arm.hpp"
+#include "sysid/effects/speed_sensor_misalignment.hpp"
 #include "sysid/effects/steer_compliance.hpp"
+#include "sysid/effects/steer_delay.hpp"
 #include "sysid/effects/steer_lag.hpp"
+#include "sysid/effects/steer_nonlinearity.hpp"
 #include "sysid/effects/steer_offset.hpp"
 #include "sysid/effects/steer_ratio.hpp"
 #include "sysid/effects/tyre_load_sensitivity.hpp"
 #include "sysid/effects/tyre_relaxation.hpp"
+#include "sysid/effects/tyre_temperature.hpp"
 #include "sysid/effects/yaw_inertia.hpp"
 
 namespace sysid {
 
-/// The order matters within a stage: the offset and ratio of the logged angle come before its lag.
+/// The order matters within a stage: what the grip is comes before what the friction ellipse leaves
+/// of it, errors of the logged angle before its delay and lag, the lean of an accelerometer before
+/// its own errors.
 using Catalogue =
-    std::tuple<AeroDownforce, AeroDrag, RollingResistance, TyreLoadSensitivity, LateralLoadTransfer,
-               CombinedSlip, TyreRelaxation, SteerOffset, SteerRatio, SteerLag, SteerCompliance,
-               RoadBank, RoadGrade, SideWind, Mass, YawInertia, CgPosition, DriveYawMoment,
-               ImuLeverArm, AccelerometerBias, GyroBias, AccelerometerScale>;
+    std::tuple<AeroDownforce, AeroDrag, RollingResistance, HeadWind, TyreLoadSensitivity,
+               LateralLoadTransfer, LongitudinalLoadTransfer, FrictionChange, TyreTemperature,
+               ForceGain, ForceSplit, CombinedSlip, AligningMoment, RearToe, TyreRelaxation,
+               SteerOffset, SteerRatio, SteerNonlinearity, SteerDelay, SteerLag, SteerCompliance,
+               RoadBank, RoadGrade, SideWind, Mass, YawInertia, CgPosition, LockedDifferential,
+               LimitedSlipDifferential, DriveYawMoment, SensorDelay, SpeedSensorLeverArm,
+               SpeedSensorMisalignment, ImuLeverArm, BodyAttitude, AccelerometerBias, GyroScale,
+               GyroBias, AccelerometerScale>;
 
 constexpr std::size_t kEffectCount = std::tuple_size_v<Catalogue>;
 
@@ -66,23 +90,77 @@ constexpr std::size_t kEffectParameterCount = effect_offset(kEffectCount);
 
 namespace detail {
 
-template <class T, class Visit, std::size_t... I>
-void visit_active(EffectMask mask, const T* p, Visit&& visit,
-                  std::index_sequence<I...> /*unused*/) {
-    (((mask >> I) & 1U ? visit(std::tuple_element_t<I, Catalogue>{}, p + effect_offset(I))
-                       : void()),
-     ...);
+template <std::size_t... I>
+constexpr std::array<std::size_t, kEffectCount> collect_state_counts(
+    std::index_sequence<I...> /*unused*/) {
+    return {std::tuple_element_t<I, Catalogue>::state_count...};
 }
+constexpr auto kEffectStateCounts = collect_state_counts(std::make_index_sequence<kEffectCount>{});
 
-template <class T, class Visit, std::size_t... I>
-void visit_backwards(EffectMask mask, const T* p, Visit&& visit,
-                     std::index_sequence<I...> /*unused*/) {
-    (visit_active(mask, p, visit, std::index_sequence<kEffectCount - 1 - I>{}), ...);
+template <std::size_t... I>
+constexpr std::array<double, kEffectCount> collect_state_spreads(
+    std::index_sequence<I...> /*unused*/) {
+    return {std::tuple_element_t<I, Catalogue>::state_spread...};
+}
+constexpr auto kEffectStateSpreads =
+    collect_state_spreads(std::make_index_sequence<kEffectCount>{});
+
+template <std::size_t... I>
+constexpr EffectMask mask_reading_yaw_acceleration(std::index_sequence<I...> /*unused*/) {
+    return ((std::tuple_element_t<I, Catalogue>::reads_yaw_acceleration ? EffectMask{1} << I : 0) |
+            ...);
 }
 
 }  // namespace detail
 
-/// Calls `visit(effect, its parameters)` for every effect of `mask`, in catalogue order.
+/// Where the states of effect `index` begin among those of the whole catalogue.
+constexpr std::size_t effect_state_offset(std::size_t index) {
+    std::size_t offset = 0;
+    for (std::size_t i = 0; i < index; ++i) offset += detail::kEffectStateCounts[i];
+    return offset;
+}
+/// Standard deviations of all those states when a run begins.
+constexpr std::array<double, effect_state_offset(kEffectCount)> effect_state_spreads() {
+    std::array<double, effect_state_offset(kEffectCount)> spreads{};
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < kEffectCount; ++i)
+        for (std::size_t n = 0; n < detail::kEffectStateCounts[i]; ++n)
+            spreads[at++] = detail::kEffectStateSpreads[i];
+    return spreads;
+}
+constexpr int kAuxiliaryStates = static_cast<int>(effect_state_offset(kEffectCount));
+
+constexpr EffectMask kReadYawAcceleration =
+    detail::mask_reading_yaw_acceleration(std::make_index_sequence<kEffectCount>{});
+
+namespace detail {
+
+// An effect for which `visit` returns `Idle` does not act there, and leaves no code behind.
+template <std::size_t I, class T, class Visit>
+void visit_one(EffectMask mask, const T* p, Visit& visit) {
+    using E = std::tuple_element_t<I, Catalogue>;
+    if constexpr (!std::is_same_v<decltype(visit(E{}, p, I)), Idle>) {
+        constexpr std::size_t at = effect_offset(I);
+        constexpr std::size_t state = effect_state_offset(I);
+        if ((mask >> I) & 1U) visit(E{}, p + at, state);
+    }
+}
+
+template <class T, class Visit, std::size_t... I>
+void visit_active(EffectMask mask, const T* p, Visit& visit, std::index_sequence<I...> /*unused*/) {
+    (visit_one<I>(mask, p, visit), ...);
+}
+
+template <class T, class Visit, std::size_t... I>
+void visit_backwards(EffectMask mask, const T* p, Visit& visit,
+                     std::index_sequence<I...> /*unused*/) {
+    (visit_one<kEffectCount - 1 - I>(mask, p, visit), ...);
+}
+
+}  // namespace detail
+
+/// Calls `visit(effect, its parameters, index of its first state)` for every effect of `mask`, in
+/// catalogue order. Effects for which that returns `Idle` cost nothing.
 template <class T, class Visit>
 void for_each_active(EffectMask mask, const T* effect_parameters, Visit&& visit) {
     if (mask == 0) return;
@@ -95,6 +173,26 @@ void for_each_active_backwards(EffectMask mask, const T* effect_parameters, Visi
     if (mask == 0) return;
     detail::visit_backwards(mask, effect_parameters, visit,
                             std::make_index_sequence<kEffectCount>{});
+}
+
+/// The states of a model's effects, by their place among those of the whole catalogue.
+struct ActiveStates {
+    std::array<std::size_t, kAuxiliaryStates> place{};
+    std::size_t count = 0;
+    const std::size_t* begin() const { return place.data(); }
+    const std::size_t* end() const { return place.data() + count; }
+};
+
+inline ActiveStates active_states(EffectMask mask) {
+    ActiveStates found;
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < kEffectCount; ++i) {
+        const std::size_t own = detail::kEffectStateCounts[i];
+        for (std::size_t n = 0; n < own && ((mask >> i) & 1U); ++n)
+            found.place[found.count++] = at + n;
+        at += own;
+    }
+    return found;
 }
 
 }  // namespace sysid

@@ -13,8 +13,10 @@ struct CgPosition : Effect {
         "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 5",
         "a ramp to the limit and a sweep; axle scales settle it",
         "yaw_rate_radps, vy_mps",
+        "steer_rad, vx_mps, yaw_rate_radps",
+        "aligning_moment, imu_lever_arm, speed_sensor_lever_arm",
         1,
-        {{"shift_rearward_m", "m", 0.0, 0.08, 0.02, -0.8, 0.8}},
+        {{"shift_rearward_m", "m", 0.0, 0.08, 0.02, -0.8, 0.8, -0.1, 0.1}},
     };
 
     template <class T, class S>

@@ -1,7 +1,6 @@
 #pragma once
 
 #include "sysid/effects/effect.hpp"
-#include "sysid/math/dual.hpp"
 
 namespace sysid {
 
@@ -15,12 +14,14 @@ struct CombinedSlip : Effect {
         "Pacejka, Tire and Vehicle Dynamics (3rd ed.), ch. 4",
         "braking and accelerating while cornering",
         "ay_mps2, yaw_rate_radps",
+        "steer_rad, vx_mps, yaw_rate_radps",
+        "longitudinal_load_transfer, force_split",
         1,
-        {{"ellipse", "1", 0.0, 1.0, 0.2, 0.0, 1.5}},
+        {{"ellipse", "1", 0.0, 1.0, 0.2, 0.0, 1.5, 0.5, 1.0}},
     };
 
     template <class T, class S>
-    static void grip(const T* p, Workings<S>& w) {
+    static void grip(const T* p, Workings<S>& w, const S* /*state*/) {
         w.grip_f *= left_over(p[0], w.fx_f / (w.mu_peak_f * w.fz_f));
         w.grip_r *= left_over(p[0], w.fx_r / (w.mu_peak_r * w.fz_r));
     }

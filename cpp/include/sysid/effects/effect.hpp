@@ -2,16 +2,21 @@
 //
 // An effect is a struct that derives from `Effect`, states its `info`, and shadows the stages at
 // which it acts. Stages run in the order they are declared here, and within a stage in the order of
-// the catalogue, `input` in the reverse order. `p` points at the effect's own parameters; at their
-// null values nothing must change.
+// the catalogue, `input` in the reverse order. `p` points at the effect's own parameters, `state`
+// and `state_rate` at its own states; at the null values of the parameters nothing must change.
 #pragma once
 
 #include <cmath>
 #include <cstddef>
 
+#include "sysid/math/dual.hpp"
 #include "sysid/model/workings.hpp"
 
 namespace sysid {
+
+/// A parameter that means nothing while the effect is null, and how its value is looked for then:
+/// over the time of the log, or over its typical range.
+enum class Scan { kNone, kTime, kRange };
 
 struct ParameterInfo {
     const char* name;
@@ -20,6 +25,9 @@ struct ParameterInfo {
     double typical;     // a size one meets in practice
     double matters;     // smallest size worth acting on
     double lower, upper;
+    double typical_low, typical_high;  // where most cars lie that have the effect
+    bool mirrored = false;             // changes its sign in a mirror that swaps left and right
+    Scan scan = Scan::kNone;
 };
 
 constexpr std::size_t kMaxEffectParameters = 2;
@@ -31,35 +39,86 @@ struct EffectInfo {
     const char* source;
     const char* excited_by;  // which driving shows it
     const char* moves;       // which measured channels it moves first
+    const char* needs;       // channels a log must have for the effect to be told at all
+    const char* twins;       // effects that act alike in most driving; said by both
     std::size_t parameter_count;
     ParameterInfo parameters[kMaxEffectParameters];
     // Derivative at the null value does not exist (a lag of zero): scored at a finite size instead.
     bool scored_at_typical = false;
     // Visible only through a known longitudinal force.
     bool needs_force = false;
+    // Effect through which it chiefly acts; weak in a model without that.
+    const char* through = "";
 };
 
 /// Lags act no faster than this [1/s]: minutes of driving hardly resolve a quarter of a
 /// millisecond, and integration would need ever shorter steps.
 constexpr double kFastestLag = 4000.0;
 
+template <class T>
+T resolvable(const T& time_constant) {
+    return value_of(time_constant) > 1.0 / kFastestLag ? time_constant : T(1.0 / kFastestLag);
+}
+
+inline double lag_rate(double time_constant) {
+    return time_constant > 0.0 ? 1.0 / resolvable(time_constant) : 0.0;
+}
+
+/// What a stage returns at which an effect does not act: it is left out when compiling.
+struct Idle {};
+
 struct Effect {
+    /// States of the effect's own; each follows something with a first-order lag.
+    static constexpr std::size_t state_count = 0;
+    /// Standard deviation of the states when a run begins, in their own unit.
+    static constexpr double state_spread = 0.02;
+    /// Whether the stage `input` reads the yaw acceleration, which the forces settle only later.
+    static constexpr bool reads_yaw_acceleration = false;
+
     template <class T, class S>
-    static void vehicle(const T* /*p*/, Workings<S>& /*w*/) {}
+    static Idle vehicle(const T* /*p*/, Workings<S>& /*w*/) {
+        return {};
+    }
     template <class T, class S>
-    static void input(const T* /*p*/, Workings<S>& /*w*/) {}
+    static Idle input(const T* /*p*/, Workings<S>& /*w*/) {
+        return {};
+    }
     template <class T, class S>
-    static void steering(const T* /*p*/, Workings<S>& /*w*/, const S* /*aux*/, S* /*aux_rate*/) {}
+    static Idle steering(const T* /*p*/, Workings<S>& /*w*/, const S* /*state*/,
+                         S* /*state_rate*/) {
+        return {};
+    }
     template <class T, class S>
-    static void body(const T* /*p*/, Workings<S>& /*w*/) {}
+    static Idle body(const T* /*p*/, Workings<S>& /*w*/) {
+        return {};
+    }
     template <class T, class S>
-    static void slip(const T* /*p*/, Workings<S>& /*w*/, const S* /*aux*/, S* /*aux_rate*/) {}
+    static Idle slip(const T* /*p*/, Workings<S>& /*w*/, const S* /*state*/, S* /*state_rate*/) {
+        return {};
+    }
     template <class T, class S>
-    static void loads(const T* /*p*/, Workings<S>& /*w*/) {}
+    static Idle loads(const T* /*p*/, Workings<S>& /*w*/) {
+        return {};
+    }
     template <class T, class S>
-    static void grip(const T* /*p*/, Workings<S>& /*w*/) {}
+    static Idle grip(const T* /*p*/, Workings<S>& /*w*/, const S* /*state*/) {
+        return {};
+    }
+    /// The lateral axle forces are known, their sums are not yet formed.
     template <class T, class S>
-    static void sensors(const T* /*p*/, const Workings<S>& /*w*/, S* /*y*/) {}
+    static Idle forces(const T* /*p*/, Workings<S>& /*w*/) {
+        return {};
+    }
+    /// Everything is known: for states that follow results.
+    template <class T, class S>
+    static Idle follow(const T* /*p*/, const Workings<S>& /*w*/, const S* /*state*/,
+                       S* /*state_rate*/) {
+        return {};
+    }
+    template <class T, class S>
+    static Idle sensors(const T* /*p*/, const Workings<S>& /*w*/, const S* /*state*/, S* /*y*/) {
+        return {};
+    }
     /// Fastest rate [1/s] the effect adds, so that the integrator can take short enough steps.
     static double rate(const double* /*p*/, double /*v_x*/) { return 0.0; }
 };

@@ -13,20 +13,23 @@ struct ImuLeverArm : Effect {
         "Klein & Morelli, Aircraft System Identification, ch. 10",
         "sweeps and tight circles",
         "ay_mps2, ax_mps2",
+        "ay_mps2, yaw_rate_radps",
+        "cg_position",
         2,
         {
-            {"forward_m", "m", 0.0, 0.5, 0.05, -4.0, 4.0},
-            {"left_m", "m", 0.0, 0.3, 0.05, -2.0, 2.0},
+            {"forward_m", "m", 0.0, 0.5, 0.05, -4.0, 4.0, 0.1, 0.8},
+            {"left_m", "m", 0.0, 0.3, 0.05, -2.0, 2.0, 0.1, 0.5, true},
         },
     };
 
+    static constexpr bool reads_yaw_acceleration = true;
+
     template <class T, class S>
     static void input(const T* p, Workings<S>& w) {
-        // l_y dr/dt is left out: the yaw acceleration follows from the forces, which come later.
-        w.ax_input += p[0] * (w.r * w.r);
+        w.ax_input += p[0] * (w.r * w.r) + p[1] * w.r_dot;
     }
     template <class T, class S>
-    static void sensors(const T* p, const Workings<S>& w, S* y) {
+    static void sensors(const T* p, const Workings<S>& w, const S* /*state*/, S* y) {
         y[kAx] = y[kAx] - (p[0] * (w.r * w.r) + p[1] * w.r_dot);
         y[kAy] += p[0] * w.r_dot - p[1] * (w.r * w.r);
     }

@@ -14,8 +14,10 @@ struct RoadBank : Effect {
         "Rajamani, Vehicle Dynamics and Control, ch. 2; Ryu & Gerdes, ACC 2004",
         "the same road in both directions, with measured sideslip",
         "vy_mps",
+        "steer_rad, vx_mps, yaw_rate_radps, ay_mps2",
+        "steer_offset, rear_toe, side_wind, gyro_bias, accelerometer_bias",
         1,
-        {{"bank_rad", "rad", 0.0, 0.05, 0.01, -0.8, 0.8}},
+        {{"bank_rad", "rad", 0.0, 0.05, 0.01, -0.8, 0.8, 0.02, 0.12, true}},
     };
 
     template <class T, class S>

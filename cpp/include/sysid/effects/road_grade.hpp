@@ -14,8 +14,10 @@ struct RoadGrade : Effect {
         "Rajamani, Vehicle Dynamics and Control, eq. (4.1)",
         "the same road out and back",
         "vx_mps",
+        "vx_mps, ax_mps2",
+        "aero_drag, rolling_resistance, head_wind, force_gain, accelerometer_bias",
         1,
-        {{"grade_rad", "rad", 0.0, 0.03, 0.005, -0.5, 0.5}},
+        {{"grade_rad", "rad", 0.0, 0.03, 0.005, -0.5, 0.5, 0.01, 0.06}},
     };
 
     template <class T, class S>

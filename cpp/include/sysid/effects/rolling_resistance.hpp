@@ -5,24 +5,29 @@
 
 namespace sysid {
 
-/// Rolling resistance of all wheels together.
+/// Rolling resistance of all wheels together, and its rise with speed.
 struct RollingResistance : Effect {
     static constexpr EffectInfo info{
         "rolling_resistance",
         "rolling resistance",
-        "F_x -= f_0 m g",
+        "F_x -= (f_0 + f_1 v_x) m g",
         "Gillespie, Fundamentals of Vehicle Dynamics, ch. 4",
         "coasting at low and high speed",
         "vx_mps, ax_mps2",
-        1,
-        {{"coefficient", "1", 0.0, 0.012, 0.003, -0.05, 0.1}},
+        "fx_n, vx_mps",
+        "aero_drag, road_grade, head_wind, force_gain",
+        2,
+        {
+            {"coefficient", "1", 0.0, 0.012, 0.003, -0.05, 0.1, 0.008, 0.015},
+            {"per_speed_spm", "s/m", 0.0, 2.5e-4, 6.0e-5, -0.002, 0.004, 0.0, 4.0e-4},
+        },
         false,
         true,
     };
 
     template <class T, class S>
     static void body(const T* p, Workings<S>& w) {
-        w.force_x = w.force_x - p[0] * (w.m * kGravity);
+        w.force_x = w.force_x - (p[0] + p[1] * w.v_x) * (w.m * kGravity);
     }
 };
 

@@ -14,12 +14,14 @@ struct SteerCompliance : Effect {
         "Gillespie, Fundamentals of Vehicle Dynamics, ch. 6",
         "a ramp at constant speed together with slow tight circles",
         "yaw_rate_radps, ay_mps2",
+        "steer_rad, vx_mps, yaw_rate_radps",
+        "lateral_load_transfer, steer_ratio, steer_nonlinearity, aligning_moment",
         1,
-        {{"compliance_radpn", "rad/N", 0.0, 1.5e-6, 3.0e-7, -1.0e-5, 2.0e-5}},
+        {{"compliance_radpn", "rad/N", 0.0, 1.5e-6, 3.0e-7, -1.0e-5, 2.0e-5, 5e-7, 2e-6}},
     };
 
     template <class T, class S>
-    static void steering(const T* p, Workings<S>& w, const S* /*aux*/, S* /*aux_rate*/) {
+    static void steering(const T* p, Workings<S>& w, const S* /*state*/, S* /*state_rate*/) {
         w.delta = w.delta - p[0] * (w.m * w.l_r / (w.l_f + w.l_r) * w.v_x * w.r);
     }
 };

@@ -1,9 +1,6 @@
 #pragma once
 
-#include <algorithm>
-
 #include "sysid/effects/effect.hpp"
-#include "sysid/math/dual.hpp"
 
 namespace sysid {
 
@@ -16,21 +13,21 @@ struct SteerLag : Effect {
         "Rajamani, Vehicle Dynamics and Control, ch. 2",
         "fast sweeps and steps of the steering",
         "yaw_rate_radps, ay_mps2",
+        "steer_rad, vx_mps, yaw_rate_radps",
+        "tyre_relaxation, steer_delay, sensor_delay",
         1,
-        {{"time_constant_s", "s", 0.0, 0.06, 0.01, 0.0, 0.5}},
+        {{"time_constant_s", "s", 0.0, 0.06, 0.01, 0.0, 0.5, 0.02, 0.08}},
         true,
     };
+    static constexpr std::size_t state_count = 1;
 
     template <class T, class S>
-    static void steering(const T* p, Workings<S>& w, const S* aux, S* aux_rate) {
+    static void steering(const T* p, Workings<S>& w, const S* state, S* state_rate) {
         if (!(value_of(p[0]) > 0.0)) return;
-        const T time_constant = value_of(p[0]) > 1.0 / kFastestLag ? p[0] : T(1.0 / kFastestLag);
-        aux_rate[kSteerLagged] = (w.delta - aux[kSteerLagged]) / time_constant;
-        w.delta = aux[kSteerLagged];
+        state_rate[0] = (w.delta - state[0]) / resolvable(p[0]);
+        w.delta = state[0];
     }
-    static double rate(const double* p, double /*v_x*/) {
-        return p[0] > 0.0 ? std::min(1.0 / p[0], kFastestLag) : 0.0;
-    }
+    static double rate(const double* p, double /*v_x*/) { return lag_rate(p[0]); }
 };
 
 }  // namespace sysid

@@ -13,12 +13,14 @@ struct SteerOffset : Effect {
         "Gillespie, Fundamentals of Vehicle Dynamics, ch. 8",
         "straight driving and corners in both directions",
         "ay_mps2, yaw_rate_radps",
+        "steer_rad, vx_mps, yaw_rate_radps",
+        "rear_toe, speed_sensor_misalignment, side_wind, road_bank",
         1,
-        {{"offset_rad", "rad", 0.0, 0.006, 0.001, -0.2, 0.2}},
+        {{"offset_rad", "rad", 0.0, 0.006, 0.001, -0.2, 0.2, 0.002, 0.01, true}},
     };
 
     template <class T, class S>
-    static void steering(const T* p, Workings<S>& w, const S* /*aux*/, S* /*aux_rate*/) {
+    static void steering(const T* p, Workings<S>& w, const S* /*state*/, S* /*state_rate*/) {
         w.delta += p[0];
     }
 };

@@ -13,12 +13,14 @@ struct SteerRatio : Effect {
         "Gillespie, Fundamentals of Vehicle Dynamics, ch. 8",
         "slow tight circles together with fast driving",
         "yaw_rate_radps, ay_mps2",
+        "steer_rad, vx_mps, yaw_rate_radps",
+        "steer_compliance, steer_nonlinearity",
         1,
-        {{"ratio_error", "1", 0.0, 0.08, 0.02, -0.6, 0.6}},
+        {{"ratio_error", "1", 0.0, 0.08, 0.02, -0.6, 0.6, -0.1, 0.1}},
     };
 
     template <class T, class S>
-    static void steering(const T* p, Workings<S>& w, const S* /*aux*/, S* /*aux_rate*/) {
+    static void steering(const T* p, Workings<S>& w, const S* /*state*/, S* /*state_rate*/) {
         w.delta *= 1.0 + p[0];
     }
 };

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "sysid/effects/effect.hpp"
-#include "sysid/math/dual.hpp"
 
 namespace sysid {
 
@@ -16,20 +15,23 @@ struct TyreRelaxation : Effect {
         "Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (7.18)",
         "steps and sweeps of the steering at low and high speed",
         "ay_mps2, yaw_rate_radps",
+        "steer_rad, vx_mps, yaw_rate_radps",
+        "steer_lag, steer_delay, yaw_inertia",
         1,
-        {{"relaxation_length_m", "m", 0.0, 0.45, 0.1, 0.0, 3.0}},
+        {{"relaxation_length_m", "m", 0.0, 0.45, 0.1, 0.0, 3.0, 0.2, 0.7}},
         true,
     };
+    static constexpr std::size_t state_count = 2;
 
     template <class T, class S>
-    static void slip(const T* p, Workings<S>& w, const S* aux, S* aux_rate) {
+    static void slip(const T* p, Workings<S>& w, const S* state, S* state_rate) {
         if (!(value_of(p[0]) > 0.0)) return;
         S rate = w.v_x / p[0];
         if (value_of(rate) > kFastestLag) rate = S(kFastestLag);
-        aux_rate[kSlipFrontLagged] = rate * (w.alpha_f - aux[kSlipFrontLagged]);
-        aux_rate[kSlipRearLagged] = rate * (w.alpha_r - aux[kSlipRearLagged]);
-        w.alpha_f = aux[kSlipFrontLagged];
-        w.alpha_r = aux[kSlipRearLagged];
+        state_rate[0] = rate * (w.alpha_f - state[0]);
+        state_rate[1] = rate * (w.alpha_r - state[1]);
+        w.alpha_f = state[0];
+        w.alpha_r = state[1];
     }
     static double rate(const double* p, double v_x) {
         return p[0] > 0.0 ? std::min(v_x / p[0], kFastestLag) : 0.0;

@@ -48,18 +48,7 @@ struct Problem {
     }
 };
 
-inline bool has_own_states(EffectMask mask) {
-    bool found = false;
-    const std::array<double, kEffectParameterCount> ones = [] {
-        std::array<double, kEffectParameterCount> a{};
-        a.fill(1.0);
-        return a;
-    }();
-    for_each_active(mask, ones.data(), [&](auto effect, const double* p) {
-        found = found || effect.rate(p, 1.0) > 0.0;
-    });
-    return found;
-}
+inline bool has_own_states(EffectMask mask) { return active_states(mask).count > 0; }
 
 /// Where a run starts: the measured motion where there is one, settled auxiliary states.
 template <class S = double, class T>

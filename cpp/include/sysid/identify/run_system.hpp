@@ -1,17 +1,24 @@
 // A run of a car as a state-space system for the extended Kalman filter.
 #pragma once
 
+#include <functional>
+
 #include "sysid/estimate/kalman.hpp"
 #include "sysid/identify/problem.hpp"
 
 namespace sysid {
 
-/// State: v_x, v_y, r, disturbing F_x, F_y, M_z and, for NX = 9, the auxiliary states.
+/// State: v_x, v_y, r, disturbing F_x, F_y, M_z, then the states of the model's own effects; what
+/// is left of NX stands still at zero and is certain.
 template <int NX>
 class RunSystem {
   public:
     RunSystem(const SingleTrack& model, const Run& run, const double* p, const Noise& noise)
-        : model_(model), run_(run), p_(p), start_(initial_state(model, run, p)) {
+        : model_(model),
+          run_(run),
+          p_(p),
+          own_(active_states(model.effects)),
+          start_(initial_state(model, run, p)) {
         forget_ = std::exp(-run.dt / noise.correlation_time_s);
         process_.setZero();
         for (int i = 0; i < kMotionStates; ++i) {
@@ -34,8 +41,7 @@ class RunSystem {
     Vec<NX> initial_mean() const {
         Vec<NX> x = Vec<NX>::Zero();
         for (int i = 0; i < kMotionStates; ++i) x[i] = start_[static_cast<std::size_t>(i)];
-        for (int i = kStatesPlain; i < NX; ++i)
-            x[i] = start_[static_cast<std::size_t>(i) - kMotionStates];
+        for (std::size_t i = 0; i < own_.count; ++i) x[packed(i)] = start_[place(i)];
         return x;
     }
 
@@ -46,68 +52,90 @@ class RunSystem {
         variance[1] = 1.0;
         variance[2] = 0.04;
         variance.template segment<kMotionStates>(kMotionStates) = wander_variance_;
-        for (int i = kStatesPlain; i < NX; ++i) variance[i] = 4e-4;
+        constexpr auto spreads = effect_state_spreads();
+        for (std::size_t i = 0; i < own_.count; ++i)
+            variance[packed(i)] = spreads[own_.place[i]] * spreads[own_.place[i]];
         return variance.asDiagonal();
     }
 
     std::size_t size() const { return run_.size(); }
 
     Vec<NX> predict(std::size_t k, const Vec<NX>& x, Mat<NX, NX>& A, Mat<NX, NX>& Q) const {
-        using D = Dual<NX>;
-        ModelState<D> s;
-        std::array<D, kPushes> push;
-        load(x, s, push);
-        const int substeps = substeps_for(model_, p_, x[0], run_.dt);
-        advance(model_, s, push.data(), run_.inputs[k - 1], run_.inputs[k], p_, run_.dt, substeps);
         A.setZero();
-        Vec<NX> next;
-        for (int i = 0; i < NX; ++i) {
-            if (i >= kMotionStates && i < kStatesPlain) {
-                next[i] = forget_ * x[i];
-                A(i, i) = forget_;
-                continue;
-            }
-            const D& moved = s[static_cast<std::size_t>(i < kMotionStates ? i : i - kMotionStates)];
-            next[i] = moved.v;
-            for (int j = 0; j < NX; ++j) A(i, j) = moved.d[static_cast<std::size_t>(j)];
+        Vec<NX> next = Vec<NX>::Zero();
+        for (int i = kMotionStates; i < kStatesPlain; ++i) {
+            next[i] = forget_ * x[i];
+            A(i, i) = forget_;
         }
+        const int substeps = substeps_for(model_, p_, x[0], run_.dt);
+        in_passes(x, [&](ModelState<D>& s, const auto& push, auto&& keep) {
+            advance(model_, s, push.data(), run_.inputs[k - 1], run_.inputs[k], p_, run_.dt,
+                    substeps);
+            for (int i = 0; i < kMotionStates; ++i)
+                keep(s[static_cast<std::size_t>(i)], i, next, A);
+            for (std::size_t i = 0; i < own_.count; ++i) keep(s[place(i)], packed(i), next, A);
+        });
         Q = process_;
         return next;
     }
 
     Vec<kChannels> observe(std::size_t k, const Vec<NX>& x, Mat<kChannels, NX>& H) const {
-        using D = Dual<NX>;
-        ModelState<D> s;
-        std::array<D, kPushes> push;
-        load(x, s, push);
-        const auto y = sense(model_, s, push.data(), run_.inputs[k], p_);
         Vec<kChannels> expected;
-        for (int i = 0; i < kChannels; ++i) {
-            const D& reading = y[static_cast<std::size_t>(i)];
-            expected[i] = reading.v;
-            for (int j = 0; j < NX; ++j) H(i, j) = reading.d[static_cast<std::size_t>(j)];
-        }
+        in_passes(x, [&](ModelState<D>& s, const auto& push, auto&& keep) {
+            const auto y = sense(model_, s, push.data(), run_.inputs[k], p_);
+            for (int i = 0; i < kChannels; ++i)
+                keep(y[static_cast<std::size_t>(i)], i, expected, H);
+        });
         return expected;
     }
+
+    /// Where the effects' state number `i` stands in the filter's state, and in the model's.
+    static int packed(std::size_t i) { return kStatesPlain + static_cast<int>(i); }
+    std::size_t place(std::size_t i) const { return kMotionStates + own_.place[i]; }
+    const ActiveStates& own() const { return own_; }
 
     const Vec<kChannels>& measurement(std::size_t k) const { return run_.measurements[k]; }
     const Mat<kChannels, kChannels>& measurement_noise(std::size_t /*k*/) const { return sensors_; }
 
   private:
-    template <class D>
-    void load(const Vec<NX>& x, ModelState<D>& s, std::array<D, kPushes>& push) const {
-        for (std::size_t i = 0; i < kModelStates; ++i) s[i] = D(start_[i]);
-        for (int i = 0; i < kMotionStates; ++i) {
-            s[static_cast<std::size_t>(i)] = D::seeded(x[i], i);
-            push[static_cast<std::size_t>(i)] = D::seeded(x[kMotionStates + i], kMotionStates + i);
+    // So many directions at once: the model is compiled for few widths.
+    static constexpr int kPass = NX % 9 == 0 ? 9 : 6;
+    static_assert(NX % kPass == 0);
+    using D = Dual<kPass>;
+
+    /// Calls `use` with every state in turn as a direction; `keep` stores a row of what results.
+    template <class Use>
+    void in_passes(const Vec<NX>& x, Use&& use) const {
+        const int wanted = kStatesPlain + static_cast<int>(own_.count);
+        for (int first = 0; first < NX; first += kPass) {
+            ModelState<D> s{};
+            std::array<D, kPushes> push{};
+            const auto seeded = [&](int i) {
+                D value(x[i]);
+                if (i >= first && i < first + kPass)
+                    value.d[static_cast<std::size_t>(i - first)] = 1.0;
+                return value;
+            };
+            for (int i = 0; i < kMotionStates; ++i) {
+                s[static_cast<std::size_t>(i)] = seeded(i);
+                push[static_cast<std::size_t>(i)] = seeded(kMotionStates + i);
+            }
+            for (std::size_t i = 0; i < own_.count; ++i) s[place(i)] = seeded(packed(i));
+            use(s, push, [&](const D& value, int row, auto& values, auto& slopes) {
+                values[row] = value.v;
+                for (int j = 0; j < kPass; ++j)
+                    slopes(row, first + j) = value.d[static_cast<std::size_t>(j)];
+            });
+            if (first + kPass >= wanted) {
+                break;
+            }
         }
-        for (int i = kStatesPlain; i < NX; ++i)
-            s[static_cast<std::size_t>(i - kMotionStates)] = D::seeded(x[i], i);
     }
 
     const SingleTrack& model_;
     const Run& run_;
     const double* p_;
+    ActiveStates own_;
     ModelState<double> start_;
     double forget_ = 0.0;
     Vec<kMotionStates> wander_variance_;
@@ -115,11 +143,28 @@ class RunSystem {
     Mat<kChannels, kChannels> sensors_;
 };
 
-/// Calls `use(std::integral_constant<int, NX>)` with the state size the effects need.
+/// State sizes for models without states of the effects' own, with a few, and with all of them.
+constexpr int kStatesFew = kStatesPlain + 3;
+constexpr int kStatesMost = (kStatesFull + 8) / 9 * 9;
+
+/// Calls `use(std::integral_constant<int, NX>)` with a state size that holds the effects' states.
 template <class Use>
 auto with_state_size(EffectMask effects, Use&& use) {
-    if (has_own_states(effects)) return use(std::integral_constant<int, kStatesFull>{});
-    return use(std::integral_constant<int, kStatesPlain>{});
+    const std::size_t own = active_states(effects).count;
+    if (own == 0) return use(std::integral_constant<int, kStatesPlain>{});
+    if (own <= 3) return use(std::integral_constant<int, kStatesFew>{});
+    return use(std::integral_constant<int, kStatesMost>{});
 }
+
+template <int NX>
+using KeepStep = std::function<void(std::size_t, const FilterStep<NX, kChannels>&)>;
+
+/// The filter over a run from its usual start; compiled once, in `run_system.cpp`.
+template <int NX>
+double filter_run(const RunSystem<NX>& system, const KeepStep<NX>& keep);
+
+extern template double filter_run(const RunSystem<kStatesPlain>&, const KeepStep<kStatesPlain>&);
+extern template double filter_run(const RunSystem<kStatesFew>&, const KeepStep<kStatesFew>&);
+extern template double filter_run(const RunSystem<kStatesMost>&, const KeepStep<kStatesMost>&);
 
 }  // namespace sysid

@@ -144,6 +144,7 @@ class ClosedLoop {
         const Input before = next_.acts;
         next_ = {};
         next_.acts = before;
+        next_.acts.time_s = static_cast<double>(k) * data_.dt;
         if (data_.steer_by == SteerBy::kTrack) {
             const TrackDriver::Sight sight =
                 driver_.look(place_.x_m, place_.y_m, place_.heading_rad, wanted.speed_mps);

@@ -89,7 +89,7 @@ class Plant {
     std::array<double, kChannels> sensed(const PlantState& x, const Input& u,
                                          const Pushes& push) const {
         std::array<double, kChannels> y;
-        model_.sense(workings(x, u, push), parameters_.data(), y.data());
+        model_.sense(workings(x, u, push), parameters_.data(), x.data() + kMotionStates, y.data());
         return y;
     }
 
@@ -127,7 +127,7 @@ class Plant {
             model_.evaluate(x.data(), push.data(), x.data() + kMotionStates, u, parameters_.data(),
                             rate.data(), rate.data() + kMotionStates);
         for_each_active(model_.effects, parameters_.data() + kBaseParameterCount,
-                        [&](auto effect, const double* own) {
+                        [&](auto effect, const double* own, std::size_t /*state*/) {
                             if constexpr (std::is_same_v<decltype(effect), AeroDownforce>) {
                                 w.fz_f += sideways * own[0];
                                 w.fz_r += sideways * own[1];

@@ -12,12 +12,14 @@ template <class S>
 struct Workings {
     // the car (stage `vehicle`)
     S m, I_z, l_f, l_r;
-    double h = 0.0;    // height of the centre of gravity [m]
-    double rho = 0.0;  // air density [kg/m3]
-    S drag_area;       // C_d A [m2]
-    S fz0_f, fz0_r;    // static axle loads [N]
+    S h;                         // height of the centre of gravity [m]
+    double rho = 0.0;            // air density [kg/m3]
+    S drag_area;                 // C_d A [m2]
+    S brake_front, drive_front;  // shares of the front axle in brake and drive force
+    S fz0_f, fz0_r;              // static axle loads [N]
     // motion
     S v_x, v_y, r;
+    double time_s = 0.0;  // since the log began
     // inputs (stages `input` and `steering`)
     S delta;     // road-wheel angle that acts [rad]
     S fx;        // total wheel force [N], or
@@ -30,17 +32,14 @@ struct Workings {
     S alpha_f, alpha_r;      // slip angles [rad]
     S fx_f, fx_r;            // longitudinal axle forces [N]
     S fz_f, fz_r;            // axle loads [N]
-    S mu_peak_f, mu_peak_r;  // D of the Magic Formula
+    S B_f, B_r;              // B of the Magic Formula [1/rad]
+    S mu_peak_f, mu_peak_r;  // its D
     S grip_f, grip_r;        // factors on the lateral axle forces
     S fy_f, fy_r;            // lateral axle forces [N]
     // results
     S a_x, a_y;  // specific force at the centre of gravity [m/s2]
     S r_dot;     // yaw acceleration [rad/s2]
 };
-
-/// States some effects own: a lagging road-wheel angle and lagging slip angles.
-enum AuxiliaryState : int { kSteerLagged = 0, kSlipFrontLagged = 1, kSlipRearLagged = 2 };
-constexpr int kAuxiliaryStates = 3;
 
 /// Measured channels, in the order of every measurement vector.
 enum Channel : int { kVx = 0, kVy = 1, kYawRate = 2, kAx = 3, kAy = 4 };
