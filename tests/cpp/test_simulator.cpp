@@ -130,7 +130,8 @@ TEST(Simulator, RecordsWhatTheModelComputes) {
         ModelState<double> x;
         std::copy_n(&drive.states[k * kModelStates], kModelStates, x.begin());
         const auto input = [&](std::size_t at) {
-            return Input{drive.inputs[2 * at], drive.inputs[2 * at + 1]};
+            return Input{drive.inputs[2 * at], drive.inputs[2 * at + 1],
+                         static_cast<double>(at) * kStep};
         };
         const auto y = sense(model, x, push.data(), input(k), p.data());
         for (std::size_t i = 0; i < kChannels; ++i)

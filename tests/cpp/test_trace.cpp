@@ -1,4 +1,6 @@
 // What the filter and the smoother say of each sample, and prediction further ahead.
+#include <algorithm>
+
 #include "helpers.hpp"
 #include "sysid/identify/prediction_error.hpp"
 
@@ -24,9 +26,13 @@ TEST(Trace, SmoothingGainsCertaintyAndKeepsTheEnd) {
         ASSERT_EQ(filtered.state_std.size(), problem.samples() * kStatesFull);
         ASSERT_EQ(smoothed.state_std.size(), filtered.state_std.size());
         const std::size_t last = filtered.state.size() - kStatesFull;
-        const std::size_t states = effects == 0 ? kStatesPlain : kStatesFull;
+        const ActiveStates own = active_states(effects);
+        const auto absent = [&](std::size_t state) {
+            return state >= kStatesPlain &&
+                   std::find(own.begin(), own.end(), state - kStatesPlain) == own.end();
+        };
         for (std::size_t n = 0; n < filtered.state.size(); ++n) {
-            if (n % kStatesFull >= states) {
+            if (absent(n % kStatesFull)) {
                 EXPECT_TRUE(std::isnan(filtered.state[n]));
                 EXPECT_TRUE(std::isnan(smoothed.state_std[n]));
                 continue;
