@@ -44,9 +44,9 @@ struct SensorDelay : Effect {
         for (int i = 0; i < kChannels; ++i)
             if (value_of(of(p, i)) > 0.0) y[i] = 2.0 * state[i] - y[i];
     }
-    // Steps three times as short as a lag needs: what is read is twice the state.
+    // Steps four times as short as a lag needs: what is read is twice the state.
     static double rate(const double* p, double /*v_x*/) {
-        return 3.0 * std::max(lag_rate(0.5 * p[0]), lag_rate(0.5 * p[1]));
+        return 4.0 * std::max(lag_rate(0.5 * p[0]), lag_rate(0.5 * p[1]));
     }
 
     template <class T>

@@ -31,8 +31,8 @@ struct SteerDelay : Effect {
             w.delta = 2.0 * state[i] - w.delta;
         }
     }
-    // Steps three times as short as a lag needs: what is read is twice the state.
-    static double rate(const double* p, double /*v_x*/) { return 3.0 * lag_rate(0.25 * p[0]); }
+    // Steps four times as short as a lag needs: what is read is twice the state.
+    static double rate(const double* p, double /*v_x*/) { return 4.0 * lag_rate(0.25 * p[0]); }
 };
 
 }  // namespace sysid
