@@ -14,4 +14,5 @@ PYBIND11_MODULE(_core, m) {
     register_lab_loop(m);
     register_lab_tyres(m);
     register_online_mu_slip(m);
+    register_twin(m);
 }

@@ -11,6 +11,20 @@ from ._core_mu_slip import TwoParameterFilter as TwoParameterFilter
 from ._core_mu_slip import _Curve as _Curve
 from ._core_mu_slip import _CurveFilter as _CurveFilter
 from ._core_mu_slip import magic_formula_coefficients as magic_formula_coefficients
+from ._core_twin import TWIN_INPUTS as TWIN_INPUTS
+from ._core_twin import TWIN_OUTPUTS as TWIN_OUTPUTS
+from ._core_twin import TWIN_READINGS as TWIN_READINGS
+from ._core_twin import TWIN_STATES as TWIN_STATES
+from ._core_twin import BatchEstimator as BatchEstimator
+from ._core_twin import ParameterLaw as ParameterLaw
+from ._core_twin import ParameterLaws as ParameterLaws
+from ._core_twin import TwinAxle as TwinAxle
+from ._core_twin import TwinCar as TwinCar
+from ._core_twin import TwinTyre as TwinTyre
+from ._core_twin import Vehicle14 as Vehicle14
+from ._core_twin import loaded as loaded
+from ._core_twin import observe14 as observe14
+from ._core_twin import observe_double_track as observe_double_track
 
 _Array = npt.NDArray[np.float64]
 

@@ -1,0 +1,287 @@
+// The twin: car, tyres, loads, observer loops.
+#include "arrays.hpp"
+#include "register.hpp"
+#include "sysid/twin/double_track.hpp"
+#include "sysid/twin/drive14.hpp"
+#include "sysid/twin/observer.hpp"
+
+namespace sysid::bindings {
+
+namespace {
+
+const Input14* inputs_of(const Array& a) {
+    return reinterpret_cast<const Input14*>(
+        matrix(a, a.ndim() == 2 ? a.shape(0) : 0, kTwinInputs, "inputs"));
+}
+
+State14 state_of(const Array& a) {
+    const double* x = vector(a, kTwinStatesWithTyres, "state");
+    State14 state;
+    std::copy(x, x + kTwinStatesWithTyres, state.begin());
+    return state;
+}
+
+template <std::size_t N>
+Array row(const std::array<double, N>& values) {
+    Array out(static_cast<py::ssize_t>(N));
+    std::copy(values.begin(), values.end(), out.mutable_data());
+    return out;
+}
+
+void register_data(py::module_& m) {
+    const auto fields = [](auto& bound, auto... pairs) {
+        (bound.def_readwrite(pairs.first, pairs.second), ...);
+    };
+    py::class_<TyreData> tyre(m, "TwinTyre");
+    tyre.def(py::init<>());
+    fields(tyre, std::pair{"nominal_load_n", &TyreData::nominal_load_n},
+           std::pair{"friction_x", &TyreData::friction_x},
+           std::pair{"friction_y", &TyreData::friction_y},
+           std::pair{"friction_slope", &TyreData::friction_slope},
+           std::pair{"slip_stiffness", &TyreData::slip_stiffness},
+           std::pair{"cornering_stiffness", &TyreData::cornering_stiffness},
+           std::pair{"load_at_peak_stiffness", &TyreData::load_at_peak_stiffness},
+           std::pair{"shape", &TyreData::shape}, std::pair{"curvature", &TyreData::curvature},
+           std::pair{"relaxation_m", &TyreData::relaxation_m});
+    py::class_<AxleData> axle(m, "TwinAxle");
+    axle.def(py::init<>());
+    fields(axle, std::pair{"track_m", &AxleData::track_m},
+           std::pair{"spring_npm", &AxleData::spring_npm},
+           std::pair{"bump_damping_nspm", &AxleData::bump_damping_nspm},
+           std::pair{"rebound_damping_nspm", &AxleData::rebound_damping_nspm},
+           std::pair{"anti_roll_npm", &AxleData::anti_roll_npm},
+           std::pair{"travel_m", &AxleData::travel_m}, std::pair{"stop_npm", &AxleData::stop_npm},
+           std::pair{"roll_centre_m", &AxleData::roll_centre_m},
+           std::pair{"anti_slope", &AxleData::anti_slope},
+           std::pair{"unsprung_kg", &AxleData::unsprung_kg},
+           std::pair{"tyre_npm", &AxleData::tyre_npm},
+           std::pair{"tyre_damping_nspm", &AxleData::tyre_damping_nspm},
+           std::pair{"radius_m", &AxleData::radius_m},
+           std::pair{"wheel_inertia_kgm2", &AxleData::wheel_inertia_kgm2},
+           std::pair{"rolling_resistance", &AxleData::rolling_resistance},
+           std::pair{"lift_area_m2", &AxleData::lift_area_m2}, std::pair{"tyre", &AxleData::tyre});
+    py::class_<CarData> car(m, "TwinCar");
+    car.def(py::init<>());
+    fields(car, std::pair{"wheelbase_m", &CarData::wheelbase_m},
+           std::pair{"drag_area_m2", &CarData::drag_area_m2},
+           std::pair{"air_density_kgpm3", &CarData::air_density_kgpm3},
+           std::pair{"front", &CarData::front}, std::pair{"rear", &CarData::rear});
+    car.def_property(
+        "design", [](const CarData& c) { return to_vector(c.design); },
+        [](CarData& c, const LoadVector& v) { c.design = to_load(v); });
+    m.def("loaded",
+          [](const LoadVector& car_load, const std::vector<std::array<double, 4>>& masses) {
+              std::vector<PointMass> points;
+              for (const auto& p : masses) points.push_back({p[0], p[1], p[2], p[3]});
+              return to_vector(loaded(to_load(car_load), points));
+          });
+}
+
+void register_vehicle(py::module_& m) {
+    py::class_<Vehicle14>(m, "Vehicle14")
+        .def(py::init([](const CarData& car, const LoadVector& load) {
+                 return Vehicle14(car, to_load(load));
+             }),
+             py::arg("car"), py::arg("load"))
+        .def_property(
+            "load", [](const Vehicle14& v) { return to_vector(v.load()); },
+            [](Vehicle14& v, const LoadVector& load) { v.set_load(to_load(load)); })
+        .def(
+            "rest", [](const Vehicle14& v, double vx) { return row(v.rest(vx)); }, py::arg("vx"))
+        .def(
+            "evaluate",
+            [](const Vehicle14& v, const Array& x, const Array& u) {
+                State14 rate;
+                Output14 out;
+                v.evaluate(state_of(x), *inputs_of(u), rate, &out);
+                return py::make_tuple(row(rate), row(out));
+            },
+            py::arg("state"), py::arg("input"))
+        .def(
+            "step",
+            [](const Vehicle14& v, const Array& x, const Array& u, double dt) {
+                State14 state = state_of(x);
+                v.step(state, *inputs_of(u), dt);
+                return row(state);
+            },
+            py::arg("state"), py::arg("input"), py::arg("dt"))
+        .def(
+            "energy",
+            [](const Vehicle14& v, const Array& x, const Array& u) {
+                return v.energy(state_of(x), *inputs_of(u));
+            },
+            py::arg("state"), py::arg("input"))
+        .def(
+            "simulate",
+            [](const Vehicle14& v, const Array& start, const Array& inputs, double dt) {
+                State14 x = state_of(start);
+                const Input14* u = inputs_of(inputs);
+                const auto n = static_cast<std::size_t>(inputs.shape(0));
+                const Run14 run = unlocked([&] { return simulate14(v, x, u, n, dt); });
+                return py::make_tuple(copy_of(run.states, kTwinStates),
+                                      copy_of(run.outputs, kTwinOutputs), row(x));
+            },
+            py::arg("start"), py::arg("inputs"), py::arg("dt"))
+        .def(
+            "drive",
+            [](const Vehicle14& v, const Driver& driver, const std::array<double, 2>& pedals,
+               const Array& references, const Array& base, double dt) {
+                const auto n = references.ndim() == 2 ? references.shape(0) : 0;
+                if (n < 2) throw std::invalid_argument("references: expected two samples or more");
+                const double* r = matrix(references, n, 3, "references");
+                const Input14* u = inputs_of(base);
+                if (base.shape(0) != n) throw std::invalid_argument("base: as long as references");
+                std::vector<Reference> wanted;
+                for (py::ssize_t k = 0; k < n; ++k)
+                    wanted.push_back({r[3 * k], r[3 * k + 1], r[3 * k + 2]});
+                const Drive14 out = unlocked(
+                    [&] { return drive14(v, driver, {pedals[0], pedals[1]}, wanted, u, dt); });
+                return py::make_tuple(copy_of(out.inputs, kTwinInputs),
+                                      copy_of(out.run.states, kTwinStates),
+                                      copy_of(out.run.outputs, kTwinOutputs), out.lost_at);
+            },
+            py::arg("driver"), py::arg("pedals"), py::arg("references"), py::arg("base"),
+            py::arg("dt"));
+}
+
+void register_laws(py::module_& m) {
+    py::class_<ParameterLaw>(m, "ParameterLaw")
+        .def(py::init<>())
+        .def_readwrite("parameter", &ParameterLaw::parameter)
+        .def_readwrite("channel", &ParameterLaw::channel)
+        .def_readwrite("differentiate", &ParameterLaw::differentiate)
+        .def_property(
+            "by_gradient", [](const ParameterLaw& l) { return l.kind == LawKind::kGradient; },
+            [](ParameterLaw& l, bool yes) { l.kind = yes ? LawKind::kGradient : LawKind::kSign; })
+        .def_property(
+            "sign_measured", [](const ParameterLaw& l) { return l.sign == SignSource::kMeasured; },
+            [](ParameterLaw& l, bool yes) {
+                l.sign = yes ? SignSource::kMeasured : SignSource::kTwin;
+            })
+        .def_readwrite("literal_sign", &ParameterLaw::literal_sign)
+        .def_readwrite("gain", &ParameterLaw::gain)
+        .def_readwrite("gain_start", &ParameterLaw::gain_start)
+        .def_readwrite("gain_time_s", &ParameterLaw::gain_time_s)
+        .def_readwrite("deadband", &ParameterLaw::deadband)
+        .def_readwrite("floor", &ParameterLaw::floor)
+        .def_readwrite("averaging_s", &ParameterLaw::averaging_s)
+        .def_readwrite("lower", &ParameterLaw::lower)
+        .def_readwrite("upper", &ParameterLaw::upper)
+        .def_readwrite("yaw_rate_below", &ParameterLaw::yaw_rate_below)
+        .def_readwrite("yaw_rate_above", &ParameterLaw::yaw_rate_above)
+        .def_readwrite("stage", &ParameterLaw::stage);
+    py::class_<ParameterLaws>(m, "ParameterLaws")
+        .def(py::init([](std::vector<ParameterLaw> laws, double dt, std::size_t yaw_rate_channel,
+                         double derivative_hz, const std::array<double, 3>& schedule) {
+                 return ParameterLaws(std::move(laws), dt, yaw_rate_channel, derivative_hz,
+                                      {schedule[0], schedule[1], schedule[2]});
+             }),
+             py::arg("laws"), py::arg("dt"), py::arg("yaw_rate_channel"), py::arg("derivative_hz"),
+             py::arg("schedule"))
+        .def(
+            "update",
+            [](ParameterLaws& laws, const Array& car, const Array& twin, LoadVector parameters) {
+                const auto n = static_cast<std::size_t>(car.size());
+                laws.update(vector(car, n, "car"), vector(twin, n, "twin"), parameters);
+                return parameters;
+            },
+            py::arg("car"), py::arg("twin"), py::arg("parameters"))
+        .def_property_readonly("stage", &ParameterLaws::stage);
+    py::class_<BatchEstimator>(m, "BatchEstimator")
+        .def(py::init([](const std::vector<std::array<double, 6>>& parameters,
+                         const std::vector<std::array<double, 3>>& channels, double dt,
+                         const std::array<double, 4>& s) {
+                 std::vector<BatchParameter> ps;
+                 for (const auto& p : parameters)
+                     ps.push_back({static_cast<int>(p[0]), p[1], p[2], p[3], p[4], p[5]});
+                 std::vector<BatchChannel> cs;
+                 for (const auto& c : channels)
+                     cs.push_back({static_cast<std::size_t>(c[0]), c[1], c[2]});
+                 return BatchEstimator(std::move(ps), std::move(cs), dt, {s[0], s[1], s[2], s[3]});
+             }),
+             py::arg("parameters"), py::arg("channels"), py::arg("dt"), py::arg("settings"))
+        .def("of_twin", &BatchEstimator::of_twin, py::arg("which"), py::arg("estimate"))
+        .def(
+            "update",
+            [](BatchEstimator& batch, const Array& car, const Array& twins, LoadVector estimate) {
+                const auto n = static_cast<std::size_t>(car.size());
+                const double* y = matrix(twins, static_cast<py::ssize_t>(batch.twins()),
+                                         static_cast<py::ssize_t>(n), "twins");
+                const Eigen::VectorXd moved = batch.update(vector(car, n, "car"), y, n, estimate);
+                Array steps(moved.size());
+                std::copy(moved.data(), moved.data() + moved.size(), steps.mutable_data());
+                return py::make_tuple(estimate, steps);
+            },
+            py::arg("car"), py::arg("twins"), py::arg("estimate"))
+        .def_property_readonly("spread", [](const BatchEstimator& batch) {
+            const Eigen::VectorXd spread = batch.covariance().diagonal().cwiseSqrt();
+            Array out(spread.size());
+            std::copy(spread.data(), spread.data() + spread.size(), out.mutable_data());
+            return out;
+        });
+}
+
+void register_observers(py::module_& m) {
+    m.def(
+        "observe14",
+        [](const Vehicle14& twin, const Array& start, const Array& inputs, const Array& measured,
+           double dt, const std::vector<std::array<double, 4>>& gains,
+           const std::optional<ParameterLaws>& laws, const std::optional<BatchEstimator>& batch,
+           std::size_t stride) {
+            const Input14* u = inputs_of(inputs);
+            const auto n = inputs.shape(0);
+            const double* y = matrix(measured, n, kReadings, "measured");
+            ObserverSettings settings{{}, laws, batch, stride};
+            for (const auto& g : gains)
+                settings.gains.push_back({static_cast<std::size_t>(g[0]),
+                                          static_cast<std::size_t>(g[1]), g[2], g[3] != 0.0});
+            const State14 x = state_of(start);
+            const Observation seen = unlocked([&] {
+                return observe14(twin, x, u, y, static_cast<std::size_t>(n), dt,
+                                 std::move(settings));
+            });
+            return py::make_tuple(copy_of(seen.loads, kLoadParameters),
+                                  copy_of(seen.readings, kTwinOutputs), seen.stages, seen.spread);
+        },
+        py::arg("twin"), py::arg("start"), py::arg("inputs"), py::arg("measured"), py::arg("dt"),
+        py::arg("gains"), py::arg("laws"), py::arg("batch"), py::arg("stride"));
+    m.def(
+        "observe_double_track",
+        [](const std::array<double, 10>& car, const std::array<double, 8>& front,
+           const std::array<double, 8>& rear, const std::array<double, 7>& gains,
+           const std::array<double, 4>& start, const Array& inputs, const Array& measured,
+           double dt, bool literal_sign) {
+            const auto pair = [](const std::array<double, 8>& t) {
+                return PacejkaPair{t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]};
+            };
+            const DoubleTrackData data{car[0], car[1], car[2], car[3], car[4],      car[5],
+                                       car[6], car[7], car[8], car[9], pair(front), pair(rear)};
+            const DoubleTrackGains k{gains[0], gains[1],     gains[2], gains[3],
+                                     gains[4], literal_sign, gains[5], gains[6]};
+            const Input14* u = inputs_of(inputs);
+            const auto n = inputs.shape(0);
+            const double* y = matrix(measured, n, kReadings, "measured");
+            return copy_of(unlocked([&] {
+                               return observe_double_track(data, k, start, u, y,
+                                                           static_cast<std::size_t>(n), dt);
+                           }),
+                           4);
+        },
+        py::arg("car"), py::arg("front"), py::arg("rear"), py::arg("gains"), py::arg("start"),
+        py::arg("inputs"), py::arg("measured"), py::arg("dt"), py::arg("literal_sign"));
+}
+
+}  // namespace
+
+void register_twin(py::module_& m) {
+    m.attr("TWIN_STATES") = kTwinStatesWithTyres;
+    m.attr("TWIN_INPUTS") = kTwinInputs;
+    m.attr("TWIN_OUTPUTS") = kTwinOutputs;
+    m.attr("TWIN_READINGS") = kReadings;
+    register_data(m);
+    register_vehicle(m);
+    register_laws(m);
+    register_observers(m);
+}
+
+}  // namespace sysid::bindings

@@ -1,0 +1,109 @@
+#include <algorithm>
+#include <cmath>
+
+#include "sysid/twin/batch.hpp"
+
+namespace sysid {
+
+namespace {
+Eigen::Index at(std::size_t i) { return static_cast<Eigen::Index>(i); }
+}  // namespace
+
+BatchEstimator::BatchEstimator(std::vector<BatchParameter> parameters,
+                               std::vector<BatchChannel> channels, double dt,
+                               BatchSettings settings)
+    : parameters_(std::move(parameters)),
+      channels_(std::move(channels)),
+      settings_(settings),
+      dt_(dt) {
+    const auto n = at(parameters_.size());
+    const auto m = at(channels_.size());
+    // In units of each parameter's spread, so that kilograms and metres mix.
+    P_ = Eigen::MatrixXd::Identity(n, n);
+    slopes_.setZero(m, n);
+    held_.setZero(m, n + 1);
+    power_.setZero(m);
+    residual_.setZero(m);
+    gain_.setZero(n);
+    moved_.setZero(n);
+}
+
+LoadVector BatchEstimator::of_twin(std::size_t which, const LoadVector& estimate) const {
+    LoadVector v = estimate;
+    if (which > 0) {
+        const BatchParameter& p = parameters_[which - 1];
+        v[static_cast<std::size_t>(p.parameter)] += p.step;
+    }
+    return v;
+}
+
+const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* twins,
+                                              std::size_t stride, LoadVector& estimate) {
+    const std::size_t n = parameters_.size();
+    moved_.setZero();
+    time_s_ += dt_;
+    const double learning_s = time_s_ - settings_.start_s;
+    for (std::size_t c = 0; c < channels_.size(); ++c) {
+        const BatchChannel& channel = channels_[c];
+        const double own = twins[channel.channel];
+        residual_[at(c)] = car[channel.channel] - own;
+        if (std::isnan(residual_[at(c)])) continue;
+        for (std::size_t j = 0; j < n; ++j)
+            slopes_(at(c), at(j)) = (twins[(j + 1) * stride + channel.channel] - own) /
+                                    parameters_[j].step * parameters_[j].spread;
+        if (channel.high_pass_hz > 0.0) {
+            const double share = std::min(1.0, dt_ * 2.0 * std::acos(-1.0) * channel.high_pass_hz);
+            const auto lifted = [&](Eigen::Index k, double value) {
+                double& low = held_(at(c), k);
+                low += share * (value - low);
+                return value - low;
+            };
+            residual_[at(c)] = lifted(at(n), residual_[at(c)]);
+            for (std::size_t j = 0; j < n; ++j)
+                slopes_(at(c), at(j)) = lifted(at(j), slopes_(at(c), at(j)));
+        }
+        const double e = residual_[at(c)];
+        // At first a plain mean, so that the scale does not start from nothing.
+        const double share = std::max(dt_ / settings_.residual_s, dt_ / time_s_);
+        power_[at(c)] += share * (e * e - power_[at(c)]);
+    }
+    if (learning_s <= 0.0) return moved_;
+
+    const double forgotten = settings_.forgetting * dt_ / (learning_s + settings_.residual_s);
+    P_ /= std::max(1.0 - forgotten, 0.5);
+    for (std::size_t j = 0; j < n; ++j) {
+        const double walk = parameters_[j].walk / parameters_[j].spread;
+        P_(at(j), at(j)) += walk * walk * dt_;
+        // A direction nobody excites must not drift open: it cannot be known worse than at first.
+        if (P_(at(j), at(j)) > 1.0) {
+            const double shrink = 1.0 / std::sqrt(P_(at(j), at(j)));
+            P_.row(at(j)) *= shrink;
+            P_.col(at(j)) *= shrink;
+        }
+    }
+    for (std::size_t c = 0; c < channels_.size(); ++c) {
+        if (std::isnan(residual_[at(c)])) continue;
+        const auto slope = slopes_.row(at(c));
+        const double variance = std::max(power_[at(c)], channels_[c].noise * channels_[c].noise);
+        gain_.noalias() = P_ * slope.transpose();
+        gain_ /= variance + slope.dot(gain_);
+        const double limit = settings_.clip * std::sqrt(variance);
+        const double e = std::clamp(residual_[at(c)], -limit, limit);
+        // Channels follow one another: the next sees what this one has already mended.
+        const Eigen::RowVectorXd learnt = slope * P_;
+        P_.noalias() -= gain_ * learnt;
+        for (std::size_t j = 0; j < n; ++j) {
+            const BatchParameter& p = parameters_[j];
+            double& value = estimate[static_cast<std::size_t>(p.parameter)];
+            const double before = value;
+            value = std::clamp(value + gain_[at(j)] * e * p.spread, p.lower, p.upper);
+            const double moved = (value - before) / p.spread;
+            moved_[at(j)] += (value - before) / p.step;
+            for (std::size_t d = c + 1; d < channels_.size(); ++d)
+                residual_[at(d)] -= slopes_(at(d), at(j)) * moved;
+        }
+    }
+    return moved_;
+}
+
+}  // namespace sysid

@@ -1,0 +1,278 @@
+"""Laws that turn what the car and its twin read into a better load.
+
+Two kinds. `ParameterLaw` takes one reading and one parameter: the laws of Dettu et al. (2023),
+eqs. (14), (15), (18), (24), or a normalised gradient in place of their sign. `SideBySide` runs one
+twin more per unknown, a step beside the estimate; the differences of their readings are the
+sensitivities, and recursive least squares do the rest. Equations: `cpp/include/sysid/twin/laws.hpp`
+and `batch.hpp`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from .. import _core
+from ..errors import InvalidInput, near_names
+from .car import LOAD_NAMES, NOMINAL_SUV, Load
+
+__all__ = [
+    "ParameterLaw",
+    "Schedule",
+    "SideBySide",
+    "Unknown",
+    "inertia_law",
+    "mass_law",
+    "unknowns",
+]
+
+# Of the first guess's size: how far the twins stand apart, how wrong the guess may be, limits.
+_APART, _LIMIT = 0.01, 0.45
+_SPREAD = {"mass_kg": 0.15, "jxx_kgm2": 0.15, "jyy_kgm2": 0.2, "jzz_kgm2": 0.2}
+_SPREAD_M = {"cg_x_m": 0.1, "cg_y_m": 0.03, "cg_z_m": 0.1}
+_ANGULAR = {
+    "jxx_kgm2": "roll_rate_radps",
+    "jyy_kgm2": "pitch_rate_radps",
+    "jzz_kgm2": "yaw_rate_radps",
+}
+
+
+@dataclass(frozen=True)
+class ParameterLaw:
+    """One reading, one parameter.
+
+    Parameters
+    ----------
+    parameter : str
+        What is corrected, such as ``mass_kg``.
+    channel : str
+        Reading whose error corrects it; an angular rate is differentiated first.
+    gain : float
+        Parameter per second and unit of the reading's error. The gain in force is
+        ``max(gain, first_gain / (1 + t/first_gain_s))``, `t` the time the law has acted.
+    first_gain, first_gain_s : float
+        A larger gain to begin with.
+    kind : {"sign", "gradient"}
+        ``d(delta)/dt = K sgn(s~) (s~ - s)``, the published law; or its normalised gradient
+        ``K s~ (s~ - s)/(floor^2 + mean of s~^2)``, which does not weigh small readings, mostly
+        noise, as it does large ones.
+    sign : {"twin", "measured"}
+        Whose reading gives the direction. A measured one holds the same noise as the error; their
+        product has a mean, and the parameter drifts.
+    published_sign : bool
+        True takes the direction as it was printed. It diverges.
+    deadband : float
+        Readings smaller than this do nothing.
+    floor : float
+        Of the gradient.
+    averaging_s : float
+        Of the gradient's mean square.
+    yaw_rate_below_radps, yaw_rate_above_radps : float
+        The law acts only between these: straight driving, or bends.
+    lower, upper : float
+        Limits of the parameter.
+    stage : int
+        Turn in the schedule.
+
+    Raises
+    ------
+    InvalidInput
+        If a gain is negative or the limits are reversed.
+    """
+
+    parameter: str
+    channel: str
+    gain: float
+    first_gain: float = 0.0
+    first_gain_s: float = 1.0
+    kind: Literal["sign", "gradient"] = "sign"
+    sign: Literal["twin", "measured"] = "twin"
+    published_sign: bool = False
+    deadband: float = 0.0
+    floor: float = 0.1
+    averaging_s: float = 5.0
+    yaw_rate_below_radps: float = float("inf")
+    yaw_rate_above_radps: float = 0.0
+    lower: float = 0.0
+    upper: float = float("inf")
+    stage: int = 0
+
+    def __post_init__(self) -> None:
+        if self.gain < 0.0 or self.first_gain < 0.0 or not self.lower < self.upper:
+            raise InvalidInput(
+                f"law of {self.parameter}: gains must not be negative and lower must be below upper"
+            )
+
+    def core(self, parameters: Sequence[str], channels: Sequence[str]) -> _core.ParameterLaw:
+        """The compiled law, for a twin with these parameters and outputs."""
+        law = _core.ParameterLaw()
+        law.parameter = place_of(self.parameter, parameters, "parameter")
+        law.channel = place_of(self.channel, channels, "channel")
+        law.differentiate = self.channel in _ANGULAR.values()
+        law.by_gradient = self.kind == "gradient"
+        law.sign_measured = self.sign == "measured"
+        law.literal_sign = self.published_sign
+        law.gain, law.gain_start, law.gain_time_s = self.gain, self.first_gain, self.first_gain_s
+        law.deadband, law.floor, law.averaging_s = self.deadband, self.floor, self.averaging_s
+        law.yaw_rate_below = self.yaw_rate_below_radps
+        law.yaw_rate_above = self.yaw_rate_above_radps
+        law.lower, law.upper, law.stage = self.lower, self.upper, self.stage
+        return law
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """When the next stage begins: figure 12 of the paper, spelt out.
+
+    Parameters
+    ----------
+    excited_s : float
+        A law has acted for so long, and
+    window_s, relative_rate_ps : float
+        its parameter moved less than so much of its first value per second, over such a window.
+    """
+
+    excited_s: float = 60.0
+    window_s: float = 10.0
+    relative_rate_ps: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A parameter that twins side by side look for.
+
+    Parameters
+    ----------
+    parameter : str
+        Its name.
+    spread : float
+        Standard deviation of the first guess.
+    apart : float
+        Step between the twins.
+    lower, upper : float
+        Limits.
+    walk_per_root_s : float
+        How far the truth may wander in a second; zero for a constant.
+    """
+
+    parameter: str
+    spread: float
+    apart: float
+    lower: float
+    upper: float
+    walk_per_root_s: float = 0.0
+
+
+def unknowns(*names: str, around: Load = NOMINAL_SUV) -> tuple[Unknown, ...]:
+    """Unknowns of a load with customary spreads around a first guess.
+
+    Raises
+    ------
+    InvalidInput
+        If a name is no number of a load.
+    """
+    out = []
+    for name in names:
+        place_of(name, LOAD_NAMES, "parameter")
+        value = getattr(around, name)
+        if name in _SPREAD_M:
+            spread = _SPREAD_M[name]
+            out.append(Unknown(name, spread, 0.2 * spread, value - 6 * spread, value + 6 * spread))
+        else:
+            out.append(
+                Unknown(
+                    name,
+                    _SPREAD[name] * value,
+                    _APART * value,
+                    (1.0 - _LIMIT) * value,
+                    (1.0 + _LIMIT) * value,
+                )
+            )
+    return tuple(out)
+
+
+@dataclass(frozen=True)
+class SideBySide:
+    """Recursive least squares on a batch of twins.
+
+    Where the twin's states can be set, every change of the estimate also moves the twins to where
+    they would be, had the parameters always been the new ones; nothing learnt from a wrong twin
+    then stays in its states. Without that, old data must be forgotten faster.
+
+    Parameters
+    ----------
+    unknowns : sequence of Unknown
+        What is looked for; each costs one twin more.
+    channels : mapping of str to float
+        Readings that are compared, with the standard deviation of their noise; the scale of the
+        residual is learnt and never taken to be less.
+    forgetting : float
+        ``n``: after the time t old data count as ``t^-n``.
+    start_s : float
+        Nothing is learnt earlier.
+    residual_s : float
+        Averaging time of the residual's scale.
+    clip : float
+        A residual counts as at most so many of its scales.
+    high_pass_hz : float
+        Slower differences between car and twin are left alone; zero leaves none.
+    """
+
+    unknowns: Sequence[Unknown]
+    channels: Mapping[str, float]
+    forgetting: float = 2.0
+    start_s: float = 1.0
+    residual_s: float = 5.0
+    clip: float = 4.0
+    high_pass_hz: Mapping[str, float] = field(default_factory=dict)
+
+    def core(
+        self, parameters: Sequence[str], channels: Sequence[str], dt_s: float
+    ) -> _core.BatchEstimator:
+        """The compiled estimator, for a twin with these parameters and outputs."""
+        rows = [
+            [
+                float(place_of(u.parameter, parameters, "parameter")),
+                u.apart,
+                u.spread,
+                u.walk_per_root_s,
+                u.lower,
+                u.upper,
+            ]
+            for u in self.unknowns
+        ]
+        read = [
+            [float(place_of(c, channels, "channel")), noise, self.high_pass_hz.get(c, 0.0)]
+            for c, noise in self.channels.items()
+        ]
+        settings = [self.forgetting, self.start_s, self.residual_s, self.clip]
+        return _core.BatchEstimator(rows, read, dt_s, settings)
+
+
+def mass_law(gain: float = 150.0, *, around: Load = NOMINAL_SUV, **changes: object) -> ParameterLaw:
+    """The mass by the longitudinal acceleration: eq. (14), with the gate of eq. (24)."""
+    given: dict[str, object] = {
+        "yaw_rate_below_radps": 0.0523598775598298873,  # 3 deg/s
+        "lower": (1.0 - _LIMIT) * around.mass_kg,
+        "upper": (1.0 + _LIMIT) * around.mass_kg,
+    }
+    return ParameterLaw("mass_kg", "ax_mps2", gain, **{**given, **changes})  # type: ignore[arg-type]
+
+
+def inertia_law(
+    parameter: str, gain: float, *, around: Load = NOMINAL_SUV, **changes: object
+) -> ParameterLaw:
+    """A moment of inertia by the angular acceleration about its axis: eqs. (15) and (18)."""
+    place_of(parameter, _ANGULAR, "moment of inertia")
+    value = getattr(around, parameter)
+    given: dict[str, object] = {"lower": (1.0 - _LIMIT) * value, "upper": (1.0 + _LIMIT) * value}
+    return ParameterLaw(parameter, _ANGULAR[parameter], gain, **{**given, **changes})  # type: ignore[arg-type]
+
+
+def place_of(name: str, known: Sequence[str] | Mapping[str, str], what: str) -> int:
+    """The position of a name among those known, or an error that gives near ones."""
+    names = list(known)
+    if name not in names:
+        raise InvalidInput(f"there is no {what} '{name}'{near_names(name, names)}")
+    return names.index(name)
