@@ -190,14 +190,15 @@ void register_laws(py::module_& m) {
     py::class_<BatchEstimator>(m, "BatchEstimator")
         .def(py::init([](const std::vector<std::array<double, 6>>& parameters,
                          const std::vector<std::array<double, 3>>& channels, double dt,
-                         const std::array<double, 4>& s) {
+                         const std::array<double, 5>& s) {
                  std::vector<BatchParameter> ps;
                  for (const auto& p : parameters)
                      ps.push_back({static_cast<int>(p[0]), p[1], p[2], p[3], p[4], p[5]});
                  std::vector<BatchChannel> cs;
                  for (const auto& c : channels)
                      cs.push_back({static_cast<std::size_t>(c[0]), c[1], c[2]});
-                 return BatchEstimator(std::move(ps), std::move(cs), dt, {s[0], s[1], s[2], s[3]});
+                 return BatchEstimator(std::move(ps), std::move(cs), dt,
+                                       {s[0], s[1], s[2], s[3], s[4]});
              }),
              py::arg("parameters"), py::arg("channels"), py::arg("dt"), py::arg("settings"))
         .def("of_twin", &BatchEstimator::of_twin, py::arg("which"), py::arg("estimate"))

@@ -81,10 +81,12 @@ const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* t
             P_.col(at(j)) *= shrink;
         }
     }
+    const double early = std::max(1.0, settings_.gentle_s / learning_s);
     for (std::size_t c = 0; c < channels_.size(); ++c) {
         if (std::isnan(residual_[at(c)])) continue;
         const auto slope = slopes_.row(at(c));
-        const double variance = std::max(power_[at(c)], channels_[c].noise * channels_[c].noise);
+        const double variance =
+            early * early * std::max(power_[at(c)], channels_[c].noise * channels_[c].noise);
         gain_.noalias() = P_ * slope.transpose();
         gain_ /= variance + slope.dot(gain_);
         const double limit = settings_.clip * std::sqrt(variance);

@@ -5,6 +5,15 @@ and its load are corrected. Dettu, Formentin and Savaresi, Joint vehicle state a
 estimation via Twin-in-the-Loop observers (2023), and a better parameter law on the same interface.
 """
 
+from .adapters import CallableTwin, NativeTwin
+from .calibrate import (
+    BayesianSearch,
+    Box,
+    Calibration,
+    Optimiser,
+    calibrate,
+    sideslip_and_mass_cost,
+)
 from .car import (
     LOAD_NAMES,
     LOADED_SUV,
@@ -15,6 +24,7 @@ from .car import (
     PointMass,
     TwinCar,
 )
+from .double_track import DoubleTrackObserver, DoubleTrackRun
 from .drives import (
     INPUTS,
     OUTPUTS,
@@ -25,6 +35,14 @@ from .drives import (
     swept_steer,
     urban_cycle,
 )
+from .experiments import (
+    LoadExperiment,
+    estimate_mass,
+    estimate_pitch,
+    estimate_roll_yaw,
+)
+from .fmu import FMUTwin, FMUVariables
+from .joint import JointExperiment, mass_and_sideslip
 from .laws import (
     ParameterLaw,
     Schedule,
@@ -35,6 +53,7 @@ from .laws import (
     unknowns,
 )
 from .observer import STATES, Observation, Observer, StateGain, observe
+from .protocol import Twin, observe_with
 from .readings import READINGS, Readings, measure, noisy_road
 
 __all__ = [
@@ -47,26 +66,46 @@ __all__ = [
     "SPORTS_CAR",
     "SPORTS_CAR_LOAD",
     "STATES",
+    "BayesianSearch",
+    "Box",
+    "Calibration",
+    "CallableTwin",
+    "DoubleTrackObserver",
+    "DoubleTrackRun",
     "Drive14",
+    "FMUTwin",
+    "FMUVariables",
+    "JointExperiment",
     "Load",
+    "LoadExperiment",
+    "NativeTwin",
     "Observation",
     "Observer",
+    "Optimiser",
     "ParameterLaw",
     "PointMass",
     "Readings",
     "Schedule",
     "SideBySide",
     "StateGain",
+    "Twin",
     "TwinCar",
     "Unknown",
+    "calibrate",
     "drive14",
+    "estimate_mass",
+    "estimate_pitch",
+    "estimate_roll_yaw",
     "inertia_law",
+    "mass_and_sideslip",
     "mass_law",
     "measure",
     "noisy_road",
     "observe",
+    "observe_with",
     "on_manoeuvre",
     "rough_road",
+    "sideslip_and_mass_cost",
     "swept_steer",
     "unknowns",
     "urban_cycle",

@@ -215,6 +215,8 @@ class SideBySide:
         Averaging time of the residual's scale.
     clip : float
         A residual counts as at most so many of its scales.
+    gentle_s : float
+        For so long data count less, the earlier the less: the first steps are long.
     high_pass_hz : float
         Slower differences between car and twin are left alone; zero leaves none.
     """
@@ -225,6 +227,7 @@ class SideBySide:
     start_s: float = 1.0
     residual_s: float = 5.0
     clip: float = 4.0
+    gentle_s: float = 20.0
     high_pass_hz: Mapping[str, float] = field(default_factory=dict)
 
     def core(
@@ -246,7 +249,7 @@ class SideBySide:
             [float(place_of(c, channels, "channel")), noise, self.high_pass_hz.get(c, 0.0)]
             for c, noise in self.channels.items()
         ]
-        settings = [self.forgetting, self.start_s, self.residual_s, self.clip]
+        settings = [self.forgetting, self.start_s, self.residual_s, self.clip, self.gentle_s]
         return _core.BatchEstimator(rows, read, dt_s, settings)
 
 

@@ -102,10 +102,14 @@ class Observer:
         if not self.laws:
             return None
         s = self.schedule
+        gated = any(
+            law.yaw_rate_below_radps < np.inf or law.yaw_rate_above_radps > 0.0 for law in self.laws
+        )
+        has_yaw_rate = gated or "yaw_rate_radps" in channels
         return _core.ParameterLaws(
             [law.core(parameters, channels) for law in self.laws],
             dt_s,
-            place_of("yaw_rate_radps", channels, "channel"),
+            place_of("yaw_rate_radps", channels, "channel") if has_yaw_rate else 0,
             self.derivative_hz,
             [s.excited_s, s.window_s, s.relative_rate_ps],
         )

@@ -53,6 +53,7 @@ def measure(
     snr: float = np.inf,
     seed: int | np.random.Generator = 0,
     unit: Literal["amplitude", "dB"] = "amplitude",
+    noise: Mapping[str, float] | None = None,
 ) -> Readings:
     """Read channels of a drive with white noise, eq. (10) of Dettu et al. (2023).
 
@@ -69,6 +70,8 @@ def measure(
         Of the noise.
     unit : {"amplitude", "dB"}
         How `snr` is meant; the paper does not say.
+    noise : mapping of str to float, optional
+        Standard deviations of sensors that are known, in place of the ratio.
 
     Raises
     ------
@@ -80,14 +83,14 @@ def measure(
     ratio = snr if unit == "amplitude" else 10.0 ** (snr / 20.0)
     rng = np.random.default_rng(seed)
     values = np.full((len(drive.outputs), len(READINGS)), np.nan)
-    noise = {}
+    known, scale = noise or {}, {}
     for name in dict.fromkeys((*channels, "yaw_rate_radps")):
         if name not in READINGS:
             raise InvalidInput(f"there is no reading '{name}'{near_names(name, READINGS)}")
         clean = drive[name]
-        noise[name] = float(np.std(clean) / ratio)
-        values[:, READINGS.index(name)] = clean + noise[name] * rng.standard_normal(len(clean))
-    return Readings(values, noise, drive.dt_s)
+        scale[name] = float(known.get(name, np.std(clean) / ratio))
+        values[:, READINGS.index(name)] = clean + scale[name] * rng.standard_normal(len(clean))
+    return Readings(values, scale, drive.dt_s)
 
 
 def noisy_road(

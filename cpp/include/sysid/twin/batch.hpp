@@ -36,6 +36,9 @@ struct BatchSettings {
     double start_s = 1.0;     // nothing is learnt earlier, and t counts from there
     double residual_s = 5.0;  // averaging time of the residual's scale
     double clip = 4.0;        // residuals count as at most so many of their scales
+    // Before this time data count less, by the square of their age: the first steps from a wrong
+    // guess are long, and what was learnt along them must not be believed too soon.
+    double gentle_s = 20.0;
 };
 
 class BatchEstimator {

@@ -1,0 +1,196 @@
+"""Twins: the built-in car as one, and any pair of functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from .._arrays import FloatArray, as_float64
+from ..errors import InvalidInput
+from .car import LOAD_NAMES, Load, TwinCar
+from .drives import INPUTS, OUTPUTS
+from .observer import STATES
+
+__all__ = ["CallableTwin", "NativeTwin"]
+
+_WRENCH = INPUTS.index("force_x_n")
+
+
+class NativeTwin:
+    """The built-in car as a twin; `observe` runs the same loop faster, without Python in it.
+
+    Parameters
+    ----------
+    car : TwinCar
+        The car.
+    load : Load
+        Its load.
+    speed_mps : float
+        It starts at rest on its springs, at this speed.
+    dt_s : float
+        Step.
+    """
+
+    input_names = INPUTS
+    output_names = OUTPUTS
+    state_names = STATES
+    parameter_names = LOAD_NAMES
+    capabilities = frozenset({"parameters", "state", "wrench", "snapshot", "clone"})
+
+    def __init__(self, car: TwinCar, load: Load, speed_mps: float, *, dt_s: float = 1e-3) -> None:
+        self.car = car
+        self.dt_s = dt_s
+        self._core = car.core(load)
+        self._state = self._core.rest(speed_mps)
+        self._wrench = np.zeros(6)
+
+    def _inputs(self, inputs: FloatArray) -> FloatArray:
+        if not self._wrench.any():
+            return as_float64(inputs).reshape(1, -1)
+        row = np.array(inputs, dtype=np.float64).reshape(1, -1)
+        row[0, _WRENCH:] += self._wrench
+        return row
+
+    def outputs(self, inputs: FloatArray) -> FloatArray:
+        """What it reads now."""
+        return self._core.evaluate(self._state, self._inputs(inputs))[1]
+
+    def step(self, inputs: FloatArray) -> None:
+        """Advance one step."""
+        self._state = self._core.step(self._state, self._inputs(inputs), self.dt_s)
+
+    def get_parameters(self) -> dict[str, float]:
+        """Its load by name."""
+        return dict(zip(LOAD_NAMES, self._core.load, strict=True))
+
+    def set_parameters(self, values: Mapping[str, float]) -> None:
+        """Change its load."""
+        self._core.load = list({**self.get_parameters(), **values}.values())
+
+    def get_state(self) -> FloatArray:
+        """Its states."""
+        return self._state.copy()
+
+    def set_state(self, state: FloatArray) -> None:
+        """Set its states."""
+        self._state = as_float64(state).copy()
+
+    def set_wrench(self, force_n: FloatArray, moment_nm: FloatArray) -> None:
+        """Push its body."""
+        self._wrench = np.concatenate([force_n, moment_nm])
+
+    def snapshot(self) -> tuple[FloatArray, list[float]]:
+        """Remember states and load."""
+        return self._state.copy(), list(self._core.load)
+
+    def restore(self, snapshot: tuple[FloatArray, list[float]]) -> None:
+        """Go back there."""
+        self._state, self._core.load = snapshot[0].copy(), list(snapshot[1])
+
+    def clone(self) -> NativeTwin:
+        """Make another that stands here."""
+        other = NativeTwin(self.car, Load(*self._core.load), 0.0, dt_s=self.dt_s)
+        other._state = self._state.copy()
+        return other
+
+
+class CallableTwin:
+    """A twin made of two functions of state, inputs and parameters.
+
+    Parameters
+    ----------
+    step : callable
+        ``step(state, inputs, parameters)`` gives the state one step later.
+    outputs : callable
+        ``outputs(state, inputs, parameters)`` gives the readings.
+    state : ndarray
+        First state.
+    dt_s : float
+        Step.
+    input_names, output_names, state_names : sequence of str
+        Names.
+    parameters : mapping of str to float
+        Numbers that may be estimated, at most seven.
+
+    Raises
+    ------
+    InvalidInput
+        If the state does not fit its names.
+    """
+
+    capabilities = frozenset({"parameters", "state", "snapshot", "clone"})
+
+    def __init__(
+        self,
+        step: Callable[[FloatArray, FloatArray, dict[str, float]], FloatArray],
+        outputs: Callable[[FloatArray, FloatArray, dict[str, float]], FloatArray],
+        state: FloatArray,
+        *,
+        dt_s: float,
+        input_names: Sequence[str],
+        output_names: Sequence[str],
+        state_names: Sequence[str],
+        parameters: Mapping[str, float],
+    ) -> None:
+        self._step, self._outputs = step, outputs
+        self.dt_s = dt_s
+        self.input_names = tuple(input_names)
+        self.output_names = tuple(output_names)
+        self.state_names = tuple(state_names)
+        self.parameter_names = tuple(parameters)
+        self._parameters = {name: float(value) for name, value in parameters.items()}
+        self._state = as_float64(state).copy()
+        if self._state.shape != (len(self.state_names),):
+            raise InvalidInput(
+                f"the state has shape {self._state.shape} but {len(self.state_names)} names"
+            )
+
+    def outputs(self, inputs: FloatArray) -> FloatArray:
+        """What it reads now."""
+        return as_float64(self._outputs(self._state, inputs, self._parameters))
+
+    def step(self, inputs: FloatArray) -> None:
+        """Advance one step."""
+        self._state = as_float64(self._step(self._state, inputs, self._parameters))
+
+    def get_parameters(self) -> dict[str, float]:
+        """Its parameters."""
+        return dict(self._parameters)
+
+    def set_parameters(self, values: Mapping[str, float]) -> None:
+        """Change some of them."""
+        self._parameters = {**self._parameters, **values}
+
+    def get_state(self) -> FloatArray:
+        """Its states."""
+        return self._state.copy()
+
+    def set_state(self, state: FloatArray) -> None:
+        """Set its states."""
+        self._state = as_float64(state).copy()
+
+    def set_wrench(self, force_n: FloatArray, moment_nm: FloatArray) -> None:
+        """Refuse: functions of states take no push."""
+        raise InvalidInput("a twin of functions takes no push; its states can be set")
+
+    def snapshot(self) -> tuple[FloatArray, dict[str, float]]:
+        """Remember states and parameters."""
+        return self._state.copy(), dict(self._parameters)
+
+    def restore(self, snapshot: tuple[FloatArray, dict[str, float]]) -> None:
+        """Go back there."""
+        self._state, self._parameters = snapshot[0].copy(), dict(snapshot[1])
+
+    def clone(self) -> CallableTwin:
+        """Make another that stands here."""
+        return CallableTwin(
+            self._step,
+            self._outputs,
+            self._state,
+            dt_s=self.dt_s,
+            input_names=self.input_names,
+            output_names=self.output_names,
+            state_names=self.state_names,
+            parameters=self._parameters,
+        )

@@ -1,0 +1,313 @@
+"""The paper's experiments on mass and inertia: another load in the car than in its twin.
+
+Dettu et al. (2023), sec. 4. Where the paper is silent: the drives of `drives.py`; noise as a ratio
+of amplitudes; a wrong mass or centre of mass is that of the unloaded car, a mass from stage 1 is
+what the mass experiment finds with the same law and the same noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from html import escape
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from ..errors import InvalidInput
+from .car import LOADED_SUV, NOMINAL_SUV, Load, TwinCar
+from .drives import Drive14, rough_road, swept_steer, urban_cycle
+from .laws import ParameterLaw, SideBySide, inertia_law, mass_law, unknowns
+from .observer import Observation, Observer, observe
+from .readings import Readings, measure, noisy_road
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["LoadExperiment", "estimate_mass", "estimate_pitch", "estimate_roll_yaw"]
+
+Law = Literal["side_by_side", "published", "gradient"]
+Mass = Literal["known", "stage_1", "wrong"]
+
+# A sensor is never believed to be better than this.
+_FLOOR = {
+    "ax_mps2": 2e-3,
+    "ay_mps2": 2e-3,
+    "az_mps2": 2e-3,
+    "roll_rate_radps": 2e-4,
+    "pitch_rate_radps": 2e-4,
+    "yaw_rate_radps": 2e-4,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class LoadExperiment:
+    """A load that was looked for, and what was found.
+
+    Attributes
+    ----------
+    name : str
+        What was done.
+    drive : Drive14
+        What was driven, with the true load.
+    readings : Readings
+        What was measured.
+    found : Observation
+        Estimates over time.
+    names : tuple of str
+        What was looked for; other parameters may have been estimated beside.
+    true, nominal : Load
+        The load in the car, and without what was added.
+    """
+
+    name: str
+    drive: Drive14
+    readings: Readings
+    found: Observation
+    names: tuple[str, ...]
+    true: Load
+    nominal: Load
+
+    def error_percent(self, name: str) -> float:
+        """Root mean square error over the last second, in % of the true change."""
+        true = getattr(self.true, name)
+        return self.found.error_percent(name, true, true - getattr(self.nominal, name))
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, for a file."""
+        return {
+            "experiment": self.name,
+            "parameters": {
+                n: {
+                    "true": getattr(self.true, n),
+                    "nominal": getattr(self.nominal, n),
+                    "first": float(self.found.parameters[n][0]),
+                    "found": self.found.last(n),
+                    "error_percent_of_change": self.error_percent(n) if n in self.names else None,
+                }
+                for n in dict.fromkeys((*self.names, *self.found.moved()))
+            },
+        }
+
+    def plot(self, name: str, *, ax: Axes | None = None) -> Axes:
+        """Draw an estimate over time."""
+        return self.found.plot(name, truth=getattr(self.true, name), ax=ax)
+
+    def __str__(self) -> str:
+        lines = [f"{self.name}: {self.drive}"]
+        for n in dict.fromkeys((*self.names, *self.found.moved())):
+            error = f"{self.error_percent(n):8.2f} % of the change" if n in self.names else ""
+            lines.append(
+                f"  {n:10s} {self.found.parameters[n][0]:10.5g} -> {self.found.last(n):10.5g}, "
+                f"true {getattr(self.true, n):10.5g} {error}"
+            )
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+
+@lru_cache(maxsize=4)
+def _town(duration_s: float) -> Drive14:
+    return urban_cycle(TwinCar(), LOADED_SUV, duration_s=duration_s)
+
+
+@lru_cache(maxsize=4)
+def _sweep(repeats: int) -> Drive14:
+    return swept_steer(TwinCar(), LOADED_SUV, repeats=repeats)
+
+
+@lru_cache(maxsize=4)
+def _road(seed: int, duration_s: float) -> Drive14:
+    return rough_road(TwinCar(), LOADED_SUV, seed=seed, duration_s=duration_s)
+
+
+def _first(names: Sequence[str], errors: Sequence[float] | None) -> dict[str, float]:
+    """Values to begin with: off by `errors` in parts of the true change, -1 for the nominal."""
+    off = [-1.0] * len(names) if errors is None else list(errors)
+    if len(off) != len(names):
+        raise InvalidInput(f"first_error has {len(off)} numbers; give {len(names)}: {names}")
+    out = {}
+    for name, e in zip(names, off, strict=True):
+        true = getattr(LOADED_SUV, name)
+        out[name] = true + e * (true - getattr(NOMINAL_SUV, name))
+    return out
+
+
+def _batch(readings: Readings, channels: Sequence[str], names: Sequence[str]) -> Observer:
+    noise = {c: max(readings.noise[c], _FLOOR[c]) for c in channels}
+    return Observer(batch=SideBySide(unknowns(*names), noise))
+
+
+def estimate_mass(
+    *,
+    snr: float = 10.0,
+    wrong_cg: bool = False,
+    law: Law = "side_by_side",
+    seed: int = 0,
+    first_error: Sequence[float] | None = None,
+    duration_s: float = 180.0,
+) -> LoadExperiment:
+    """Estimate the mass in town: table 4, figures 4 and 5.
+
+    Parameters
+    ----------
+    snr : float
+        Amplitude ratio of signal to noise, infinite for none.
+    wrong_cg : bool
+        The twin keeps the centre of mass of the unloaded car.
+    law : {"side_by_side", "published", "gradient"}
+        Which law. Twins side by side look for the centre of mass too: how far the car pitches
+        changes what its accelerometer feels of gravity.
+    seed : int
+        Of the noise.
+    first_error : sequence of float, optional
+        First error of the mass in parts of the change; -1, the unloaded car's, by default.
+    duration_s : float
+        Length of the drive.
+    """
+    drive = _town(duration_s)
+    first = LOADED_SUV.replace(**_first(["mass_kg"], first_error), **_centre(wrong_cg))
+    channels = ["ax_mps2", "pitch_rate_radps"] if law == "side_by_side" else ["ax_mps2"]
+    readings = measure(drive, channels, snr=snr, seed=seed)
+    if law == "side_by_side":
+        observer = _batch(readings, channels, ["mass_kg", "cg_x_m", "cg_z_m"])
+    elif law == "published":
+        observer = Observer(laws=[mass_law(150.0, yaw_rate_below_radps=np.inf)])
+    else:
+        observer = Observer(laws=[mass_law(400.0, kind="gradient", yaw_rate_below_radps=np.inf)])
+    found = observe(TwinCar(), first, drive.inputs, readings, observer, speed_mps=_speed(drive))
+    return LoadExperiment("mass", drive, readings, found, ("mass_kg",), LOADED_SUV, NOMINAL_SUV)
+
+
+def estimate_roll_yaw(
+    *,
+    snr: float = 10.0,
+    mass: Mass = "known",
+    wrong_cg: bool = False,
+    law: Law = "side_by_side",
+    seed: int = 0,
+    first_error: Sequence[float] | None = None,
+    repeats: int = 4,
+) -> LoadExperiment:
+    """Estimate roll and yaw inertia in a swept steer: table 5, figures 6 to 8.
+
+    Parameters
+    ----------
+    snr, wrong_cg, law, seed : float, bool, str, int
+        As in `estimate_mass`. What is not known is looked for too by twins side by side.
+    mass : {"known", "stage_1", "wrong"}
+        What the twin has: the true mass, what `estimate_mass` finds, the unloaded car's.
+    first_error : sequence of two floats, optional
+        First errors of roll and yaw inertia in parts of the change.
+    repeats : int
+        Number of sweeps.
+    """
+    names = ("jxx_kgm2", "jzz_kgm2")
+    drive = _sweep(repeats)
+    first = LOADED_SUV.replace(
+        **_first(names, first_error), **_centre(wrong_cg), mass_kg=_mass(mass, snr, law, seed)
+    )
+    channels = ["roll_rate_radps", "yaw_rate_radps"]
+    looked_for = [*names, *_unsure(mass, wrong_cg)]
+    if law == "side_by_side" and len(looked_for) > 2:
+        channels.append("ay_mps2")
+    readings = measure(drive, channels, snr=snr, seed=seed)
+    if law == "side_by_side":
+        observer = _batch(readings, channels, looked_for)
+    else:
+        observer = Observer(
+            laws=_laws(law, snr, {"jxx_kgm2": (60.0, 15.0, 8.0), "jzz_kgm2": (900.0, 200.0, 80.0)})
+        )
+    found = observe(TwinCar(), first, drive.inputs, readings, observer, speed_mps=_speed(drive))
+    return LoadExperiment(
+        "roll and yaw inertia", drive, readings, found, names, LOADED_SUV, NOMINAL_SUV
+    )
+
+
+def estimate_pitch(
+    *,
+    snr: float = 10.0,
+    road_noise: float = 0.0,
+    mass: Mass = "known",
+    wrong_cg: bool = False,
+    law: Law = "side_by_side",
+    seed: int = 0,
+    first_error: Sequence[float] | None = None,
+    duration_s: float = 120.0,
+) -> LoadExperiment:
+    """Estimate the pitch inertia on a rough road: table 6, figures 9 to 11.
+
+    Parameters
+    ----------
+    snr, wrong_cg, law : float, bool, str
+        As in `estimate_mass`.
+    road_noise : float
+        Relative noise of the road that the twin is told, eq. (17).
+    mass : {"known", "stage_1", "wrong"}
+        As in `estimate_roll_yaw`.
+    seed : int
+        Of the noise and of the road.
+    first_error : sequence of one float, optional
+        First error of the pitch inertia in parts of the change.
+    duration_s : float
+        Length of the drive.
+    """
+    names = ("jyy_kgm2",)
+    drive = _road(seed, duration_s)
+    rng = np.random.default_rng([seed, 1])
+    first = LOADED_SUV.replace(
+        **_first(names, first_error), **_centre(wrong_cg), mass_kg=_mass(mass, snr, law, seed)
+    )
+    channels = ["pitch_rate_radps"]
+    looked_for = [*names, *(n for n in _unsure(mass, wrong_cg) if n != "cg_y_m")]
+    if law == "side_by_side" and len(looked_for) > 1:
+        channels += ["ax_mps2", "az_mps2"]
+    readings = measure(drive, channels, snr=snr, seed=rng)
+    told = noisy_road(drive.inputs, road_noise, seed=rng) if road_noise > 0.0 else drive.inputs
+    if law == "side_by_side":
+        observer = _batch(readings, channels, looked_for)
+    else:
+        observer = Observer(laws=_laws(law, snr, {"jyy_kgm2": (300.0, 60.0, 40.0)}))
+    found = observe(TwinCar(), first, told, readings, observer, speed_mps=_speed(drive))
+    return LoadExperiment("pitch inertia", drive, readings, found, names, LOADED_SUV, NOMINAL_SUV)
+
+
+def _laws(law: Law, snr: float, gains: dict[str, tuple[float, float, float]]) -> list[ParameterLaw]:
+    """High gains first; without noise they stay, with noise they fall."""
+    kind: Literal["sign", "gradient"] = "sign" if law == "published" else "gradient"
+    out = []
+    for name, (high, low, time_s) in gains.items():
+        final = high if np.isinf(snr) else low
+        out.append(
+            inertia_law(name, final, first_gain=high, first_gain_s=time_s, kind=kind, floor=0.05)
+        )
+    return out
+
+
+def _centre(wrong: bool) -> dict[str, float]:
+    load = NOMINAL_SUV if wrong else LOADED_SUV
+    return {"cg_x_m": load.cg_x_m, "cg_y_m": load.cg_y_m, "cg_z_m": load.cg_z_m}
+
+
+@lru_cache(maxsize=64)
+def _stage_1(snr: float, law: Law, seed: int) -> float:
+    return estimate_mass(snr=snr, law=law, seed=seed).found.last("mass_kg")
+
+
+def _mass(mass: Mass, snr: float, law: Law, seed: int) -> float:
+    if mass == "stage_1":
+        return _stage_1(snr, law, seed)
+    return (NOMINAL_SUV if mass == "wrong" else LOADED_SUV).mass_kg
+
+
+def _unsure(mass: Mass, wrong_cg: bool) -> list[str]:
+    return [
+        *(["mass_kg"] if mass == "wrong" or wrong_cg else []),
+        *(["cg_x_m", "cg_y_m", "cg_z_m"] if mass == "wrong" or wrong_cg else []),
+    ]
+
+
+def _speed(drive: Drive14) -> float:
+    return float(drive["vx_mps"][0])

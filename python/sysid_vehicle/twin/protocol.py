@@ -1,0 +1,260 @@
+"""What a simulator must be able to do to serve as a twin, and the loop around any that can.
+
+A twin announces its capabilities; the observer uses what there is and says what is missing:
+
+- ``parameters``: numbers that may be changed between steps,
+- ``state``: its states can be read and set, so that eq. (4) can correct them,
+- ``wrench``: it takes a force and a moment on its body; where states cannot be set, velocities are
+  corrected by the push that changes them so much in a step,
+- ``snapshot``: it can be put back to where it was,
+- ``clone``: a second one can be made that stands where the first does, which twins side by side
+  need.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from .._arrays import FloatArray, as_float64
+from ..errors import InvalidInput, NumericalError
+from .observer import Observation, Observer
+
+__all__ = ["CAPABILITIES", "Twin", "observe_with"]
+
+CAPABILITIES = ("parameters", "state", "wrench", "snapshot", "clone")
+_MOST_PARAMETERS = 7
+# Velocity: (force or moment, axis, what resists it). The horizontal axes move the whole mass.
+_PUSHES = {
+    "vx_mps": (0, 0, "mass_kg"),
+    "vy_mps": (0, 1, "mass_kg"),
+    "roll_rate_radps": (1, 0, "jxx_kgm2"),
+    "pitch_rate_radps": (1, 1, "jyy_kgm2"),
+    "yaw_rate_radps": (1, 2, "jzz_kgm2"),
+}
+
+
+@runtime_checkable
+class Twin(Protocol):
+    """A simulator of a car.
+
+    Attributes
+    ----------
+    dt_s : float
+        Step.
+    input_names, output_names, state_names, parameter_names : tuple of str
+        What it takes, gives, and may be asked for; states and parameters may be none. The names
+        of this package (`INPUTS`, `OUTPUTS`, `STATES`, `LOAD_NAMES`) where they mean the same.
+    capabilities : frozenset of str
+        Out of `CAPABILITIES`; the methods that belong to one are called only if it is announced.
+    """
+
+    dt_s: float
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    state_names: tuple[str, ...]
+    parameter_names: tuple[str, ...]
+    capabilities: frozenset[str]
+
+    def outputs(self, inputs: FloatArray) -> FloatArray:
+        """What it reads now; time stands still."""
+
+    def step(self, inputs: FloatArray) -> None:
+        """Advance one step with the inputs held."""
+
+    def get_parameters(self) -> dict[str, float]:
+        """Numbers by name (``parameters``)."""
+
+    def set_parameters(self, values: Mapping[str, float]) -> None:
+        """Change some of them from the next step on (``parameters``)."""
+
+    def get_state(self) -> FloatArray:
+        """States in the order of their names (``state``)."""
+
+    def set_state(self, state: FloatArray) -> None:
+        """Set all of them (``state``)."""
+
+    def set_wrench(self, force_n: FloatArray, moment_nm: FloatArray) -> None:
+        """Push the body in its yaw frame during the coming steps (``wrench``)."""
+
+    def snapshot(self) -> Any:
+        """Remember where it stands (``snapshot``)."""
+
+    def restore(self, snapshot: Any) -> None:
+        """Go back there (``snapshot``)."""
+
+    def clone(self) -> Twin:
+        """Make another that stands where this one does (``clone``)."""
+
+
+def observe_with(
+    twin: Twin,
+    inputs: FloatArray,
+    measured: Mapping[str, FloatArray],
+    observer: Observer,
+    *,
+    stride: int = 10,
+) -> Observation:
+    """Run an observer on any twin, step by step; it starts where the twin stands.
+
+    Parameters
+    ----------
+    twin : Twin
+        The simulator. It is used up: it ends where the observer left it.
+    inputs : ndarray, shape (n, inputs)
+        What the car was given, columns as the twin's `input_names`.
+    measured : mapping of str to ndarray, shape (n,)
+        What the car read, by the twin's names of outputs; NaN where nothing was read.
+    observer : Observer
+        What corrects the twin.
+    stride : int
+        Every so many samples are recorded.
+
+    Returns
+    -------
+    Observation
+
+    Raises
+    ------
+    InvalidInput
+        If the observer needs what the twin cannot do, or arrays do not fit; the message says what.
+    NumericalError
+        If an output of the twin is no number any more; the message names the time.
+    """
+    n = len(inputs)
+    inputs = as_float64(inputs)
+    if inputs.ndim != 2 or inputs.shape[1] != len(twin.input_names):
+        raise InvalidInput(
+            f"inputs have shape {inputs.shape}; the twin takes (n, {len(twin.input_names)})"
+        )
+    read = _table(twin, measured, n)
+    _check(twin, observer)
+    dt, names = twin.dt_s, twin.parameter_names
+    laws = observer.core_laws(names, twin.output_names, dt)
+    batch = None
+    if observer.batch is not None:
+        batch = observer.batch.core(names, twin.output_names, dt)
+    parameters = twin.get_parameters() if "parameters" in twin.capabilities else {}
+    estimate = [parameters.get(name, 0.0) for name in names]
+    estimate += [0.0] * (_MOST_PARAMETERS - len(estimate))
+    count = 1 + (0 if observer.batch is None else len(observer.batch.unknowns))
+    twins = [twin, *(twin.clone() for _ in range(count - 1))]
+    if batch is not None:
+        for j, t in enumerate(twins):
+            t.set_parameters(_named(names, batch.of_twin(j, estimate)))
+    gains = [g.row(twin.output_names, _correctable(twin)) for g in observer.gains]
+    kept: list[tuple[list[float], FloatArray, int]] = []
+    for k in range(n):
+        outputs = np.array([t.outputs(inputs[k]) for t in twins], dtype=np.float64)
+        if not np.all(np.isfinite(outputs[0])):
+            where = twin.output_names[int(np.flatnonzero(~np.isfinite(outputs[0]))[0])]
+            raise NumericalError(
+                f"the twin's {where} is no number at sample {k}, t = {k * dt:.6g} s; take smaller "
+                f"gains or a nearer start"
+            )
+        if k % stride == 0:
+            kept.append((list(estimate), outputs[0], laws.stage if laws is not None else 0))
+        if gains:
+            for t, y in zip(twins, outputs, strict=True):
+                _correct(t, gains, read[k] - y, dt, _named(names, estimate))
+        if laws is not None:
+            estimate = laws.update(read[k], outputs[0], estimate)
+        if batch is not None:
+            estimate, moved = batch.update(read[k], outputs, estimate)
+            if "state" in twin.capabilities and np.any(moved):
+                _follow(twins, moved)
+        for j, t in enumerate(twins):
+            if batch is not None:
+                t.set_parameters(_named(names, batch.of_twin(j, estimate)))
+            elif laws is not None:
+                t.set_parameters(_named(names, estimate))
+            t.step(inputs[k])
+    unknown = [] if observer.batch is None else list(observer.batch.unknowns)
+    spread = [] if batch is None else batch.spread.tolist()
+    history = np.array([row[0] for row in kept])
+    seen = np.array([row[1] for row in kept])
+    return Observation(
+        as_float64(np.arange(len(kept)) * (stride * dt)),
+        {name: history[:, i] for i, name in enumerate(names)},
+        {name: seen[:, i] for i, name in enumerate(twin.output_names)},
+        np.array([float(row[2]) for row in kept]),
+        {u.parameter: s * u.spread for u, s in zip(unknown, spread, strict=True)},
+    )
+
+
+def _named(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
+    return dict(zip(names, values, strict=False))
+
+
+def _table(twin: Twin, measured: Mapping[str, FloatArray], n: int) -> FloatArray:
+    read = np.full((n, len(twin.output_names)), np.nan)
+    for name, values in measured.items():
+        if name not in twin.output_names:
+            continue  # a sensor that the twin has no counterpart of teaches nothing
+        if len(values) != n:
+            raise InvalidInput(f"measured '{name}' has {len(values)} samples; the inputs have {n}")
+        read[:, twin.output_names.index(name)] = values
+    return read
+
+
+def _check(twin: Twin, observer: Observer) -> None:
+    def need(capability: str, why: str) -> None:
+        if capability not in twin.capabilities:
+            able = ", ".join(sorted(twin.capabilities)) or "nothing of it"
+            raise InvalidInput(f"{why} needs a twin with '{capability}'; this one has {able}")
+
+    if observer.laws or observer.batch is not None:
+        need("parameters", "correcting the load")
+    if observer.batch is not None:
+        need("clone", "a batch of twins side by side")
+    if observer.gains and "state" not in twin.capabilities:
+        need("wrench", "correcting states that cannot be set")
+    if len(twin.parameter_names) > _MOST_PARAMETERS:
+        raise InvalidInput(
+            f"the twin has {len(twin.parameter_names)} parameters; give it at most "
+            f"{_MOST_PARAMETERS}, those that are looked for"
+        )
+
+
+def _correctable(twin: Twin) -> tuple[str, ...]:
+    return twin.state_names if "state" in twin.capabilities else tuple(_PUSHES)
+
+
+def _correct(
+    twin: Twin,
+    gains: Sequence[Sequence[float]],
+    innovation: FloatArray,
+    dt: float,
+    load: Mapping[str, float],
+) -> None:
+    by_state = "state" in twin.capabilities
+    names = _correctable(twin)
+    change = np.zeros(len(names))
+    for channel, state, gain, per_sample in gains:
+        error = innovation[int(channel)]
+        if np.isfinite(error):
+            change[int(state)] += gain * (1.0 if per_sample else dt) * error
+    if by_state:
+        if np.any(change):
+            twin.set_state(twin.get_state() + change)
+        return
+    push = np.zeros((2, 3))
+    for name, moved in zip(names, change, strict=True):
+        kind, axis, inertia = _PUSHES[name]
+        if moved != 0.0:
+            if inertia not in load:
+                raise InvalidInput(f"to correct {name} by a push, the twin must give its {inertia}")
+            push[kind, axis] = load[inertia] * moved / dt
+    twin.set_wrench(push[0], push[1])
+
+
+def _follow(twins: Sequence[Twin], moved: FloatArray) -> None:
+    """Take all twins to where they would be, had the parameters always been the new ones."""
+    states = [t.get_state() for t in twins]
+    change = np.zeros_like(states[0])
+    for part, state in zip(moved, states[1:], strict=True):
+        change += part * (state - states[0])
+    for t, state in zip(twins, states, strict=True):
+        t.set_state(state + change)
