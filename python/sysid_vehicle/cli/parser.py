@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .. import _core
 from ..demo import DEFAULT, RANDOM
-from . import lab, mu_slip
+from . import lab, mu_slip, twin
 
 __all__ = ["parse"]
 
@@ -70,6 +70,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     mu_slip.add_parser(commands)
     commands.add_parser("effects", help="the catalogue of effects")
     lab.add_parser(commands)
+    twin.add_parser(commands)
     return parser.parse_args(argv)
 
 
