@@ -1,0 +1,138 @@
+// Laws, batch and observers of the twin.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "sysid/math/errors.hpp"
+#include "sysid/twin/double_track.hpp"
+#include "sysid/twin/observer.hpp"
+
+using namespace sysid;
+
+namespace {
+
+constexpr double kDt = 1e-3;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+LoadVector start() { return to_vector(Load{}); }
+
+ParameterLaw mass_law(double gain) {
+    ParameterLaw law;
+    law.gain = gain;
+    return law;
+}
+
+/// A reading of one over the mass, by a car of 2000 kg.
+double read(double mass, double t) { return 4000.0 * std::sin(t) / mass; }
+
+}  // namespace
+
+TEST(TwinLaws, AHeavierCarMakesTheParameterGrow) {
+    ParameterLaws laws({mass_law(100.0)}, kDt, 1);
+    LoadVector load = start();
+    const double before = load[kMass];
+    const double car[2] = {0.9, 0.0}, twin[2] = {1.0, 0.0};
+    laws.update(car, twin, load);
+    EXPECT_NEAR(load[kMass] - before, 100.0 * 0.1 * kDt, 1e-12);
+    // Braking: the same the other way round.
+    const double slow[2] = {-0.9, 0.0}, slower[2] = {-1.0, 0.0};
+    laws.update(slow, slower, load);
+    EXPECT_NEAR(load[kMass] - before, 200.0 * 0.1 * kDt, 1e-12);
+}
+
+TEST(TwinLaws, LimitsGatesAndMissingReadingsHold) {
+    ParameterLaw law = mass_law(1e6);
+    law.upper = 2200.0;
+    law.yaw_rate_below = 0.05;
+    ParameterLaws laws({law}, kDt, 1);
+    LoadVector load = start();
+    const double twin[2] = {1.0, 0.0};
+    const double turning[2] = {0.9, 0.1}, missing[2] = {kNone, 0.0}, straight[2] = {0.5, 0.0};
+    laws.update(turning, twin, load);
+    laws.update(missing, twin, load);
+    EXPECT_EQ(load, start());
+    for (int k = 0; k < 10; ++k) laws.update(straight, twin, load);
+    EXPECT_EQ(load[kMass], 2200.0);
+}
+
+TEST(TwinLaws, TheDerivativeOfARampIsItsSlope) {
+    Derivative derivative(20.0, kDt);
+    double slope = 0.0;
+    for (int k = 0; k < 500; ++k) slope = derivative(3.0 * k * kDt);
+    EXPECT_NEAR(slope, 3.0, 0.2);
+}
+
+TEST(TwinBatch, FindsTheMassOfALinearReading) {
+    BatchEstimator batch({{kMass, 20.0, 300.0, 0.0, 1000.0, 3000.0}}, {{0, 0.05, 0.0}}, kDt);
+    EXPECT_EQ(batch.twins(), 2U);
+    LoadVector estimate = start();
+    std::mt19937 generator(1);
+    std::normal_distribution<double> noise(0.0, 0.05);
+    for (int k = 0; k < 40000; ++k) {
+        const double t = k * kDt;
+        const double car = read(2000.0, t) + noise(generator);
+        const double twins[2] = {read(batch.of_twin(0, estimate)[kMass], t),
+                                 read(batch.of_twin(1, estimate)[kMass], t)};
+        batch.update(&car, twins, 1, estimate);
+    }
+    const double spread = 300.0 * std::sqrt(batch.covariance()(0, 0));
+    EXPECT_NEAR(estimate[kMass], 2000.0, 5.0 * spread);
+    EXPECT_LT(spread, 2.0);
+}
+
+TEST(TwinBatch, WithoutExcitationNothingIsClaimed) {
+    BatchEstimator batch({{kMass, 20.0, 300.0, 0.0, 1000.0, 3000.0}}, {{0, 0.05, 0.0}}, kDt);
+    LoadVector estimate = start();
+    const double car = 0.3, twins[2] = {0.0, 0.0};
+    for (int k = 0; k < 20000; ++k) batch.update(&car, twins, 1, estimate);
+    EXPECT_EQ(estimate, start());
+    EXPECT_NEAR(batch.covariance()(0, 0), 1.0, 1e-9);
+}
+
+TEST(TwinObserver, TheTruthIsAtRest) {
+    const Vehicle14 car{CarData{}};
+    std::vector<Input14> inputs(3000);
+    for (std::size_t k = 0; k < inputs.size(); ++k) {
+        const double pull = 300.0 * std::sin(2e-3 * static_cast<double>(k));
+        inputs[k].drive_nm = {0.0, 0.0, pull, pull};
+    }
+    State14 x = car.rest(15.0);
+    const State14 first = x;
+    const Run14 run = simulate14(car, x, inputs.data(), inputs.size(), kDt);
+    std::vector<double> measured;
+    for (std::size_t k = 0; k < inputs.size(); ++k) {
+        const auto row = run.outputs.begin() + static_cast<std::ptrdiff_t>(k * kTwinOutputs);
+        measured.insert(measured.end(), row, row + kReadings);
+    }
+    ObserverSettings settings;
+    settings.gains = {{output14::Q, state14::Q, 10.0, false}};
+    settings.batch = BatchEstimator({{kMass, 20.0, 300.0, 0.0, 1000.0, 3000.0}},
+                                    {{output14::Ax, 1e-3, 0.0}}, kDt);
+    const Observation seen =
+        observe14(car, first, inputs.data(), measured.data(), inputs.size(), kDt, settings);
+    EXPECT_EQ(seen.loads.back(), car.load().cg_z_m);
+    EXPECT_EQ(seen.loads[seen.loads.size() - kLoadParameters], car.load().mass_kg);
+}
+
+TEST(TwinDoubleTrack, ASteadyTurnIsThatOfTheBicycle) {
+    DoubleTrackData car;
+    car.front.dy = car.rear.dy = 1.0;
+    std::vector<Input14> inputs(8000);
+    std::vector<double> measured(inputs.size() * kReadings, kNone);
+    const double speed = 15.0, steer = 0.01;
+    const double turning = speed * steer / (car.lf_m + car.lr_m);
+    for (std::size_t k = 0; k < inputs.size(); ++k) {
+        inputs[k].steer_rad = {steer, steer};
+        for (std::size_t w = 0; w < kWheels; ++w) {
+            const double inwards = (w % 2 == 0 ? 0.5 : -0.5) * car.track_m * turning;
+            measured[k * kReadings + output14::kWheelSpeed + w] = (speed - inwards) / car.radius_m;
+        }
+    }
+    const std::vector<double> s = observe_double_track(
+        car, {}, {speed, 0.0, 0.0, 0.0}, inputs.data(), measured.data(), inputs.size(), kDt);
+    const double r = s[s.size() - 2];
+    // Equal tyres per load: neutral steer.
+    EXPECT_NEAR(r, turning, 0.02 * r);
+}
