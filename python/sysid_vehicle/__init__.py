@@ -7,7 +7,14 @@ is missing, add it, and watch the error fall on driving the fit never saw.
 from . import manoeuvres
 from ._core import __version__
 from .compare import Comparison, compare
-from .diagnose import Diagnosis, diagnose
+from .diagnose import (
+    Diagnosis,
+    DriveLimits,
+    bias_report,
+    diagnose,
+    suggest_manoeuvre,
+    verdicts,
+)
 from .effects import Effect, catalogue, effect
 from .errors import InvalidInput, NumericalError, SysidError, SysidWarning
 from .estimate import Driving, NoiseModel
@@ -23,6 +30,7 @@ __all__ = [
     "ChannelMap",
     "Comparison",
     "Diagnosis",
+    "DriveLimits",
     "Driving",
     "Effect",
     "Fit",
@@ -39,6 +47,7 @@ __all__ = [
     "Tyre",
     "Vehicle",
     "__version__",
+    "bias_report",
     "catalogue",
     "check_excitation",
     "compare",
@@ -50,4 +59,6 @@ __all__ = [
     "improve",
     "manoeuvres",
     "read_log",
+    "suggest_manoeuvre",
+    "verdicts",
 ]

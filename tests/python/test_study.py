@@ -16,13 +16,20 @@ from sysid_vehicle import (
     SysidWarning,
     catalogue,
     drive,
+    effect,
     improve,
     manoeuvres,
 )
 from sysid_vehicle.study.held_out import error_falls, gain_in_log_likelihood, hold_out
 
 LAG = "steer_lag.time_constant_s", 0.06
-LOOKS_LIKE_LAG = {"steer_lag", "tyre_relaxation", "yaw_inertia", "steer_compliance"}
+LOOKS_LIKE_LAG = {
+    "steer_lag",
+    "steer_compliance",
+    "tyre_relaxation",
+    "yaw_inertia",
+    *effect("steer_lag").twins,
+}
 Drives = Callable[[Model, int], tuple[Log, Log]]
 
 
@@ -109,6 +116,7 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
         "ranking",
         "regions",
         "verdict",
+        "verdicts",
         "warnings",
     ]
     assert told["verdict"] == "explained"
@@ -264,3 +272,23 @@ def test_what_is_added_lowers_the_error_by_the_richer_models_own_measure(study: 
     assert error_falls(baseline, found, study.held_out)
     assert not error_falls(found, baseline, study.held_out)
     assert not error_falls(found, found, study.held_out)
+
+
+def test_the_waterfall_falls_at_every_horizon(study: Study) -> None:
+    falls = study.waterfall((0.5, 1.0))
+    assert falls.steps == ("baseline", "+ steer_lag")
+    assert falls.horizons_s == (0.0, 0.5, 1.0)
+    assert np.all(falls.test[1] < falls.test[0])
+    assert np.all(falls.train[1] < falls.train[0])
+    assert falls.test[1, 0] == pytest.approx(study.test[-1].error, rel=0.1)
+    assert np.all(np.diff(falls.test[0]) > 0.0)  # the further, the worse
+    assert "held out 0.5 s" in str(falls)
+    assert "<table" in falls._repr_html_()
+    assert falls.plot().get_xlabel() == "predicted ahead"
+
+
+def test_every_effect_has_a_verdict(study: Study) -> None:
+    assert len(study.verdicts.all) == len(catalogue())
+    assert study.verdicts["steer_lag"].finding in ("missing", "one of a group")
+    assert not [v for v in study.verdicts.of("missing") if v.effect.id != "steer_lag"]
+    assert study.to_dict()["verdicts"]["steer_lag"]["value"] == [study.added[0].parameters[0].value]

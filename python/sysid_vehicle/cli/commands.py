@@ -69,6 +69,8 @@ def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
     print(study.diagnoses[0])
     print()
     print(" ".join(summary(study)))
+    print()
+    print(study.verdicts)
     if args.json is not None:
         study.to_json(args.json)
 

@@ -22,10 +22,10 @@ from .._arrays import FloatArray
 from ..effects import Effect
 from ..estimate import Driving, NoiseModel
 from ..identify import Fit
+from .sensitivity import duration, sensitivities
 
 __all__ = ["Score", "ScoreBoard", "score_board"]
 
-_AT_ONCE = 8  # directions that the core differentiates in one pass
 _INVISIBLE = 1e-3  # share of an effect's sensitivity that the fitted parameters cannot copy
 
 
@@ -125,19 +125,12 @@ def score_board(
     noise : NoiseModel, optional
         Other noise than the fit's.
     """
-    if not driving.force_known:
-        candidates = tuple(e for e in candidates if not e.needs_force)
-    base = driving.problem(fit.model)
-    p = fit.model.vector()
-    frozen = base.freeze(p, (fit.noise if noise is None else noise).vector())
-    e = base.residuals(p, frozen).ravel()
-    known = fit.model.parameters
-    G = base.sensitivities(p, frozen, [known[n].column for n in fit.model.free_names])
+    found = sensitivities(fit, driving, candidates, noise)
+    e, G, columns = found.residual, found.fitted, found.effects
     basis = _basis(G)
     e_left = e - basis @ (basis.T @ e)
-    columns = _sensitivities(fit, driving, base, candidates, p, frozen, e)
     scores, directions = [], {}
-    for effect in candidates:
+    for effect in found.candidates:
         G_j = columns[effect.id]
         R = G_j - basis @ (basis.T @ G_j)
         size = float(np.linalg.norm(G_j))
@@ -145,70 +138,9 @@ def score_board(
         if retained < _INVISIBLE:
             continue
         directions[effect.id] = R
-        scores.append(_score(effect, R, e_left, retained, _duration(driving)))
+        scores.append(_score(effect, R, e_left, retained, duration(driving)))
     scores.sort(key=lambda s: (s.p_value, -s.statistic))
     return ScoreBoard(tuple(scores), directions, e_left)
-
-
-def _sensitivities(
-    fit: Fit,
-    driving: Driving,
-    base: _core.Problem,
-    candidates: tuple[Effect, ...],
-    p: FloatArray,
-    frozen: _core.FrozenFilter,
-    e: FloatArray,
-) -> dict[str, FloatArray]:
-    regular = tuple(c for c in candidates if not c.scored_at_typical and c.scanned is None)
-    known = driving.force_known
-    found: dict[str, FloatArray] = {}
-    for few in _groups(regular):
-        wide = base.with_model(fit.model.core(force_known=known, also=few))
-        all_columns = wide.sensitivities(p, frozen, [i for c in few for i in c.columns])
-        at = 0
-        for c in few:
-            found[c.id] = all_columns[:, at : at + len(c.columns)]
-            at += len(c.columns)
-    for c in candidates:
-        if c in regular:
-            continue
-        one = base.with_model(fit.model.core(force_known=known, also=(c,)))
-        if c.scored_at_typical:
-            # No derivative at zero: the finite steps to the typical sizes are the directions.
-            steps = []
-            for parameter in c.parameters:
-                there = p.copy()
-                there[parameter.column] = parameter.typical
-                steps.append((e - one.residuals(there, frozen).ravel()) / parameter.typical)
-            found[c.id] = np.column_stack(steps)
-        elif c.scanned is not None:
-            # At its null value the effect knows nothing of this parameter: one column for each
-            # value of a grid. Their joint test needs no supremum.
-            first = c.parameters[0]
-            step = 0.1 * first.matters  # small enough to stand for the derivative
-            columns = []
-            for value in c.scanned.grid(_duration(driving)):
-                there = p.copy()
-                there[c.scanned.column] = value
-                there[first.column] = first.null_value + step
-                columns.append((e - one.residuals(there, frozen).ravel()) / step)
-            found[c.id] = np.column_stack(columns)
-    return found
-
-
-def _groups(effects: tuple[Effect, ...]) -> list[tuple[Effect, ...]]:
-    """Effects that the core differentiates in one pass: the others need not act meanwhile."""
-    groups: list[list[Effect]] = [[]]
-    for effect in effects:
-        if sum(len(e.columns) for e in (*groups[-1], effect)) > _AT_ONCE:
-            groups.append([])
-        groups[-1].append(effect)
-    return [tuple(g) for g in groups if g]
-
-
-def _duration(driving: Driving) -> float:
-    """Of the longest log [s]."""
-    return max(float(s.where.stop / driving.logs[s.log].rate_hz) for s in driving.stretches)
 
 
 def _basis(G: FloatArray) -> FloatArray:

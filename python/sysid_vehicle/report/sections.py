@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from .._style import new_figure
 from .._text import number
+from ..diagnose import bias_report
 from ..estimate import UNITS
 from ..model import Model
 from ..study import Study
@@ -17,6 +18,8 @@ from .tyres import AXLES, identified_curves, model_curves
 from .words import RANKING_HEAD, interval, quantity, ranking_rows, stages, summary, unit
 
 __all__ = ["SECTIONS"]
+
+_HORIZONS_S = (0.5, 1.0, 2.0)
 
 
 def _verdict(study: Study, truth: Model | None) -> list[str]:
@@ -103,6 +106,40 @@ def _which(study: Study, truth: Model | None) -> list[str]:
         )
     )
     return parts
+
+
+def _verdicts(study: Study, truth: Model | None) -> list[str]:
+    rows = [[v.effect.id, v.finding, v.sentence] for v in study.verdicts.all]
+    parts = [
+        heading("A verdict for every effect"),
+        table(("effect", "verdict", "in words"), rows, "verdicts"),
+        paragraph(
+            "Each is judged beside the effects of the final model. 'proxy': it acted like one of "
+            "them, or no car has such a value. 'absent': it can be no larger than stated. 'not "
+            "testable': this driving could hide one large enough to matter."
+        ),
+    ]
+    biases = bias_report(study.fit).biases[:5]
+    if biases:
+        parts += [
+            heading("What the identified parameters would hide", 3),
+            bullets(f"{b}." for b in biases),
+        ]
+    return parts
+
+
+def _ahead(study: Study, truth: Model | None) -> list[str]:
+    falls = study.waterfall(_HORIZONS_S)
+    figure = new_figure(6.0, 3.4)
+    falls.plot(figure.add_subplot())
+    return [
+        heading("Further ahead"),
+        picture(
+            figure,
+            "Held-out error over how far ahead was predicted, from what was known then and the "
+            "steering and force since; in units of the noise floor of one step.",
+        ),
+    ]
 
 
 def _with_minus_signs(rows: list[list[str]]) -> list[list[str]]:
@@ -236,6 +273,8 @@ SECTIONS: tuple[Callable[[Study, Model | None], list[str]], ...] = (
     _verdict,
     _where,
     _which,
+    _verdicts,
+    _ahead,
     _parameters,
     _excerpt,
     _remains,

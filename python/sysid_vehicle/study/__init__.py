@@ -2,5 +2,6 @@
 
 from .improve import improve
 from .study import AddedEffect, Study, Verdict
+from .waterfall import Waterfall
 
-__all__ = ["AddedEffect", "Study", "Verdict", "improve"]
+__all__ = ["AddedEffect", "Study", "Verdict", "Waterfall", "improve"]

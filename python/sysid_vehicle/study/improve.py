@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..compare import Comparison, compare
-from ..diagnose import Candidate, Diagnosis, Omnibus, diagnose, omnibus
+from ..diagnose import Candidate, Diagnosis, Omnibus, diagnose, judge, omnibus
+from ..effects import Effect, effect
 from ..errors import InvalidInput, warn
 from ..estimate import Driving
 from ..identify import Fit, identify, refine
@@ -72,6 +73,7 @@ def improve(
     diagnoses: list[Diagnosis] = []
     fits = [baseline]
     p_values: dict[str, float] = {}
+    rivals: dict[str, tuple[str, ...]] = {}
     while True:
         dx = diagnose(fit, candidates=candidates, alpha=alpha, seed=seed, progress=progress)
         diagnoses.append(dx)
@@ -82,6 +84,7 @@ def improve(
             break
         assert chosen.fit is not None
         p_values[chosen.id] = chosen.p_value
+        rivals[chosen.id] = chosen.indistinguishable_from
         fit = _without_idle(chosen.fit)
         if chosen.id not in fit.model.effects or any(
             f.model.effects == fit.model.effects for f in fits
@@ -108,9 +111,24 @@ def improve(
         held_out=test_driving,
         added=_added(fits, on_test, p_values),
         omnibus=left,
+        verdicts=judge(
+            fit,
+            lacked={e.id for e in _considered(model, candidates)},
+            groups=rivals,
+            acted={c.id for dx in diagnoses for c in dx.significant},
+            alpha=alpha,
+            seed=seed,
+        ),
         warnings=_warnings(fit, train_driving),
         seconds=time.perf_counter() - began,
     )
+
+
+def _considered(model: Model, candidates: Sequence[str] | None) -> tuple[Effect, ...]:
+    if candidates is None:
+        return model.candidates
+    wanted = {effect(c).id for c in candidates}
+    return tuple(e for e in model.candidates if e.id in wanted)
 
 
 def _silent(_: str) -> None:

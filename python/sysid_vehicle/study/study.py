@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -9,10 +10,11 @@ from typing import Any, Literal
 from .._files import write_json
 from .._text import html_table, number, text_table
 from ..compare import Comparison
-from ..diagnose import Candidate, Diagnosis, Omnibus
+from ..diagnose import Candidate, Diagnosis, Omnibus, Verdicts
 from ..estimate import Driving
 from ..identify import Estimate, Fit
 from ..model import Model
+from .waterfall import Waterfall, waterfall
 
 __all__ = ["AddedEffect", "Study", "Verdict"]
 
@@ -73,6 +75,8 @@ class Study:
     added : tuple of AddedEffect
     omnibus : Omnibus
         Whether the final model leaves anything that depends on the driving.
+    verdicts : Verdicts
+        What is to be said of every effect that the baseline lacks.
     seconds : float
         Wall time.
     """
@@ -85,6 +89,7 @@ class Study:
     held_out: Driving
     added: tuple[AddedEffect, ...]
     omnibus: Omnibus
+    verdicts: Verdicts
     warnings: tuple[str, ...]
     seconds: float
 
@@ -103,13 +108,33 @@ class Study:
         """The verdict in words."""
         return _MEANING[self.verdict]
 
+    @property
+    def steps(self) -> tuple[str, ...]:
+        """The baseline and what was added, in order."""
+        return ("baseline", *(f"+ {a.id}" for a in self.added))
+
+    def waterfall(self, horizons_s: Sequence[float] = (0.5, 1.0, 2.0, 5.0)) -> Waterfall:
+        """Errors of every step, one sample and further ahead, in training and held out.
+
+        Parameters
+        ----------
+        horizons_s : sequence of float
+            How far ahead, beside one sample. Long ones take some seconds each.
+        """
+        return waterfall(
+            self.fits,
+            self.steps,
+            (self.fit.driving, self.train[-1]),
+            (self.held_out, self.test[-1]),
+            horizons_s,
+        )
+
     _HEAD = ("step", "train error", "held-out error")
 
     def _rows(self) -> list[list[str]]:
-        labels = ["baseline", *(f"+ {a.id}" for a in self.added)]
         return [
             [label, f"{a.error:.3f}", f"{b.error:.3f}"]
-            for label, a, b in zip(labels, self.train, self.test, strict=False)
+            for label, a, b in zip(self.steps, self.train, self.test, strict=False)
         ] + [["noise floor", "1.000", "1.000"]]
 
     def __str__(self) -> str:
@@ -132,6 +157,7 @@ class Study:
             "verdict": self.verdict,
             "effects": [_effect(a) for a in self.added],
             "ranking": [_candidate(c) for c in self.diagnoses[0].ranking],
+            "verdicts": self.verdicts.to_dict(),
             "channels": {
                 "before": {"train": _channels(self.train[0]), "test": _channels(self.test[0])},
                 "after": {"train": _channels(self.train[-1]), "test": _channels(self.test[-1])},

@@ -1,0 +1,312 @@
+"""Which drive would tell two effects apart, and by how many standard errors.
+
+Every manoeuvre of a menu within the limits is driven in simulation, at the fit. Its information is
+added to that of the driving at hand (`information.py`); the two effects are as far apart as the
+nearer of them stands out from the other (T-optimality, linearised: Atkinson & Fedorov, Biometrika
+1975).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from tqdm.auto import tqdm
+
+from .. import manoeuvres
+from .._text import html_table, text_table
+from ..effects import Effect, effect
+from ..errors import InvalidInput, NumericalError
+from ..estimate import MEASURED, Driving
+from ..estimate.inputs import white_noise_std
+from ..identify import Fit
+from ..log import Log
+from ..manoeuvres import Manoeuvre
+from ..model import Model
+from ..simulate import Drive, SensorNoise, drive_truth
+from .information import Information, information_of
+
+__all__ = ["DriveLimits", "NextDrive", "Suggestion", "separations", "suggest_manoeuvre"]
+
+_ENOUGH = 5.0  # standard errors
+
+
+@dataclass(frozen=True)
+class DriveLimits:
+    """What can be driven.
+
+    Parameters
+    ----------
+    speed_mps : float
+        Highest speed.
+    lateral_mps2 : float
+        Highest lateral acceleration, either side.
+    area_m : tuple of 2 floats, optional
+        Longer and shorter side of the ground there is.
+    duration_s : float
+        Longest drive.
+    """
+
+    speed_mps: float = 36.0
+    lateral_mps2: float = 8.5
+    area_m: tuple[float, float] | None = None
+    duration_s: float = 120.0
+
+    def __post_init__(self) -> None:
+        for name in ("speed_mps", "lateral_mps2", "duration_s"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise InvalidInput(f"{name} is {getattr(self, name)}; give a positive number")
+        if self.area_m is not None and not min(self.area_m) > 0.0:
+            raise InvalidInput(f"area_m is {self.area_m}; give two positive lengths")
+
+    def hold(self, drive: Drive) -> bool:
+        """Whether a drive stayed within them."""
+        speed, lateral = drive.states[:, 0], drive.outputs[:, 4]
+        inside = (
+            speed.max() <= 1.02 * self.speed_mps
+            and np.abs(lateral).max() <= 1.05 * self.lateral_mps2
+            and drive.log.duration_s <= self.duration_s
+        )
+        if self.area_m is None or not inside:
+            return bool(inside)
+        long, short = sorted(extent_m(drive), reverse=True)
+        return long <= max(self.area_m) and short <= min(self.area_m)
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """One manoeuvre and what it would tell.
+
+    Attributes
+    ----------
+    manoeuvre : Manoeuvre
+    duration_s : float
+    sigmas : float
+        Standard errors between the rivals after it, together with the driving at hand.
+    """
+
+    manoeuvre: Manoeuvre
+    duration_s: float
+    sigmas: float
+
+    def __str__(self) -> str:
+        return f"{self.manoeuvre.name}, {self.duration_s:.0f} s: {self.sigmas:.1f} standard errors"
+
+
+@dataclass(frozen=True, eq=False)
+class NextDrive:
+    """Drives that tell two effects apart.
+
+    Attributes
+    ----------
+    first, second : Effect
+    now : float
+        Standard errors between them with the driving at hand.
+    suggestions : tuple of Suggestion
+        The cheapest that is enough first; the others by standard errors.
+    refused : int
+        Manoeuvres of the menu beyond the limits, or that the car did not survive.
+    """
+
+    first: Effect
+    second: Effect
+    now: float
+    suggestions: tuple[Suggestion, ...]
+    refused: int
+
+    @property
+    def best(self) -> Suggestion:
+        """The cheapest drive that separates the two by five standard errors, or the most telling.
+
+        Raises
+        ------
+        InvalidInput
+            No manoeuvre is within the limits.
+        """
+        if not self.suggestions:
+            raise InvalidInput("no manoeuvre of the library is within the limits; widen them")
+        return self.suggestions[0]
+
+    _HEAD = ("manoeuvre", "duration [s]", "standard errors")
+
+    def _rows(self) -> list[list[str]]:
+        return [
+            [s.manoeuvre.name, f"{s.duration_s:.0f}", f"{s.sigmas:.1f}"]
+            for s in self.suggestions[:8]
+        ]
+
+    def _headline(self) -> str:
+        pair = f"{self.first.id} and {self.second.id}"
+        return f"{pair} are {self.now:.1f} standard errors apart; after"
+
+    def __str__(self) -> str:
+        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{self._headline()}</p>{html_table(self._HEAD, self._rows())}"
+
+
+def separations(
+    fit: Fit, effects: Sequence[Effect | str], *, information: Information | None = None
+) -> dict[tuple[str, str], float]:
+    """Standard errors between every two effects of typical size, with the driving at hand.
+
+    Returns
+    -------
+    dict of (effect, effect) to float
+        The nearer of both directions.
+    """
+    several = tuple(effect(e) for e in effects)
+    known = information if information is not None else information_of(fit, fit.driving, several)
+    shown = [e for e in several if any(e.id == k.id for k in known.effects)]
+    return {
+        (a.id, b.id): _apart(known, a, b, None) for i, a in enumerate(shown) for b in shown[i + 1 :]
+    }
+
+
+def suggest_manoeuvre(
+    fit: Fit,
+    first: Effect | str,
+    second: Effect | str,
+    *,
+    size: Sequence[float] | None = None,
+    limits: DriveLimits | None = None,
+    enough: float = _ENOUGH,
+    seed: int = 0,
+    progress: bool = False,
+) -> NextDrive:
+    """Suggest the cheapest drive that tells two effects apart.
+
+    Parameters
+    ----------
+    fit : Fit
+        Without either effect.
+    first, second : Effect or str
+        The likelier one first.
+    size : sequence of float, optional
+        Size of the first, as distance from its null values; by default a typical one.
+    limits : DriveLimits, optional
+        What can be driven.
+    enough : float
+        Standard errors that are wanted.
+    seed : int
+        Of the simulated drives.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    NextDrive
+
+    Raises
+    ------
+    InvalidInput
+        The model has one of the effects already, or the driving cannot show it.
+    """
+    a, b = effect(first), effect(second)
+    for e in (a, b):
+        if e.id in fit.model.effects:
+            raise InvalidInput(f"the model has '{e.id}' already; give a fit without it")
+    bounds = limits if limits is not None else DriveLimits()
+    here = information_of(fit, fit.driving, (a, b))
+    psi = None if size is None else tuple(size)
+    now = _apart(here, a, b, psi)
+    menu = _menu(bounds)
+    truth = fit.model.add(a).with_values(_values(a, psi))
+    found, refused = [], 0
+    for manoeuvre in tqdm(menu, desc="manoeuvres", disable=not progress):
+        log = _driven(truth, manoeuvre, fit, bounds, seed)
+        if log is None:
+            refused += 1
+            continue
+        there = information_of(fit, Driving.of(log), (a, b))
+        found.append(Suggestion(manoeuvre, log.duration_s, _apart(here + there, a, b, psi)))
+    found.sort(key=lambda s: (s.sigmas < enough, s.duration_s if s.sigmas >= enough else -s.sigmas))
+    return NextDrive(a, b, now, tuple(found), refused)
+
+
+def extent_m(drive: Drive) -> tuple[float, float]:
+    """Length and width of the ground that a drive takes, along its main directions."""
+    dt = 1.0 / drive.log.rate_hz
+    vx, vy, r = drive.states.T
+    heading = np.cumsum(r) * dt
+    east = np.cumsum(vx * np.cos(heading) - vy * np.sin(heading)) * dt
+    north = np.cumsum(vx * np.sin(heading) + vy * np.cos(heading)) * dt
+    path = np.column_stack([east, north])
+    turned = path @ np.linalg.svd(path - path.mean(axis=0), full_matrices=False)[2].T
+    size = np.ptp(turned, axis=0)
+    return float(size[0]), float(size[1])
+
+
+def _apart(
+    known: Information,
+    a: Effect,
+    b: Effect,
+    size_a: tuple[float, ...] | None,
+) -> float:
+    return min(
+        known.separation(a.id, _size(a, size_a), b.id),
+        known.separation(b.id, _size(b, None), a.id),
+    )
+
+
+def _size(e: Effect, given: tuple[float, ...] | None) -> tuple[float, ...]:
+    return given if given is not None else tuple(p.typical - p.null_value for p in e.parameters)
+
+
+def _values(e: Effect, size: tuple[float, ...] | None) -> dict[str, float]:
+    return {
+        f"{e.id}.{p.name}": float(np.clip(p.null_value + s, p.lower, p.upper))
+        for p, s in zip(e.parameters, _size(e, size), strict=True)
+    }
+
+
+def _menu(limits: DriveLimits) -> list[Manoeuvre]:
+    """Manoeuvres of the library at several speeds and strengths within the limits."""
+    top, lateral = limits.speed_mps, limits.lateral_mps2
+    slow, fast = 0.5 * top, 0.8 * top
+    menu = [
+        manoeuvres.sine_sweep(speed_mps=v, lateral_mps2=share * lateral, duration_s=t)
+        for v in (slow, fast)
+        for share in (0.35, 0.6)
+        for t in (20.0, 40.0)
+    ]
+    menu += [
+        manoeuvres.step_steer((0.45 * top, 0.65 * top, 0.85 * top), (0.3 * lateral, 0.6 * lateral)),
+        manoeuvres.step_steer((0.45 * top,), (0.4 * lateral, 0.7 * lateral)),
+        manoeuvres.step_steer((0.85 * top,), (0.4 * lateral, 0.7 * lateral)),
+        manoeuvres.ramp_steer((slow,), 0.95 * lateral),
+        manoeuvres.ramp_steer((slow, fast), 0.95 * lateral),
+        manoeuvres.sine_with_dwell(0.6 * top, (0.3 * lateral, 0.5 * lateral, 0.7 * lateral)),
+        manoeuvres.slalom(speed_mps=slow, lateral_mps2=0.65 * lateral),
+        manoeuvres.brake_in_turn(lateral_mps2=0.6 * lateral),
+        manoeuvres.straight_acceleration(top_speed_mps=top, low_speed_mps=0.3 * top),
+        manoeuvres.lap(lateral_mps2=0.95 * lateral, top_speed_mps=0.95 * top),
+        manoeuvres.handling_course(lateral_mps2=0.95 * lateral, top_speed_mps=0.95 * top),
+    ]
+    menu += [
+        manoeuvres.constant_radius(radius, 0.95 * lateral, 40.0)
+        for radius in (30.0, 60.0, 100.0)
+        if radius * 0.95 * lateral < top**2
+    ]
+    return menu
+
+
+def _driven(
+    truth: Model, manoeuvre: Manoeuvre, fit: Fit, limits: DriveLimits, seed: int
+) -> Log | None:
+    """What the user's own sensors would write; None where the limits or the car do not hold."""
+    sensor = dict(zip(MEASURED, fit.noise.sensor, strict=True))
+    steer = max(white_noise_std(log["steer_rad"]) for log in fit.driving.logs)
+    noise = SensorNoise(**{n: float(s) for n, s in sensor.items()}, steer_rad=steer)
+    rate = fit.driving.logs[0].rate_hz
+    try:
+        drive = drive_truth(truth, manoeuvre, seed=seed, noise=noise, rate_hz=rate)
+    except (NumericalError, InvalidInput):
+        return None
+    if not limits.hold(drive):
+        return None
+    there = {c for log in fit.driving.logs for c in log.channels}
+    columns = {c: drive.log[c] for c in drive.log.channels if c in there or c == "time_s"}
+    return Log.from_arrays(columns, name=manoeuvre.name, check=False)

@@ -1,0 +1,268 @@
+"""A verdict for every effect: missing, one of a group, negligible, a proxy, absent, not testable.
+
+After Saris, Satorra & van der Veld (Structural Equation Modeling 2009): evidence, power and size
+together, never a p-value alone. Every effect is judged beside those that are known to be missing,
+so that what merely acted like one of them is told from what is missing too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from .._text import html_table, number
+from ..effects import Effect
+from ..identify import Fit
+from .diagnose import Diagnosis
+from .score import Score, score_board
+
+__all__ = ["EffectVerdict", "Finding", "Verdicts", "judge", "verdicts"]
+
+Finding = Literal["missing", "one of a group", "proxy", "negligible", "not testable", "absent"]
+
+_ORDER: tuple[Finding, ...] = (
+    "missing",
+    "one of a group",
+    "proxy",
+    "negligible",
+    "not testable",
+    "absent",
+)
+_IMPOSSIBLE = 5.0  # typical sizes, beyond which no car is known
+_UPPER = 1.645  # 95 %, one side
+_CERTAIN = 1.96
+
+
+@dataclass(frozen=True)
+class EffectVerdict:
+    """What the driving says of one effect.
+
+    Attributes
+    ----------
+    effect : Effect
+    finding : str
+        `missing`; `one of a group` of rivals that explain this driving as well; `proxy`, which acts
+        like something else; `negligible`; `absent`; or `not testable` with this data.
+    value, std : tuple of float
+        Parameters, predicted or refitted; empty where nothing is known of them.
+    bound : tuple of float
+        How far from nothing each parameter may be, at 95 %.
+    group : tuple of str
+        The rivals, or what the proxy acted like.
+    """
+
+    effect: Effect
+    finding: Finding
+    value: tuple[float, ...] = ()
+    std: tuple[float, ...] = ()
+    bound: tuple[float, ...] = ()
+    group: tuple[str, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words."""
+        size = _listed(self.effect, [f"{number(v, 3)} +- {number(s, 2)}" for v, s in self._pairs()])
+        below = _listed(self.effect, [f"below {number(b, 2)}" for b in self.bound])
+        matters = _listed(self.effect, [number(p.matters, 2) for p in self.effect.parameters])
+        rivals = ", ".join(self.group)
+        if self.finding == "missing":
+            return f"missing; {size}"
+        if self.finding == "one of a group":
+            return f"missing, or else {rivals}, which this driving cannot tell from it; {size}"
+        if self.finding == "proxy" and rivals:
+            return f"only acted like what {rivals} explains"
+        if self.finding == "proxy":
+            return f"something acts like it, but no car has such a value ({size}): look elsewhere"
+        if self.finding == "negligible":
+            return f"present but negligible; {size}; it would matter from {matters}"
+        if self.finding == "absent":
+            return f"absent; {below} at 95 %"
+        takes = f"it takes {self.effect.excited_by}"
+        if not self.bound:
+            return f"not testable: the fitted parameters copy it, or a channel is missing; {takes}"
+        return f"not testable; {below} at 95 %, and it would matter from {matters}; {takes}"
+
+    def _pairs(self) -> list[tuple[float, float]]:
+        return list(zip(self.value, self.std, strict=True))
+
+    def __str__(self) -> str:
+        return f"{self.effect.id}: {self.sentence}"
+
+
+@dataclass(frozen=True, eq=False)
+class Verdicts:
+    """The verdicts of all effects.
+
+    Attributes
+    ----------
+    all : tuple of EffectVerdict
+        What is missing first.
+    """
+
+    all: tuple[EffectVerdict, ...]
+
+    def __getitem__(self, effect: str) -> EffectVerdict:
+        for v in self.all:
+            if v.effect.id == effect:
+                return v
+        raise KeyError(f"'{effect}'; there are {', '.join(v.effect.id for v in self.all)}")
+
+    def of(self, finding: Finding) -> tuple[EffectVerdict, ...]:
+        """All of one kind."""
+        return tuple(v for v in self.all if v.finding == finding)
+
+    def __str__(self) -> str:
+        width = max((len(v.effect.id) for v in self.all), default=0)
+        return "\n".join(f"{v.effect.id:<{width}}  {v.sentence}" for v in self.all)
+
+    def _repr_html_(self) -> str:
+        return html_table(("effect", "verdict"), [[v.effect.id, v.sentence] for v in self.all])
+
+    def to_dict(self) -> dict[str, dict[str, object]]:
+        """All figures, ready for JSON."""
+        return {
+            v.effect.id: {
+                "finding": v.finding,
+                "sentence": v.sentence,
+                "value": list(v.value),
+                "std": list(v.std),
+                "bound": list(v.bound),
+                "group": list(v.group),
+            }
+            for v in self.all
+        }
+
+
+def verdicts(dx: Diagnosis, *, seed: int = 0) -> Verdicts:
+    """Give a verdict on every effect that a diagnosed model lacks.
+
+    Parameters
+    ----------
+    dx : Diagnosis
+    seed : int
+        Of the draws that correct for testing many effects.
+
+    Returns
+    -------
+    Verdicts
+    """
+    best = dx.ranking[0] if dx.significant else None
+    final = dx.fit if best is None or best.fit is None else best.fit
+    groups = {} if best is None else {best.id: best.indistinguishable_from}
+    return judge(
+        final,
+        lacked={e.id for e in dx.fit.model.candidates},
+        groups=groups,
+        acted={c.id for c in dx.significant},
+        alpha=dx.alpha,
+        seed=seed,
+    )
+
+
+def judge(
+    final: Fit,
+    *,
+    lacked: set[str],
+    groups: Mapping[str, tuple[str, ...]],
+    acted: set[str],
+    alpha: float,
+    seed: int = 0,
+) -> Verdicts:
+    """Judge every effect beside those of the final model.
+
+    Parameters
+    ----------
+    final : Fit
+        With all effects that were found missing.
+    lacked : set of str
+        What the model lacked to begin with: only that is judged.
+    groups : mapping
+        By effect of the final model, the rivals that driving cannot tell from it.
+    acted : set of str
+        Effects for which there was evidence before.
+    alpha : float
+        Rate of false claims accepted, over all effects together.
+    seed : int
+        Of the draws that correct for testing many effects.
+    """
+    board = score_board(final, final.driving, final.model.candidates)
+    family = board.family_p_values(seed=seed)
+    scores = {s.effect.id: s for s in board.scores}
+    rivals = {r for g in groups.values() for r in g}
+    names = tuple(e for e in final.model.effects if e in lacked)
+    found = [_of_added(e, final, groups.get(e.id, ())) for e in final.model.parts if e.id in lacked]
+    for effect in final.model.candidates:
+        if effect.id not in lacked:
+            continue
+        score = scores.get(effect.id)
+        verdict = _of_scored(effect, score, family.get(effect.id, 1.0) < alpha)
+        if effect.id in acted and names and verdict.finding in ("absent", "not testable"):
+            kind: Finding = "one of a group" if effect.id in rivals else "proxy"
+            verdict = EffectVerdict(
+                effect, kind, verdict.value, verdict.std, verdict.bound, group=names
+            )
+        found.append(verdict)
+    found.sort(key=lambda v: (_ORDER.index(v.finding), family.get(v.effect.id, 0.0)))
+    return Verdicts(tuple(found))
+
+
+def _of_added(effect: Effect, final: Fit, group: tuple[str, ...]) -> EffectVerdict:
+    estimates = [final[f"{effect.id}.{p.name}"] for p in effect.parameters]
+    value, std = tuple(e.value for e in estimates), tuple(e.std for e in estimates)
+    return _of_present(effect, value, std, group)
+
+
+def _of_scored(effect: Effect, score: Score | None, evidence: bool) -> EffectVerdict:
+    if score is None:
+        return EffectVerdict(effect, "not testable")
+    if evidence:
+        return _of_present(effect, score.value, score.std, ())
+    bound = _bound(effect, score.value, score.std)
+    # The bound says it all: below what matters, the test had the power to find what does.
+    small = all(b < p.matters for b, p in zip(bound, effect.parameters, strict=True) if not p.scan)
+    return EffectVerdict(
+        effect, "absent" if small else "not testable", score.value, score.std, bound
+    )
+
+
+def _of_present(
+    effect: Effect, value: tuple[float, ...], std: tuple[float, ...], group: tuple[str, ...]
+) -> EffectVerdict:
+    sizes = [
+        (p, v - p.null_value, _CERTAIN * s)
+        for p, v, s in zip(effect.parameters, value, std, strict=True)
+        if not p.scan
+    ]
+    finding: Finding = "one of a group" if group else "missing"
+    if any(_impossible(p.null_value, p.typical, p.lower, p.upper, d, s) for p, d, s in sizes):
+        finding, group = "proxy", ()
+    elif all(abs(d) + s < p.matters for p, d, s in sizes):
+        finding, group = "negligible", ()
+    return EffectVerdict(effect, finding, value, std, _bound(effect, value, std), group)
+
+
+def _impossible(
+    null: float, typical: float, lower: float, upper: float, off: float, reach: float
+) -> bool:
+    """Whether no value of the interval is one that a car can have."""
+    most = _IMPOSSIBLE * abs(typical - null)
+    low, high = max(lower - null, -most), min(upper - null, most)
+    return bool(off + reach < low or off - reach > high)
+
+
+def _bound(effect: Effect, value: tuple[float, ...], std: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(
+        float(np.abs(v - p.null_value) + _UPPER * s)
+        for p, v, s in zip(effect.parameters, value, std, strict=True)
+    )
+
+
+def _listed(effect: Effect, figures: list[str]) -> str:
+    return ", ".join(
+        f"{p.name} {x} {p.unit}".removesuffix(" 1")
+        for p, x in zip(effect.parameters, figures, strict=False)
+        if not p.scan
+    )

@@ -1,0 +1,128 @@
+"""The error of every model of a study, one step ahead and further."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _core
+from .._arrays import FloatArray
+from .._style import AFTER, BEFORE, axes_or_new, tidy
+from .._text import html_table, text_table
+from ..compare import Comparison
+from ..estimate import MEASURED, Driving, NoiseModel
+from ..identify import Fit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["Waterfall", "waterfall"]
+
+
+@dataclass(frozen=True, eq=False)
+class Waterfall:
+    """Errors step by step, in units of the noise floor of one-step-ahead predictions.
+
+    Attributes
+    ----------
+    steps : tuple of str
+        The baseline, then what was added.
+    horizons_s : tuple of float
+        How far ahead was predicted from what was known then and the inputs since; 0 is one sample.
+    train, test : array, shape (steps, horizons)
+        Root mean square over all channels; infinite where a model lost the car, NaN where the
+        driving is too short for the horizon.
+    """
+
+    steps: tuple[str, ...]
+    horizons_s: tuple[float, ...]
+    train: FloatArray
+    test: FloatArray
+
+    def _head(self) -> list[str]:
+        ahead = ["one step" if h == 0.0 else f"{h:g} s" for h in self.horizons_s]
+        return ["error ahead by", *(f"train {a}" for a in ahead), *(f"held out {a}" for a in ahead)]
+
+    def _rows(self) -> list[list[str]]:
+        rows = [
+            [step, *(f"{e:.2f}" for e in (*train, *test))]
+            for step, train, test in zip(self.steps, self.train, self.test, strict=True)
+        ]
+        floor = ["1.00" if h == 0.0 else "" for h in self.horizons_s]
+        return [*rows, ["noise floor", *floor, *floor]]
+
+    def __str__(self) -> str:
+        return text_table(self._head(), self._rows())
+
+    def _repr_html_(self) -> str:
+        return html_table(self._head(), self._rows())
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the held-out errors over the horizon, one line for each step.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        ax = axes_or_new(ax, 5.5, 3.4)
+        places = np.arange(len(self.horizons_s))
+        for i, step in enumerate(self.steps):
+            colour = BEFORE if i == 0 else AFTER
+            share = 1.0 if i in (0, len(self.steps) - 1) else 0.4
+            ax.plot(places, self.test[i], "o-", color=colour, alpha=share, label=step)
+        ax.axhline(1.0, color="0.4", linestyle="--", linewidth=0.8)
+        ax.set_yscale("log")
+        ax.set_xticks(places, ["one step" if h == 0.0 else f"{h:g} s" for h in self.horizons_s])
+        ax.legend()
+        return tidy(ax, xlabel="predicted ahead", ylabel="held-out error / noise floor")
+
+
+def waterfall(
+    fits: Sequence[Fit],
+    steps: Sequence[str],
+    train: tuple[Driving, Comparison],
+    test: tuple[Driving, Comparison],
+    horizons_s: Sequence[float],
+) -> Waterfall:
+    """Work out the errors of several models on two sets of driving.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+    steps : sequence of str
+        A word for each fit.
+    train, test : (Driving, Comparison)
+        Driving, and how the last fit did on it: its noise floor is the unit.
+    horizons_s : sequence of float
+        Beside one step.
+    """
+    floor = fits[-1].noise.floor()
+    horizons = (0.0, *horizons_s)
+
+    def errors(driving: Driving, score: Comparison) -> FloatArray:
+        spread = np.array(
+            [score.channels[c].noise_floor if c in score.channels else np.nan for c in MEASURED]
+        )
+        return np.array([[_error(f, floor, driving, h, spread) for h in horizons] for f in fits])
+
+    return Waterfall(tuple(steps), horizons, errors(*train), errors(*test))
+
+
+def _error(
+    fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float, spread: FloatArray
+) -> float:
+    ahead = max(round(horizon_s * driving.logs[0].rate_hz), 1)
+    problem = driving.problem(fit.model)
+    try:
+        e = problem.look_ahead(fit.model.vector(), noise.vector(), ahead) / spread
+    except _core.NumericalFailure:
+        return float("inf")
+    e = np.where(np.isfinite(driving.measured), e, np.nan)
+    return float(np.sqrt(np.nanmean(e**2))) if np.isfinite(e).any() else float("nan")

@@ -1,0 +1,108 @@
+"""Every effect gets a verdict, and the verdict of what is absent holds its bound."""
+
+from collections.abc import Callable
+
+import pytest
+
+from sysid_vehicle import (
+    Diagnosis,
+    Fit,
+    Model,
+    diagnose,
+    drive,
+    effect,
+    identify,
+    manoeuvres,
+    verdicts,
+)
+from sysid_vehicle.diagnose import EffectVerdict, Verdicts
+from sysid_vehicle.diagnose.verdicts import _of_present
+
+Hidden = Callable[[str, float], Fit]
+OFFSET = "steer_offset.offset_rad", 0.002
+
+
+@pytest.fixture(scope="module")
+def found(hidden_fit: Hidden) -> Diagnosis:
+    return diagnose(hidden_fit(*OFFSET))
+
+
+@pytest.fixture(scope="module")
+def judged(found: Diagnosis) -> Verdicts:
+    return verdicts(found)
+
+
+def test_the_hidden_effect_is_missing_with_its_size(judged: Verdicts) -> None:
+    first = judged.all[0]
+    assert first.effect.id == "steer_offset"
+    assert first.finding == "missing"
+    assert abs(first.value[0] - OFFSET[1]) < 4.0 * first.std[0]
+    assert first.sentence.startswith("missing; offset_rad 0.002")
+
+
+def test_every_effect_is_judged_once(judged: Verdicts, found: Diagnosis) -> None:
+    ids = [v.effect.id for v in judged.all]
+    assert sorted(ids) == sorted(e.id for e in found.fit.model.candidates)
+    assert sum(len(judged.of(f)) for f in ("missing", "one of a group", "proxy")) < len(ids) / 2
+
+
+def test_what_only_acted_like_it_is_a_proxy_of_it(judged: Verdicts, found: Diagnosis) -> None:
+    others = [c.id for c in found.significant if c.id != "steer_offset"]
+    assert others  # many effects push a car to one side
+    for name in others:
+        assert judged[name].finding in ("proxy", "one of a group")
+        assert judged[name].group == ("steer_offset",)
+    assert "steer_offset" in judged[others[0]].sentence
+
+
+def test_what_is_absent_is_bounded_below_what_matters(judged: Verdicts) -> None:
+    absent = judged.of("absent")
+    assert len(absent) >= 5
+    for v in absent:
+        for p, bound in zip(v.effect.parameters, v.bound, strict=True):
+            assert bound < p.matters or p.scan
+    # The bound is the truth's: none of these acts.
+    assert judged["gyro_bias"].finding == "absent"
+    assert "at 95 %" in judged["gyro_bias"].sentence
+
+
+def test_bounds_hold_the_truth_as_often_as_they_say(complete_fits: tuple[Fit, ...]) -> None:
+    told = [v for fit in complete_fits for v in verdicts(diagnose(fit)).all if v.bound]
+    exceeded = [
+        abs(v.value[0] - v.effect.parameters[0].null_value) > 1.645 * v.std[0]
+        for v in told
+        if not v.effect.parameters[0].one_sided
+    ]
+    # 10 % on two sides; effects share their noise, so that few fits scatter widely.
+    assert sum(exceeded) / len(exceeded) < 0.25
+    assert not [v for v in told if v.finding in ("missing", "one of a group")]
+
+
+def test_what_this_driving_cannot_show_is_not_testable(truth: Model, start: Model) -> None:
+    straight = drive(truth, manoeuvres.sine_sweep(15.0, lateral_mps2=1.0), seed=4)
+    judged = verdicts(diagnose(identify(start, straight, starts=1), refits=0))
+    # A weave at one speed, far from the limit, tells nothing of grip.
+    for name in ("lateral_load_transfer", "aero_downforce", "tyre_load_sensitivity"):
+        assert judged[name].finding == "not testable"
+        assert judged[name].effect.excited_by in judged[name].sentence
+
+
+def kind(name: str, value: float, std: float) -> EffectVerdict:
+    return _of_present(effect(name), (value,), (std,), ())
+
+
+def test_impossible_and_negligible_values() -> None:
+    drag = effect("aero_drag").parameters[0]
+    assert kind("aero_drag", drag.typical, 0.01).finding == "missing"
+    assert kind("aero_drag", 0.3 * drag.matters, 0.1 * drag.matters).finding == "negligible"
+    assert kind("aero_drag", 8.0 * drag.typical, 0.01).finding == "proxy"
+    assert kind("tyre_relaxation", -0.5, 0.1).finding == "proxy"  # below its bound
+    assert "look elsewhere" in kind("aero_drag", 8.0 * drag.typical, 0.01).sentence
+
+
+def test_verdicts_show_themselves(judged: Verdicts) -> None:
+    assert "steer_offset" in str(judged).splitlines()[0]
+    assert "<table" in judged._repr_html_()
+    assert judged.to_dict()["steer_offset"]["finding"] == "missing"
+    with pytest.raises(KeyError, match="there are"):
+        judged["magic"]
