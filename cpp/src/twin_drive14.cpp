@@ -73,8 +73,10 @@ Drive14 drive14(const Vehicle14& car, const Driver& driver, const Pedals& pedals
         const Output14 y = car.output(x, u);
         out.run.states.insert(out.run.states.end(), x.begin(), x.begin() + kTwinStates);
         out.run.outputs.insert(out.run.outputs.end(), y.begin(), y.end());
-        // Written so that a state that is not a number counts as lost.
-        if (!(x[state14::Vx] >= kSlowestDrive && std::abs(y[output14::kSideslip]) <= kLost)) {
+        // Asked so that a state that is not a number counts as lost.
+        const bool held =
+            x[state14::Vx] >= kSlowestDrive && std::abs(y[output14::kSideslip]) <= kLost;
+        if (!held) {
             out.lost_at = k;
             break;
         }

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -18,9 +19,7 @@ double sign_of_rotation(double speed) {
     return speed / std::sqrt(speed * speed + kStandingWheel * kStandingWheel);
 }
 
-double beyond(double travel, double limit) {
-    return travel > limit ? travel - limit : (travel < -limit ? travel + limit : 0.0);
-}
+double beyond(double travel, double limit) { return travel - std::clamp(travel, -limit, limit); }
 
 }  // namespace
 

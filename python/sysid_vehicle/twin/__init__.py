@@ -52,6 +52,7 @@ from .laws import (
     mass_law,
     unknowns,
 )
+from .logs import single_track, to_log
 from .observer import STATES, Observation, Observer, StateGain, observe
 from .protocol import Twin, observe_with
 from .readings import READINGS, Readings, measure, noisy_road
@@ -106,7 +107,9 @@ __all__ = [
     "on_manoeuvre",
     "rough_road",
     "sideslip_and_mass_cost",
+    "single_track",
     "swept_steer",
+    "to_log",
     "unknowns",
     "urban_cycle",
 ]
