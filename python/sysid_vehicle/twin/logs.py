@@ -74,6 +74,8 @@ def to_log(
 ) -> Log:
     """The log that the car's sensors would write.
 
+    The wheel force is what the torques give, less what spins the wheels up.
+
     Parameters
     ----------
     car, drive : TwinCar, Drive14
@@ -105,8 +107,11 @@ def to_log(
         steer = steer + steer_lag_s * np.gradient(steer, drive.dt_s)
     force = np.zeros(len(steer))
     for wheel in _WHEELS:
-        radius = numbers["front.radius_m" if wheel[0] == "f" else "rear.radius_m"]
-        force += (drive[f"drive_{wheel}_nm"] - drive[f"brake_{wheel}_nm"]) / radius
+        axle = "front" if wheel[0] == "f" else "rear"
+        spin_up = np.gradient(drive[f"wheel_speed_{wheel}_radps"], drive.dt_s)
+        torque = drive[f"drive_{wheel}_nm"] - drive[f"brake_{wheel}_nm"]
+        torque = torque - numbers[f"{axle}.wheel_inertia_kgm2"] * spin_up
+        force += torque / numbers[f"{axle}.radius_m"]
     columns = {
         "time_s": drive.time_s,
         **{name: drive[name] for name in ("vx_mps", "vy_mps", "yaw_rate_radps")},
