@@ -1,6 +1,24 @@
-"""State estimation on logs: prepared driving and the noise model."""
+"""State estimation: prepared driving, the noise model, filters for models of one's own."""
 
+from .consistency import Consistency, nees_check, nis_check, whiteness_check
 from .driving import MEASURED, UNITS, Driving
+from .filters import FilterRun, FilterState, LateMeasurements, StateFilter, StateModel
 from .noise import NoiseModel, first_guess, learn_noise
 
-__all__ = ["MEASURED", "UNITS", "Driving", "NoiseModel", "first_guess", "learn_noise"]
+__all__ = [
+    "MEASURED",
+    "UNITS",
+    "Consistency",
+    "Driving",
+    "FilterRun",
+    "FilterState",
+    "LateMeasurements",
+    "NoiseModel",
+    "StateFilter",
+    "StateModel",
+    "first_guess",
+    "learn_noise",
+    "nees_check",
+    "nis_check",
+    "whiteness_check",
+]
