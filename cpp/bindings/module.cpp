@@ -15,4 +15,5 @@ PYBIND11_MODULE(_core, m) {
     register_lab_tyres(m);
     register_online_mu_slip(m);
     register_twin(m);
+    register_online_sideslip(m);
 }

@@ -12,5 +12,6 @@ void register_lab_loop(pybind11::module_& m);
 void register_lab_tyres(pybind11::module_& m);
 void register_online_mu_slip(pybind11::module_& m);
 void register_twin(pybind11::module_& m);
+void register_online_sideslip(pybind11::module_& m);
 
 }  // namespace sysid::bindings

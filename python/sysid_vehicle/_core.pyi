@@ -11,6 +11,16 @@ from ._core_mu_slip import TwoParameterFilter as TwoParameterFilter
 from ._core_mu_slip import _Curve as _Curve
 from ._core_mu_slip import _CurveFilter as _CurveFilter
 from ._core_mu_slip import magic_formula_coefficients as magic_formula_coefficients
+from ._core_sideslip import CorneringRls as CorneringRls
+from ._core_sideslip import ObservedCar as ObservedCar
+from ._core_sideslip import PublishedDual as PublishedDual
+from ._core_sideslip import SideslipDual as SideslipDual
+from ._core_sideslip import SideslipEkf as SideslipEkf
+from ._core_sideslip import SideslipSquareRootUkf as SideslipSquareRootUkf
+from ._core_sideslip import SideslipUkf as SideslipUkf
+from ._core_sideslip import _SideslipObserver as _SideslipObserver
+from ._core_sideslip import _SideslipUkf as _SideslipUkf
+from ._core_sideslip import sideslip_defaults as sideslip_defaults
 from ._core_twin import TWIN_INPUTS as TWIN_INPUTS
 from ._core_twin import TWIN_OUTPUTS as TWIN_OUTPUTS
 from ._core_twin import TWIN_READINGS as TWIN_READINGS

@@ -17,7 +17,7 @@ from .effects import Effect, Parameter, base_parameters, catalogue, effect
 from .errors import InvalidInput
 from .vehicle import Tyre, Vehicle
 
-__all__ = ["Model"]
+__all__ = ["Model", "vehicle_data"]
 
 _YAW_INERTIA = "yaw_inertia_kgm2"
 
@@ -147,19 +147,7 @@ class Model:
 
     def core(self, *, force_known: bool = True, also: Iterable[Effect] = ()) -> _core.SingleTrack:
         """The compiled model, with effects `also` switched on."""
-        v = self.vehicle
-        data = _core.VehicleData()
-        for name in (
-            "mass_kg",
-            "lf_m",
-            "lr_m",
-            "cg_height_m",
-            "drag_area_m2",
-            "air_density_kgpm3",
-            "brake_front_share",
-            "drive_front_share",
-        ):
-            setattr(data, name, getattr(v, name))
+        data = vehicle_data(self.vehicle)
         mask = 0
         for e in (*self.parts, *also):
             mask |= e.bit
@@ -176,3 +164,20 @@ class Model:
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(str(self))}</pre>"
+
+
+def vehicle_data(vehicle: Vehicle) -> _core.VehicleData:
+    """What the compiled core knows of the car."""
+    data = _core.VehicleData()
+    for name in (
+        "mass_kg",
+        "lf_m",
+        "lr_m",
+        "cg_height_m",
+        "drag_area_m2",
+        "air_density_kgpm3",
+        "brake_front_share",
+        "drive_front_share",
+    ):
+        setattr(data, name, getattr(vehicle, name))
+    return data

@@ -21,7 +21,7 @@ from ..read import ChannelMap, read_log
 from ..report import summary, write_report
 from ..study import Study, improve
 from ..vehicle import Vehicle
-from . import lab, mu_slip, twin
+from . import lab, mu_slip, sideslip, twin
 from .outputs import refuse_unwritable
 
 __all__ = ["COMMANDS"]
@@ -100,6 +100,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
     "lab": lab.run,
     "mu-slip": mu_slip.run,
     "twin": twin.run,
+    "sideslip": sideslip.run,
 }
 
 

@@ -1,5 +1,6 @@
 """Estimators that run while driving, one reading at a time."""
 
+from .cornering import CorneringRls, CorneringRun, cornering_stiffness
 from .mu_slip_compare import MuSlipComparison, compare_mu_slip
 from .mu_slip_curve import (
     MAGIC_FORMULA,
@@ -21,10 +22,16 @@ from .mu_slip_figures import (
 from .mu_slip_filter import MuSlipFilter, mu_slip_ekf, mu_slip_smooth
 from .mu_slip_least_squares import mu_slip_cramer_rao, mu_slip_fit
 from .mu_slip_results import MuSlipEstimate, MuSlipRun, MuSlipSmoothed
+from .sideslip import KINDS, SideslipEstimate, SideslipObserver, estimate_sideslip
+from .sideslip_results import SideslipError, SideslipRun, sideslip_overview
+from .sideslip_settings import SideslipSettings
 
 __all__ = [
+    "KINDS",
     "MAGIC_FORMULA",
     "TWO_PARAMETER",
+    "CorneringRls",
+    "CorneringRun",
     "MuSlipComparison",
     "MuSlipCurve",
     "MuSlipData",
@@ -34,11 +41,18 @@ __all__ = [
     "MuSlipPrior",
     "MuSlipRun",
     "MuSlipSmoothed",
+    "SideslipError",
+    "SideslipEstimate",
+    "SideslipObserver",
+    "SideslipRun",
+    "SideslipSettings",
     "animate_mu_slip",
     "compare_mu_slip",
+    "cornering_stiffness",
     "draw_mu_slip_convergence",
     "draw_mu_slip_observability",
     "draw_mu_slip_signal",
+    "estimate_sideslip",
     "magic_formula_coefficients",
     "mu_slip_cramer_rao",
     "mu_slip_ekf",
@@ -46,5 +60,6 @@ __all__ = [
     "mu_slip_overview",
     "mu_slip_smooth",
     "save_animation",
+    "sideslip_overview",
     "simulate_mu_slip",
 ]

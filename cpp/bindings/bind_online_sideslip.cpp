@@ -1,0 +1,186 @@
+// Sideslip observers, a sample at a time and over a whole log, and the recursive least squares of
+// the cornering stiffness.
+#include <utility>
+
+#include "arrays.hpp"
+#include "register.hpp"
+#include "sysid/online/cornering_rls.hpp"
+#include "sysid/online/published_dual.hpp"
+#include "sysid/online/sideslip_dual.hpp"
+#include "sysid/online/sideslip_ukf.hpp"
+
+namespace sysid::bindings {
+
+namespace {
+
+using Member = double ObserverSettings::*;
+constexpr std::pair<const char*, Member> kSettings[] = {
+    {"vx_mps", &ObserverSettings::vx_mps},
+    {"yaw_rate_radps", &ObserverSettings::yaw_rate_radps},
+    {"ax_mps2", &ObserverSettings::ax_mps2},
+    {"ay_mps2", &ObserverSettings::ay_mps2},
+    {"road_mps2", &ObserverSettings::road_mps2},
+    {"roll_share", &ObserverSettings::roll_share},
+    {"road_time_s", &ObserverSettings::road_time_s},
+    {"force_wander", &ObserverSettings::force_wander},
+    {"error_load", &ObserverSettings::error_load},
+    {"error_lateral", &ObserverSettings::error_lateral},
+    {"error_braking", &ObserverSettings::error_braking},
+    {"error_drive", &ObserverSettings::error_drive},
+    {"error_time_s", &ObserverSettings::error_time_s},
+    {"yaw_wander_radps", &ObserverSettings::yaw_wander_radps},
+    {"sideslip_wander_rad", &ObserverSettings::sideslip_wander_rad},
+    {"stiffness_prior", &ObserverSettings::stiffness_prior},
+    {"friction_prior", &ObserverSettings::friction_prior},
+    {"stiffness_wander", &ObserverSettings::stiffness_wander},
+    {"friction_time_s", &ObserverSettings::friction_time_s},
+    {"relaxation_m", &ObserverSettings::relaxation_m},
+    {"gate_probability", &ObserverSettings::gate_probability},
+    {"gate_patience_s", &ObserverSettings::gate_patience_s},
+    {"frozen_after_s", &ObserverSettings::frozen_after_s},
+    {"stop_below_mps", &ObserverSettings::stop_below_mps},
+    {"go_above_mps", &ObserverSettings::go_above_mps},
+    {"fx_wander", &ObserverSettings::fx_wander},
+    {"beta_wander_radps", &ObserverSettings::beta_wander_radps},
+    {"model_ay_mps2", &ObserverSettings::model_ay_mps2},
+};
+
+TyreCoefficients<double> to_tyre(const std::array<double, 4>& t) {
+    return {t[0], t[1], t[2], t[3]};
+}
+
+ObserverSettings to_settings(const py::dict& values) {
+    ObserverSettings out;
+    std::size_t known = 0;
+    for (const auto& [name, member] : kSettings)
+        if (values.contains(name)) {
+            out.*member = values[name].cast<double>();
+            ++known;
+        }
+    if (known != values.size()) throw std::invalid_argument("settings: a name is not known");
+    return out;
+}
+
+/// Adds step and whole-log call; both go through the same `step`, so the numbers are the same.
+template <class Observer>
+void add_calls(py::class_<Observer>& bound) {
+    bound
+        .def(
+            "step",
+            [](Observer& self, double dt, double steer, double vx, double r, double ax, double ay) {
+                return columns_of(self.step(dt, {steer, vx, r, ax, ay}));
+            },
+            py::arg("dt_s"), py::arg("steer_rad"), py::arg("vx_mps"), py::arg("yaw_rate_radps"),
+            py::arg("ax_mps2"), py::arg("ay_mps2"))
+        .def(
+            "run",
+            [](Observer& self, const Array& dt, const Array& sensors) {
+                const auto n = static_cast<std::size_t>(dt.size());
+                const double* step = vector(dt, n, "dt_s");
+                const double* s = matrix(sensors, dt.size(), 5, "sensors");
+                Array out = empty(n, kEstimateColumns);
+                double* to = out.mutable_data();
+                unlocked([&] {
+                    for (std::size_t k = 0; k < n; ++k, s += 5) {
+                        const auto row =
+                            columns_of(self.step(step[k], {s[0], s[1], s[2], s[3], s[4]}));
+                        to = std::copy(row.begin(), row.end(), to);
+                    }
+                });
+                return out;
+            },
+            py::arg("dt_s"), py::arg("sensors"))
+        .def("copy", [](const Observer& self) { return Observer(self); })
+        .def_property_readonly("samples", &Observer::samples);
+}
+
+template <Method method>
+void register_ukf(py::module_& m, const char* name) {
+    py::class_<SideslipUkf<method>> bound(m, name);
+    bound.def(py::init([](const ObservedCar& car, const py::dict& settings, bool linear) {
+                  return SideslipUkf<method>(car, to_settings(settings), linear);
+              }),
+              py::arg("car"), py::arg("settings"), py::arg("linear"));
+    add_calls(bound);
+}
+
+}  // namespace
+
+void register_online_sideslip(py::module_& m) {
+    py::class_<ObservedCar>(m, "ObservedCar")
+        .def(py::init([](const VehicleData& data, double yaw_inertia,
+                         const std::array<double, 4>& front, const std::array<double, 4>& rear) {
+                 return ObservedCar{data, yaw_inertia, to_tyre(front), to_tyre(rear)};
+             }),
+             py::arg("data"), py::arg("yaw_inertia_kgm2"), py::arg("front"), py::arg("rear"));
+    m.def("sideslip_defaults", [] {
+        py::dict out;
+        const ObserverSettings defaults;
+        for (const auto& [name, member] : kSettings) out[name] = defaults.*member;
+        return out;
+    });
+
+    py::class_<SideslipDual> dual(m, "SideslipDual");
+    dual.def(py::init([](const ObservedCar& car, const py::dict& settings) {
+                 return SideslipDual(car, to_settings(settings));
+             }),
+             py::arg("car"), py::arg("settings"));
+    add_calls(dual);
+    py::class_<PublishedDual> published(m, "PublishedDual");
+    published.def(py::init<const ObservedCar&, double, double>(), py::arg("car"), py::arg("cf_npr"),
+                  py::arg("cr_npr"));
+    add_calls(published);
+    register_ukf<Method::kExtended>(m, "SideslipEkf");
+    register_ukf<Method::kUnscented>(m, "SideslipUkf");
+    register_ukf<Method::kSquareRoot>(m, "SideslipSquareRootUkf");
+
+    py::class_<CorneringRls>(m, "CorneringRls")
+        .def(py::init([](double mass, double inertia, double lf, double lr, double forgetting,
+                         double prior_std, double ay_std, double yaw_std, double most_slip,
+                         double least_slip, double cf, double cr) {
+                 return CorneringRls({mass, inertia, lf, lr, forgetting, prior_std, ay_std, yaw_std,
+                                      most_slip, least_slip},
+                                     cf, cr);
+             }),
+             py::arg("mass_kg"), py::arg("yaw_inertia_kgm2"), py::arg("lf_m"), py::arg("lr_m"),
+             py::arg("forgetting"), py::arg("prior_std_npr"), py::arg("ay_std_mps2"),
+             py::arg("yaw_acceleration_std_radps2"), py::arg("most_slip_rad"),
+             py::arg("least_slip_rad"), py::arg("cf_npr"), py::arg("cr_npr"))
+        .def("step", &CorneringRls::step, py::arg("alpha_f_rad"), py::arg("alpha_r_rad"),
+             py::arg("ay_mps2"), py::arg("yaw_acceleration_radps2"))
+        .def(
+            "run",
+            [](CorneringRls& self, const Array& readings) {
+                const double* r = matrix(readings, readings.shape(0), 4, "readings");
+                const auto n = static_cast<std::size_t>(readings.shape(0));
+                Array out = empty(n, 5);
+                double* to = out.mutable_data();
+                unlocked([&] {
+                    for (std::size_t k = 0; k < n; ++k, r += 4) {
+                        const bool used = self.step(r[0], r[1], r[2], r[3]);
+                        const auto& P = self.covariance();
+                        for (const double v :
+                             {self.stiffness_npr()[0], self.stiffness_npr()[1], std::sqrt(P(0, 0)),
+                              std::sqrt(P(1, 1)), used ? 1.0 : 0.0})
+                            *to++ = v;
+                    }
+                });
+                return out;
+            },
+            py::arg("readings"))
+        .def("reset", &CorneringRls::reset)
+        .def_property_readonly("stiffness_npr",
+                               [](const CorneringRls& self) {
+                                   return py::make_tuple(self.stiffness_npr()[0],
+                                                         self.stiffness_npr()[1]);
+                               })
+        .def_property_readonly("std_npr",
+                               [](const CorneringRls& self) {
+                                   return py::make_tuple(std::sqrt(self.covariance()(0, 0)),
+                                                         std::sqrt(self.covariance()(1, 1)));
+                               })
+        .def_property_readonly("samples", &CorneringRls::samples)
+        .def_property_readonly("used", &CorneringRls::used);
+}
+
+}  // namespace sysid::bindings

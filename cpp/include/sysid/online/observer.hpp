@@ -1,0 +1,159 @@
+// What every sideslip observer takes and gives at a sample, what it assumes about sensors, road and
+// tyre model, and how it looks after its sensors.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "sysid/math/errors.hpp"
+#include "sysid/math/linear.hpp"
+
+namespace sysid {
+
+/// One sample of the sensors; NaN is missing. SI units, ISO 8855 axes.
+struct SensorSample {
+    double steer_rad, vx_mps, yaw_rate_radps, ax_mps2, ay_mps2;
+};
+
+enum class ObserverMode : int {
+    kRunning = 0,
+    kHolding = 1,   // too slow: sideslip of a car that rolls without slip
+    kCoasting = 2,  // a sensor is missing or refused: the tyre model stands in
+};
+
+struct SideslipEstimate {
+    double beta_rad = 0.0, beta_std_rad = 0.0;
+    double vx_mps = 0.0, yaw_rate_radps = 0.0;
+    double fyf_n = 0.0, fyr_n = 0.0, fx_n = 0.0;
+    double cf_npr = 0.0, cr_npr = 0.0;  // cornering stiffness at the static load [N/rad]
+    double cf_std_npr = 0.0, cr_std_npr = 0.0;
+    double mu_f = 0.0, mu_r = 0.0;  // friction at the peak [-]
+    double nis = 0.0;               // squared whitened innovation
+    double observed = 0.0;          // readings that it is made of
+    double log_likelihood = 0.0;
+    ObserverMode mode = ObserverMode::kRunning;
+};
+constexpr std::size_t kEstimateColumns = 17;
+
+inline std::array<double, kEstimateColumns> columns_of(const SideslipEstimate& e) {
+    return {e.beta_rad,
+            e.beta_std_rad,
+            e.vx_mps,
+            e.yaw_rate_radps,
+            e.fyf_n,
+            e.fyr_n,
+            e.fx_n,
+            e.cf_npr,
+            e.cr_npr,
+            e.cf_std_npr,
+            e.cr_std_npr,
+            e.mu_f,
+            e.mu_r,
+            e.nis,
+            e.observed,
+            e.log_likelihood,
+            static_cast<double>(e.mode)};
+}
+
+/// A car too slow for slip to be seen; for the rest of the estimate there is nothing to say.
+inline SideslipEstimate rolling_without_slip(double lf_m, double lr_m, const SensorSample& s) {
+    SideslipEstimate out;
+    out.beta_rad = std::atan(lr_m * std::tan(s.steer_rad) / (lf_m + lr_m));
+    out.beta_std_rad = 0.01 + 0.2 * std::abs(out.beta_rad);
+    out.vx_mps = s.vx_mps;
+    out.yaw_rate_radps = s.yaw_rate_radps;
+    out.fyf_n = out.fyr_n = out.fx_n = std::nan("");
+    out.cf_npr = out.cr_npr = out.cf_std_npr = out.cr_std_npr = std::nan("");
+    out.mu_f = out.mu_r = out.nis = std::nan("");
+    out.mode = ObserverMode::kHolding;
+    return out;
+}
+
+/// Standard deviations; those of things that wander are per root second.
+struct ObserverSettings {
+    // white noise of the sensors
+    double vx_mps = 0.05, yaw_rate_radps = 0.005, ax_mps2 = 0.1, ay_mps2 = 0.1;
+    // lateral acceleration that moves the car but that no accelerometer feels (road bank), and the
+    // share of it that it feels too much, by gravity in body roll
+    double road_mps2 = 0.05, road_time_s = 10.0, roll_share = 0.03;
+    // axle forces as observer A lets them change, as a share of the load
+    double force_wander = 1.0;
+    // error of the tyre model, as a share of load, lateral force, and grip lost to braking
+    double error_load = 0.007, error_lateral = 0.05, error_braking = 0.3, error_time_s = 0.5;
+    // yaw moment by drive and brakes: share of their force, at half the wheelbase
+    double error_drive = 0.2;
+    // what neither tyres nor road explain of yaw rate and sideslip
+    double yaw_wander_radps = 0.02, sideslip_wander_rad = 0.001;
+    // logarithm of the tyre's numbers: stiffness is doubtful at first and wanders in hard driving,
+    // friction changes with the road and comes back
+    double stiffness_prior = 0.4, stiffness_wander = 0.01;
+    double friction_prior = 0.2, friction_time_s = 20.0;
+    double relaxation_m = 0.6;  // relaxation length of both axles
+    // gate, frozen sensors, low speed
+    double gate_probability = 1e-6, gate_patience_s = 3.0, frozen_after_s = 0.2;
+    double stop_below_mps = 3.0, go_above_mps = 4.0;
+    // the three-state observer: longitudinal forces as a share of the load, errors of the
+    // sideslip rate and of the lateral acceleration
+    double fx_wander = 0.3, beta_wander_radps = 0.004, model_ay_mps2 = 0.3;
+};
+
+/// Fills gaps of the inputs, notices sensors that stand still, decides whether the car is fast
+/// enough.
+class SensorWatch {
+  public:
+    explicit SensorWatch(const ObserverSettings& settings) : settings_(settings) {
+        last_.fill(std::nan(""));
+        still_s_.fill(0.0);
+    }
+
+    /// The sample without frozen channels, and with the steering angle held over gaps.
+    SensorSample look(double dt, SensorSample s, std::size_t sample) {
+        if (!(dt > 0.0) || !std::isfinite(dt))
+            throw NumericalFailure("the time step is not positive", sample);
+        check(s.steer_rad, "steer_rad", sample);
+        check(s.vx_mps, "vx_mps", sample);
+        check(s.yaw_rate_radps, "yaw_rate_radps", sample);
+        check(s.ax_mps2, "ax_mps2", sample);
+        check(s.ay_mps2, "ay_mps2", sample);
+        steer_gap_s_ = std::isnan(s.steer_rad) ? steer_gap_s_ + dt : 0.0;
+        if (steer_gap_s_ == 0.0) steer_ = s.steer_rad;
+        s.steer_rad = steer_;
+        drop_if_frozen(0, s.yaw_rate_radps, dt);
+        drop_if_frozen(1, s.ax_mps2, dt);
+        drop_if_frozen(2, s.ay_mps2, dt);
+        return s;
+    }
+
+    double steer_gap_s() const { return steer_gap_s_; }
+
+    /// Hysteresis keeps the mode from flickering.
+    bool fast_enough(double speed) {
+        if (!std::isnan(speed))
+            running_ = speed > (running_ ? settings_.stop_below_mps : settings_.go_above_mps);
+        return running_;
+    }
+
+  private:
+    static void check(double value, const char* channel, std::size_t sample) {
+        if (std::isinf(value))
+            throw NumericalFailure(
+                std::string(channel) + " is infinite (NaN marks a missing value)", sample);
+    }
+
+    void drop_if_frozen(std::size_t i, double& value, double dt) {
+        if (std::isnan(value)) return;
+        still_s_[i] = value == last_[i] ? still_s_[i] + dt : 0.0;
+        last_[i] = value;
+        // A true zero is what a noise-free simulation gives on a straight.
+        if (value != 0.0 && still_s_[i] > settings_.frozen_after_s) value = std::nan("");
+    }
+
+    ObserverSettings settings_;
+    std::array<double, 3> last_{};
+    std::array<double, 3> still_s_{};
+    double steer_ = 0.0, steer_gap_s_ = 0.0;
+    bool running_ = false;
+};
+
+}  // namespace sysid

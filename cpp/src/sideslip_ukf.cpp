@@ -1,0 +1,181 @@
+#include "sysid/online/sideslip_ukf.hpp"
+
+namespace sysid {
+
+namespace {
+
+constexpr double kSlowestMps = 1.0;
+constexpr double kSharingTime_s = 0.1;
+
+double slope(const TyreCoefficients<double>& t) { return t.B * t.C * t.D; }
+
+}  // namespace
+
+template <class S>
+void SideslipModel::lateral(double steer, double vx, double r, const Input& u, const S* x, S& front,
+                            S& rear) const {
+    using std::atan;
+    using std::sin;
+    const S tangent = sin(x[0]) / sqrt(1.0 - sin(x[0]) * sin(x[0]));
+    const S alpha_f = steer - atan(tangent + car.data.lf_m * r / vx);
+    const S alpha_r = -1.0 * atan(tangent - car.data.lr_m * r / vx);
+    if (linear) {
+        const double weight = car.data.mass_kg * kGravity / car.wheelbase_m();
+        front = slope(car.front) * weight * car.data.lr_m * alpha_f;
+        rear = slope(car.rear) * weight * car.data.lf_m * alpha_r;
+        return;
+    }
+    const S one = S(1.0);
+    front = axle_force<S>(alpha_f, u.fz_f, value_of(x[1]), car.front, one, one);
+    rear = axle_force<S>(alpha_r, u.fz_r, value_of(x[2]), car.rear, one, one);
+}
+
+template <class S>
+S SideslipModel::beta_rate(double steer, double vx, double r, const Input& u, const S* x) const {
+    using std::cos;
+    using std::sin;
+    S front, rear;
+    lateral(steer, vx, r, u, x, front, rear);
+    const S across =
+        x[1] * sin(steer - x[0]) + front * cos(steer - x[0]) + rear * cos(x[0]) - x[2] * sin(x[0]);
+    return across * cos(x[0]) / (car.data.mass_kg * vx) - r;
+}
+
+template <class S>
+void SideslipModel::predict(const Input& u, const S* x, S* next) const {
+    // Heun's rule: at low speed the tyres answer within a few samples.
+    const S first = beta_rate(u.steer_before, u.vx_before, u.yaw_rate_before, u, x);
+    const S trial[3] = {x[0] + u.dt * first, x[1], x[2]};
+    const S second = beta_rate(u.steer, u.vx, u.yaw_rate, u, trial);
+    next[0] = x[0] + 0.5 * u.dt * (first + second);
+    // a_x tells the sum of the longitudinal forces alone: how they are shared is taken from the
+    // car.
+    const S total = x[1] + x[2];
+    const double share =
+        value_of(total) < 0.0 ? car.data.brake_front_share : car.data.drive_front_share;
+    const double keep = std::exp(-u.dt / kSharingTime_s);
+    next[1] = share * total + keep * (x[1] - share * total);
+    next[2] = (1.0 - share) * total + keep * (x[2] - (1.0 - share) * total);
+}
+
+template <class S>
+void SideslipModel::observe(const Input& u, const S* x, S* y) const {
+    S front, rear;
+    lateral(u.steer, u.vx, u.yaw_rate, u, x, front, rear);
+    const double sine = std::sin(u.steer), cosine = std::cos(u.steer);
+    y[0] = (x[1] * cosine - front * sine + x[2]) / car.data.mass_kg;
+    y[1] = (front * cosine + rear + x[1] * sine) / car.data.mass_kg;
+}
+
+Mat<3, 3> SideslipModel::process_noise(const Input& u) const {
+    const double beta = settings.beta_wander_radps, rate = u.yaw_rate_std;
+    const double fx = settings.fx_wander * car.data.mass_kg * kGravity;
+    return Vec<3>(u.dt * beta * beta + u.dt * u.dt * rate * rate, u.dt * fx * fx, u.dt * fx * fx)
+        .asDiagonal();
+}
+
+Mat<2, 2> SideslipModel::measurement_noise(const Input& u) const {
+    const double weight = kGravity / car.wheelbase_m();
+    const double c_f = slope(car.front) * weight * car.data.lr_m;  // per mass
+    const double c_r = slope(car.rear) * weight * car.data.lf_m;
+    const double by_rate = (c_f * car.data.lf_m - c_r * car.data.lr_m) / u.vx * u.yaw_rate_std;
+    const double by_steer = c_f * u.steer_std;
+    const double ay = settings.ay_mps2, model = settings.model_ay_mps2;
+    return Vec<2>(settings.ax_mps2 * settings.ax_mps2,
+                  ay * ay + model * model + by_rate * by_rate + by_steer * by_steer)
+        .asDiagonal();
+}
+
+template <Method method>
+SideslipUkf<method>::SideslipUkf(const ObservedCar& car, const ObserverSettings& settings,
+                                 bool linear)
+    : car_(car),
+      settings_(settings),
+      watch_(settings),
+      filter_(SideslipModel{car, settings, linear}, Vec<3>::Zero(), Mat<3, 3>::Identity(),
+              Gate<2>(settings.gate_probability, 1)) {}
+
+template <Method method>
+const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample& sample) {
+    const SensorSample s = watch_.look(dt, sample, index_);
+    ++index_;
+    if (!watch_.fast_enough(s.vx_mps)) {
+        started_ = false;
+        out_ = rolling_without_slip(car_.data.lf_m, car_.data.lr_m, s);
+        return out_;
+    }
+    if (!started_) start(s);
+    SideslipModel::Input& u = input_;
+    u.dt = dt;
+    u.steer_before = u.steer;
+    u.vx_before = u.vx;
+    u.yaw_rate_before = u.yaw_rate;
+    u.steer = s.steer_rad;
+    u.steer_std = std::min(watch_.steer_gap_s(), 0.1);
+    if (!std::isnan(s.vx_mps)) u.vx = std::max(s.vx_mps, kSlowestMps);
+    rate_gap_s_ = std::isnan(s.yaw_rate_radps) ? rate_gap_s_ + dt : 0.0;
+    if (rate_gap_s_ == 0.0) {
+        u.yaw_rate = s.yaw_rate_radps;
+    } else if (!std::isnan(s.ay_mps2)) {
+        u.yaw_rate = s.ay_mps2 / u.vx;  // a steady corner
+    }
+    u.yaw_rate_std = rate_gap_s_ == 0.0 ? settings_.yaw_rate_radps : 0.2;
+    const Vec<3>& x = filter_.state().mean;
+    const AxleLoads loads = axle_loads(car_, (x[1] + x[2]) / car_.data.mass_kg, 0.0);
+    u.fz_f = loads.fz_f;
+    u.fz_r = loads.fz_r;
+    filter_.step(u, Vec<2>(s.ax_mps2, s.ay_mps2));
+    report(s);
+    return out_;
+}
+
+template <Method method>
+void SideslipUkf<method>::start(const SensorSample& s) {
+    const double vx = std::max(std::isnan(s.vx_mps) ? kSlowestMps : s.vx_mps, kSlowestMps);
+    const double r = std::isnan(s.yaw_rate_radps) ? 0.0 : s.yaw_rate_radps;
+    const double ax = std::isnan(s.ax_mps2) ? 0.0 : s.ax_mps2;
+    const AxleLoads loads = axle_loads(car_, ax, 0.0);
+    const double beta = car_.data.lr_m * r / vx - vx * r / (kGravity * slope(car_.rear));
+    const double weight = car_.data.mass_kg * kGravity;
+    filter_.restart(Vec<3>(beta, loads.fx_f, loads.fx_r),
+                    Vec<3>(0.03, 0.2 * weight, 0.2 * weight).cwiseAbs2().asDiagonal());
+    input_ = {};
+    input_.steer = s.steer_rad;
+    input_.vx = vx;
+    input_.yaw_rate = r;
+    started_ = true;
+}
+
+template <Method method>
+void SideslipUkf<method>::report(const SensorSample& s) {
+    const auto& now = filter_.state();
+    const VehicleData& c = car_.data;
+    const double weight = c.mass_kg * kGravity / car_.wheelbase_m();
+    out_ = {};
+    out_.beta_rad = now.mean[0];
+    out_.beta_std_rad = std::sqrt(now.covariance(0, 0));
+    out_.vx_mps = input_.vx;
+    out_.yaw_rate_radps = input_.yaw_rate;
+    out_.fx_n = now.mean[1] + now.mean[2];
+    const double beta_at = now.mean[0];
+    const double tangent = std::tan(beta_at);
+    const double alpha_f = input_.steer - std::atan(tangent + c.lf_m * input_.yaw_rate / input_.vx);
+    const double alpha_r = -std::atan(tangent - c.lr_m * input_.yaw_rate / input_.vx);
+    out_.fyf_n = axle_force<double>(alpha_f, input_.fz_f, now.mean[1], car_.front, 1.0, 1.0);
+    out_.fyr_n = axle_force<double>(alpha_r, input_.fz_r, now.mean[2], car_.rear, 1.0, 1.0);
+    out_.cf_npr = slope(car_.front) * weight * c.lr_m;
+    out_.cr_npr = slope(car_.rear) * weight * c.lf_m;
+    out_.mu_f = car_.front.D;
+    out_.mu_r = car_.rear.D;
+    out_.nis = filter_.nis();
+    out_.observed = now.update.observed;
+    out_.log_likelihood = now.update.log_likelihood;
+    const bool whole = now.update.observed == 2 && rate_gap_s_ == 0.0 && !std::isnan(s.vx_mps);
+    out_.mode = whole ? ObserverMode::kRunning : ObserverMode::kCoasting;
+}
+
+template class SideslipUkf<Method::kExtended>;
+template class SideslipUkf<Method::kUnscented>;
+template class SideslipUkf<Method::kSquareRoot>;
+
+}  // namespace sysid

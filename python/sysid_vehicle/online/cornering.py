@@ -1,0 +1,242 @@
+"""Recursive least squares for the cornering stiffness of both axles.
+
+Where the slip angles are known, lateral and yaw acceleration are linear in the stiffnesses:
+``a_y = (C_f alpha_f + C_r alpha_r) / m``, ``r_dot = (l_f C_f alpha_f - l_r C_r alpha_r) / I_z``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from .._style import AFTER, MEASURED, axes_or_new, tidy
+from ..errors import InvalidInput, warn
+from ..log import Log
+from ..vehicle import Vehicle
+from .sideslip import static_stiffness, yaw_inertia
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["CorneringRls", "CorneringRun", "cornering_stiffness"]
+
+_ENOUGH = 200  # samples with slip
+
+
+class CorneringRls:
+    """Recursive least squares with forgetting, one sample at a time.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Mass, geometry and inertia; its tyres are where the estimate starts.
+    forgetting : float
+        Weight of the past per used sample, 0.98 to 1.
+    prior_std_npr : float
+        Doubt of the start [N/rad]; the covariance never grows beyond it.
+    ay_std_mps2, yaw_acceleration_std_radps2 : float
+        Noise of the two readings, by which they are weighted.
+    least_slip_rad, most_slip_rad : float
+        Samples whose larger slip angle lies outside are left out: with less they tell nothing
+        (and would only make the filter forget), with more the tyre is not linear.
+
+    Raises
+    ------
+    InvalidInput
+        If a value cannot be.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        *,
+        forgetting: float = 0.999,
+        prior_std_npr: float = 1e5,
+        ay_std_mps2: float = 0.1,
+        yaw_acceleration_std_radps2: float = 0.1,
+        least_slip_rad: float = 0.004,
+        most_slip_rad: float = 0.03,
+    ) -> None:
+        if not 0.98 <= forgetting <= 1.0:
+            raise InvalidInput(f"forgetting: {forgetting:g} lies outside 0.98 to 1")
+        for name, value in (
+            ("prior_std_npr", prior_std_npr),
+            ("ay_std_mps2", ay_std_mps2),
+            ("yaw_acceleration_std_radps2", yaw_acceleration_std_radps2),
+        ):
+            if not (np.isfinite(value) and value > 0.0):
+                raise InvalidInput(f"{name}: {value:g} is not above 0")
+        if not 0.0 <= least_slip_rad < most_slip_rad:
+            raise InvalidInput("least_slip_rad: must lie between 0 and most_slip_rad")
+        self._core = _core.CorneringRls(
+            vehicle.mass_kg, yaw_inertia(vehicle), vehicle.lf_m, vehicle.lr_m, forgetting,
+            prior_std_npr, ay_std_mps2, yaw_acceleration_std_radps2, most_slip_rad, least_slip_rad,
+            *static_stiffness(vehicle),
+        )  # fmt: skip
+
+    def step(
+        self, alpha_f_rad: float, alpha_r_rad: float, ay_mps2: float, yaw_acceleration_radps2: float
+    ) -> bool:
+        """Use one sample and tell whether it was used; NaN is a missing reading.
+
+        Slip angles are positive where the force is: ``alpha_f = delta - beta - l_f r / v``,
+        ``alpha_r = -beta + l_r r / v``.
+
+        Raises
+        ------
+        NumericalFailure
+            If a value is infinite; the message gives the sample.
+        """
+        return self._core.step(alpha_f_rad, alpha_r_rad, ay_mps2, yaw_acceleration_radps2)
+
+    def run(self, readings: FloatArray) -> FloatArray:
+        """Use many samples; columns are the arguments of :meth:`step`.
+
+        Returns
+        -------
+        ndarray, shape (n, 5)
+            Stiffness front and rear [N/rad], their standard deviations, 1 where used.
+        """
+        readings = as_float64(readings)
+        if readings.ndim != 2 or readings.shape[1] != 4:
+            raise InvalidInput(f"readings: shape {readings.shape}; give (n, 4)")
+        return self._core.run(readings)
+
+    def reset(self) -> None:
+        """Doubt the estimate as at the start, without changing it: the road or tyres are others."""
+        self._core.reset()
+
+    @property
+    def stiffness_npr(self) -> tuple[float, float]:
+        """Cornering stiffness of the front and the rear axle [N/rad]."""
+        return self._core.stiffness_npr
+
+    @property
+    def std_npr(self) -> tuple[float, float]:
+        """Their standard deviations [N/rad]."""
+        return self._core.std_npr
+
+    @property
+    def used(self) -> int:
+        """How many samples were used."""
+        return self._core.used
+
+
+@dataclass(frozen=True)
+class CorneringRun:
+    """The way of the stiffnesses through a log; arrays have shape (n,).
+
+    Attributes
+    ----------
+    time_s, cf_npr, cr_npr, cf_std_npr, cr_std_npr : ndarray
+        Time, stiffness of the axles [N/rad] and their standard deviations.
+    used : ndarray of bool
+        Whether the sample held enough slip, and not too much.
+    """
+
+    log_name: str
+    time_s: FloatArray
+    cf_npr: FloatArray
+    cr_npr: FloatArray
+    cf_std_npr: FloatArray
+    cr_std_npr: FloatArray
+    used: np.ndarray
+
+    @property
+    def excited(self) -> bool:
+        """Whether enough samples held slip for the result to mean something."""
+        return int(self.used.sum()) >= _ENOUGH
+
+    def __str__(self) -> str:
+        return (
+            f"{self.log_name}: cornering stiffness front {self.cf_npr[-1] / 1e3:.1f} +- "
+            f"{self.cf_std_npr[-1] / 1e3:.1f}, rear {self.cr_npr[-1] / 1e3:.1f} +- "
+            f"{self.cr_std_npr[-1] / 1e3:.1f} kN/rad, from {int(self.used.sum())} of "
+            f"{len(self.used)} samples"
+        )
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw both stiffnesses over time onto `ax`."""
+        ax = axes_or_new(ax, 9.0, 3.5)
+        ax.plot(self.time_s, self.cf_npr / 1e3, color=AFTER, label="front")
+        ax.plot(self.time_s, self.cr_npr / 1e3, color=MEASURED, label="rear")
+        ax.legend(frameon=False)
+        return tidy(ax, xlabel="time [s]", ylabel="cornering stiffness [kN/rad]")
+
+
+def cornering_stiffness(
+    vehicle: Vehicle,
+    log: Log,
+    *,
+    beta_rad: FloatArray | None = None,
+    forgetting: float = 0.9999,
+    window_s: float = 0.15,
+    **settings: float,
+) -> CorneringRun:
+    """Cornering stiffness over a log, by recursive least squares.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The car.
+    log : Log
+        Its driving.
+    beta_rad : ndarray, shape (n,), optional
+        Sideslip; from the log's ``vy_mps`` if left out.
+    forgetting : float
+        Weight of the past per used sample, 0.98 to 1.
+    window_s : float
+        Yaw rate and lateral acceleration are smoothed, and the yaw acceleration is taken, by local
+        parabolas of this length.
+    **settings : float
+        Further arguments of :class:`CorneringRls`.
+
+    Raises
+    ------
+    InvalidInput
+        If neither `beta_rad` nor ``vy_mps`` is there, or a value cannot be.
+
+    Warns
+    -----
+    SysidWarning
+        If too few samples hold slip.
+    """
+    beta = np.arctan2(log["vy_mps"], log["vx_mps"]) if beta_rad is None else as_float64(beta_rad)
+    if beta.shape != (log.n,):
+        raise InvalidInput(f"beta_rad: shape {beta.shape}; give one value for each of {log.n}")
+    width = max(5, 2 * round(0.5 * window_s * log.rate_hz) + 1)
+    if width > log.n:
+        raise InvalidInput(f"{log.name}: {log.n} samples are fewer than the window of {width}")
+
+    def smooth(y: FloatArray, derivative: int = 0) -> FloatArray:
+        step = 1.0 / log.rate_hz
+        return np.asarray(savgol_filter(y, width, 2, deriv=derivative, delta=step))
+
+    rate, vx = smooth(log["yaw_rate_radps"]), log["vx_mps"]
+    turned = smooth(log["yaw_rate_radps"], 1)
+    readings = np.column_stack(
+        [
+            log["steer_rad"] - np.arctan(np.tan(beta) + vehicle.lf_m * rate / vx),
+            -np.arctan(np.tan(beta) - vehicle.lr_m * rate / vx),
+            smooth(log["ay_mps2"]),
+            turned,
+        ]
+    )
+    found = CorneringRls(vehicle, forgetting=forgetting, **settings).run(readings).T
+    cf, cr, cf_std, cr_std, used = found
+    run = CorneringRun(log.name, log["time_s"], cf, cr, cf_std, cr_std, used > 0.5)
+    if not run.excited:
+        warn(
+            f"{log.name}: only {int(run.used.sum())} samples hold slip angles in the linear range; "
+            f"the cornering stiffness stays near where it started. Give a log with gentle corners"
+        )
+    return run

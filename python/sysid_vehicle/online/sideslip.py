@@ -1,0 +1,229 @@
+"""Sideslip observers: one sample at a time in a control loop, or a whole log at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from ..errors import InvalidInput, warn
+from ..log import Log
+from ..model import vehicle_data
+from ..vehicle import Tyre, Vehicle
+from .sideslip_results import SideslipRun
+from .sideslip_settings import SideslipSettings
+
+__all__ = ["KINDS", "SideslipEstimate", "SideslipObserver", "estimate_sideslip"]
+
+#: Kinds of observers, with what each is.
+KINDS: Mapping[str, str] = {
+    "dual": "dual UKF with saturating, load-dependent, adapting tyres",
+    "ukf": "UKF of three states with the tyres of the vehicle file",
+    "ekf": "the same as an extended Kalman filter",
+    "square-root-ukf": "the same as a square-root UKF",
+    "linear-ukf": "the UKF with tyres that do not saturate",
+    "published": "dual UKF of Cl4y3R/VehicleStateEstimation, 2024, with its defects",
+}
+_SENSORS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+
+
+class SideslipEstimate(NamedTuple):
+    """What an observer knows after a sample; NaN where it does not say.
+
+    `cf_npr` and `cr_npr` are the cornering stiffness of the axles at their static load [N/rad],
+    `mu_f` and `mu_r` the friction at the peak. `mode` is 0 while running, 1 while the car is too
+    slow, 2 while a sensor is missing or refused and the tyre model stands in.
+    """
+
+    beta_rad: float
+    beta_std_rad: float
+    vx_mps: float
+    yaw_rate_radps: float
+    fyf_n: float
+    fyr_n: float
+    fx_n: float
+    cf_npr: float
+    cr_npr: float
+    cf_std_npr: float
+    cr_std_npr: float
+    mu_f: float
+    mu_r: float
+    nis: float
+    observed: float
+    log_likelihood: float
+    mode: float
+
+
+class SideslipObserver:
+    """An observer that is given one sample of the sensors after another.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The car; its tyres are where adaptation begins.
+    settings : SideslipSettings, optional
+        The defaults if left out.
+    kind : str
+        One of :data:`KINDS`.
+
+    Notes
+    -----
+    The parallel structure of two filters is that of Cl4y3R/VehicleStateEstimation (2024). Tyres
+    saturate (Pacejka, *Tire and Vehicle Dynamics*, 3rd ed., eq. 4.6), loads move with the
+    acceleration, braking takes its share of the grip, and stiffness and friction of both axles are
+    states, as is what the tyre model does not explain. The standard deviation covers all of it.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        settings: SideslipSettings | None = None,
+        kind: str = "dual",
+    ) -> None:
+        values = dict(settings if settings is not None else SideslipSettings())
+        self.vehicle, self.kind = vehicle, kind
+        car = _car(vehicle)
+        self._core: _core._SideslipObserver
+        if kind == "dual":
+            self._core = _core.SideslipDual(car, values)
+        elif kind == "published":
+            self._core = _core.PublishedDual(car, *static_stiffness(vehicle))
+        elif kind == "ekf":
+            self._core = _core.SideslipEkf(car, values, False)
+        elif kind == "square-root-ukf":
+            self._core = _core.SideslipSquareRootUkf(car, values, False)
+        elif kind in ("ukf", "linear-ukf"):
+            self._core = _core.SideslipUkf(car, values, kind == "linear-ukf")
+        else:
+            raise InvalidInput(f"kind: '{kind}' is not known; give one of {', '.join(KINDS)}")
+
+    def step(
+        self,
+        dt_s: float,
+        steer_rad: float,
+        vx_mps: float,
+        yaw_rate_radps: float,
+        ax_mps2: float,
+        ay_mps2: float,
+    ) -> SideslipEstimate:
+        """Use one sample, `dt_s` seconds after the one before; NaN is a missing reading.
+
+        Raises
+        ------
+        NumericalFailure
+            If a reading is infinite, the time step is not positive, or the filter leaves the range
+            of numbers; the message gives the sample.
+        """
+        return SideslipEstimate._make(
+            self._core.step(dt_s, steer_rad, vx_mps, yaw_rate_radps, ax_mps2, ay_mps2)
+        )
+
+    def run(self, dt_s: FloatArray, sensors: FloatArray) -> FloatArray:
+        """Use many samples at once, with the numbers of as many steps.
+
+        Parameters
+        ----------
+        dt_s : ndarray, shape (n,)
+            Time since the sample before.
+        sensors : ndarray, shape (n, 5)
+            Columns in the order of the arguments of :meth:`step`.
+
+        Returns
+        -------
+        ndarray, shape (n, 17)
+            Columns in the order of :class:`SideslipEstimate`.
+        """
+        dt_s, sensors = as_float64(dt_s), as_float64(sensors)
+        if sensors.ndim != 2 or sensors.shape[1] != len(_SENSORS):
+            raise InvalidInput(
+                f"sensors: shape {sensors.shape}; give (n, 5) with columns {', '.join(_SENSORS)}"
+            )
+        if dt_s.shape != (len(sensors),):
+            raise InvalidInput(f"dt_s: shape {dt_s.shape}; give ({len(sensors)},), as sensors")
+        return self._core.run(dt_s, sensors)
+
+    def copy(self) -> SideslipObserver:
+        """An independent observer in the same state."""
+        other = object.__new__(SideslipObserver)
+        other.vehicle, other.kind, other._core = self.vehicle, self.kind, self._core.copy()
+        return other
+
+    @property
+    def samples(self) -> int:
+        """How many samples there were."""
+        return self._core.samples
+
+
+def estimate_sideslip(
+    vehicle: Vehicle,
+    log: Log,
+    *,
+    kind: str = "dual",
+    settings: SideslipSettings | None = None,
+) -> SideslipRun:
+    """Estimate sideslip over a whole log; a measured ``vy_mps`` is not looked at.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The car; its tyres are where adaptation begins.
+    log : Log
+        Needs ``ax_mps2`` besides the channels every log has.
+    kind : str
+        One of :data:`KINDS`.
+    settings : SideslipSettings, optional
+        If left out, :meth:`SideslipSettings.of` the log.
+
+    Raises
+    ------
+    InvalidInput
+        If a channel is absent or the kind is not known.
+    NumericalFailure
+        If the filter leaves the range of numbers; the message gives the sample.
+    """
+    settings = settings if settings is not None else SideslipSettings.of(log)
+    observer = SideslipObserver(vehicle, settings, kind)
+    sensors = np.column_stack([log[name] for name in _SENSORS])
+    dt = np.full(log.n, 1.0 / log.rate_hz)
+    found = SideslipEstimate._make(observer.run(dt, sensors).T)
+    true_beta = np.arctan2(log["vy_mps"], log["vx_mps"]) if log.has("vy_mps") else None
+    return SideslipRun(
+        kind, vehicle, log.name, settings, log["time_s"], log["ay_mps2"], true_beta,
+        **{name: np.ascontiguousarray(column) for name, column in found._asdict().items()},
+    )  # fmt: skip
+
+
+def static_stiffness(vehicle: Vehicle) -> tuple[float, float]:
+    """Cornering stiffness of both axles [N/rad] at the static load, from the vehicle file."""
+    weight = vehicle.mass_kg * 9.80665 / vehicle.wheelbase_m
+    return (
+        vehicle.tyre_front.cornering_stiffness_per_load * weight * vehicle.lr_m,
+        vehicle.tyre_rear.cornering_stiffness_per_load * weight * vehicle.lf_m,
+    )
+
+
+def yaw_inertia(vehicle: Vehicle) -> float:
+    """Yaw inertia of the car, or what cars of its mass and wheelbase have [kg m^2]."""
+    if vehicle.yaw_inertia_kgm2 is not None:
+        return vehicle.yaw_inertia_kgm2
+    typical = vehicle.mass_kg * vehicle.lf_m * vehicle.lr_m
+    warn(
+        f"{vehicle.name}: yaw_inertia_kgm2 is not given; {typical:.4g} is taken, which cars of its "
+        f"mass and wheelbase have"
+    )
+    return typical
+
+
+def _car(vehicle: Vehicle) -> _core.ObservedCar:
+    def letters(tyre: Tyre) -> list[float]:
+        return [tyre.B, tyre.C, tyre.D, tyre.E]
+
+    return _core.ObservedCar(
+        vehicle_data(vehicle),
+        yaw_inertia(vehicle),
+        letters(vehicle.tyre_front),
+        letters(vehicle.tyre_rear),
+    )

@@ -1,0 +1,229 @@
+"""What a sideslip observer found over a log."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._arrays import FloatArray
+from .._style import AFTER, MEASURED, TRUTH, axes_or_new, new_figure, tidy
+from .._text import text_table
+from ..vehicle import Vehicle
+from .sideslip_settings import SideslipSettings
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["SideslipError", "SideslipRun", "sideslip_overview"]
+
+_BANDS_MPS2 = (0.0, 2.0, 4.0, 6.0, 8.0, 10.0)
+
+
+@dataclass(frozen=True)
+class SideslipError:
+    """Estimated less true sideslip.
+
+    Attributes
+    ----------
+    rms_deg, max_deg : float
+        Size of the error.
+    covered : float
+        Share of samples whose true sideslip lies in the band of 2 standard deviations.
+    bands : tuple of (low, high, rms_deg, samples)
+        Error by size of the lateral acceleration [m/s2].
+    """
+
+    rms_deg: float
+    max_deg: float
+    covered: float
+    bands: tuple[tuple[float, float, float, int], ...]
+
+    def __str__(self) -> str:
+        rows = [[f"{a:g} .. {b:g}", f"{rms:.3f}", str(n)] for a, b, rms, n in self.bands]
+        return (
+            f"error: {self.rms_deg:.3f} deg rms, {self.max_deg:.2f} deg at most; "
+            f"{100.0 * self.covered:.1f} % of samples inside 2 sigma\n"
+            + text_table(["|a_y| [m/s2]", "rms [deg]", "samples"], rows)
+        )
+
+
+@dataclass(frozen=True)
+class SideslipRun:
+    """Estimates over a log of `n` samples; arrays have shape (n,), NaN where nothing is known.
+
+    Attributes
+    ----------
+    kind, vehicle, log_name, settings :
+        What was run on what.
+    time_s, ay_mps2 : ndarray
+        Of the log.
+    true_beta_rad : ndarray or None
+        Sideslip from the log's own ``vy_mps``, which the observer did not see.
+    beta_rad, beta_std_rad : ndarray
+        Sideslip and its standard deviation.
+    vx_mps, yaw_rate_radps, fyf_n, fyr_n, fx_n : ndarray
+        Speed, yaw rate, lateral axle forces, longitudinal force without drag.
+    cf_npr, cr_npr, cf_std_npr, cr_std_npr, mu_f, mu_r : ndarray
+        Cornering stiffness at the static load [N/rad], its standard deviation, peak friction.
+    nis, observed, log_likelihood : ndarray
+        Squared whitened innovation, readings it is made of, log density of the readings.
+    mode : ndarray
+        0 running, 1 holding (too slow), 2 coasting (a sensor is missing or refused).
+    """
+
+    kind: str
+    vehicle: Vehicle
+    log_name: str
+    settings: SideslipSettings
+    time_s: FloatArray
+    ay_mps2: FloatArray
+    true_beta_rad: FloatArray | None
+    beta_rad: FloatArray
+    beta_std_rad: FloatArray
+    vx_mps: FloatArray
+    yaw_rate_radps: FloatArray
+    fyf_n: FloatArray
+    fyr_n: FloatArray
+    fx_n: FloatArray
+    cf_npr: FloatArray
+    cr_npr: FloatArray
+    cf_std_npr: FloatArray
+    cr_std_npr: FloatArray
+    mu_f: FloatArray
+    mu_r: FloatArray
+    nis: FloatArray
+    observed: FloatArray
+    log_likelihood: FloatArray
+    mode: FloatArray
+
+    @property
+    def vy_mps(self) -> FloatArray:
+        """Lateral speed at the centre of gravity."""
+        return self.vx_mps * np.tan(self.beta_rad)
+
+    def error(self, true_beta_rad: FloatArray | None = None) -> SideslipError | None:
+        """Compare with the truth; with that of the log, or None, if there is none."""
+        truth = true_beta_rad if true_beta_rad is not None else self.true_beta_rad
+        if truth is None:
+            return None
+        known = np.isfinite(truth)
+        off = (self.beta_rad - truth)[known]
+        degrees, size = np.degrees(off), np.abs(self.ay_mps2[known])
+        bands = []
+        for low, high in itertools.pairwise(_BANDS_MPS2):
+            inside = (size >= low) & (size < high)
+            if inside.any():
+                rms = float(np.sqrt(np.mean(degrees[inside] ** 2)))
+                bands.append((low, high, rms, int(inside.sum())))
+        return SideslipError(
+            float(np.sqrt(np.mean(degrees**2))),
+            float(np.abs(degrees).max()),
+            float(np.mean(np.abs(off) <= 2.0 * self.beta_std_rad[known])),
+            tuple(bands),
+        )
+
+    def __str__(self) -> str:
+        beta = np.degrees(self.beta_rad)
+        lines = [
+            f"{self.log_name}: sideslip by the {self.kind} observer, {len(beta)} samples",
+            (
+                f"  sideslip {beta.min():.2f} .. {beta.max():.2f} deg, standard deviation "
+                f"{np.degrees(np.nanmean(self.beta_std_rad)):.3f} deg on average"
+            ),
+        ]
+        running = np.flatnonzero(self.mode != 1)
+        if running.size:
+            k = running[-1]
+            rows = [
+                [
+                    axle,
+                    f"{c[k] / 1e3:.1f}",
+                    f"{s[k] / 1e3:.1f}",
+                    f"{mu[k]:.2f}" if np.isfinite(mu[k]) else "-",
+                ]
+                for axle, c, s, mu in (
+                    ("front", self.cf_npr, self.cf_std_npr, self.mu_f),
+                    ("rear", self.cr_npr, self.cr_std_npr, self.mu_r),
+                )
+            ]
+            lines.append(text_table(["axle", "stiffness [kN/rad]", "std", "friction"], rows))
+        for number, meaning in ((1, "too slow to tell"), (2, "with a sensor missing or refused")):
+            share = float(np.mean(self.mode == number))
+            if share > 0.0:
+                lines.append(f"  {100.0 * share:.1f} % of samples {meaning}")
+        found = self.error()
+        return "\n".join([*lines, *([str(found)] if found is not None else [])])
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures and series as plain numbers."""
+        series = ("time_s", "beta_rad", "beta_std_rad", "cf_npr", "cr_npr", "mu_f", "mu_r", "mode")
+        found = self.error()
+        return {
+            "log": self.log_name,
+            "kind": self.kind,
+            "settings": dict(self.settings),
+            "error": None
+            if found is None
+            else {
+                "rms_deg": found.rms_deg,
+                "max_deg": found.max_deg,
+                "inside_two_sigma": found.covered,
+                "by_ay_mps2": [
+                    {"low": a, "high": b, "rms_deg": rms, "samples": n}
+                    for a, b, rms, n in found.bands
+                ],
+            },
+            "series": {name: getattr(self, name).tolist() for name in series},
+        }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw sideslip with its 2-sigma band, and the truth where the log has it, onto `ax`."""
+        ax = axes_or_new(ax, 9.0, 3.5)
+        beta, std = np.degrees(self.beta_rad), np.degrees(self.beta_std_rad)
+        ax.fill_between(
+            self.time_s, beta - 2 * std, beta + 2 * std, color=AFTER, alpha=0.25, linewidth=0,
+            label="2 sigma",
+        )  # fmt: skip
+        ax.plot(self.time_s, beta, color=AFTER, linewidth=1.0, label="estimated")
+        if self.true_beta_rad is not None:
+            truth = np.degrees(self.true_beta_rad)
+            ax.plot(self.time_s, truth, color=TRUTH, linewidth=0.8, label="measured")
+        ax.legend(frameon=False, ncols=3)
+        return tidy(ax, xlabel="time [s]", ylabel="sideslip [deg]", title=self.log_name)
+
+    def plot_stiffness(self, ax: Axes | None = None) -> Axes:
+        """Draw both cornering stiffnesses with their 2-sigma bands onto `ax`."""
+        ax = axes_or_new(ax, 9.0, 3.5)
+        for name, c, s, color in (
+            ("front", self.cf_npr, self.cf_std_npr, AFTER),
+            ("rear", self.cr_npr, self.cr_std_npr, MEASURED),
+        ):
+            ax.fill_between(
+                self.time_s, (c - 2 * s) / 1e3, (c + 2 * s) / 1e3, color=color, alpha=0.2,
+                linewidth=0,
+            )  # fmt: skip
+            ax.plot(self.time_s, c / 1e3, color=color, linewidth=1.0, label=name)
+        ax.set_ylim(0.0, 2.0 * float(np.nanmax([self.cf_npr[-1], self.cr_npr[-1]])) / 1e3)
+        ax.legend(frameon=False)
+        return tidy(ax, xlabel="time [s]", ylabel="cornering stiffness [kN/rad]")
+
+
+def sideslip_overview(run: SideslipRun) -> Figure:
+    """Sideslip, cornering stiffness and axle forces over time in one figure."""
+    figure = new_figure(9.0, 9.0)
+    above, middle, below = figure.subplots(3, 1, sharex=True)
+    run.plot(above)
+    run.plot_stiffness(middle)
+    below.plot(run.time_s, run.fyf_n / 1e3, color=AFTER, linewidth=0.8, label="front")
+    below.plot(run.time_s, run.fyr_n / 1e3, color=MEASURED, linewidth=0.8, label="rear")
+    below.legend(frameon=False)
+    tidy(below, xlabel="time [s]", ylabel="lateral axle force [kN]")
+    return figure

@@ -1,0 +1,110 @@
+// Sideslip observers and recursive least squares, called from C++.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sysid/online/cornering_rls.hpp"
+#include "sysid/online/published_dual.hpp"
+#include "sysid/online/sideslip_dual.hpp"
+#include "sysid/online/sideslip_ukf.hpp"
+
+namespace sysid {
+namespace {
+
+ObservedCar car() {
+    ObservedCar out;
+    out.data.mass_kg = 1500.0;
+    out.data.lf_m = 1.2;
+    out.data.lr_m = 1.4;
+    out.data.cg_height_m = 0.5;
+    out.yaw_inertia_kgm2 = 2500.0;
+    out.front = out.rear = {10.0, 1.4, 1.0, 0.0};
+    return out;
+}
+
+/// A steady corner of 4 m/s2 at 20 m/s: sideslip by hand, then what the sensors say.
+struct Corner {
+    double beta, steer, rate = 0.2, ay = 4.0, vx = 20.0;
+
+    Corner() {
+        const ObservedCar c = car();
+        const auto slip = [&](double share) {  // the Magic Formula, inverted by bisection
+            double low = 0.0, high = 0.1;
+            for (int i = 0; i < 60; ++i) {
+                const double middle = 0.5 * (low + high);
+                (magic_formula<double>(middle, c.front) < share ? low : high) = middle;
+            }
+            return low;
+        };
+        const double alpha = slip(ay / kGravity);  // each axle carries its share of mass
+        beta = std::atan(c.data.lr_m * rate / vx - std::tan(alpha));
+        steer = alpha + std::atan(std::tan(beta) + c.data.lf_m * rate / vx);
+    }
+    SensorSample sample() const { return {steer, vx, rate, 0.0, ay}; }
+};
+
+template <class Observer>
+double settled(Observer& observer) {
+    const Corner corner;
+    SideslipEstimate out;
+    for (int k = 0; k < 1000; ++k) out = observer.step(0.01, corner.sample());
+    return out.beta_rad;
+}
+
+TEST(SideslipObservers, AgreeOnASteadyCorner) {
+    ObserverSettings settings;
+    settings.frozen_after_s = 1e9;  // nothing moves here
+    const double truth = Corner().beta;
+    SideslipDual dual(car(), settings);
+    SideslipUkf<Method::kUnscented> ukf(car(), settings, false);
+    SideslipUkf<Method::kExtended> ekf(car(), settings, false);
+    SideslipUkf<Method::kSquareRoot> root(car(), settings, false);
+    EXPECT_NEAR(settled(dual), truth, 0.002);
+    const double by_ukf = settled(ukf);
+    EXPECT_NEAR(by_ukf, truth, 0.002);
+    EXPECT_NEAR(settled(ekf), by_ukf, 1e-3);
+    EXPECT_NEAR(settled(root), by_ukf, 1e-9);
+}
+
+TEST(SideslipObservers, AFrozenSensorIsLeftOut) {
+    SideslipDual dual(car(), ObserverSettings());
+    const Corner corner;
+    SideslipEstimate out;
+    for (int k = 0; k < 100; ++k) {
+        SensorSample s = corner.sample();
+        s.yaw_rate_radps += 1e-4 * (k % 3);
+        s.ax_mps2 += 1e-4 * (k % 3);
+        out = dual.step(0.01, s);  // a_y stands still
+        if (k == 10) {
+            EXPECT_EQ(out.mode, ObserverMode::kRunning);
+        }
+    }
+    EXPECT_EQ(out.mode, ObserverMode::kCoasting);
+}
+
+TEST(SideslipObservers, ThePublishedOneNeedsEverySensor) {
+    PublishedDual published(car(), 1e5, 1e5);
+    SensorSample s = Corner().sample();
+    published.step(0.01, s);
+    published.step(0.01, s);
+    s.ay_mps2 = std::nan("");
+    EXPECT_THROW(published.step(0.01, s), NumericalFailure);
+}
+
+TEST(CorneringRls, RefusesWhatCannotBe) {
+    CorneringRlsSettings settings{1500.0, 2500.0, 1.2, 1.4};
+    settings.forgetting = 0.9;
+    EXPECT_THROW(CorneringRls(settings, 1e5, 1e5), std::invalid_argument);
+    settings.forgetting = 0.99;
+    settings.mass_kg = 0.0;
+    EXPECT_THROW(CorneringRls(settings, 1e5, 1e5), std::invalid_argument);
+    settings.mass_kg = 1500.0;
+    CorneringRls rls(settings, 1e5, 1e5);
+    EXPECT_FALSE(rls.step(std::nan(""), 0.01, 1.0, 0.0));
+    EXPECT_THROW(rls.step(0.01, 0.01, HUGE_VAL, 0.0), NumericalFailure);
+    EXPECT_TRUE(rls.step(0.01, 0.01, 1.0, std::nan("")));
+    EXPECT_EQ(rls.used(), 1U);
+}
+
+}  // namespace
+}  // namespace sysid

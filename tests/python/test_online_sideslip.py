@@ -1,0 +1,202 @@
+"""Sideslip observers and recursive least squares on simulated drives."""
+
+import dataclasses
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle import _core
+from sysid_vehicle.cli import main
+from sysid_vehicle.errors import InvalidInput, SysidWarning
+from sysid_vehicle.online import (
+    KINDS,
+    CorneringRls,
+    SideslipObserver,
+    SideslipSettings,
+    cornering_stiffness,
+    estimate_sideslip,
+)
+
+SENSORS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+DATA = Path(os.environ.get("SYSID_DATA", Path(__file__).resolve().parents[3] / "shared/data"))
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return sv.example_vehicle()
+
+
+@pytest.fixture(scope="module")
+def log(vehicle):
+    return sv.drive(sv.Model(vehicle), sv.manoeuvres.handling_course(), seed=1)
+
+
+def sensors_of(log):
+    return np.column_stack([log[name] for name in SENSORS])
+
+
+def with_tyres_times(vehicle, factor):
+    return dataclasses.replace(
+        vehicle,
+        tyre_front=vehicle.tyre_front.replace(B=factor * vehicle.tyre_front.B),
+        tyre_rear=vehicle.tyre_rear.replace(B=factor * vehicle.tyre_rear.B),
+    )
+
+
+def test_the_dual_observer_finds_the_sideslip_and_says_how_well(vehicle, log):
+    run = estimate_sideslip(vehicle, log)
+    error = run.error()
+    assert error.rms_deg < 0.2
+    assert error.covered > 0.9
+    assert "inside 2 sigma" in str(run)
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_steps_and_whole_log_give_the_same_numbers(vehicle, log, kind):
+    sensors = sensors_of(log)[:200]
+    dt = np.full(200, 1.0 / log.rate_hz)
+    sensors = np.nan_to_num(sensors, nan=0.0)
+    whole = SideslipObserver(vehicle, kind=kind).run(dt, sensors)
+    step = SideslipObserver(vehicle, kind=kind)
+    for k, row in enumerate(sensors):
+        if k == 100:
+            step = step.copy()
+        assert np.array_equal(step.step(dt[k], *row), whole[k], equal_nan=True)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_wrong_stiffness_is_mended_within_20_s_of_cornering(vehicle, log, factor):
+    run = estimate_sideslip(with_tyres_times(vehicle, factor), log)
+    true = estimate_sideslip(vehicle, log, kind="ukf")  # carries the stiffness of the vehicle
+    cornering = np.cumsum(np.abs(log["ay_mps2"]) > 1.0) / log.rate_hz
+    at = int(np.argmax(cornering >= 20.0)) or log.n - 1
+    assert run.cf_npr[at] == pytest.approx(true.cf_npr[0], rel=0.10)
+    assert run.cr_npr[at] == pytest.approx(true.cr_npr[0], rel=0.10)
+
+
+@pytest.mark.parametrize("column", range(5))
+@pytest.mark.parametrize("fault", ["drops out", "freezes", "jumps"])
+def test_a_sensor_that_fails_for_two_seconds_does_no_lasting_harm(vehicle, log, column, fault):
+    sensors = sensors_of(log)
+    rate = round(log.rate_hz)
+    first = int(np.argmax(np.abs(log["ay_mps2"]) > 3.0))
+    gap = slice(first, first + 2 * rate)
+    size = (0.05, 3.0, 0.5, 5.0, 8.0)[column]
+    if fault == "drops out":
+        sensors[gap, column] = np.nan
+    elif fault == "freezes":
+        sensors[gap, column] = sensors[first, column]
+    else:
+        sensors[gap, column] += size
+    dt = np.full(log.n, 1.0 / log.rate_hz)
+    found = SideslipObserver(vehicle, SideslipSettings.of(log)).run(dt, sensors)
+    truth = np.arctan2(log["vy_mps"], log["vx_mps"])
+    error = np.degrees(np.abs(found[:, 0] - truth))
+    assert np.isfinite(found[:, :2]).all()
+    assert np.nanmax(error) < 15.0
+    assert np.sqrt(np.nanmean(error[first + 12 * rate :] ** 2)) < 1.0
+
+
+def test_a_slow_car_rolls_without_slip(vehicle):
+    observer = SideslipObserver(vehicle)
+    slow = observer.step(0.01, 0.1, 2.0, 0.05, 0.0, 0.1)
+    share = vehicle.lr_m / vehicle.wheelbase_m
+    assert slow.beta_rad == pytest.approx(np.arctan(share * np.tan(0.1)))
+    assert slow.mode == 1.0
+    assert observer.step(0.01, 0.0, 3.5, 0.0, 0.0, 0.0).mode == 1.0  # hysteresis
+    assert observer.step(0.01, 0.0, 4.5, 0.0, 0.0, 0.0).mode == 0.0
+    assert observer.step(0.01, 0.0, 3.5, 0.0, 0.0, 0.0).mode == 0.0
+
+
+def test_what_cannot_be_is_refused(vehicle, log):
+    with pytest.raises(InvalidInput, match="'kalmann' is not known"):
+        SideslipObserver(vehicle, kind="kalmann")
+    with pytest.raises(InvalidInput, match="did you mean 'ay_mps2'"):
+        SideslipSettings(ay_mps=0.1)
+    with pytest.raises(InvalidInput, match="road_mps2 = -1"):
+        SideslipSettings(road_mps2=-1.0)
+    observer = SideslipObserver(vehicle)
+    observer.step(0.01, 0.0, 20.0, 0.0, 0.0, 0.0)
+    with pytest.raises(_core.NumericalFailure, match=r"ay_mps2 is infinite.* at sample 1"):
+        observer.step(0.01, 0.0, 20.0, 0.0, 0.0, np.inf)
+    with pytest.raises(_core.NumericalFailure, match="time step is not positive at sample 1"):
+        observer.step(0.0, 0.0, 20.0, 0.0, 0.0, 0.0)
+    with pytest.raises(InvalidInput, match=r"give \(n, 5\)"):
+        observer.run(np.ones(3), np.zeros((3, 4)))
+
+
+def test_least_squares_find_the_stiffness_behind_exact_readings(vehicle):
+    rng = np.random.default_rng(0)
+    alpha = 0.02 * rng.standard_normal((500, 2))
+    true = np.array([9.0e4, 12.0e4])
+    force = alpha * true
+    ay = force.sum(axis=1) / vehicle.mass_kg
+    turned = (vehicle.lf_m * force[:, 0] - vehicle.lr_m * force[:, 1]) / vehicle.yaw_inertia_kgm2
+    readings = np.column_stack([alpha, ay, turned])
+    rls = CorneringRls(vehicle, forgetting=1.0, most_slip_rad=1.0)
+    found = rls.run(readings)
+    assert found[-1, :2] == pytest.approx(true, rel=1e-3)
+    assert found[-1, :2] == pytest.approx(rls.stiffness_npr)
+    before = rls.std_npr
+    rls.reset()
+    assert rls.std_npr[0] > 10.0 * before[0]
+    assert rls.stiffness_npr == pytest.approx(found[-1, :2])
+
+
+def test_without_slip_nothing_is_forgotten(vehicle):
+    rls = CorneringRls(vehicle, forgetting=0.98)
+    before = rls.stiffness_npr, rls.std_npr
+    for _ in range(1000):
+        assert not rls.step(1e-4, 1e-4, 0.3, 0.0)
+    assert (rls.stiffness_npr, rls.std_npr) == before
+    assert rls.used == 0
+    with pytest.raises(InvalidInput, match=r"0\.98 to 1"):
+        CorneringRls(vehicle, forgetting=0.9)
+
+
+def test_least_squares_over_a_log(vehicle, log):
+    run = cornering_stiffness(vehicle, log)
+    true = estimate_sideslip(vehicle, log, kind="ukf")
+    assert run.cf_npr[-1] == pytest.approx(true.cf_npr[0], rel=0.1)
+    assert run.cr_npr[-1] == pytest.approx(true.cr_npr[0], rel=0.1)
+    with pytest.warns(SysidWarning, match="hold slip angles"):
+        cornering_stiffness(vehicle, log, beta_rad=np.full(log.n, 0.5))
+
+
+def test_the_command_line_prints_and_writes(vehicle, log, tmp_path, capsys):
+    log.between(0.0, 20.0).to_csv(tmp_path / "run.csv")
+    vehicle.to_toml(tmp_path / "car.toml")
+    args = ["sideslip", str(tmp_path / "run.csv"), "--vehicle", str(tmp_path / "car.toml")]
+    outputs = ["--plot", str(tmp_path / "a.svg"), "--json", str(tmp_path / "a.json")]
+    assert main([*args, *outputs]) == 0
+    assert "stiffness" in capsys.readouterr().out
+    content = json.loads((tmp_path / "a.json").read_text())
+    assert content["kind"] == "dual"
+    assert len(content["series"]["beta_rad"]) == len(content["series"]["time_s"])
+    assert "<svg" in (tmp_path / "a.svg").read_text()
+    assert main([*args, "--plot", str(tmp_path / "a.png")]) == 2
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="needs the driving data under ../shared/data")
+def test_the_published_observer_repeats_its_figures():
+    raw = np.genfromtxt(
+        DATA / "carsim_like_handling/handling_course.csv", delimiter=",", names=True
+    )
+    mass, lf, lr = 1549.8, 1.11, 1.756
+    load = mass * 9.80665 / (lf + lr)
+    car = sv.Vehicle(
+        mass_kg=mass, lf_m=lf, lr_m=lr, cg_height_m=0.5, track_front_m=1.5, track_rear_m=1.5,
+        drag_area_m2=0.6, brake_front_share=0.6, drive_front_share=1.0, yaw_inertia_kgm2=2315.3,
+        tyre_front=sv.Tyre(B=1e5 / (load * lr), C=1.0, D=1.0),
+        tyre_rear=sv.Tyre(B=1e5 / (load * lf), C=1.0, D=1.0),
+    )  # fmt: skip
+    columns = ("delta_f", "vx", "yawrate", "ax", "ay")
+    sensors = np.column_stack([raw[name] for name in columns])
+    found = SideslipObserver(car, kind="published").run(np.full(len(raw), 0.01), sensors)
+    error = np.degrees(found[:, 0] - raw["beta"])
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(0.462, rel=0.02)
+    assert np.abs(error).max() == pytest.approx(3.60, rel=0.02)
