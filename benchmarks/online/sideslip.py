@@ -119,7 +119,7 @@ def kinematic(log: sv.Log) -> np.ndarray:
 
 
 def settled_after(log: sv.Log, run: SideslipRun, target: tuple[float, float]) -> float:
-    """Seconds of excited driving after which both stiffnesses stay within 10 %."""
+    """Seconds of cornering after which both stiffnesses are first within 10 %."""
     excited = np.cumsum(np.abs(log["ay_mps2"]) > EXCITED_MPS2) / log.rate_hz
     off = np.maximum(np.abs(run.cf_npr / target[0] - 1), np.abs(run.cr_npr / target[1] - 1))
     inside = off <= 0.10
