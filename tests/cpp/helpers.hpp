@@ -209,13 +209,12 @@ inline Small small_system(std::size_t samples) {
     return s;
 }
 
-/// The same with uncorrelated sensors, of which `Direct` are states.
-template <int Direct>
+/// The same with uncorrelated sensors, of which the first one is a state.
 struct Uncorrelated : Small {
-    static constexpr int kDirectReadings = Direct;
+    static constexpr int kDirectReadings = 1;
     explicit Uncorrelated(Small s) : Small(std::move(s)) {
-        H.topRows<Direct>() = Mat<2, 3>::Identity().template topRows<Direct>();
-        R = R.diagonal().asDiagonal();
+        H.row(0) << 1.0, 0.0, 0.0;
+        R(0, 1) = R(1, 0) = 0.0;
     }
 };
 

@@ -43,9 +43,8 @@ TEST(Kalman, EqualsTheTextbookFilter) {
     EXPECT_EQ(samples, s.size());
 }
 
-template <int Direct>
-void one_reading_after_the_other_is_the_same() {
-    const Uncorrelated<Direct> s(small_system(40));
+TEST(Kalman, OneReadingAfterTheOtherIsTheSame) {
+    const Uncorrelated s(small_system(40));
     std::vector<FilterStep<3, 2>> together;
     const double joint = extended_kalman_filter<3, 2>(
         s, kSmallMean, small_covariance(),
@@ -58,12 +57,6 @@ void one_reading_after_the_other_is_the_same() {
             EXPECT_NEAR(step.update.log_likelihood, together[k].update.log_likelihood, 1e-12);
         });
     EXPECT_NEAR(sequential, joint, 1e-10);
-}
-
-TEST(Kalman, OneReadingAfterTheOtherIsTheSame) {
-    one_reading_after_the_other_is_the_same<0>();
-    one_reading_after_the_other_is_the_same<1>();
-    one_reading_after_the_other_is_the_same<2>();
 }
 
 TEST(Kalman, LogLikelihoodIsTheDensityOfAllMeasurements) {

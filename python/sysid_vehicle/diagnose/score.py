@@ -88,6 +88,8 @@ class ScoreBoard:
             return {}
         names = [s.effect.id for s in self.scores]
         R = np.hstack([self.directions[n] for n in names])
+        # In units of their own: rounding at the largest would drown the smallest.
+        R = R / np.maximum(np.linalg.norm(R, axis=0), 1e-300)
         covariance = R.T @ R
         values, vectors = np.linalg.eigh(covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))

@@ -241,7 +241,7 @@ def _estimates(
     margin = 1e-6 * (box.upper - box.lower)
     at_bound = (x <= box.lower + margin) | (x >= box.upper - margin)
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    free = ~at_bound
+    free = ~at_bound & (np.diag(information) > 0.0)  # of what is never felt nothing is known
     covariance = np.zeros_like(information)
     if free.any():
         scaled = information[np.ix_(free, free)] / np.outer(scale[free], scale[free])

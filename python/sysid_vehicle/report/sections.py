@@ -114,7 +114,7 @@ def _verdicts(study: Study, truth: Model | None) -> list[str]:
         heading("A verdict for every effect"),
         table(("effect", "verdict", "in words"), rows, "verdicts"),
         paragraph(
-            "Each is judged beside the effects of the final model. 'proxy': it acted like one of "
+            "Each is judged beside the effects that were added. 'proxy': it acted like one of "
             "them, or no car has such a value. 'absent': it can be no larger than stated. 'not "
             "testable': this driving could hide one large enough to matter."
         ),
