@@ -7,6 +7,11 @@ namespace sysid::bindings {
 
 namespace {
 
+const char* scan_name(Scan scan) {
+    if (scan == Scan::kTime) return "time";
+    return scan == Scan::kRange ? "range" : "";
+}
+
 py::dict describe(const ParameterInfo& info) {
     py::dict d;
     d["name"] = info.name;
@@ -19,7 +24,7 @@ py::dict describe(const ParameterInfo& info) {
     d["typical_low"] = info.typical_low;
     d["typical_high"] = info.typical_high;
     d["mirrored"] = info.mirrored;
-    d["scan"] = info.scan == Scan::kTime ? "time" : info.scan == Scan::kRange ? "range" : "";
+    d["scan"] = scan_name(info.scan);
     return d;
 }
 
@@ -31,7 +36,8 @@ py::tuple names(const std::string& list) {
         all.append(list.substr(at, end - at));
         at = end + 2;
     }
-    return py::tuple(all);
+    py::tuple fixed(all);
+    return fixed;
 }
 
 py::list base_parameters() {

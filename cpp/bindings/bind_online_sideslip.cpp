@@ -138,9 +138,20 @@ void register_online_sideslip(py::module_& m) {
         .def(py::init([](double mass, double inertia, double lf, double lr, double forgetting,
                          double prior_std, double ay_std, double yaw_std, double most_slip,
                          double least_slip, double cf, double cr) {
-                 return CorneringRls({mass, inertia, lf, lr, forgetting, prior_std, ay_std, yaw_std,
-                                      most_slip, least_slip},
-                                     cf, cr);
+                 return CorneringRls(
+                     {
+                         mass,
+                         inertia,
+                         lf,
+                         lr,
+                         forgetting,
+                         prior_std,
+                         ay_std,
+                         yaw_std,
+                         most_slip,
+                         least_slip,
+                     },
+                     cf, cr);
              }),
              py::arg("mass_kg"), py::arg("yaw_inertia_kgm2"), py::arg("lf_m"), py::arg("lr_m"),
              py::arg("forgetting"), py::arg("prior_std_npr"), py::arg("ay_std_mps2"),
@@ -159,9 +170,13 @@ void register_online_sideslip(py::module_& m) {
                     for (std::size_t k = 0; k < n; ++k, r += 4) {
                         const bool used = self.step(r[0], r[1], r[2], r[3]);
                         const auto& P = self.covariance();
-                        for (const double v :
-                             {self.stiffness_npr()[0], self.stiffness_npr()[1], std::sqrt(P(0, 0)),
-                              std::sqrt(P(1, 1)), used ? 1.0 : 0.0})
+                        for (const double v : {
+                                 self.stiffness_npr()[0],
+                                 self.stiffness_npr()[1],
+                                 std::sqrt(P(0, 0)),
+                                 std::sqrt(P(1, 1)),
+                                 used ? 1.0 : 0.0,
+                             })
                             *to++ = v;
                     }
                 });

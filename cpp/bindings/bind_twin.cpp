@@ -72,6 +72,7 @@ void register_data(py::module_& m) {
     m.def("loaded",
           [](const LoadVector& car_load, const std::vector<std::array<double, 4>>& masses) {
               std::vector<PointMass> points;
+              points.reserve(masses.size());
               for (const auto& p : masses) points.push_back({p[0], p[1], p[2], p[3]});
               return to_vector(loaded(to_load(car_load), points));
           });
@@ -132,6 +133,7 @@ void register_vehicle(py::module_& m) {
                 const Input14* u = inputs_of(base);
                 if (base.shape(0) != n) throw std::invalid_argument("base: as long as references");
                 std::vector<Reference> wanted;
+                wanted.reserve(static_cast<std::size_t>(n));
                 for (py::ssize_t k = 0; k < n; ++k)
                     wanted.push_back({r[3 * k], r[3 * k + 1], r[3 * k + 2]});
                 const Drive14 out = unlocked(
@@ -192,9 +194,11 @@ void register_laws(py::module_& m) {
                          const std::vector<std::array<double, 3>>& channels, double dt,
                          const std::array<double, 5>& s) {
                  std::vector<BatchParameter> ps;
+                 ps.reserve(parameters.size());
                  for (const auto& p : parameters)
                      ps.push_back({static_cast<int>(p[0]), p[1], p[2], p[3], p[4], p[5]});
                  std::vector<BatchChannel> cs;
+                 cs.reserve(channels.size());
                  for (const auto& c : channels)
                      cs.push_back({static_cast<std::size_t>(c[0]), c[1], c[2]});
                  return BatchEstimator(std::move(ps), std::move(cs), dt,
@@ -234,8 +238,12 @@ void register_observers(py::module_& m) {
             const double* y = matrix(measured, n, kReadings, "measured");
             ObserverSettings settings{{}, laws, batch, stride};
             for (const auto& g : gains)
-                settings.gains.push_back({static_cast<std::size_t>(g[0]),
-                                          static_cast<std::size_t>(g[1]), g[2], g[3] != 0.0});
+                settings.gains.push_back({
+                    static_cast<std::size_t>(g[0]),
+                    static_cast<std::size_t>(g[1]),
+                    g[2],
+                    g[3] != 0.0,
+                });
             const State14 x = state_of(start);
             const Observation seen = unlocked([&] {
                 return observe14(twin, x, u, y, static_cast<std::size_t>(n), dt,
@@ -255,10 +263,13 @@ void register_observers(py::module_& m) {
             const auto pair = [](const std::array<double, 8>& t) {
                 return PacejkaPair{t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]};
             };
-            const DoubleTrackData data{car[0], car[1], car[2], car[3], car[4],      car[5],
-                                       car[6], car[7], car[8], car[9], pair(front), pair(rear)};
-            const DoubleTrackGains k{gains[0], gains[1],     gains[2], gains[3],
-                                     gains[4], literal_sign, gains[5], gains[6]};
+            const DoubleTrackData data{
+                car[0], car[1], car[2], car[3], car[4],      car[5],
+                car[6], car[7], car[8], car[9], pair(front), pair(rear),
+            };
+            const DoubleTrackGains k{
+                gains[0], gains[1], gains[2], gains[3], gains[4], literal_sign, gains[5], gains[6],
+            };
             const Input14* u = inputs_of(inputs);
             const auto n = inputs.shape(0);
             const double* y = matrix(measured, n, kReadings, "measured");

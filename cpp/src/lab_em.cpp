@@ -1,6 +1,7 @@
 #include "sysid/lab/lab_em.hpp"
 
 #include <cmath>
+#include <type_traits>
 
 namespace sysid::lab {
 
@@ -88,8 +89,8 @@ class PublishedExpectation {
 
 double log_likelihood(const ObserverLog& log, const ObserverNoise& noise) {
     const ObserverSystem system(log.model, log.inputs, log.readings, noise);
-    const auto pass = [&](auto form) {
-        return extended_kalman_filter<NX, NY, decltype(form)>(
+    const auto pass = [&](const auto& form) {
+        return extended_kalman_filter<NX, NY, std::decay_t<decltype(form)>>(
             system, log.start.mean, log.start.covariance, [](std::size_t, const auto&) {},
             log.start.one_before);
     };
@@ -134,8 +135,9 @@ ObserverEm learn(const std::vector<ObserverLog>& logs, const ObserverNoise& star
         records.push_back(
             {&systems.back(), log.start.mean, log.start.covariance, log.start.one_before});
     }
-    const auto learn_by = [&](auto form) {
-        FilteredExpectation<NX, NY, ObserverSystem, decltype(form)> expectation(records);
+    const auto learn_by = [&](const auto& form) {
+        FilteredExpectation<NX, NY, ObserverSystem, std::decay_t<decltype(form)>> expectation(
+            records);
         return learn_noise<NX, NY>(expectation, noise, process, sensors, options);
     };
     return sensors.uncorrelated() ? learn_by(SequentialUpdate<NX, NY>())

@@ -279,8 +279,9 @@ void SideslipDual::run_forces(double dt, const SensorSample& s) {
         x[ForceModel::kYawRate] = b[TyreModel::kYawRate];
         forces_.restart(x, P);
     }
-    const ForceModel::Input u{dt, s.steer_rad, std::tan(b[TyreModel::kBeta]), input_.loads.fz_f,
-                              input_.loads.fz_r};
+    const ForceModel::Input u{
+        dt, s.steer_rad, std::tan(b[TyreModel::kBeta]), input_.loads.fz_f, input_.loads.fz_r,
+    };
     forces_.step(u, Vec<4>(s.vx_mps, used[0], s.ax_mps2, used[1]));
 }
 

@@ -59,7 +59,7 @@ void Vehicle14::set_load(const Load& load) {
     }
 }
 
-double Vehicle14::spring_force(const AxleData& a, double travel) const {
+double Vehicle14::spring_force(const AxleData& a, double travel) {
     return -a.spring_npm * travel - a.stop_npm * beyond(travel, a.travel_m);
 }
 

@@ -28,10 +28,17 @@ class CorneringRls {
     CorneringRls(const CorneringRlsSettings& settings, double cf_npr, double cr_npr)
         : settings_(settings), theta_(cf_npr, cr_npr) {
         const auto& s = settings;
-        if (!(s.forgetting >= 0.98 && s.forgetting <= 1.0))
+        if (std::isnan(s.forgetting) || s.forgetting < 0.98 || s.forgetting > 1.0)
             throw std::invalid_argument("forgetting: expected 0.98 to 1");
-        for (const double v : {s.mass_kg, s.yaw_inertia_kgm2, s.lf_m, s.lr_m, s.prior_std_npr,
-                               s.ay_std_mps2, s.yaw_acceleration_std_radps2})
+        for (const double v : {
+                 s.mass_kg,
+                 s.yaw_inertia_kgm2,
+                 s.lf_m,
+                 s.lr_m,
+                 s.prior_std_npr,
+                 s.ay_std_mps2,
+                 s.yaw_acceleration_std_radps2,
+             })
             if (!(v > 0.0) || !std::isfinite(v))
                 throw std::invalid_argument("a setting is not above 0");
         reset();

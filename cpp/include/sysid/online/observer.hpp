@@ -37,23 +37,25 @@ struct SideslipEstimate {
 constexpr std::size_t kEstimateColumns = 17;
 
 inline std::array<double, kEstimateColumns> columns_of(const SideslipEstimate& e) {
-    return {e.beta_rad,
-            e.beta_std_rad,
-            e.vx_mps,
-            e.yaw_rate_radps,
-            e.fyf_n,
-            e.fyr_n,
-            e.fx_n,
-            e.cf_npr,
-            e.cr_npr,
-            e.cf_std_npr,
-            e.cr_std_npr,
-            e.mu_f,
-            e.mu_r,
-            e.nis,
-            e.observed,
-            e.log_likelihood,
-            static_cast<double>(e.mode)};
+    return {
+        e.beta_rad,
+        e.beta_std_rad,
+        e.vx_mps,
+        e.yaw_rate_radps,
+        e.fyf_n,
+        e.fyr_n,
+        e.fx_n,
+        e.cf_npr,
+        e.cr_npr,
+        e.cf_std_npr,
+        e.cr_std_npr,
+        e.mu_f,
+        e.mu_r,
+        e.nis,
+        e.observed,
+        e.log_likelihood,
+        static_cast<double>(e.mode),
+    };
 }
 
 /// A car too slow for slip to be seen; for the rest of the estimate there is nothing to say.

@@ -34,8 +34,12 @@ inline AxleLoads axle_loads(const ObservedCar& car, double ax, double speed) {
     const double front = fx < 0.0 ? c.brake_front_share : c.drive_front_share;
     const double weight = c.mass_kg * kGravity / car.wheelbase_m();
     const double least = 0.05 * c.mass_kg * kGravity;  // a wheel in the air breaks every formula
-    return {std::max(weight * c.lr_m - shift, least), std::max(weight * c.lf_m + shift, least),
-            front * fx, (1.0 - front) * fx};
+    return {
+        std::max(weight * c.lr_m - shift, least),
+        std::max(weight * c.lf_m + shift, least),
+        front * fx,
+        (1.0 - front) * fx,
+    };
 }
 
 /// Share of the lateral grip that the longitudinal force leaves (friction ellipse).
@@ -49,8 +53,12 @@ inline double grip_left(double fx, double fz, double mu) {
 template <class S>
 S axle_force(const S& alpha, double fz, double fx, const TyreCoefficients<double>& tyre,
              const S& stiffness, const S& friction) {
-    const TyreCoefficients<S> t{tyre.B * stiffness / friction, S(tyre.C), tyre.D * friction,
-                                S(tyre.E)};
+    const TyreCoefficients<S> t{
+        tyre.B * stiffness / friction,
+        S(tyre.C),
+        tyre.D * friction,
+        S(tyre.E),
+    };
     return fz * grip_left(fx, fz, tyre.D * value_of(friction)) * magic_formula<S>(alpha, t);
 }
 

@@ -128,7 +128,7 @@ class Vehicle14 {
                Output14* out) const;
     int parts(const State14& x, const Input14& u, double dt) const;
     const AxleData& axle(std::size_t wheel) const { return wheel < 2 ? car_.front : car_.rear; }
-    double spring_force(const AxleData& a, double travel) const;
+    static double spring_force(const AxleData& a, double travel);
 
     CarData car_;
     Load load_;
