@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import os
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +21,6 @@ from sysid_vehicle.online import (
 )
 
 SENSORS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
-DATA = Path(os.environ.get("SYSID_DATA", Path(__file__).resolve().parents[3] / "shared/data"))
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +96,9 @@ def test_a_sensor_that_fails_for_two_seconds_does_no_lasting_harm(vehicle, log, 
     error = np.degrees(np.abs(found[:, 0] - truth))
     assert np.isfinite(found[:, :2]).all()
     assert np.nanmax(error) < 15.0
-    assert np.sqrt(np.nanmean(error[first + 12 * rate :] ** 2)) < 1.0
+    # A steering angle that jumps cannot be told from a road that banks, and is learnt as one.
+    most = 1.0 if (column, fault) == (0, "jumps") else 0.5
+    assert np.sqrt(np.nanmean(error[first + 12 * rate :] ** 2)) < most
 
 
 def test_a_slow_car_rolls_without_slip(vehicle):
@@ -181,10 +181,9 @@ def test_the_command_line_prints_and_writes(vehicle, log, tmp_path, capsys):
     assert main([*args, "--plot", str(tmp_path / "a.png")]) == 2
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="needs the driving data under ../shared/data")
-def test_the_published_observer_repeats_its_figures():
+def test_the_published_observer_repeats_its_figures(shared_data: Path):
     raw = np.genfromtxt(
-        DATA / "carsim_like_handling/handling_course.csv", delimiter=",", names=True
+        shared_data / "carsim_like_handling/handling_course.csv", delimiter=",", names=True
     )
     mass, lf, lr = 1549.8, 1.11, 1.756
     load = mass * 9.80665 / (lf + lr)
