@@ -306,7 +306,7 @@ void SideslipDual::report() {
     out_.mu_r = car_.rear.D * std::exp(b.mean[TyreModel::kGripR]);
     out_.nis = tyres_.nis();
     out_.observed = b.update.observed;
-    out_.log_likelihood = b.update.log_likelihood;
+    out_.log_likelihood = LogDensity::of(b.update);
     out_.mode = tyres_.used().hasNaN() ? ObserverMode::kCoasting : ObserverMode::kRunning;
 }
 

@@ -169,7 +169,7 @@ void SideslipUkf<method>::report(const SensorSample& s) {
     out_.mu_r = car_.rear.D;
     out_.nis = filter_.nis();
     out_.observed = now.update.observed;
-    out_.log_likelihood = now.update.log_likelihood;
+    out_.log_likelihood = LogDensity::of(now.update);
     const bool whole = now.update.observed == 2 && rate_gap_s_ == 0.0 && !std::isnan(s.vx_mps);
     out_.mode = whole ? ObserverMode::kRunning : ObserverMode::kCoasting;
 }

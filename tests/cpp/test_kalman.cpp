@@ -54,7 +54,8 @@ TEST(Kalman, OneReadingAfterTheOtherIsTheSame) {
             EXPECT_LT((step.mean - together[k].mean).norm(), 1e-12) << k;
             EXPECT_LT((step.covariance - together[k].covariance).norm(), 1e-12) << k;
             EXPECT_EQ(step.update.observed, together[k].update.observed);
-            EXPECT_NEAR(step.update.log_likelihood, together[k].update.log_likelihood, 1e-12);
+            EXPECT_NEAR(LogDensity::of(step.update), LogDensity::of(together[k].update), 1e-12);
+            EXPECT_EQ(step.covariance, step.covariance.transpose());
         });
     EXPECT_NEAR(sequential, joint, 1e-10);
 }
@@ -80,7 +81,7 @@ TEST(Kalman, MissingEverythingOnlyPredicts) {
                                      if (k != 3) return;
                                      EXPECT_EQ(step.mean, step.predicted_mean);
                                      EXPECT_EQ(step.covariance, step.predicted_covariance);
-                                     EXPECT_EQ(step.update.log_likelihood, 0.0);
+                                     EXPECT_EQ(LogDensity::of(step.update), 0.0);
                                      EXPECT_EQ(step.update.observed, 0);
                                  });
 }

@@ -28,7 +28,7 @@ ObserverLog pushed_car(ObserverForm form, std::size_t samples, double side_force
     ObserverVec x = ObserverVec::Zero();
     x[0] = 12.0;
     x[4] = side_force;
-    ObserverMat A;
+    ObserverMat A = ObserverMat::Identity();
     ObserverRow H;
     std::mt19937 generator(4);
     std::normal_distribution<double> normal;
@@ -55,14 +55,30 @@ TEST(HeldResponse, IsTheIntegralOfTheExponential) {
         J << 0.0, -w, w, 0.0;
         Mat<2, 2> expected;
         expected << std::sin(w), std::cos(w) - 1.0, 1.0 - std::cos(w), std::sin(w);
-        EXPECT_LT((held_response<2>(J, 1.0) - expected / w).norm(), 1e-11);
+        EXPECT_LT((held_response<2>(J, 1.0).response - expected / w).norm(), 1e-11);
     }
-    EXPECT_LT((held_response<3>(Mat<3, 3>::Zero(), 0.3) - 0.3 * Mat<3, 3>::Identity()).norm(),
-              1e-15);
+    const HeldResponse<3> still = held_response<3>(Mat<3, 3>::Zero(), 0.3);
+    EXPECT_LT((still.response - 0.3 * Mat<3, 3>::Identity()).norm(), 1e-15);
+    EXPECT_LT((still.transition - Mat<3, 3>::Identity()).norm(), 1e-15);
     const Mat<3, 3> stiff = Vec<3>(-1.0, -50.0, -4000.0).asDiagonal();
-    const Mat<3, 3> response = held_response<3>(stiff, 0.1);
+    const Mat<3, 3> response = held_response<3>(stiff, 0.1).response;
     for (int i = 0; i < 3; ++i)
         EXPECT_NEAR(response(i, i), std::expm1(0.1 * stiff(i, i)) / stiff(i, i), 1e-13);
+}
+
+TEST(HeldResponse, OfThreeStatesIsThatOfAnySize) {
+    Mat<3, 3> J;
+    J << -0.3, 0.4, 1.1, 2.0, -5.0, -28.0, -0.2, 1.5, -6.0;
+    Mat<4, 4> wide = Mat<4, 4>::Zero();
+    wide.topLeftCorner<3, 3>() = J;
+    for (const double h : {1e-4, 0.01, 0.017, 0.3}) {
+        const HeldResponse<3> three = held_response<3>(J, h);
+        const HeldResponse<4> four = held_response<4>(wide, h);
+        const double size = four.response.norm();
+        EXPECT_LT((three.response - four.response.topLeftCorner<3, 3>()).norm(), 1e-13 * size);
+        EXPECT_LT((three.transition - four.transition.topLeftCorner<3, 3>()).norm(), 1e-12);
+        EXPECT_LT((three.transition - Mat<3, 3>::Identity() - J * three.response).norm(), 1e-12);
+    }
 }
 
 TEST(ObserverModel, JacobiansAreDerivatives) {
@@ -72,7 +88,7 @@ TEST(ObserverModel, JacobiansAreDerivatives) {
         const ObserverModel model(kCar, form, 0.01);
         ObserverVec at = kState;
         at[0] = v_x;
-        ObserverMat A, ignored;
+        ObserverMat A = ObserverMat::Identity(), ignored;
         ObserverRow H, ignored_row;
         model.predict(at, kBefore, kNow, A);
         model.observe(at[0], at, kNow, H);
@@ -100,7 +116,7 @@ TEST(ObserverModel, ExactSamplingIsTheLimitOfFineSteps) {
         const ObserverModel model(kCar, form, 0.01 / steps);
         ObserverVec x = kState;
         x[0] = v_x;
-        ObserverMat A;
+        ObserverMat A = ObserverMat::Identity();
         for (int i = 0; i < 100 * steps; ++i) x = model.predict(x, kBefore, kBefore, A);
         return x;
     };
@@ -121,7 +137,7 @@ TEST(ObserverModel, StaysStableAtWalkingPaceUnlikeEuler) {
         const ObserverModel model(kCar, form, 0.01);
         ObserverVec x = ObserverVec::Zero();
         x[0] = 1.0;
-        ObserverMat A;
+        ObserverMat A = ObserverMat::Identity();
         model.predict(x, kNow, kNow, A);
         return A.topLeftCorner<3, 3>().eigenvalues().cwiseAbs().maxCoeff();
     };
@@ -131,7 +147,7 @@ TEST(ObserverModel, StaysStableAtWalkingPaceUnlikeEuler) {
 
 TEST(ObserverModel, PublishedFormIsItsMatrices) {
     const ObserverModel model(kCar, ObserverForm::published(), 0.01);
-    ObserverMat A;
+    ObserverMat A = ObserverMat::Identity();
     ObserverRow H;
     const ObserverVec x = model.predict(kState, kBefore, kNow, A);
     const ObserverReading y = model.observe(kState[0], x, kNow, H);

@@ -44,12 +44,14 @@ struct WithNoise {
 
     static constexpr int kMovingStates = MovingStates<System, NX>::value;
     static constexpr int kDirectReadings = DirectReadings<System>::value;
+    static constexpr bool kSteadyNoise = true;
 
     std::size_t size() const { return system.size(); }
+    const Mat<NX, NX>& process_noise() const { return noise.process; }
     Vec<NX> predict(std::size_t k, const Vec<NX>& x, Mat<NX, NX>& A, Mat<NX, NX>& Q) const {
-        const Vec<NX> next = system.predict(k, x, A, Q);
-        Q = noise.process;
-        return next;
+        if constexpr (SteadyNoise<System>::value) return system.predict(k, x, A, Q);
+        Mat<NX, NX> ignored;
+        return system.predict(k, x, A, ignored);
     }
     Vec<NY> observe(std::size_t k, const Vec<NX>& x, Mat<NY, NX>& H) const {
         return system.observe(k, x, H);
@@ -202,7 +204,7 @@ class FilteredExpectation {
 template <int NX, int NY, class System>
 void add_smoothed_moments(const System& system, const std::vector<SmoothedStep<NX>>& states,
                           NoiseMoments<NX, NY>& out) {
-    Mat<NX, NX> A, ignored;
+    Mat<NX, NX> A = Mat<NX, NX>::Identity(), ignored;
     Mat<NY, NX> H;
     for (std::size_t k = 0; k < states.size(); ++k) {
         const auto& now = states[k];

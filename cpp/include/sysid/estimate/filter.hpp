@@ -101,7 +101,8 @@ class Filter {
             seed(x);
             model_.predict(input, x.data(), next.data());
             unpack<NX>(next, state_.mean, state_.transition);
-            state_.covariance = propagated<NX>(state_.transition, state_.covariance) + Q;
+            propagate<NX>(state_.transition, state_.covariance);
+            state_.covariance += Q;
         } else {
             if constexpr (method == Method::kUnscented)
                 root_ = factor_of<NX>(state_.covariance, index_);

@@ -9,8 +9,12 @@
 //   Mat<NY, NY> measurement_noise(k) const
 //
 // For speed it may promise, as static constexpr int:
-//   kMovingStates    only so many first states change by themselves: A's other rows are the unit's
+//   kMovingStates    only so many first states change by themselves: A's other rows are the unit's,
+//                    and `predict` finds and leaves them so
 //   kDirectReadings  so many first readings are the states of the same number
+//   kSteadyNoise     true: Q is the same for all samples; `process_noise()` gives it, `predict`
+//   does
+//                    not fill it
 #pragma once
 
 #include <cmath>
@@ -35,23 +39,25 @@ template <class System>
 struct DirectReadings<System, std::void_t<decltype(System::kDirectReadings)>>
     : std::integral_constant<int, System::kDirectReadings> {};
 
-/// A P A' of a symmetric P, where only the first M rows of A differ from the unit matrix.
+template <class System, class = void>
+struct SteadyNoise : std::false_type {};
+template <class System>
+struct SteadyNoise<System, std::void_t<decltype(System::kSteadyNoise)>>
+    : std::bool_constant<System::kSteadyNoise> {};
+
+/// Turns a symmetric P into A P A', where only the first M rows of A differ from the unit matrix.
 template <int M, int NX>
-Mat<NX, NX> propagated(const Mat<NX, NX>& A, const Mat<NX, NX>& P) {
+void propagate(const Mat<NX, NX>& A, Mat<NX, NX>& P) {
     if constexpr (M == NX) {
-        Mat<NX, NX> out = A * P * A.transpose();
-        symmetrise(out);
-        return out;
+        P = (A * P * A.transpose()).eval();
+        symmetrise(P);
     } else {
-        const Mat<NX, M> halfway = P * A.template topRows<M>().transpose();
-        Mat<M, M> corner = A.template topRows<M>() * halfway;
-        symmetrise(corner);
-        Mat<NX, NX> out = P;
-        out.template topLeftCorner<M, M>() = corner;
-        out.template bottomLeftCorner<NX - M, M>() = halfway.template bottomRows<NX - M>();
-        out.template topRightCorner<M, NX - M>() =
-            halfway.template bottomRows<NX - M>().transpose();
-        return out;
+        Mat<NX, M> halfway;
+        halfway.noalias() = P * A.template topRows<M>().transpose();
+        for (int j = 0; j < M; ++j)
+            for (int i = 0; i <= j; ++i) P(i, j) = P(j, i) = A.row(i).dot(halfway.col(j));
+        for (int j = 0; j < M; ++j)
+            for (int i = M; i < NX; ++i) P(i, j) = P(j, i) = halfway(i, j);
     }
 }
 
@@ -90,7 +96,42 @@ struct Update {
     Mat<NX, NY> gain;         // zero columns for missing measurements
     Mat<NY, NX> observation;  // zero rows for missing measurements
     int observed = 0;
-    double log_likelihood = 0.0;
+    double squares = 0.0;      // innovations against their covariance
+    double determinant = 1.0;  // of that covariance
+};
+
+/// The log-density of innovations, gathered from updates. A logarithm for each would take longer
+/// than much of the update itself.
+class LogDensity {
+  public:
+    template <class U>
+    void add(const U& update) {
+        sum_ -= 0.5 * (update.squares + update.observed * kLogTwoPi);
+        // What leaves this range on its own is a matter of the logarithm too.
+        if (!(update.determinant > 1e-140 && update.determinant < 1e140)) {
+            sum_ -= 0.5 * std::log(update.determinant);
+            return;
+        }
+        product_ *= update.determinant;
+        if (!(product_ > 1e-140 && product_ < 1e140)) {
+            sum_ -= 0.5 * std::log(product_);
+            product_ = 1.0;
+        }
+    }
+    double value() const { return sum_ - 0.5 * std::log(product_); }
+    bool finite() const { return std::isfinite(sum_); }
+
+    /// Of one update alone.
+    template <class U>
+    static double of(const U& update) {
+        LogDensity one;
+        one.add(update);
+        return one.value();
+    }
+
+  private:
+    double sum_ = 0.0;
+    double product_ = 1.0;
 };
 
 /// Updates mean and covariance with the elements of `y` that are there (Joseph form). The first `D`
@@ -101,7 +142,7 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
                         Update<NX, NY>& u) {
     u.observed = 0;
     u.innovation = y - expected;
-    u.observation = H;
+    if (&u.observation != &H) u.observation = H;
     Mat<NY, NY> noise = R;
     for (int i = 0; i < NY; ++i) {
         if (std::isnan(y[i])) {
@@ -127,8 +168,9 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
     u.information.noalias() = whitening.transpose() * whitening;
     u.gain.noalias() = cross * u.information;
     const Vec<NY> whitened = whitening * u.innovation;
-    u.log_likelihood = -0.5 * (whitened.squaredNorm() + u.observed * kLogTwoPi) -
-                       std::log(u.lower.diagonal().prod());
+    u.squares = whitened.squaredNorm();
+    u.determinant = u.lower.diagonal().prod();
+    u.determinant *= u.determinant;
     x += u.gain * u.innovation;
     // (I - K H) P (I - K H)' + K R K', multiplied from the left, then from the right.
     const Mat<NX, NX> left = P - u.gain * crossed;
@@ -147,7 +189,8 @@ struct SequentialUpdate {
     Mat<NX, NY> gain;         // zero columns for missing measurements
     Mat<NY, NX> observation;  // zero rows for missing measurements
     int observed = 0;
-    double log_likelihood = 0.0;
+    double squares = 0.0;      // innovations against their covariance
+    double determinant = 1.0;  // of that covariance
 };
 
 /// Updates as above, for a diagonal `R`; several times faster, for nothing is factorised.
@@ -157,8 +200,9 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
                         SequentialUpdate<NX, NY>& u) {
     const Vec<NX> before = x;
     u.observed = 0;
-    u.observation = H;
-    double squares = 0.0, variances = 1.0;
+    if (&u.observation != &H) u.observation = H;
+    u.squares = 0.0;
+    u.determinant = 1.0;
     for (int j = 0; j < NY; ++j) {
         if (std::isnan(y[j])) {
             u.innovation[j] = u.information[j] = 0.0;
@@ -182,19 +226,17 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
             throw NumericalFailure("the innovation covariance is not positive definite", sample);
         const double information = 1.0 / variance;
         const Vec<NX> gain = cross * information;
-        // (I - k h') P (I - k h')' + R k k': the two products of the Joseph form share their
-        // factors.
-        const Vec<NX> rest = cross - variance * gain;
-        P -= gain * cross.transpose() + rest * gain.transpose();
+        // The Joseph form (I - k h') P (I - k h')' + R k k' is P - k c' - c k' + s k k', with
+        // c = P h and the variance s of the innovation; written so it stays symmetric.
+        const Vec<NX> half = cross - (0.5 * variance) * gain;
+        P -= gain.lazyProduct(half.transpose()) + half.lazyProduct(gain.transpose());
         x += gain * innovation;
-        squares += innovation * innovation * information;
-        variances *= variance;
+        u.squares += innovation * innovation * information;
+        u.determinant *= variance;
         u.innovation[j] = innovation;
         u.information[j] = information;
         u.gain.col(j) = gain;
     }
-    symmetrise(P);
-    u.log_likelihood = -0.5 * (squares + u.observed * kLogTwoPi + std::log(variances));
 }
 
 /// What is known before and after a sample has been used; `transition` led to it from the sample
@@ -218,32 +260,32 @@ template <int NX, int NY, class Form = Update<NX, NY>, class System, class Keep>
 double extended_kalman_filter(const System& system, const Vec<NX>& mean,
                               const Mat<NX, NX>& covariance, Keep&& keep,
                               bool predict_first = false) {
-    double log_likelihood = 0.0;
+    LogDensity log_density;
     FilterStep<NX, NY, Form> step;
     Vec<NX>& x = step.mean;
     Mat<NX, NX>& P = step.covariance;
     Mat<NX, NX> Q;
-    Mat<NY, NX> H;
+    Mat<NY, NX>& H = step.update.observation;
+    if constexpr (SteadyNoise<System>::value) Q = system.process_noise();
     step.transition.setIdentity();
     step.predicted_mean = x = mean;
     step.predicted_covariance = P = covariance;
     for (std::size_t k = 0; k < system.size(); ++k) {
         if (k > 0 || predict_first) {
             step.predicted_mean = system.predict(k, x, step.transition, Q);
-            step.predicted_covariance =
-                propagated<MovingStates<System, NX>::value>(step.transition, P) + Q;
+            propagate<MovingStates<System, NX>::value>(step.transition, P);
+            P += Q;
+            step.predicted_covariance = P;
         }
         x = step.predicted_mean;
-        P = step.predicted_covariance;
         const Vec<NY> expected = system.observe(k, x, H);
         measurement_update<NX, NY, DirectReadings<System>::value>(
             x, P, system.measurement(k), expected, H, system.measurement_noise(k), k, step.update);
-        log_likelihood += step.update.log_likelihood;
-        if (!std::isfinite(log_likelihood))
-            throw NumericalFailure("the log-likelihood is not finite", k);
+        log_density.add(step.update);
+        if (!log_density.finite()) throw NumericalFailure("the log-likelihood is not finite", k);
         keep(k, step);
     }
-    return log_likelihood;
+    return log_density.value();
 }
 
 }  // namespace sysid

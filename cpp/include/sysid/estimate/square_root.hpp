@@ -74,8 +74,9 @@ void square_root_update(const Transformed<NX, NY>& t, Vec<NX>& x, Mat<NX, NX>& L
     u.information = whitening.transpose() * whitening;
     u.gain = lower.template block<NX, NY>(NY, 0) * whitening;
     const Vec<NY> white = whitening * u.innovation;
-    u.log_likelihood = -0.5 * (white.squaredNorm() + u.observed * kLogTwoPi) -
-                       u.lower.diagonal().array().log().sum();
+    u.squares = white.squaredNorm();
+    u.determinant = u.lower.diagonal().prod();
+    u.determinant *= u.determinant;
     x += u.gain * u.innovation;
     L = lower.template bottomRightCorner<NX, NX>();
 }

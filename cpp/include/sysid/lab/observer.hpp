@@ -77,7 +77,8 @@ class ObserverModel {
     const ObserverCar& car() const { return car_; }
     ObserverModel with_form(const ObserverForm& form) const { return {car_, form, dt_}; }
 
-    /// State one sample after `x`, and the Jacobian `A` that leads there.
+    /// State one sample after `x`, and the first three rows of the Jacobian `A` that leads there;
+    /// the others are the unit matrix's, as the forces only wander.
     ObserverVec predict(const ObserverVec& x, const ObserverInput& before, const ObserverInput& now,
                         ObserverMat& A) const {
         const ObserverInput& u = form_.input_before ? before : now;
@@ -97,17 +98,19 @@ class ObserverModel {
         }
         // Local linearisation (Ozaki, Statistica Sinica 1992): the rate's own Jacobian is what is
         // sampled exactly. It stays stable at walking pace, where Euler's rule does not.
-        A.setIdentity();
         ObserverVec next = x;
         if (!form_.exact_sampling) {
-            A.topLeftCorner<3, 3>() += dt_ * J;
+            A.topRows<3>().setZero();
+            A.topLeftCorner<3, 3>() = dt_ * J;
+            A.topLeftCorner<3, 3>().diagonal().array() += 1.0;
             A(0, 3) = A(1, 4) = dt_ * per_mass_;
             A(2, 5) = dt_ * per_inertia_;
             next.head<3>() += dt_ * rate;
             return next;
         }
-        const Mat<3, 3> response = held_response<3>(J, dt_);
-        A.topLeftCorner<3, 3>() += J * response;
+        const HeldResponse<3> held = held_response<3>(J, dt_);
+        const Mat<3, 3>& response = held.response;
+        A.topLeftCorner<3, 3>() = held.transition;
         A.col(3).head<3>() = response.col(0) * per_mass_;
         A.col(4).head<3>() = response.col(1) * per_mass_;
         A.col(5).head<3>() = response.col(2) * per_inertia_;
@@ -197,14 +200,16 @@ class ObserverSystem {
   public:
     static constexpr int kMovingStates = 3;
     static constexpr int kDirectReadings = 3;
+    static constexpr bool kSteadyNoise = true;
 
     ObserverSystem(const ObserverModel& model, const std::vector<ObserverInput>& inputs,
                    const std::vector<ObserverReading>& readings, ObserverNoise noise)
         : model_(&model), inputs_(&inputs), readings_(&readings), noise_(std::move(noise)) {}
 
     std::size_t size() const { return readings_->size(); }
-    ObserverVec predict(std::size_t k, const ObserverVec& x, ObserverMat& A, ObserverMat& Q) const {
-        Q = noise_.process;
+    const ObserverMat& process_noise() const { return noise_.process; }
+    ObserverVec predict(std::size_t k, const ObserverVec& x, ObserverMat& A,
+                        ObserverMat& /*steady*/) const {
         speed_ = x[0];
         return model_->predict(x, (*inputs_)[k > 0 ? k - 1 : 0], (*inputs_)[k], A);
     }
@@ -239,9 +244,10 @@ class Observer {
     const ObserverVec& step(const ObserverInput& now, const ObserverReading& y) {
         double speed = x_[0];
         if (samples_ > 0 || start_.one_before) {
-            ObserverMat A;
+            ObserverMat A = ObserverMat::Identity();
             x_ = model_.predict(x_, samples_ > 0 ? before_ : now, now, A);
-            P_ = propagated<ObserverSystem::kMovingStates>(A, P_) + noise_.process;
+            propagate<ObserverSystem::kMovingStates>(A, P_);
+            P_ += noise_.process;
         }
         if (model_.form().speed_predicted) speed = x_[0];
         ObserverRow H;
@@ -249,7 +255,7 @@ class Observer {
         Update<kObserverStates, kObserverMeasurements> update;
         measurement_update<kObserverStates, kObserverMeasurements, ObserverSystem::kDirectReadings>(
             x_, P_, y, expected, H, noise_.sensors, samples_, update);
-        log_likelihood_ += update.log_likelihood;
+        log_density_.add(update);
         before_ = now;
         ++samples_;
         return x_;
@@ -257,7 +263,7 @@ class Observer {
 
     const ObserverVec& state() const { return x_; }
     const ObserverMat& covariance() const { return P_; }
-    double log_likelihood() const { return log_likelihood_; }
+    double log_likelihood() const { return log_density_.value(); }
 
   private:
     ObserverModel model_;
@@ -267,7 +273,7 @@ class Observer {
     ObserverMat P_;
     ObserverInput before_;
     std::size_t samples_ = 0;
-    double log_likelihood_ = 0.0;
+    LogDensity log_density_;
 };
 
 }  // namespace sysid::lab
