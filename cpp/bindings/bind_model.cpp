@@ -95,6 +95,57 @@ Array evaluate(const SingleTrack& model, const Array& p, const Array& motion, do
     return out;
 }
 
+/// As Python hands a formula over: what is added to, and steps (operation, operands, constant).
+using Step = std::tuple<int, std::array<std::size_t, 3>, double>;
+using Act = std::pair<int, std::vector<Step>>;
+
+Formula formula(const std::vector<Step>& steps) {
+    std::vector<Instruction> all;
+    all.reserve(steps.size());
+    for (const auto& [operation, from, constant] : steps)
+        all.push_back({static_cast<Operation>(operation), from, constant});
+    return Formula(std::move(all), kUserParameters);
+}
+
+UserEffects user_effects(const std::vector<std::pair<std::size_t, std::vector<Act>>>& given) {
+    if (given.empty()) return nullptr;
+    std::vector<UserEffect> all;
+    for (const auto& [slot, acts] : given) {
+        if (slot >= kUserEffects)
+            throw std::invalid_argument("user: there is no such place for an effect");
+        UserEffect effect;
+        effect.slot = slot;
+        for (const auto& [target, steps] : acts) {
+            if (target < 0 || target >= static_cast<int>(Target::kTargets))
+                throw std::invalid_argument("user: there is no such target");
+            effect.acts.emplace_back(static_cast<Target>(target), formula(steps));
+        }
+        all.push_back(std::move(effect));
+    }
+    return std::make_shared<const std::vector<UserEffect>>(std::move(all));
+}
+
+template <std::size_t N>
+py::tuple texts(const std::array<const char*, N>& all) {
+    py::list list;
+    for (const char* text : all) list.append(text);
+    py::tuple fixed(list);
+    return fixed;
+}
+
+/// What formulas are made of, each name at its number.
+py::dict formula_parts() {
+    py::dict d;
+    d["operations"] = texts(kOperationNames);
+    d["signals"] = texts(kSignalNames);
+    d["targets"] = texts(kTargetNames);
+    py::list known;
+    for (std::size_t i = 0; i < kTargetNames.size(); ++i)
+        known.append(static_cast<int>(first_unknown(static_cast<Target>(i))));
+    d["signals_known"] = py::tuple(known);
+    return d;
+}
+
 }  // namespace
 
 void register_model(py::module_& m) {
@@ -109,17 +160,23 @@ void register_model(py::module_& m) {
         .def_readwrite("brake_front_share", &VehicleData::brake_front_share)
         .def_readwrite("drive_front_share", &VehicleData::drive_front_share);
     py::class_<SingleTrack>(m, "SingleTrack")
-        .def(py::init([](const VehicleData& car, EffectMask effects, bool force_known) {
+        .def(py::init([](const VehicleData& car, EffectMask effects, bool force_known,
+                         const std::vector<std::pair<std::size_t, std::vector<Act>>>& user) {
                  if (effects >> kEffectCount != 0)
                      throw std::invalid_argument(
                          "effects: the mask names effects there are none of");
-                 return SingleTrack{car, effects, force_known};
+                 return SingleTrack{car, effects, force_known, HeldLoads{}, user_effects(user)};
              }),
-             py::arg("car"), py::arg("effects"), py::arg("force_known"))
+             py::arg("car"), py::arg("effects"), py::arg("force_known"),
+             py::arg("user") = std::vector<std::pair<std::size_t, std::vector<Act>>>{})
         .def("evaluate", &evaluate, py::arg("parameters"), py::arg("motion"), py::arg("steer"),
              py::arg("longitudinal"));
     m.def("base_parameters", &base_parameters);
     m.def("effects", &effects);
+    m.def("formula_parts", &formula_parts);
+    m.attr("USER_OFFSET") = kBaseParameterCount + user_offset(0);
+    m.attr("USER_EFFECTS") = kUserEffects;
+    m.attr("USER_PARAMETERS") = kUserParameters;
 }
 
 }  // namespace sysid::bindings

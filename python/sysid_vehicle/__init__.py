@@ -24,6 +24,7 @@ from .model import Model
 from .read import ChannelMap, read_log
 from .simulate import RoadDisturbance, SensorNoise, drive, example_vehicle
 from .study import Study, improve
+from .user_effects import define_effect, forget_effect, load_effects, parameter
 from .vehicle import Tyre, Vehicle
 
 __all__ = [
@@ -51,13 +52,17 @@ __all__ = [
     "catalogue",
     "check_excitation",
     "compare",
+    "define_effect",
     "diagnose",
     "drive",
     "effect",
     "example_vehicle",
+    "forget_effect",
     "identify",
     "improve",
+    "load_effects",
     "manoeuvres",
+    "parameter",
     "read_log",
     "suggest_manoeuvre",
     "verdicts",

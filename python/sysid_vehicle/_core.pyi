@@ -37,11 +37,15 @@ from ._core_twin import observe14 as observe14
 from ._core_twin import observe_double_track as observe_double_track
 
 _Array = npt.NDArray[np.float64]
+_Step = tuple[int, tuple[int, int, int], float]  # operation, operands, constant
 
 __version__: str
 CHANNELS: int
 NOISE_PARAMETERS: int
 PARAMETERS: int
+USER_EFFECTS: int
+USER_OFFSET: int
+USER_PARAMETERS: int
 PUSHES: int
 
 class NumericalFailure(ArithmeticError): ...
@@ -71,7 +75,13 @@ class VehicleData(metaclass=_Bound):
     def __init__(self) -> None: ...
 
 class SingleTrack(metaclass=_Bound):
-    def __init__(self, car: VehicleData, effects: int, force_known: bool) -> None: ...
+    def __init__(
+        self,
+        car: VehicleData,
+        effects: int,
+        force_known: bool,
+        user: Sequence[tuple[int, Sequence[tuple[int, Sequence[_Step]]]]] = ...,
+    ) -> None: ...
     def evaluate(
         self, parameters: _Array, motion: _Array, steer: float, longitudinal: float
     ) -> _Array: ...
@@ -209,6 +219,7 @@ class LabLoop(metaclass=_Bound):
 
 def base_parameters() -> list[dict[str, Any]]: ...
 def effects() -> list[dict[str, Any]]: ...
+def formula_parts() -> dict[str, Any]: ...
 def simulate(
     model: SingleTrack,
     parameters: _Array,

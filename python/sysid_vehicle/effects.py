@@ -1,12 +1,12 @@
 """The catalogue of physical effects, as the compiled core declares it.
 
 Each effect's equation, parameters and null values have their home in `cpp/include/sysid/effects/`;
-nothing is repeated here.
+nothing is repeated here. Effects that users define stand beside them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from html import escape
 from typing import Any
@@ -17,7 +17,7 @@ from . import _core
 from ._arrays import FloatArray, as_float64
 from .errors import InvalidInput, near_names
 
-__all__ = ["Effect", "Parameter", "base_parameters", "catalogue", "effect"]
+__all__ = ["Effect", "Parameter", "base_parameters", "catalogue", "effect", "forget", "register"]
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Effect:
     Attributes
     ----------
     index : int
-        Place in the catalogue.
+        Place in the catalogue, or among the effects of users.
     moves : str
         Measured channels it moves first.
     excited_by : str
@@ -93,6 +93,8 @@ class Effect:
         Effect through which it chiefly acts, if any: weak in a model without that.
     states : int
         How many states of its own it adds to the model.
+    acts : tuple
+        Of an effect that a user defined: what its formulas add to, and their steps.
     """
 
     id: str
@@ -109,11 +111,12 @@ class Effect:
     twins: tuple[str, ...]
     through: str
     states: int
+    acts: tuple[tuple[int, Any], ...] = ()
 
     @property
     def bit(self) -> int:
-        """The effect's bit in the core's mask."""
-        return 1 << self.index
+        """The effect's bit in the core's mask; a user's effect has none."""
+        return 0 if self.acts else 1 << self.index
 
     @property
     def columns(self) -> list[int]:
@@ -182,9 +185,40 @@ def _by_id() -> dict[str, Effect]:
     return found
 
 
+_users: dict[str, Effect] = {}
+
+
 def catalogue() -> tuple[Effect, ...]:
-    """Every effect the software knows, in the core's order."""
-    return tuple(_by_id().values())
+    """Every effect the software knows, in the core's order; those of users last."""
+    return (*_by_id().values(), *_users.values())
+
+
+def register(made: Effect) -> Effect:
+    """Give a user's effect its place in the core's parameter vector.
+
+    Raises
+    ------
+    InvalidInput
+        All places are taken.
+    """
+    taken = {e.index for e in _users.values() if e.id != made.id}
+    free = next((i for i in range(_core.USER_EFFECTS) if i not in taken), None)
+    if free is None:
+        raise InvalidInput(
+            f"effect '{made.id}': there is room for {_core.USER_EFFECTS} effects of your own; "
+            "forget one with forget_effect"
+        )
+    first = _core.USER_OFFSET + free * _core.USER_PARAMETERS
+    parameters = tuple(replace(p, column=first + i) for i, p in enumerate(made.parameters))
+    _users[made.id] = replace(made, index=free, parameters=parameters)
+    return _users[made.id]
+
+
+def forget(name: str) -> None:
+    """Remove a user's effect."""
+    if name not in _users:
+        raise InvalidInput(f"no effect of yours is called '{name}'{near_names(name, _users)}")
+    del _users[name]
 
 
 def effect(name: str | Effect) -> Effect:
@@ -197,7 +231,7 @@ def effect(name: str | Effect) -> Effect:
     """
     if isinstance(name, Effect):
         return name
-    known = _by_id()
+    known = {**_by_id(), **_users}
     if name not in known:
         raise InvalidInput(
             f"no effect is called '{name}'{near_names(name, known)}; "

@@ -148,10 +148,13 @@ class Model:
     def core(self, *, force_known: bool = True, also: Iterable[Effect] = ()) -> _core.SingleTrack:
         """The compiled model, with effects `also` switched on."""
         data = vehicle_data(self.vehicle)
+        acting = (*self.parts, *also)
         mask = 0
-        for e in (*self.parts, *also):
+        for e in acting:
             mask |= e.bit
-        return _core.SingleTrack(data, mask, force_known)
+        return _core.SingleTrack(
+            data, mask, force_known, [(e.index, e.acts) for e in acting if e.acts]
+        )
 
     def __str__(self) -> str:
         what = ", ".join(self.effects) if self.effects else "baseline"

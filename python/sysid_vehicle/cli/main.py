@@ -11,6 +11,7 @@ from typing import TextIO
 
 from .. import _core
 from ..errors import SysidError
+from ..user_effects import load_effects
 from .commands import COMMANDS
 from .parser import parse
 
@@ -36,6 +37,8 @@ def main(argv: list[str] | None = None) -> int:
     args = parse(argv)
     try:
         with _warnings_as_lines() as heard:
+            for path in getattr(args, "define", ()):
+                load_effects(path)
             COMMANDS[args.command](args, heard)
         sys.stdout.flush()
     except BrokenPipeError:

@@ -69,7 +69,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
 
     sideslip.add_parser(commands)
     mu_slip.add_parser(commands)
-    commands.add_parser("effects", help="the catalogue of effects")
+    _define(commands.add_parser("effects", help="the catalogue of effects"))
     lab.add_parser(commands)
     twin.add_parser(commands)
     return parser.parse_args(argv)
@@ -82,6 +82,18 @@ def _driving(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--channels", type=Path, metavar="TOML", help="channel map, for other column names or units"
+    )
+    _define(parser)
+
+
+def _define(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--define",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="PY",
+        help="Python file that defines effects of your own; it is run (may be repeated)",
     )
 
 

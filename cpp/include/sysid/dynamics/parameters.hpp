@@ -1,10 +1,11 @@
-// The flat parameter vector: eight tyre coefficients, the yaw inertia, then every effect's own.
+// The flat parameter vector: eight tyre coefficients, the yaw inertia, then every effect's own,
+// those of users' effects last.
 #pragma once
 
 #include <array>
 #include <cstddef>
 
-#include "sysid/effects/catalogue.hpp"
+#include "sysid/effects/user_effect.hpp"
 
 namespace sysid {
 
@@ -21,7 +22,7 @@ enum BaseParameter : std::size_t {
     kBaseParameterCount,
 };
 
-constexpr std::size_t kParameterCount = kBaseParameterCount + kEffectParameterCount;
+constexpr std::size_t kParameterCount = kBaseParameterCount + user_offset(kUserEffects);
 
 /// Name, unit and box of the base parameters; `typical` is where a search may start.
 constexpr std::array<ParameterInfo, kBaseParameterCount> kBaseParameterInfos{

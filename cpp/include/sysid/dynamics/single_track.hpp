@@ -42,6 +42,7 @@ struct SingleTrack {
     EffectMask effects = 0;
     bool force_known = true;  // false: `Input::longitudinal` is the measured acceleration
     HeldLoads held{};
+    UserEffects user{};  // those that act; `effects` has no bits of theirs
 
     /// Evaluates (1) to (5). `motion` = v_x, v_y, r; `push` = disturbance, see
     /// `Push`; `aux` = auxiliary states; `rate` receives the derivatives of motion and aux.
@@ -73,6 +74,7 @@ struct SingleTrack {
         for_each_active(
             effects, p + kBaseParameterCount,
             [&](auto e, const T* own, std::size_t at) { return e.sensors(own, w, aux + at, y); });
+        user_sensors(user, p + kBaseParameterCount, w, y);
     }
 
     /// Fastest rate [1/s] of the motion and of the active effects, for choosing integration steps.
@@ -116,6 +118,7 @@ struct SingleTrack {
         });
         settle_outside_forces(w, push);
         each([&](auto e, const T* own, At) { return e.body(own, w); });
+        user_body(user, q, w);
         slip_angles(w);
         each([&](auto e, const T* own, At at) { return e.slip(own, w, aux + at, aux_rate + at); });
         const S mu_f = magic_formula(w.alpha_f, front_tyre(p));
@@ -126,6 +129,7 @@ struct SingleTrack {
         w.fy_f = (held.on ? S(held.front_n) : w.fz_f) * mu_f * w.grip_f;
         w.fy_r = (held.on ? S(held.rear_n) : w.fz_r) * mu_r * w.grip_r;
         each([&](auto e, const T* own, At) { return e.forces(own, w); });
+        user_forces(user, q, w);
         balance(w);
         each(
             [&](auto e, const T* own, At at) { return e.follow(own, w, aux + at, aux_rate + at); });

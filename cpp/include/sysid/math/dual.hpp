@@ -83,6 +83,11 @@ struct Dual {
         const double e = std::exp(a.v);
         return chain(a, e, e);
     }
+    friend Dual log(const Dual& a) { return chain(a, std::log(a.v), 1.0 / a.v); }
+    friend Dual tanh(const Dual& a) {
+        const double t = std::tanh(a.v);
+        return chain(a, t, 1.0 - t * t);
+    }
     friend Dual abs(const Dual& a) { return chain(a, std::abs(a.v), a.v < 0.0 ? -1.0 : 1.0); }
 };
 
