@@ -14,6 +14,10 @@ const Input14* inputs_of(const Array& a) {
         matrix(a, a.ndim() == 2 ? a.shape(0) : 0, kTwinInputs, "inputs"));
 }
 
+const Input14& input_of(const Array& a) {
+    return *reinterpret_cast<const Input14*>(matrix(a, 1, kTwinInputs, "input"));
+}
+
 State14 state_of(const Array& a) {
     const double* x = vector(a, kTwinStatesWithTyres, "state");
     State14 state;
@@ -94,7 +98,7 @@ void register_vehicle(py::module_& m) {
             [](const Vehicle14& v, const Array& x, const Array& u) {
                 State14 rate;
                 Output14 out;
-                v.evaluate(state_of(x), *inputs_of(u), rate, &out);
+                v.evaluate(state_of(x), input_of(u), rate, &out);
                 return py::make_tuple(row(rate), row(out));
             },
             py::arg("state"), py::arg("input"))
@@ -102,14 +106,14 @@ void register_vehicle(py::module_& m) {
             "step",
             [](const Vehicle14& v, const Array& x, const Array& u, double dt) {
                 State14 state = state_of(x);
-                v.step(state, *inputs_of(u), dt);
+                v.step(state, input_of(u), dt);
                 return row(state);
             },
             py::arg("state"), py::arg("input"), py::arg("dt"))
         .def(
             "energy",
             [](const Vehicle14& v, const Array& x, const Array& u) {
-                return v.energy(state_of(x), *inputs_of(u));
+                return v.energy(state_of(x), input_of(u));
             },
             py::arg("state"), py::arg("input"))
         .def(
@@ -118,9 +122,10 @@ void register_vehicle(py::module_& m) {
                 State14 x = state_of(start);
                 const Input14* u = inputs_of(inputs);
                 const auto n = static_cast<std::size_t>(inputs.shape(0));
-                const Run14 run = unlocked([&] { return simulate14(v, x, u, n, dt); });
-                return py::make_tuple(copy_of(run.states, kTwinStates),
-                                      copy_of(run.outputs, kTwinOutputs), row(x));
+                Array states = empty(n, kTwinStates), outputs = empty(n, kTwinOutputs);
+                double *to_states = states.mutable_data(), *to_outputs = outputs.mutable_data();
+                unlocked([&] { simulate14(v, x, u, n, dt, to_states, to_outputs); });
+                return py::make_tuple(states, outputs, row(x));
             },
             py::arg("start"), py::arg("inputs"), py::arg("dt"))
         .def(
@@ -139,8 +144,8 @@ void register_vehicle(py::module_& m) {
                 const Drive14 out = unlocked(
                     [&] { return drive14(v, driver, {pedals[0], pedals[1]}, wanted, u, dt); });
                 return py::make_tuple(copy_of(out.inputs, kTwinInputs),
-                                      copy_of(out.run.states, kTwinStates),
-                                      copy_of(out.run.outputs, kTwinOutputs), out.lost_at);
+                                      copy_of(out.states, kTwinStates),
+                                      copy_of(out.outputs, kTwinOutputs), out.lost_at);
             },
             py::arg("driver"), py::arg("pedals"), py::arg("references"), py::arg("base"),
             py::arg("dt"));

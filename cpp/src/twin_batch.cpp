@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "sysid/twin/batch.hpp"
 
@@ -24,6 +25,9 @@ BatchEstimator::BatchEstimator(std::vector<BatchParameter> parameters,
     held_.setZero(m, n + 1);
     power_.setZero(m);
     residual_.setZero(m);
+    since_s_.setZero(m);
+    heard_.setZero(m);
+    learnt_.setZero(n);
     gain_.setZero(n);
     moved_.setZero(n);
 }
@@ -47,12 +51,17 @@ const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* t
         const BatchChannel& channel = channels_[c];
         const double own = twins[channel.channel];
         residual_[at(c)] = car[channel.channel] - own;
+        since_s_[at(c)] += dt_;
         if (std::isnan(residual_[at(c)])) continue;
+        // A channel may be read less often than the twins step.
+        const double gap_s = std::exchange(since_s_[at(c)], 0.0);
+        heard_[at(c)] += 1.0;
         for (std::size_t j = 0; j < n; ++j)
             slopes_(at(c), at(j)) = (twins[(j + 1) * stride + channel.channel] - own) /
                                     parameters_[j].step * parameters_[j].spread;
         if (channel.high_pass_hz > 0.0) {
-            const double share = std::min(1.0, dt_ * 2.0 * std::acos(-1.0) * channel.high_pass_hz);
+            const double share =
+                std::min(1.0, gap_s * 2.0 * std::acos(-1.0) * channel.high_pass_hz);
             const auto lifted = [&](Eigen::Index k, double value) {
                 double& low = held_(at(c), k);
                 low += share * (value - low);
@@ -64,7 +73,8 @@ const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* t
         }
         const double e = residual_[at(c)];
         // At first a plain mean, so that the scale does not start from nothing.
-        const double share = std::max(dt_ / settings_.residual_s, dt_ / time_s_);
+        const double share =
+            std::min(1.0, std::max(gap_s / settings_.residual_s, 1.0 / heard_[at(c)]));
         power_[at(c)] += share * (e * e - power_[at(c)]);
     }
     if (learning_s <= 0.0) return moved_;
@@ -92,8 +102,8 @@ const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* t
         const double limit = settings_.clip * std::sqrt(variance);
         const double e = std::clamp(residual_[at(c)], -limit, limit);
         // Channels follow one another: the next sees what this one has already mended.
-        const Eigen::RowVectorXd learnt = slope * P_;
-        P_.noalias() -= gain_ * learnt;
+        learnt_.noalias() = slope * P_;
+        P_.noalias() -= gain_ * learnt_;
         for (std::size_t j = 0; j < n; ++j) {
             const BatchParameter& p = parameters_[j];
             double& value = estimate[static_cast<std::size_t>(p.parameter)];

@@ -23,6 +23,7 @@ Drive14 drive14(const Vehicle14& car, const Driver& driver, const Pedals& pedals
     Drive14 out;
     out.lost_at = n;
     State14 x = car.rest(references.front().speed_mps);
+    Output14 y;
     const double drag = 0.5 * data.air_density_kgpm3 * data.drag_area_m2;
     const double weight = data.design.mass_kg * kTwinGravity;
     double steer = references.front().steer_rad;
@@ -70,17 +71,16 @@ Drive14 drive14(const Vehicle14& car, const Driver& driver, const Pedals& pedals
         }
         const auto* row = reinterpret_cast<const double*>(&u);
         out.inputs.insert(out.inputs.end(), row, row + kTwinInputs);
-        const Output14 y = car.output(x, u);
-        out.run.states.insert(out.run.states.end(), x.begin(), x.begin() + kTwinStates);
-        out.run.outputs.insert(out.run.outputs.end(), y.begin(), y.end());
+        out.states.insert(out.states.end(), x.begin(), x.begin() + kTwinStates);
+        car.read_and_step(x, u, dt, y);
+        out.outputs.insert(out.outputs.end(), y.begin(), y.end());
         // Asked so that a state that is not a number counts as lost.
         const bool held =
-            x[state14::Vx] >= kSlowestDrive && std::abs(y[output14::kSideslip]) <= kLost;
+            y[output14::kVx] >= kSlowestDrive && std::abs(y[output14::kSideslip]) <= kLost;
         if (!held) {
             out.lost_at = k;
             break;
         }
-        car.step(x, u, dt);
     }
     return out;
 }

@@ -6,17 +6,16 @@
 namespace sysid {
 
 Derivative::Derivative(double corner_hz, double dt)
-    : time_constant_(1.0 / (2.0 * std::acos(-1.0) * corner_hz)),
-      share_(1.0 - std::exp(-dt / time_constant_)) {}
+    : share_(1.0 - std::exp(-2.0 * std::acos(-1.0) * corner_hz * dt)), dt_(dt) {}
 
 double Derivative::operator()(double value) {
     if (!started_) {
         smooth_ = value;
         started_ = true;
     }
-    const double slope = (value - smooth_) / time_constant_;
-    smooth_ += share_ * (value - smooth_);
-    return slope;
+    const double change = share_ * (value - smooth_);
+    smooth_ += change;
+    return change / dt_;
 }
 
 ParameterLaws::ParameterLaws(std::vector<ParameterLaw> laws, double dt,
@@ -45,8 +44,10 @@ void ParameterLaws::update(const double* car, const double* twin, LoadVector& pa
             model = w.twin(model);
         }
         w.power += dt_ / law.averaging_s * (model * model - w.power);
-        // Written so that an unknown yaw rate closes only a gate that asks for it.
-        const bool gated = yaw_rate > law.yaw_rate_below || yaw_rate < law.yaw_rate_above;
+        // Written so that an unknown yaw rate closes a gate, but only where one is asked for.
+        const bool gated =
+            (std::isfinite(law.yaw_rate_below) && !(yaw_rate <= law.yaw_rate_below)) ||
+            (law.yaw_rate_above > 0.0 && !(yaw_rate >= law.yaw_rate_above));
         const double leading = law.sign == SignSource::kTwin ? model : real;
         if (law.stage != stage_ || gated || !(std::abs(leading) > law.deadband)) continue;
         const double gain =

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <stdexcept>
 
 #include "sysid/math/errors.hpp"
 #include "sysid/twin/observer.hpp"
@@ -24,6 +25,7 @@ void follow(const Eigen::VectorXd& moved, std::vector<State14>& states) {
 
 Observation observe14(const Vehicle14& twin, const State14& start, const Input14* inputs,
                       const double* measured, std::size_t n, double dt, ObserverSettings settings) {
+    if (settings.stride == 0) throw std::invalid_argument("stride = 0: give one or more");
     const std::size_t count = settings.batch ? settings.batch->twins() : 1;
     std::vector<Vehicle14> twins(count, twin);
     std::vector<State14> states(count, start);
@@ -32,8 +34,9 @@ Observation observe14(const Vehicle14& twin, const State14& start, const Input14
     Observation seen;
     for (std::size_t k = 0; k < n; ++k) {
         const double* car = measured + k * kReadings;
+        const Steered steered(inputs[k]);
         for (std::size_t t = 0; t < count; ++t) {
-            readings[t] = twins[t].output(states[t], inputs[k]);
+            readings[t] = twins[t].output(states[t], inputs[k], steered);
             for (const StateGain& g : settings.gains) {
                 const double innovation = car[g.channel] - readings[t][g.channel];
                 if (!std::isnan(innovation))
@@ -55,7 +58,7 @@ Observation observe14(const Vehicle14& twin, const State14& start, const Input14
             if (settings.laws || settings.batch)
                 twins[t].set_load(
                     to_load(settings.batch ? settings.batch->of_twin(t, estimate) : estimate));
-            twins[t].step(states[t], inputs[k], dt);
+            twins[t].step(states[t], inputs[k], steered, dt);
         }
     }
     if (settings.batch) {

@@ -57,11 +57,28 @@ TEST(TwinLaws, LimitsGatesAndMissingReadingsHold) {
     EXPECT_EQ(load[kMass], 2200.0);
 }
 
+TEST(TwinLaws, AnUnknownYawRateClosesAGateThatAsksForIt) {
+    const double car[2] = {0.9, kNone}, twin[2] = {1.0, 0.0};
+    ParameterLaw straight = mass_law(100.0), bends = mass_law(100.0);
+    straight.yaw_rate_below = 0.05;
+    bends.yaw_rate_above = 0.05;
+    for (const ParameterLaw& gated : {straight, bends}) {
+        ParameterLaws laws({gated}, kDt, 1);
+        LoadVector load = start();
+        laws.update(car, twin, load);
+        EXPECT_EQ(load, start());
+    }
+    ParameterLaws open({mass_law(100.0)}, kDt, 1);
+    LoadVector load = start();
+    open.update(car, twin, load);
+    EXPECT_GT(load[kMass], start()[kMass]);
+}
+
 TEST(TwinLaws, TheDerivativeOfARampIsItsSlope) {
     Derivative derivative(20.0, kDt);
     double slope = 0.0;
     for (int k = 0; k < 500; ++k) slope = derivative(3.0 * k * kDt);
-    EXPECT_NEAR(slope, 3.0, 0.2);
+    EXPECT_NEAR(slope, 3.0, 1e-9);
 }
 
 TEST(TwinBatch, FindsTheMassOfALinearReading) {
@@ -82,6 +99,27 @@ TEST(TwinBatch, FindsTheMassOfALinearReading) {
     EXPECT_LT(spread, 2.0);
 }
 
+TEST(TwinBatch, TwinsThatStepOftenerThanTheCarIsReadBelieveNoMore) {
+    // Ten readings a second, with more noise than was promised; the twins step with them, or ten
+    // times between.
+    const auto spread = [](int between) {
+        const double dt = 0.1 / between;
+        BatchEstimator batch({{kMass, 20.0, 300.0, 0.0, 1000.0, 3000.0}}, {{0, 0.01, 0.0}}, dt);
+        LoadVector estimate = start();
+        std::mt19937 generator(2);
+        std::normal_distribution<double> noise(0.0, 0.1);
+        for (int k = 0; k < 300 * between; ++k) {
+            const double t = k * dt;
+            const double car = k % between == 0 ? read(2000.0, t) + noise(generator) : kNone;
+            const double twins[2] = {read(batch.of_twin(0, estimate)[kMass], t),
+                                     read(batch.of_twin(1, estimate)[kMass], t)};
+            batch.update(&car, twins, 1, estimate);
+        }
+        return std::sqrt(batch.covariance()(0, 0));
+    };
+    EXPECT_NEAR(spread(10) / spread(1), 1.0, 0.1);
+}
+
 TEST(TwinBatch, WithoutExcitationNothingIsClaimed) {
     BatchEstimator batch({{kMass, 20.0, 300.0, 0.0, 1000.0, 3000.0}}, {{0, 0.05, 0.0}}, kDt);
     LoadVector estimate = start();
@@ -100,13 +138,18 @@ TEST(TwinObserver, TheTruthIsAtRest) {
     }
     State14 x = car.rest(15.0);
     const State14 first = x;
-    const Run14 run = simulate14(car, x, inputs.data(), inputs.size(), kDt);
+    std::vector<double> states(inputs.size() * kTwinStates), outputs(inputs.size() * kTwinOutputs);
+    simulate14(car, x, inputs.data(), inputs.size(), kDt, states.data(), outputs.data());
     std::vector<double> measured;
     for (std::size_t k = 0; k < inputs.size(); ++k) {
-        const auto row = run.outputs.begin() + static_cast<std::ptrdiff_t>(k * kTwinOutputs);
+        const auto row = outputs.begin() + static_cast<std::ptrdiff_t>(k * kTwinOutputs);
         measured.insert(measured.end(), row, row + kReadings);
     }
     ObserverSettings settings;
+    settings.stride = 0;
+    EXPECT_THROW(observe14(car, first, inputs.data(), measured.data(), 1, kDt, settings),
+                 std::invalid_argument);
+    settings.stride = 10;
     settings.gains = {{output14::Q, state14::Q, 10.0, false}};
     settings.batch = BatchEstimator({{kMass, 20.0, 300.0, 0.0, 1000.0, 3000.0}},
                                     {{output14::Ax, 1e-3, 0.0}}, kDt);

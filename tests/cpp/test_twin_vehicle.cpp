@@ -274,20 +274,87 @@ TEST(TwinVehicle, AnExternalWrenchGivesItsMomentum) {
 
 TEST(TwinVehicle, LongSlipNeverGivesMoreThanFriction) {
     const TyreData t;
+    const TyreCurve<double> curve(t, t);
     for (double kappa = -3.0; kappa <= 3.0; kappa += 0.17) {
         for (double slip = -2.0; slip <= 2.0; slip += 0.13) {
-            const TyreForce f = tyre_force(t, t.nominal_load_n, kappa, slip);
+            const TyreForce<double> f = tyre_force(curve, t.nominal_load_n, kappa, slip);
             const double use = std::hypot(f.fx / t.friction_x, f.fy / t.friction_y);
             EXPECT_LE(use, t.nominal_load_n * (1.0 + 1e-9));
-            const TyreForce mirrored = tyre_force(t, t.nominal_load_n, kappa, -slip);
+            const TyreForce<double> mirrored = tyre_force(curve, t.nominal_load_n, kappa, -slip);
             EXPECT_DOUBLE_EQ(mirrored.fy, -f.fy);
         }
     }
-    const TyreForce small = tyre_force(t, 4000.0, 0.0, 1e-4);
+    const TyreForce<double> small = tyre_force(curve, 4000.0, 0.0, 1e-4);
     const double load = 4000.0 / t.nominal_load_n;
     const double stiffness = t.cornering_stiffness * t.nominal_load_n *
                              std::sin(2.0 * std::atan(load / t.load_at_peak_stiffness));
     EXPECT_NEAR(small.fy / 1e-4, stiffness, 1e-3 * stiffness);
+}
+
+TEST(TwinVehicle, ArcTangentAndSineAreThoseOfTheLibrary) {
+    for (double x = 0.0; x < 60.0; x = 1.01 * x + 1e-3) {
+        EXPECT_NEAR(atan_of_positive(x), std::atan(x), 3e-16 * (1.0 + std::atan(x)));
+        if (x < 4.7) EXPECT_NEAR(sin_of_positive(x), std::sin(x), 3e-16);
+    }
+}
+
+TEST(TwinVehicle, EveryWheelHasTheForceOfItsOwnTyre) {
+    TyreData front, rear;
+    rear.friction_y = 1.2;
+    rear.shape = 1.7;
+    rear.curvature = 0.4;
+    const TyreCurve<Wheels> all(front, rear);
+    const Wheels load(Pair{3000.0, 0.0}, Pair{6000.0, 9000.0});
+    const Wheels kappa(Pair{0.02, 0.1}, Pair{0.0, -0.5});
+    const Wheels slip(Pair{-0.03, 0.1}, Pair{0.0, 0.9});
+    const TyreForce<Wheels> found = tyre_force(all, load, kappa, slip);
+    for (std::size_t i = 0; i < kWheels; ++i) {
+        const TyreData& t = i < 2 ? front : rear;
+        const auto one = tyre_force(TyreCurve<double>(t, t), load[i], kappa[i], slip[i]);
+        EXPECT_DOUBLE_EQ(found.fx[i], one.fx) << i;
+        EXPECT_DOUBLE_EQ(found.fy[i], one.fy) << i;
+    }
+}
+
+TEST(TwinVehicle, ReadingAndSteppingTogetherIsOneAfterTheOther) {
+    CarData data = symmetric_car();
+    data.front.tyre.relaxation_m = 0.4;  // the rear follows at once
+    const Vehicle14 car{data};
+    Input14 u;
+    u.steer_rad = {0.03, 0.028};
+    u.brake_nm = {900.0, 900.0, 0.0, 0.0};
+    State14 apart = car.rest(4.0), together = apart;
+    for (int k = 0; k < 1500; ++k) {
+        const Output14 y = car.output(apart, u);
+        car.step(apart, u, 1e-3);
+        Output14 read;
+        car.read_and_step(together, u, 1e-3, read);
+        ASSERT_EQ(read, y) << k;
+        ASSERT_EQ(together, apart) << k;
+    }
+    EXPECT_EQ(apart[kSlip + 2], 0.0);
+    EXPECT_NE(apart[kSlip], 0.0);
+}
+
+TEST(TwinVehicle, WhatIsFasterThanTheStepIsTakenInParts) {
+    // The right wheel stands, the left one turns; the left one alone would not need parts.
+    Input14 u;
+    u.brake_nm = {0.0, 8000.0, 0.0, 0.0};
+    const Vehicle14 car{symmetric_car()};
+    State14 x = run(car, car.rest(30.0), u, 1.0, 1e-3);
+    EXPECT_NEAR(x[kWheelSpeed + 1], 0.0, 0.5);
+    EXPECT_GT(x[kWheelSpeed], 50.0);
+    // A relaxation length shorter than a step's way.
+    CarData data = symmetric_car();
+    data.front.tyre.relaxation_m = data.rear.tyre.relaxation_m = 0.004;
+    const Vehicle14 short_lag{data};
+    u = {};
+    u.steer_rad = {0.01, 0.01};
+    x = run(short_lag, short_lag.rest(30.0), u, 1.0, 1e-3);
+    EXPECT_NEAR(x[R], run(car, car.rest(30.0), u, 1.0, 1e-3)[R], 1e-3);
+    // Absurd torques end, if not well.
+    u.brake_nm = {1e300, 1e300, 1e300, 1e300};
+    run(car, car.rest(1.0), u, 2e-3, 1e-3);
 }
 
 TEST(TwinVehicle, RelaxedTyresFollowAfterTheirLength) {

@@ -16,7 +16,7 @@ struct Pedals {
 
 struct Drive14 {
     std::vector<double> inputs;  // rows of Input14
-    Run14 run;
+    std::vector<double> states, outputs;
     std::size_t lost_at = 0;  // sample at which the car spun or stopped; samples if it did not
 };
 

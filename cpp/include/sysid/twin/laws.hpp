@@ -48,14 +48,14 @@ struct Schedule {
     double relative_rate_ps = 1e-3;  // of the parameter's first value
 };
 
-/// First-order low-pass and its derivative; car and twin go through the same one.
+/// The derivative of a first-order low-pass, exact on ramps; car and twin go through the same one.
 class Derivative {
   public:
     Derivative(double corner_hz, double dt);
     double operator()(double value);
 
   private:
-    double time_constant_, share_;
+    double share_, dt_;
     double smooth_ = 0.0;
     bool started_ = false;
 };

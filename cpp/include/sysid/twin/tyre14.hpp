@@ -9,8 +9,7 @@
 //   b = s/C, so that f has slope one at the origin.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
+#include <type_traits>
 
 #include "sysid/twin/trig.hpp"
 
@@ -28,31 +27,64 @@ struct TyreData {
     double relaxation_m = 0.0;                   // zero: forces follow the slip at once
 };
 
-struct TyreForce {
-    double fx, fy;
+/// What the equations take of the data, worked out once: of one tyre, or of all wheels at once.
+template <class T>
+struct TyreCurve {
+    T per_nominal_load, friction_x, friction_y, lowest_x, lowest_y, friction_slope;
+    T slip_stiffness, stiffness, per_load_at_peak, shape, per_shape, curvature;
+
+    TyreCurve() = default;
+    /// Of the tyres in front and rear; the same tyre twice for `double`.
+    TyreCurve(const TyreData& front, const TyreData& rear) {
+        const auto take = [&](auto of) {
+            if constexpr (std::is_same_v<T, double>)
+                return of(front);
+            else
+                return T(of(front), of(rear));
+        };
+        const double lowest = 0.3;  // of the friction, far beyond any load the data stand for
+        per_nominal_load = take([](const TyreData& t) { return 1.0 / t.nominal_load_n; });
+        friction_x = take([](const TyreData& t) { return t.friction_x; });
+        friction_y = take([](const TyreData& t) { return t.friction_y; });
+        lowest_x = T(lowest) * friction_x;
+        lowest_y = T(lowest) * friction_y;
+        friction_slope = take([](const TyreData& t) { return t.friction_slope; });
+        slip_stiffness = take([](const TyreData& t) { return t.slip_stiffness; });
+        stiffness =
+            take([](const TyreData& t) { return 2.0 * t.cornering_stiffness * t.nominal_load_n; });
+        per_load_at_peak = take([](const TyreData& t) { return 1.0 / t.load_at_peak_stiffness; });
+        shape = take([](const TyreData& t) { return t.shape; });
+        per_shape = take([](const TyreData& t) { return 1.0 / t.shape; });
+        curvature = take([](const TyreData& t) { return t.curvature; });
+    }
 };
 
-/// Forces of one tyre; slips positive where the force is.
-inline TyreForce tyre_force(const TyreData& t, double load, double kappa, double tan_alpha) {
-    const double ratio = load / t.nominal_load_n;
-    const double sensitivity = t.friction_slope * (ratio - 1.0);
-    const double lowest = 0.3;  // of the friction, far beyond any load the data stand for
-    const double peak_x = load * std::max(t.friction_x + sensitivity, lowest * t.friction_x);
-    const double peak_y = load * std::max(t.friction_y + sensitivity, lowest * t.friction_y);
+template <class T>
+struct TyreForce {
+    T fx, fy;
+};
+
+/// Forces of a tyre or of all; slips positive where the force is.
+template <class T>
+inline TyreForce<T> tyre_force(const TyreCurve<T>& t, T load, T kappa, T tan_alpha) {
+    const T one = 1.0;
+    const T ratio = load * t.per_nominal_load;
+    const T sensitivity = t.friction_slope * (ratio - one);
+    const T peak_x = load * larger(t.friction_x + sensitivity, t.lowest_x);
+    const T peak_y = load * larger(t.friction_y + sensitivity, t.lowest_y);
     // sin(2 atan q) = 2 q / (1 + q^2)
-    const double q = ratio / t.load_at_peak_stiffness;
-    const double stiffness_y = t.cornering_stiffness * t.nominal_load_n * 2.0 * q / (1.0 + q * q);
-    const double tiny = 1e-9;
-    const double force_x = t.slip_stiffness * load * kappa;
-    const double force_y = stiffness_y * tan_alpha;
-    const double sx = force_x / (peak_x + tiny);
-    const double sy = force_y / (peak_y + tiny);
-    const double s = std::sqrt(sx * sx + sy * sy);
-    if (s < 1e-8) return {force_x, force_y};
-    const double b = s / t.shape;
+    const T q = ratio * t.per_load_at_peak;
+    const T stiffness_y = t.stiffness * q / (one + q * q);
+    const T tiny = 1e-9;
+    const T force_x = t.slip_stiffness * load * kappa;
+    const T force_y = stiffness_y * tan_alpha;
+    const T sx = force_x / (peak_x + tiny);
+    const T sy = force_y / (peak_y + tiny);
+    const T s = root(sx * sx + sy * sy);
+    const T b = s * t.per_shape;
     // Never negative for E <= 1.
-    const double bent = t.curvature == 0.0 ? b : b - t.curvature * (b - atan_of_positive(b));
-    const double gain = sin_of_positive(t.shape * atan_of_positive(bent)) / s;
+    const T bent = b - t.curvature * (b - atan_of_positive(b));
+    const T gain = choose(s < T(1e-8), one, sin_of_positive(t.shape * atan_of_positive(bent)) / s);
     return {gain * force_x, gain * force_y};
 }
 

@@ -25,15 +25,17 @@
 
 #include "sysid/twin/load.hpp"
 #include "sysid/twin/tyre14.hpp"
+#include "sysid/twin/wheels.hpp"
 
 namespace sysid {
 
-constexpr std::size_t kWheels = 4;  // front left, front right, rear left, rear right
 constexpr std::size_t kTwinStates = 28;
 constexpr std::size_t kTwinStatesWithTyres = kTwinStates + 2 * kWheels;
 constexpr std::size_t kTwinInputs = 24;
 constexpr std::size_t kTwinOutputs = 38;
 constexpr double kTwinGravity = 9.81;
+constexpr double kSlowest = 1.0;        // [m/s] below it slip is referred to this speed
+constexpr double kStandingWheel = 1.0;  // [rad/s] below it brakes and rolling resistance fade out
 
 /// Positions of the states in the state vector.
 namespace state14 {
@@ -91,6 +93,12 @@ struct CarData {
     AxleData front, rear;
 };
 
+/// Sines and cosines of the steering: the same all through a step, and for all twins.
+struct Steered {
+    explicit Steered(const Input14& u);
+    Wheels cosine, sine;
+};
+
 class Vehicle14 {
   public:
     explicit Vehicle14(const CarData& car) : Vehicle14(car, car.design) {}
@@ -108,10 +116,15 @@ class Vehicle14 {
     void evaluate(const State14& x, const Input14& u, State14& rate, Output14* out) const;
 
     /// One step with the input held: classical Runge-Kutta of fourth order, in parts where the
-    /// slip of a slow wheel is faster than the step.
+    /// slip of a slow wheel, a brake on it or a short relaxation length is faster than the step.
     void step(State14& x, const Input14& u, double dt) const;
+    void step(State14& x, const Input14& u, const Steered& steered, double dt) const;
 
     Output14 output(const State14& x, const Input14& u) const;
+    Output14 output(const State14& x, const Input14& u, const Steered& steered) const;
+
+    /// What `output` gives, then what `step` does, with the derivatives they share.
+    void read_and_step(State14& x, const Input14& u, double dt, Output14& out) const;
 
     /// Kinetic energy plus energy of springs, tyres and height [J], from the design position.
     double energy(const State14& x, const Input14& u) const;
@@ -119,29 +132,36 @@ class Vehicle14 {
     std::size_t states() const { return states_; }
 
   private:
-    /// Sines and cosines of the steering, the same all through a step.
-    struct Steered {
-        explicit Steered(const Input14& u);
-        std::array<double, 2> cosine, sine;
-    };
+    /// All derivatives but those of the place on the plane.
     void rates(const State14& x, const Input14& u, const Steered& steered, State14& rate,
                Output14* out) const;
+    void travel_along(State14& x, const Input14& u, const Steered& steered, double dt,
+                      const State14* first) const;
     int parts(const State14& x, const Input14& u, double dt) const;
-    const AxleData& axle(std::size_t wheel) const { return wheel < 2 ? car_.front : car_.rear; }
-    static double spring_force(const AxleData& a, double travel);
+
+    /// What the equations take of the axles, for all wheels at once.
+    struct OfWheels {
+        OfWheels(const CarData& car);
+        Wheels half_track, spring, bump, rebound, anti_roll, travel, stop, roll_centre, link,
+            anti_slope, unsprung, per_unsprung, weight, tyre_spring, tyre_damping, radius, inertia,
+            per_inertia, rolling, relaxation;
+        TyreCurve<Wheels> tyre;
+    };
 
     CarData car_;
+    OfWheels w_;
     Load load_;
     std::size_t states_;
-    std::array<double, kWheels> x_{}, y_{}, link_{}, tilt_{};
-    std::array<double, kWheels> wheel_load_{};  // at the design position
+    std::array<double, 2> slip_pace_{};  // times speed: how fast slip answers, front and rear
+    double fastest_relaxation_ = 0.0;    // per speed
+    Wheels design_load_;                 // of the wheels, at the design position
+    Wheels x_, y_, tilt_;
     double sprung_ = 0.0;
 };
 
-/// Runs a car over rows of inputs: states and outputs at each sample, `x` ends after the last.
-struct Run14 {
-    std::vector<double> states, outputs;
-};
-Run14 simulate14(const Vehicle14& car, State14& x, const Input14* inputs, std::size_t n, double dt);
+/// Runs a car over `n` rows of inputs: its first 28 states and its outputs at each sample, row by
+/// row; `x` ends after the last.
+void simulate14(const Vehicle14& car, State14& x, const Input14* inputs, std::size_t n, double dt,
+                double* states, double* outputs);
 
 }  // namespace sysid
