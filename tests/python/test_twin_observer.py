@@ -192,6 +192,8 @@ def test_wrong_questions_are_answered_with_the_remedy(town: Drive14) -> None:
         observe(TwinCar(), LIGHT, town.inputs, readings, Observer())
     with pytest.raises(InvalidInput, match="rows of inputs"):
         observe(TwinCar(), LIGHT, town.inputs[1:], readings, Observer(), speed_mps=12.0)
+    with pytest.raises(InvalidInput, match="stride = 0"):
+        observe(TwinCar(), LIGHT, town.inputs, readings, Observer(), speed_mps=12.0, stride=0)
     with pytest.raises(InvalidInput, match="no parameter 'mass'"):
         unknowns("mass")
     with pytest.raises(InvalidInput, match="gains must not be negative"):

@@ -129,6 +129,8 @@ def test_what_a_twin_cannot_do_is_said() -> None:
         observe_with(twin, force, measured, Observer(batch=SideBySide([MASS], {"ax_mps2": 0.05})))
     with pytest.raises(InvalidInput, match="'wrench'"):
         observe_with(twin, force, measured, Observer(gains=[StateGain("vx_mps", "vx_mps", 1.0)]))
+    with pytest.raises(InvalidInput, match="stride = 0"):
+        observe_with(twin, force, measured, Observer(), stride=0)
     with pytest.raises(InvalidInput, match=r"\(n, 1\)"):
         observe_with(twin, np.zeros((10, 2)), measured, Observer())
     with pytest.raises(InvalidInput, match="yaw_rate_radps"):

@@ -157,9 +157,27 @@ class Calibration:
         """Draw every trial's cost, and the best so far."""
         ax = axes_or_new(ax, 6.0, 3.0)
         cost = np.array([c for _, c in self.tried])
-        cost[np.isinf(cost)] = np.nan
-        ax.semilogy(cost, ".", color=MEASURED, label="tried")
-        ax.semilogy(np.fmin.accumulate(cost), color=AFTER, label="best so far")
+        trial = np.arange(1, len(cost) + 1)
+        lost = np.isinf(cost)
+        cost[lost] = np.nan
+        ax.semilogy(trial, cost, ".", color=MEASURED, label="tried")
+        ax.semilogy(
+            trial,
+            np.fmin.accumulate(cost),
+            color=AFTER,
+            drawstyle="steps-post",
+            label="best so far",
+        )
+        if lost.any():
+            at_top = {"transform": ax.get_xaxis_transform(), "clip_on": False}
+            ax.plot(
+                trial[lost],
+                np.ones(lost.sum()),
+                "x",
+                color=MEASURED,
+                label="lost the twin",
+                **at_top,
+            )
         ax.legend(frameon=False)
         return tidy(ax, xlabel="trial", ylabel="cost")
 

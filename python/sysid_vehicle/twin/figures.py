@@ -47,9 +47,10 @@ def load_figure(
     axes = list(figure.subplots(count, 1, squeeze=False)[:, 0])
     for ax, name in zip(axes, names, strict=False):
         for run, colour in zip(runs, _LINES, strict=False):
-            ax.plot(run.found.time_s, run.found.parameters[name], color=colour)
+            value = run.found.parameters[name]
+            ax.plot(run.found.time_s, value, color=colour, label=f"from {value[0]:.4g}")
         ax.axhline(getattr(runs[0].true, name), color=TRUTH, linestyle="--", label="true")
-        ax.legend(frameon=False)
+        _legend(ax)
         tidy(ax, xlabel="time [s]", ylabel=name)
     drive = runs[0].drive
     ax = axes[len(names)]
@@ -59,7 +60,7 @@ def load_figure(
         for i, (name, colour) in enumerate(zip(names, _LINES, strict=False)):
             ax.plot(list(errors), [e[i] for e in errors.values()], "o-", color=colour, label=name)
         ax.axhline(_ACCEPTABLE, color=FLOOR, linestyle=":", label="acceptable")
-        ax.legend(frameon=False)
+        _legend(ax)
         tidy(ax, xlabel=condition, ylabel="error [% of the change]")
         ax.set_ylim(bottom=0.0)
     return figure
@@ -80,12 +81,12 @@ def _course(axes: Sequence[Axes], experiment: JointExperiment) -> None:
     for ax, name in zip(axes, ("vx_mps", "yaw_rate_radps", "plane_ay_mps2"), strict=False):
         ax.plot(time, drive[name][::step], color=MEASURED, linewidth=0.7)
         tidy(ax, xlabel="time [s]", ylabel=name)
-    axes[0].set_title(drive.name.replace("_", " "))
+    axes[0].set_title(drive.name.replace("_", " "), loc="left")
     mass = axes[3]
     mass.plot(time, experiment.twin.parameters["mass_kg"], color=AFTER, label="twin")
     mass.plot(time, experiment.benchmark.mass_kg[::step], color=BEFORE, label="double track")
     mass.axhline(SPORTS_CAR.design.mass_kg, color=TRUTH, linestyle="--", label="true")
-    mass.legend(frameon=False)
+    _legend(mass)
     tidy(mass, xlabel="time [s]", ylabel="mass [kg]")
     for ax, shown in zip(
         axes[4:], (np.full(len(time), True), time > time[-1] - _CLOSE_UP_S), strict=True
@@ -96,5 +97,11 @@ def _course(axes: Sequence[Axes], experiment: JointExperiment) -> None:
             (drive["sideslip_rad"][::step], TRUTH, "true"),
         ):
             ax.plot(time[shown], np.degrees(values[shown]), color=colour, label=label, linewidth=1)
-        ax.legend(frameon=False)
+        _legend(ax)
         tidy(ax, xlabel="time [s]", ylabel="sideslip [deg]")
+
+
+def _legend(ax: Axes) -> None:
+    """In one row above the axes, where no line can run under it."""
+    count = len(ax.get_legend_handles_labels()[1])
+    ax.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=count, fontsize=8)

@@ -216,13 +216,16 @@ def observe(
     Raises
     ------
     InvalidInput
-        If inputs and readings differ in length, or the first speed is unknown.
+        If inputs and readings differ in length, nothing would be recorded, or the first speed is
+        unknown.
     NumericalError
         If the twin overturned or left the range of numbers; the message names the time.
     """
     n, dt = len(readings.values), readings.dt_s
     if len(inputs) != n:
         raise InvalidInput(f"{len(inputs)} rows of inputs but {n} of readings; give equally many")
+    if stride < 1:
+        raise InvalidInput(f"stride = {stride}; give a whole number from one up")
     twin = car.core(load)
     start = twin.rest(_first_speed(car, readings) if speed_mps is None else speed_mps)
     batch = None if observer.batch is None else observer.batch.core(LOAD_NAMES, READINGS, dt)

@@ -129,6 +129,8 @@ def observe_with(
         raise InvalidInput(
             f"inputs have shape {inputs.shape}; the twin takes (n, {len(twin.input_names)})"
         )
+    if stride < 1:
+        raise InvalidInput(f"stride = {stride}; give a whole number from one up")
     read = _table(twin, measured, n)
     _check(twin, observer)
     dt, names = twin.dt_s, twin.parameter_names
