@@ -68,6 +68,7 @@ SETS = {
         manoeuvres.lap(lateral_mps2=8.0),
     ),
 }
+MISSING = ("missing", "one of a group")
 Done = dict[str, Any]
 
 
@@ -102,7 +103,7 @@ def study(name: str, which: str, seed: int) -> Done:
 def claims_of(done: Done) -> dict[str, list[str]]:
     """What is named, each with what it is said not to be told from."""
     found = done["verdicts"]
-    return {n: found[n][1] for n in done["added"] if found[n][0] in ("missing", "one of a group")}
+    return {n: found[n][1] for n in done["added"] if found[n][0] in MISSING}
 
 
 def line_of(done: Done) -> str:
@@ -158,6 +159,15 @@ def summary(all_done: list[Done]) -> None:
     told("the same, rivals counted", (names(d, True) for d in sought))
     for name in CASES:
         told(f"  {name}", (names(d, True) for d in sought if d["hidden"] == name))
+    said = [(d, n) for d in all_done for n, (f, _) in d["verdicts"].items() if f in MISSING]
+    told(
+        "all that the verdicts call missing, added or not",
+        (n in in_car(d["hidden"]) for d, n in said),
+    )
+    told(
+        "hidden effects among all that",
+        (bool({n for e, n in said if e is d} & CASES[d["hidden"]].named) for d in sought),
+    )
     told(
         "of those not named: called unknown or partly explained",
         (

@@ -169,14 +169,10 @@ class Calibration:
             label="best so far",
         )
         if lost.any():
-            at_top = {"transform": ax.get_xaxis_transform(), "clip_on": False}
+            top = ax.get_xaxis_transform()
+            ones = np.ones(lost.sum())
             ax.plot(
-                trial[lost],
-                np.ones(lost.sum()),
-                "x",
-                color=MEASURED,
-                label="lost the twin",
-                **at_top,
+                trial[lost], ones, "x", color=MEASURED, transform=top, clip_on=False, label="lost"
             )
         ax.legend(frameon=False)
         return tidy(ax, xlabel="trial", ylabel="cost")

@@ -91,12 +91,13 @@ def _course(axes: Sequence[Axes], experiment: JointExperiment) -> None:
     for ax, shown in zip(
         axes[4:], (np.full(len(time), True), time > time[-1] - _CLOSE_UP_S), strict=True
     ):
-        for values, colour, label in (
-            (experiment.benchmark.sideslip_rad[::step], BEFORE, "double track"),
-            (experiment.twin.outputs["sideslip_rad"], AFTER, "twin"),
-            (drive["sideslip_rad"][::step], TRUTH, "true"),
+        for values, colour, label, style in (
+            (experiment.benchmark.sideslip_rad[::step], BEFORE, "double track", "-"),
+            (experiment.twin.outputs["sideslip_rad"], AFTER, "twin", "-"),
+            (drive["sideslip_rad"][::step], TRUTH, "true", "--"),
         ):
-            ax.plot(time[shown], np.degrees(values[shown]), color=colour, label=label, linewidth=1)
+            beta = np.degrees(values[shown])
+            ax.plot(time[shown], beta, style, color=colour, label=label, linewidth=1)
         _legend(ax)
         tidy(ax, xlabel="time [s]", ylabel="sideslip [deg]")
 
