@@ -14,6 +14,7 @@ from .diagnose import (
     diagnose,
     suggest_manoeuvre,
     verdicts,
+    where,
 )
 from .effects import Effect, catalogue, effect
 from .errors import InvalidInput, NumericalError, SysidError, SysidWarning
@@ -66,4 +67,5 @@ __all__ = [
     "read_log",
     "suggest_manoeuvre",
     "verdicts",
+    "where",
 ]

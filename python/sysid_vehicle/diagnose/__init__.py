@@ -1,22 +1,31 @@
 """Diagnosis: which physical effect a model is missing, or that none explains what is left."""
 
+from .change_points import ChangePoint
+from .coherence import Coherence, Delay
 from .diagnose import Candidate, Diagnosis, diagnose
+from .force_map import ForceMap
 from .hiding import Bias, BiasReport, bias_report
 from .next_drive import DriveLimits, NextDrive, Suggestion, separations, suggest_manoeuvre
 from .omnibus import Omnibus, omnibus
 from .verdicts import EffectVerdict, Verdicts, judge, verdicts
+from .where import Where, where
 
 __all__ = [
     "Bias",
     "BiasReport",
     "Candidate",
+    "ChangePoint",
+    "Coherence",
+    "Delay",
     "Diagnosis",
     "DriveLimits",
     "EffectVerdict",
+    "ForceMap",
     "NextDrive",
     "Omnibus",
     "Suggestion",
     "Verdicts",
+    "Where",
     "bias_report",
     "diagnose",
     "judge",
@@ -24,4 +33,5 @@ __all__ = [
     "separations",
     "suggest_manoeuvre",
     "verdicts",
+    "where",
 ]

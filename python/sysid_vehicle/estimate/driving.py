@@ -111,12 +111,39 @@ class Driving:
         there = np.isfinite(self.measured)
         return tuple(c for i, c in enumerate(MEASURED) if there[:, i].any())
 
-    def problem(self, model: Model, *, most_samples: int | None = None) -> _core.Problem:
-        """The core's problem for a model; of at most so many samples, if that is asked for."""
+    def inputs(self) -> FloatArray:
+        """Steering angle and wheel force (or acceleration) without their noise, samples x 2."""
+        whole = [(self.logs[s.log], s.where) for s in self.stretches]
+        return as_float64(np.vstack([self._inputs(log, where) for log, where in whole]))
+
+    def _inputs(self, log: Log, where: slice) -> FloatArray:
+        push = "fx_n" if self.force_known else "ax_mps2"
+        return np.column_stack([quiet(log["steer_rad"][where]), quiet(log[push][where])])
+
+    def problem(
+        self,
+        model: Model,
+        *,
+        most_samples: int | None = None,
+        other_inputs: FloatArray | None = None,
+    ) -> _core.Problem:
+        """The core's problem for a model.
+
+        Parameters
+        ----------
+        most_samples : int, optional
+            Of at most so many samples.
+        other_inputs : array, shape (samples, 2), optional
+            In place of `inputs()`.
+        """
         problem = _core.Problem(model.core(force_known=self.force_known))
+        at = 0
         for log, where in self._pieces(most_samples):
-            push = "fx_n" if self.force_known else "ax_mps2"
-            inputs = np.column_stack([quiet(log["steer_rad"][where]), quiet(log[push][where])])
+            if other_inputs is None:
+                inputs = self._inputs(log, where)
+            else:
+                inputs = other_inputs[at : at + where.stop - where.start]
+            at += where.stop - where.start
             y = np.full((len(inputs), len(MEASURED)), np.nan)
             for i, c in enumerate(MEASURED):
                 if log.has(c) and (self.force_known or c != "ax_mps2"):

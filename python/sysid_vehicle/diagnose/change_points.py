@@ -1,0 +1,310 @@
+"""Moments at which the car changed.
+
+Had the car stayed the same, the scores of its parameters would sum up evenly over time. With z the
+sensitivities of the whitened residuals e to everything that is taken as constant (the fitted
+parameters, steady forces), a, some of them, change at time t by M^-1 S where
+
+    S(t) = sum_k>t a_k' (I - P_z) e_k,   M(t) = sum_k>t a_k' a_k - its part that z explains,
+
+and the largest S' M^-1 S over t tells whether they do (Andrews, Econometrica 1993). How large it
+gets by chance depends on the driving and is drawn: residuals are white, so that the sums over
+fifths of a second are independent normal variables of known covariance. Where a change was found
+both sides are searched again (binary segmentation).
+
+The wandering forces of the filter soon take up a change, which shows at once or not at all. So the
+moment is read from the response to forces that step there; its interval is that of Hansen
+(Econometrica 2000): all moments whose statistic is within 7.35 of the largest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import expit
+from scipy.stats import chi2
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from ..effects import effect
+from ..estimate import Driving
+from .coordinates import running_time
+from .evidence import Evidence, solve, variance_ratio
+from .score import _basis
+
+__all__ = ["ChangePoint", "change_points"]
+
+_STEP_S = 0.2
+_LEAST_S = 1.5  # on both sides of a change
+_INTERVAL = 7.35
+_NEAR_S, _FINE_S = 1.2, 0.1  # how far around, and how finely, the moment is read
+_BLEND_S = 0.2  # a change takes about a second, as that of `friction_change`
+_SMALL = 0.01
+_GRIP = ("D_front", "D_rear")
+_MOST = 5
+
+
+@dataclass(frozen=True)
+class ChangePoint:
+    """A moment at which the car changed.
+
+    Attributes
+    ----------
+    log : str
+        Name of the log.
+    time_s, from_s, until_s : float
+        In that log, with its 95 % interval. The ends of an interval that reaches into another log
+        are those of this log.
+    driven_s : float
+        The same moment in seconds driven, through all stretches.
+    what : str
+        `grip`, `side force` or `forward force`.
+    size, std : dict of str to float
+        What changed by how much: forces in N and N m, grip as a share.
+    p_value : float
+        Of a car that stays the same, over all moments and kinds of change together.
+    """
+
+    log: str
+    time_s: float
+    from_s: float
+    until_s: float
+    driven_s: float
+    what: str
+    size: dict[str, float]
+    std: dict[str, float]
+    p_value: float
+
+    def __str__(self) -> str:
+        sizes = ", ".join(
+            f"{100 * v:+.2g} +- {100 * self.std[name]:.1g} %"
+            if name == "grip"
+            else f"{name} {v:+.3g} +- {self.std[name]:.2g} {'N m' if name == 'M_z' else 'N'}"
+            for name, v in self.size.items()
+        )
+        return (
+            f"{self.what} changes in {self.log} at {self.time_s:.1f} s "
+            f"({self.from_s:.1f} to {self.until_s:.1f} s): {sizes} (p = {self.p_value:.1g})"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Kind:
+    what: str
+    names: tuple[str, ...]
+    columns: FloatArray  # of all the time, shape (5 n, names)
+
+
+def change_points(
+    evidence: Evidence, *, alpha: float = 0.01, draws: int = 1000, seed: int = 0
+) -> tuple[ChangePoint, ...]:
+    """Find the moments at which the car changed.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    alpha : float
+        Rate of driving in which a change is claimed though the car stays the same.
+    draws : int
+        To calibrate with.
+    """
+    driving = evidence.driving
+    kinds = _kinds(evidence)
+    constant = np.hstack([evidence.fitted, *(k.columns for k in kinds)])
+    rng = np.random.default_rng(seed)
+    found: list[ChangePoint] = []
+    to_search = [(0, driving.samples)]
+    while to_search and len(found) < _MOST:
+        begin, end = to_search.pop(0)
+        at = _search(driving, kinds, constant, evidence.residual, (begin, end), alpha, draws, rng)
+        if at is not None:
+            found.append(_read(evidence, constant, *at))
+            to_search += [(begin, at[0]), (at[0], end)]
+    return tuple(sorted(found, key=lambda c: c.driven_s))
+
+
+def _kinds(evidence: Evidence) -> list[_Kind]:
+    model = evidence.fit.model
+    of_grip = evidence.of_parameters(*_GRIP) @ [[model.value(n)] for n in _GRIP]
+    kinds = [_Kind("grip", ("grip",), of_grip)]
+    for what, names in (("side force", ("F_y", "M_z")), ("forward force", ("F_x",))):
+        if evidence.targets(*names):
+            ones = np.ones((evidence.driving.samples, len(names)))
+            kinds.append(_Kind(what, names, evidence.of_signals(ones, list(names))))
+    return kinds
+
+
+def _from(evidence: Evidence, kind: _Kind, samples: list[int]) -> list[FloatArray]:
+    """Directions of changes of a kind that begin at some samples, (5 n, names) each."""
+    driving, n = evidence.driving, evidence.driving.samples
+    now, model = running_time(driving), evidence.fit.model
+    change = effect("friction_change")
+    if kind.what == "grip" and change in model.parts:
+        return [_cut(kind.columns, n, k) for k in samples]
+    if kind.what == "grip":
+        wide = model.core(force_known=driving.force_known, also=(change,))
+        changing = evidence.problem.with_model(wide)
+        return [_of_grip(evidence, kind, changing, change.columns, k) for k in samples]
+    width = len(kind.names)
+    signals = [expit((now - now[k]) / _BLEND_S) for k in samples]
+    columns = evidence.of_signals(
+        np.repeat(np.column_stack(signals), width, axis=1), list(kind.names) * len(samples)
+    )
+    return [as_float64(c) for c in np.split(columns, len(samples), axis=1)]
+
+
+def _of_grip(
+    evidence: Evidence, kind: _Kind, changing: _core.Problem, at: list[int], sample: int
+) -> FloatArray:
+    """Direction of more grip from a sample on, exact in the stretch in which it lies."""
+    driving, begin = evidence.driving, 0
+    for s in driving.stretches:
+        end = begin + s.where.stop - s.where.start
+        if sample < end:
+            break
+        begin = end
+    p = evidence.fit.model.vector().copy()
+    moment = (s.where.start + sample - begin) / driving.logs[s.log].rate_hz
+    p[at] = [-_SMALL, moment]
+    channels = len(evidence.residual) // driving.samples
+    own = slice(channels * begin, channels * end)
+    direction = _cut(kind.columns, driving.samples, end)
+    changed = changing.residuals(p, evidence.frozen).ravel()
+    direction[own, 0] = (evidence.residual - changed)[own] / _SMALL
+    return direction
+
+
+def _cut(columns: FloatArray, samples: int, first: int) -> FloatArray:
+    late = columns.copy()
+    late[: first * (len(columns) // samples)] = 0.0
+    return late
+
+
+def _search(
+    driving: Driving,
+    kinds: list[_Kind],
+    constant: FloatArray,
+    residual: FloatArray,
+    segment: tuple[int, int],
+    alpha: float,
+    draws: int,
+    rng: np.random.Generator,
+) -> tuple[int, _Kind, float] | None:
+    """The change that stands out most in samples of a segment, if any does."""
+    begin, end = segment
+    channels = len(residual) // driving.samples
+    rate = driving.logs[0].rate_hz
+    step = max(round(_STEP_S * rate), 1)
+    steps, edge = (end - begin) // step, round(_LEAST_S / _STEP_S)
+    if steps < 2 * edge + 2:
+        return None
+    rows = slice(channels * begin, channels * (begin + steps * step))
+    Q = _basis(constant[rows])
+    e = residual[rows] - Q @ (Q.T @ residual[rows])
+    by_step = (steps, step * channels)
+    inner = slice(edge, steps - edge)  # steps before which a change may lie
+    Q_steps = Q.reshape(*by_step, -1)
+    results, walks = [], []
+    for kind in kinds:
+        A = kind.columns[rows].reshape(*by_step, -1)
+        gram = _after(np.einsum("bki,bkj->bij", A, A))[inner]
+        across = _after(np.einsum("bki,bkj->bij", Q_steps, A))[inner]
+        # Of the columns after t, what the constant columns explain of them.
+        M = gram - np.einsum("bri,brj->bij", across, across)
+        inverse = _inverses(M)
+        S = _after(np.einsum("bki,bk->bi", A, e.reshape(by_step)))[inner]
+        T = np.einsum("bi,bij,bj->b", S, inverse, S)
+        results.append((T, S, inverse))
+        walks.append((A, across, inverse))
+    by_chance = _by_chance(Q_steps, walks, inner, draws, rng)
+    best: tuple[float, int, int] | None = None
+    for i, (kind, (T, S, inverse)) in enumerate(zip(kinds, results, strict=True)):
+        at = int(np.argmax(T))
+        after = kind.columns[rows].copy()
+        after[: (at + edge) * step * channels] = 0.0
+        direction = after @ (inverse[at] @ S[at])
+        direction -= Q @ (Q.T @ direction)
+        ratio = variance_ratio(direction, e - direction)
+        strength = -float(chi2.logsf(T[at] / ratio, S.shape[1]))
+        if best is None or strength > best[0]:
+            best = (strength, i, at)
+    assert best is not None
+    p = float((1 + np.count_nonzero(by_chance >= best[0])) / (1 + len(by_chance)))
+    if p > alpha:
+        return None
+    return begin + (best[2] + edge) * step, kinds[best[1]], p
+
+
+def _read(
+    evidence: Evidence, constant: FloatArray, about: int, kind: _Kind, p: float
+) -> ChangePoint:
+    """The moment near a sample at which forces that step explain most, and their sizes."""
+    driving = evidence.driving
+    rate = driving.logs[0].rate_hz
+    reach, fine = round(_NEAR_S * rate), max(round(_FINE_S * rate), 1)
+    tried = list(range(max(about - reach, 0), min(about + reach, driving.samples), fine))
+    Q = _basis(constant)
+    e = evidence.residual - Q @ (Q.T @ evidence.residual)
+    found = [solve(R - Q @ (Q.T @ R), e) for R in _from(evidence, kind, tried)]
+    statistic = np.array([f.statistic for f in found])
+    place = int(np.argmax(statistic))
+    best, at = found[place], tried[place]
+    near = np.flatnonzero(statistic >= statistic.max() - _INTERVAL)
+    low, high = max(near[0] - 1, 0), min(near[-1] + 1, len(tried) - 1)
+    time, log = driving.channel("time_s"), driving.log_number
+    own = np.flatnonzero(log == log[at])
+    return ChangePoint(
+        driving.logs[int(log[at])].name,
+        float(time[at]),
+        float(time[np.clip(tried[low], own[0], own[-1])]),
+        float(time[np.clip(tried[high], own[0], own[-1])]),
+        float(running_time(driving)[at]),
+        kind.what,
+        dict(zip(kind.names, map(float, best.size), strict=True)),
+        dict(zip(kind.names, map(float, np.sqrt(np.diag(best.covariance))), strict=True)),
+        p,
+    )
+
+
+def _by_chance(
+    Q_steps: FloatArray,
+    walks: list[tuple[FloatArray, FloatArray, FloatArray]],
+    inner: slice,
+    draws: int,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """The largest evidence over all moments and kinds, in draws of a car that stays the same."""
+    together = np.concatenate([Q_steps, *(A for A, _, _ in walks)], axis=2)
+    gram = np.einsum("bki,bkj->bij", together, together, optimize=True)
+    values, vectors = np.linalg.eigh(gram)
+    roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    normal = rng.standard_normal((draws, *roots.shape[::2]))
+    sums = np.einsum("bij,dbj->bdi", roots, normal, optimize=True)
+    later = _after(sums)[inner]
+    rank = Q_steps.shape[2]
+    total = sums[:, :, :rank].sum(axis=0)
+    largest = np.zeros(draws)
+    first = rank
+    for A, across, inverse in walks:
+        width = A.shape[2]
+        S = later[:, :, first : first + width]
+        S = S - np.einsum("bri,dr->bdi", across, total, optimize=True)
+        first += width
+        T = np.einsum("bdi,bij,bdj->bd", S, inverse, S, optimize=True).max(axis=0)
+        largest = np.maximum(largest, -chi2.logsf(T, width))
+    return as_float64(largest)
+
+
+def _after(by_step: FloatArray) -> FloatArray:
+    """Sums from each step to the end."""
+    return as_float64(np.cumsum(by_step[::-1], axis=0)[::-1])
+
+
+def _inverses(M: FloatArray) -> FloatArray:
+    """Inverse of each matrix; directions that the driving hardly shows on one side left out."""
+    scale = np.sqrt(np.maximum(M.diagonal(axis1=1, axis2=2).max(axis=0), 1e-300))
+    values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
+    inverse = np.where(values > 1e-3, 1.0 / np.maximum(values, 1e-3), 0.0)
+    return as_float64((vectors * inverse[:, None, :]) @ vectors.swapaxes(1, 2)) / np.outer(
+        scale, scale
+    )

@@ -1,0 +1,95 @@
+"""What the car was doing at each sample: the axes of maps and the variables of formulas."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import FloatArray, as_float64
+from ..estimate import Driving
+from ..identify import Fit
+
+__all__ = ["COORDINATES", "Coordinate", "coordinates", "late", "running_time"]
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A quantity over which something is drawn.
+
+    Attributes
+    ----------
+    scale : float
+        Factor from SI to the unit of the axis.
+    """
+
+    name: str
+    label: str
+    unit: str
+    scale: float = 1.0
+
+    @property
+    def axis(self) -> str:
+        """Label of an axis."""
+        return f"{self.label} [{self.unit}]"
+
+
+COORDINATES = {
+    c.name: c
+    for c in (
+        Coordinate("vx_mps", "speed", "m/s"),
+        Coordinate("ay_mps2", "lateral acceleration", "m/s2"),
+        Coordinate("ax_mps2", "longitudinal acceleration", "m/s2"),
+        Coordinate("slip_front_rad", "front slip angle", "deg", float(np.degrees(1.0))),
+        Coordinate("slip_rear_rad", "rear slip angle", "deg", float(np.degrees(1.0))),
+        Coordinate("steer_rad", "steering angle", "deg", float(np.degrees(1.0))),
+        Coordinate("yaw_rate_radps", "yaw rate", "rad/s"),
+        Coordinate("time_s", "time driven", "s"),
+    )
+}
+
+
+def coordinates(fit: Fit, driving: Driving, state: FloatArray) -> dict[str, FloatArray]:
+    """Coordinates of every sample, from a filter's or a smoother's states.
+
+    Lateral acceleration is v_x r, longitudinal that of the wheel forces (measured where the force
+    is not known). Time runs on through all stretches.
+    """
+    car = fit.model.vehicle
+    v, side, r = state[:, 0], state[:, 1], state[:, 2]
+    steer = driving.channel("steer_rad")
+    push = (
+        driving.channel("fx_n") / car.mass_kg if driving.force_known else driving.channel("ax_mps2")
+    )
+    return {
+        "vx_mps": v,
+        "ay_mps2": v * r,
+        "ax_mps2": push,
+        "slip_front_rad": steer - np.arctan2(side + car.lf_m * r, v),
+        "slip_rear_rad": -np.arctan2(side - car.lr_m * r, v),
+        "steer_rad": steer,
+        "yaw_rate_radps": r,
+        "time_s": running_time(driving),
+    }
+
+
+def running_time(driving: Driving) -> FloatArray:
+    """Seconds driven until each sample, without what lies between stretches."""
+    steps = [
+        np.full(s.where.stop - s.where.start, 1.0 / driving.logs[s.log].rate_hz)
+        for s in driving.stretches
+    ]
+    return as_float64(np.cumsum(np.concatenate(steps)))
+
+
+def late(driving: Driving, signal: FloatArray, first: float = 0.0) -> FloatArray:
+    """The signal one sample later: noise of a measurement must not enter its own prediction.
+
+    The first sample of a stretch, of which nothing was known, gets `first`.
+    """
+    out = np.concatenate([signal[:1], signal[:-1]])
+    at = 0
+    for s in driving.stretches:
+        out[at] = first
+        at += s.where.stop - s.where.start
+    return as_float64(out)

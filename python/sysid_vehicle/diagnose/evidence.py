@@ -1,0 +1,126 @@
+"""Whitened residuals of a fit, and what a signal that acts on the car or a sensor does to them."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from ..estimate import Driving
+from ..identify import Fit
+from .score import _basis, _pseudo_inverse, _variance_ratio
+
+__all__ = ["FORCES", "READINGS", "TARGETS", "Evidence", "Solution"]
+
+# Targets in the core's order: pushes F_x, F_y, M_z, then accelerations, then sensor readings.
+FORCES = {"F_x": 0, "F_y": 1, "M_z": 2}
+READINGS = {"r": 7, "a_x": 8, "a_y": 9}
+TARGETS = {**FORCES, **READINGS}
+_AT_ONCE = 8  # columns that the core differentiates in one pass
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Sizes of some directions by generalised least squares, the fitted parameters left free.
+
+    Attributes
+    ----------
+    statistic : float
+        Fall of the sum of squares, over the variance ratio.
+    size : array, shape (n,)
+    covariance : array, shape (n, n)
+        Widened by the variance ratio.
+    ratio : float
+        Long-run over naive variance of the score along the solution, at least 1.
+    """
+
+    statistic: float
+    size: FloatArray
+    covariance: FloatArray
+    ratio: float
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """The residuals of a fit on some driving, with the filter's gains frozen."""
+
+    fit: Fit
+    driving: Driving
+
+    @cached_property
+    def problem(self) -> _core.Problem:
+        """The core's problem."""
+        return self.driving.problem(self.fit.model)
+
+    @cached_property
+    def frozen(self) -> _core.FrozenFilter:
+        """The filter at the fit."""
+        return self.problem.freeze(self.fit.model.vector(), self.fit.noise.vector())
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Whitened residuals, sample by sample, channel by channel, shape (5 n,)."""
+        return self.problem.residuals(self.fit.model.vector(), self.frozen).ravel()
+
+    @cached_property
+    def fitted(self) -> FloatArray:
+        """Sensitivities to the free parameters, shape (5 n, parameters)."""
+        return self.of_parameters(*self.fit.model.free_names)
+
+    @cached_property
+    def basis(self) -> FloatArray:
+        """Orthonormal directions of all that the free parameters can do."""
+        return _basis(self.fitted)
+
+    @cached_property
+    def left(self) -> FloatArray:
+        """Residuals without what the free parameters can do."""
+        return self.project(self.residual)
+
+    def project(self, columns: FloatArray) -> FloatArray:
+        """Take out what the free parameters can do."""
+        return as_float64(columns - self.basis @ (self.basis.T @ columns))
+
+    def of_parameters(self, *names: str) -> FloatArray:
+        """Sensitivities to parameters of the model, free or not."""
+        known = self.fit.model.parameters
+        columns = [known[n].column for n in names]
+        return self.problem.sensitivities(self.fit.model.vector(), self.frozen, columns)
+
+    def of_signals(self, signals: FloatArray, targets: list[str]) -> FloatArray:
+        """Sensitivities to signals added to forces or readings, one column each."""
+        numbers = [TARGETS[t] for t in targets]
+        p = self.fit.model.vector()
+        frozen, problem = self.frozen, self.problem
+
+        def some(at: int) -> FloatArray:
+            few = slice(at, at + _AT_ONCE)
+            return problem.signal_sensitivities(
+                p, frozen, as_float64(signals[:, few]), numbers[few]
+            )
+
+        with ThreadPoolExecutor(2) as pool:
+            return np.hstack(list(pool.map(some, range(0, len(numbers), _AT_ONCE))))
+
+    def targets(self, *among: str) -> list[str]:
+        """Those of some targets that this driving can show."""
+        blind = set() if self.driving.force_known else {"F_x", "a_x"}
+        return [t for t in (among or TARGETS) if t not in blind]
+
+
+def solve(R: FloatArray, e: FloatArray) -> Solution:
+    """Sizes of directions that are projected off the fitted parameters."""
+    inverse, _ = _pseudo_inverse(R.T @ R)
+    score = R.T @ e
+    size = inverse @ score
+    ratio = variance_ratio(R @ size, e - R @ size)
+    return Solution(float(score @ size) / ratio, size, inverse * ratio, ratio)
+
+
+def variance_ratio(direction: FloatArray, e: FloatArray) -> float:
+    """Long-run over naive variance of the score along one direction, at least 1."""
+    return max(_variance_ratio(direction[:, None], e, np.eye(1)), 1.0)

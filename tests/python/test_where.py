@@ -1,0 +1,113 @@
+"""Where, when and at which frequencies a model fails."""
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Fit, Model, drive, identify, manoeuvres, where
+from sysid_vehicle.diagnose import Where
+from sysid_vehicle.diagnose.change_points import change_points
+from sysid_vehicle.diagnose.evidence import Evidence
+
+
+@pytest.fixture(scope="module")
+def null(complete_fits: tuple[Fit, ...]) -> tuple[Where, ...]:
+    return tuple(where(fit) for fit in complete_fits)
+
+
+@pytest.fixture(scope="module")
+def delayed(hidden_fit: Callable[[str, float], Fit]) -> Where:
+    return where(hidden_fit("steer_delay.delay_s", 0.04))
+
+
+@pytest.fixture(scope="module")
+def blown(hidden_fit: Callable[[str, float], Fit]) -> Where:
+    return where(hidden_fit("side_wind.side_force_n", 450.0))
+
+
+@pytest.fixture(scope="module")
+def wet(truth: Model, start: Model) -> Where:
+    values = {"friction_change.drop": 0.15, "friction_change.at_s": 15.0}
+    log = drive(truth.add("friction_change").with_values(values), manoeuvres.lap(30.0), seed=3)
+    return where(identify(start, log, starts=1))
+
+
+def test_a_complete_model_fails_nowhere(null: tuple[Where, ...]) -> None:
+    # The least likely of 4 claims at a rate of 1 %, of 8 delays at three standard errors.
+    assert [w.change_points for w in null] == [(), (), (), ()]
+    assert max(w.best_pair.share for w in null) < 0.02
+    for w in null:
+        assert not any(c.delay is not None and c.delay.significant for c in w.coherence)
+        assert all(c.peak[2] < c.threshold for c in w.coherence)
+        assert "no pair of coordinates" in str(w)
+
+
+def test_the_errors_of_the_maps_are_those_of_a_complete_model(null: tuple[Where, ...]) -> None:
+    z = np.concatenate([(m.force / m.std).ravel() for w in null for m in w.maps])
+    z = z[np.isfinite(z)]
+    assert len(z) > 500
+    assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0, abs=0.2)
+    assert np.mean(np.abs(z) > 1.96) < 0.10
+
+
+def test_change_points_are_claimed_at_the_stated_rate(complete_fits: tuple[Fit, ...]) -> None:
+    evidence = Evidence(complete_fits[0], complete_fits[0].driving)
+    rng = np.random.default_rng(7)
+    measured = np.isfinite(evidence.driving.measured).ravel()
+    _ = evidence.fitted, evidence.residual
+    claims = 0
+    for seed in range(30):
+        evidence.__dict__["residual"] = measured * rng.standard_normal(measured.size)
+        claims += bool(change_points(evidence, alpha=0.2, draws=100, seed=seed))
+    # 6 expected; beyond 2 to 12 lie 0.7 %.
+    assert 2 <= claims <= 12
+
+
+def test_a_change_of_grip_is_dated(wet: Where) -> None:
+    (change,) = wet.change_points
+    assert change.what == "grip"
+    assert change.from_s <= 15.0 <= change.until_s
+    assert change.until_s - change.from_s < 3.0
+    # The fitted grip lies between that before and that after.
+    assert abs(change.size["grip"] + 0.162) < 4.0 * change.std["grip"]
+    assert "grip changes in lap at 15." in str(wet) or "grip changes in lap at 14." in str(wet)
+
+
+def test_a_late_steering_is_timed(delayed: Where) -> None:
+    steer, force = delayed.coherence
+    assert steer.delay is not None
+    low, high = steer.delay.interval
+    assert low < 0.04 < high
+    assert high - low < 0.02
+    assert steer.delay.linear
+    assert steer.peak[2] > steer.threshold
+    assert "later than the model" in str(delayed)
+    assert force.delay is not None
+    assert not force.delay.significant
+
+
+def test_a_steady_force_is_seen(blown: Where) -> None:
+    mean, std = blown.steady["F_y"]
+    assert abs(mean - 450.0) < 4.0 * std
+    assert "a steady F_y is missing" in str(blown)
+    assert blown.change_points == ()
+
+
+def test_it_is_drawn_and_written(wet: Where, delayed: Where) -> None:
+    assert "missing F_y" in wet.over_time.plot(target="F_y").get_ylabel()
+    for ax in (wet.plot(), wet.plot_time(), wet.coherence[0].plot(), delayed.coherence[0].plot()):
+        assert ax.has_data()
+    assert delayed.coherence[0].plot_phase().get_xlabel() == "frequency [Hz]"
+    told = json.loads(json.dumps(wet.to_dict()))
+    assert told["change_points"][0]["what"] == "grip"
+    assert told["best_pair"]["coordinates"] == list(wet.best_pair.coordinates)
+    assert set(told["delays"]) == {"steer", "force"}
+    assert wet._repr_html_().count("<li>") == len(wet.lines)
+
+
+def test_nobody_drove_there(wet: Where) -> None:
+    best = wet.best_pair
+    assert np.isnan(best.force).any()
+    assert np.array_equal(np.isnan(best.force[0]), best.samples < 20)
