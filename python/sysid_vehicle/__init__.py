@@ -13,6 +13,7 @@ from .diagnose import (
     bias_report,
     diagnose,
     suggest_manoeuvre,
+    unknown,
     verdicts,
     where,
 )
@@ -66,6 +67,7 @@ __all__ = [
     "parameter",
     "read_log",
     "suggest_manoeuvre",
+    "unknown",
     "verdicts",
     "where",
 ]

@@ -65,10 +65,13 @@ def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
     refuse_unwritable([args.json], inputs=_inputs(args))
     study = _study(args, heard)
     print(study.test[0])
+    print(study.where)
     print()
     print(study.diagnoses[0])
     print()
     print(" ".join(summary(study)))
+    if study.unknown is not None:
+        print(study.unknown)
     print()
     print(study.verdicts)
     if args.json is not None:
@@ -80,6 +83,9 @@ def _improve(args: argparse.Namespace, heard: Warnings) -> None:
     study = _study(args, heard)
     # The warnings have gone to the error stream.
     print(replace(study, warnings=()))
+    print(study.where)
+    if study.unknown is not None:
+        print(study.unknown)
     print(study.fit)
     if args.json is not None:
         study.to_json(args.json)

@@ -7,6 +7,9 @@ from .force_map import ForceMap
 from .hiding import Bias, BiasReport, bias_report
 from .next_drive import DriveLimits, NextDrive, Suggestion, separations, suggest_manoeuvre
 from .omnibus import Omnibus, omnibus
+from .proposals import Proposal
+from .shape import Curve, Surface
+from .unknown import Unknown, unknown
 from .verdicts import EffectVerdict, Verdicts, judge, verdicts
 from .where import Where, where
 
@@ -16,6 +19,7 @@ __all__ = [
     "Candidate",
     "ChangePoint",
     "Coherence",
+    "Curve",
     "Delay",
     "Diagnosis",
     "DriveLimits",
@@ -23,7 +27,10 @@ __all__ = [
     "ForceMap",
     "NextDrive",
     "Omnibus",
+    "Proposal",
     "Suggestion",
+    "Surface",
+    "Unknown",
     "Verdicts",
     "Where",
     "bias_report",
@@ -32,6 +39,7 @@ __all__ = [
     "omnibus",
     "separations",
     "suggest_manoeuvre",
+    "unknown",
     "verdicts",
     "where",
 ]

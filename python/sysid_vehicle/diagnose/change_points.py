@@ -207,12 +207,12 @@ def _search(
     results, walks = [], []
     for kind in kinds:
         A = kind.columns[rows].reshape(*by_step, -1)
-        gram = _after(np.einsum("bki,bkj->bij", A, A))[inner]
-        across = _after(np.einsum("bki,bkj->bij", Q_steps, A))[inner]
+        gram = _after(A.swapaxes(1, 2) @ A)[inner]
+        across = _after(Q_steps.swapaxes(1, 2) @ A)[inner]
         # Of the columns after t, what the constant columns explain of them.
-        M = gram - np.einsum("bri,brj->bij", across, across)
+        M = gram - across.swapaxes(1, 2) @ across
         inverse = _inverses(M)
-        S = _after(np.einsum("bki,bk->bi", A, e.reshape(by_step)))[inner]
+        S = _after(np.einsum("bki,bk->bi", A, e.reshape(by_step), optimize=True))[inner]
         T = np.einsum("bi,bij,bj->b", S, inverse, S)
         results.append((T, S, inverse))
         walks.append((A, across, inverse))
@@ -275,11 +275,11 @@ def _by_chance(
 ) -> FloatArray:
     """The largest evidence over all moments and kinds, in draws of a car that stays the same."""
     together = np.concatenate([Q_steps, *(A for A, _, _ in walks)], axis=2)
-    gram = np.einsum("bki,bkj->bij", together, together, optimize=True)
+    gram = together.swapaxes(1, 2) @ together
     values, vectors = np.linalg.eigh(gram)
     roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-    normal = rng.standard_normal((draws, *roots.shape[::2]))
-    sums = np.einsum("bij,dbj->bdi", roots, normal, optimize=True)
+    normal = rng.standard_normal((len(roots), draws, roots.shape[2]))
+    sums = normal @ roots.swapaxes(1, 2)
     later = _after(sums)[inner]
     rank = Q_steps.shape[2]
     total = sums[:, :, :rank].sum(axis=0)

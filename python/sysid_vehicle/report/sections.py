@@ -13,6 +13,7 @@ from ..model import Model
 from ..study import Study
 from . import figures
 from .excerpt import worst_excerpt
+from .failure import unknown, where_and_when
 from .page import bullets, heading, paragraph, picture, table
 from .tyres import AXLES, identified_curves, model_curves
 from .words import RANKING_HEAD, interval, quantity, ranking_rows, stages, summary, unit
@@ -272,7 +273,9 @@ def _method(study: Study, truth: Model | None) -> list[str]:
 SECTIONS: tuple[Callable[[Study, Model | None], list[str]], ...] = (
     _verdict,
     _where,
+    where_and_when,
     _which,
+    unknown,
     _verdicts,
     _ahead,
     _parameters,

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
 from .._files import write_json
 from .._text import html_table, number, text_table
 from ..compare import Comparison
-from ..diagnose import Candidate, Diagnosis, Omnibus, Verdicts
+from ..diagnose import (
+    Candidate,
+    Diagnosis,
+    Omnibus,
+    Unknown,
+    Verdicts,
+    Where,
+    unknown,
+    where,
+)
 from ..estimate import Driving
 from ..identify import Estimate, Fit
 from ..model import Model
@@ -113,6 +123,21 @@ class Study:
         """The baseline and what was added, in order."""
         return ("baseline", *(f"+ {a.id}" for a in self.added))
 
+    @cached_property
+    def where(self) -> Where:
+        """Where, when and at which frequencies the baseline fails; some seconds at first."""
+        return where(self.fits[0])
+
+    @cached_property
+    def unknown(self) -> Unknown | None:
+        """The shape of what is still missing, and formulas for it; some seconds at first.
+
+        None where the verdict does not ask for it.
+        """
+        if self.verdict not in ("unknown", "partly_explained"):
+            return None
+        return unknown(self.fit, self.held_out)
+
     def waterfall(self, horizons_s: Sequence[float] = (0.5, 1.0, 2.0, 5.0)) -> Waterfall:
         """Errors of every step, one sample and further ahead, in training and held out.
 
@@ -170,6 +195,12 @@ class Study:
                 }
                 for r in self.test[0].regions
             ],
+            "where": self.where.to_dict(),
+            "unknown": {
+                "p_value": self.omnibus.p_value,
+                "strongest": self.omnibus.strongest,
+                **({} if self.unknown is None else self.unknown.to_dict()),
+            },
             "errors": {
                 "train": [c.error for c in self.train],
                 "test": [c.error for c in self.test],

@@ -1,0 +1,271 @@
+"""Formulas for a missing force or a false reading, tried on driving the fit never saw.
+
+Each formula of the grammar is a column of sensitivities, projected on all that the fitted
+parameters can do; forces at an unknown place act on F_y and M_z at once. The best by
+
+    T - q ln n - 2 ln N
+
+(T the fall of the sum of squares, q gains, n samples, N formulas tried: Chen & Chen, Biometrika
+2008) is kept if, with its gains and the shift of the fitted parameters taken over unchanged, the
+held-out driving becomes likelier by more than a standard error. What remains is searched again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from .._arrays import FloatArray
+from .._text import number
+from ..effects import Effect
+from .evidence import FORCES, READINGS, Evidence, Solution, solve
+from .grammar import Form, forms, unit_of_gain
+from .shape import known
+
+__all__ = ["Proposal", "propose"]
+
+_MOST = 3
+_TRIED = 4  # on held-out driving, before a step gives up
+_ALIKE = 9.0  # difference of statistics that does not tell two formulas apart
+_BLOCK_S = 5.0
+_CHANNELS = {"r": "yaw_rate_radps", "a_x": "ax_mps2", "a_y": "ay_mps2"}
+_FORCES = {"F_x": "force_x", "F_y": "force_y", "M_z": "moment_z"}
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A formula for what is missing.
+
+    Attributes
+    ----------
+    form : Form
+    gain, std : dict of str to float
+        By target: the number before the formula, and its standard error.
+    statistic : float
+        Fall of the sum of squared residuals in training.
+    held_out_gain, held_out_error : float
+        Gain in log-likelihood on driving the fit never saw, and its standard error.
+    alike : tuple of str
+        Other formulas that this driving hardly tells from it.
+    """
+
+    form: Form
+    gain: dict[str, float]
+    std: dict[str, float]
+    statistic: float
+    held_out_gain: float
+    held_out_error: float
+    alike: tuple[str, ...]
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the gains."""
+        return {t: unit_of_gain(t, self.form) for t in self.gain}
+
+    @property
+    def equation(self) -> str:
+        """What it adds to each target, with names for the gains."""
+        product = str(self.form)
+        return ", ".join(f"{t} += {_gain_name(t, self.gain)} {product}".rstrip() for t in self.gain)
+
+    def __str__(self) -> str:
+        sizes = ", ".join(
+            f"{_gain_name(t, self.gain)} = {number(g, 3)} +- {number(self.std[t], 2)} "
+            f"{self.units[t]}"
+            for t, g in self.gain.items()
+        )
+        text = (
+            f"{self.equation} with {sizes}; held-out driving becomes likelier by "
+            f"{self.held_out_gain:.0f} +- {self.held_out_error:.0f} nats"
+        )
+        return f"{text}; much like {', '.join(self.alike)}" if self.alike else text
+
+    def functions(self) -> dict[str, Callable[[Any, Any], Any]]:
+        """A function f(d, p) of each target: what the car does, and the gains."""
+        return {t: _function(self.form, _gain_name(t, self.gain)) for t in self.gain}
+
+    def as_effect(self, id: str, title: str = "") -> Effect:
+        """Define it as an effect under a name of your own."""
+        # Effects that users define come with the catalogue; only who asks for one needs them.
+        from ..user_effects import define_effect, parameter
+
+        act = self.functions()
+        parameters = [
+            parameter(
+                _gain_name(t, self.gain),
+                self.units[t],
+                typical=g,
+                lower=-20.0 * abs(g),
+                upper=20.0 * abs(g),
+                matters=min(2.0 * self.std[t], 0.5 * abs(g)),
+            )
+            for t, g in self.gain.items()
+        ]
+        reads: Mapping[str, Any] = {_CHANNELS[t]: f for t, f in act.items() if t in _CHANNELS}
+        return define_effect(
+            id,
+            title=title or f"proposed: {self.equation}",
+            parameters=parameters,
+            reads=reads or None,
+            **{_FORCES[t]: f for t, f in act.items() if t in _FORCES},
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it, ready for JSON."""
+        return {
+            "equation": self.equation,
+            "gains": {
+                t: {"value": g, "std": self.std[t], "unit": self.units[t]}
+                for t, g in self.gain.items()
+            },
+            "statistic": self.statistic,
+            "held_out_gain": self.held_out_gain,
+            "held_out_error": self.held_out_error,
+            "alike": list(self.alike),
+        }
+
+
+def _gain_name(target: str, among: Mapping[str, float]) -> str:
+    return "gain" if len(among) == 1 else f"gain_{target.lower()}"
+
+
+def _function(form: Form, gain: str) -> Callable[[Any, Any], Any]:
+    def act(d: Any, p: Any) -> Any:
+        return getattr(p, gain) * form(d)
+
+    return act
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    form: Form
+    targets: tuple[str, ...]
+    columns: tuple[int, ...]
+
+    @property
+    def text(self) -> str:
+        return f"{' and '.join(self.targets)} with {str(self.form) or 'no change'}"
+
+
+def propose(train: Evidence, held_out: Evidence) -> tuple[Proposal, ...]:
+    """Find at most three formulas that explain what is left and also hold on held-out driving."""
+    acting = [(t, f) for t in train.targets(*FORCES, *READINGS) for f in forms(t)]
+    candidates = _candidates(acting)
+    raw = _columns(train, acting)
+    R = train.project(raw)
+    size = np.linalg.norm(R, axis=0)
+    e = train.left
+    dear = float(np.log(train.driving.samples))
+    tried_price = 2.0 * float(np.log(len(candidates)))
+    chosen: list[_Candidate] = []
+    found: list[Proposal] = []
+    refused: set[int] = set()
+    while len(found) < _MOST:
+        # What was chosen before stays free, as the fitted parameters do.
+        Q = np.linalg.qr(R[:, [i for c in chosen for i in c.columns]])[0]
+        left, columns = e - Q @ (Q.T @ e), R - Q @ (Q.T @ R)
+        scores = np.array([_statistic(columns, left, size, c) for c in candidates])
+        merit = scores - dear * np.array([len(c.columns) for c in candidates]) - tried_price
+        merit[list(refused)] = -np.inf
+        added = None
+        for k in np.argsort(-merit)[:_TRIED]:
+            c = candidates[k]
+            if merit[k] <= 0.0:
+                break
+            own = solve(columns[:, list(c.columns)], left)
+            if own.statistic - dear * len(c.columns) - tried_price <= 0.0:
+                refused.add(int(k))
+                continue
+            places = [i for done in (*chosen, c) for i in done.columns]
+            there = _columns(held_out, [acting[i] for i in places])
+            gain, error = _on_held_out(train, held_out, raw[:, places], there, len(c.columns))
+            if gain > error:
+                near = np.flatnonzero(merit > merit[k] - _ALIKE)
+                alike = [candidates[j].text for j in near[np.argsort(-merit[near])] if j != k]
+                added = _proposal(c, own, gain, error, tuple(alike[:3]))
+                chosen.append(c)
+                break
+            refused.add(int(k))
+        if added is None:
+            break
+        found.append(added)
+    return tuple(found)
+
+
+def _candidates(acting: list[tuple[str, Form]]) -> list[_Candidate]:
+    place = {pair: i for i, pair in enumerate(acting)}
+    single = [_Candidate(form, (target,), (i,)) for i, (target, form) in enumerate(acting)]
+    both = [
+        _Candidate(form, ("F_y", "M_z"), (i, place["M_z", form]))
+        for i, (target, form) in enumerate(acting)
+        if target == "F_y"
+    ]
+    return single + both
+
+
+def _columns(evidence: Evidence, acting: list[tuple[str, Form]]) -> FloatArray:
+    where = known(evidence)
+    d = SimpleNamespace(
+        v_x=where["vx_mps"],
+        r=where["yaw_rate_radps"],
+        steer=where["steer_rad"],
+        alpha_f=where["slip_front_rad"],
+        alpha_r=where["slip_rear_rad"],
+        F_x=where["ax_mps2"] * evidence.fit.model.vehicle.mass_kg,
+    )
+    signals = np.column_stack([form(d) for _, form in acting])
+    return evidence.of_signals(signals, [target for target, _ in acting])
+
+
+def _statistic(
+    columns: FloatArray, e: FloatArray, before: FloatArray, candidate: _Candidate
+) -> float:
+    few = list(candidate.columns)
+    R = columns[:, few]
+    if np.any(np.linalg.norm(R, axis=0) < 1e-3 * np.maximum(before[few], 1e-300)):
+        return 0.0  # a copy of what is there already
+    scale = np.linalg.norm(R, axis=0)
+    gram, score = (R / scale).T @ (R / scale), (R / scale).T @ e
+    return float(score @ np.linalg.lstsq(gram, score, rcond=1e-8)[0])
+
+
+def _on_held_out(
+    train: Evidence, held_out: Evidence, here: FloatArray, there: FloatArray, new: int
+) -> tuple[float, float]:
+    """Gain in log-likelihood on held-out driving of the last columns, and its standard error.
+
+    Gains and the shift of the fitted parameters beside them are those of the training.
+    """
+    residuals = []
+    for count in (here.shape[1] - new, here.shape[1]):
+        gains = np.zeros(0)
+        if count:
+            gains = solve(train.project(here[:, :count]), train.left).size
+        rest = train.residual - here[:, :count] @ gains
+        shift = np.linalg.lstsq(train.fitted, rest, rcond=1e-6)[0]
+        predicted = held_out.fitted @ shift + there[:, :count] @ gains
+        residuals.append(held_out.residual - predicted)
+    fall = 0.5 * (residuals[0] ** 2 - residuals[1] ** 2)
+    channels = len(fall) // held_out.driving.samples
+    block = channels * int(_BLOCK_S * held_out.driving.logs[0].rate_hz)
+    sums = [float(fall[i : i + block].sum()) for i in range(0, len(fall), block)]
+    return float(fall.sum()), float(np.std(sums) * np.sqrt(len(sums)))
+
+
+def _proposal(
+    c: _Candidate, own: Solution, gain: float, error: float, alike: tuple[str, ...]
+) -> Proposal:
+    std = np.sqrt(np.diag(own.covariance))
+    return Proposal(
+        c.form,
+        dict(zip(c.targets, map(float, own.size), strict=True)),
+        dict(zip(c.targets, map(float, std), strict=True)),
+        own.statistic,
+        gain,
+        error,
+        alike,
+    )
