@@ -112,6 +112,22 @@ def test_a_report_is_whole_and_needs_no_other_file(written: Path) -> None:
     assert [p.name for p in written.parent.iterdir()] == ["report.html"]
 
 
+def test_a_report_tells_where_it_fails_and_the_shape_of_what_is_unknown(
+    study: sv.Study, nothing_added: sv.Study, written: Path, tmp_path: Path
+) -> None:
+    text = " ".join(read(written).text)
+    assert "Where, when and how fast the baseline fails" in text
+    for line in study.where.lines:
+        assert line[1:] in text
+    assert "The shape of what is missing" not in text
+    nothing_added.report(tmp_path / "unknown.html")
+    text = " ".join(read(tmp_path / "unknown.html").text)
+    assert "The shape of what is missing" in text
+    assert nothing_added.unknown is not None
+    for proposal in nothing_added.unknown.proposals:
+        assert str(proposal) in text
+
+
 def test_a_report_tells_what_the_study_found(study: sv.Study, written: Path) -> None:
     text = " ".join(read(written).text)
     found = study.fit["tyre_load_sensitivity.sensitivity"]

@@ -115,9 +115,11 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
         "parameters",
         "ranking",
         "regions",
+        "unknown",
         "verdict",
         "verdicts",
         "warnings",
+        "where",
     ]
     assert told["verdict"] == "explained"
     (added,) = told["effects"]
@@ -141,6 +143,11 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
             for figures in channels.values():
                 assert sorted(figures) == ["noise_floor", "nrmse", "r2", "rmse"]
     assert told["channels"]["after"]["test"]["ay_mps2"]["nrmse"] < 1.1
+    # Where the verdict does not ask for it, the shape of the unknown is not sought.
+    assert study.unknown is None
+    assert sorted(told["unknown"]) == ["p_value", "strongest"]
+    delay = told["where"]["delays"]["steer"]
+    assert delay["delay_s"] > 3.0 * delay["std_s"]
     assert told["regions"]
     for region in told["regions"]:
         assert sorted(region) == ["lateral_acceleration_mps2", "share", "speed_mps"]

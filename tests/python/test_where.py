@@ -14,7 +14,7 @@ from sysid_vehicle.diagnose.evidence import Evidence
 
 @pytest.fixture(scope="module")
 def null(complete_fits: tuple[Fit, ...]) -> tuple[Where, ...]:
-    return tuple(where(fit) for fit in complete_fits)
+    return tuple(where(fit) for fit in complete_fits[:2])
 
 
 @pytest.fixture(scope="module")
@@ -23,8 +23,8 @@ def delayed(hidden_fit: Callable[[str, float], Fit]) -> Where:
 
 
 @pytest.fixture(scope="module")
-def blown(hidden_fit: Callable[[str, float], Fit]) -> Where:
-    return where(hidden_fit("side_wind.side_force_n", 450.0))
+def dragged(hidden_fit: Callable[[str, float], Fit]) -> Where:
+    return where(hidden_fit("aero_drag.drag_area_m2", 0.45))
 
 
 @pytest.fixture(scope="module")
@@ -35,8 +35,7 @@ def wet(truth: Model, start: Model) -> Where:
 
 
 def test_a_complete_model_fails_nowhere(null: tuple[Where, ...]) -> None:
-    # The least likely of 4 claims at a rate of 1 %, of 8 delays at three standard errors.
-    assert [w.change_points for w in null] == [(), (), (), ()]
+    assert [w.change_points for w in null] == [(), ()]
     assert max(w.best_pair.share for w in null) < 0.02
     for w in null:
         assert not any(c.delay is not None and c.delay.significant for c in w.coherence)
@@ -47,7 +46,7 @@ def test_a_complete_model_fails_nowhere(null: tuple[Where, ...]) -> None:
 def test_the_errors_of_the_maps_are_those_of_a_complete_model(null: tuple[Where, ...]) -> None:
     z = np.concatenate([(m.force / m.std).ravel() for w in null for m in w.maps])
     z = z[np.isfinite(z)]
-    assert len(z) > 500
+    assert len(z) > 250
     assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0, abs=0.2)
     assert np.mean(np.abs(z) > 1.96) < 0.10
 
@@ -58,11 +57,11 @@ def test_change_points_are_claimed_at_the_stated_rate(complete_fits: tuple[Fit, 
     measured = np.isfinite(evidence.driving.measured).ravel()
     _ = evidence.fitted, evidence.residual
     claims = 0
-    for seed in range(30):
+    for seed in range(14):
         evidence.__dict__["residual"] = measured * rng.standard_normal(measured.size)
-        claims += bool(change_points(evidence, alpha=0.2, draws=100, seed=seed))
-    # 6 expected; beyond 2 to 12 lie 0.7 %.
-    assert 2 <= claims <= 12
+        claims += bool(change_points(evidence, alpha=0.3, draws=100, seed=seed))
+    # 4.2 expected; beyond 1 to 9 lie 0.8 %.
+    assert 1 <= claims <= 9
 
 
 def test_a_change_of_grip_is_dated(wet: Where) -> None:
@@ -88,11 +87,16 @@ def test_a_late_steering_is_timed(delayed: Where) -> None:
     assert not force.delay.significant
 
 
-def test_a_steady_force_is_seen(blown: Where) -> None:
-    mean, std = blown.steady["F_y"]
-    assert abs(mean - 450.0) < 4.0 * std
-    assert "a steady F_y is missing" in str(blown)
-    assert blown.change_points == ()
+def test_a_steady_force_is_seen(dragged: Where, truth: Model) -> None:
+    mean, std = dragged.steady["F_x"]
+    drag = -0.5 * truth.vehicle.air_density_kgpm3 * 0.45 * 26.0**2  # at the mean speed of the lap
+    assert mean == pytest.approx(drag, rel=0.3)
+    assert abs(mean) > 3.0 * std
+    assert "a steady F_x is missing" in str(dragged)
+    assert dragged.change_points == ()
+    # Drag depends on speed: a map with it predicts, one of slip angles does not.
+    by_name = {m.coordinates: m for m in dragged.maps}
+    assert by_name["vx_mps", "ay_mps2"].shares["F_x"] > 0.5
 
 
 def test_it_is_drawn_and_written(wet: Where, delayed: Where) -> None:

@@ -36,6 +36,7 @@ _WINDOW_S = 5.0
 _BANDS = 6
 _LOWEST_HZ, _HIGHEST_HZ = 0.15, 5.0
 _LEVEL = 0.05
+_WORDS = {"steer": "steering", "force": "wheel force"}
 _SMALL = 1e-3  # of an input, to differentiate by
 
 
@@ -104,17 +105,16 @@ class Coherence:
 
     def __str__(self) -> str:
         channel, f, c = self.peak
+        name = _WORDS[self.input]
         if c > self.threshold:
-            text = (
-                f"residuals of {channel} follow the {self.input} at {f:.1f} Hz (coherence {c:.2f})"
-            )
+            text = f"residuals of {channel} follow the {name} at {f:.1f} Hz (coherence {c:.2f})"
         else:
-            text = f"no residual follows the {self.input}"
+            text = f"no residual follows the {name}"
         if self.delay is not None and self.delay.significant:
             d = self.delay
             sooner = "later" if d.delay_s > 0 else "sooner"
             text += (
-                f"; the car answers {1e3 * abs(d.delay_s):.0f} +- {1e3 * d.std_s:.1g} ms {sooner} "
+                f"; the car answers it {1e3 * abs(d.delay_s):.0f} +- {1e3 * d.std_s:.1g} ms {sooner} "
                 "than the model"
             )
             if not d.linear:
@@ -132,7 +132,7 @@ class Coherence:
         ax.axhline(self.threshold, color="0.4", ls="--", lw=1.0, label="by chance, 95 %")
         ax.set_ylim(0.0, 1.0)
         ax.legend(frameon=False, fontsize="small", ncols=2)
-        return tidy(ax, xlabel="frequency [Hz]", ylabel=f"coherence with the {self.input}")
+        return tidy(ax, xlabel="frequency [Hz]", ylabel=f"coherence with the {_WORDS[self.input]}")
 
     def plot_phase(self, ax: Axes | None = None) -> Axes:
         """Draw by how much the car lags the model, and the delay that fits."""
@@ -147,12 +147,14 @@ class Coherence:
             label = f"{1e3 * d.delay_s:.1f} $\\pm$ {1e3 * d.std_s:.1f} ms"
             ax.plot(f, d.delay_s * line, color="tab:blue", label=label)
             phase, std = np.degrees(d.phase_rad), np.degrees(d.phase_std_rad)
-            known = std < 60.0
+            known = std < 30.0
             ax.errorbar(
                 d.frequency_hz[known], phase[known], 1.96 * std[known], fmt="ko", ms=4.0, lw=1.0
             )
             ax.legend(frameon=False, loc="upper left")
-        return tidy(ax, xlabel="frequency [Hz]", ylabel=f"lag behind the {self.input} [deg]")
+        return tidy(
+            ax, xlabel="frequency [Hz]", ylabel=f"lag behind the {_WORDS[self.input]} [deg]"
+        )
 
 
 def coherence(evidence: Evidence) -> tuple[Coherence, ...]:

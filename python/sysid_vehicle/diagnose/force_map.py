@@ -130,9 +130,9 @@ class ForceMap:
         ax = axes_or_new(ax, 5.0, 3.8)
         ax.set_facecolor("0.85")
         top = max(float(np.nanmax(np.abs(force), initial=0.0)), 1e-9)
-        mesh = ax.pcolormesh(
-            edges[1], edges[0], np.ma.masked_invalid(force), cmap="RdBu_r", vmin=-top, vmax=top
-        )
+        shown = np.ma.masked_invalid(force)
+        mesh = ax.pcolormesh(edges[1], edges[0], shown, cmap="RdBu_r", vmin=-top, vmax=top)
+        mesh.set_rasterized(True)
         ax.figure.colorbar(mesh, ax=ax, label=f"missing {label}")
         beyond = np.argwhere(np.abs(force) > 2.0 * std)
         middles = [0.5 * (e[1:] + e[:-1]) for e in edges]

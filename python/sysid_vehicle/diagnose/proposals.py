@@ -168,7 +168,8 @@ def propose(train: Evidence, held_out: Evidence) -> tuple[Proposal, ...]:
         # What was chosen before stays free, as the fitted parameters do.
         Q = np.linalg.qr(R[:, [i for c in chosen for i in c.columns]])[0]
         left, columns = e - Q @ (Q.T @ e), R - Q @ (Q.T @ R)
-        scores = np.array([_statistic(columns, left, size, c) for c in candidates])
+        gram, score = columns.T @ columns, columns.T @ left
+        scores = np.array([_statistic(gram, score, size, c) for c in candidates])
         merit = scores - dear * np.array([len(c.columns) for c in candidates]) - tried_price
         merit[list(refused)] = -np.inf
         added = None
@@ -222,15 +223,14 @@ def _columns(evidence: Evidence, acting: list[tuple[str, Form]]) -> FloatArray:
 
 
 def _statistic(
-    columns: FloatArray, e: FloatArray, before: FloatArray, candidate: _Candidate
+    gram: FloatArray, score: FloatArray, before: FloatArray, candidate: _Candidate
 ) -> float:
     few = list(candidate.columns)
-    R = columns[:, few]
-    if np.any(np.linalg.norm(R, axis=0) < 1e-3 * np.maximum(before[few], 1e-300)):
+    scale = np.sqrt(np.maximum(np.diag(gram)[few], 0.0))
+    if np.any(scale <= 1e-3 * before[few]):
         return 0.0  # a copy of what is there already
-    scale = np.linalg.norm(R, axis=0)
-    gram, score = (R / scale).T @ (R / scale), (R / scale).T @ e
-    return float(score @ np.linalg.lstsq(gram, score, rcond=1e-8)[0])
+    S = score[few] / scale
+    return float(S @ np.linalg.pinv(gram[np.ix_(few, few)] / np.outer(scale, scale), 1e-8) @ S)
 
 
 def _on_held_out(

@@ -21,6 +21,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, axes_or_new, tidy
@@ -37,6 +38,7 @@ OVER = ("vx_mps", "ay_mps2", "ax_mps2", "slip_front_rad", "slip_rear_rad", "stee
 _KNOTS = 7
 _KNOTS_OF_PAIR = 6
 _SIZES = (0.0005, 0.002, 0.006, 0.02, 0.06, 0.2)  # of the weight, or of it at half a wheelbase
+_SIZES_OF_PAIR = (0.0005, 0.005, 0.05)
 _SMOOTH = 0.35  # correlation length of a curve, as a share of its range
 _FINE = 61
 _DRAWS = 4000
@@ -117,15 +119,9 @@ class Surface:
         ax.set_facecolor("0.85")
         y, x = (c.scale * a for c, a in zip(self.coordinates, self.at, strict=True))
         top = max(float(np.nanmax(np.abs(self.force), initial=0.0)), 1e-9)
-        mesh = ax.pcolormesh(
-            x,
-            y,
-            np.ma.masked_invalid(self.force),
-            cmap="RdBu_r",
-            vmin=-top,
-            vmax=top,
-            shading="nearest",
-        )
+        shown = np.ma.masked_invalid(self.force)
+        mesh = ax.pcolormesh(x, y, shown, shading="nearest", cmap="RdBu_r", vmin=-top, vmax=top)
+        mesh.set_rasterized(True)
         ax.figure.colorbar(mesh, ax=ax, label=f"missing {self.target} [{UNITS[self.target]}]")
         sure = np.argwhere(np.abs(self.force) > self.half_width)
         ax.plot(x[sure[:, 1]], y[sure[:, 0]], "k.", ms=4.0)
@@ -177,7 +173,7 @@ def surface(evidence: Evidence, pair: tuple[str, str], seed: int = 0) -> Surface
     hats = (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
     places = np.array(list(product(*(np.linspace(0.0, 1.0, _KNOTS_OF_PAIR) for _ in pair))))
     square = ((places[:, None] - places) ** 2).sum(axis=2)
-    found = _posterior(evidence, hats, targets, square)
+    found = _posterior(evidence, hats, targets, square, _SIZES_OF_PAIR)
     i = int(np.argmax(found.evidence))
     own = slice(i * hats.shape[1], (i + 1) * hats.shape[1])
     visited = hats.sum(axis=0) >= _FEWEST
@@ -218,7 +214,11 @@ def _hats(z: FloatArray, knots: FloatArray) -> FloatArray:
 
 
 def _posterior(
-    evidence: Evidence, hats: FloatArray, targets: list[str], square: FloatArray
+    evidence: Evidence,
+    hats: FloatArray,
+    targets: list[str],
+    square: FloatArray,
+    sizes: tuple[float, ...] = _SIZES,
 ) -> _Posterior:
     width = hats.shape[1]
     signals = np.tile(hats, (1, len(targets)))
@@ -233,13 +233,13 @@ def _posterior(
     units = np.array([weight * (0.5 * car.wheelbase_m if t == "M_z" else 1.0) for t in targets])
     C = np.exp(-0.5 * square / _SMOOTH**2) + 1e-4 * np.eye(width)
     root = np.kron(np.eye(len(targets)), np.linalg.cholesky(C))
-    choices = np.array(list(product(range(len(_SIZES)), repeat=len(targets))))
+    choices = np.array(list(product(range(len(sizes)), repeat=len(targets))))
     log_evidence, means, covariances = [], [], []
     for choice in choices:
         # w = L x with x ~ N(0, I): no matrix that could be singular is inverted.
-        L = np.repeat(units * np.take(_SIZES, choice), width)[:, None] * root
+        L = np.repeat(units * np.take(sizes, choice), width)[:, None] * root
         lower = np.linalg.cholesky(np.eye(len(L)) + L.T @ A @ L)
-        half = np.linalg.solve(lower, L.T)
+        half = solve_triangular(lower, L.T, lower=True, check_finite=False)
         x = half @ b
         log_evidence.append(0.5 * float(x @ x) - float(np.log(np.diag(lower)).sum()))
         means.append(half.T @ x)
