@@ -113,10 +113,8 @@ class Coherence:
         if self.delay is not None and self.delay.significant:
             d = self.delay
             sooner = "later" if d.delay_s > 0 else "sooner"
-            text += (
-                f"; the car answers it {1e3 * abs(d.delay_s):.0f} +- {1e3 * d.std_s:.1g} ms {sooner} "
-                "than the model"
-            )
+            size = f"{1e3 * abs(d.delay_s):.0f} +- {1e3 * d.std_s:.1g} ms"
+            text += f"; the car answers it {size} {sooner} than the model"
             if not d.linear:
                 text += ", but not equally at all frequencies"
         return text
@@ -228,7 +226,7 @@ def _delay(
     gain, shift = 1.0 + found.size[0::2], found.size[1::2]
     phase = np.arctan2(shift, gain)
     jacobian = np.zeros((len(phase), len(found.size)))
-    square = gain**2 + shift**2
+    square = np.maximum(gain**2 + shift**2, 1e-12)
     for b in range(len(phase)):
         jacobian[b, 2 * b : 2 * b + 2] = np.array([-shift[b], gain[b]]) / square[b]
     covariance = jacobian @ found.covariance @ jacobian.T

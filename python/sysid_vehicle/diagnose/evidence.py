@@ -91,20 +91,26 @@ class Evidence:
         columns = [known[n].column for n in names]
         return self.problem.sensitivities(self.fit.model.vector(), self.frozen, columns)
 
-    def of_signals(self, signals: FloatArray, targets: list[str]) -> FloatArray:
-        """Sensitivities to signals added to forces or readings, one column each."""
+    def of_signals(
+        self, signals: FloatArray, targets: list[str], *, projected: bool = False
+    ) -> FloatArray:
+        """Sensitivities to signals added to forces or readings, one column each.
+
+        Projected columns hold what the free parameters cannot do.
+        """
         numbers = [TARGETS[t] for t in targets]
         p = self.fit.model.vector()
-        frozen, problem = self.frozen, self.problem
+        frozen, problem, basis = self.frozen, self.problem, self.basis
+        out = np.empty((len(self.residual), len(numbers)))
 
-        def some(at: int) -> FloatArray:
+        def some(at: int) -> None:
             few = slice(at, at + _AT_ONCE)
-            return problem.signal_sensitivities(
-                p, frozen, as_float64(signals[:, few]), numbers[few]
-            )
+            G = problem.signal_sensitivities(p, frozen, as_float64(signals[:, few]), numbers[few])
+            out[:, few] = G - basis @ (basis.T @ G) if projected else G
 
         with ThreadPoolExecutor(2) as pool:
-            return np.hstack(list(pool.map(some, range(0, len(numbers), _AT_ONCE))))
+            list(pool.map(some, range(0, len(numbers), _AT_ONCE)))
+        return out
 
     def targets(self, *among: str) -> list[str]:
         """Those of some targets that this driving can show."""

@@ -65,6 +65,10 @@ class Form:
             result = x if result is None else result * x
         return result
 
+    def uses(self, quantity: str) -> bool:
+        """Whether a quantity is among its factors."""
+        return any(q == quantity for q, _ in self.factors)
+
     @property
     def units(self) -> dict[str, int]:
         """Powers of m, s, rad and N."""

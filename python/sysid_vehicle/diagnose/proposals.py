@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, as_float64
 from .._text import number
 from ..effects import Effect
 from .evidence import FORCES, READINGS, Evidence, Solution, solve
@@ -32,6 +32,7 @@ _MOST = 3
 _TRIED = 4  # on held-out driving, before a step gives up
 _ALIKE = 9.0  # difference of statistics that does not tell two formulas apart
 _BLOCK_S = 5.0
+_VISIBLE = 0.03  # share of a formula that those chosen before it cannot copy
 _CHANNELS = {"r": "yaw_rate_radps", "a_x": "ax_mps2", "a_y": "ay_mps2"}
 _FORCES = {"F_x": "force_x", "F_y": "force_y", "M_z": "moment_z"}
 
@@ -153,48 +154,56 @@ class _Candidate:
 
 def propose(train: Evidence, held_out: Evidence) -> tuple[Proposal, ...]:
     """Find at most three formulas that explain what is left and also hold on held-out driving."""
-    acting = [(t, f) for t in train.targets(*FORCES, *READINGS) for f in forms(t)]
+    targets = train.targets(*FORCES, *READINGS)
+    acting = [
+        (t, f) for t in targets for f in forms(t) if train.driving.force_known or not f.uses("F_x")
+    ]
     candidates = _candidates(acting)
-    raw = _columns(train, acting)
-    R = train.project(raw)
-    size = np.linalg.norm(R, axis=0)
-    e = train.left
+    R = _columns(train, acting, projected=True)
+    gram, score = R.T @ R, R.T @ train.left
+    before = np.sqrt(np.diag(gram))
     dear = float(np.log(train.driving.samples))
     tried_price = 2.0 * float(np.log(len(candidates)))
-    chosen: list[_Candidate] = []
+    taken: list[int] = []
     found: list[Proposal] = []
     refused: set[int] = set()
     while len(found) < _MOST:
         # What was chosen before stays free, as the fitted parameters do.
-        Q = np.linalg.qr(R[:, [i for c in chosen for i in c.columns]])[0]
-        left, columns = e - Q @ (Q.T @ e), R - Q @ (Q.T @ R)
-        gram, score = columns.T @ columns, columns.T @ left
-        scores = np.array([_statistic(gram, score, size, c) for c in candidates])
+        copied = np.linalg.pinv(gram[np.ix_(taken, taken)]) @ gram[taken]
+        G, s = gram - gram[:, taken] @ copied, score - copied.T @ score[taken]
+        scores = np.array([_statistic(G, s, before, c) for c in candidates])
         merit = scores - dear * np.array([len(c.columns) for c in candidates]) - tried_price
         merit[list(refused)] = -np.inf
         added = None
-        for k in np.argsort(-merit)[:_TRIED]:
-            c = candidates[k]
+        for k in map(int, np.argsort(-merit)[:_TRIED]):
             if merit[k] <= 0.0:
                 break
-            own = solve(columns[:, list(c.columns)], left)
+            c = candidates[k]
+            refused.add(k)
+            places = [*taken, *c.columns]
+            own = _with_others_free(R, train.left, places, len(c.columns))
             if own.statistic - dear * len(c.columns) - tried_price <= 0.0:
-                refused.add(int(k))
                 continue
-            places = [i for done in (*chosen, c) for i in done.columns]
-            there = _columns(held_out, [acting[i] for i in places])
-            gain, error = _on_held_out(train, held_out, raw[:, places], there, len(c.columns))
+            few = [acting[i] for i in places]
+            here, there = _columns(train, few), _columns(held_out, few)
+            gain, error = _on_held_out(train, held_out, here, there, len(c.columns))
             if gain > error:
                 near = np.flatnonzero(merit > merit[k] - _ALIKE)
                 alike = [candidates[j].text for j in near[np.argsort(-merit[near])] if j != k]
                 added = _proposal(c, own, gain, error, tuple(alike[:3]))
-                chosen.append(c)
+                taken = places
                 break
-            refused.add(int(k))
         if added is None:
             break
         found.append(added)
     return tuple(found)
+
+
+def _with_others_free(R: FloatArray, e: FloatArray, places: list[int], new: int) -> Solution:
+    """Sizes of the last columns, those before them left free."""
+    Q = np.linalg.qr(R[:, places[:-new]])[0]
+    own = R[:, places[-new:]]
+    return solve(as_float64(own - Q @ (Q.T @ own)), as_float64(e - Q @ (Q.T @ e)))
 
 
 def _candidates(acting: list[tuple[str, Form]]) -> list[_Candidate]:
@@ -208,7 +217,9 @@ def _candidates(acting: list[tuple[str, Form]]) -> list[_Candidate]:
     return single + both
 
 
-def _columns(evidence: Evidence, acting: list[tuple[str, Form]]) -> FloatArray:
+def _columns(
+    evidence: Evidence, acting: list[tuple[str, Form]], *, projected: bool = False
+) -> FloatArray:
     where = known(evidence)
     d = SimpleNamespace(
         v_x=where["vx_mps"],
@@ -219,7 +230,7 @@ def _columns(evidence: Evidence, acting: list[tuple[str, Form]]) -> FloatArray:
         F_x=where["ax_mps2"] * evidence.fit.model.vehicle.mass_kg,
     )
     signals = np.column_stack([form(d) for _, form in acting])
-    return evidence.of_signals(signals, [target for target, _ in acting])
+    return evidence.of_signals(signals, [t for t, _ in acting], projected=projected)
 
 
 def _statistic(
@@ -227,7 +238,7 @@ def _statistic(
 ) -> float:
     few = list(candidate.columns)
     scale = np.sqrt(np.maximum(np.diag(gram)[few], 0.0))
-    if np.any(scale <= 1e-3 * before[few]):
+    if np.any(scale <= _VISIBLE * before[few]):
         return 0.0  # a copy of what is there already
     S = score[few] / scale
     return float(S @ np.linalg.pinv(gram[np.ix_(few, few)] / np.outer(scale, scale), 1e-8) @ S)

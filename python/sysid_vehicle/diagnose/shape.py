@@ -222,7 +222,7 @@ def _posterior(
 ) -> _Posterior:
     width = hats.shape[1]
     signals = np.tile(hats, (1, len(targets)))
-    R = evidence.project(evidence.of_signals(signals, list(np.repeat(targets, width))))
+    R = evidence.of_signals(signals, list(np.repeat(targets, width)), projected=True)
     A, b = R.T @ R, R.T @ evidence.left
     # Colour that is left in the residuals counts against all weights alike.
     size = np.linalg.lstsq(A + 1e-9 * np.trace(A) * np.eye(len(A)), b, rcond=None)[0]
