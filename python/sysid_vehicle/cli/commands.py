@@ -12,6 +12,7 @@ from typing import Any
 from .._files import write_json
 from ..compare import Comparison, compare
 from ..demo import run_demo
+from ..diagnose import where
 from ..effects import catalogue
 from ..errors import warn
 from ..identify import Fit, identify
@@ -55,10 +56,13 @@ def _compare(args: argparse.Namespace, heard: Warnings) -> None:
     logs = _read(args.logs, args.channels)
     fit = identify(model, logs, progress=_on_terminal())
     comparison = compare(fit, logs)
+    failing = where(fit)
     print(comparison)
+    print(failing)
     print(fit)
     if args.json is not None:
-        write_json(args.json, _comparison(comparison, fit, heard))
+        told = _comparison(comparison, fit, heard)
+        write_json(args.json, {**told, "where": failing.to_dict()})
 
 
 def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:

@@ -2,7 +2,8 @@
 
 Had the car stayed the same, the scores of its parameters would sum up evenly over time. With z the
 sensitivities of the whitened residuals e to everything that is taken as constant (the fitted
-parameters, steady forces), a, some of them, change at time t by M^-1 S where
+parameters, forces that are steady or depend on speed and acceleration alone), a, some of them,
+change at time t by M^-1 S where
 
     S(t) = sum_k>t a_k' (I - P_z) e_k,   M(t) = sum_k>t a_k' a_k - its part that z explains,
 
@@ -29,8 +30,9 @@ from .._arrays import FloatArray, as_float64
 from ..effects import effect
 from ..estimate import Driving
 from .coordinates import running_time
-from .evidence import Evidence, solve, variance_ratio
+from .evidence import FORCES, Evidence, solve, variance_ratio
 from .score import _basis
+from .shape import known
 
 __all__ = ["ChangePoint", "change_points"]
 
@@ -110,7 +112,7 @@ def change_points(
     """
     driving = evidence.driving
     kinds = _kinds(evidence)
-    constant = np.hstack([evidence.fitted, *(k.columns for k in kinds)])
+    constant = np.hstack([evidence.fitted, *(k.columns for k in kinds), _of_driving(evidence)])
     rng = np.random.default_rng(seed)
     found: list[ChangePoint] = []
     to_search = [(0, driving.samples)]
@@ -132,6 +134,19 @@ def _kinds(evidence: Evidence) -> list[_Kind]:
             ones = np.ones((evidence.driving.samples, len(names)))
             kinds.append(_Kind(what, names, evidence.of_signals(ones, list(names))))
     return kinds
+
+
+def _of_driving(evidence: Evidence) -> FloatArray:
+    """Forces that depend on speed and acceleration: that the driving changed, is no change."""
+    where = known(evidence)
+    v, side, ahead = (where[n] for n in ("vx_mps", "ay_mps2", "ax_mps2"))
+    turning = [v**2, side, side * np.abs(side), ahead, ahead * side]
+    signals, targets = [], []
+    for target in evidence.targets(*FORCES):
+        some = [v**2, side**2, ahead] if target == "F_x" else turning
+        signals += some
+        targets += [target] * len(some)
+    return evidence.of_signals(np.column_stack(signals), targets)
 
 
 def _from(evidence: Evidence, kind: _Kind, samples: list[int]) -> list[FloatArray]:
