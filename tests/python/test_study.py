@@ -128,14 +128,24 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     assert added["parameters"]["time_constant_s"]["value"] == study.model.value(LAG[0])
     first = told["ranking"][0]
     assert sorted(first) == [
+        "bound",
+        "group",
         "id",
         "indistinguishable_from",
         "p_value",
         "parameters",
         "predicted_error",
+        "retained",
         "statistic",
+        "status",
     ]
     assert first["id"] == "steer_lag"
+    assert (first["status"], first["group"]) == ("missing", [])
+    assert 0.0 < first["retained"] <= 1.0
+    assert {c["status"] for c in told["ranking"][1:]} <= {"proxy", "absent", "not testable"}
+    absent = [c for c in told["ranking"] if c["status"] == "absent"]
+    assert absent
+    assert all(b > 0.0 for c in absent for b in c["bound"])
     for when in ("before", "after"):
         for where in ("train", "test"):
             channels = told["channels"][when][where]

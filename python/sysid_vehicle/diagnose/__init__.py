@@ -2,6 +2,7 @@
 
 from .change_points import ChangePoint
 from .coherence import Coherence, Delay
+from .constancy import Constancy, constancy
 from .diagnose import Candidate, Diagnosis, diagnose
 from .force_map import ForceMap
 from .hiding import Bias, BiasReport, bias_report
@@ -19,6 +20,7 @@ __all__ = [
     "Candidate",
     "ChangePoint",
     "Coherence",
+    "Constancy",
     "Curve",
     "Delay",
     "Diagnosis",
@@ -34,6 +36,7 @@ __all__ = [
     "Verdicts",
     "Where",
     "bias_report",
+    "constancy",
     "diagnose",
     "judge",
     "omnibus",

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 __all__ = ["Candidate", "Diagnosis", "diagnose"]
 
 _REFITS = 5
+# Of the best statistic: what scores less than this share does not overtake it. States of their own
+# make a refit slow, and what has some is scored at its typical size, not far from the refit.
+_HOPELESS = 0.15
+_HOPELESS_WITH_STATES = 0.35
 _TELLS_APART = 9.0  # twice the log-likelihood, or a statistic: three standard errors
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
 
@@ -89,12 +93,18 @@ class Diagnosis:
         Whether anything at all is left.
     alpha : float
         Rate of false claims accepted, over all effects together.
+    scores : tuple of Score
+        The tests that the ranking began with, beside the fit as it is.
+    family : dict of str to float
+        Their p-values by effect, corrected for testing all of them.
     """
 
     fit: Fit
     ranking: tuple[Candidate, ...]
     omnibus: Omnibus
     alpha: float
+    scores: tuple[Score, ...]
+    family: dict[str, float]
 
     @property
     def significant(self) -> tuple[Candidate, ...]:
@@ -216,17 +226,22 @@ def diagnose(
         )
         for s in board.scores
     ]
-    few = [c for c in ranked if c.p_value < alpha][:refits]
+    few = _worth_refitting([c for c in ranked if c.p_value < alpha], refits)
     if few:
+        # What the best one gains tells which of the others cannot come near it.
+        first = _refitted(fit, driving, few[0])
+        best = max(first.statistic, few[0].statistic)
+        others = [c for c in few[1:] if c.statistic > _hopeless(c) * best]
         with ThreadPoolExecutor(workers) as pool:
-            tried = list(
-                tqdm(
-                    pool.map(lambda c: _refitted(fit, driving, c), few),
-                    total=len(few),
+            tried = [
+                first,
+                *tqdm(
+                    pool.map(lambda c: _refitted(fit, driving, c), others),
+                    total=len(others),
                     desc="refits",
                     disable=not progress,
-                )
-            )
+                ),
+            ]
             # Under the noise of the poorer model they differ less than they really do.
             top = max(c.statistic for c in tried)
             near = [c for c in tried if c.statistic > 0.4 * top]
@@ -234,10 +249,21 @@ def diagnose(
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         finished = [_with_refit_twins(c, finished) for c in finished]
         done = {c.id for c in finished}
-        others = sorted((c for c in tried if c.id not in done), key=lambda c: -c.statistic)
-        done |= {c.id for c in others}
-        ranked = finished + others + [c for c in ranked if c.id not in done]
-    return Diagnosis(fit, tuple(ranked), omnibus(fit, driving), alpha)
+        far = sorted((c for c in tried if c.id not in done), key=lambda c: -c.statistic)
+        done |= {c.id for c in far}
+        ranked = finished + far + [c for c in ranked if c.id not in done]
+    return Diagnosis(fit, tuple(ranked), omnibus(fit, driving), alpha, board.scores, family)
+
+
+def _worth_refitting(significant: list[Candidate], refits: int) -> list[Candidate]:
+    """The best few, and the effects that the catalogue says act like the very best."""
+    few = significant[:refits]
+    twins = few[0].effect.twins if few else ()
+    return few + [c for c in significant[refits:] if c.id in twins]
+
+
+def _hopeless(c: Candidate) -> float:
+    return _HOPELESS_WITH_STATES if c.effect.states > 1 else _HOPELESS
 
 
 def _merit(c: Candidate, samples: int) -> float:
@@ -300,9 +326,11 @@ def _starts(c: Candidate) -> list[dict[str, float]]:
         value = float(np.clip(v, p.null_value - reach, p.null_value + reach))
         predicted[f"{c.id}.{p.name}"] = float(np.clip(value, p.lower, p.upper))
     starts = [predicted]
-    if len(c.effect.parameters) == 1 and c.effect.parameters[0].one_sided:
+    first = c.effect.parameters[0]
+    near = 0.5 * first.typical <= predicted[f"{c.id}.{first.name}"] <= 2.0 * first.typical
+    if len(c.effect.parameters) == 1 and first.one_sided and not near:
         # Far from its null value the dynamics of such an effect are not those of the score.
-        starts.append({f"{c.id}.{c.effect.parameters[0].name}": c.effect.parameters[0].typical})
+        starts.append({f"{c.id}.{first.name}": first.typical})
     return starts
 
 

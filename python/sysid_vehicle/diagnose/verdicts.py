@@ -8,7 +8,7 @@ so that what merely acted like one of them is told from what is missing too.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from .._text import html_table, number
 from ..effects import Effect
 from ..identify import Fit
+from .constancy import constancy
 from .diagnose import Diagnosis
 from .score import Score, score_board
 
@@ -52,6 +53,9 @@ class EffectVerdict:
         How far from nothing each parameter may be, at 95 %.
     group : tuple of str
         The rivals, or what the proxy acted like.
+    varies : tuple of float
+        Smallest and largest value of the first parameter over the pieces of driving, of a proxy
+        that does not keep its value.
     """
 
     effect: Effect
@@ -60,6 +64,7 @@ class EffectVerdict:
     std: tuple[float, ...] = ()
     bound: tuple[float, ...] = ()
     group: tuple[str, ...] = ()
+    varies: tuple[float, ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -74,6 +79,11 @@ class EffectVerdict:
             return f"missing, or else {rivals}, which this driving cannot tell from it; {size}"
         if self.finding == "proxy" and rivals:
             return f"only acted like what {rivals} explains"
+        if self.finding == "proxy" and self.varies:
+            low, high = (number(v, 3) for v in self.varies)
+            first = self.effect.parameters[0]
+            span = f"{first.name} from {low} to {high} {first.unit}".removesuffix(" 1")
+            return f"something acts like it, but not with one value ({span}): look elsewhere"
         if self.finding == "proxy":
             return f"something acts like it, but no car has such a value ({size}): look elsewhere"
         if self.finding == "negligible":
@@ -131,6 +141,7 @@ class Verdicts:
                 "std": list(v.std),
                 "bound": list(v.bound),
                 "group": list(v.group),
+                "varies": list(v.varies),
             }
             for v in self.all
         }
@@ -152,8 +163,10 @@ def verdicts(dx: Diagnosis, *, seed: int = 0) -> Verdicts:
     best = dx.ranking[0] if dx.significant else None
     final = dx.fit if best is None or best.fit is None else best.fit
     groups = {} if best is None else {best.id: best.indistinguishable_from}
+    known = (dx.scores, dx.family) if final is dx.fit else None
     return judge(
         final,
+        scored=known,
         lacked={e.id for e in dx.fit.model.candidates},
         groups=groups,
         acted={c.id for c in dx.significant},
@@ -170,6 +183,7 @@ def judge(
     acted: set[str],
     alpha: float,
     seed: int = 0,
+    scored: tuple[tuple[Score, ...], Mapping[str, float]] | None = None,
 ) -> Verdicts:
     """Judge every effect beside those of the final model.
 
@@ -187,13 +201,23 @@ def judge(
         Rate of false claims accepted, over all effects together.
     seed : int
         Of the draws that correct for testing many effects.
+    scored : (scores, p-values), optional
+        Of what the final model lacks, where a diagnosis of it has them already.
     """
-    board = score_board(final, final.driving, final.model.candidates)
-    family = board.family_p_values(seed=seed)
-    scores = {s.effect.id: s for s in board.scores}
+    if scored is None:
+        lacking = tuple(e for e in final.model.candidates if e.id in lacked)
+        board = score_board(final, final.driving, lacking)
+        scored = board.scores, board.family_p_values(seed=seed)
+    family = scored[1]
+    scores = {s.effect.id: s for s in scored[0]}
     rivals = {r for g in groups.values() for r in g}
     names = tuple(e for e in final.model.effects if e in lacked)
     found = [_of_added(e, final, groups.get(e.id, ())) for e in final.model.parts if e.id in lacked]
+    kept = constancy(final)
+    for i, v in enumerate(found):
+        if v.effect.id in kept and not kept[v.effect.id].holds:
+            values = kept[v.effect.id].values
+            found[i] = replace(v, finding="proxy", group=(), varies=(min(values), max(values)))
     for effect in final.model.candidates:
         if effect.id not in lacked:
             continue

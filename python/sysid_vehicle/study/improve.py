@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..compare import Comparison, compare
-from ..diagnose import Candidate, Diagnosis, Omnibus, diagnose, judge, omnibus
+from ..diagnose import Candidate, Diagnosis, Omnibus, Verdicts, diagnose, judge, omnibus
 from ..effects import Effect, effect
 from ..errors import InvalidInput, warn
 from ..estimate import Driving
@@ -100,8 +100,18 @@ def improve(
     floor = fit.noise
     on_train = [compare(f, train_driving, noise=floor) for f in fits]
     on_test = [compare(f, test_driving, noise=floor) for f in fits]
-    left = omnibus(fit, train_driving)
-    verdict = _verdict(fit, diagnoses[-1], on_train[-1], left)
+    last = diagnoses[-1]
+    left = last.omnibus if last.fit is fit else omnibus(fit, train_driving)
+    told = judge(
+        fit,
+        scored=(last.scores, last.family) if last.fit is fit else None,
+        lacked={e.id for e in _considered(model, candidates)},
+        groups=rivals,
+        acted={c.id for dx in diagnoses for c in dx.significant},
+        alpha=alpha,
+        seed=seed,
+    )
+    verdict = _verdict(fits, told, last, on_train[-1], left)
     return Study(
         verdict=verdict,
         fits=tuple(fits),
@@ -111,14 +121,7 @@ def improve(
         held_out=test_driving,
         added=_added(fits, on_test, p_values),
         omnibus=left,
-        verdicts=judge(
-            fit,
-            lacked={e.id for e in _considered(model, candidates)},
-            groups=rivals,
-            acted={c.id for dx in diagnoses for c in dx.significant},
-            alpha=alpha,
-            seed=seed,
-        ),
+        verdicts=told,
         warnings=_warnings(fit, train_driving),
         seconds=time.perf_counter() - began,
     )
@@ -168,12 +171,17 @@ def _strength(fit: Fit, name: str) -> float:
     )
 
 
-def _verdict(fit: Fit, last: Diagnosis, score: Comparison, left: Omnibus) -> Verdict:
-    found = bool(fit.model.effects)
-    complete = not left.rejects and score.error < _AT_FLOOR
-    if not found:
+def _verdict(
+    fits: list[Fit], told: Verdicts, last: Diagnosis, score: Comparison, left: Omnibus
+) -> Verdict:
+    added = set(fits[-1].model.effects) - set(fits[0].model.effects)
+    if not added:
         return "adequate" if not left.rejects and not last.significant else "unknown"
-    return "explained" if complete else "partly_explained"
+    # What only stands in for something else explains nothing, however well it fits.
+    proxies = {e for e in added if told[e].finding == "proxy"}
+    if not left.rejects and score.error < _AT_FLOOR and not proxies:
+        return "explained"
+    return "unknown" if proxies == added else "partly_explained"
 
 
 def _added(

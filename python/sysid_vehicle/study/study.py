@@ -14,6 +14,7 @@ from ..compare import Comparison
 from ..diagnose import (
     Candidate,
     Diagnosis,
+    EffectVerdict,
     Omnibus,
     Unknown,
     Verdicts,
@@ -181,7 +182,7 @@ class Study:
         return {
             "verdict": self.verdict,
             "effects": [_effect(a) for a in self.added],
-            "ranking": [_candidate(c) for c in self.diagnoses[0].ranking],
+            "ranking": [_candidate(c, self.verdicts[c.id]) for c in self.diagnoses[0].ranking],
             "verdicts": self.verdicts.to_dict(),
             "channels": {
                 "before": {"train": _channels(self.train[0]), "test": _channels(self.test[0])},
@@ -231,9 +232,13 @@ def _effect(a: AddedEffect) -> dict[str, Any]:
     }
 
 
-def _candidate(c: Candidate) -> dict[str, Any]:
+def _candidate(c: Candidate, verdict: EffectVerdict) -> dict[str, Any]:
     return {
         "id": c.id,
+        "status": verdict.finding,
+        "bound": list(verdict.bound),
+        "group": list(verdict.group),
+        "retained": c.retained,
         "statistic": c.statistic,
         "p_value": c.p_value,
         "predicted_error": c.predicted_error,

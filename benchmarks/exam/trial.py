@@ -1,0 +1,93 @@
+"""One trial: drive, study, and keep what the tables need."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import truths
+from design import Trial
+
+import sysid_vehicle as sv
+from sysid_vehicle.diagnose import constancy
+
+Outcome = dict[str, Any]
+
+STARTS = 3
+
+
+def examine(trial: Trial, among: Sequence[str] | None = None) -> Outcome:
+    """Do one trial; plain figures, ready for JSON.
+
+    Parameters
+    ----------
+    among : sequence of str, optional
+        Candidates, where not all effects are.
+
+    Returns
+    -------
+    dict
+        `state` is `done`, `lost` (no driver could hold the car) or `failed` (with `why`).
+    """
+    began, cpu = time.perf_counter(), time.thread_time()
+    outcome: Outcome = {"key": trial.key, "trial": trial.to_dict(), "state": "done"}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sv.SysidWarning)
+        try:
+            train, test, ease = truths.sample(trial)
+        except sv.NumericalError as error:
+            return outcome | {"state": "lost", "why": str(error)}
+        try:
+            known = [e.id for e in sv.catalogue()] if among is None else among
+            candidates = [e for e in known if e not in trial.removed]
+            study = sv.improve(
+                truths.baseline(trial.vehicle),
+                train,
+                test,
+                candidates=candidates,
+                starts=STARTS,
+                seed=trial.seed,
+            )
+        except sv.SysidError as error:
+            outcome |= {"state": "failed", "why": f"{type(error).__name__}: {error}"}
+        else:
+            outcome |= {"ease": ease, **_told(study), **_against(study, trial)}
+    outcome["seconds"] = time.perf_counter() - began
+    outcome["cpu_seconds"] = time.thread_time() - cpu
+    return outcome
+
+
+def _told(study: sv.Study) -> Outcome:
+    """What the study said."""
+    first, last = study.diagnoses[0], study.diagnoses[-1]
+    leader = first.ranking[0] if first.significant else None
+    return {
+        "verdict": study.verdict,
+        "added": [a.id for a in study.added],
+        "groups": {a.id: list(study.verdicts[a.id].group) for a in study.added},
+        "evidence": [c.id for c in first.significant],
+        "leader": None if leader is None else leader.id,
+        "leader_group": [] if leader is None else list(leader.indistinguishable_from),
+        "findings": {v.effect.id: v.finding for v in study.verdicts.all if v.finding != "absent"},
+        "constancy": {e: [c.p_value, c.spread, c.degrees] for e, c in constancy(study.fit).items()},
+        "left": [c.id for c in last.significant],
+        "omnibus_first": first.omnibus.p_value,
+        "omnibus_last": study.omnibus.p_value,
+        "train_errors": [c.error for c in study.train],
+        "test_errors": [c.error for c in study.test],
+        "study_seconds": study.seconds,
+    }
+
+
+def _against(study: sv.Study, trial: Trial) -> Outcome:
+    """How that compares with what was hidden."""
+    if trial.kind not in ("effect", "pair"):
+        return {"intervals": {}}
+    intervals = {}
+    for name, true in truths.true_values(trial).items():
+        if name.split(".")[0] in study.model.effects:
+            estimate = study.fit[name]
+            intervals[name] = [estimate.value, estimate.std, true]
+    return {"intervals": intervals}

@@ -1,0 +1,232 @@
+"""The cars, the driving, and what is hidden: effects of the catalogue, and some outside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from design import Trial
+
+import sysid_vehicle as sv
+from sysid_vehicle.simulate import Drive, drive_truth
+
+RATE_HZ = 50.0
+_G = 9.81
+# A car that spins tells nothing: the driver tries again with less.
+_EASIER = (1.0, 0.85, 0.7, 0.55)
+
+Array = npt.NDArray[np.float64]
+Push = Callable[[Drive, float], Array]
+
+
+def vehicle(name: str) -> sv.Vehicle:
+    """The car that is driven."""
+    if name == "saloon":
+        return sv.example_vehicle()
+    return sv.Vehicle(
+        name="hatchback",
+        mass_kg=1080.0,
+        yaw_inertia_kgm2=1480.0,
+        lf_m=1.0,
+        lr_m=1.5,
+        cg_height_m=0.53,
+        track_front_m=1.48,
+        track_rear_m=1.47,
+        drag_area_m2=0.68,
+        brake_front_share=0.72,
+        drive_front_share=1.0,
+        tyre_front=sv.Tyre(B=9.0, C=1.35, D=1.02, E=0.0),
+        tyre_rear=sv.Tyre(B=11.0, C=1.35, D=1.05, E=-0.1),
+    )
+
+
+def baseline(name: str) -> sv.Model:
+    """The same car of which the tyres are not known."""
+    other = {
+        "tyre_front": sv.Tyre(B=9.0, C=1.3, D=0.9, E=0.0),
+        "tyre_rear": sv.Tyre(B=11.0, C=1.5, D=1.1, E=-0.2),
+    }
+    return sv.Model(vehicle(name).replace(**other))
+
+
+def manoeuvres(driving: str, ease: float) -> tuple[sv.manoeuvres.Manoeuvre, ...]:
+    """The drives of one set, 25 to 40 s each; `ease` scales the lateral acceleration."""
+    m = sv.manoeuvres
+    made = {
+        "ramp": lambda: m.ramp_steer((18.0, 27.0), 8.6 * ease, 4.0),
+        "sweep": lambda: m.sine_sweep(25.0, 25.0, 3.5 * ease),
+        "step": lambda: m.step_steer((17.0, 27.0), (3.0 * ease, 6.0 * ease)),
+        "lap": lambda: m.lap(40.0, 8.6 * ease),
+    }
+    return tuple(made[name]() for name in (made if driving == "all" else (driving,)))
+
+
+def hidden(trial: Trial) -> sv.Model:
+    """The true car, as far as the catalogue can tell it."""
+    car = sv.Model(vehicle(trial.vehicle))
+    if trial.kind == "outside":
+        return car
+    values = {}
+    for name in trial.truth:
+        for p in sv.effect(name).parameters:
+            size = p.null_value + trial.severity * (p.typical - p.null_value)
+            if p.scan == "time":
+                size = 14.0  # about the middle of each drive
+            values[f"{name}.{p.name}"] = float(np.clip(size, p.lower, p.upper))
+    return car.add(*trial.truth).with_values(values)
+
+
+def sample(trial: Trial) -> tuple[list[sv.Log], sv.Log, float]:
+    """Drive the training manoeuvres and a held-out course: logs, and how easily it went.
+
+    Raises
+    ------
+    sysid_vehicle.NumericalError
+        The car spins however easily it is driven.
+    """
+    for ease in _EASIER:
+        rng = np.random.default_rng(trial.seed)
+        course = sv.manoeuvres.handling_course(30.0, 8.0 * ease)
+        try:
+            logs = [_log(trial, m, rng) for m in (*manoeuvres(trial.driving, ease), course)]
+        except sv.NumericalError:
+            if ease == _EASIER[-1]:
+                raise
+            continue
+        return logs[:-1], logs[-1], ease
+    raise AssertionError("unreachable")
+
+
+def _log(trial: Trial, manoeuvre: sv.manoeuvres.Manoeuvre, rng: np.random.Generator) -> sv.Log:
+    road = sv.RoadDisturbance()
+    if trial.noise == "coloured force":
+        road = sv.RoadDisturbance(fx_n=120.0, fy_n=150.0, mz_nm=150.0, correlation_time_s=0.3)
+    sensors = sv.SensorNoise().scaled(2.5 if trial.noise == "high" else 1.0)
+    seed = int(rng.integers(2**31))
+    truth = hidden(trial)
+    if trial.kind == "outside":
+        push = OUTSIDE_FORCES[trial.truth[0]]
+        log = pushed(truth, manoeuvre, push, trial.severity, seed, sensors, road)
+    else:
+        log = sv.drive(
+            truth, manoeuvre, seed=seed, noise=sensors, disturbance=road, rate_hz=RATE_HZ
+        )
+    columns = {c: np.asarray(log[c]) for c in log.channels}
+    if trial.noise == "coloured sensor":
+        for channel, std in (("ay_mps2", 0.12), ("yaw_rate_radps", 0.003)):
+            wander = sv.RoadDisturbance(fx_n=std, correlation_time_s=0.05)
+            columns[channel] = columns[channel] + wander.sample(log.n, RATE_HZ, rng)[:, 0]
+    if not trial.with_vy:
+        del columns["vy_mps"]
+    return sv.Log.from_arrays(columns, name=log.name, check=False)
+
+
+class _Pushed(sv.RoadDisturbance):
+    """A road that also pushes as it is told; the driving is made to agree with it."""
+
+    told: Array | None = None
+
+    def sample(self, n: int, rate_hz: float, rng: np.random.Generator) -> Array:
+        road = super().sample(n, rate_hz, rng)
+        return road if self.told is None else np.ascontiguousarray(road + self.told)
+
+
+def pushed(
+    truth: sv.Model,
+    manoeuvre: sv.manoeuvres.Manoeuvre,
+    push: Push,
+    severity: float,
+    seed: int,
+    noise: sv.SensorNoise,
+    road: sv.RoadDisturbance,
+) -> sv.Log:
+    """Drive with forces that depend on the motion, found by repetition until both agree.
+
+    A force that follows from the motion of the same drive is a fixed point, and as it acts only on
+    what comes later, repetition converges.
+    """
+    told: Array | None = None
+    for _ in range(30):
+        disturbance = _Pushed(**{k: getattr(road, k) for k in road.__dataclass_fields__})
+        object.__setattr__(disturbance, "told", told)
+        done = drive_truth(
+            truth, manoeuvre, seed=seed, noise=noise, disturbance=disturbance, rate_hz=RATE_HZ
+        )
+        wanted = np.ascontiguousarray(push(done, severity))
+        if told is not None and np.max(np.abs(wanted - told)) < 1.0:
+            return done.log
+        told = wanted
+    raise sv.NumericalError(f"{manoeuvre.name}: force and motion do not come to agree")
+
+
+def _signals(done: Drive) -> tuple[Array, Array, Array, Array]:
+    """Speed, lateral acceleration, rear slip angle, wheel force."""
+    vx, vy, r = done.states.T
+    rear = -np.arctan2(vy - done.model.vehicle.lr_m * r, vx)
+    return vx, vx * r, rear, done.inputs[:, 1]
+
+
+def _rear_tyre_bump(done: Drive, s: float) -> Array:
+    """A rear tyre that is stronger at one slip angle than any Magic Formula."""
+    _, _, slip, _ = _signals(done)
+    bump = 250.0 * s * np.sign(slip) * np.exp(-(((np.abs(slip) - 0.035) / 0.02) ** 2))
+    return np.column_stack([0.0 * bump, bump, -done.model.vehicle.lr_m * bump])
+
+
+def _torque_vectoring(done: Drive, s: float) -> Array:
+    """A moment that helps to turn in fast corners, until it has reached what it can."""
+    vx, ay, _, _ = _signals(done)
+    moment = 350.0 * s * np.tanh(ay / 5.0) * np.clip((vx - 15.0) / 10.0, 0.0, 1.0)
+    return np.column_stack([0.0 * moment, 0.0 * moment, moment])
+
+
+def _wing_that_opens(done: Drive, s: float) -> Array:
+    """Drag, and the side force of a rear axle, that are lost above one speed."""
+    vx, ay, _, _ = _signals(done)
+    opened = 1.0 / (1.0 + np.exp(-(vx - 24.0) / 0.5))
+    side = -0.03 * s * done.model.vehicle.mass_kg * ay * opened
+    return np.column_stack([250.0 * s * opened, side, -done.model.vehicle.lr_m * side])
+
+
+def _crowned_road(done: Drive, s: float) -> Array:
+    """A road whose bank comes and goes with the distance."""
+    way = np.cumsum(done.states[:, 0]) / RATE_HZ
+    side = 0.03 * s * done.model.vehicle.mass_kg * _G * np.sin(2.0 * np.pi * way / 160.0)
+    return np.column_stack([0.0 * side, side, 0.0 * side])
+
+
+def _braking_moment(done: Drive, s: float) -> Array:
+    """A moment out of the corner that comes with hard braking only."""
+    _, ay, _, force = _signals(done)
+    braking = np.clip((-force - 800.0) / 2000.0, 0.0, 1.0)
+    moment = -500.0 * s * braking * np.tanh(ay / 5.0)
+    return np.column_stack([0.0 * moment, 0.0 * moment, moment])
+
+
+def _cornering_drag(done: Drive, s: float) -> Array:
+    """Drag that grows with the work tyres did in the last seconds."""
+    vx, ay, slip, _ = _signals(done)
+    keep = np.exp(-1.0 / (4.0 * RATE_HZ))
+    work = np.abs(ay * slip * vx)
+    warm = np.zeros_like(work)
+    for k in range(1, len(work)):
+        warm[k] = keep * warm[k - 1] + (1.0 - keep) * work[k]
+    drag = -60.0 * s * warm
+    return np.column_stack([drag, 0.0 * drag, 0.0 * drag])
+
+
+OUTSIDE_FORCES: dict[str, Push] = {
+    "rear tyre bump": _rear_tyre_bump,
+    "torque vectoring": _torque_vectoring,
+    "wing that opens": _wing_that_opens,
+    "crowned road": _crowned_road,
+    "braking moment": _braking_moment,
+    "cornering drag by temperature": _cornering_drag,
+}
+
+
+def true_values(trial: Trial) -> dict[str, float]:
+    """Hidden parameters by full name, without those that mean nothing to an interval."""
+    model = hidden(trial)
+    return {n: model.value(n) for n, p in model.parameters.items() if "." in n and not p.scan}

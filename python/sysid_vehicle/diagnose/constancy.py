@@ -1,0 +1,152 @@
+"""Does a parameter of an effect have one value everywhere? What is truly there has.
+
+An effect that stands in for another one takes whatever value each piece of driving asks for. So
+its sensitivities are cut into pieces, one for each log or for some seconds of the only one, and the
+pieces are tested beside the whole: a score test of values that differ (Chow, Econometrica 1960),
+the same as Cochran's Q of the pieces' own estimates (Biometrics 1954) with all else fitted anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from .. import _core
+from .._arrays import FloatArray
+from .._text import number
+from ..effects import Effect
+from ..estimate import Driving
+from ..identify import Fit
+from .score import _basis, _pseudo_inverse, _variance_ratio
+
+__all__ = ["Constancy", "constancy"]
+
+_LEVEL = 0.01
+_SPREAD = 0.25  # share of a value: less is what any equation of any textbook leaves open
+_PIECE_S = 10.0
+_MOST_PIECES = 6
+
+
+@dataclass(frozen=True)
+class Constancy:
+    """Whether an effect keeps its value throughout the driving.
+
+    Attributes
+    ----------
+    statistic, degrees : float, int
+        Chi-squared where the value is one.
+    p_value : float
+    spread : float
+        Standard deviation of the value over the pieces, beyond what their noise explains, as a
+        share of the whole value; the largest of the effect's parameters.
+    values : tuple of float
+        Of the first parameter, piece by piece.
+    """
+
+    effect: Effect
+    statistic: float
+    degrees: int
+    p_value: float
+    spread: float
+    values: tuple[float, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether one value will do: no evidence at 1 % of differences, or small ones only."""
+        return self.p_value > _LEVEL or self.spread < _SPREAD
+
+    def __str__(self) -> str:
+        if self.holds:
+            return f"{self.effect.id} keeps its value (p = {self.p_value:.2g})"
+        low, high = (number(v, 3) for v in (min(self.values), max(self.values)))
+        first = self.effect.parameters[0]
+        unit = f" {first.unit}".removesuffix(" 1")
+        return (
+            f"{self.effect.id} does not keep its value: {first.name} changes from {low} to "
+            f"{high}{unit} (p = {self.p_value:.2g})"
+        )
+
+
+def constancy(fit: Fit) -> dict[str, Constancy]:
+    """Test every effect of a fitted model, on what it was fitted to.
+
+    Returns
+    -------
+    dict
+        By id of the effect. Effects whose time or place is itself a parameter are left out, and
+        driving that is one short piece tells nothing.
+    """
+    pieces = _pieces(fit.driving)
+    parts = [e for e in fit.model.parts if e.scanned is None]
+    if len(pieces) < 2 or not parts:
+        return {}
+    problem = fit.driving.problem(fit.model)
+    p = fit.model.vector()
+    frozen = problem.freeze(p, fit.noise.vector())
+    e = problem.residuals(p, frozen).ravel()
+    known = fit.model.parameters
+    names = list(fit.model.free_names)
+    G = problem.sensitivities(p, frozen, [known[n].column for n in names])
+    basis = _basis(G)
+    e = e - basis @ (basis.T @ e)
+    return {
+        part.id: _of_effect(
+            part,
+            fit,
+            G[:, [names.index(f"{part.id}.{q.name}") for q in part.parameters]],
+            pieces,
+            basis,
+            e,
+        )
+        for part in parts
+    }
+
+
+def _pieces(driving: Driving) -> list[FloatArray]:
+    """Masks over the residuals: the logs, or equal parts of the only one."""
+    number = driving.log_number
+    if len(driving.logs) == 1:
+        seconds = driving.samples / driving.logs[0].rate_hz
+        count = min(int(seconds / _PIECE_S), _MOST_PIECES)
+        number = np.floor(np.arange(driving.samples) * count / max(driving.samples, 1))
+    return [np.repeat(number == i, _core.CHANNELS) for i in np.unique(number)]
+
+
+def _of_effect(
+    effect: Effect,
+    fit: Fit,
+    own: FloatArray,
+    pieces: list[FloatArray],
+    basis: FloatArray,
+    e: FloatArray,
+) -> Constancy:
+    whole = np.array([fit[f"{effect.id}.{q.name}"].value - q.null_value for q in effect.parameters])
+    # The pieces add up to the whole, which is fitted: the last one says nothing of its own.
+    cut = np.hstack([own * piece[:, None] for piece in pieces])
+    R = cut - basis @ (basis.T @ cut)
+    inverse, rank = _pseudo_inverse(R.T @ R)
+    S = R.T @ e
+    off = inverse @ S
+    along = (R @ off)[:, None]
+    ratio = max(_variance_ratio(along, e - along[:, 0], inverse[:1, :1]), 1.0)
+    statistic = float(S @ off) / ratio
+    width = own.shape[1]
+    by_piece = off.reshape(len(pieces), width)
+    precision = np.array([(own[piece] ** 2).sum(axis=0) for piece in pieces])
+    weights = precision / np.maximum(precision.sum(axis=0), 1e-300)
+    centred = by_piece - (weights * by_piece).sum(axis=0)
+    # What noise alone would scatter, taken off (DerSimonian & Laird, Controlled Trials 1986).
+    excess = max(1.0 - rank / statistic, 0.0) if statistic > 0.0 else 0.0
+    scatter = np.sqrt(excess * (weights * centred**2).sum(axis=0))
+    share = scatter / np.maximum(np.abs(whole), 1e-300)
+    felt = [i for i, q in enumerate(effect.parameters) if abs(whole[i]) > 0.5 * q.matters]
+    return Constancy(
+        effect,
+        statistic,
+        rank,
+        float(chi2.sf(statistic, rank)),
+        float(np.max(share[felt])) if felt else 0.0,
+        tuple(float(v) for v in effect.parameters[0].null_value + whole[0] + centred[:, 0]),
+    )
