@@ -1,7 +1,8 @@
 """The exam: how often does the diagnosis find what is hidden, and own up when it cannot?
 
-    python benchmarks/exam [--small | --full] [--draw KIND=N ...] [--workers N] [--only TABLE]
-                           [--json FILE] [--plot PNG]
+    python benchmarks/exam [--small | --full | --draw KIND=N ...] [--driving SET ...]
+                           [--severity S ...] [--workers N] [--only TABLE] [--json FILE]
+                           [--plot PNG]
 
 `--small` (the default) takes less than a minute. `--full` does every point of the grid; `--draw`
 some of them, its truths and severities in turn. Outcomes go to the file as they come: the same
@@ -19,7 +20,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from confusion import draw
-from design import KINDS, Trial, full, small, stratified
+from design import KINDS, MANOEUVRES, SEVERITIES, Trial, full, small, stratified
 from store import read, run
 from tables import KINDS_OF, NAMES, tables
 from trial import Outcome
@@ -55,6 +56,8 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     size.add_argument(
         "--draw", nargs="+", metavar="KIND=N", help=f"so many of each kind: {', '.join(KINDS)}"
     )
+    parser.add_argument("--driving", nargs="+", choices=MANOEUVRES, default=MANOEUVRES)
+    parser.add_argument("--severity", nargs="+", type=float, choices=SEVERITIES, default=SEVERITIES)
     parser.add_argument("--repeats", type=int, default=1, help="of each point of the full grid")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
@@ -65,11 +68,17 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _trials(args: argparse.Namespace) -> tuple[Trial, ...]:
-    if args.draw:
-        each = {kind: int(n) for kind, n in (text.rsplit("=", 1) for text in args.draw)}
-        trials = stratified(full(args.repeats), each, args.seed)
+    if args.full or args.draw:
+        trials = tuple(
+            t
+            for t in full(args.repeats)
+            if t.driving in args.driving and (t.severity in args.severity or t.kind == "null")
+        )
+        if args.draw:
+            each = {kind: int(n) for kind, n in (text.rsplit("=", 1) for text in args.draw)}
+            trials = stratified(trials, each, args.seed)
     else:
-        trials = full(args.repeats) if args.full else small(args.seed)
+        trials = small(args.seed)
     if args.only is not None:
         trials = tuple(t for t in trials if t.kind in KINDS_OF[args.only])
     return trials

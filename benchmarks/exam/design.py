@@ -185,5 +185,5 @@ def stratified(
 def small(seed: int = 0) -> tuple[Trial, ...]:
     """Few trials of every kind, cheap enough for continuous integration."""
     short = [t for t in full(null_repeats=1) if t.driving != "all"]
-    counts = {"null": 4, "effect": 3, "pair": 1, "outside": 1, "group removed": 1}
+    counts = {"null": 4, "effect": 2, "pair": 1, "outside": 1, "group removed": 1}
     return stratified(short, counts, seed, nominal=1.0)

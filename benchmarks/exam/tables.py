@@ -110,11 +110,9 @@ def _mean(values: object) -> str:
 def _improving(outcomes: Sequence[Outcome]) -> list[Row]:
     found = [o for o in _of(outcomes, "effect", "pair") if o["added"]]
     better = Rate.over(o["test_errors"][-1] < o["test_errors"][0] for o in found)
-    last = [
-        o["test_errors"][-1]
-        for o in _of(outcomes, "effect")
-        if o["trial"]["severity"] >= 1.0 and detected(o)
-    ]
+    hard = [o for o in _of(outcomes, "effect") if o["trial"]["severity"] >= 1.0 and detected(o)]
+    plain = [o["test_errors"][-1] for o in hard if "coloured" not in o["trial"]["noise"]]
+    to_truth = [o["test_errors"][-1] / o["true_error"] for o in hard]
     covered = [
         abs(value - true) <= 1.96 * std
         for o in found
@@ -123,8 +121,10 @@ def _improving(outcomes: Sequence[Outcome]) -> list[Row]:
     ]
     return [
         ("held-out error improved by what was added", str(better), ">= 98 %"),
-        ("held-out error after, severity 1 and 2, median", _quantile(last, 0.5), "<= 1.03"),
-        ("  95th percentile", _quantile(last, 0.95), "<= 1.10"),
+        ("held-out error after, of the true car's, median", _quantile(to_truth, 0.5), "<= 1.03"),
+        ("  95th percentile", _quantile(to_truth, 0.95), "<= 1.10"),
+        ("  of the noise floor, where noise is white, median", _quantile(plain, 0.5), "<= 1.03"),
+        ("  95th percentile", _quantile(plain, 0.95), "<= 1.10"),
         ("95 % intervals that hold the true parameter", str(Rate.over(covered)), "93-97 %"),
     ]
 

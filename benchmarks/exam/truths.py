@@ -15,6 +15,8 @@ RATE_HZ = 50.0
 _G = 9.81
 # A car that spins tells nothing: the driver tries again with less.
 _EASIER = (1.0, 0.85, 0.7, 0.55)
+# Held-out driving asks no more of the tyres than the fit has seen: no model knows what comes then.
+_COURSE_MPS2 = {"ramp": 8.0, "sweep": 3.0, "step": 5.5, "lap": 8.0, "all": 8.0}
 
 Array = npt.NDArray[np.float64]
 Push = Callable[[Drive, float], Array]
@@ -87,7 +89,7 @@ def sample(trial: Trial) -> tuple[list[sv.Log], sv.Log, float]:
     """
     for ease in _EASIER:
         rng = np.random.default_rng(trial.seed)
-        course = sv.manoeuvres.handling_course(30.0, 8.0 * ease)
+        course = sv.manoeuvres.handling_course(30.0, _COURSE_MPS2[trial.driving] * ease)
         try:
             logs = [_log(trial, m, rng) for m in (*manoeuvres(trial.driving, ease), course)]
         except sv.NumericalError:
@@ -147,7 +149,7 @@ def pushed(
     what comes later, repetition converges.
     """
     told: Array | None = None
-    for _ in range(30):
+    for i in range(40):
         disturbance = _Pushed(**{k: getattr(road, k) for k in road.__dataclass_fields__})
         object.__setattr__(disturbance, "told", told)
         done = drive_truth(
@@ -156,7 +158,8 @@ def pushed(
         wanted = np.ascontiguousarray(push(done, severity))
         if told is not None and np.max(np.abs(wanted - told)) < 1.0:
             return done.log
-        told = wanted
+        # Halves where it swings about the end.
+        told = wanted if told is None or i < 10 else 0.5 * (told + wanted)
     raise sv.NumericalError(f"{manoeuvre.name}: force and motion do not come to agree")
 
 

@@ -40,6 +40,7 @@ def outcome(exam: SimpleNamespace, kind: str, truth: tuple[str, ...], **told: An
         "omnibus_first": 0.5,
         "omnibus_last": 0.5,
         "test_errors": [1.5, 1.0],
+        "true_error": 1.0,
         "intervals": {},
     }
     return {"key": trial.key, "trial": trial.to_dict(), "state": "done", **usual, **told}

@@ -60,13 +60,14 @@ class Constancy:
     def __str__(self) -> str:
         if self.holds:
             return f"{self.effect.id} keeps its value (p = {self.p_value:.2g})"
+        return f"{self.effect.id} does not keep its value: {self.span} (p = {self.p_value:.2g})"
+
+    @property
+    def span(self) -> str:
+        """Between which values the first parameter changes, in words."""
         low, high = (number(v, 3) for v in (min(self.values), max(self.values)))
         first = self.effect.parameters[0]
-        unit = f" {first.unit}".removesuffix(" 1")
-        return (
-            f"{self.effect.id} does not keep its value: {first.name} changes from {low} to "
-            f"{high}{unit} (p = {self.p_value:.2g})"
-        )
+        return f"{first.name} from {low} to {high} {first.unit}".removesuffix(" 1")
 
 
 def constancy(fit: Fit) -> dict[str, Constancy]:
@@ -130,7 +131,7 @@ def _of_effect(
     S = R.T @ e
     off = inverse @ S
     along = (R @ off)[:, None]
-    ratio = max(_variance_ratio(along, e - along[:, 0], inverse[:1, :1]), 1.0)
+    ratio = max(_variance_ratio(along, e - along[:, 0], along.T @ along), 1.0)
     statistic = float(S @ off) / ratio
     width = own.shape[1]
     by_piece = off.reshape(len(pieces), width)

@@ -90,7 +90,8 @@ def _statistic(R: FloatArray, e: FloatArray) -> tuple[float, int]:
     inverse, rank = _pseudo_inverse(R.T @ R)
     S = R.T @ e
     value = inverse @ S
-    ratio = _variance_ratio(R[:, :1] * 0.0 + (R @ value)[:, None], e - R @ value, inverse[:1, :1])
+    along = (R @ value)[:, None]
+    ratio = _variance_ratio(along, e - along[:, 0], along.T @ along)
     return float(S @ value) / max(ratio, 1.0), rank
 
 

@@ -7,7 +7,7 @@ so that what merely acted like one of them is told from what is missing too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -53,9 +53,8 @@ class EffectVerdict:
         How far from nothing each parameter may be, at 95 %.
     group : tuple of str
         The rivals, or what the proxy acted like.
-    varies : tuple of float
-        Smallest and largest value of the first parameter over the pieces of driving, of a proxy
-        that does not keep its value.
+    because : str
+        Of a proxy: what tells that it is not the effect itself.
     """
 
     effect: Effect
@@ -64,7 +63,7 @@ class EffectVerdict:
     std: tuple[float, ...] = ()
     bound: tuple[float, ...] = ()
     group: tuple[str, ...] = ()
-    varies: tuple[float, ...] = ()
+    because: str = ""
 
     @property
     def sentence(self) -> str:
@@ -79,13 +78,8 @@ class EffectVerdict:
             return f"missing, or else {rivals}, which this driving cannot tell from it; {size}"
         if self.finding == "proxy" and rivals:
             return f"only acted like what {rivals} explains"
-        if self.finding == "proxy" and self.varies:
-            low, high = (number(v, 3) for v in self.varies)
-            first = self.effect.parameters[0]
-            span = f"{first.name} from {low} to {high} {first.unit}".removesuffix(" 1")
-            return f"something acts like it, but not with one value ({span}): look elsewhere"
         if self.finding == "proxy":
-            return f"something acts like it, but no car has such a value ({size}): look elsewhere"
+            return f"something acts like it, but {self.because}: look elsewhere"
         if self.finding == "negligible":
             return f"present but negligible; {size}; it would matter from {matters}"
         if self.finding == "absent":
@@ -120,6 +114,17 @@ class Verdicts:
                 return v
         raise KeyError(f"'{effect}'; there are {', '.join(v.effect.id for v in self.all)}")
 
+    def doubting(self, effects: Iterable[str], because: str) -> Verdicts:
+        """The same, but what is said to be missing of these effects is called a proxy."""
+        doubted = set(effects)
+        told = [
+            replace(v, finding="proxy", group=(), because=because)
+            if v.effect.id in doubted and v.finding in ("missing", "one of a group")
+            else v
+            for v in self.all
+        ]
+        return Verdicts(tuple(sorted(told, key=lambda v: _ORDER.index(v.finding))))
+
     def of(self, finding: Finding) -> tuple[EffectVerdict, ...]:
         """All of one kind."""
         return tuple(v for v in self.all if v.finding == finding)
@@ -141,7 +146,7 @@ class Verdicts:
                 "std": list(v.std),
                 "bound": list(v.bound),
                 "group": list(v.group),
-                "varies": list(v.varies),
+                "because": v.because,
             }
             for v in self.all
         }
@@ -184,6 +189,7 @@ def judge(
     alpha: float,
     seed: int = 0,
     scored: tuple[tuple[Score, ...], Mapping[str, float]] | None = None,
+    settled: bool = False,
 ) -> Verdicts:
     """Judge every effect beside those of the final model.
 
@@ -203,6 +209,9 @@ def judge(
         Of the draws that correct for testing many effects.
     scored : (scores, p-values), optional
         Of what the final model lacks, where a diagnosis of it has them already.
+    settled : bool
+        Whether everything worth adding was added. What there is still evidence for is then no
+        explanation: with it, driving that no fit saw is not predicted better.
     """
     if scored is None:
         lacking = tuple(e for e in final.model.candidates if e.id in lacked)
@@ -216,8 +225,8 @@ def judge(
     kept = constancy(final)
     for i, v in enumerate(found):
         if v.effect.id in kept and not kept[v.effect.id].holds:
-            values = kept[v.effect.id].values
-            found[i] = replace(v, finding="proxy", group=(), varies=(min(values), max(values)))
+            because = f"not with one value ({kept[v.effect.id].span})"
+            found[i] = replace(v, finding="proxy", group=(), because=because)
     for effect in final.model.candidates:
         if effect.id not in lacked:
             continue
@@ -228,6 +237,9 @@ def judge(
             verdict = EffectVerdict(
                 effect, kind, verdict.value, verdict.std, verdict.bound, group=names
             )
+        elif settled and verdict.finding == "missing":
+            because = "with it, driving that no fit saw is predicted no better"
+            verdict = replace(verdict, finding="proxy", because=because)
         found.append(verdict)
     found.sort(key=lambda v: (_ORDER.index(v.finding), family.get(v.effect.id, 0.0)))
     return Verdicts(tuple(found))
@@ -261,11 +273,16 @@ def _of_present(
         if not p.scan
     ]
     finding: Finding = "one of a group" if group else "missing"
+    because = ""
     if any(_impossible(p.null_value, p.typical, p.lower, p.upper, d, s) for p, d, s in sizes):
         finding, group = "proxy", ()
+        size = _listed(
+            effect, [f"{number(v, 3)} +- {number(s, 2)}" for v, s in zip(value, std, strict=True)]
+        )
+        because = f"no car has such a value ({size})"
     elif all(abs(d) + s < p.matters for p, d, s in sizes):
         finding, group = "negligible", ()
-    return EffectVerdict(effect, finding, value, std, _bound(effect, value, std), group)
+    return EffectVerdict(effect, finding, value, std, _bound(effect, value, std), group, because)
 
 
 def _impossible(

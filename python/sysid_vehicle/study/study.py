@@ -33,7 +33,7 @@ Verdict = Literal["adequate", "explained", "partly_explained", "unknown"]
 
 _MEANING = {
     "adequate": "nothing is missing that this driving can show",
-    "explained": "the effects found explain the driving down to the noise floor",
+    "explained": "the effects found explain all that depends on the driving",
     "partly_explained": "the effects found explain part of it; something else is missing",
     "unknown": "something is missing and no effect of the catalogue explains it",
 }
