@@ -26,17 +26,23 @@ _DEGREE = 6
 _AGREES = 1.8  # standard deviations
 
 
-def white_noise_std(y: FloatArray) -> float:
+def white_noise_std(y: FloatArray, block: int | None = None) -> float:
     """White noise of a signal from its third differences, which smooth driving hardly enters.
 
-    NaN stands for missing samples; 0 where there are too few to tell.
+    NaN stands for missing samples; 0 where there are too few to tell. Noise that pauses is a
+    mixture whose median tells little: with `block`, the root mean variance of stretches of so many
+    samples is returned.
     """
     d = np.diff(y, n=3)
     d = d[np.isfinite(d)]
-    if len(d) < 20:
-        return 0.0
+    parts = [d] if block is None else np.array_split(d, max(len(d) // block, 1))
     # 20 = 1 + 9 + 9 + 1; the median stands a few corners in the signal.
-    return float(1.4826 * np.median(np.abs(d - np.median(d))) / np.sqrt(20.0))
+    variances = [
+        (1.4826 * np.median(np.abs(part - np.median(part)))) ** 2 / 20.0
+        for part in parts
+        if len(part) >= 20
+    ]
+    return float(np.sqrt(np.mean(variances))) if variances else 0.0
 
 
 def quiet(y: FloatArray) -> FloatArray:

@@ -6,13 +6,11 @@ import math
 from collections.abc import Iterator, Mapping
 from html import escape
 
-import numpy as np
-
 from .. import _core
-from .._arrays import FloatArray
 from .._files import refuse_unknown
 from .._text import text_table
 from ..errors import InvalidInput
+from ..estimate.inputs import white_noise_std
 from ..log import Log
 
 __all__ = ["SideslipSettings"]
@@ -49,7 +47,7 @@ _MEANING = {
 }
 # Quieter than these no sensor of a car is; simulated channels without noise are.
 _QUIETEST = {"vx_mps": 0.01, "yaw_rate_radps": 5e-4, "ax_mps2": 0.02, "ay_mps2": 0.02}
-_BLOCK = 100  # samples
+_BLOCK = 100  # samples; vibration comes and goes with the driving
 
 
 class SideslipSettings(Mapping[str, float]):
@@ -85,7 +83,7 @@ class SideslipSettings(Mapping[str, float]):
     def of(cls, log: Log, **changes: float) -> SideslipSettings:
         """Take the noise of the sensors from the fast scatter of the log's channels."""
         noise = {
-            name: max(_scatter(log[name]), least)
+            name: max(white_noise_std(log[name], _BLOCK), least)
             for name, least in _QUIETEST.items()
             if log.has(name)
         }
@@ -113,16 +111,3 @@ class SideslipSettings(Mapping[str, float]):
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(str(self))}</pre>"
-
-
-def _scatter(y: FloatArray) -> float:
-    """White noise from third differences: the median stands corners, the blocks noise that pauses.
-
-    A record may hold stretches that are quieter than others; what counts is the mean variance.
-    """
-    d = np.diff(y, n=3)
-    d = d[np.isfinite(d)]
-    blocks = np.array_split(d, max(len(d) // _BLOCK, 1))
-    medians = [1.4826 * float(np.median(np.abs(block))) for block in blocks if len(block) > 20]
-    # 20 = 1 + 9 + 9 + 1 is the gain of a third difference on the variance of white noise.
-    return math.sqrt(float(np.mean(np.square(medians))) / 20.0) if medians else 0.0
