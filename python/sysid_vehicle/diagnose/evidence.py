@@ -129,4 +129,5 @@ def solve(R: FloatArray, e: FloatArray) -> Solution:
 
 def variance_ratio(direction: FloatArray, e: FloatArray) -> float:
     """Long-run over naive variance of the score along one direction, at least 1."""
-    return max(_variance_ratio(direction[:, None], e, np.eye(1)), 1.0)
+    along = direction[:, None]
+    return max(_variance_ratio(along, e, along.T @ along), 1.0)
