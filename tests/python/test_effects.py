@@ -15,7 +15,7 @@ def test_the_catalogue_fills_the_core_vector_without_overlap() -> None:
     columns = [p.column for p in base_parameters()]
     for e in catalogue():
         columns += e.columns
-    assert columns == list(range(_core.PARAMETERS))
+    assert columns == list(range(_core.USER_OFFSET))
     assert [e.bit for e in catalogue()] == [1 << i for i in range(len(catalogue()))]
     assert len({e.id for e in catalogue()}) == len(catalogue())
 
