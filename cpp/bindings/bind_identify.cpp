@@ -184,15 +184,16 @@ void register_identify(py::module_& m) {
             py::arg("parameters"), py::arg("noise"), py::arg("smoothed"))
         .def(
             "look_ahead",
-            [](const Problem& self, const Array& p, const Array& noise, std::size_t ahead) {
+            [](const Problem& self, const Array& p, const Array& noise, std::size_t ahead,
+               std::size_t every) {
                 const double* values = values_of(p);
                 const Noise n = to_noise(noise);
                 Array out = empty(self.samples(), kChannels);
                 double* to = out.mutable_data();
-                unlocked([&] { look_ahead(self, values, n, ahead, to); });
+                unlocked([&] { look_ahead(self, values, n, ahead, every, to); });
                 return out;
             },
-            py::arg("parameters"), py::arg("noise"), py::arg("ahead"));
+            py::arg("parameters"), py::arg("noise"), py::arg("ahead"), py::arg("every") = 1);
 }
 
 }  // namespace sysid::bindings

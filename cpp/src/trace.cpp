@@ -1,3 +1,5 @@
+#include <stdexcept>
+
 #include "sysid/estimate/smoother.hpp"
 #include "sysid/identify/prediction_error.hpp"
 #include "sysid/identify/run_system.hpp"
@@ -50,14 +52,14 @@ void trace_run(const Problem& problem, const Run& run, const double* p, const No
 
 template <int NX>
 void look_ahead_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
-                    std::size_t ahead, double* errors) {
+                    std::size_t ahead, std::size_t every, double* errors) {
     const RunSystem<NX> system(problem.model, run, p, noise);
     std::vector<Vec<NX>> means(run.size());
     filter_run<NX>(system,
                    [&](std::size_t k, const FilterStep<NX, kChannels>& s) { means[k] = s.mean; });
     std::fill(errors, errors + run.size() * kChannels, std::nan(""));
     const std::array<double, kPushes> calm{};
-    for (std::size_t k = 0; k + ahead < run.size(); ++k) {
+    for (std::size_t k = 0; k + ahead < run.size(); k += every) {
         ModelState<double> x = system.start();
         for (int i = 0; i < kMotionStates; ++i) x[static_cast<std::size_t>(i)] = means[k][i];
         for (std::size_t i = 0; i < system.own().count; ++i)
@@ -87,10 +89,11 @@ Trace trace(const Problem& problem, const double* p, const Noise& noise, bool sm
 }
 
 void look_ahead(const Problem& problem, const double* p, const Noise& noise, std::size_t ahead,
-                double* errors) {
+                std::size_t every, double* errors) {
+    if (every == 0) throw std::invalid_argument("every = 0: give one or more");
     with_state_size(problem.model.effects, [&](auto nx) {
         for (const Run& run : problem.runs) {
-            look_ahead_run<decltype(nx)::value>(problem, run, p, noise, ahead, errors);
+            look_ahead_run<decltype(nx)::value>(problem, run, p, noise, ahead, every, errors);
             errors += run.size() * kChannels;
         }
     });

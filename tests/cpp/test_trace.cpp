@@ -78,7 +78,7 @@ TEST(LookAhead, PerfectModelAndDataLeaveNoError) {
         problem.runs = {run, run};
         for (std::size_t ahead : {1U, 20U}) {
             std::vector<double> errors(problem.samples() * kChannels);
-            look_ahead(problem, p.data(), ordinary_noise(), ahead, errors.data());
+            look_ahead(problem, p.data(), ordinary_noise(), ahead, 1, errors.data());
             for (std::size_t n = 0; n < errors.size(); ++n) {
                 const std::size_t k = n / kChannels % run.size();
                 if (k < ahead) {
@@ -97,12 +97,25 @@ TEST(LookAhead, ErrorOfAWrongModelGrowsWithTheHorizon) {
     p[kBRear] *= 0.7;
     const auto yaw_rate_error = [&](std::size_t ahead) {
         std::vector<double> errors(problem.samples() * kChannels);
-        look_ahead(problem, p.data(), ordinary_noise(), ahead, errors.data());
+        look_ahead(problem, p.data(), ordinary_noise(), ahead, 1, errors.data());
         double sum = 0.0;
         for (std::size_t k = 60; k < problem.samples(); ++k)
             sum += std::pow(errors[k * kChannels + kYawRate], 2);
         return std::sqrt(sum);
     };
+    // Starting fewer predictions leaves those that are made as they were.
+    std::vector<double> all(problem.samples() * kChannels), few(all.size());
+    look_ahead(problem, p.data(), ordinary_noise(), 30, 1, all.data());
+    look_ahead(problem, p.data(), ordinary_noise(), 30, 7, few.data());
+    for (std::size_t k = 0; k < problem.samples(); ++k) {
+        const std::size_t n = k * kChannels + kYawRate;
+        if (k >= 30 && (k - 30) % 7 == 0)
+            EXPECT_EQ(few[n], all[n]) << k;
+        else
+            EXPECT_TRUE(std::isnan(few[n])) << k;
+    }
+    EXPECT_THROW(look_ahead(problem, p.data(), ordinary_noise(), 30, 0, all.data()),
+                 std::invalid_argument);
     EXPECT_GT(yaw_rate_error(30), 1.5 * yaw_rate_error(3));
 }
 

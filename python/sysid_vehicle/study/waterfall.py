@@ -121,7 +121,9 @@ def _error(
     ahead = max(round(horizon_s * driving.logs[0].rate_hz), 1)
     problem = driving.problem(fit.model)
     try:
-        e = problem.look_ahead(fit.model.vector(), noise.vector(), ahead) / spread
+        # Predictions that begin a twentieth of their length apart are wrong alike.
+        every = max(ahead // 20, 1)
+        e = problem.look_ahead(fit.model.vector(), noise.vector(), ahead, every) / spread
     except _core.NumericalFailure:
         return float("inf")
     e = np.where(np.isfinite(driving.measured), e, np.nan)

@@ -69,8 +69,9 @@ struct Trace {
 
 Trace trace(const Problem& problem, const double* p, const Noise& noise, bool smoothed);
 
-/// Prediction errors `ahead` samples ahead, from the filtered state: samples x kChannels.
+/// Prediction errors `ahead` samples ahead, from the filtered state: samples x kChannels. Only
+/// one sample in `every` starts a prediction; where none ends, errors are NaN.
 void look_ahead(const Problem& problem, const double* p, const Noise& noise, std::size_t ahead,
-                double* errors);
+                std::size_t every, double* errors);
 
 }  // namespace sysid
