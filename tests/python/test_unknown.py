@@ -7,7 +7,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, Log, Model, RoadDisturbance, drive, identify, manoeuvres, unknown
+from sysid_vehicle import (
+    Fit,
+    Log,
+    Model,
+    RoadDisturbance,
+    drive,
+    identify,
+    manoeuvres,
+    unknown,
+    where,
+)
 from sysid_vehicle.diagnose import Unknown
 from sysid_vehicle.diagnose.evidence import Evidence
 from sysid_vehicle.diagnose.grammar import Form, forms, unit_of_gain
@@ -33,9 +43,13 @@ def blown(truth: Model, manoeuvre: manoeuvres.Manoeuvre, seed: int) -> Log:
 
 
 @pytest.fixture(scope="module")
-def wind(truth: Model, start: Model) -> Unknown:
-    fit = identify(start, blown(truth, manoeuvres.lap(30.0), 5), starts=1)
-    return unknown(fit, blown(truth, manoeuvres.handling_course(30.0, lateral_mps2=7.5), 6))
+def windy(truth: Model, start: Model) -> Fit:
+    return identify(start, blown(truth, manoeuvres.lap(30.0), 5), starts=1)
+
+
+@pytest.fixture(scope="module")
+def wind(windy: Fit, truth: Model) -> Unknown:
+    return unknown(windy, blown(truth, manoeuvres.handling_course(30.0, lateral_mps2=7.5), 6))
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +100,13 @@ def test_a_formula_carries_functions_of_arrays(wind: Unknown) -> None:
     act = first.functions()
     assert act["F_y"](d, p) == pytest.approx([50.0, 200.0])
     assert act["M_z"](d, p) == pytest.approx([200.0, 800.0])
+
+
+def test_that_the_speed_changes_is_no_change_of_the_car(windy: Fit) -> None:
+    failing = where(windy)
+    assert failing.change_points == ()
+    assert failing.best_pair.coordinates[0] == "vx_mps"
+    assert failing.best_pair.share > 0.2
 
 
 def test_nothing_is_made_of_noise(complete: Unknown) -> None:

@@ -22,27 +22,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit
 from scipy.stats import chi2
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
-from ..effects import effect
 from ..estimate import Driving
+from .change_directions import Kind, beginning, kinds_of_change, of_driving
 from .coordinates import running_time
-from .evidence import FORCES, Evidence, solve, variance_ratio
+from .evidence import Evidence, solve, variance_ratio
 from .score import _basis
-from .shape import known
 
 __all__ = ["ChangePoint", "change_points"]
 
-_STEP_S = 0.2
+_STEP_S, _MOST_STEPS = 0.2, 400
 _LEAST_S = 1.5  # on both sides of a change
 _INTERVAL = 7.35
-_NEAR_S, _FINE_S = 1.2, 0.1  # how far around, and how finely, the moment is read
-_BLEND_S = 0.2  # a change takes about a second, as that of `friction_change`
-_SMALL = 0.01
-_GRIP = ("D_front", "D_rear")
+_NEAR_S, _FINE = 1.2, 24  # how far around, and at how many places, the moment is read
 _MOST = 5
 
 
@@ -90,13 +84,6 @@ class ChangePoint:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Kind:
-    what: str
-    names: tuple[str, ...]
-    columns: FloatArray  # of all the time, shape (5 n, names)
-
-
 def change_points(
     evidence: Evidence, *, alpha: float = 0.01, draws: int = 1000, seed: int = 0
 ) -> tuple[ChangePoint, ...]:
@@ -111,8 +98,8 @@ def change_points(
         To calibrate with.
     """
     driving = evidence.driving
-    kinds = _kinds(evidence)
-    constant = np.hstack([evidence.fitted, *(k.columns for k in kinds), _of_driving(evidence)])
+    kinds = kinds_of_change(evidence)
+    constant = np.hstack([evidence.fitted, *(k.columns for k in kinds), of_driving(evidence)])
     rng = np.random.default_rng(seed)
     found: list[ChangePoint] = []
     to_search = [(0, driving.samples)]
@@ -125,92 +112,22 @@ def change_points(
     return tuple(sorted(found, key=lambda c: c.driven_s))
 
 
-def _kinds(evidence: Evidence) -> list[_Kind]:
-    model = evidence.fit.model
-    of_grip = evidence.of_parameters(*_GRIP) @ [[model.value(n)] for n in _GRIP]
-    kinds = [_Kind("grip", ("grip",), of_grip)]
-    for what, names in (("side force", ("F_y", "M_z")), ("forward force", ("F_x",))):
-        if evidence.targets(*names):
-            ones = np.ones((evidence.driving.samples, len(names)))
-            kinds.append(_Kind(what, names, evidence.of_signals(ones, list(names))))
-    return kinds
-
-
-def _of_driving(evidence: Evidence) -> FloatArray:
-    """Forces that depend on speed and acceleration: that the driving changed, is no change."""
-    where = known(evidence)
-    v, side, ahead = (where[n] for n in ("vx_mps", "ay_mps2", "ax_mps2"))
-    turning = [v**2, side, side * np.abs(side), ahead, ahead * side]
-    signals, targets = [], []
-    for target in evidence.targets(*FORCES):
-        some = [v**2, side**2, ahead] if target == "F_x" else turning
-        signals += some
-        targets += [target] * len(some)
-    return evidence.of_signals(np.column_stack(signals), targets)
-
-
-def _from(evidence: Evidence, kind: _Kind, samples: list[int]) -> list[FloatArray]:
-    """Directions of changes of a kind that begin at some samples, (5 n, names) each."""
-    driving, n = evidence.driving, evidence.driving.samples
-    now, model = running_time(driving), evidence.fit.model
-    change = effect("friction_change")
-    if kind.what == "grip" and change in model.parts:
-        return [_cut(kind.columns, n, k) for k in samples]
-    if kind.what == "grip":
-        wide = model.core(force_known=driving.force_known, also=(change,))
-        changing = evidence.problem.with_model(wide)
-        return [_of_grip(evidence, kind, changing, change.columns, k) for k in samples]
-    width = len(kind.names)
-    signals = [expit((now - now[k]) / _BLEND_S) for k in samples]
-    columns = evidence.of_signals(
-        np.repeat(np.column_stack(signals), width, axis=1), list(kind.names) * len(samples)
-    )
-    return [as_float64(c) for c in np.split(columns, len(samples), axis=1)]
-
-
-def _of_grip(
-    evidence: Evidence, kind: _Kind, changing: _core.Problem, at: list[int], sample: int
-) -> FloatArray:
-    """Direction of more grip from a sample on, exact in the stretch in which it lies."""
-    driving, begin = evidence.driving, 0
-    for s in driving.stretches:
-        end = begin + s.where.stop - s.where.start
-        if sample < end:
-            break
-        begin = end
-    p = evidence.fit.model.vector().copy()
-    moment = (s.where.start + sample - begin) / driving.logs[s.log].rate_hz
-    p[at] = [-_SMALL, moment]
-    channels = len(evidence.residual) // driving.samples
-    own = slice(channels * begin, channels * end)
-    direction = _cut(kind.columns, driving.samples, end)
-    changed = changing.residuals(p, evidence.frozen).ravel()
-    direction[own, 0] = (evidence.residual - changed)[own] / _SMALL
-    return direction
-
-
-def _cut(columns: FloatArray, samples: int, first: int) -> FloatArray:
-    late = columns.copy()
-    late[: first * (len(columns) // samples)] = 0.0
-    return late
-
-
 def _search(
     driving: Driving,
-    kinds: list[_Kind],
+    kinds: list[Kind],
     constant: FloatArray,
     residual: FloatArray,
     segment: tuple[int, int],
     alpha: float,
     draws: int,
     rng: np.random.Generator,
-) -> tuple[int, _Kind, float] | None:
+) -> tuple[int, Kind, float] | None:
     """The change that stands out most in samples of a segment, if any does."""
     begin, end = segment
     channels = len(residual) // driving.samples
     rate = driving.logs[0].rate_hz
-    step = max(round(_STEP_S * rate), 1)
-    steps, edge = (end - begin) // step, round(_LEAST_S / _STEP_S)
+    step = max(round(_STEP_S * rate), -(-driving.samples // _MOST_STEPS), 1)
+    steps, edge = (end - begin) // step, max(round(_LEAST_S * rate / step), 1)
     if steps < 2 * edge + 2:
         return None
     rows = slice(channels * begin, channels * (begin + steps * step))
@@ -251,16 +168,17 @@ def _search(
 
 
 def _read(
-    evidence: Evidence, constant: FloatArray, about: int, kind: _Kind, p: float
+    evidence: Evidence, constant: FloatArray, about: int, kind: Kind, p: float
 ) -> ChangePoint:
     """The moment near a sample at which forces that step explain most, and their sizes."""
     driving = evidence.driving
     rate = driving.logs[0].rate_hz
-    reach, fine = round(_NEAR_S * rate), max(round(_FINE_S * rate), 1)
+    reach = max(round(_NEAR_S * rate), 2 * driving.samples // _MOST_STEPS)
+    fine = max(2 * reach // _FINE, 1)
     tried = list(range(max(about - reach, 0), min(about + reach, driving.samples), fine))
     Q = _basis(constant)
     e = evidence.residual - Q @ (Q.T @ evidence.residual)
-    found = [solve(R - Q @ (Q.T @ R), e) for R in _from(evidence, kind, tried)]
+    found = [solve(R - Q @ (Q.T @ R), e) for R in beginning(evidence, kind, tried)]
     statistic = np.array([f.statistic for f in found])
     place = int(np.argmax(statistic))
     best, at = found[place], tried[place]
