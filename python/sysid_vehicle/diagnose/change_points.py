@@ -25,6 +25,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from .._arrays import FloatArray, as_float64
+from ..effects import effect
 from ..estimate import Driving
 from .change_directions import Kind, beginning, kinds_of_change, of_driving
 from .coordinates import running_time
@@ -106,8 +107,9 @@ def change_points(
     while to_search and len(found) < _MOST:
         begin, end = to_search.pop(0)
         at = _search(driving, kinds, constant, evidence.residual, (begin, end), alpha, draws, rng)
-        if at is not None:
-            found.append(_read(evidence, constant, *at))
+        change = None if at is None else _read(evidence, constant, *at, alpha)
+        if at is not None and change is not None:
+            found.append(change)
             to_search += [(begin, at[0]), (at[0], end)]
     return tuple(sorted(found, key=lambda c: c.driven_s))
 
@@ -168,9 +170,13 @@ def _search(
 
 
 def _read(
-    evidence: Evidence, constant: FloatArray, about: int, kind: Kind, p: float
-) -> ChangePoint:
-    """The moment near a sample at which forces that step explain most, and their sizes."""
+    evidence: Evidence, constant: FloatArray, about: int, kind: Kind, p: float, alpha: float
+) -> ChangePoint | None:
+    """The moment near a sample at which forces that step explain most, and their sizes.
+
+    None where such a step explains nothing, or grip had to change by more than roads and tyres do:
+    something else is wrong then.
+    """
     driving = evidence.driving
     rate = driving.logs[0].rate_hz
     reach = max(round(_NEAR_S * rate), 2 * driving.samples // _MOST_STEPS)
@@ -182,6 +188,13 @@ def _read(
     statistic = np.array([f.statistic for f in found])
     place = int(np.argmax(statistic))
     best, at = found[place], tried[place]
+    if best.statistic < chi2.isf(alpha, len(kind.names)):
+        return None
+    if (
+        kind.what == "grip"
+        and abs(best.size[0]) > effect("friction_change").parameters[0].typical_high
+    ):
+        return None
     near = np.flatnonzero(statistic >= statistic.max() - _INTERVAL)
     low, high = max(near[0] - 1, 0), min(near[-1] + 1, len(tried) - 1)
     time, log = driving.channel("time_s"), driving.log_number

@@ -32,6 +32,7 @@ _MOST = 3
 _TRIED = 4  # on held-out driving, before a step gives up
 _ALIKE = 9.0  # difference of statistics that does not tell two formulas apart
 _BLOCK_S = 5.0
+_RETAINED = 0.02  # below that the formula is what a fitted parameter does as well
 _VISIBLE = 0.03  # share of a formula that those chosen before it cannot copy
 _CHANNELS = {"r": "yaw_rate_radps", "a_x": "ax_mps2", "a_y": "ay_mps2"}
 _FORCES = {"F_x": "force_x", "F_y": "force_y", "M_z": "moment_z"}
@@ -186,6 +187,9 @@ def propose(train: Evidence, held_out: Evidence) -> tuple[Proposal, ...]:
                 continue
             few = [acting[i] for i in places]
             here, there = _columns(train, few), _columns(held_out, few)
+            whole, part = (np.linalg.norm(m, axis=0) for m in (here, R[:, places]))
+            if np.any(part < _RETAINED * whole):
+                continue
             gain, error = _on_held_out(train, held_out, here, there, len(c.columns))
             if gain > error:
                 near = np.flatnonzero(merit > merit[k] - _ALIKE)
