@@ -10,6 +10,10 @@ phase phi: signals
 go through the model in place of u, and generalised least squares of the residuals finds both for
 all bands together with the fitted parameters. A delay T shows as phi = 2 pi f T: its estimate is
 the slope, weighted with the joint covariance of the phases.
+
+It is a hint. The fitted parameters have taken up part of a delay and are put right to first order
+only: 40 ms are read as 31 to 39 ms, and the interval knows nothing of that. An effect of the
+catalogue that is refitted tells the delay itself.
 """
 
 from __future__ import annotations
