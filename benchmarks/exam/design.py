@@ -11,7 +11,7 @@ import numpy as np
 
 import sysid_vehicle as sv
 
-Kind = Literal["null", "effect", "pair", "outside", "itself removed", "group removed"]
+Kind = Literal["null", "effect", "pair", "outside", "itself removed", "group removed", "rivals"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 SEVERITIES = (0.5, 1.0, 2.0)
@@ -30,6 +30,18 @@ PAIRS = (
     ("road_grade", "lateral_load_transfer"),
     ("force_gain", "body_attitude"),
     ("speed_sensor_misalignment", "aligning_moment"),
+)
+
+# The first acts; a drive is asked for that tells it from the second.
+RIVALS = (
+    ("steer_lag", "tyre_relaxation"),
+    ("aero_drag", "rolling_resistance"),
+    ("steer_offset", "rear_toe"),
+    ("yaw_inertia", "tyre_relaxation"),
+    ("cg_position", "aligning_moment"),
+    ("steer_ratio", "steer_compliance"),
+    ("road_grade", "aero_drag"),
+    ("aero_downforce", "tyre_load_sensitivity"),
 )
 
 OUTSIDE = (
@@ -124,6 +136,8 @@ def _truths() -> Iterator[tuple[Kind, tuple[str, ...], tuple[float, ...]]]:
         yield "group removed", (e.id,), SEVERITIES
     for pair in PAIRS:
         yield "pair", pair, SEVERITIES
+    for rivals in RIVALS:
+        yield "rivals", rivals, SEVERITIES
     for name in OUTSIDE:
         yield "outside", (name,), SEVERITIES
 

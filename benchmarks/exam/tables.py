@@ -202,6 +202,20 @@ def _steps(outcomes: Sequence[Outcome]) -> list[Row]:
     ]
 
 
+def _rivals(outcomes: Sequence[Outcome]) -> list[Row]:
+    # Below two standard errors the noise of the measurement is all there is.
+    found = [o for o in _of(outcomes, "rivals") if o["promised"] > 2.0]
+    ratios = [o["achieved"] / o["promised"] for o in found]
+    before = [o["before"] for o in found]
+    after = [o["promised"] for o in found]
+    return [
+        ("achieved / promised separation, median", _quantile(ratios, 0.5), "0.8-1.25"),
+        ("  first and third quartile", f"{_quantile(ratios, 0.25)}, {_quantile(ratios, 0.75)}", ""),
+        ("standard errors before, median", _quantile(before, 0.5), ""),
+        ("standard errors promised, median", _quantile(after, 0.5), ""),
+    ]
+
+
 _MAKERS: dict[str, tuple[str, Callable[[Sequence[Outcome]], list[Row]]]] = {
     "null": ("Nothing hidden", _null),
     "naming": ("One effect hidden: is it named?", _naming),
@@ -211,6 +225,7 @@ _MAKERS: dict[str, tuple[str, Callable[[Sequence[Outcome]], list[Row]]]] = {
     "kinematic": ("Kinematic and sensor effects, not among the candidates", _kinematic),
     "pairs": ("Two effects hidden", _pairs),
     "steps": ("Step-like driving beside laps", _steps),
+    "rivals": ("After the drive that was suggested", _rivals),
 }
 NAMES = tuple(_MAKERS)
 
@@ -224,6 +239,7 @@ KINDS_OF = {
     "kinematic": ("itself removed", "group removed"),
     "pairs": ("pair",),
     "steps": ("null",),
+    "rivals": ("rivals",),
 }
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import truths
 from design import Trial
+from rivals import separate
 
 import sysid_vehicle as sv
 from sysid_vehicle.diagnose import constancy
@@ -41,6 +42,8 @@ def examine(trial: Trial, among: Sequence[str] | None = None) -> Outcome:
         except sv.NumericalError as error:
             return outcome | {"state": "lost", "why": str(error)}
         try:
+            if trial.kind == "rivals":
+                return outcome | separate(trial, train) | {"seconds": time.perf_counter() - began}
             known = [e.id for e in sv.catalogue()] if among is None else among
             candidates = [e for e in known if e not in trial.removed]
             study = sv.improve(

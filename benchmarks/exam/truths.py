@@ -69,6 +69,14 @@ def hidden(trial: Trial) -> sv.Model:
     car = sv.Model(vehicle(trial.vehicle))
     if trial.kind == "outside":
         return car
+    if trial.kind == "rivals":
+        first = trial.truth[0]
+        return car.add(first).with_values(
+            {
+                f"{first}.{p.name}": p.null_value + size
+                for p, size in zip(sv.effect(first).parameters, rival_size(trial), strict=True)
+            }
+        )
     values = {}
     for name in trial.truth:
         for p in sv.effect(name).parameters:
@@ -77,6 +85,12 @@ def hidden(trial: Trial) -> sv.Model:
                 size = 14.0  # about the middle of each drive
             values[f"{name}.{p.name}"] = float(np.clip(size, p.lower, p.upper))
     return car.add(*trial.truth).with_values(values)
+
+
+def rival_size(trial: Trial) -> tuple[float, ...]:
+    """How far the first of two rivals is from null: little, as predictions are linear."""
+    first = sv.effect(trial.truth[0])
+    return tuple(0.15 * trial.severity * (p.typical - p.null_value) for p in first.parameters)
 
 
 def sample(trial: Trial) -> tuple[list[sv.Log], sv.Log, float]:
@@ -91,7 +105,7 @@ def sample(trial: Trial) -> tuple[list[sv.Log], sv.Log, float]:
         rng = np.random.default_rng(trial.seed)
         course = sv.manoeuvres.handling_course(30.0, _COURSE_MPS2[trial.driving] * ease)
         try:
-            logs = [_log(trial, m, rng) for m in (*manoeuvres(trial.driving, ease), course)]
+            logs = [drive_one(trial, m, rng) for m in (*manoeuvres(trial.driving, ease), course)]
         except sv.NumericalError:
             if ease == _EASIER[-1]:
                 raise
@@ -100,7 +114,8 @@ def sample(trial: Trial) -> tuple[list[sv.Log], sv.Log, float]:
     raise AssertionError("unreachable")
 
 
-def _log(trial: Trial, manoeuvre: sv.manoeuvres.Manoeuvre, rng: np.random.Generator) -> sv.Log:
+def drive_one(trial: Trial, manoeuvre: sv.manoeuvres.Manoeuvre, rng: np.random.Generator) -> sv.Log:
+    """Drive one manoeuvre with what is hidden and the noise of the trial."""
     road = sv.RoadDisturbance()
     if trial.noise == "coloured force":
         road = sv.RoadDisturbance(fx_n=120.0, fy_n=150.0, mz_nm=150.0, correlation_time_s=0.3)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-MODULES = ("confusion", "design", "rates", "store", "tables", "trial", "truths")
+MODULES = ("confusion", "design", "rates", "rivals", "store", "tables", "trial", "truths")
 
 
 @pytest.fixture(scope="module")
