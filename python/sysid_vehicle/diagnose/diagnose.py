@@ -29,7 +29,7 @@ _REFITS = 5
 # Of the best statistic: what scores less than this share does not overtake it. States of their own
 # make a refit slow, and what has some is scored at its typical size, not far from the refit.
 _HOPELESS = 0.15
-_HOPELESS_WITH_STATES = 0.35
+_HOPELESS_WITH_STATES = 0.6
 _TELLS_APART = 9.0  # twice the log-likelihood, or a statistic: three standard errors
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
 
@@ -231,7 +231,7 @@ def diagnose(
         # What the best one gains tells which of the others cannot come near it.
         first = _refitted(fit, driving, few[0])
         best = max(first.statistic, few[0].statistic)
-        others = [c for c in few[1:] if c.statistic > _hopeless(c) * best]
+        others = [c for c in few[1:] if c.statistic > _hopeless(c) * best and not _too_fast(c)]
         with ThreadPoolExecutor(workers) as pool:
             tried = [
                 first,
@@ -264,6 +264,13 @@ def _worth_refitting(significant: list[Candidate], refits: int) -> list[Candidat
 
 def _hopeless(c: Candidate) -> float:
     return _HOPELESS_WITH_STATES if c.effect.states > 1 else _HOPELESS
+
+
+def _too_fast(c: Candidate) -> bool:
+    """Whether its states would be so fast that they matter to nothing but the time they take."""
+    pairs = zip(c.effect.parameters, c.value, strict=True)
+    small = all(abs(v - p.null_value) < p.matters for p, v in pairs)
+    return c.effect.states > 1 and c.effect.scored_at_typical and small
 
 
 def _merit(c: Candidate, samples: int) -> float:
