@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, Model, drive, effect, identify, manoeuvres
-from sysid_vehicle.diagnose import constancy, judge
+from sysid_vehicle.diagnose import EffectVerdict, Verdicts, constancy, judge
 from sysid_vehicle.diagnose.score import _p_value
 from sysid_vehicle.identify import refine
 
@@ -45,6 +45,23 @@ def test_a_proxy_changes_from_drive_to_drive(fits: dict[str, Fit]) -> None:
     assert judged.finding == "proxy"
     assert "not with one value (speed_mps from " in judged.sentence
     assert judged.sentence.endswith("m/s): look elsewhere")
+
+
+def test_with_an_effect_its_rivals_are_doubted() -> None:
+    drag, rolling, mass = (effect(e) for e in ("aero_drag", "rolling_resistance", "mass"))
+    told = Verdicts(
+        (
+            EffectVerdict(mass, "missing", (0.1,), (0.01,)),
+            EffectVerdict(drag, "one of a group", (0.4,), (0.01,), group=("rolling_resistance",)),
+            EffectVerdict(rolling, "one of a group", group=("aero_drag",)),
+        )
+    )
+    doubted = told.doubting({"aero_drag"}, "it explains little")
+    assert [v.finding for v in doubted.all] == ["missing", "proxy", "proxy"]
+    assert doubted["rolling_resistance"].sentence == (
+        "something acts like it, but it explains little: look elsewhere"
+    )
+    assert told.doubting((), "nothing").all == told.all
 
 
 def test_the_only_log_is_cut_into_pieces(hidden_fit: Callable[[str, float], Fit]) -> None:

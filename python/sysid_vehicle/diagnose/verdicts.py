@@ -115,12 +115,16 @@ class Verdicts:
         raise KeyError(f"'{effect}'; there are {', '.join(v.effect.id for v in self.all)}")
 
     def doubting(self, effects: Iterable[str], because: str) -> Verdicts:
-        """The same, but what is said to be missing of these effects is called a proxy."""
+        """The same, but these effects, and rivals of nothing else, are called proxies."""
         doubted = set(effects)
+
+        def falls(v: EffectVerdict) -> bool:
+            if v.finding == "one of a group" and set(v.group) <= doubted:
+                return True
+            return v.effect.id in doubted and v.finding in ("missing", "one of a group")
+
         told = [
-            replace(v, finding="proxy", group=(), because=because)
-            if v.effect.id in doubted and v.finding in ("missing", "one of a group")
-            else v
+            replace(v, finding="proxy", group=(), because=because) if falls(v) else v
             for v in self.all
         ]
         return Verdicts(tuple(sorted(told, key=lambda v: _ORDER.index(v.finding))))

@@ -195,6 +195,9 @@ def _verdict(
         )
     # What only stands in for something else explains nothing, however well it fits.
     proxies = {e for e in added if told[e].finding == "proxy"}
+    told = told.doubting(
+        proxies, f"it acts like {', '.join(sorted(proxies))}, which is none either"
+    )
     if proxies == added:
         return "unknown", told
     return "explained" if complete and not proxies else "partly_explained", told
