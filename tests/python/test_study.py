@@ -270,6 +270,8 @@ def test_held_out_driving_tells_the_richer_model(study: Study, lagging: tuple[Lo
     back, _ = gain_in_log_likelihood(richer, poorer, test)
     assert back == pytest.approx(-gain)
     assert gain_in_log_likelihood(richer, richer, test) == (0.0, 0.0)
+    same, error = gain_in_log_likelihood(poorer, richer, test, same_noise=True)
+    assert same > 2.0 * error > 0.0
     exact = [test.problem(f.model).freeze(f.model.vector(), f.noise.vector()) for f in study.fits]
     difference = exact[1].log_likelihood - exact[0].log_likelihood
     assert gain == pytest.approx(difference, rel=1e-9)

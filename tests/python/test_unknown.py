@@ -13,6 +13,7 @@ from sysid_vehicle import (
     Model,
     RoadDisturbance,
     drive,
+    forget_effect,
     identify,
     manoeuvres,
     unknown,
@@ -22,6 +23,7 @@ from sysid_vehicle.diagnose import Unknown
 from sysid_vehicle.diagnose.evidence import Evidence
 from sysid_vehicle.diagnose.grammar import Form, forms, unit_of_gain
 from sysid_vehicle.diagnose.shape import _posterior, curves
+from sysid_vehicle.identify import refine
 
 FORCE, MOMENT = 0.6, 0.3  # N and N m, per square of the speed
 
@@ -174,3 +176,17 @@ def test_it_is_drawn_and_written(wind: Unknown) -> None:
     assert told["proposals"][0]["gains"]["F_y"]["unit"] == "N s2/m2"
     assert any(None in row for row in told["surface"]["force"])
     assert wind._repr_html_().count("<li>") == len(wind.lines)
+
+
+def test_a_formula_becomes_an_effect(wind: Unknown, windy: Fit) -> None:
+    made = wind.proposals[0].as_effect("roof_box")
+    try:
+        fit = refine(windy.model.add(made), windy.driving, windy.noise)
+    finally:
+        forget_effect("roof_box")
+    gain = fit.estimates[-2:]
+    for found, true in zip(gain, (FORCE, MOMENT), strict=True):
+        assert found.name.startswith("roof_box.")
+        assert abs(found.value - true) < 4.0 * found.std
+        assert found.std < 0.05 * true
+    assert fit.log_likelihood > windy.log_likelihood + 100.0

@@ -107,13 +107,16 @@ class Proposal:
             )
             for t, g in self.gain.items()
         ]
+        forces = {_FORCES[t]: f for t, f in act.items() if t in _FORCES}
         reads: Mapping[str, Any] = {_CHANNELS[t]: f for t, f in act.items() if t in _CHANNELS}
         return define_effect(
             id,
             title=title or f"proposed: {self.equation}",
             parameters=parameters,
+            force_x=forces.get("force_x"),
+            force_y=forces.get("force_y"),
+            moment_z=forces.get("moment_z"),
             reads=reads or None,
-            **{_FORCES[t]: f for t, f in act.items() if t in _FORCES},
         )
 
     def to_dict(self) -> dict[str, Any]:

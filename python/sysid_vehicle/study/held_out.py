@@ -40,17 +40,21 @@ def hold_out(
     return Driving.of(log.between(-np.inf, cut)), Driving.of(log.between(cut, np.inf))
 
 
-def gain_in_log_likelihood(poorer: Fit, richer: Fit, test: Driving) -> tuple[float, float]:
+def gain_in_log_likelihood(
+    poorer: Fit, richer: Fit, test: Driving, *, same_noise: bool = False
+) -> tuple[float, float]:
     """What the richer model gains on held-out driving, and the standard error of that, in nats.
 
-    Each model predicts with its own noise; the error comes from blocks of 5 s. A model that fails
-    on the held-out driving gains minus infinity.
+    Each model predicts with its own noise, or both with that of the poorer one: a richer model that
+    has only learnt larger noise gains by the first and loses by the second. The error comes from
+    blocks of 5 s. A model that fails on the held-out driving gains minus infinity.
     """
     pieces = []
     for fit in (poorer, richer):
         problem = test.problem(fit.model)
         try:
-            trace = problem.trace(fit.model.vector(), fit.noise.vector(), False)
+            noise = poorer.noise if same_noise else fit.noise
+            trace = problem.trace(fit.model.vector(), noise.vector(), False)
         except _core.NumericalFailure:
             return -np.inf, 0.0
         # Per sample, up to what both models share: - 1/2 (e' S^-1 e + log det S).

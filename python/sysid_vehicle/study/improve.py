@@ -145,8 +145,8 @@ def _first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> Candidate | Non
     for c in dx.significant[:3]:
         if c.fit is None or c.statistic < 2.0 * np.log(c.fit.driving.samples):
             continue
-        gain, error = gain_in_log_likelihood(fit, c.fit, test)
-        if gain > error and error_falls(fit, c.fit, test):
+        gains = [gain_in_log_likelihood(fit, c.fit, test, same_noise=s) for s in (False, True)]
+        if all(g > e for g, e in gains) and error_falls(fit, c.fit, test):
             return c
     return None
 
