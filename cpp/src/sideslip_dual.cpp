@@ -44,7 +44,7 @@ Mat<5, 5> ForceModel::process_noise(const Input& u) const {
     Mat<5, 3> G = Mat<5, 3>::Zero();
     G(kFyf, 0) = root * u.fz_f;
     G(kFyr, 1) = root * u.fz_r;
-    G(kFx, 2) = root * weight;
+    G(kFx, 2) = settings.fx_wander * std::sqrt(u.dt) * weight;
     const double half = 0.5 * u.dt;
     G(kYawRate, 0) = half * c.lf_m / car.yaw_inertia_kgm2 * G(kFyf, 0);
     G(kYawRate, 1) = -half * c.lr_m / car.yaw_inertia_kgm2 * G(kFyr, 1);
@@ -233,7 +233,8 @@ void SideslipDual::run_tyres(double dt, const SensorSample& s) {
     u.vx_before = u.vx;
     u.ax_before = u.ax;
     u.steer = s.steer_rad;
-    u.ax = std::isnan(s.ax_mps2) ? a[ForceModel::kFx] / car_.data.mass_kg : s.ax_mps2;
+    // Not the raw reading: its vibration would take grip, and always take it.
+    u.ax = (a[ForceModel::kFx] - std::sin(u.steer) * a[ForceModel::kFyf]) / car_.data.mass_kg;
     u.vx = std::max(std::isnan(s.vx_mps) ? u.vx_before + dt * u.ax : s.vx_mps, kSlowestMps);
     u.loads = axle_loads(car_, u.ax, u.vx);
     double front = 0.0, rear = 0.0;

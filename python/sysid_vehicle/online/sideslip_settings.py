@@ -23,7 +23,7 @@ _MEANING = {
     "road_mps2": "bank of the road as a lateral acceleration [m/s2]",
     "road_time_s": "time over which the bank changes [s]",
     "roll_share": "doubt of the gravity felt through body roll, share of a_y",
-    "force_wander": "change of an axle force, share of the load [1/sqrt(s)]",
+    "force_wander": "change of a lateral axle force, share of the load [1/sqrt(s)]",
     "error_load": "error of the tyre model, share of the load",
     "error_lateral": "error of the tyre model, share of the lateral force",
     "error_braking": "error of the tyre model, share of the grip that braking takes",
@@ -41,7 +41,7 @@ _MEANING = {
     "frozen_after_s": "a sensor that stands still for longer is left out [s]",
     "stop_below_mps": "below this speed the car is taken to roll without slip [m/s]",
     "go_above_mps": "above this speed the observer begins again [m/s]",
-    "fx_wander": "three-state observer: change of the longitudinal force, share of the weight",
+    "fx_wander": "change of the longitudinal force, share of the weight [1/sqrt(s)]",
     "beta_wander_radps": "three-state observer: unexplained change of the sideslip [rad/sqrt(s)]",
     "model_ay_mps2": "three-state observer: error of the modelled lateral acceleration [m/s2]",
 }

@@ -79,7 +79,7 @@ struct ObserverSettings {
     // lateral acceleration that moves the car but that no accelerometer feels (road bank), and the
     // share of it that it feels too much, by gravity in body roll
     double road_mps2 = 0.05, road_time_s = 10.0, roll_share = 0.03;
-    // axle forces as observer A lets them change, as a share of the load
+    // lateral axle forces as observer A lets them change, as a share of the load
     double force_wander = 1.0;
     // error of the tyre model, as a share of load, lateral force, and grip lost to braking
     double error_load = 0.007, error_lateral = 0.05, error_braking = 0.3, error_time_s = 0.5;
@@ -95,9 +95,10 @@ struct ObserverSettings {
     // gate, frozen sensors, low speed
     double gate_probability = 1e-6, gate_patience_s = 3.0, frozen_after_s = 0.2;
     double stop_below_mps = 3.0, go_above_mps = 4.0;
-    // the three-state observer: longitudinal forces as a share of the load, errors of the
-    // sideslip rate and of the lateral acceleration
-    double fx_wander = 0.3, beta_wander_radps = 0.004, model_ay_mps2 = 0.3;
+    // longitudinal force as the observers let it change, as a share of the weight
+    double fx_wander = 0.3;
+    // the three-state observer: errors of the sideslip rate and of the lateral acceleration
+    double beta_wander_radps = 0.004, model_ay_mps2 = 0.3;
 };
 
 /// Fills gaps of the inputs, notices sensors that stand still, decides whether the car is fast
