@@ -23,6 +23,7 @@ from .mu_slip_filter import MuSlipFilter, mu_slip_ekf, mu_slip_smooth
 from .mu_slip_least_squares import mu_slip_cramer_rao, mu_slip_fit
 from .mu_slip_results import MuSlipEstimate, MuSlipRun, MuSlipSmoothed
 from .sideslip import KINDS, SideslipEstimate, SideslipObserver, estimate_sideslip
+from .sideslip_calibration import SideslipCalibration, calibrate_sideslip, fitted_vehicle
 from .sideslip_results import SideslipError, SideslipRun, sideslip_overview
 from .sideslip_settings import SideslipSettings
 
@@ -41,18 +42,21 @@ __all__ = [
     "MuSlipPrior",
     "MuSlipRun",
     "MuSlipSmoothed",
+    "SideslipCalibration",
     "SideslipError",
     "SideslipEstimate",
     "SideslipObserver",
     "SideslipRun",
     "SideslipSettings",
     "animate_mu_slip",
+    "calibrate_sideslip",
     "compare_mu_slip",
     "cornering_stiffness",
     "draw_mu_slip_convergence",
     "draw_mu_slip_observability",
     "draw_mu_slip_signal",
     "estimate_sideslip",
+    "fitted_vehicle",
     "magic_formula_coefficients",
     "mu_slip_cramer_rao",
     "mu_slip_ekf",

@@ -1,0 +1,161 @@
+"""What a drive with measured sideslip teaches the observers for drives without."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+from .._arrays import FloatArray
+from ..errors import InvalidInput
+from ..identify import Fit
+from ..log import Log
+from ..vehicle import Tyre, Vehicle
+from .sideslip import estimate_sideslip
+from .sideslip_results import SideslipRun
+from .sideslip_settings import SideslipSettings
+
+__all__ = ["SideslipCalibration", "calibrate_sideslip", "fitted_vehicle"]
+
+#: What no data sheet tells: errors of the model, and how far two sensors are to be trusted.
+_LEARNT = (
+    "road_mps2", "road_time_s", "roll_share", "error_load", "error_lateral", "error_braking",
+    "error_drive", "error_time_s", "yaw_wander_radps", "sideslip_wander_rad", "stiffness_prior",
+    "stiffness_wander", "friction_prior", "friction_time_s", "relaxation_m", "yaw_rate_radps",
+    "ay_mps2",
+)  # fmt: skip
+_FIRST_STEP, _WIDEN, _NARROW = 0.7, 1.15, 0.96  # of the logarithms
+
+
+@dataclass(frozen=True)
+class SideslipCalibration:
+    """Settings under which the sideslip of a drive is likeliest.
+
+    Attributes
+    ----------
+    settings : SideslipSettings
+        To be used for further drives of the car.
+    before, after : SideslipRun
+        The drive with the settings at the start and with these; their error is in-sample.
+    score_before, score_after : float
+        Mean log density of the measured sideslip [1 / sample].
+    """
+
+    settings: SideslipSettings
+    before: SideslipRun
+    after: SideslipRun
+    score_before: float
+    score_after: float
+
+    def __str__(self) -> str:
+        score = f"{self.score_before:.3f} to {self.score_after:.3f} per sample"
+        lines = [f"{self.after.log_name}: log density of the sideslip {score}"]
+        for name, run in (("before", self.before), ("after", self.after)):
+            e = run.error()
+            assert e is not None
+            lines.append(
+                f"  {name:6s} {e.rms_deg:.3f} deg rms, {100.0 * e.covered:.1f} % inside 2 sigma"
+            )
+        old = self.before.settings
+        new = {name: value for name, value in self.settings.items() if value != old[name]}
+        changed = [f"{name} {old[name]:.3g} to {value:.3g}" for name, value in new.items()]
+        return "\n".join([*lines, "  " + ", ".join(changed)])
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+
+def calibrate_sideslip(
+    vehicle: Vehicle,
+    log: Log,
+    *,
+    kind: str = "dual",
+    settings: SideslipSettings | None = None,
+    learnt: Sequence[str] = _LEARNT,
+    runs: int = 120,
+    seed: int = 0,
+) -> SideslipCalibration:
+    """Learn how far model and sensors are to be trusted, from a drive with measured sideslip.
+
+    The observer runs without ``vy_mps``; its settings are those under which the measured sideslip
+    has the highest density, which rewards small errors and an honest band alike (the logarithmic
+    score is proper: Gneiting & Raftery, JASA 2007). The search is an evolution strategy with one
+    parent and one child (Rechenberg, 1973), over the logarithms of the settings.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The car, with its tyres identified: see :func:`fitted_vehicle`.
+    log : Log
+        A drive with ``vy_mps``; a minute or two of hard cornering is enough.
+    kind : str
+        One of :data:`KINDS`.
+    settings : SideslipSettings, optional
+        Where the search begins; :meth:`SideslipSettings.of` the log if left out.
+    learnt : sequence of str
+        The settings to learn.
+    runs : int
+        How often the observer runs over the log.
+    seed : int
+        Of the search.
+
+    Raises
+    ------
+    InvalidInput
+        If the log has no measured sideslip, or nothing is to be learnt.
+    """
+    if not log.has("vy_mps"):
+        raise InvalidInput(f"{log.name}: vy_mps is not there; calibrate on a drive that has it")
+    if runs < 1 or not learnt:
+        raise InvalidInput("learnt, runs: give one setting and one run at least")
+    start = settings if settings is not None else SideslipSettings.of(log)
+    names = list(learnt)
+    rng = np.random.default_rng(seed)
+
+    def tried(x: FloatArray) -> tuple[float, SideslipRun]:
+        changed = dict(zip(names, (float(v) for v in np.exp(x)), strict=True))
+        run = estimate_sideslip(vehicle, log, kind=kind, settings=start.replace(**changed))
+        return _score(run), run
+
+    x = np.log([start[name] for name in names])
+    steps = np.full(len(names), _FIRST_STEP)
+    score_before, before = tried(x)
+    score, after = score_before, before
+    for _ in range(runs):
+        moved = rng.integers(len(names), size=rng.integers(1, 4))
+        child = x.copy()
+        child[moved] += steps[moved] * rng.standard_normal(len(moved))
+        found, run = tried(child)
+        if found > score:
+            score, after, x = found, run, child
+            steps[moved] *= _WIDEN
+        else:
+            steps[moved] *= _NARROW
+    return SideslipCalibration(after.settings, before, after, score_before, score)
+
+
+def _score(run: SideslipRun) -> float:
+    assert run.true_beta_rad is not None
+    known = np.isfinite(run.true_beta_rad) & (run.mode != 1)
+    std = run.beta_std_rad[known]
+    off = (run.beta_rad - run.true_beta_rad)[known] / std
+    return float(np.mean(-0.5 * off**2 - np.log(std)) - 0.5 * math.log(2.0 * math.pi))
+
+
+def fitted_vehicle(fit: Fit) -> Vehicle:
+    """The car of a fit with the tyres, and the yaw inertia, that were found."""
+    model = fit.model
+
+    def tyre(axle: str) -> Tyre:
+        return Tyre(**{letter: model.value(f"{letter}_{axle}") for letter in "BCDE"})
+
+    return dataclasses.replace(
+        model.vehicle,
+        yaw_inertia_kgm2=model.value("yaw_inertia_kgm2"),
+        tyre_front=tyre("front"),
+        tyre_rear=tyre("rear"),
+    )

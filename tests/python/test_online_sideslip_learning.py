@@ -1,0 +1,73 @@
+"""What a calibration drive teaches the sideslip observers, and what vibration must not do."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle.errors import InvalidInput
+from sysid_vehicle.online import (
+    calibrate_sideslip,
+    estimate_sideslip,
+    fitted_vehicle,
+)
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return sv.example_vehicle()
+
+
+@pytest.fixture(scope="module")
+def log(vehicle):
+    return sv.drive(sv.Model(vehicle), sv.manoeuvres.handling_course(), seed=1).between(0.0, 40.0)
+
+
+@pytest.fixture(scope="module")
+def wrong(vehicle):
+    """The car with tyres that grip less, and saturate otherwise, than they do."""
+    tyre = {"C": 1.1, "D": 0.8}
+    return dataclasses.replace(
+        vehicle,
+        tyre_front=vehicle.tyre_front.replace(**tyre),
+        tyre_rear=vehicle.tyre_rear.replace(**tyre),
+    )
+
+
+def test_vibration_of_the_longitudinal_accelerometer_takes_no_grip(vehicle, log):
+    rng = np.random.default_rng(0)
+    columns = {name: log[name] for name in log.channels}
+    columns["ax_mps2"] = log["ax_mps2"] + 1.5 * rng.standard_normal(log.n)
+    shaken = estimate_sideslip(vehicle, sv.Log.from_arrays(columns, name="shaken", check=False))
+    quiet = estimate_sideslip(vehicle, log)
+    assert shaken.error().rms_deg < 1.5 * quiet.error().rms_deg
+    assert shaken.error().covered > 0.85
+
+
+def test_a_calibration_drive_teaches_what_to_trust(wrong, log):
+    drive = log.between(0.0, 15.0)
+    found = calibrate_sideslip(wrong, drive, runs=12)
+    assert found.score_after > found.score_before
+    assert "log density" in str(found)
+    again = calibrate_sideslip(wrong, drive, runs=12)
+    assert dict(again.settings) == dict(found.settings)
+
+
+def test_a_drive_without_sideslip_teaches_nothing(vehicle, log):
+    columns = {name: log[name] for name in log.channels if name != "vy_mps"}
+    blind = sv.Log.from_arrays(columns, name="blind", check=False)
+    with pytest.raises(InvalidInput, match="calibrate on a drive that has it"):
+        calibrate_sideslip(vehicle, blind)
+    with pytest.raises(InvalidInput, match="one run at least"):
+        calibrate_sideslip(vehicle, log, runs=0)
+
+
+def test_a_fit_gives_its_car(vehicle):
+    model = sv.Model(vehicle).with_values({"B_front": 7.5, "D_rear": 1.25})
+    car = fitted_vehicle(SimpleNamespace(model=model))
+    assert car.tyre_front.B == 7.5
+    assert car.tyre_rear.D == 1.25
+    assert car.yaw_inertia_kgm2 == vehicle.yaw_inertia_kgm2
+    assert car.tyre_front.C == vehicle.tyre_front.C
