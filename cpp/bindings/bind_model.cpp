@@ -104,7 +104,7 @@ Formula formula(const std::vector<Step>& steps) {
     all.reserve(steps.size());
     for (const auto& [operation, from, constant] : steps)
         all.push_back({static_cast<Operation>(operation), from, constant});
-    return Formula(std::move(all), kUserParameters);
+    return {std::move(all), kUserParameters};
 }
 
 UserEffects user_effects(const std::vector<std::pair<std::size_t, std::vector<Act>>>& given) {
@@ -165,7 +165,9 @@ void register_model(py::module_& m) {
                  if (effects >> kEffectCount != 0)
                      throw std::invalid_argument(
                          "effects: the mask names effects there are none of");
-                 return SingleTrack{car, effects, force_known, HeldLoads{}, user_effects(user)};
+                 SingleTrack model{car, effects, force_known};
+                 model.user = user_effects(user);
+                 return model;
              }),
              py::arg("car"), py::arg("effects"), py::arg("force_known"),
              py::arg("user") = std::vector<std::pair<std::size_t, std::vector<Act>>>{})

@@ -108,12 +108,12 @@ class LogDensity {
     void add(const U& update) {
         sum_ -= 0.5 * (update.squares + update.observed * kLogTwoPi);
         // What leaves this range on its own is a matter of the logarithm too.
-        if (!(update.determinant > 1e-140 && update.determinant < 1e140)) {
+        if (!ordinary(update.determinant)) {
             sum_ -= 0.5 * std::log(update.determinant);
             return;
         }
         product_ *= update.determinant;
-        if (!(product_ > 1e-140 && product_ < 1e140)) {
+        if (!ordinary(product_)) {
             sum_ -= 0.5 * std::log(product_);
             product_ = 1.0;
         }
@@ -130,6 +130,9 @@ class LogDensity {
     }
 
   private:
+    /// Whether two such numbers can be multiplied; false for what is not a number.
+    static bool ordinary(double x) { return x > 1e-140 && x < 1e140; }
+
     double sum_ = 0.0;
     double product_ = 1.0;
 };

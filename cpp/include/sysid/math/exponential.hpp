@@ -59,8 +59,9 @@ inline HeldResponse<3> short_response(const Mat<3, 3>& J, double h) {
     // X^k / (k + 1)! with k = 12, 10, ... and with k = 11, 9, ...
     Sum even{1.0 / 6227020800.0, 0.0, 0.0};
     Sum odd{1.0 / 479001600.0, 0.0, 0.0};
-    constexpr double kEven[] = {1.0 / 39916800.0, 1.0 / 362880.0, 1.0 / 5040.0,
-                                1.0 / 120.0,      1.0 / 6.0,      1.0};
+    constexpr double kEven[] = {
+        1.0 / 39916800.0, 1.0 / 362880.0, 1.0 / 5040.0, 1.0 / 120.0, 1.0 / 6.0, 1.0,
+    };
     constexpr double kOdd[] = {1.0 / 3628800.0, 1.0 / 40320.0, 1.0 / 720.0, 1.0 / 24.0, 0.5};
     for (int i = 0; i < 5; ++i) {
         grow(even, kEven[i]);

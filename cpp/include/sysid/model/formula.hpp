@@ -216,7 +216,7 @@ class Formula {
             case Operation::kAbs:
                 return abs(a);
             case Operation::kSign:
-                return S(value_of(a) > 0.0 ? 1.0 : value_of(a) < 0.0 ? -1.0 : 0.0);
+                return S((value_of(a) > 0.0 ? 1.0 : 0.0) - (value_of(a) < 0.0 ? 1.0 : 0.0));
             case Operation::kSin:
                 return sin(a);
             case Operation::kCos:
