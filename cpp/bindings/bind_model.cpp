@@ -165,7 +165,10 @@ void register_model(py::module_& m) {
                  if (effects >> kEffectCount != 0)
                      throw std::invalid_argument(
                          "effects: the mask names effects there are none of");
-                 SingleTrack model{car, effects, force_known};
+                 SingleTrack model;
+                 model.car = car;
+                 model.effects = effects;
+                 model.force_known = force_known;
                  model.user = user_effects(user);
                  return model;
              }),

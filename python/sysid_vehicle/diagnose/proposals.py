@@ -22,6 +22,7 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from .._text import number
 from ..effects import Effect
+from ..user_effects import define_effect, parameter
 from .evidence import FORCES, READINGS, Evidence, Solution, solve
 from .grammar import Form, forms, unit_of_gain
 from .shape import known
@@ -92,9 +93,6 @@ class Proposal:
 
     def as_effect(self, id: str, title: str = "") -> Effect:
         """Define it as an effect under a name of your own."""
-        # Effects that users define come with the catalogue; only who asks for one needs them.
-        from ..user_effects import define_effect, parameter
-
         act = self.functions()
         parameters = [
             parameter(

@@ -42,7 +42,7 @@ struct SingleTrack {
     EffectMask effects = 0;
     bool force_known = true;  // false: `Input::longitudinal` is the measured acceleration
     HeldLoads held{};
-    UserEffects user;  // those that act; `effects` has no bits of theirs
+    UserEffects user = nullptr;  // those that act; `effects` has no bits of theirs
 
     /// Evaluates (1) to (5). `motion` = v_x, v_y, r; `push` = disturbance, see
     /// `Push`; `aux` = auxiliary states; `rate` receives the derivatives of motion and aux.
