@@ -294,7 +294,9 @@ TEST(TwinVehicle, LongSlipNeverGivesMoreThanFriction) {
 TEST(TwinVehicle, ArcTangentAndSineAreThoseOfTheLibrary) {
     for (double x = 0.0; x < 60.0; x = 1.01 * x + 1e-3) {
         EXPECT_NEAR(atan_of_positive(x), std::atan(x), 3e-16 * (1.0 + std::atan(x)));
-        if (x < 4.7) EXPECT_NEAR(sin_of_positive(x), std::sin(x), 3e-16);
+        if (x < 4.7) {
+            EXPECT_NEAR(sin_of_positive(x), std::sin(x), 3e-16);
+        }
     }
 }
 
