@@ -226,7 +226,8 @@ TEST(Catalogue, OffsetsFollowEachOther) {
     for (std::size_t i = 0; i + 1 < kEffectCount; ++i)
         EXPECT_EQ(effect_offset(i + 1), effect_offset(i) + kEffectInfos[i].parameter_count);
     EXPECT_EQ(effect_offset(0), 0U);
-    EXPECT_EQ(kParameterCount, kBaseParameterCount + kEffectParameterCount);
+    EXPECT_EQ(kParameterCount,
+              kBaseParameterCount + kEffectParameterCount + kUserEffects * kUserParameters);
 }
 
 TEST(Catalogue, StatesOfTheirOwn) {

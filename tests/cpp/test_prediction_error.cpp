@@ -56,7 +56,9 @@ Table signals_of(const Problem& problem, const Parameters& p, const FrozenFilter
 
 std::vector<int> all_columns() {
     std::vector<int> columns;
-    for (int i = 0; i < static_cast<int>(kParameterCount); ++i) columns.push_back(i);
+    // Users' effects have columns only where one acts.
+    const auto own = static_cast<int>(kBaseParameterCount + kEffectParameterCount);
+    for (int i = 0; i < own; ++i) columns.push_back(i);
     return columns;
 }
 
