@@ -10,6 +10,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <utility>
 #include <vector>
 
 #include "sysid/lab/adrc.hpp"
@@ -83,9 +84,9 @@ struct Reckoning {
 template <class Observer>
 class ClosedLoop {
   public:
-    ClosedLoop(const LoopData& data, const Plant& plant, Observer observer)
+    ClosedLoop(const LoopData& data, Plant plant, Observer observer)
         : data_(data),
-          plant_(plant),
+          plant_(std::move(plant)),
           observer_(std::move(observer)),
           controller_(data.controller, data.car),
           sensors_(data.sensors, data.dt),

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <type_traits>
+#include <utility>
 
 #include "sysid/dynamics/step.hpp"
 #include "sysid/lab/integrate.hpp"
@@ -46,8 +47,8 @@ class Plant {
     using Parameters = std::array<double, kParameterCount>;
     using Pushes = std::array<double, kPushes>;
 
-    Plant(const SingleTrack& model, const double* p, const PlantOptions& options)
-        : model_(model), options_(options) {
+    Plant(SingleTrack model, const double* p, const PlantOptions& options)
+        : model_(std::move(model)), options_(options) {
         std::copy(p, p + kParameterCount, parameters_.begin());
         // The force per load of the law, times the share, is the force per load of the axle.
         parameters_[kDFront] *= options.load_share;
