@@ -29,6 +29,7 @@ void step_with_tangent(const GreyBoxCar& car, State& x, Tangent<W>& tangent, con
     GreyBoxSlope slope;
     LoadsSince<double> since;
     std::array<double, W> drawn_by{};
+    std::array<double, W> squared_by{};
     for (int n = 0; n < substeps; ++n) {
         State k{};
         State moved = x;
@@ -43,14 +44,16 @@ void step_with_tangent(const GreyBoxCar& car, State& x, Tangent<W>& tangent, con
             for (std::size_t i = 0; i < kGreyStates; ++i)
                 for (std::size_t w = 0; w < W; ++w) here[i][w] = tangent[i][w] + reach * rate[i][w];
             const bool begins = stage == 0 && n == 0 && car.cg_height_m > 0.0;
-            if (begins) since = {true, drawn_along(car, at, u, p, slope.value)};
+            if (begins) since = loads_from(car, at, u, p, slope.value);
             for (std::size_t i = 0; i < kGreyStates; ++i) {
                 const auto& a = slope.by_state[i];
                 for (std::size_t w = 0; w < W; ++w) {
                     rate[i][w] = a[0] * here[0][w] + a[1] * here[1][w] + a[2] * here[2][w];
                     if constexpr (kParameters) rate[i][w] += slope.by_parameter[i][w];
-                    // In the first stage nothing has moved yet, whatever T(0).
-                    if (!begins) rate[i][w] += slope.by_drawn[i] * drawn_by[w];
+                    // In the first stage nothing has moved yet, whatever it moves from.
+                    if (!begins)
+                        rate[i][w] += slope.by_drawn[i] * drawn_by[w] +
+                                      slope.by_first_squared[i] * squared_by[w];
                     next[i][w] += h * kWeight[stage] * rate[i][w];
                 }
                 k[i] = slope.value[i];
@@ -58,8 +61,10 @@ void step_with_tangent(const GreyBoxCar& car, State& x, Tangent<W>& tangent, con
             }
             if (!begins) continue;
             const double mass = car.mass_kg * p[kMassFactor];
-            for (std::size_t w = 0; w < W; ++w)
+            for (std::size_t w = 0; w < W; ++w) {
                 drawn_by[w] = mass * (at[2] * here[1][w] + at[1] * here[2][w] - rate[0][w]);
+                squared_by[w] = 2.0 * at[0] * here[0][w];
+            }
             // T is a force: the mass has no part in it but through the motion.
             if constexpr (kParameters)
                 drawn_by[kMassFactor] += mass * slope.by_parameter[0][kMassFactor];

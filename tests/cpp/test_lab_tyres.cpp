@@ -25,7 +25,7 @@ Tyres tyres() {
 }
 
 GreyBoxInput input(double steer, double force = 300.0) {
-    return {force, steer, std::sin(steer), std::cos(steer), 2000.0, 1800.0};
+    return {force, steer, std::sin(steer), std::cos(steer), 4200.0, 3700.0};
 }
 
 /// A weave that brings both axles near their peaks, read with noise and some readings missing.
@@ -51,13 +51,14 @@ TyreRun weave(std::size_t n, unsigned seed) {
 const std::array<double, kGreyNoises> kNoise{0.05, 0.01, 0.003, 0.03, 0.02, 0.03, 0.01};
 
 TEST(GreyBox, DerivativesByHandAreThoseOfDualNumbers) {
-    using D = Dual<kGreyStates + kTyreParameters + 1>;
+    using D = Dual<kGreyStates + kTyreParameters + 2>;
     const Tyres p = tyres();
     for (const double speed : {20.0, 0.5})  // below 1 m/s the slip angles are those at 1 m/s
         for (const double steer : {-0.15, 0.0, 0.08})
             for (const bool moves : {false, true}) {
                 const std::array<double, kGreyStates> x{speed, 0.4, -0.3};
-                const LoadsSince<double> since{moves, 130.0};
+                const double squared = moves ? 1.1 * speed * speed : 0.0;
+                const LoadsSince<double> since{moves, 130.0, squared};
                 GreyBoxSlope slope;
                 grey_box_slope(racer(), x, input(steer), p.data(), true, slope, since);
                 std::array<D, kGreyStates> xd;
@@ -65,15 +66,17 @@ TEST(GreyBox, DerivativesByHandAreThoseOfDualNumbers) {
                 int seed = 0;
                 for (std::size_t i = 0; i < x.size(); ++i) xd[i] = D::seeded(x[i], seed++);
                 for (std::size_t i = 0; i < p.size(); ++i) pd[i] = D::seeded(p[i], seed++);
-                const LoadsSince<D> since_d{moves, D::seeded(130.0, seed)};
+                const LoadsSince<D> since_d{moves, D::seeded(130.0, seed),
+                                            D::seeded(squared, seed + 1)};
                 const auto f = grey_box(racer(), xd, input(steer), pd.data(), since_d);
                 for (std::size_t i = 0; i < f.size(); ++i) {
                     EXPECT_NEAR(slope.value[i], f[i].v, 1e-12 * (1.0 + std::abs(f[i].v)));
-                    for (std::size_t j = 0; j < kGreyStates + kTyreParameters + 1; ++j) {
-                        double by = slope.by_drawn[i];
+                    for (std::size_t j = 0; j < kGreyStates + kTyreParameters + 2; ++j) {
+                        constexpr std::size_t kDrawn = kGreyStates + kTyreParameters;
+                        double by = j == kDrawn ? slope.by_drawn[i] : slope.by_first_squared[i];
                         if (j < kGreyStates)
                             by = slope.by_state[i][j];
-                        else if (j < kGreyStates + kTyreParameters)
+                        else if (j < kDrawn)
                             by = slope.by_parameter[i][j - kGreyStates];
                         EXPECT_NEAR(by, f[i].d[j], 1e-10 * (1.0 + std::abs(f[i].d[j])))
                             << "row " << i << ", column " << j;
@@ -88,8 +91,9 @@ TEST(GreyBox, LoadsMoveWithinASampleOnlyByWhatIsDrawnSince) {
     const GreyBoxInput u = input(0.1);
     const auto held = grey_box(racer(), x, u, p.data());
     const double drawn = drawn_along(racer(), x, u, p.data(), held);
-    const auto at_once = grey_box(racer(), x, u, p.data(), LoadsSince<double>{true, drawn});
-    const auto later = grey_box(racer(), x, u, p.data(), LoadsSince<double>{true, drawn - 500.0});
+    const auto at_once = grey_box(racer(), x, u, p.data(), LoadsSince<double>{true, drawn, 625.0});
+    const auto later =
+        grey_box(racer(), x, u, p.data(), LoadsSince<double>{true, drawn - 500.0, 625.0});
     // 500 N drawn since then: 500 h/L newtons more in front, as many fewer behind.
     GreyBoxInput moved = u;
     for (int i = 0; i < 4; ++i) EXPECT_NEAR(at_once[i], held[i], 1e-9);
@@ -102,6 +106,35 @@ TEST(GreyBox, LoadsMoveWithinASampleOnlyByWhatIsDrawnSince) {
     }
     const auto agreed = grey_box(racer(), x, moved, p.data());
     for (int i = 0; i < 4; ++i) EXPECT_NEAR(later[i], agreed[i], 1e-9);
+}
+
+TEST(GreyBox, TheAirsPartOfTheLoadsGoesWithTheSquareOfTheSpeed) {
+    const Tyres p = tyres();
+    GreyBoxInput u = input(0.0);
+    const std::array<double, kGreyStates> x{30.0, 0.5, 0.4};
+    // All that is not weight or acceleration's is the air's; from 25 to 30 m/s it grows by 0.44.
+    const double drag = 0.5 * 1.225 * 0.7 * 900.0;
+    const double weight = 780.0 * 1.05 * kGravity / 3.0;
+    const double shift = 0.35 / 3.0 * (u.fx_n - drag);
+    const auto grown = grey_box(racer(), x, u, p.data(), LoadsSince<double>{true, drag, 625.0});
+    u.fz_front_n += 0.44 * (u.fz_front_n - weight * 1.6 + shift);
+    u.fz_rear_n += 0.44 * (u.fz_rear_n - weight * 1.4 - shift);
+    const auto held = grey_box(racer(), x, u, p.data());
+    for (int i = 0; i < 4; ++i) EXPECT_NEAR(grown[i], held[i], 1e-9);
+}
+
+TEST(GreyBox, SubstepsFollowTheFastestMotion) {
+    const Tyres p = tyres();
+    for (const double speed : {3.0, 12.0, 30.0}) {
+        const GreyBoxInput u = input(0.05);
+        std::array<double, kGreyStates> coarse{speed, 0.2, 0.1};
+        std::array<double, kGreyStates> fine = coarse;
+        grey_box_step(racer(), coarse, u, p.data(), 0.01,
+                      grey_box_substeps(racer(), u, p.data(), speed, 0.01));
+        grey_box_step(racer(), fine, u, p.data(), 0.01, 400);
+        EXPECT_NEAR(coarse[1], fine[1], 2e-5) << speed;
+        EXPECT_NEAR(coarse[2], fine[2], 2e-5) << speed;
+    }
 }
 
 TEST(GreyBox, SubstepsKeepSlowDrivingStable) {

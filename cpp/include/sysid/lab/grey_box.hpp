@@ -1,13 +1,15 @@
 // The grey-box car whose tyres are to be identified: a single track with logged inputs.
 //
-//   dv_x/dt = v_y r + (F_x - F_yf sin(delta) - 1/2 rho C_dA V^2)/m                        (1)
+//   dv_x/dt = v_y r + (F_x - F_yf sin(delta) - 1/2 rho C_dA v_x^2)/m                      (1)
 //   a_y     = (F_yf cos(delta) + F_yr)/m + P_1 v_x^2 + P_2 v_y + P_3 r                    (2)
 //   dv_y/dt = a_y - v_x r,   dr/dt = (l_f F_yf cos(delta) - l_r F_yr)/I_z                 (3)
 //   F_y = F_z mu(alpha),  alpha_f = delta - atan((v_y + l_f r)/v_x), rear without delta   (4)
 // with mu the Magic Formula of `model/tyre.hpp`. The logged loads F_z belong to the beginning of a
-// sample; within it they move with the longitudinal acceleration,
-//   F_zf = F_zf(0) + h/L (T - T(0)),  F_zr = F_zr(0) - h/L (T - T(0)),                    (5)
-//   T = F_yf sin(delta) + 1/2 rho C_dA V^2.
+// sample; within it they move with the longitudinal acceleration and with the speed,
+//   F_zf = F_zf(0) + h/L (T - T(0)) + A_f (v_x^2/v_x(0)^2 - 1),                           (5)
+//   F_zr = F_zr(0) - h/L (T - T(0)) + A_r (v_x^2/v_x(0)^2 - 1),
+//   T = F_yf sin(delta) + 1/2 rho C_dA v_x^2,
+// where A is what is left of F_z(0) besides the weight and h/L m a_x: the air's part.
 // At 10 ms that is a thousandth of the force, which a drive beyond the peak resolves. Written once
 // for any scalar, and once more with its derivatives by hand, which is what the searches spend
 // their time in; tests hold the two together.
@@ -20,6 +22,7 @@
 
 #include "sysid/math/dual.hpp"
 #include "sysid/model/tyre.hpp"
+#include "sysid/model/vehicle.hpp"
 
 namespace sysid::lab {
 
@@ -58,12 +61,19 @@ struct GreyBoxInput {
 
 constexpr int kGreyStates = 3;  // v_x, v_y, r
 
-/// T(0) of (5); without `moves` the loads are those that were logged.
+/// T(0) and v_x(0)^2 of (5); without `moves` the loads are those that were logged.
 template <class S>
 struct LoadsSince {
     bool moves = false;
     S drawn_n{};
+    S speed_squared{};  // 0 at walking pace, where the air does nothing
 };
+
+/// How far the air's part of the loads has grown: v_x^2/v_x(0)^2 - 1.
+template <class S>
+S air_growth(const LoadsSince<S>& since, const S& v_x) {
+    return value_of(since.speed_squared) > 0.0 ? v_x * v_x / since.speed_squared - 1.0 : S(0.0);
+}
 
 /// Rates of v_x, v_y, r, and a_y.
 template <class S, class T>
@@ -78,14 +88,18 @@ std::array<S, kGreyStates + 1> grey_box(const GreyBoxCar& car, const std::array<
     const TyreCoefficients<T> rear{p[kRear], p[kRear + 1], p[kRear + 2], p[kRear + 3]};
     const T mass = car.mass_kg * p[kMassFactor];
     const T inertia = car.yaw_inertia_kgm2 * p[kInertiaFactor];
-    const S squared = x[0] * x[0] + x[1] * x[1];
-    const S drag = 0.5 * car.air_density_kgpm3 * (p[kDragArea] * squared);
+    const S drag = 0.5 * car.air_density_kgpm3 * (p[kDragArea] * (x[0] * x[0]));
     const double lever = since.moves ? car.cg_height_m / (car.lf_m + car.lr_m) : 0.0;
     const S mu_f = magic_formula(alpha_f, front);
+    const S growth = air_growth(since, x[0]);
+    const S shift = lever * (u.fx_n - since.drawn_n);
+    const T weight = mass * (kGravity / (car.lf_m + car.lr_m));
+    const S fz_f = u.fz_front_n + growth * (u.fz_front_n - weight * car.lr_m + shift);
+    const S fz_r = u.fz_rear_n + growth * (u.fz_rear_n - weight * car.lf_m - shift);
     const S force_f =
-        (u.fz_front_n + lever * (drag - since.drawn_n)) * mu_f / (1.0 - lever * u.sin_steer * mu_f);
+        (fz_f + lever * (drag - since.drawn_n)) * mu_f / (1.0 - lever * u.sin_steer * mu_f);
     const S moved = lever * (u.sin_steer * force_f + drag - since.drawn_n);
-    const S force_r = (u.fz_rear_n - moved) * magic_formula(alpha_r, rear);
+    const S force_r = (fz_r - moved) * magic_formula(alpha_r, rear);
     const S a_y = (u.cos_steer * force_f + force_r) / mass + p[kP1] * (x[0] * x[0]) +
                   p[kP2] * x[1] + p[kP3] * x[2];
     return {
@@ -118,7 +132,8 @@ struct GreyBoxSlope {
     std::array<double, kGreyStates + 1> value;
     std::array<std::array<double, kGreyStates>, kGreyStates + 1> by_state;
     std::array<std::array<double, kTyreParameters>, kGreyStates + 1> by_parameter;
-    std::array<double, kGreyStates + 1> by_drawn;  // by T(0)
+    std::array<double, kGreyStates + 1> by_drawn;          // by T(0)
+    std::array<double, kGreyStates + 1> by_first_squared;  // by v_x(0)^2
 };
 
 void grey_box_slope(const GreyBoxCar& car, const std::array<double, kGreyStates>& x,
@@ -132,7 +147,18 @@ S drawn_along(const GreyBoxCar& car, const std::array<S, kGreyStates>& x, const 
     return u.fx_n - car.mass_kg * p[kMassFactor] * (rates[0] - x[1] * x[2]);
 }
 
-/// Sub-steps of the Runge-Kutta rule that keep the fastest motion stable.
+/// What the loads move from, with the rates at the beginning of a sample.
+template <class S, class T>
+LoadsSince<S> loads_from(const GreyBoxCar& car, const std::array<S, kGreyStates>& x,
+                         const GreyBoxInput& u, const T* p,
+                         const std::array<S, kGreyStates + 1>& rates) {
+    if (car.cg_height_m <= 0.0) return {};
+    const bool rolling = value_of(x[0]) > car.slowest_mps;
+    return {true, drawn_along(car, x, u, p, rates), rolling ? x[0] * x[0] : S(0.0)};
+}
+
+/// Sub-steps of the Runge-Kutta rule that follow the fastest motion to some 1e-5 of what it moves
+/// in a sample; a precise drive resolves the 5 % that stability alone would leave.
 inline int grey_box_substeps(const GreyBoxCar& car, const GreyBoxInput& u, const double* p,
                              double v_x, double dt) {
     const double front = std::abs(p[kFront] * p[kFront + 1] * p[kFront + 2]) * u.fz_front_n;
@@ -143,7 +169,7 @@ inline int grey_box_substeps(const GreyBoxCar& car, const GreyBoxInput& u, const
         std::max((front + rear) / mass,
                  (front * car.lf_m * car.lf_m + rear * car.lr_m * car.lr_m) / inertia) /
         std::max(v_x, car.slowest_mps);
-    return static_cast<int>(std::clamp(std::ceil(dt * rate / 1.5), 1.0, 24.0));
+    return static_cast<int>(std::clamp(std::ceil(dt * rate / 0.25), 1.0, 144.0));
 }
 
 /// Classical Runge-Kutta over `dt`; force and steering are held, as a digital controller does.
@@ -158,7 +184,7 @@ void grey_box_step(const GreyBoxCar& car, std::array<S, kGreyStates>& x, const G
     LoadsSince<S> since;
     for (int n = 0; n < substeps; ++n) {
         const auto k1 = grey_box(car, x, u, p, since);
-        if (n == 0 && car.cg_height_m > 0.0) since = {true, drawn_along(car, x, u, p, k1)};
+        if (n == 0) since = loads_from(car, x, u, p, k1);
         const auto k2 = grey_box(car, moved(x, k1, 0.5 * h), u, p, since);
         const auto k3 = grey_box(car, moved(x, k2, 0.5 * h), u, p, since);
         const auto k4 = grey_box(car, moved(x, k3, h), u, p, since);
