@@ -11,7 +11,7 @@ from .omnibus import Omnibus, omnibus
 from .proposals import Proposal
 from .shape import Curve, Surface
 from .unknown import Unknown, unknown
-from .verdicts import EffectVerdict, Verdicts, judge, verdicts
+from .verdicts import EffectVerdict, Verdicts, judge, possible, verdicts
 from .where import Where, where
 
 __all__ = [
@@ -40,6 +40,7 @@ __all__ = [
     "diagnose",
     "judge",
     "omnibus",
+    "possible",
     "separations",
     "suggest_manoeuvre",
     "unknown",

@@ -7,20 +7,20 @@ so that what merely acted like one of them is told from what is missing too.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from .._text import html_table, number
-from ..effects import Effect
+from ..effects import Effect, Parameter
 from ..identify import Fit
 from .constancy import constancy
 from .diagnose import Diagnosis
 from .score import Score, score_board
 
-__all__ = ["EffectVerdict", "Finding", "Verdicts", "judge", "verdicts"]
+__all__ = ["EffectVerdict", "Finding", "Verdicts", "judge", "possible", "verdicts"]
 
 Finding = Literal["missing", "one of a group", "proxy", "negligible", "not testable", "absent"]
 
@@ -33,6 +33,7 @@ _ORDER: tuple[Finding, ...] = (
     "absent",
 )
 _IMPOSSIBLE = 5.0  # typical sizes, beyond which no car is known
+_AT_BOUND = 1e-5  # of the width between the bounds
 _UPPER = 1.645  # 95 %, one side
 _CERTAIN = 1.96
 
@@ -271,30 +272,54 @@ def _of_scored(effect: Effect, score: Score | None, evidence: bool) -> EffectVer
 def _of_present(
     effect: Effect, value: tuple[float, ...], std: tuple[float, ...], group: tuple[str, ...]
 ) -> EffectVerdict:
-    sizes = [
-        (p, v - p.null_value, _CERTAIN * s)
-        for p, v, s in zip(effect.parameters, value, std, strict=True)
-        if not p.scan
-    ]
     finding: Finding = "one of a group" if group else "missing"
     because = ""
-    if any(_impossible(p.null_value, p.typical, p.lower, p.upper, d, s) for p, d, s in sizes):
+    if not possible(effect, value, std):
         finding, group = "proxy", ()
         size = _listed(
             effect, [f"{number(v, 3)} +- {number(s, 2)}" for v, s in zip(value, std, strict=True)]
         )
         because = f"no car has such a value ({size})"
-    elif all(abs(d) + s < p.matters for p, d, s in sizes):
+    elif all(abs(d) + s < p.matters for p, d, s in _sizes(effect, value, std)):
         finding, group = "negligible", ()
     return EffectVerdict(effect, finding, value, std, _bound(effect, value, std), group, because)
 
 
-def _impossible(
-    null: float, typical: float, lower: float, upper: float, off: float, reach: float
-) -> bool:
-    """Whether no value of the interval is one that a car can have."""
-    most = _IMPOSSIBLE * abs(typical - null)
-    low, high = max(lower - null, -most), min(upper - null, most)
+def possible(effect: Effect, value: Sequence[float], std: Sequence[float]) -> bool:
+    """Whether the 95 % intervals of an effect's parameters hold values that a car can have.
+
+    A search that ends at a bound other than nothing wanted more than any car has.
+
+    Parameters
+    ----------
+    effect : Effect
+    value, std : sequence of float
+        Of its parameters, in their order.
+
+    Returns
+    -------
+    bool
+    """
+    return not any(_impossible(p, d, s) for p, d, s in _sizes(effect, value, std))
+
+
+def _sizes(
+    effect: Effect, value: Sequence[float], std: Sequence[float]
+) -> list[tuple[Parameter, float, float]]:
+    """Parameters that have a size, how far each is from nothing, and the reach of its interval."""
+    return [
+        (p, v - p.null_value, _CERTAIN * s)
+        for p, v, s in zip(effect.parameters, value, std, strict=True)
+        if not p.scan
+    ]
+
+
+def _impossible(p: Parameter, off: float, reach: float) -> bool:
+    most = _IMPOSSIBLE * abs(p.typical - p.null_value)
+    low, high = max(p.lower - p.null_value, -most), min(p.upper - p.null_value, most)
+    if np.isinf(reach):
+        at = _AT_BOUND * (p.upper - p.lower)
+        return bool((low < 0.0 and off < low + at) or (high > 0.0 and off > high - at))
     return bool(off + reach < low or off - reach > high)
 
 

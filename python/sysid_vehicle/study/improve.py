@@ -8,19 +8,27 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..compare import Comparison, compare
-from ..diagnose import Candidate, Diagnosis, Omnibus, Verdicts, diagnose, judge, omnibus
+from ..diagnose import (
+    Candidate,
+    Diagnosis,
+    Omnibus,
+    Verdicts,
+    diagnose,
+    judge,
+    omnibus,
+)
 from ..effects import Effect, effect
 from ..errors import InvalidInput, warn
 from ..estimate import Driving
-from ..identify import Fit, identify, refine
+from ..identify import Fit, identify
 from ..log import Log
 from ..model import Model
-from .held_out import error_falls, gain_in_log_likelihood, hold_out
+from .held_out import hold_out
+from .steps import alternatives, exchanged, first_that_holds, way, without_idle
 from .study import AddedEffect, Study, Verdict
 
 __all__ = ["improve"]
 
-_IDLE = 2.6  # an added effect within so many standard errors of nothing is dropped again
 _MOST = 0.8  # share of what is missing, by which an effect has to be more than a stand-in
 _SURE = 0.01  # evidence of one effect more: at 5 % it would spoil one complete model in twenty
 
@@ -75,29 +83,29 @@ def improve(
     fits = [baseline]
     p_values: dict[str, float] = {}
     rivals: dict[str, tuple[str, ...]] = {}
+    nearly: dict[str, tuple[Candidate, ...]] = {}
     while True:
         dx = diagnose(fit, candidates=candidates, alpha=alpha, seed=seed, progress=progress)
         diagnoses.append(dx)
         if len(fit.model.effects) >= most_effects:
             break
-        chosen = _first_that_holds(dx, fit, test_driving)
+        chosen = first_that_holds(dx, fit, test_driving)
         if chosen is None:
             break
         assert chosen.fit is not None
-        p_values[chosen.id] = chosen.p_value
+        nearly[chosen.id] = alternatives(dx, chosen)
+        for c in nearly[chosen.id]:
+            nearly.setdefault(c.id, alternatives(dx, c))
+        p_values |= {c.id: c.p_value for c in (chosen, *nearly[chosen.id])}
         rivals[chosen.id] = chosen.indistinguishable_from
-        fit = _without_idle(chosen.fit)
-        if chosen.id not in fit.model.effects or any(
-            f.model.effects == fit.model.effects for f in fits
-        ):
-            fit = fits[-1]
+        found = exchanged(without_idle(chosen.fit), nearly, test_driving, most_effects=most_effects)
+        if any(set(f.model.effects) == set(found.model.effects) for f in fits):
             break
+        fit = without_idle(found)
         fits.append(fit)
-        say(f"Added {chosen.id}: {chosen.size}.")
-    # Effects that were dropped on the way are no part of the story.
-    fits = [f for f in fits if set(f.model.effects) <= set(fit.model.effects)]
-    if fits[-1] is not fit:
-        fits.append(fit)
+        gone = set(fits[-2].model.effects) - set(fit.model.effects)
+        say(f"Added {chosen.id}: {chosen.size}." + _instead(fit, gone))
+    fits = way(fits)
     floor = fit.noise
     on_train = [compare(f, train_driving, noise=floor) for f in fits]
     on_test = [compare(f, test_driving, noise=floor) for f in fits]
@@ -107,7 +115,7 @@ def improve(
         fit,
         scored=(last.scores, last.family) if last.fit is fit else None,
         lacked={e.id for e in _considered(model, candidates)},
-        groups=rivals,
+        groups={e: g for e, g in rivals.items() if e in fit.model.effects},
         acted={c.id for dx in diagnoses for c in dx.significant},
         alpha=alpha,
         seed=seed,
@@ -140,37 +148,11 @@ def _silent(_: str) -> None:
     pass
 
 
-def _first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> Candidate | None:
-    """The likeliest candidate that fits better and predicts the held-out driving better."""
-    for c in dx.significant[:3]:
-        if c.fit is None or c.statistic < 2.0 * np.log(c.fit.driving.samples):
-            continue
-        gains = [gain_in_log_likelihood(fit, c.fit, test, same_noise=s) for s in (False, True)]
-        if all(g > e for g, e in gains) and error_falls(fit, c.fit, test):
-            return c
-    return None
-
-
-def _without_idle(fit: Fit) -> Fit:
-    """The fit without effects whose parameters have all become indistinguishable from nothing."""
-    while True:
-        idle = [e for e in fit.model.parts if _strength(fit, e.id) < _IDLE]
-        if not idle:
-            return fit
-        weakest = min(idle, key=lambda e: _strength(fit, e.id))
-        fit = refine(fit.model.drop(weakest), fit.driving, fit.noise)
-
-
-def _strength(fit: Fit, name: str) -> float:
-    """Largest distance of the effect's parameters from their null values, in standard errors."""
-    parameters = fit.model.parameters
-    found = [
-        e for e in fit.estimates if e.name.startswith(f"{name}.") and not parameters[e.name].scan
-    ]
-    return max(
-        abs(e.value - parameters[e.name].null_value) / e.std if np.isfinite(e.std) else np.inf
-        for e in found
-    )
+def _instead(fit: Fit, gone: set[str]) -> str:
+    """What the step took out of the model, and what came in its place, in words."""
+    if not gone:
+        return ""
+    return f" Without {', '.join(sorted(gone))} the model is {', '.join(fit.model.effects)}."
 
 
 def _verdict(

@@ -18,8 +18,8 @@ struct RollingResistance : Effect {
         "aero_drag, road_grade, head_wind, force_gain",
         2,
         {
-            {"coefficient", "1", 0.0, 0.012, 0.003, -0.05, 0.1, 0.008, 0.015},
-            {"per_speed_spm", "s/m", 0.0, 2.5e-4, 6.0e-5, -0.002, 0.004, 0.0, 4.0e-4},
+            {"coefficient", "1", 0.0, 0.012, 0.003, 0.0, 0.1, 0.008, 0.015},
+            {"per_speed_spm", "s/m", 0.0, 2.2e-4, 6.0e-5, 0.0, 5.0e-4, 0.0, 4.0e-4},
         },
         false,
         true,

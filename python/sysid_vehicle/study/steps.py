@@ -1,0 +1,163 @@
+"""One step of the way to a better model: what is added, exchanged, or dropped again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from .. import _core
+from ..diagnose import Candidate, Diagnosis, possible
+from ..estimate import Driving
+from ..identify import Fit, refine
+from .held_out import error_falls, gain_in_log_likelihood
+
+__all__ = ["alternatives", "exchanged", "first_that_holds", "way", "without_idle"]
+
+_IDLE = 2.6  # an effect within so many standard errors of nothing is none
+_NEAR = 0.6  # of the evidence for the chosen effect
+_ALTERNATIVES = 2
+_BETTER = 4.5  # nats, beyond the Bayesian price of the parameters: three standard errors
+
+
+def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> Candidate | None:
+    """The likeliest candidate that fits better and predicts the held-out driving better.
+
+    One with a value that a car can have comes before one that only acts like something else.
+    """
+    likely = sorted(dx.significant, key=lambda c: not possible(c.effect, c.value, c.std))
+    for c in likely:
+        if c.fit is None or c.statistic < 2.0 * np.log(c.fit.driving.samples):
+            continue
+        if c.id not in without_idle(c.fit).model.effects:
+            continue
+        gains = [gain_in_log_likelihood(fit, c.fit, test, same_noise=s) for s in (False, True)]
+        if all(g > e for g, e in gains) and error_falls(fit, c.fit, test):
+            return c
+    return None
+
+
+def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
+    """Effects that act like the chosen one and nearly were, the likeliest first.
+
+    The catalogue says what acts like what, and the driving may add to it.
+    """
+    alike = [
+        c
+        for c in dx.significant
+        if c.statistic > _NEAR * chosen.statistic
+        and (
+            c.id in chosen.effect.twins
+            or chosen.id in c.effect.twins
+            or c.id in chosen.indistinguishable_from
+        )
+    ]
+    return tuple(alike[:_ALTERNATIVES])
+
+
+def exchanged(
+    fit: Fit, nearly: Mapping[str, Sequence[Candidate]], test: Driving, *, most_effects: int
+) -> Fit:
+    """The fit with another effect, or two, in place of an earlier one that they explain away.
+
+    Where several effects are missing, one that is not there can stand in for two of them: a head
+    wind for drag and rolling resistance. It is chosen first, as either alone explains less.
+
+    Parameters
+    ----------
+    fit : Fit
+    nearly : mapping
+        By effect of the model, what was nearly chosen instead.
+    test : Driving
+        What the fit never saw: the exchange must lower the error there too.
+    most_effects : int
+        That the model may have.
+
+    Returns
+    -------
+    Fit
+    """
+    best = fit
+    for name in fit.model.effects:
+        near = [c for c in nearly.get(name, ()) if c.id not in fit.model.effects]
+        for others in dict.fromkeys([*((c,) for c in near), tuple(near)]):
+            if not others or len(fit.model.effects) - 1 + len(others) > most_effects:
+                continue
+            trial = _with_others(fit, name, others)
+            if trial is None or _merit(trial) < _merit(best) + _BETTER:
+                continue
+            if all(_real(trial, c) for c in others) and error_falls(fit, trial, test):
+                best = without_idle(trial)
+    return best
+
+
+def _with_others(fit: Fit, name: str, others: Sequence[Candidate]) -> Fit | None:
+    """The fit with others in place of an effect; None where the search fails."""
+    model = fit.model.drop(name)
+    for c in others:
+        values = zip(c.effect.parameters, c.value, strict=True)
+        model = model.add(c.id).with_values({f"{c.id}.{p.name}": v for p, v in values})
+    try:
+        return refine(model, fit.driving, fit.noise)
+    except (_core.NumericalFailure, np.linalg.LinAlgError):
+        return None
+
+
+def _real(fit: Fit, c: Candidate) -> bool:
+    """Whether the effect has a value that a car can have."""
+    found = [fit[f"{c.id}.{p.name}"] for p in c.effect.parameters]
+    return possible(c.effect, [e.value for e in found], [e.std for e in found])
+
+
+def without_idle(fit: Fit) -> Fit:
+    """The fit without effects that have become indistinguishable from nothing, and unnecessary.
+
+    Of two effects that act alike neither may be told from nothing while the model needs one of
+    them: an effect goes only where the model without it is as good for its number of parameters.
+    """
+    kept: set[str] = set()
+    while True:
+        idle = [e.id for e in fit.model.parts if e.id not in kept and _strength(fit, e.id) < _IDLE]
+        if not idle:
+            return fit
+        weakest = min(idle, key=lambda name: _strength(fit, name))
+        without = refine(fit.model.drop(weakest), fit.driving, fit.noise)
+        if _merit(without) + _BETTER < _merit(fit):
+            kept.add(weakest)
+        else:
+            fit = without
+
+
+def way(fits: Sequence[Fit]) -> list[Fit]:
+    """The fits of a story that leads to the last one: one effect more each time.
+
+    Effects that were dropped or exchanged on the way are no part of it; where one was, the steps
+    after it are fitted anew.
+    """
+    baseline, final = fits[0], fits[-1]
+    known = {frozenset(f.model.effects): f for f in fits}
+    story = [final]
+    while len(story[0].model.effects) > len(baseline.model.effects):
+        later = story[0]
+        last = later.model.effects[-1]
+        earlier = later.model.drop(last)
+        found = known.get(frozenset(earlier.effects))
+        story.insert(0, found or refine(earlier, later.driving, later.noise))
+    return story if story[0] is baseline else [baseline, *story]
+
+
+def _merit(fit: Fit) -> float:
+    price = 0.5 * len(fit.estimates) * float(np.log(fit.driving.samples))
+    return fit.log_likelihood - price
+
+
+def _strength(fit: Fit, name: str) -> float:
+    """Largest distance of the effect's parameters from their null values, in standard errors."""
+    parameters = fit.model.parameters
+    found = [
+        e for e in fit.estimates if e.name.startswith(f"{name}.") and not parameters[e.name].scan
+    ]
+    return max(
+        abs(e.value - parameters[e.name].null_value) / e.std if np.isfinite(e.std) else np.inf
+        for e in found
+    )
