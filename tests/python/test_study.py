@@ -168,6 +168,13 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_other_warnings_cost_no_second_look(study: Study) -> None:
+    known = study.where, study.unknown
+    other = study.with_warnings(["the road was wet"])
+    assert other.warnings == ("the road was wet",)
+    assert (other.where, other.unknown) == known
+
+
 def test_infinite_figures_become_null(study: Study, tmp_path: Path) -> None:
     names = [e.name for e in study.fit.estimates if not np.isfinite(e.std)]
     told = study.to_dict()["parameters"]

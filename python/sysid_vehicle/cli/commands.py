@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +86,7 @@ def _improve(args: argparse.Namespace, heard: Warnings) -> None:
     refuse_unwritable([args.report, args.json], inputs=_inputs(args))
     study = _study(args, heard)
     # The warnings have gone to the error stream.
-    print(replace(study, warnings=()))
+    print(study.with_warnings(()))
     print(study.where)
     if study.unknown is not None:
         print(study.unknown)
@@ -135,7 +135,7 @@ def _with_warnings(study: Study, heard: Warnings) -> Study:
     for text in study.warnings:
         if text not in heard:
             warn(text)
-    return replace(study, warnings=tuple(heard))
+    return study.with_warnings(heard)
 
 
 def _read(paths: list[Path], channels: Path | None) -> list[Log]:

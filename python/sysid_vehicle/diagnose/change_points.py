@@ -29,8 +29,8 @@ from ..effects import effect
 from ..estimate import Driving
 from .change_directions import Kind, beginning, kinds_of_change, of_driving
 from .coordinates import running_time
-from .evidence import Evidence, solve, variance_ratio
-from .score import _basis
+from .evidence import Evidence, solve
+from .projection import orthonormal_basis, variance_ratio
 
 __all__ = ["ChangePoint", "change_points"]
 
@@ -133,7 +133,7 @@ def _search(
     if steps < 2 * edge + 2:
         return None
     rows = slice(channels * begin, channels * (begin + steps * step))
-    Q = _basis(constant[rows])
+    Q = orthonormal_basis(constant[rows])
     e = residual[rows] - Q @ (Q.T @ residual[rows])
     by_step = (steps, step * channels)
     inner = slice(edge, steps - edge)  # steps before which a change may lie
@@ -182,7 +182,7 @@ def _read(
     reach = max(round(_NEAR_S * rate), 2 * driving.samples // _MOST_STEPS)
     fine = max(2 * reach // _FINE, 1)
     tried = list(range(max(about - reach, 0), min(about + reach, driving.samples), fine))
-    Q = _basis(constant)
+    Q = orthonormal_basis(constant)
     e = evidence.residual - Q @ (Q.T @ evidence.residual)
     found = [solve(R - Q @ (Q.T @ R), e) for R in beginning(evidence, kind, tried)]
     statistic = np.array([f.statistic for f in found])

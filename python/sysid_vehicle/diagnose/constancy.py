@@ -19,7 +19,8 @@ from .._text import number
 from ..effects import Effect
 from ..estimate import Driving
 from ..identify import Fit
-from .score import _basis, _pseudo_inverse, _variance_ratio
+from .evidence import Evidence
+from .projection import pseudo_inverse, variance_ratio
 
 __all__ = ["Constancy", "constancy"]
 
@@ -83,23 +84,14 @@ def constancy(fit: Fit) -> dict[str, Constancy]:
     parts = [e for e in fit.model.parts if e.scanned is None]
     if len(pieces) < 2 or not parts:
         return {}
-    problem = fit.driving.problem(fit.model)
-    p = fit.model.vector()
-    frozen = problem.freeze(p, fit.noise.vector())
-    e = problem.residuals(p, frozen).ravel()
-    known = fit.model.parameters
+    evidence = Evidence(fit, fit.driving)
     names = list(fit.model.free_names)
-    G = problem.sensitivities(p, frozen, [known[n].column for n in names])
-    basis = _basis(G)
-    e = e - basis @ (basis.T @ e)
     return {
         part.id: _of_effect(
             part,
-            fit,
-            G[:, [names.index(f"{part.id}.{q.name}") for q in part.parameters]],
+            evidence,
+            evidence.fitted[:, [names.index(f"{part.id}.{q.name}") for q in part.parameters]],
             pieces,
-            basis,
-            e,
         )
         for part in parts
     }
@@ -117,21 +109,20 @@ def _pieces(driving: Driving) -> list[FloatArray]:
 
 def _of_effect(
     effect: Effect,
-    fit: Fit,
+    evidence: Evidence,
     own: FloatArray,
     pieces: list[FloatArray],
-    basis: FloatArray,
-    e: FloatArray,
 ) -> Constancy:
+    fit, e = evidence.fit, evidence.left
     whole = np.array([fit[f"{effect.id}.{q.name}"].value - q.null_value for q in effect.parameters])
     # The pieces add up to the whole, which is fitted: the last one says nothing of its own.
     cut = np.hstack([own * piece[:, None] for piece in pieces])
-    R = cut - basis @ (basis.T @ cut)
-    inverse, rank = _pseudo_inverse(R.T @ R)
+    R = evidence.project(cut)
+    inverse, rank = pseudo_inverse(R.T @ R)
     S = R.T @ e
     off = inverse @ S
-    along = (R @ off)[:, None]
-    ratio = max(_variance_ratio(along, e - along[:, 0], along.T @ along), 1.0)
+    along = R @ off
+    ratio = variance_ratio(along, e - along)
     statistic = float(S @ off) / ratio
     width = own.shape[1]
     by_piece = off.reshape(len(pieces), width)

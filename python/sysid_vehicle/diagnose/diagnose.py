@@ -17,8 +17,9 @@ from ..errors import InvalidInput
 from ..estimate import Driving
 from ..identify import Fit, refine, refit
 from ..log import Log
-from .omnibus import Omnibus, omnibus
-from .score import Score, ScoreBoard, score_board
+from .evidence import Evidence
+from .omnibus import Omnibus, omnibus_of
+from .score import Score, ScoreBoard, score_board_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -206,7 +207,9 @@ def diagnose(
     if candidates is not None:
         wanted = {effect(c).id for c in candidates}
         possible = tuple(e for e in possible if e.id in wanted)
-    board = score_board(fit, driving, possible)
+    evidence = Evidence(fit, driving)
+    board = score_board_of(evidence, possible)
+    left = omnibus_of(evidence)
     family = board.family_p_values(seed=seed)
     present = max(int(np.isfinite(driving.measured).sum()), 1)
     remaining = float(board.residual @ board.residual)
@@ -252,7 +255,7 @@ def diagnose(
         far = sorted((c for c in tried if c.id not in done), key=lambda c: -c.statistic)
         done |= {c.id for c in far}
         ranked = finished + far + [c for c in ranked if c.id not in done]
-    return Diagnosis(fit, tuple(ranked), omnibus(fit, driving), alpha, board.scores, family)
+    return Diagnosis(fit, tuple(ranked), left, alpha, board.scores, family)
 
 
 def _worth_refitting(significant: list[Candidate], refits: int) -> list[Candidate]:
@@ -288,6 +291,8 @@ def _score_twins(board: ScoreBoard, score: Score) -> tuple[str, ...]:
         if rival.effect.id == score.effect.id:
             continue
         theirs = board.joint_statistic(rival.effect.id)
+        if abs(theirs - own) >= _TELLS_APART:
+            continue  # together they tell at least as much as either
         both = board.joint_statistic(score.effect.id, rival.effect.id)
         if both - theirs < _TELLS_APART and both - own < _TELLS_APART:
             twins.append(rival.effect.id)

@@ -12,7 +12,7 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..estimate import Driving
 from ..identify import Fit
-from .score import _basis, _pseudo_inverse, _variance_ratio
+from .projection import orthonormal_basis, pseudo_inverse, variance_ratio
 
 __all__ = ["FORCES", "READINGS", "TARGETS", "Evidence", "Solution"]
 
@@ -74,7 +74,7 @@ class Evidence:
     @cached_property
     def basis(self) -> FloatArray:
         """Orthonormal directions of all that the free parameters can do."""
-        return _basis(self.fitted)
+        return orthonormal_basis(self.fitted)
 
     @cached_property
     def left(self) -> FloatArray:
@@ -120,14 +120,8 @@ class Evidence:
 
 def solve(R: FloatArray, e: FloatArray) -> Solution:
     """Sizes of directions that are projected off the fitted parameters."""
-    inverse, _ = _pseudo_inverse(R.T @ R)
+    inverse, _ = pseudo_inverse(R.T @ R)
     score = R.T @ e
     size = inverse @ score
     ratio = variance_ratio(R @ size, e - R @ size)
     return Solution(float(score @ size) / ratio, size, inverse * ratio, ratio)
-
-
-def variance_ratio(direction: FloatArray, e: FloatArray) -> float:
-    """Long-run over naive variance of the score along one direction, at least 1."""
-    along = direction[:, None]
-    return max(_variance_ratio(along, e, along.T @ along), 1.0)

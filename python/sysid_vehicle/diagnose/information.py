@@ -22,6 +22,7 @@ from ..effects import Effect
 from ..errors import InvalidInput
 from ..estimate import Driving
 from ..identify import Fit
+from .evidence import Evidence
 from .sensitivity import sensitivities
 
 __all__ = ["Information", "information_of"]
@@ -109,8 +110,8 @@ class Information:
 
 def information_of(fit: Fit, driving: Driving, effects: Sequence[Effect]) -> Information:
     """Information of some driving, at the fit, about its parameters and effects it lacks."""
-    found = sensitivities(fit, driving, effects)
-    blocks = [found.effects[e.id] for e in found.candidates]
-    G = np.hstack([found.fitted, *blocks])
-    widths = tuple(b.shape[1] for b in blocks)
+    evidence = Evidence(fit, driving)
+    found = sensitivities(evidence, effects)
+    G = np.hstack([evidence.fitted, found.columns])
+    widths = tuple(p.stop - p.start for p in found.places.values())
     return Information(fit.model.free_names, found.candidates, widths, as_float64(G.T @ G))

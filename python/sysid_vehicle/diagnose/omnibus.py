@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from .. import _core
-from .._arrays import FloatArray, as_float64
+from .._arrays import FloatArray
 from ..estimate import Driving
 from ..identify import Fit
-from .score import _basis, _pseudo_inverse, _variance_ratio
+from .evidence import Evidence
+from .projection import pseudo_inverse, variance_ratio
 
-__all__ = ["Omnibus", "omnibus"]
+__all__ = ["Omnibus", "omnibus", "omnibus_of"]
 
 _LEVEL = 0.01
 
@@ -61,23 +61,29 @@ class Omnibus:
 
 def omnibus(fit: Fit, driving: Driving) -> Omnibus:
     """Test a fitted model, with the effects it has, for anything left."""
-    problem = driving.problem(fit.model)
-    p = fit.model.vector()
-    noise = fit.noise.vector()
-    frozen = problem.freeze(p, noise)
-    e = problem.residuals(p, frozen).ravel()
-    known = fit.model.parameters
-    basis = _basis(
-        problem.sensitivities(p, frozen, [known[n].column for n in fit.model.free_names])
-    )
-    names, signals, targets = _virtual(problem, p, noise, driving)
-    G = problem.signal_sensitivities(p, frozen, as_float64(signals), targets)
-    R = G - basis @ (basis.T @ G)
+    return omnibus_of(Evidence(fit, driving))
+
+
+def omnibus_of(evidence: Evidence) -> Omnibus:
+    """The same of residuals that may be known already."""
+    names, signals, targets = _virtual(evidence)
+    p = evidence.fit.model.vector()
+    G = evidence.problem.signal_sensitivities(p, evidence.frozen, signals, targets)
+    R = evidence.project(G)
     kept = np.linalg.norm(R, axis=0) > 1e-3 * np.maximum(np.linalg.norm(G, axis=0), 1e-300)
     R, names = R[:, kept], [n for n, k in zip(names, kept, strict=True) if k]
-    e = e - basis @ (basis.T @ e)
-    statistic, degrees = _statistic(R, e)
-    by_target = {t: _statistic(R[:, [n == t for n in names]], e)[0] for t in dict.fromkeys(names)}
+    e = evidence.left
+    information, S = R.T @ R, R.T @ e
+
+    def of(columns: list[int]) -> tuple[float, int]:
+        inverse, rank = pseudo_inverse(information[np.ix_(columns, columns)])
+        value = np.zeros(len(names))
+        value[columns] = inverse @ S[columns]
+        along = R @ value
+        return float(S @ value) / variance_ratio(along, e - along), rank
+
+    statistic, degrees = of(list(range(len(names))))
+    by_target = {t: of([i for i, n in enumerate(names) if n == t])[0] for t in dict.fromkeys(names)}
     return Omnibus(
         statistic,
         degrees,
@@ -86,19 +92,11 @@ def omnibus(fit: Fit, driving: Driving) -> Omnibus:
     )
 
 
-def _statistic(R: FloatArray, e: FloatArray) -> tuple[float, int]:
-    inverse, rank = _pseudo_inverse(R.T @ R)
-    S = R.T @ e
-    value = inverse @ S
-    along = (R @ value)[:, None]
-    ratio = _variance_ratio(along, e - along[:, 0], along.T @ along)
-    return float(S @ value) / max(ratio, 1.0), rank
-
-
-def _virtual(
-    problem: _core.Problem, p: FloatArray, noise: FloatArray, driving: Driving
-) -> tuple[list[str], FloatArray, list[int]]:
-    state = problem.trace(p, noise, False)["state"]
+def _virtual(evidence: Evidence) -> tuple[list[str], FloatArray, list[int]]:
+    """Signals and what they act on: names of the targets, signals as columns, their numbers."""
+    fit, driving = evidence.fit, evidence.driving
+    trace = evidence.problem.trace(fit.model.vector(), fit.noise.vector(), False)
+    state = trace["state"]
     v, r = state[:, 0], state[:, 2]
     a = v * r / 9.81
     steer = driving.channel("steer_rad")

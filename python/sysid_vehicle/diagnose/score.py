@@ -17,16 +17,17 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import chdtrc as chi2_tail
+from scipy.special import chdtrc, erfc
 
-from .. import _core
-from .._arrays import FloatArray
+from .._arrays import FloatArray, as_float64
 from ..effects import Effect
-from ..estimate import Driving, NoiseModel
+from ..estimate import Driving
 from ..identify import Fit
+from .evidence import Evidence
+from .projection import long_run_ratios, pseudo_inverse
 from .sensitivity import duration, sensitivities
 
-__all__ = ["Score", "ScoreBoard", "score_board"]
+__all__ = ["Score", "ScoreBoard", "score_board", "score_board_of"]
 
 _INVISIBLE = 1e-3  # share of an effect's sensitivity that the fitted parameters cannot copy
 
@@ -80,17 +81,22 @@ class ScoreBoard:
     information: FloatArray
 
     @cached_property
-    def _places(self) -> dict[str, list[int]]:
+    def _places(self) -> dict[str, slice]:
         ends = np.cumsum([0, *(R.shape[1] for R in self.directions.values())])
-        return {
-            n: list(range(a, b)) for n, (a, b) in zip(self.directions, pairwise(ends), strict=True)
-        }
+        return {n: slice(a, b) for n, (a, b) in zip(self.directions, pairwise(ends), strict=True)}
+
+    @cached_property
+    def _alone(self) -> dict[str, float]:
+        return {n: self._joint(n) for n in self.directions}
 
     def joint_statistic(self, *names: str) -> float:
         """T of several effects together."""
-        where = [i for n in names for i in self._places[n]]
+        return self._alone[names[0]] if len(names) == 1 else self._joint(*names)
+
+    def _joint(self, *names: str) -> float:
+        where = np.concatenate([np.r_[self._places[n]] for n in names])
         S = self.gradient[where]
-        return float(S @ _pseudo_inverse(self.information[np.ix_(where, where)])[0] @ S)
+        return float(S @ pseudo_inverse(self.information[np.ix_(where, where)])[0] @ S)
 
     def family_p_values(self, draws: int = 4000, seed: int = 0) -> dict[str, float]:
         """P-values corrected for testing all effects at once.
@@ -106,18 +112,9 @@ class ScoreBoard:
         values, vectors = np.linalg.eigh(covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         normal = np.random.default_rng(seed).standard_normal((draws, len(values))) @ root.T
-        smallest = np.ones(draws)
-        largest: dict[int, FloatArray] = {}  # of equal degrees the largest has the smallest p-value
-        for s in self.scores:
-            own = self._places[s.effect.id]
-            S, block = normal[:, own], covariance[np.ix_(own, own)]
-            if _on_one_side(s.effect, len(own)):
-                smallest = np.minimum(smallest, _p_value(s.effect, S, block))
-                continue
-            T, degrees = _chi_squared(S, block)
-            largest[degrees] = np.maximum(largest.get(degrees, 0.0), T)
-        for degrees, T in largest.items():
-            smallest = np.minimum(smallest, chi2_tail(degrees, T))
+        smallest = _smallest_p_values(
+            [(s.effect, self._places[s.effect.id]) for s in self.scores], normal, covariance
+        )
         smallest.sort()
         alone = np.array([s.p_value for s in self.scores])
         family = np.searchsorted(smallest, alone, side="right") / draws
@@ -127,9 +124,7 @@ class ScoreBoard:
         return dict(zip((s.effect.id for s in self.scores), map(float, family), strict=True))
 
 
-def score_board(
-    fit: Fit, driving: Driving, candidates: tuple[Effect, ...], noise: NoiseModel | None = None
-) -> ScoreBoard:
+def score_board(fit: Fit, driving: Driving, candidates: tuple[Effect, ...]) -> ScoreBoard:
     """Score every candidate at once.
 
     Parameters
@@ -138,69 +133,72 @@ def score_board(
         A converged fit.
     driving : Driving
         What it was fitted to.
-    noise : NoiseModel, optional
-        Other noise than the fit's.
     """
-    found = sensitivities(fit, driving, candidates, noise)
-    basis = _basis(found.fitted)
-    e = found.residual - basis @ (basis.T @ found.residual)
+    return score_board_of(Evidence(fit, driving), candidates)
+
+
+def score_board_of(evidence: Evidence, candidates: tuple[Effect, ...]) -> ScoreBoard:
+    """The same of residuals that may be known already."""
+    found = sensitivities(evidence, candidates)
+    e = evidence.left
     if not found.candidates:
         return ScoreBoard((), {}, e, np.empty(0), np.empty((0, 0)))
-    # All at once: most of the work is in passing over as many residuals.
-    G = np.hstack([found.effects[c.id] for c in found.candidates])
-    R = G - basis @ (basis.T @ G)
-    before, after = (np.einsum("ij,ij->j", m, m) for m in (G, R))
-    visible, kept, at = [], [], 0
+    # All at once and in place: most of the work is in passing over as many numbers.
+    R = found.columns
+    copied = evidence.basis.T @ R
+    R -= evidence.basis @ copied
+    information = R.T @ R
+    after = np.diag(information)
+    before = after + np.einsum("ij,ij->j", copied, copied)
+    visible: list[tuple[Effect, float, slice]] = []
+    kept: list[int] = []
     for effect in found.candidates:
-        own = slice(at, at + found.effects[effect.id].shape[1])
-        at = own.stop
+        own = found.places[effect.id]
         retained = float(np.sqrt(after[own].sum() / max(before[own].sum(), 1e-300)))
         if retained >= _INVISIBLE:
-            visible.append((effect, retained, own.stop - own.start))
+            visible.append((effect, retained, slice(len(kept), len(kept) + own.stop - own.start)))
             kept += list(range(own.start, own.stop))
-    R = R[:, kept] if len(kept) < R.shape[1] else R
-    S, information = R.T @ e, R.T @ R
-    scores, directions, at = [], {}, 0
-    for effect, retained, width in visible:
-        own = slice(at, at + width)
-        at = own.stop
-        directions[effect.id] = R[:, own]
-        seconds = duration(driving)
-        scores.append(
-            _score(effect, R[:, own], e, S[own], information[own, own], retained, seconds)
+    if len(kept) < R.shape[1]:
+        R, information = R[:, kept], information[np.ix_(kept, kept)]
+    S = R.T @ e
+    covariance = np.zeros_like(information)
+    for *_, own in visible:
+        covariance[own, own] = pseudo_inverse(information[own, own])[0]
+    # Each effect's own explanation is taken out before its residuals are asked for their colour.
+    sizes = np.zeros_like(information)
+    for *_, own in visible:
+        sizes[own, own] = np.repeat(
+            (covariance[own, own] @ S[own])[:, None], own.stop - own.start, 1
         )
+    ratios = long_run_ratios(R, e, sizes, np.diag(information))
+    seconds = duration(evidence.driving)
+    scores = [
+        _score(
+            effect,
+            S[own],
+            information[own, own],
+            covariance[own, own],
+            retained,
+            float(ratios[own].max()),
+            seconds,
+        )
+        for effect, retained, own in visible
+    ]
     scores.sort(key=lambda s: (s.p_value, -s.statistic))
+    directions = {effect.id: R[:, own] for effect, _, own in visible}
     return ScoreBoard(tuple(scores), directions, e, S, information)
-
-
-def _basis(G: FloatArray) -> FloatArray:
-    """Orthonormal basis of the columns; directions that are copies of others are left out."""
-    scaled = G / np.maximum(np.linalg.norm(G, axis=0), 1e-300)
-    u, s, _ = np.linalg.svd(scaled, full_matrices=False)
-    kept: FloatArray = u[:, s > 1e-7 * s[0]]
-    return kept
-
-
-def _pseudo_inverse(information: FloatArray) -> tuple[FloatArray, int]:
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    kept = values > 1e-6 * values[-1]
-    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
-    return inverse / np.outer(scale, scale), int(kept.sum())
 
 
 def _score(
     effect: Effect,
-    R: FloatArray,
-    e: FloatArray,
     S: FloatArray,
     information: FloatArray,
+    covariance: FloatArray,
     retained: float,
+    ratio: float,
     duration_s: float,
 ) -> Score:
-    covariance, _ = _pseudo_inverse(information)
     value = covariance @ S
-    ratio = _variance_ratio(R, e - R @ value, information)
     more = max(ratio, 1.0)
     p = float(_p_value(effect, S[None, :] / np.sqrt(more), information)[0])
     std = np.sqrt(np.maximum(np.diag(covariance) * more, 0.0))
@@ -227,8 +225,38 @@ def _p_value(effect: Effect, S: FloatArray, information: FloatArray) -> FloatArr
         sides = np.sign([p.typical - p.null_value for p in effect.parameters])
         return _p_value_on_one_side(S * sides, information * np.outer(sides, sides))
     T, degrees = _chi_squared(S, information)
-    p: FloatArray = chi2_tail(degrees, T)
+    p: FloatArray = _chi2_tail(degrees, T)
     return p
+
+
+def _smallest_p_values(
+    effects: list[tuple[Effect, slice]], scores: FloatArray, covariance: FloatArray
+) -> FloatArray:
+    """Of scores of several effects, one draw a row: the smallest p-value of each draw.
+
+    P-values fall with what they are the p-values of. So the largest of it comes first, over all
+    effects that are tested alike, and its p-value once.
+    """
+    draws = len(scores)
+    smallest = np.ones(draws)
+    one_sided = np.zeros(draws)
+    largest: dict[int, FloatArray] = {}
+    for effect, own in effects:
+        S, block = scores[:, own], covariance[own, own]
+        if _on_one_side(effect, S.shape[1]):
+            if S.shape[1] > 1:
+                smallest = np.minimum(smallest, _p_value(effect, S, block))
+                continue
+            side = np.sign(effect.parameters[0].typical - effect.parameters[0].null_value)
+            np.maximum(one_sided, side * S[:, 0] / np.sqrt(block[0, 0]), out=one_sided)
+            continue
+        T, degrees = _chi_squared(S, block)
+        largest[degrees] = np.maximum(largest.get(degrees, 0.0), T)
+    for degrees, T in largest.items():
+        np.minimum(smallest, _chi2_tail(degrees, T), out=smallest)
+    found = one_sided > 0.0
+    smallest[found] = np.minimum(smallest[found], 0.5 * _chi2_tail(1, one_sided[found] ** 2))
+    return smallest
 
 
 def _on_one_side(effect: Effect, directions: int) -> bool:
@@ -236,9 +264,16 @@ def _on_one_side(effect: Effect, directions: int) -> bool:
     return len(one_sided) == directions <= 2 and all(one_sided)
 
 
+def _chi2_tail(degrees: int, T: FloatArray) -> FloatArray:
+    # Far quicker than the general form, and thousands of draws have one or two degrees.
+    if degrees == 1:
+        return as_float64(erfc(np.sqrt(0.5 * np.maximum(T, 0.0))))
+    return as_float64(np.exp(-0.5 * T) if degrees == 2 else chdtrc(degrees, T))
+
+
 def _chi_squared(S: FloatArray, information: FloatArray) -> tuple[FloatArray, int]:
     """Statistics of scores, one a row, and their degrees of freedom."""
-    inverse, rank = _pseudo_inverse(information)
+    inverse, rank = pseudo_inverse(information)
     return np.einsum("ij,ij->i", S @ inverse, S), rank
 
 
@@ -255,26 +290,5 @@ def _p_value_on_one_side(S: FloatArray, information: FloatArray) -> FloatArray:
             whole = (z[:, 0] ** 2 - 2.0 * alike * z[:, 0] * z[:, 1] + z[:, 1] ** 2) / left
             T = np.where(inside, whole, T)
             both = float(np.arccos(alike) / (2.0 * np.pi))
-    p: FloatArray = np.where(T > 0.0, 0.5 * chi2_tail(1, T) + both * chi2_tail(2, T), 1.0)
+    p: FloatArray = np.where(T > 0.0, 0.5 * _chi2_tail(1, T) + both * _chi2_tail(2, T), 1.0)
     return p
-
-
-def _variance_ratio(R: FloatArray, e: FloatArray, information: FloatArray) -> float:
-    """Long-run over naive variance of the score, the effect's own explanation taken out.
-
-    Bartlett weights over 100 samples (Newey & West, Econometrica 1987), which are those of sums
-    over all windows of so many; the largest over the effect's parameters.
-    """
-    channels = _core.CHANNELS
-    terms = np.einsum("kcj,kc->kj", R.reshape(-1, channels, R.shape[1]), e.reshape(-1, channels))
-    terms -= terms.mean(axis=0)
-    n, lags = len(terms), min(100, len(terms) // 10)
-    sums = np.zeros((n + 2 * lags + 2, terms.shape[1]))
-    np.cumsum(terms, axis=0, out=sums[lags + 1 : n + lags + 1])
-    sums[n + lags + 1 :] = sums[n + lags]
-    windows = sums[lags + 1 :] - sums[: n + lags + 1]
-    long_run = np.einsum("ij,ij->j", windows, windows) / (lags + 1)
-    ratio = float(np.max(long_run / np.maximum(np.diag(information), 1e-300)))
-    # An estimate from so many lags scatters: what it cannot tell from 1 counts as 1.
-    uncertainty = np.sqrt(4.0 * lags / (3.0 * n))
-    return ratio / (1.0 + 2.0 * float(uncertainty))

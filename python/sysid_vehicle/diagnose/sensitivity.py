@@ -1,20 +1,21 @@
-"""How the residuals answer to the fitted parameters and to effects the model lacks.
+"""How the residuals answer to effects the model lacks.
 
 The filter runs once, at the fit; its gains stay. Nothing is refitted.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray
 from ..effects import Effect
-from ..estimate import Driving, NoiseModel
-from ..identify import Fit
+from ..estimate import Driving
+from .evidence import Evidence
 
 __all__ = ["Sensitivities", "duration", "sensitivities"]
 
@@ -23,97 +24,94 @@ _AT_ONCE = 8  # directions that the core differentiates in one pass
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
-    """Whitened residuals and minus their derivatives.
+    """Minus the derivatives of the whitened residuals by the parameters of effects.
 
     Attributes
     ----------
     candidates : tuple of Effect
         Those that this driving can show at all.
-    residual : array, shape (5 n,)
-        Sample by sample, channel by channel.
-    fitted : array, shape (5 n, parameters)
-        By the fit's free parameters.
-    effects : dict of str to array, shape (5 n, parameters of the effect)
-        At the effects' null values.
+    columns : array, shape (5 n, parameters of all of them)
+        By their parameters, at the null values; sample by sample, channel by channel.
+    places : dict of str to slice
+        Which columns belong to which effect.
     """
 
     candidates: tuple[Effect, ...]
-    residual: FloatArray
-    fitted: FloatArray
-    effects: dict[str, FloatArray]
+    columns: FloatArray
+    places: dict[str, slice]
 
 
-def sensitivities(
-    fit: Fit, driving: Driving, candidates: Sequence[Effect], noise: NoiseModel | None = None
-) -> Sensitivities:
-    """Differentiate the residuals of a fit on some driving.
+def sensitivities(evidence: Evidence, candidates: Sequence[Effect]) -> Sensitivities:
+    """Differentiate the residuals of a fit by effects that its model lacks.
 
     Parameters
     ----------
-    fit : Fit
-    driving : Driving
+    evidence : Evidence
     candidates : sequence of Effect
-        Effects that the model lacks.
-    noise : NoiseModel, optional
-        Other noise than the fit's.
     """
+    driving = evidence.driving
     possible = tuple(e for e in candidates if driving.force_known or not e.needs_force)
-    base = driving.problem(fit.model)
-    p = fit.model.vector()
-    frozen = base.freeze(p, (fit.noise if noise is None else noise).vector())
-    e = base.residuals(p, frozen).ravel()
-    known = fit.model.parameters
-    G = base.sensitivities(p, frozen, [known[n].column for n in fit.model.free_names])
-    return Sensitivities(possible, e, G, _of_effects(fit, driving, base, possible, p, frozen, e))
+    long = duration(driving)
+    ends = np.cumsum([0, *(_width(e, long) for e in possible)])
+    places = {
+        e.id: slice(int(a), int(b)) for e, (a, b) in zip(possible, pairwise(ends), strict=True)
+    }
+    # In place: most of the work is in passing over so many numbers.
+    out = np.empty((len(evidence.residual), int(ends[-1])))
+    p, model = evidence.fit.model.vector(), evidence.fit.model
 
+    def acting(*effects: Effect) -> _core.Problem:
+        return evidence.problem.with_model(
+            model.core(force_known=driving.force_known, also=effects)
+        )
 
-def _of_effects(
-    fit: Fit,
-    driving: Driving,
-    base: _core.Problem,
-    candidates: tuple[Effect, ...],
-    p: FloatArray,
-    frozen: _core.FrozenFilter,
-    e: FloatArray,
-) -> dict[str, FloatArray]:
-    regular = tuple(c for c in candidates if not c.scored_at_typical and c.scanned is None)
-    known = driving.force_known
-    found: dict[str, FloatArray] = {}
-    for few in _groups(regular):
-        wide = base.with_model(fit.model.core(force_known=known, also=few))
-        all_columns = wide.sensitivities(p, frozen, [i for c in few for i in c.columns])
+    for few in _groups([c for c in possible if _regular(c)]):
+        columns = [i for c in few for i in c.columns]
+        found = acting(*few).sensitivities(p, evidence.frozen, columns)
         at = 0
         for c in few:
-            found[c.id] = all_columns[:, at : at + len(c.columns)]
+            out[:, places[c.id]] = found[:, at : at + len(c.columns)]
             at += len(c.columns)
-    for c in candidates:
-        if c in regular:
-            continue
-        one = base.with_model(fit.model.core(force_known=known, also=(c,)))
-        if c.scored_at_typical:
-            # No derivative at zero: the finite steps to the typical sizes are the directions.
-            steps = []
-            for parameter in c.parameters:
-                there = p.copy()
-                there[parameter.column] = parameter.typical
-                steps.append((e - one.residuals(there, frozen).ravel()) / parameter.typical)
-            found[c.id] = np.column_stack(steps)
-        elif c.scanned is not None:
-            # At its null value the effect knows nothing of this parameter: one column for each
-            # value of a grid. Their joint test needs no supremum.
-            first = c.parameters[0]
-            step = 0.1 * first.matters  # small enough to stand for the derivative
-            columns = []
-            for value in c.scanned.grid(duration(driving)):
-                there = p.copy()
-                there[c.scanned.column] = value
-                there[first.column] = first.null_value + step
-                columns.append((e - one.residuals(there, frozen).ravel()) / step)
-            found[c.id] = np.column_stack(columns)
-    return found
+    for c in possible:
+        if not _regular(c):
+            own, one = out[:, places[c.id]], acting(c)
+            for i, (there, step) in enumerate(_steps(c, p, long)):
+                moved = one.residuals(there, evidence.frozen).ravel()
+                own[:, i] = (evidence.residual - moved) / step
+    return Sensitivities(possible, out, places)
 
 
-def _groups(effects: tuple[Effect, ...]) -> list[tuple[Effect, ...]]:
+def _regular(effect: Effect) -> bool:
+    return not effect.scored_at_typical and effect.scanned is None
+
+
+def _width(effect: Effect, seconds: float) -> int:
+    if effect.scored_at_typical or effect.scanned is None:
+        return len(effect.columns)
+    return len(effect.scanned.grid(seconds))
+
+
+def _steps(effect: Effect, p: FloatArray, seconds: float) -> Iterator[tuple[FloatArray, float]]:
+    """Where an effect without derivatives at its null value is tried, and how far that is."""
+    if effect.scored_at_typical:
+        # No derivative at zero: the finite steps to the typical sizes are the directions.
+        for parameter in effect.parameters:
+            there = p.copy()
+            there[parameter.column] = parameter.typical
+            yield there, parameter.typical
+    elif effect.scanned is not None:
+        # At its null value the effect knows nothing of this parameter: one column for each value
+        # of a grid. Their joint test needs no supremum.
+        first = effect.parameters[0]
+        step = 0.1 * first.matters  # small enough to stand for the derivative
+        for value in effect.scanned.grid(seconds):
+            there = p.copy()
+            there[effect.scanned.column] = value
+            there[first.column] = first.null_value + step
+            yield there, step
+
+
+def _groups(effects: Sequence[Effect]) -> list[tuple[Effect, ...]]:
     """Effects that the core differentiates in one pass: the others need not act meanwhile."""
     groups: list[list[Effect]] = [[]]
     for effect in effects:

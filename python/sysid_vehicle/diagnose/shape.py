@@ -26,8 +26,9 @@ from scipy.linalg import solve_triangular
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, axes_or_new, tidy
 from .coordinates import COORDINATES, Coordinate, coordinates, late
-from .evidence import FORCES, Evidence, variance_ratio
+from .evidence import FORCES, Evidence
 from .force_map import UNITS
+from .projection import variance_ratio
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -138,6 +138,14 @@ class Study:
         if self.verdict not in ("unknown", "partly_explained"):
             return None
         return unknown(self.fit, self.held_out)
+
+    def with_warnings(self, warnings: Sequence[str]) -> Study:
+        """The same study with these warnings; what it has worked out so far it keeps."""
+        other = replace(self, warnings=tuple(warnings))
+        for slow in ("where", "unknown"):
+            if slow in self.__dict__:
+                other.__dict__[slow] = self.__dict__[slow]
+        return other
 
     def waterfall(self, horizons_s: Sequence[float] = (0.5, 1.0, 2.0, 5.0)) -> Waterfall:
         """Errors of every step, one sample and further ahead, in training and held out.

@@ -1,0 +1,127 @@
+"""Linear algebra of directions: what columns span, what remains of them, how evenly it adds up.
+
+Columns are sensitivities of whitened residuals, sample by sample, channel by channel; residuals of
+a complete model are white with variance 1 along every direction.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import _core
+from .._arrays import FloatArray
+
+__all__ = [
+    "long_run_ratio",
+    "long_run_ratios",
+    "orthonormal_basis",
+    "pseudo_inverse",
+    "variance_ratio",
+]
+
+_COPIED = 1e-7  # of the largest singular value, below which a direction is a copy of others
+_SINGULAR = 1e-6  # the same of the eigenvalues of an information matrix
+_LAGS = 100
+_ROWS = 256  # samples at once, which stay in the cache
+
+
+def orthonormal_basis(columns: FloatArray) -> FloatArray:
+    """Orthonormal basis of the columns; directions that are copies of others are left out.
+
+    Parameters
+    ----------
+    columns : array, shape (n, m)
+
+    Returns
+    -------
+    array, shape (n, rank)
+    """
+    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    u, s, _ = np.linalg.svd(scaled, full_matrices=False)
+    kept: FloatArray = u[:, s > _COPIED * s[0]]
+    return kept
+
+
+def pseudo_inverse(information: FloatArray) -> tuple[FloatArray, int]:
+    """Inverse of an information matrix without directions it says nothing of, and its rank."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    if len(scale) == 1:
+        return 1.0 / np.outer(scale, scale), 1
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    kept = values > _SINGULAR * values[-1]
+    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+    return inverse / np.outer(scale, scale), int(kept.sum())
+
+
+def variance_ratio(direction: FloatArray, e: FloatArray) -> float:
+    """Long-run over naive variance of the score along one direction, at least 1.
+
+    Parameters
+    ----------
+    direction, e : array, shape (5 n,)
+    """
+    return max(long_run_ratio(direction[:, None], e), 1.0)
+
+
+def long_run_ratio(directions: FloatArray, e: FloatArray) -> float:
+    """Long-run over naive variance of the score, the largest over some directions.
+
+    Parameters
+    ----------
+    directions : array, shape (5 n, m)
+    e : array, shape (5 n,)
+        Residuals without what the directions explain of them.
+    """
+    by_sample = (-1, _core.CHANNELS)
+    terms = np.einsum(
+        "kcj,kc->kj", directions.reshape(*by_sample, directions.shape[1]), e.reshape(by_sample)
+    )
+    return float(np.max(_ratios(terms, np.einsum("ij,ij->j", directions, directions))))
+
+
+def long_run_ratios(
+    directions: FloatArray, e: FloatArray, sizes: FloatArray, squares: FloatArray
+) -> FloatArray:
+    """The same for every one of many directions, each without what some explain together.
+
+    Parameters
+    ----------
+    directions : array, shape (5 n, m)
+    e : array, shape (5 n,)
+    sizes : array, shape (m, m)
+        `directions @ sizes[:, j]` is taken off before the ratio along direction j is looked at.
+    squares : array, shape (m,)
+        Of the directions' norms.
+
+    Returns
+    -------
+    array, shape (m,)
+    """
+    channels = _core.CHANNELS
+    samples, width = len(e) // channels, directions.shape[1]
+    terms = np.empty((samples, width))
+    for begin in range(0, samples, _ROWS):
+        rows = slice(channels * begin, channels * (begin + _ROWS))
+        R = directions[rows]
+        along = (e[rows, None] - R @ sizes) * R
+        terms[begin : begin + _ROWS] = along.reshape(-1, channels, width).sum(axis=1)
+    return _ratios(terms, squares)
+
+
+def _ratios(terms: FloatArray, naive: FloatArray) -> FloatArray:
+    """Long-run over naive variance of sums of terms, (samples, m), column by column.
+
+    Bartlett weights over 100 samples (Newey & West, Econometrica 1987), which are those of sums
+    over all windows of so many.
+    """
+    terms -= terms.mean(axis=0)
+    n, lags = len(terms), min(_LAGS, len(terms) // 10)
+    sums = np.zeros((n + 2 * lags + 2, terms.shape[1]))
+    np.cumsum(terms, axis=0, out=sums[lags + 1 : n + lags + 1])
+    sums[n + lags + 1 :] = sums[n + lags]
+    windows = sums[lags + 1 :] - sums[: n + lags + 1]
+    long_run = np.einsum("ij,ij->j", windows, windows) / (lags + 1)
+    # An estimate from so many lags scatters: what it cannot tell from 1 counts as 1.
+    uncertainty = np.sqrt(4.0 * lags / (3.0 * n))
+    ratios: FloatArray = long_run / np.maximum(naive, 1e-300) / (1.0 + 2.0 * float(uncertainty))
+    return ratios

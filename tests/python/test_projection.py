@@ -1,0 +1,56 @@
+"""Linear algebra of directions: spans, inverses without copies, and the colour of scores."""
+
+import numpy as np
+import pytest
+
+from sysid_vehicle.diagnose.projection import (
+    long_run_ratio,
+    long_run_ratios,
+    orthonormal_basis,
+    pseudo_inverse,
+    variance_ratio,
+)
+
+CHANNELS = 5
+
+
+def test_a_copy_adds_nothing_to_a_basis(rng: np.random.Generator) -> None:
+    columns = rng.standard_normal((50, 3))
+    basis = orthonormal_basis(np.column_stack([columns, 1e6 * columns[:, 0]]))
+    assert basis.shape == (50, 3)
+    assert basis.T @ basis == pytest.approx(np.eye(3))
+    assert basis @ (basis.T @ columns) == pytest.approx(columns)
+
+
+@pytest.mark.parametrize("width", [1, 3])
+def test_the_inverse_of_an_information_matrix(width: int, rng: np.random.Generator) -> None:
+    columns = rng.standard_normal((50, width)) * 10.0 ** np.arange(width)
+    information = columns.T @ columns
+    inverse, rank = pseudo_inverse(information)
+    assert rank == width
+    assert inverse @ information == pytest.approx(np.eye(width), abs=1e-9)
+    twice = np.column_stack([columns, columns[:, 0]])
+    assert pseudo_inverse(twice.T @ twice)[1] == width
+
+
+def test_white_scores_have_ratio_one_and_coloured_ones_more(rng: np.random.Generator) -> None:
+    samples = 4000
+    white = rng.standard_normal(samples * CHANNELS)
+    direction = np.ones(samples * CHANNELS)
+    assert variance_ratio(direction, white) == pytest.approx(1.0, abs=0.4)
+    # Ten samples of five channels that are all alike: fifty times the variance, less what an
+    # estimate from a hundred lags cannot tell from 1.
+    slow = np.repeat(rng.standard_normal(samples // 10), 10 * CHANNELS)
+    alone = long_run_ratio(direction[:, None], slow)
+    assert alone == pytest.approx(10.0 * CHANNELS / (1.0 + 2.0 * 0.18), rel=0.3)
+
+
+def test_many_ratios_at_once_are_those_one_by_one(rng: np.random.Generator) -> None:
+    directions = rng.standard_normal((700 * CHANNELS, 4))
+    e = rng.standard_normal(700 * CHANNELS)
+    sizes = 0.3 * rng.standard_normal((4, 4))
+    squares = np.einsum("ij,ij->j", directions, directions)
+    one_by_one = [
+        long_run_ratio(directions[:, [j]], e - directions @ sizes[:, j]) for j in range(4)
+    ]
+    assert long_run_ratios(directions, e, sizes, squares) == pytest.approx(one_by_one)
