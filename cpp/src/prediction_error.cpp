@@ -6,7 +6,8 @@ namespace sysid {
 
 namespace {
 
-constexpr int kWidth = 8;  // directions differentiated in one pass
+constexpr int kWidth = 8;   // directions differentiated in one pass
+constexpr int kNarrow = 4;  // in a pass for the few that are left over
 using Wide = Dual<kWidth>;
 
 template <int NX>
@@ -90,12 +91,47 @@ void run_frozen(const SingleTrack& model, const Run& run, const double* p_values
 
 const auto kNothing = [](std::size_t, auto&) {};
 
-/// The parameter vector with up to kWidth of `columns`, from `first` on, as directions.
-std::vector<Wide> seeded(const double* p, const std::vector<int>& columns, std::size_t first) {
-    std::vector<Wide> wide(p, p + kParameterCount);
-    for (std::size_t i = first; i < columns.size() && i < first + kWidth; ++i)
-        wide[static_cast<std::size_t>(columns[i])].d[i - first] = 1.0;
+/// The parameter vector with `count` of `columns`, from `first` on, as directions.
+template <int N>
+std::vector<Dual<N>> seeded(const double* p, const std::vector<int>& columns, std::size_t first,
+                            std::size_t count) {
+    std::vector<Dual<N>> wide(p, p + kParameterCount);
+    for (std::size_t i = 0; i < count; ++i)
+        wide[static_cast<std::size_t>(columns[first + i])].d[i] = 1.0;
     return wide;
+}
+
+template <int N, class Keep>
+void differentiate(const Problem& problem, const double* p, const FrozenFilter& filter,
+                   const std::vector<int>& columns, std::size_t first, std::size_t count,
+                   Keep&& keep) {
+    const std::vector<Dual<N>> wide = seeded<N>(p, columns, first, count);
+    for (std::size_t i = 0; i < problem.runs.size(); ++i) {
+        run_frozen<Dual<N>>(problem.model, problem.runs[i], p, wide.data(), filter.runs[i],
+                            filter.correlation_time_s, kNothing, kNothing, keep);
+    }
+}
+
+/// Sensitivities to the parameters `columns`, row-major, and where `values` is given the residuals
+/// themselves, which the first pass has along the way.
+void passes(const Problem& problem, const double* p, const FrozenFilter& filter,
+            const std::vector<int>& columns, double* out, double* values) {
+    const std::size_t width = columns.size();
+    for (std::size_t first = 0; first < width; first += kWidth) {
+        const std::size_t count = std::min<std::size_t>(kWidth, width - first);
+        double* row = out + first;
+        const auto keep = [&](std::size_t, const auto& white) {
+            for (const auto& e : white) {
+                for (std::size_t j = 0; j < count; ++j) row[j] = -e.d[j];
+                row += width;
+                if (first == 0 && values != nullptr) *values++ = e.v;
+            }
+        };
+        if (count <= kNarrow)
+            differentiate<kNarrow>(problem, p, filter, columns, first, count, keep);
+        else
+            differentiate<kWidth>(problem, p, filter, columns, first, count, keep);
+    }
 }
 
 }  // namespace
@@ -136,22 +172,7 @@ double half_sum_of_squares(const Problem& problem, const double* p, const Frozen
 
 void sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,
                    const std::vector<int>& columns, double* out) {
-    const std::size_t width = columns.size();
-    for (std::size_t first = 0; first < width; first += kWidth) {
-        const std::vector<Wide> wide = seeded(p, columns, first);
-        const std::size_t count = std::min<std::size_t>(kWidth, width - first);
-        double* row = out + first;
-        for (std::size_t i = 0; i < problem.runs.size(); ++i) {
-            run_frozen<Wide>(problem.model, problem.runs[i], p, wide.data(), filter.runs[i],
-                             filter.correlation_time_s, kNothing, kNothing,
-                             [&](std::size_t, const auto& white) {
-                                 for (const Wide& e : white) {
-                                     for (std::size_t j = 0; j < count; ++j) row[j] = -e.d[j];
-                                     row += width;
-                                 }
-                             });
-        }
-    }
+    passes(problem, p, filter, columns, out, nullptr);
 }
 
 double normal_equations(const Problem& problem, const double* p, const FrozenFilter& filter,
@@ -160,9 +181,9 @@ double normal_equations(const Problem& problem, const double* p, const FrozenFil
     const auto rows = static_cast<Eigen::Index>(problem.samples() * kChannels);
     using Wholes = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     Wholes G(rows, width);
-    sensitivities(problem, p, filter, columns, G.data());
     Eigen::VectorXd e(rows);
-    residuals(problem, p, filter, e.data());
+    if (columns.empty()) residuals(problem, p, filter, e.data());
+    passes(problem, p, filter, columns, G.data(), e.data());
     Eigen::Map<Eigen::VectorXd>(gradient, width).noalias() = G.transpose() * e;
     Eigen::Map<Wholes>(information, width, width).noalias() = G.transpose() * G;
     return 0.5 * e.squaredNorm();
