@@ -175,6 +175,8 @@ def _verdict(
         told = told.doubting(
             added, f"takes up only {max(100 * share, 0.0):.0f} % of what is missing"
         )
+    elif not complete:
+        told = told.doubting(_small(fits, on_train), "what is left unexplained is larger")
     # What only stands in for something else explains nothing, however well it fits.
     proxies = {e for e in added if told[e].finding == "proxy"}
     told = told.doubting(
@@ -189,6 +191,17 @@ def _share_explained(on_train: list[Comparison]) -> float:
     """Of the square of the error beyond the noise floor."""
     before, after = (max(c.error**2 - 1.0, 0.0) for c in (on_train[0], on_train[-1]))
     return 1.0 - after / before if before > 0.0 else 1.0
+
+
+def _small(fits: list[Fit], on_train: list[Comparison]) -> set[str]:
+    """Effects that took up less of the square of the error than is left in the end."""
+    left = on_train[-1].error ** 2 - 1.0
+    steps = zip(fits[:-1], fits[1:], on_train[:-1], on_train[1:], strict=True)
+    small: set[str] = set()
+    for poorer, richer, before, after in steps:
+        if before.error**2 - after.error**2 < left:
+            small |= set(richer.model.effects) - set(poorer.model.effects)
+    return small
 
 
 def _added(
