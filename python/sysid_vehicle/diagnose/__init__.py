@@ -1,8 +1,9 @@
 """Diagnosis: which physical effect a model is missing, or that none explains what is left."""
 
 from .change_points import ChangePoint
-from .coherence import Coherence, Delay
+from .coherence import Coherence
 from .constancy import Constancy, constancy
+from .delay import Delay
 from .diagnose import Candidate, Diagnosis, diagnose
 from .force_map import ForceMap
 from .hiding import Bias, BiasReport, bias_report

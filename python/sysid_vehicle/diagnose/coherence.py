@@ -2,79 +2,31 @@
 
 Coherence is that of the whitened residuals with each input (Welch's method; Bendat & Piersol,
 Random Data, ch. 9). Its phase is not a delay: filter and car lie between. So the delay is sought
-where it acts. In each band of frequencies the input may act larger by a share a and later by a
-phase phi: signals
-
-    (1 + a) cos(phi) u_band + (1 + a) sin(phi) H[u_band],  H the Hilbert transform,
-
-go through the model in place of u, and generalised least squares of the residuals finds both for
-all bands together with the fitted parameters. A delay T shows as phi = 2 pi f T: its estimate is
-the slope, weighted with the joint covariance of the phases.
-
-It is a hint. The fitted parameters have taken up part of a delay and are put right to first order
-only: 40 ms are read as 31 to 39 ms, and the interval knows nothing of that. An effect of the
-catalogue that is refitted tells the delay itself.
+where it acts (`delay.py`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import csd, hilbert, welch
-from scipy.stats import chi2
+from scipy.signal import csd, welch
 
 from .._arrays import FloatArray, as_float64
 from .._style import axes_or_new, tidy
-from ..estimate import MEASURED, Driving
-from .evidence import Evidence, solve
+from ..estimate import MEASURED
+from .delay import HIGHEST_HZ, Delay, delay, pieces_of
+from .evidence import Evidence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Coherence", "Delay", "coherence"]
+__all__ = ["Coherence", "coherence"]
 
 _WINDOW_S = 5.0
-_BANDS = 6
-_LOWEST_HZ, _HIGHEST_HZ = 0.15, 5.0
 _LEVEL = 0.05
 _WORDS = {"steer": "steering", "force": "wheel force"}
-_SMALL = 1e-3  # of an input, to differentiate by
-
-
-@dataclass(frozen=True, eq=False)
-class Delay:
-    """How much later than the model the car follows an input.
-
-    Attributes
-    ----------
-    delay_s, std_s : float
-        Slope of the phase over frequency, and its standard error.
-    frequency_hz, phase_rad, phase_std_rad : array, shape (bands,)
-        Phase by which the car lags the model; the parameters of the fit left free.
-    linear : bool
-        Whether the phases lie on one line as closely as their errors allow: a delay, not a lag or
-        a gain that changes with frequency.
-    """
-
-    delay_s: float
-    std_s: float
-    frequency_hz: FloatArray
-    phase_rad: FloatArray
-    phase_std_rad: FloatArray
-    linear: bool
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % interval."""
-        return self.delay_s - 1.96 * self.std_s, self.delay_s + 1.96 * self.std_s
-
-    @property
-    def significant(self) -> bool:
-        """Whether it differs from none by three standard errors."""
-        return abs(self.delay_s) > 3.0 * self.std_s
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,18 +111,28 @@ class Coherence:
         )
 
 
-def coherence(evidence: Evidence) -> tuple[Coherence, ...]:
-    """Coherence with the steering angle and, where it is known, with the wheel force."""
+def coherence(evidence: Evidence, *, seed: int = 0) -> tuple[Coherence, ...]:
+    """Coherence with the steering angle and, where it is known, with the wheel force.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    seed : int
+        Of the draws of noise of the inputs, which widens the intervals of delays.
+    """
+    rng = np.random.default_rng(seed)
     names = ("steer", "force") if evidence.driving.force_known else ("steer",)
     inputs = evidence.driving.inputs()
-    return tuple(_with(evidence, inputs, i, name) for i, name in enumerate(names))
+    return tuple(_with(evidence, inputs, i, name, rng) for i, name in enumerate(names))
 
 
-def _with(evidence: Evidence, inputs: FloatArray, which: int, name: str) -> Coherence:
+def _with(
+    evidence: Evidence, inputs: FloatArray, which: int, name: str, rng: np.random.Generator
+) -> Coherence:
     driving = evidence.driving
     rate = driving.logs[0].rate_hz
     e = evidence.residual.reshape(driving.samples, -1)
-    pieces = _pieces(driving)
+    pieces = pieces_of(driving)
     length = min(round(_WINDOW_S * rate), max(end - begin for begin, end, _ in pieces) // 3)
     windows, cross, own, of_e = 0, 0.0, 0.0, 0.0
     f = np.zeros(0)
@@ -185,7 +147,7 @@ def _with(evidence: Evidence, inputs: FloatArray, which: int, name: str) -> Cohe
         own = own + count * welch(u, **how)[1]
         of_e = of_e + count * welch(e[begin:end], **how)[1]
         windows += count
-    band = (f > 0.0) & (f <= _HIGHEST_HZ)
+    band = (f > 0.0) & (f <= HIGHEST_HZ)
     with np.errstate(invalid="ignore", divide="ignore"):
         gamma = np.nan_to_num((np.abs(cross) ** 2 / (own * of_e))[band])
     there = {c: gamma[:, i] for i, c in enumerate(MEASURED) if c in driving.present}
@@ -193,85 +155,5 @@ def _with(evidence: Evidence, inputs: FloatArray, which: int, name: str) -> Cohe
     effective = max(1.0 + (windows - 1) * 11.0 / 18.0, 2.0)
     tests = len(there) * int(band.sum())
     threshold = 1.0 - (_LEVEL / tests) ** (1.0 / (effective - 1.0))
-    delay = _delay(evidence, inputs, which, pieces)
-    return Coherence(name, as_float64(f[band]), there, float(threshold), delay)
-
-
-def _pieces(driving: Driving) -> list[tuple[int, int, float]]:
-    """Begin, end and sampling rate of each stretch."""
-    ends = np.cumsum([s.where.stop - s.where.start for s in driving.stretches])
-    rates = [driving.logs[s.log].rate_hz for s in driving.stretches]
-    return list(zip([0, *map(int, ends[:-1])], map(int, ends), rates, strict=True))
-
-
-def _delay(
-    evidence: Evidence, inputs: FloatArray, which: int, pieces: list[tuple[int, int, float]]
-) -> Delay | None:
-    u = inputs[:, which]
-    size = float(np.std(u))
-    if size <= 0.0:
-        return None
-    edges = np.concatenate([[0.0], np.geomspace(_LOWEST_HZ, _HIGHEST_HZ, _BANDS)])
-    columns, middles = [], []
-    for low, high in pairwise(edges):
-        signal, quadrature = np.zeros_like(u), np.zeros_like(u)
-        power, moment = 0.0, 0.0
-        for begin, end, rate in pieces:
-            part, turned, p, m = _in_band(u[begin:end], rate, low, high)
-            signal[begin:end], quadrature[begin:end] = part, turned
-            power, moment = power + p, moment + m
-        if power <= 0.0:
-            continue
-        middles.append(np.sqrt(moment / power))
-        columns += [_through(evidence, inputs, which, s) for s in (signal, quadrature)]
-    R = evidence.project(np.column_stack(columns))
-    found = solve(R, evidence.left)
-    # Bands in which the input hardly moved tell nothing.
-    gain, shift = 1.0 + found.size[0::2], found.size[1::2]
-    phase = np.arctan2(shift, gain)
-    jacobian = np.zeros((len(phase), len(found.size)))
-    square = np.maximum(gain**2 + shift**2, 1e-12)
-    for b in range(len(phase)):
-        jacobian[b, 2 * b : 2 * b + 2] = np.array([-shift[b], gain[b]]) / square[b]
-    covariance = jacobian @ found.covariance @ jacobian.T
-    std = np.sqrt(np.diag(covariance))
-    f = np.array(middles)
-    known = (std < 0.5) & (square > 0.1)
-    if not known.any():
-        return None
-    line = 2.0 * np.pi * f[known]
-    weight = np.linalg.pinv(covariance[np.ix_(known, known)], rcond=1e-10)
-    information = float(line @ weight @ line)
-    slope = float(line @ weight @ phase[known]) / information
-    off = phase[known] - slope * line
-    chance = float(chi2.sf(off @ weight @ off, max(int(known.sum()) - 1, 1)))
-    return Delay(
-        slope, float(information**-0.5), f, as_float64(phase), as_float64(std), chance > 0.01
-    )
-
-
-def _in_band(
-    u: FloatArray, rate: float, low: float, high: float
-) -> tuple[FloatArray, FloatArray, float, float]:
-    """A band of a signal and its Hilbert transform, its power, and that times frequency squared.
-
-    Mirrored at its end, the signal has no jump there that would leak into all bands.
-    """
-    both = np.concatenate([u, u[::-1]])
-    spectrum = np.fft.rfft(both)
-    f = np.fft.rfftfreq(len(both), 1.0 / rate)
-    inside = (f >= low) & (f < high)
-    part = np.fft.irfft(np.where(inside, spectrum, 0.0), len(both))
-    power = np.where(inside & (f > 0.0), np.abs(spectrum) ** 2, 0.0)
-    turned = np.imag(hilbert(part))
-    return part[: len(u)], turned[: len(u)], float(power.sum()), float(power @ f**2)
-
-
-def _through(evidence: Evidence, inputs: FloatArray, which: int, signal: FloatArray) -> FloatArray:
-    """What the model makes of a signal added to an input: minus the derivative of the residuals."""
-    step = _SMALL * float(np.std(inputs[:, which])) / max(float(np.std(signal)), 1e-300)
-    moved = inputs.copy()
-    moved[:, which] += step * signal
-    problem = evidence.driving.problem(evidence.fit.model, other_inputs=moved)
-    after = problem.residuals(evidence.fit.model.vector(), evidence.frozen).ravel()
-    return as_float64((evidence.residual - after) / step)
+    late = delay(evidence, inputs, which, pieces, rng)
+    return Coherence(name, as_float64(f[band]), there, float(threshold), late)

@@ -46,15 +46,24 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """The residuals of a fit on some driving, with the filter's gains frozen."""
+    """The residuals of a fit on some driving, with the filter's gains frozen.
+
+    Attributes
+    ----------
+    fit : Fit
+    driving : Driving
+    inputs : array, shape (samples, 2), optional
+        In place of the driving's own steering angle and wheel force.
+    """
 
     fit: Fit
     driving: Driving
+    inputs: FloatArray | None = None
 
     @cached_property
     def problem(self) -> _core.Problem:
         """The core's problem."""
-        return self.driving.problem(self.fit.model)
+        return self.driving.problem(self.fit.model, other_inputs=self.inputs)
 
     @cached_property
     def frozen(self) -> _core.FrozenFilter:

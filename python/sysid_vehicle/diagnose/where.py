@@ -157,7 +157,7 @@ def where(
     alpha : float
         Rate of change points claimed where the car stays the same.
     seed : int
-        Of the draws that calibrate the change points.
+        Of the draws that calibrate change points and delays.
     """
     driving = fit.driving if logs is None else Driving.of(logs)
     evidence = Evidence(fit, driving)
@@ -167,5 +167,5 @@ def where(
         steady,
         change_points(evidence, alpha=alpha, seed=seed),
         alpha,
-        coherence(evidence),
+        coherence(evidence, seed=seed),
     )

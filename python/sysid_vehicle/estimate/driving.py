@@ -137,13 +137,11 @@ class Driving:
             In place of `inputs()`.
         """
         problem = _core.Problem(model.core(force_known=self.force_known))
-        at = 0
-        for log, where in self._pieces(most_samples):
+        for log, where, at in self._pieces(most_samples):
             if other_inputs is None:
                 inputs = self._inputs(log, where)
             else:
                 inputs = other_inputs[at : at + where.stop - where.start]
-            at += where.stop - where.start
             y = np.full((len(inputs), len(MEASURED)), np.nan)
             for i, c in enumerate(MEASURED):
                 if log.has(c) and (self.force_known or c != "ax_mps2"):
@@ -152,19 +150,24 @@ class Driving:
             problem.add_run(1.0 / log.rate_hz, as_float64(inputs), as_float64(y), began)
         return problem
 
-    def _pieces(self, most_samples: int | None) -> list[tuple[Log, slice]]:
-        whole = [(self.logs[s.log], s.where) for s in self.stretches]
+    def _pieces(self, most_samples: int | None) -> list[tuple[Log, slice, int]]:
+        """Logs, samples of them, and the place of the first among all usable samples."""
+        whole = []
+        at = 0
+        for s in self.stretches:
+            whole.append((self.logs[s.log], s.where, at))
+            at += s.where.stop - s.where.start
         if most_samples is None or self.samples <= most_samples:
             return whole
         # Windows of some seconds, evenly spread, keep every kind of driving in.
-        pieces: list[tuple[Log, slice]] = []
+        pieces: list[tuple[Log, slice, int]] = []
         share = most_samples / self.samples
-        for log, where in whole:
+        for log, where, at in whole:
             length = int(4.0 * log.rate_hz)
             for start in range(where.start, where.stop, max(int(length / share), 1)):
                 stop = min(start + length, where.stop)
                 if stop - start > length // 2 or not pieces:
-                    pieces.append((log, slice(start, stop)))
+                    pieces.append((log, slice(start, stop), at + start - where.start))
         return pieces
 
     def __str__(self) -> str:

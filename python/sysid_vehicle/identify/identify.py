@@ -113,10 +113,19 @@ def identify(
     return _polish(model, driving, p, noise, box, names, table)
 
 
-def refine(model: Model, driving: Driving, noise: NoiseModel) -> Fit:
-    """Go on from a model's values and a noise model that are already near: one start."""
+def refine(
+    model: Model, driving: Driving, noise: NoiseModel, *, inputs: FloatArray | None = None
+) -> Fit:
+    """Go on from a model's values and a noise model that are already near: one start.
+
+    Parameters
+    ----------
+    inputs : array, shape (samples, 2), optional
+        In place of the driving's own steering angle and wheel force.
+    """
     names = list(model.free_names)
-    return _polish(model, driving, model.vector(), noise, _box(model, names), names, ())
+    p = model.vector()
+    return _polish(model, driving, p, noise, _box(model, names), names, (), inputs)
 
 
 def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3) -> Fit:
@@ -187,11 +196,12 @@ def _polish(
     box: Box,
     names: list[str],
     starts: tuple[Start, ...],
+    inputs: FloatArray | None = None,
 ) -> Fit:
     """Alternate between noise and parameters until the likelihood stands still."""
-    problem = driving.problem(model)
+    problem = driving.problem(model, other_inputs=inputs)
     # Noise needs fewer samples than parameters do; the last word has all of them.
-    thin = driving.problem(model, most_samples=_THINNED)
+    thin = driving.problem(model, most_samples=_THINNED, other_inputs=inputs)
     p = p.copy()
     p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
     converged = False
