@@ -9,8 +9,10 @@ change at time t by M^-1 S where
 
 and the largest S' M^-1 S over t tells whether they do (Andrews, Econometrica 1993). How large it
 gets by chance depends on the driving and is drawn: residuals are white, so that the sums over
-fifths of a second are independent normal variables of known covariance. Where a change was found
-both sides are searched again (binary segmentation).
+fifths of a second are independent normal variables of known covariance. Of a model that lacks
+something at all times they are not. So a change has to stand out from what it leaves besides, too:
+the scores of that, turned at random some seconds at a time. Where one was found both sides are
+searched again (binary segmentation).
 
 The wandering forces of the filter soon take up a change, which shows at once or not at all. So the
 moment is read from the response to forces that step there; its interval is that of Hansen
@@ -19,6 +21,7 @@ moment is read from the response to forces that step there; its interval is that
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,6 +42,7 @@ _LEAST_S = 1.5  # on both sides of a change
 _INTERVAL = 7.35
 _NEAR_S, _FINE = 1.2, 24  # how far around, and at how many places, the moment is read
 _MOST = 5
+_TOGETHER_S = 5.0  # over which a wrong model errs alike: about one corner
 
 
 @dataclass(frozen=True)
@@ -150,20 +154,25 @@ def _search(
         T = np.einsum("bi,bij,bj->b", S, inverse, S)
         results.append((T, S, inverse))
         walks.append((A, across, inverse))
-    by_chance = _by_chance(Q_steps, walks, inner, draws, rng)
     best: tuple[float, int, int] | None = None
+    ratios, left = [], e
     for i, (kind, (T, S, inverse)) in enumerate(zip(kinds, results, strict=True)):
         at = int(np.argmax(T))
         after = kind.columns[rows].copy()
         after[: (at + edge) * step * channels] = 0.0
         direction = after @ (inverse[at] @ S[at])
         direction -= Q @ (Q.T @ direction)
-        ratio = variance_ratio(direction, e - direction)
-        strength = -float(chi2.logsf(T[at] / ratio, S.shape[1]))
+        ratios.append(variance_ratio(direction, e - direction))
+        strength = -float(chi2.logsf(T[at] / ratios[-1], S.shape[1]))
         if best is None or strength > best[0]:
-            best = (strength, i, at)
+            best, left = (strength, i, at), e - direction
     assert best is not None
-    p = float((1 + np.count_nonzero(by_chance >= best[0])) / (1 + len(by_chance)))
+    noise = _noise(Q_steps, walks, draws, rng)
+    p = _p_value(best[0], _largest(noise, Q_steps.shape[2], walks, inner, np.ones(len(kinds))))
+    if p <= alpha:
+        # A model that is wrong in the same way throughout leaves more than white noise.
+        misfit = _misfit(Q_steps, walks, left.reshape(by_step), step / rate, draws, rng)
+        p = max(p, _p_value(best[0], _largest(misfit, Q_steps.shape[2], walks, inner, ratios)))
     if p > alpha:
         return None
     return begin + (best[2] + edge) * step, kinds[best[1]], p
@@ -212,33 +221,67 @@ def _read(
     )
 
 
-def _by_chance(
-    Q_steps: FloatArray,
-    walks: list[tuple[FloatArray, FloatArray, FloatArray]],
-    inner: slice,
-    draws: int,
-    rng: np.random.Generator,
+_Walk = tuple[FloatArray, FloatArray, FloatArray]
+
+
+def _noise(
+    Q_steps: FloatArray, walks: list[_Walk], draws: int, rng: np.random.Generator
 ) -> FloatArray:
-    """The largest evidence over all moments and kinds, in draws of a car that stays the same."""
+    """Scores of all columns step by step, (steps, draws, columns), were residuals white."""
     together = np.concatenate([Q_steps, *(A for A, _, _ in walks)], axis=2)
     gram = together.swapaxes(1, 2) @ together
     values, vectors = np.linalg.eigh(gram)
     roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
     normal = rng.standard_normal((len(roots), draws, roots.shape[2]))
-    sums = normal @ roots.swapaxes(1, 2)
-    later = _after(sums)[inner]
-    rank = Q_steps.shape[2]
-    total = sums[:, :, :rank].sum(axis=0)
-    largest = np.zeros(draws)
+    return as_float64(normal @ roots.swapaxes(1, 2))
+
+
+def _misfit(
+    Q_steps: FloatArray,
+    walks: list[_Walk],
+    left: FloatArray,
+    step_s: float,
+    draws: int,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """The same, were they what the change that was found leaves, its sign left to chance.
+
+    Steps near each other are turned together, for what a wrong model leaves in one corner hangs
+    together (dependent wild bootstrap; Shao, J. American Statistical Association 2010).
+    """
+    together = np.concatenate([Q_steps, *(A for A, _, _ in walks)], axis=2)
+    scores = np.einsum("bki,bk->bi", together, left, optimize=True)
+    steps, reach = len(scores), max(round(_TOGETHER_S / step_s), 1)
+    # Moving averages of white noise are correlated by Bartlett's triangle.
+    white = np.cumsum(rng.standard_normal((steps + reach, draws)), axis=0)
+    turned = (white[reach:] - white[:-reach]) / np.sqrt(reach)
+    return as_float64(turned[:, :, None] * scores[:, None, :])
+
+
+def _largest(
+    scores: FloatArray,
+    rank: int,
+    walks: list[_Walk],
+    inner: slice,
+    ratios: Sequence[float] | FloatArray,
+) -> FloatArray:
+    """The largest evidence over all moments and kinds, in draws of a car that stays the same."""
+    later = _after(scores)[inner]
+    total = scores[:, :, :rank].sum(axis=0)
+    largest = np.zeros(scores.shape[1])
     first = rank
-    for A, across, inverse in walks:
+    for (A, across, inverse), ratio in zip(walks, ratios, strict=True):
         width = A.shape[2]
         S = later[:, :, first : first + width]
         S = S - np.einsum("bri,dr->bdi", across, total, optimize=True)
         first += width
         T = np.einsum("bdi,bij,bdj->bd", S, inverse, S, optimize=True).max(axis=0)
-        largest = np.maximum(largest, -chi2.logsf(T, width))
+        largest = np.maximum(largest, -chi2.logsf(T / ratio, width))
     return as_float64(largest)
+
+
+def _p_value(found: float, by_chance: FloatArray) -> float:
+    return float((1 + np.count_nonzero(by_chance >= found)) / (1 + len(by_chance)))
 
 
 def _after(by_step: FloatArray) -> FloatArray:
