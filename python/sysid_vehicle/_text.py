@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
+from math import isfinite
 
-__all__ = ["html_table", "number", "text_table"]
+__all__ = ["html_table", "number", "text_table", "with_error"]
 
 
 def number(x: float, digits: int = 4) -> str:
     """A number in few characters."""
     return f"{x:.{digits}g}"
+
+
+def with_error(value: float, std: float) -> str:
+    """A value with its standard error, or why it has none."""
+    if not isfinite(std):
+        return f"{number(value, 3)} (at a bound, or never felt)"
+    return f"{number(value, 3)} +- {number(std, 2)}"
 
 
 def text_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

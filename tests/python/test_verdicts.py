@@ -100,6 +100,16 @@ def test_impossible_and_negligible_values() -> None:
     assert "look elsewhere" in kind("aero_drag", 8.0 * drag.typical, 0.01).sentence
 
 
+def test_a_value_at_its_bound_has_no_error() -> None:
+    rolling = effect("rolling_resistance")
+    found = _of_present(rolling, (0.012, 0.0), (0.001, float("inf")), ())
+    assert found.sentence.startswith("missing; coefficient 0.012 +- 0.001, per_speed_spm 0 (at a")
+    most = rolling.parameters[1].upper
+    beyond = _of_present(rolling, (0.012, most), (0.001, float("inf")), ())
+    assert beyond.finding == "proxy"
+    assert "no car has such a value" in beyond.sentence
+
+
 def test_verdicts_show_themselves(judged: Verdicts) -> None:
     assert "steer_offset" in str(judged).splitlines()[0]
     assert "<table" in judged._repr_html_()

@@ -11,7 +11,7 @@ import numpy as np
 from tqdm import tqdm
 
 from .. import _core
-from .._text import html_table, number, text_table
+from .._text import html_table, text_table, with_error
 from ..effects import Effect, effect
 from ..errors import InvalidInput
 from ..estimate import Driving
@@ -77,7 +77,7 @@ class Candidate:
     def size(self) -> str:
         """Its parameters with standard errors, in words."""
         return ", ".join(
-            f"{p.name} {number(v, 3)} +- {number(s, 2)} {p.unit}"
+            f"{p.name} {with_error(v, s)} {p.unit}"
             for p, v, s in zip(self.effect.parameters, self.value, self.std, strict=True)
         )
 

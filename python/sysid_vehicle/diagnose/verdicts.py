@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from .._text import html_table, number
+from .._text import html_table, number, with_error
 from ..effects import Effect, Parameter
 from ..identify import Fit
 from .constancy import constancy
@@ -69,7 +69,7 @@ class EffectVerdict:
     @property
     def sentence(self) -> str:
         """The verdict in words."""
-        size = _listed(self.effect, [f"{number(v, 3)} +- {number(s, 2)}" for v, s in self._pairs()])
+        size = _listed(self.effect, [with_error(v, s) for v, s in self._pairs()])
         below = _listed(self.effect, [f"below {number(b, 2)}" for b in self.bound])
         matters = _listed(self.effect, [number(p.matters, 2) for p in self.effect.parameters])
         rivals = ", ".join(self.group)
@@ -276,9 +276,7 @@ def _of_present(
     because = ""
     if not possible(effect, value, std):
         finding, group = "proxy", ()
-        size = _listed(
-            effect, [f"{number(v, 3)} +- {number(s, 2)}" for v, s in zip(value, std, strict=True)]
-        )
+        size = _listed(effect, [with_error(v, s) for v, s in zip(value, std, strict=True)])
         because = f"no car has such a value ({size})"
     elif all(abs(d) + s < p.matters for p, d, s in _sizes(effect, value, std)):
         finding, group = "negligible", ()

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from .._files import write_json
-from .._text import html_table, number, text_table
+from .._text import html_table, text_table, with_error
 from ..compare import Comparison
 from ..diagnose import (
     Candidate,
@@ -61,8 +61,7 @@ class AddedEffect:
 
     def __str__(self) -> str:
         size = ", ".join(
-            f"{e.name.split('.')[1]} {number(e.value, 3)} +- {number(e.std, 2)} {e.unit}"
-            for e in self.parameters
+            f"{e.name.split('.')[1]} {with_error(e.value, e.std)} {e.unit}" for e in self.parameters
         )
         return f"{self.id}: {size}"
 
