@@ -167,6 +167,21 @@ def test_least_squares_over_a_log(vehicle, log):
         cornering_stiffness(vehicle, log, beta_rad=np.full(log.n, 0.5))
 
 
+def test_noise_of_the_yaw_rate_does_not_make_the_stiffness_too_small(vehicle, log):
+    rng = np.random.default_rng(0)
+    columns = {name: log[name] for name in log.channels}
+    columns["yaw_rate_radps"] = log["yaw_rate_radps"] + 0.05 * rng.standard_normal(log.n)
+    noisy = sv.Log.from_arrays(columns, name="noisy", check=False)
+    quiet = cornering_stiffness(vehicle, log, forgetting=1.0)
+    short = cornering_stiffness(vehicle, noisy, forgetting=1.0, window_s=0.05)
+    chosen = cornering_stiffness(vehicle, noisy, forgetting=1.0)
+
+    def off(run):
+        return abs(run.cr_npr[-1] / quiet.cr_npr[-1] - 1.0)
+
+    assert off(chosen) < 0.5 * off(short)
+
+
 def test_the_command_line_prints_and_writes(vehicle, log, tmp_path, capsys):
     log.between(0.0, 20.0).to_csv(tmp_path / "run.csv")
     vehicle.to_toml(tmp_path / "car.toml")

@@ -17,6 +17,7 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, MEASURED, axes_or_new, tidy
 from ..errors import InvalidInput, warn
+from ..estimate.inputs import white_noise_std
 from ..log import Log
 from ..vehicle import Vehicle
 from .sideslip import static_stiffness, yaw_inertia
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 __all__ = ["CorneringRls", "CorneringRun", "cornering_stiffness"]
 
 _ENOUGH = 200  # samples with slip
+_BLOCK = 100  # samples over which the noise is one
+_SHORTEST_S, _LONGEST_S = 0.15, 1.0  # of the window; corners are smoothed away by a longer one
+_NOISE_SHARE = 0.01  # of the variance of a slip angle
 
 
 class CorneringRls:
@@ -179,7 +183,7 @@ def cornering_stiffness(
     *,
     beta_rad: FloatArray | None = None,
     forgetting: float = 0.9999,
-    window_s: float = 0.15,
+    window_s: float | None = None,
     **settings: float,
 ) -> CorneringRun:
     """Cornering stiffness over a log, by recursive least squares.
@@ -194,9 +198,11 @@ def cornering_stiffness(
         Sideslip; from the log's ``vy_mps`` if left out.
     forgetting : float
         Weight of the past per used sample, 0.98 to 1.
-    window_s : float
-        Yaw rate and lateral acceleration are smoothed, and the yaw acceleration is taken, by local
-        parabolas of this length.
+    window_s : float, optional
+        Slip angles and lateral acceleration are smoothed, and the yaw acceleration is taken, by
+        local parabolas of this length, the same for all so that none lags. If left out, as long as
+        it takes for the noise of the yaw rate to be no more than 1 % of the variance of either slip
+        angle: noise in what is regressed on makes the stiffness too small.
     **settings : float
         Further arguments of :class:`CorneringRls`.
 
@@ -213,6 +219,17 @@ def cornering_stiffness(
     beta = np.arctan2(log["vy_mps"], log["vx_mps"]) if beta_rad is None else as_float64(beta_rad)
     if beta.shape != (log.n,):
         raise InvalidInput(f"beta_rad: shape {beta.shape}; give one value for each of {log.n}")
+    rate, vx = log["yaw_rate_radps"], log["vx_mps"]
+    slips = (
+        log["steer_rad"] - np.arctan(np.tan(beta) + vehicle.lf_m * rate / vx),
+        -np.arctan(np.tan(beta) - vehicle.lr_m * rate / vx),
+    )
+    if window_s is None:
+        arms = (vehicle.lf_m, vehicle.lr_m)
+        noise = white_noise_std(rate, _BLOCK) / vx
+        window_s = max(
+            _window_s(slip, arm * noise, log.rate_hz) for slip, arm in zip(slips, arms, strict=True)
+        )
     width = max(5, 2 * round(0.5 * window_s * log.rate_hz) + 1)
     if width > log.n:
         raise InvalidInput(f"{log.name}: {log.n} samples are fewer than the window of {width}")
@@ -221,15 +238,8 @@ def cornering_stiffness(
         step = 1.0 / log.rate_hz
         return np.asarray(savgol_filter(y, width, 2, deriv=derivative, delta=step))
 
-    rate, vx = smooth(log["yaw_rate_radps"]), log["vx_mps"]
-    turned = smooth(log["yaw_rate_radps"], 1)
     readings = np.column_stack(
-        [
-            log["steer_rad"] - np.arctan(np.tan(beta) + vehicle.lf_m * rate / vx),
-            -np.arctan(np.tan(beta) - vehicle.lr_m * rate / vx),
-            smooth(log["ay_mps2"]),
-            turned,
-        ]
+        [smooth(slips[0]), smooth(slips[1]), smooth(log["ay_mps2"]), smooth(rate, 1)]
     )
     found = CorneringRls(vehicle, forgetting=forgetting, **settings).run(readings).T
     cf, cr, cf_std, cr_std, used = found
@@ -240,3 +250,15 @@ def cornering_stiffness(
             f"the cornering stiffness stays near where it started. Give a log with gentle corners"
         )
     return run
+
+
+def _window_s(slip: FloatArray, noise: FloatArray, rate_hz: float) -> float:
+    """Shortest window that leaves little of the noise [rad] of a slip angle."""
+    known = np.isfinite(slip) & np.isfinite(noise)
+    noise_variance = float(np.mean(noise[known] ** 2)) if known.any() else 0.0
+    variance = float(np.mean(slip[known] ** 2)) - noise_variance if known.any() else 0.0
+    if variance <= 0.0:
+        return _LONGEST_S
+    # A parabola over w samples leaves 9 / (4 w) of the variance of white noise at its middle.
+    samples = 2.25 * noise_variance / (_NOISE_SHARE * variance)
+    return min(max(samples / rate_hz, _SHORTEST_S), _LONGEST_S)
