@@ -67,6 +67,16 @@ class NoiseModel:
         x, y, yaw = (max(m, least) for m, least in zip(self.motion, _LEAST_MOTION, strict=True))
         return replace(self, motion=(x, y, yaw), wander=(0.0, 0.0, 0.0))
 
+    def elsewhere(self, vehicle: Vehicle) -> NoiseModel:
+        """The same noise on other driving: nowhere sure to less than a thousandth of the weight.
+
+        A manoeuvre that happens to show no unexplained force would otherwise have the filter sure
+        of its model wherever it is taken.
+        """
+        force, moment = _weight_and_moment(vehicle)
+        least = _LEAST_WANDER * np.array([force, force, moment])
+        return replace(self, wander=tuple(map(float, np.maximum(self.wander, least))))
+
     def __str__(self) -> str:
         lines = [
             f"  {c:15s} {s:10.3g} {UNITS[c]}" for c, s in zip(MEASURED, self.sensor, strict=True)
@@ -84,17 +94,20 @@ class NoiseModel:
 
 # Per square root of a second: over one, 5 mm/s and 1 mrad/s.
 _LEAST_MOTION = (5e-3, 5e-3, 1e-3)
-# Of the weight: no model tells the forces on a car to a thousandth of it. A manoeuvre that happens
-# to show none would otherwise have the filter sure of its model on all other driving.
-_LEAST_WANDER = 1e-3
+_LEAST_WANDER = 1e-3  # of the weight
 _SMALLEST = np.array([1e-3, 1e-3, 1e-4, 5e-3, 5e-3])
 
 
-def _limits(vehicle: Vehicle) -> tuple[FloatArray, FloatArray]:
+def _weight_and_moment(vehicle: Vehicle) -> tuple[float, float]:
+    """The weight [N], and the yaw moment of half of it at half the wheelbase [N m]."""
     weight = vehicle.mass_kg * 9.81
-    arm = weight * vehicle.wheelbase_m / 4.0
+    return weight, weight * vehicle.wheelbase_m / 4.0
+
+
+def _limits(vehicle: Vehicle) -> tuple[FloatArray, FloatArray]:
+    weight, arm = _weight_and_moment(vehicle)
     low = np.concatenate(
-        [_SMALLEST, [1e-4, 1e-4, 1e-5], _LEAST_WANDER * np.array([weight, weight, arm]), [0.05]]
+        [_SMALLEST, [1e-4, 1e-4, 1e-5], 1e-4 * np.array([weight, weight, arm]), [0.05]]
     )
     high = np.concatenate(
         [[5.0, 5.0, 1.0, 20.0, 20.0], [2.0, 2.0, 1.0], 0.6 * np.array([weight, weight, arm]), [1.0]]

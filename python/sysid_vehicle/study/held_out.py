@@ -46,14 +46,15 @@ def gain_in_log_likelihood(
     """What the richer model gains on held-out driving, and the standard error of that, in nats.
 
     Each model predicts with its own noise, or both with that of the poorer one: a richer model that
-    has only learnt larger noise gains by the first and loses by the second. The error comes from
-    blocks of 5 s. A model that fails on the held-out driving gains minus infinity.
+    has only learnt larger noise gains by the first and loses by the second, and none is taken to be
+    surer than `NoiseModel.elsewhere`. The error comes from blocks of 5 s. A model that fails on the
+    held-out driving gains minus infinity.
     """
     pieces = []
     for fit in (poorer, richer):
         problem = test.problem(fit.model)
         try:
-            noise = poorer.noise if same_noise else fit.noise
+            noise = (poorer if same_noise else fit).noise.elsewhere(fit.model.vehicle)
             trace = problem.trace(fit.model.vector(), noise.vector(), False)
         except _core.NumericalFailure:
             return -np.inf, 0.0
