@@ -21,6 +21,7 @@ from sysid_vehicle import (
     manoeuvres,
 )
 from sysid_vehicle.study.held_out import error_falls, gain_in_log_likelihood, hold_out
+from sysid_vehicle.study.improve import _small
 
 LAG = "steer_lag.time_constant_s", 0.06
 LOOKS_LIKE_LAG = {
@@ -208,6 +209,16 @@ def test_what_no_candidate_explains_is_not_explained(
     assert found.verdict in ("unknown", "partly_explained")
     assert not set(found.model.effects) & LOOKS_LIKE_LAG
     assert found.omnibus.p_value < 0.01 or found.train[-1].error > 1.1
+
+
+def test_what_took_up_less_than_is_left_is_doubted() -> None:
+    taken = {"large": 10.0, "middle": 2.0, "tiny": 0.1}
+    assert _small(taken, 0.01, set()) == set()
+    assert _small(taken, 0.5, set()) == {"tiny"}
+    # What proxies took up is unexplained too, and so is what was doubted for it.
+    assert _small(taken, 1.95, set()) == {"tiny", "middle"}
+    assert _small(taken, 0.5, {"large"}) == {"tiny", "middle"}
+    assert _small({}, 1.0, set()) == set()
 
 
 def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: Drives) -> None:

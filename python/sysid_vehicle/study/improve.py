@@ -176,7 +176,9 @@ def _verdict(
             added, f"takes up only {max(100 * share, 0.0):.0f} % of what is missing"
         )
     elif not complete:
-        told = told.doubting(_small(fits, on_train), "what is left unexplained is larger")
+        proxies = {e for e in added if told[e].finding == "proxy"}
+        small = _small(_taken_up(fits, on_train), on_train[-1].error ** 2 - 1.0, proxies)
+        told = told.doubting(small, "what is left unexplained is larger")
     # What only stands in for something else explains nothing, however well it fits.
     proxies = {e for e in added if told[e].finding == "proxy"}
     told = told.doubting(
@@ -193,15 +195,28 @@ def _share_explained(on_train: list[Comparison]) -> float:
     return 1.0 - after / before if before > 0.0 else 1.0
 
 
-def _small(fits: list[Fit], on_train: list[Comparison]) -> set[str]:
-    """Effects that took up less of the square of the error than is left in the end."""
-    left = on_train[-1].error ** 2 - 1.0
+def _taken_up(fits: list[Fit], on_train: list[Comparison]) -> dict[str, float]:
+    """Of the square of the error, by each effect that was added."""
+    taken = {}
     steps = zip(fits[:-1], fits[1:], on_train[:-1], on_train[1:], strict=True)
-    small: set[str] = set()
     for poorer, richer, before, after in steps:
-        if before.error**2 - after.error**2 < left:
-            small |= set(richer.model.effects) - set(poorer.model.effects)
-    return small
+        for e in set(richer.model.effects) - set(poorer.model.effects):
+            taken[e] = before.error**2 - after.error**2
+    return taken
+
+
+def _small(taken: dict[str, float], left: float, proxies: set[str]) -> set[str]:
+    """Effects that took up less than is left unexplained in the end.
+
+    What a proxy took up is unexplained too.
+    """
+    doubted = set(proxies)
+    while True:
+        unexplained = left + sum(max(taken.get(e, 0.0), 0.0) for e in doubted)
+        more = {e for e, t in taken.items() if e not in doubted and t < unexplained}
+        if not more:
+            return doubted - proxies
+        doubted |= more
 
 
 def _added(
