@@ -21,7 +21,7 @@ from sysid_vehicle import (
     manoeuvres,
 )
 from sysid_vehicle.study.held_out import error_falls, gain_in_log_likelihood, hold_out
-from sysid_vehicle.study.improve import _small
+from sysid_vehicle.study.improve import _alike, _small
 
 LAG = "steer_lag.time_constant_s", 0.06
 LOOKS_LIKE_LAG = {
@@ -219,6 +219,12 @@ def test_what_took_up_less_than_is_left_is_doubted() -> None:
     assert _small(taken, 1.95, set()) == {"tiny", "middle"}
     assert _small(taken, 0.5, {"large"}) == {"tiny", "middle"}
     assert _small({}, 1.0, set()) == set()
+
+
+def test_effects_that_act_alike_count_together() -> None:
+    assert _alike("aero_drag", "rolling_resistance")
+    assert _alike("rolling_resistance", "aero_drag")
+    assert not _alike("aero_drag", "steer_offset")
 
 
 def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: Drives) -> None:

@@ -196,13 +196,20 @@ def _share_explained(on_train: list[Comparison]) -> float:
 
 
 def _taken_up(fits: list[Fit], on_train: list[Comparison]) -> dict[str, float]:
-    """Of the square of the error, by each effect that was added."""
-    taken = {}
+    """Of the square of the error, by each effect that was added.
+
+    Of effects that act alike the first takes up what the others could: they count together.
+    """
+    taken: dict[str, float] = {}
     steps = zip(fits[:-1], fits[1:], on_train[:-1], on_train[1:], strict=True)
     for poorer, richer, before, after in steps:
         for e in set(richer.model.effects) - set(poorer.model.effects):
             taken[e] = before.error**2 - after.error**2
-    return taken
+    return {e: sum(t for o, t in taken.items() if o == e or _alike(o, e)) for e in taken}
+
+
+def _alike(one: str, other: str) -> bool:
+    return one in effect(other).twins or other in effect(one).twins
 
 
 def _small(taken: dict[str, float], left: float, proxies: set[str]) -> set[str]:
