@@ -8,7 +8,9 @@ from sysid_vehicle import Diagnosis, Fit, Model, diagnose, drive, identify, mano
 from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
+from sysid_vehicle.identify import Estimate
 from sysid_vehicle.study.steps import (
+    _distance,
     alternatives,
     exchanged,
     first_that_holds,
@@ -79,6 +81,14 @@ def test_what_is_not_there_is_dropped_and_what_is_needed_stays(dx: Diagnosis) ->
     model = fit.model.add("steer_offset")
     idle = identify(model, fit.driving, starts=1)
     assert without_idle(idle).model.effects == ("aero_drag",)
+
+
+def test_at_its_null_value_a_bound_is_nothing() -> None:
+    drag, speed = effect("aero_drag").parameters[0], effect("rolling_resistance").parameters[1]
+    inf = float("inf")
+    assert _distance(Estimate("a", 0.0, inf, "s/m", "at bound"), speed) == 0.0
+    assert _distance(Estimate("a", speed.upper, inf, "s/m", "at bound"), speed) == inf
+    assert _distance(Estimate("a", 0.3, 0.1, "m2", ""), drag) == pytest.approx(3.0)
 
 
 def test_a_possible_value_comes_before_an_impossible_one(

@@ -8,8 +8,9 @@ import numpy as np
 
 from .. import _core
 from ..diagnose import Candidate, Diagnosis, possible
+from ..effects import Parameter
 from ..estimate import Driving
-from ..identify import Fit, refine
+from ..identify import Estimate, Fit, refine
 from .held_out import error_falls, gain_in_log_likelihood
 
 __all__ = ["alternatives", "exchanged", "first_that_holds", "way", "without_idle"]
@@ -17,6 +18,7 @@ __all__ = ["alternatives", "exchanged", "first_that_holds", "way", "without_idle
 _IDLE = 2.6  # an effect within so many standard errors of nothing is none
 _NEAR = 0.6  # of the evidence for the chosen effect
 _ALTERNATIVES = 2
+_AT_NULL = 1e-5  # of the width between the bounds
 _BETTER = 4.5  # nats, beyond the Bayesian price of the parameters: three standard errors
 
 
@@ -153,11 +155,16 @@ def _merit(fit: Fit) -> float:
 
 def _strength(fit: Fit, name: str) -> float:
     """Largest distance of the effect's parameters from their null values, in standard errors."""
-    parameters = fit.model.parameters
-    found = [
-        e for e in fit.estimates if e.name.startswith(f"{name}.") and not parameters[e.name].scan
-    ]
     return max(
-        abs(e.value - parameters[e.name].null_value) / e.std if np.isfinite(e.std) else np.inf
-        for e in found
+        _distance(e, fit.model.parameters[e.name])
+        for e in fit.estimates
+        if e.name.startswith(f"{name}.") and not fit.model.parameters[e.name].scan
     )
+
+
+def _distance(found: Estimate, parameter: Parameter) -> float:
+    off = abs(found.value - parameter.null_value)
+    if np.isfinite(found.std):
+        return off / found.std
+    # At a bound: nothing itself, or as far from it as a car can be.
+    return 0.0 if off < _AT_NULL * (parameter.upper - parameter.lower) else np.inf
