@@ -25,7 +25,7 @@ Tyres tyres() {
 }
 
 GreyBoxInput input(double steer, double force = 300.0) {
-    return {force, steer, std::sin(steer), std::cos(steer), 4200.0, 3700.0};
+    return {force, steer, std::sin(steer), std::cos(steer), 2000.0, 1800.0};
 }
 
 /// A weave that brings both axles near their peaks, read with noise and some readings missing.
