@@ -8,6 +8,7 @@ from sysid_vehicle.diagnose.projection import (
     long_run_ratios,
     orthonormal_basis,
     pseudo_inverse,
+    score_terms,
     variance_ratio,
 )
 
@@ -53,4 +54,4 @@ def test_many_ratios_at_once_are_those_one_by_one(rng: np.random.Generator) -> N
     one_by_one = [
         long_run_ratio(directions[:, [j]], e - directions @ sizes[:, j]) for j in range(4)
     ]
-    assert long_run_ratios(directions, e, sizes, squares) == pytest.approx(one_by_one)
+    assert long_run_ratios(score_terms(directions, e, sizes), squares) == pytest.approx(one_by_one)

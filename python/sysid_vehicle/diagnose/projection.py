@@ -16,6 +16,7 @@ __all__ = [
     "long_run_ratios",
     "orthonormal_basis",
     "pseudo_inverse",
+    "score_terms",
     "variance_ratio",
 ]
 
@@ -76,26 +77,23 @@ def long_run_ratio(directions: FloatArray, e: FloatArray) -> float:
     terms = np.einsum(
         "kcj,kc->kj", directions.reshape(*by_sample, directions.shape[1]), e.reshape(by_sample)
     )
-    return float(np.max(_ratios(terms, np.einsum("ij,ij->j", directions, directions))))
+    return float(np.max(long_run_ratios(terms, np.einsum("ij,ij->j", directions, directions))))
 
 
-def long_run_ratios(
-    directions: FloatArray, e: FloatArray, sizes: FloatArray, squares: FloatArray
-) -> FloatArray:
-    """The same for every one of many directions, each without what some explain together.
+def score_terms(directions: FloatArray, e: FloatArray, sizes: FloatArray) -> FloatArray:
+    """What each sample adds to the score along each of many directions, by chance.
 
     Parameters
     ----------
     directions : array, shape (5 n, m)
     e : array, shape (5 n,)
     sizes : array, shape (m, m)
-        `directions @ sizes[:, j]` is taken off before the ratio along direction j is looked at.
-    squares : array, shape (m,)
-        Of the directions' norms.
+        `directions @ sizes[:, j]` is taken off before the score along direction j.
 
     Returns
     -------
-    array, shape (m,)
+    array, shape (n, m)
+        Without their mean.
     """
     channels = _core.CHANNELS
     samples, width = len(e) // channels, directions.shape[1]
@@ -105,16 +103,23 @@ def long_run_ratios(
         R = directions[rows]
         along = (e[rows, None] - R @ sizes) * R
         terms[begin : begin + _ROWS] = along.reshape(-1, channels, width).sum(axis=1)
-    return _ratios(terms, squares)
+    terms -= terms.mean(axis=0)
+    return terms
 
 
-def _ratios(terms: FloatArray, naive: FloatArray) -> FloatArray:
+def long_run_ratios(terms: FloatArray, naive: FloatArray) -> FloatArray:
     """Long-run over naive variance of sums of terms, (samples, m), column by column.
 
     Bartlett weights over 100 samples (Newey & West, Econometrica 1987), which are those of sums
     over all windows of so many.
+
+    Parameters
+    ----------
+    terms : array, shape (n, m)
+    naive : array, shape (m,)
+        Variance of their sums, were they independent.
     """
-    terms -= terms.mean(axis=0)
+    terms = terms - terms.mean(axis=0)
     n, lags = len(terms), min(_LAGS, len(terms) // 10)
     sums = np.zeros((n + 2 * lags + 2, terms.shape[1]))
     np.cumsum(terms, axis=0, out=sums[lags + 1 : n + lags + 1])

@@ -24,11 +24,12 @@ from ..effects import Effect
 from ..estimate import Driving
 from ..identify import Fit
 from .evidence import Evidence
-from .projection import long_run_ratios, pseudo_inverse
+from .projection import long_run_ratios, pseudo_inverse, score_terms
 from .sensitivity import duration, sensitivities
 
 __all__ = ["Score", "ScoreBoard", "score_board", "score_board_of"]
 
+_BLOCK_S, _FEWEST_BLOCKS = 0.5, 24
 _INVISIBLE = 1e-3  # share of an effect's sensitivity that the fitted parameters cannot copy
 
 
@@ -72,6 +73,9 @@ class ScoreBoard:
         Whitened residuals, projected off the fitted parameters.
     gradient, information : array, shape (n,), (n, n)
         S and I of all directions together, in the order of `directions`.
+    blocks : array, shape (blocks, n)
+        What stretches of the driving add to the gradient by chance, over the root of each effect's
+        variance ratio.
     """
 
     scores: tuple[Score, ...]
@@ -79,6 +83,7 @@ class ScoreBoard:
     residual: FloatArray
     gradient: FloatArray
     information: FloatArray
+    blocks: FloatArray
 
     @cached_property
     def _places(self) -> dict[str, slice]:
@@ -101,17 +106,18 @@ class ScoreBoard:
     def family_p_values(self, draws: int = 4000, seed: int = 0) -> dict[str, float]:
         """P-values corrected for testing all effects at once.
 
-        The smallest p-value of all is simulated under a complete model, with the effects' true
-        correlation (Westfall & Young, Resampling-Based Multiple Testing, 1993).
+        The smallest p-value of all is drawn under a complete model by turning what blocks of the
+        driving add to the scores at random, all effects together (multiplier bootstrap;
+        Chernozhukov, Chetverikov & Kato, Annals of Statistics 2013): residuals that are not white,
+        or have outliers, scatter as they do.
         """
         if not self.scores:
             return {}
         # In units of their own: rounding at the largest would drown the smallest.
         scale = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
         covariance = self.information / np.outer(scale, scale)
-        values, vectors = np.linalg.eigh(covariance)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        normal = np.random.default_rng(seed).standard_normal((draws, len(values))) @ root.T
+        turned = np.random.default_rng(seed).standard_normal((draws, len(self.blocks)))
+        normal = turned @ (self.blocks / scale)
         smallest = _smallest_p_values(
             [(s.effect, self._places[s.effect.id]) for s in self.scores], normal, covariance
         )
@@ -119,7 +125,7 @@ class ScoreBoard:
         alone = np.array([s.p_value for s in self.scores])
         family = np.searchsorted(smallest, alone, side="right") / draws
         # Below what the draws resolve: as many independent tests as they act like at 1 %.
-        tests = 0.01 / max(float(np.quantile(smallest, 0.01)), 1e-12)
+        tests = max(0.01 / max(float(np.quantile(smallest, 0.01)), 1e-12), 1.0)
         family = np.where(alone < smallest[20], np.minimum(alone * tests, 1.0), family)
         return dict(zip((s.effect.id for s in self.scores), map(float, family), strict=True))
 
@@ -142,7 +148,7 @@ def score_board_of(evidence: Evidence, candidates: tuple[Effect, ...]) -> ScoreB
     found = sensitivities(evidence, candidates)
     e = evidence.left
     if not found.candidates:
-        return ScoreBoard((), {}, e, np.empty(0), np.empty((0, 0)))
+        return ScoreBoard((), {}, e, np.empty(0), np.empty((0, 0)), np.empty((0, 0)))
     # All at once and in place: most of the work is in passing over as many numbers.
     R = found.columns
     copied = evidence.basis.T @ R
@@ -170,7 +176,8 @@ def score_board_of(evidence: Evidence, candidates: tuple[Effect, ...]) -> ScoreB
         sizes[own, own] = np.repeat(
             (covariance[own, own] @ S[own])[:, None], own.stop - own.start, 1
         )
-    ratios = long_run_ratios(R, e, sizes, np.diag(information))
+    terms = score_terms(R, e, sizes)
+    ratios = long_run_ratios(terms, np.diag(information))
     seconds = duration(evidence.driving)
     scores = [
         _score(
@@ -186,7 +193,17 @@ def score_board_of(evidence: Evidence, candidates: tuple[Effect, ...]) -> ScoreB
     ]
     scores.sort(key=lambda s: (s.p_value, -s.statistic))
     directions = {effect.id: R[:, own] for effect, _, own in visible}
-    return ScoreBoard(tuple(scores), directions, e, S, information)
+    more = np.ones(len(kept))
+    for *_, own in visible:
+        more[own] = max(float(ratios[own].max()), 1.0)
+    blocks = _by_block(terms, evidence.driving) / np.sqrt(more)
+    return ScoreBoard(tuple(scores), directions, e, S, information, blocks)
+
+
+def _by_block(terms: FloatArray, driving: Driving) -> FloatArray:
+    """Sums over blocks of half a second, or shorter ones where there would be too few."""
+    length = max(min(int(_BLOCK_S * driving.logs[0].rate_hz), len(terms) // _FEWEST_BLOCKS), 1)
+    return np.add.reduceat(terms, np.arange(0, len(terms), length), axis=0)
 
 
 def _score(
