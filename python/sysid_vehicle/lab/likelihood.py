@@ -98,10 +98,11 @@ class Likelihood:
         return np.vstack([self.problem.sensitivities(p, gains, columns), slopes[:, columns]])
 
 
-# Of the disturbances: what sampling and a car of one track leave out of any motion, some 1e-5 of it
-# in a sample of 10 ms. Without that floor a drive far into the slide is taken as one calculation of
-# a minute, and its coefficients as known to the sixth figure.
-_SMALLEST = np.array([1e-4, 1e-4, 1e-5, 1e-4, 1e-4, 1e-4, 1e-4])
+# Of the disturbances: what steps of 10 ms and axles without a width leave out. Beside the true
+# tyres a step is 3e-7 m/s, 3e-6 m/s and 3e-6 rad/s off in a slide; ten times that per root second.
+# Without that floor a minute of sliding is taken as one calculation, and its coefficients as known
+# to the sixth figure.
+_SMALLEST = np.array([1e-4, 1e-4, 1e-5, 1e-4, 3e-6, 3e-5, 3e-5])
 _LARGEST = np.array([10.0, 10.0, 2.0, 20.0, 5.0, 5.0, 5.0])
 
 
