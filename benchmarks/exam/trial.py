@@ -66,14 +66,20 @@ def examine(trial: Trial, among: Sequence[str] | None = None) -> Outcome:
 def _told(study: sv.Study) -> Outcome:
     """What the study said."""
     first, last = study.diagnoses[0], study.diagnoses[-1]
-    leader = first.ranking[0] if first.significant else None
+    leader, group = None, ()
+    if first.significant:
+        leader, group = first.ranking[0].id, first.ranking[0].indistinguishable_from
+    if study.added:
+        # After the refits, and with a word from the driving that was held out.
+        leader = study.added[0].id
+        group = study.verdicts[leader].group
     return {
         "verdict": study.verdict,
         "added": [a.id for a in study.added],
         "groups": {a.id: list(study.verdicts[a.id].group) for a in study.added},
         "evidence": [c.id for c in first.significant],
-        "leader": None if leader is None else leader.id,
-        "leader_group": [] if leader is None else list(leader.indistinguishable_from),
+        "leader": leader,
+        "leader_group": list(group),
         "findings": {v.effect.id: v.finding for v in study.verdicts.all if v.finding != "absent"},
         "constancy": {e: [c.p_value, c.spread, c.degrees] for e, c in constancy(study.fit).items()},
         "left": [c.id for c in last.significant],
