@@ -50,13 +50,6 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(1)
 
 
-@pytest.fixture(autouse=True)
-def _close_figures() -> Iterator[None]:
-    yield
-    if "matplotlib.pyplot" in sys.modules:
-        sys.modules["matplotlib.pyplot"].close("all")
-
-
 @pytest.fixture(scope="session")
 def car() -> Vehicle:
     """The car that is driven."""

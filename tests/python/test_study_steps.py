@@ -9,11 +9,14 @@ from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate
+from sysid_vehicle.study.search import Search, Trail
 from sysid_vehicle.study.steps import (
     _distance,
     alternatives,
+    better,
     exchanged,
     first_that_holds,
+    lead,
     way,
     without_idle,
 )
@@ -59,6 +62,81 @@ def test_a_head_wind_gives_way_to_drag_and_rolling_resistance(
     one = exchanged(windy, {"head_wind": near}, driving[1], most_effects=1)
     assert len(one.model.effects) == 1
     assert exchanged(windy, {}, driving[1], most_effects=4) is windy
+
+
+def test_what_fits_to_the_last_digit_alike_is_no_alternative(dx: Diagnosis) -> None:
+    (wind,) = (c for c in dx.ranking if c.id == "head_wind")
+    others = tuple(
+        replace(c, statistic=wind.statistic) if c.id == "aero_drag" else c for c in dx.ranking
+    )
+    assert [c.id for c in alternatives(replace(dx, ranking=others), wind)] == ["rolling_resistance"]
+
+
+def test_held_out_driving_has_a_say_between_what_the_fit_cannot_tell_apart(
+    dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving]
+) -> None:
+    wind, drag = (next(c for c in dx.ranking if c.id == name) for name in AGAINST[::-2])
+    assert wind.fit is not None
+    assert drag.fit is not None
+    ahead = lead(wind.fit, drag.fit, driving[1])
+    assert abs(ahead) > 1.0
+    preferred, other = (wind, drag) if ahead > 0.0 else (drag, wind)
+    for told_apart in (True, False):
+        first = replace(other, indistinguishable_from=() if told_apart else (preferred.id,))
+        chosen = first_that_holds(replace(dx, ranking=(first, preferred)), baseline, driving[1])
+        assert chosen is not None
+        assert chosen.id == (other.id if told_apart else preferred.id)
+
+
+def test_of_two_that_are_as_good_the_simpler_is_preferred(
+    dx: Diagnosis, driving: tuple[Driving, Driving]
+) -> None:
+    simple = by_id(dx, "aero_drag")
+    more = identify(simple.model.add("steer_offset"), simple.driving, starts=1)
+    assert better(simple, more, driving[1])
+    assert not better(more, simple, driving[1])
+    both = identify(simple.model.add("rolling_resistance"), simple.driving, starts=1)
+    assert better(both, simple, driving[1])
+    assert not better(simple, both, driving[1])
+
+
+def search(test: Driving, most_effects: int, told: list[str]) -> Search:
+    return Search(
+        test,
+        candidates=AGAINST,
+        most_effects=most_effects,
+        alpha=0.05,
+        seed=0,
+        progress=False,
+        say=told.append,
+    )
+
+
+def test_second_thoughts_lead_from_an_alternative_to_what_is_there(
+    dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving]
+) -> None:
+    (wind,) = (c for c in dx.ranking if c.id == "head_wind")
+    assert wind.fit is not None
+    found = search(driving[1], 2, [])
+    # A way that ended at the wind, as it would were nothing exchanged.
+    ended = Trail([baseline, wind.fit], [dx])
+    ended.note(dx, wind)
+    other = next(found._second_thoughts(ended))
+    assert set(other.fit.model.effects) == {"aero_drag", "rolling_resistance"}
+    assert other.fits[:2] == ended.fits
+    assert ended.fit is wind.fit
+
+
+def test_no_more_effects_are_added_than_allowed(
+    baseline: Fit, driving: tuple[Driving, Driving]
+) -> None:
+    told: list[str] = []
+    none = search(driving[1], 0, told).from_baseline(baseline)
+    assert none.fit is baseline
+    assert len(none.diagnoses) == 1
+    one = search(driving[1], 1, told).from_baseline(baseline)
+    assert len(one.fit.model.effects) == 1
+    assert one.diagnoses[-1].fit is one.fit
 
 
 def test_the_story_leads_over_every_effect_of_its_end(

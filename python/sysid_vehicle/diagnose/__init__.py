@@ -4,7 +4,7 @@ from .change_points import ChangePoint
 from .coherence import Coherence
 from .constancy import Constancy, constancy
 from .delay import Delay
-from .diagnose import Candidate, Diagnosis, diagnose
+from .diagnose import Candidate, Diagnosis, considered, diagnose
 from .force_map import ForceMap
 from .hiding import Bias, BiasReport, bias_report
 from .next_drive import DriveLimits, NextDrive, Suggestion, separations, suggest_manoeuvre
@@ -37,6 +37,7 @@ __all__ = [
     "Verdicts",
     "Where",
     "bias_report",
+    "considered",
     "constancy",
     "diagnose",
     "judge",

@@ -17,6 +17,7 @@ from ..errors import InvalidInput
 from ..estimate import Driving
 from ..identify import Fit, refine, refit
 from ..log import Log
+from ..model import Model
 from .evidence import Evidence
 from .omnibus import Omnibus, omnibus_of
 from .score import Score, ScoreBoard, score_board_of
@@ -24,7 +25,7 @@ from .score import Score, ScoreBoard, score_board_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Candidate", "Diagnosis", "diagnose"]
+__all__ = ["Candidate", "Diagnosis", "considered", "diagnose"]
 
 _REFITS = 5
 # Of the best statistic: what scores less than this share does not overtake it. States of their own
@@ -203,10 +204,7 @@ def diagnose(
         How many of the best to refit; 0 ranks by score alone.
     """
     driving = fit.driving if logs is None else Driving.of(logs)
-    possible = fit.model.candidates
-    if candidates is not None:
-        wanted = {effect(c).id for c in candidates}
-        possible = tuple(e for e in possible if e.id in wanted)
+    possible = considered(fit.model, candidates)
     evidence = Evidence(fit, driving)
     board = score_board_of(evidence, possible)
     left = omnibus_of(evidence)
@@ -256,6 +254,14 @@ def diagnose(
         done |= {c.id for c in far}
         ranked = finished + far + [c for c in ranked if c.id not in done]
     return Diagnosis(fit, tuple(ranked), left, alpha, board.scores, family)
+
+
+def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple[Effect, ...]:
+    """What may be added to a model: all that it lacks, or what is wanted of that."""
+    if candidates is None:
+        return model.candidates
+    wanted = {effect(c).id for c in candidates}
+    return tuple(e for e in model.candidates if e.id in wanted)
 
 
 def _worth_refitting(significant: list[Candidate], refits: int) -> list[Candidate]:

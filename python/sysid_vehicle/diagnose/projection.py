@@ -102,7 +102,9 @@ def score_terms(directions: FloatArray, e: FloatArray, sizes: FloatArray) -> Flo
         rows = slice(channels * begin, channels * (begin + _ROWS))
         R = directions[rows]
         along = (e[rows, None] - R @ sizes) * R
-        terms[begin : begin + _ROWS] = along.reshape(-1, channels, width).sum(axis=1)
+        terms[begin : begin + _ROWS] = along.reshape(len(along) // channels, channels, width).sum(
+            axis=1
+        )
     terms -= terms.mean(axis=0)
     return terms
 

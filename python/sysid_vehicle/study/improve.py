@@ -9,22 +9,22 @@ import numpy as np
 
 from ..compare import Comparison, compare
 from ..diagnose import (
-    Candidate,
     Diagnosis,
     Omnibus,
     Verdicts,
-    diagnose,
+    considered,
     judge,
     omnibus,
 )
-from ..effects import Effect, effect
+from ..effects import effect
 from ..errors import InvalidInput, warn
 from ..estimate import Driving
 from ..identify import Fit, identify
 from ..log import Log
 from ..model import Model
 from .held_out import hold_out
-from .steps import alternatives, exchanged, first_that_holds, way, without_idle
+from .search import Search
+from .steps import way
 from .study import AddedEffect, Study, Verdict
 
 __all__ = ["improve"]
@@ -38,7 +38,7 @@ def improve(
     train: Log | Sequence[Log],
     test: Log | Sequence[Log] | None = None,
     *,
-    most_effects: int = 4,
+    most_effects: int = 6,
     alpha: float = 0.05,
     candidates: Sequence[str] | None = None,
     starts: int = 8,
@@ -78,34 +78,18 @@ def improve(
     train_driving, test_driving = hold_out(train, test)
     baseline = identify(model, train_driving, starts=starts, seed=seed, progress=progress)
     say(f"Fitted the baseline to {train_driving}.")
-    fit = baseline
-    diagnoses: list[Diagnosis] = []
-    fits = [baseline]
-    p_values: dict[str, float] = {}
-    rivals: dict[str, tuple[str, ...]] = {}
-    nearly: dict[str, tuple[Candidate, ...]] = {}
-    while True:
-        dx = diagnose(fit, candidates=candidates, alpha=alpha, seed=seed, progress=progress)
-        diagnoses.append(dx)
-        if len(fit.model.effects) >= most_effects:
-            break
-        chosen = first_that_holds(dx, fit, test_driving)
-        if chosen is None:
-            break
-        assert chosen.fit is not None
-        nearly[chosen.id] = alternatives(dx, chosen)
-        for c in nearly[chosen.id]:
-            nearly.setdefault(c.id, alternatives(dx, c))
-        p_values |= {c.id: c.p_value for c in (chosen, *nearly[chosen.id])}
-        rivals[chosen.id] = chosen.indistinguishable_from
-        found = exchanged(without_idle(chosen.fit), nearly, test_driving, most_effects=most_effects)
-        if any(set(f.model.effects) == set(found.model.effects) for f in fits):
-            break
-        fit = without_idle(found)
-        fits.append(fit)
-        gone = set(fits[-2].model.effects) - set(fit.model.effects)
-        say(f"Added {chosen.id}: {chosen.size}." + _instead(fit, gone))
-    fits = way(fits)
+    search = Search(
+        test_driving,
+        candidates=candidates,
+        most_effects=most_effects,
+        alpha=alpha,
+        seed=seed,
+        progress=progress,
+        say=say,
+    )
+    found = search.from_baseline(baseline)
+    fit, diagnoses = found.fit, found.diagnoses
+    fits = way(found.fits)
     floor = fit.noise
     on_train = [compare(f, train_driving, noise=floor) for f in fits]
     on_test = [compare(f, test_driving, noise=floor) for f in fits]
@@ -114,8 +98,8 @@ def improve(
     told = judge(
         fit,
         scored=(last.scores, last.family) if last.fit is fit else None,
-        lacked={e.id for e in _considered(model, candidates)},
-        groups={e: g for e, g in rivals.items() if e in fit.model.effects},
+        lacked={e.id for e in considered(model, candidates)},
+        groups={e: g for e, g in found.rivals.items() if e in fit.model.effects},
         acted={c.id for dx in diagnoses for c in dx.significant},
         alpha=alpha,
         seed=seed,
@@ -129,7 +113,7 @@ def improve(
         train=tuple(on_train),
         test=tuple(on_test),
         held_out=test_driving,
-        added=_added(fits, on_test, p_values),
+        added=_added(fits, on_test, found.p_values),
         omnibus=left,
         verdicts=told,
         warnings=_warnings(fit, train_driving),
@@ -137,22 +121,8 @@ def improve(
     )
 
 
-def _considered(model: Model, candidates: Sequence[str] | None) -> tuple[Effect, ...]:
-    if candidates is None:
-        return model.candidates
-    wanted = {effect(c).id for c in candidates}
-    return tuple(e for e in model.candidates if e.id in wanted)
-
-
 def _silent(_: str) -> None:
     pass
-
-
-def _instead(fit: Fit, gone: set[str]) -> str:
-    """What the step took out of the model, and what came in its place, in words."""
-    if not gone:
-        return ""
-    return f" Without {', '.join(sorted(gone))} the model is {', '.join(fit.model.effects)}."
 
 
 def _verdict(

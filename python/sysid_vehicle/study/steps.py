@@ -8,16 +8,26 @@ import numpy as np
 
 from .. import _core
 from ..diagnose import Candidate, Diagnosis, possible
-from ..effects import Parameter
+from ..effects import Parameter, effect
 from ..estimate import Driving
 from ..identify import Estimate, Fit, refine
 from .held_out import error_falls, gain_in_log_likelihood
 
-__all__ = ["alternatives", "exchanged", "first_that_holds", "way", "without_idle"]
+__all__ = [
+    "alternatives",
+    "better",
+    "exchanged",
+    "first_that_holds",
+    "lead",
+    "way",
+    "with_others",
+    "without_idle",
+]
 
 _IDLE = 2.6  # an effect within so many standard errors of nothing is none
 _NEAR = 0.6  # of the evidence for the chosen effect
 _ALTERNATIVES = 2
+_SAME = 0.05  # twice the nats between two fits that say the same
 _AT_NULL = 1e-5  # of the width between the bounds
 _BETTER = 4.5  # nats, beyond the Bayesian price of the parameters: three standard errors
 
@@ -25,29 +35,41 @@ _BETTER = 4.5  # nats, beyond the Bayesian price of the parameters: three standa
 def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> Candidate | None:
     """The likeliest candidate that fits better and predicts the held-out driving better.
 
-    One with a value that a car can have comes before one that only acts like something else.
+    One with a value that a car can have comes before one that only acts like something else. Among
+    those that the fitted driving cannot tell apart the held-out driving has a say too.
     """
-    likely = sorted(dx.significant, key=lambda c: not possible(c.effect, c.value, c.std))
+    likely = sorted(dx.significant, key=lambda c: not _can_be(c))
+    first: Candidate | None = None
+    held: dict[str, float] = {}
     for c in likely:
+        if first and (c.id not in first.indistinguishable_from or _can_be(c) != _can_be(first)):
+            continue
         if c.fit is None or c.statistic < 2.0 * np.log(c.fit.driving.samples):
             continue
         if c.id not in without_idle(c.fit).model.effects:
             continue
         gains = [gain_in_log_likelihood(fit, c.fit, test, same_noise=s) for s in (False, True)]
         if all(g > e for g, e in gains) and error_falls(fit, c.fit, test):
-            return c
-    return None
+            first = first or c
+            held[c.id] = _merit(c.fit) + gains[0][0]
+    return None if first is None else max(likely, key=lambda c: held.get(c.id, -np.inf))
+
+
+def _can_be(c: Candidate) -> bool:
+    return possible(c.effect, c.value, c.std)
 
 
 def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
     """Effects that act like the chosen one and nearly were, the likeliest first.
 
-    The catalogue says what acts like what, and the driving may add to it.
+    The catalogue says what acts like what, and the driving may add to it. What fits to the last
+    digit as the chosen one does is the same thing by another name, and no alternative.
     """
     alike = [
         c
         for c in dx.significant
         if c.statistic > _NEAR * chosen.statistic
+        and abs(c.statistic - chosen.statistic) > _SAME
         and (
             c.id in chosen.effect.twins
             or chosen.id in c.effect.twins
@@ -60,7 +82,7 @@ def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
 def exchanged(
     fit: Fit, nearly: Mapping[str, Sequence[Candidate]], test: Driving, *, most_effects: int
 ) -> Fit:
-    """The fit with another effect, or two, in place of an earlier one that they explain away.
+    """The fit with others in place of effects that they explain away, one or two for each.
 
     Where several effects are missing, one that is not there can stand in for two of them: a head
     wind for drag and rolling resistance. It is chosen first, as either alone explains less.
@@ -79,36 +101,62 @@ def exchanged(
     -------
     Fit
     """
-    best = fit
-    for name in fit.model.effects:
-        near = [c for c in nearly.get(name, ()) if c.id not in fit.model.effects]
-        for others in dict.fromkeys([*((c,) for c in near), tuple(near)]):
-            if not others or len(fit.model.effects) - 1 + len(others) > most_effects:
-                continue
-            trial = _with_others(fit, name, others)
-            if trial is None or _merit(trial) < _merit(best) + _BETTER:
-                continue
-            if all(_real(trial, c) for c in others) and error_falls(fit, trial, test):
-                best = without_idle(trial)
-    return best
+    while True:
+        best = fit
+        for name in fit.model.effects:
+            near = [c for c in nearly.get(name, ()) if c.id not in fit.model.effects]
+            for others in dict.fromkeys([*((c,) for c in near), tuple(near)]):
+                if not others or len(fit.model.effects) - 1 + len(others) > most_effects:
+                    continue
+                trial = with_others(fit, name, others)
+                if trial is not None and better(trial, best, test):
+                    best = trial
+        if best is fit:
+            return fit
+        fit = best
 
 
-def _with_others(fit: Fit, name: str, others: Sequence[Candidate]) -> Fit | None:
-    """The fit with others in place of an effect; None where the search fails."""
+def with_others(fit: Fit, name: str, others: Sequence[Candidate]) -> Fit | None:
+    """The fit with others in place of an effect, and without what is idle then.
+
+    None where the search fails.
+    """
     model = fit.model.drop(name)
     for c in others:
         values = zip(c.effect.parameters, c.value, strict=True)
         model = model.add(c.id).with_values({f"{c.id}.{p.name}": v for p, v in values})
     try:
-        return refine(model, fit.driving, fit.noise)
+        return without_idle(refine(model, fit.driving, fit.noise))
     except (_core.NumericalFailure, np.linalg.LinAlgError):
         return None
 
 
-def _real(fit: Fit, c: Candidate) -> bool:
-    """Whether the effect has a value that a car can have."""
-    found = [fit[f"{c.id}.{p.name}"] for p in c.effect.parameters]
-    return possible(c.effect, [e.value for e in found], [e.std for e in found])
+def better(one: Fit, other: Fit, test: Driving) -> bool:
+    """Whether one fit is to be preferred, and what is new in it has values that a car can have.
+
+    Both drivings speak: that of the fit, less the Bayesian price of the parameters, and the held-
+    out one, where the error must fall too. Of two that are as good the one with fewer effects is
+    preferred.
+    """
+    ones, others = set(one.model.effects), set(other.model.effects)
+    if not all(_real(one, name) for name in ones - others):
+        return False
+    ahead = lead(one, other, test)
+    if len(ones) < len(others):
+        return ahead > 0.0
+    return ahead > _BETTER and error_falls(other, one, test)
+
+
+def lead(one: Fit, other: Fit, test: Driving) -> float:
+    """Log-likelihood, less the price of the parameters, that one fit is ahead on all driving."""
+    return _merit(one) - _merit(other) + gain_in_log_likelihood(other, one, test)[0]
+
+
+def _real(fit: Fit, name: str) -> bool:
+    """Whether an effect of the model has a value that a car can have."""
+    found = effect(name)
+    estimates = [fit[f"{name}.{p.name}"] for p in found.parameters]
+    return possible(found, [e.value for e in estimates], [e.std for e in estimates])
 
 
 def without_idle(fit: Fit) -> Fit:
