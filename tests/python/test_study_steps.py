@@ -9,7 +9,7 @@ from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate
-from sysid_vehicle.study.search import Search, Trail
+from sysid_vehicle.study.search import Search
 from sysid_vehicle.study.steps import (
     _distance,
     alternatives,
@@ -110,21 +110,6 @@ def search(test: Driving, most_effects: int, told: list[str]) -> Search:
         progress=False,
         say=told.append,
     )
-
-
-def test_second_thoughts_lead_from_an_alternative_to_what_is_there(
-    dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving]
-) -> None:
-    (wind,) = (c for c in dx.ranking if c.id == "head_wind")
-    assert wind.fit is not None
-    found = search(driving[1], 2, [])
-    # A way that ended at the wind, as it would were nothing exchanged.
-    ended = Trail([baseline, wind.fit], [dx])
-    ended.note(dx, wind)
-    other = next(found._second_thoughts(ended))
-    assert set(other.fit.model.effects) == {"aero_drag", "rolling_resistance"}
-    assert other.fits[:2] == ended.fits
-    assert ended.fit is wind.fit
 
 
 def test_no_more_effects_are_added_than_allowed(

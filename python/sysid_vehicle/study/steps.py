@@ -20,7 +20,6 @@ __all__ = [
     "first_that_holds",
     "lead",
     "way",
-    "with_others",
     "without_idle",
 ]
 
@@ -48,10 +47,10 @@ def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> Candidate | None
             continue
         if c.id not in without_idle(c.fit).model.effects:
             continue
-        gains = [gain_in_log_likelihood(fit, c.fit, test, same_noise=s) for s in (False, True)]
-        if all(g > e for g, e in gains) and error_falls(fit, c.fit, test):
+        gain, error = gain_in_log_likelihood(fit, c.fit, test, same_noise=True)
+        if gain > error and error_falls(fit, c.fit, test):
             first = first or c
-            held[c.id] = _merit(c.fit) + gains[0][0]
+            held[c.id] = _merit(c.fit) + gain
     return None if first is None else max(likely, key=lambda c: held.get(c.id, -np.inf))
 
 
@@ -62,13 +61,15 @@ def _can_be(c: Candidate) -> bool:
 def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
     """Effects that act like the chosen one and nearly were, the likeliest first.
 
-    The catalogue says what acts like what, and the driving may add to it. What fits to the last
-    digit as the chosen one does is the same thing by another name, and no alternative.
+    Of those that were refitted: the others came nowhere near, or would take for ever. The catalogue
+    says what acts like what, and the driving may add to it. What fits to the last digit as the
+    chosen one does is the same thing by another name, and no alternative.
     """
     alike = [
         c
         for c in dx.significant
-        if c.statistic > _NEAR * chosen.statistic
+        if c.fit is not None
+        and c.statistic > _NEAR * chosen.statistic
         and abs(c.statistic - chosen.statistic) > _SAME
         and (
             c.id in chosen.effect.twins
@@ -108,7 +109,7 @@ def exchanged(
             for others in dict.fromkeys([*((c,) for c in near), tuple(near)]):
                 if not others or len(fit.model.effects) - 1 + len(others) > most_effects:
                     continue
-                trial = with_others(fit, name, others)
+                trial = _with_others(fit, name, others)
                 if trial is not None and better(trial, best, test):
                     best = trial
         if best is fit:
@@ -116,7 +117,7 @@ def exchanged(
         fit = best
 
 
-def with_others(fit: Fit, name: str, others: Sequence[Candidate]) -> Fit | None:
+def _with_others(fit: Fit, name: str, others: Sequence[Candidate]) -> Fit | None:
     """The fit with others in place of an effect, and without what is idle then.
 
     None where the search fails.
@@ -149,7 +150,9 @@ def better(one: Fit, other: Fit, test: Driving) -> bool:
 
 def lead(one: Fit, other: Fit, test: Driving) -> float:
     """Log-likelihood, less the price of the parameters, that one fit is ahead on all driving."""
-    return _merit(one) - _merit(other) + gain_in_log_likelihood(other, one, test)[0]
+    return (
+        _merit(one) - _merit(other) + gain_in_log_likelihood(other, one, test, same_noise=True)[0]
+    )
 
 
 def _real(fit: Fit, name: str) -> bool:
