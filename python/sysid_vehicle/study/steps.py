@@ -47,11 +47,23 @@ def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> Candidate | None
             continue
         if c.id not in without_idle(c.fit).model.effects:
             continue
-        gain, error = gain_in_log_likelihood(fit, c.fit, test, same_noise=True)
-        if gain > error and error_falls(fit, c.fit, test):
+        gain, holds = _held_out_gain(fit, c, test)
+        if holds and error_falls(fit, c.fit, test):
             first = first or c
             held[c.id] = _merit(c.fit) + gain
     return None if first is None else max(likely, key=lambda c: held.get(c.id, -np.inf))
+
+
+def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:
+    """What a candidate gains on held-out driving, and whether it does so beyond doubt."""
+    assert c.fit is not None
+    gain, error = gain_in_log_likelihood(fit, c.fit, test, same_noise=True)
+    if gain <= error or not np.isfinite(c.std).all():
+        # What the fit never felt of an effect may well be missing elsewhere: its noise, learnt
+        # without, is not held against it.
+        return gain, gain > error
+    own, error = gain_in_log_likelihood(fit, c.fit, test)
+    return gain, own > error
 
 
 def _can_be(c: Candidate) -> bool:
