@@ -99,10 +99,11 @@ class Likelihood:
 
 
 # Of the disturbances: what steps of 10 ms and axles without a width leave out. Beside the true
-# tyres a step is 3e-7 m/s, 3e-6 m/s and 3e-6 rad/s off in a slide; ten times that per root second.
-# Without that floor a minute of sliding is taken as one calculation, and its coefficients as known
-# to the sixth figure.
-_SMALLEST = np.array([1e-4, 1e-4, 1e-5, 1e-4, 3e-6, 3e-5, 3e-5])
+# tyres a step is 3e-7 m/s, 3e-6 m/s and 3e-6 rad/s off in a slide: ten times that per root second
+# where each step errs anew, as of v_y and yaw rate, and a hundred times where all of a second err
+# alike, as of v_x. Without that floor a minute of sliding is taken as one calculation, and its
+# coefficients as known to the sixth figure.
+_SMALLEST = np.array([1e-4, 1e-4, 1e-5, 1e-4, 3e-5, 3e-5, 3e-5])
 _LARGEST = np.array([10.0, 10.0, 2.0, 20.0, 5.0, 5.0, 5.0])
 
 
