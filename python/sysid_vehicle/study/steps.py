@@ -114,6 +114,7 @@ def exchanged(
     -------
     Fit
     """
+    seen = {frozenset(fit.model.effects)}
     while True:
         best = fit
         for name in fit.model.effects:
@@ -122,11 +123,14 @@ def exchanged(
                 if not others or len(fit.model.effects) - 1 + len(others) > most_effects:
                     continue
                 trial = _with_others(fit, name, others)
-                if trial is not None and better(trial, best, test):
+                if trial is None or frozenset(trial.model.effects) in seen:
+                    continue
+                if better(trial, best, test):
                     best = trial
         if best is fit:
             return fit
         fit = best
+        seen.add(frozenset(fit.model.effects))
 
 
 def _with_others(fit: Fit, name: str, others: Sequence[Candidate]) -> Fit | None:
