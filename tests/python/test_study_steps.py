@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from sysid_vehicle import Diagnosis, Fit, Model, diagnose, drive, identify, manoeuvres
@@ -9,6 +10,7 @@ from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate
+from sysid_vehicle.study.held_out import gain_in_log_likelihood, share_explained
 from sysid_vehicle.study.search import Search
 from sysid_vehicle.study.steps import (
     _distance,
@@ -86,6 +88,27 @@ def test_held_out_driving_has_a_say_between_what_the_fit_cannot_tell_apart(
         chosen = first_that_holds(replace(dx, ranking=(first, preferred)), baseline, driving[1])
         assert chosen is not None
         assert chosen.id == (other.id if told_apart else preferred.id)
+
+
+def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(
+    start: Model, truth: Model
+) -> None:
+    """Nobody brakes in the fitted driving, and the other half of the effect is right."""
+    car = truth.add("force_gain").with_values(
+        {"force_gain.drive_error": 0.08, "force_gain.brake_error": 0.08}
+    )
+    fit = identify(start, drive(car, manoeuvres.ramp_steer(), seed=21), starts=1)
+    test = Driving.of(drive(car, manoeuvres.lap(30.0), seed=22))
+    dx = diagnose(fit, candidates=["force_gain"])
+    (gain,) = (c.fit for c in dx.ranking)
+    assert gain is not None
+    assert not np.isfinite(gain["force_gain.brake_error"].std)
+    assert gain_in_log_likelihood(fit, gain, test)[0] < 0.0
+    assert share_explained(fit, gain, fit.driving) == pytest.approx(1.0, abs=0.05)
+    assert 0.2 < share_explained(fit, gain, test) < 0.6
+    chosen = first_that_holds(dx, fit, test)
+    assert chosen is not None
+    assert share_explained(gain, gain, test) == 0.0
 
 
 def test_of_two_that_are_as_good_the_simpler_is_preferred(

@@ -13,7 +13,7 @@ from ..estimate import Driving
 from ..identify import Fit
 from ..log import Log
 
-__all__ = ["error_falls", "gain_in_log_likelihood", "hold_out"]
+__all__ = ["error_falls", "gain_in_log_likelihood", "hold_out", "share_explained"]
 
 _SHARE = 0.3
 _BLOCK_S = 5.0
@@ -73,3 +73,10 @@ def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:
     Noise of its own can make a model likelier whose forces explain less than before.
     """
     return compare(richer, test).error < compare(poorer, test, noise=richer.noise).error
+
+
+def share_explained(poorer: Fit, richer: Fit, driving: Driving) -> float:
+    """Of the square of the poorer model's error beyond the richer one's noise floor."""
+    before = compare(poorer, driving, noise=richer.noise).error ** 2 - 1.0
+    after = compare(richer, driving).error ** 2 - 1.0
+    return 1.0 - max(after, 0.0) / before if before > 0.0 else 0.0

@@ -11,7 +11,7 @@ from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter, effect
 from ..estimate import Driving
 from ..identify import Estimate, Fit, refine
-from .held_out import error_falls, gain_in_log_likelihood
+from .held_out import error_falls, gain_in_log_likelihood, share_explained
 
 __all__ = [
     "alternatives",
@@ -26,6 +26,7 @@ __all__ = [
 _IDLE = 2.6  # an effect within so many standard errors of nothing is none
 _NEAR = 0.6  # of the evidence for the chosen effect
 _ALTERNATIVES = 2
+_KEPT = 0.5  # of the share of the error that an effect explains, on driving it was not fitted to
 _SAME = 0.05  # twice the nats between two fits that say the same
 _AT_NULL = 1e-5  # of the width between the bounds
 _BETTER = 4.5  # nats, beyond the Bayesian price of the parameters: three standard errors
@@ -48,22 +49,25 @@ def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> Candidate | None
         if c.id not in without_idle(c.fit).model.effects:
             continue
         gain, holds = _held_out_gain(fit, c, test)
-        if holds and error_falls(fit, c.fit, test):
+        if holds:
             first = first or c
             held[c.id] = _merit(c.fit) + gain
     return None if first is None else max(likely, key=lambda c: held.get(c.id, -np.inf))
 
 
 def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:
-    """What a candidate gains on held-out driving, and whether it does so beyond doubt."""
+    """What a candidate gains on held-out driving, and whether it holds there."""
     assert c.fit is not None
     gain, error = gain_in_log_likelihood(fit, c.fit, test, same_noise=True)
-    if gain <= error or not np.isfinite(c.std).all():
-        # What the fit never felt of an effect may well be missing elsewhere: its noise, learnt
-        # without, is not held against it.
-        return gain, gain > error
+    if gain <= error or not error_falls(fit, c.fit, test):
+        return gain, False
     own, error = gain_in_log_likelihood(fit, c.fit, test)
-    return gain, own > error
+    if own > error or not np.isfinite(c.std).all():
+        return gain, True  # what the fit never felt of an effect may well be missing elsewhere
+    # It is surer than it may be there, as is the right one beside another that acts there only. But
+    # what is not in the car explains far less of other driving than of that it was fitted to.
+    promised = share_explained(fit, c.fit, c.fit.driving)
+    return gain, share_explained(fit, c.fit, test) > _KEPT * promised
 
 
 def _can_be(c: Candidate) -> bool:
