@@ -53,6 +53,7 @@ def test_it_drives_a_car_from_a_file(tmp_path: Path, capsys: pytest.CaptureFixtu
         (["--effects", "steer_lagg"], "steer_lag"),
         (["--seed", "-1"], "--seed -1"),
         (["--log", "/nowhere/at/all.csv"], "does not exist"),
+        (["--plot", "drive.png"], "end the name in .svg"),
         (["--preset", "published", "--vehicle", "car.toml"], "leave --vehicle out"),
     ],
 )

@@ -28,7 +28,7 @@ from ..lab import (
 from ..model import Model
 from ..vehicle import Vehicle
 from . import lab_em, lab_identify, lab_validate
-from .outputs import refuse_unwritable
+from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_parser", "run"]
 
@@ -97,6 +97,7 @@ def _run_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(args: argparse.Namespace, heard: list[str]) -> None:
     inputs = [args.vehicle] if args.vehicle is not None else []
+    refuse_other_suffix(args.plot, ".svg")
     refuse_unwritable([args.log, args.plot, args.json], inputs=inputs)
     if args.seed < 0:
         raise InvalidInput(f"--seed {args.seed}: give a whole number from zero up")

@@ -18,7 +18,7 @@ from ..lab import (
     learn_observer_noise,
 )
 from .lab_inputs import add_log_arguments, add_vehicle_argument, files_of, logs_of, vehicle_of
-from .outputs import refuse_unwritable
+from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_arguments", "run"]
 
@@ -57,6 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Learn, print, and write what was asked for; `heard` are the warnings so far."""
+    refuse_other_suffix(args.plot, ".svg")
     refuse_unwritable([args.plot, args.json], inputs=files_of(args))
     vehicle = vehicle_of(args)
     car = ObserverCar.of(vehicle, drag_nspm=args.drag)

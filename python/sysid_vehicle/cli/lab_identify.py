@@ -11,7 +11,7 @@ from .._style import new_figure, svg
 from ..identify import METHODS
 from ..lab import GreyBoxVehicle, TyreLog, identify_tyres
 from .lab_inputs import add_log_arguments, add_vehicle_argument, files_of, logs_of, vehicle_of
-from .outputs import refuse_unwritable
+from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_arguments", "run"]
 
@@ -49,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Identify, print, and write what was asked for."""
+    refuse_other_suffix(args.plot, ".svg")
     refuse_unwritable([args.plot, args.json], inputs=files_of(args))
     car = GreyBoxVehicle.of(vehicle_of(args), mass_tolerance=args.mass_tolerance)
     logs = [part for log in logs_of(args) for part in TyreLog.from_log(log, car)]

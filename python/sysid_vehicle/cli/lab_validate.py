@@ -10,7 +10,7 @@ from .._style import new_figure, svg
 from ..lab import IdentifiedCar, TyreLog, validate_tyres
 from ..lab.tyre_data import READINGS
 from .lab_inputs import add_log_arguments, files_of, logs_of
-from .outputs import refuse_unwritable
+from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_arguments", "run"]
 
@@ -38,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Predict, print, and write what was asked for."""
+    refuse_other_suffix(args.plot, ".svg")
     refuse_unwritable([args.plot, args.json], inputs=[*files_of(args), args.tyres])
     car = IdentifiedCar.from_json(args.tyres)
     logs = [part for log in logs_of(args) for part in TyreLog.from_log(log, car.vehicle)]

@@ -8,7 +8,6 @@ from typing import Any
 
 from .._files import write_json, write_text
 from .._style import svg
-from ..errors import InvalidInput
 from ..online import (
     MAGIC_FORMULA,
     TWO_PARAMETER,
@@ -20,7 +19,7 @@ from ..online import (
     mu_slip_overview,
     save_animation,
 )
-from .outputs import refuse_unwritable
+from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_parser", "run"]
 
@@ -57,9 +56,8 @@ def add_parser(commands: Any) -> None:
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Estimate with every method, print them, and write what was asked for."""
-    for path, suffix in ((args.plot, ".svg"), (args.animation, ".gif")):
-        if path is not None and path.suffix.lower() != suffix:
-            raise InvalidInput(f"{path}: the file will be {suffix}; end the name in {suffix}")
+    refuse_other_suffix(args.plot, ".svg")
+    refuse_other_suffix(args.animation, ".gif")
     refuse_unwritable([args.plot, args.animation, args.json], inputs=[args.data])
     curve = _CURVES[args.curve]
     comparison = compare_mu_slip(MuSlipData.from_csv(args.data, args.noise_std), curve=curve)

@@ -8,11 +8,10 @@ from typing import Any
 
 from .._files import write_json, write_text
 from .._style import svg
-from ..errors import InvalidInput
 from ..online import KINDS, estimate_sideslip, sideslip_overview
 from ..read import read_log
 from ..vehicle import Vehicle
-from .outputs import refuse_unwritable
+from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_parser", "run"]
 
@@ -45,8 +44,7 @@ def add_parser(commands: Any) -> None:
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Estimate, print, and write what was asked for."""
-    if args.plot is not None and args.plot.suffix.lower() != ".svg":
-        raise InvalidInput(f"{args.plot}: the file will be .svg; end the name in .svg")
+    refuse_other_suffix(args.plot, ".svg")
     inputs = [args.log, args.vehicle, *([args.channels] if args.channels is not None else [])]
     refuse_unwritable([args.plot, args.json], inputs=inputs)
     vehicle, log = Vehicle.from_toml(args.vehicle), read_log(args.log, args.channels)

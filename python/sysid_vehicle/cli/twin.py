@@ -29,7 +29,7 @@ from ..twin.joint import (
     benchmark_cost,
     twin_cost,
 )
-from .outputs import refuse_unwritable
+from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_parser", "run"]
 
@@ -151,8 +151,7 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Do the subcommand that was asked for."""
     given = [args.gains] if getattr(args, "gains", None) is not None else []
     refuse_unwritable([args.plot, args.json], inputs=given)
-    if args.plot is not None and args.plot.suffix.lower() != ".svg":
-        raise InvalidInput(f"{args.plot}: the file will be .svg; end the name in .svg")
+    refuse_other_suffix(args.plot, ".svg")
     if args.seed < 0:
         raise InvalidInput(f"--seed {args.seed}: give a whole number from zero up")
     todo = {"calibrate": _calibrate, "validate": _validate}
