@@ -55,3 +55,9 @@ def test_many_ratios_at_once_are_those_one_by_one(rng: np.random.Generator) -> N
         long_run_ratio(directions[:, [j]], e - directions @ sizes[:, j]) for j in range(4)
     ]
     assert long_run_ratios(score_terms(directions, e, sizes), squares) == pytest.approx(one_by_one)
+
+
+def test_where_no_direction_is_left_there_are_no_terms(rng: np.random.Generator) -> None:
+    e = rng.standard_normal(5 * 40)
+    terms = score_terms(np.empty((len(e), 0)), e, np.empty((0, 0)))
+    assert terms.shape == (40, 0)

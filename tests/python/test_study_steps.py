@@ -14,6 +14,7 @@ from sysid_vehicle.study.held_out import gain_in_log_likelihood, share_explained
 from sysid_vehicle.study.search import Search
 from sysid_vehicle.study.steps import (
     _distance,
+    _share,
     alternatives,
     better,
     exchanged,
@@ -104,11 +105,20 @@ def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(
     assert gain is not None
     assert not np.isfinite(gain["force_gain.brake_error"].std)
     assert gain_in_log_likelihood(fit, gain, test)[0] < 0.0
-    assert share_explained(fit, gain, fit.driving) == pytest.approx(1.0, abs=0.05)
-    assert 0.2 < share_explained(fit, gain, test) < 0.6
+    assert _share(fit, gain, fit.driving) == pytest.approx(1.0, abs=0.05)
+    assert 0.2 < _share(fit, gain, test) < 0.6
     chosen = first_that_holds(dx, fit, test)
     assert chosen is not None
-    assert share_explained(gain, gain, test) == 0.0
+    assert _share(gain, gain, test) == 0.0
+
+
+def test_the_share_explained_is_of_what_is_beyond_the_noise_floor() -> None:
+    assert share_explained(2.0, 1.0) == 1.0
+    assert share_explained(2.0, 0.99) == 1.0
+    assert share_explained(3.0, np.sqrt(5.0)) == pytest.approx(0.5)
+    assert share_explained(2.0, 2.0) == 0.0
+    assert share_explained(2.0, 3.0) < 0.0
+    assert share_explained(1.0, 1.0) == 1.0
 
 
 def test_of_two_that_are_as_good_the_simpler_is_preferred(

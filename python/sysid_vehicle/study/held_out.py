@@ -75,8 +75,10 @@ def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:
     return compare(richer, test).error < compare(poorer, test, noise=richer.noise).error
 
 
-def share_explained(poorer: Fit, richer: Fit, driving: Driving) -> float:
-    """Of the square of the poorer model's error beyond the richer one's noise floor."""
-    before = compare(poorer, driving, noise=richer.noise).error ** 2 - 1.0
-    after = compare(richer, driving).error ** 2 - 1.0
-    return 1.0 - max(after, 0.0) / before if before > 0.0 else 0.0
+def share_explained(before: float, after: float) -> float:
+    """Of the square of an error beyond the noise floor, what a richer model took away.
+
+    All of it, where nothing was beyond the noise floor.
+    """
+    most, left = (max(error**2 - 1.0, 0.0) for error in (before, after))
+    return 1.0 - left / most if most > 0.0 else 1.0

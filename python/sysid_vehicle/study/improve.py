@@ -22,7 +22,7 @@ from ..estimate import Driving
 from ..identify import Fit, identify
 from ..log import Log
 from ..model import Model
-from .held_out import hold_out
+from .held_out import hold_out, share_explained
 from .search import Search
 from .steps import way
 from .study import AddedEffect, Study, Verdict
@@ -139,7 +139,7 @@ def _verdict(
     # An uneven road or a coloured sensor keeps the error of the true car above its noise floor:
     # what does not depend on the driving is no effect's to explain.
     complete = not left.rejects and not any(c.p_value < _SURE for c in last.significant)
-    share = _share_explained(on_train)
+    share = share_explained(on_train[0].error, on_train[-1].error)
     if not complete and share < _MOST:
         # Beside something larger that is not modelled no name is safe.
         told = told.doubting(
@@ -157,12 +157,6 @@ def _verdict(
     if proxies == added:
         return "unknown", told
     return "explained" if complete and not proxies else "partly_explained", told
-
-
-def _share_explained(on_train: list[Comparison]) -> float:
-    """Of the square of the error beyond the noise floor."""
-    before, after = (max(c.error**2 - 1.0, 0.0) for c in (on_train[0], on_train[-1]))
-    return 1.0 - after / before if before > 0.0 else 1.0
 
 
 def _taken_up(fits: list[Fit], on_train: list[Comparison]) -> dict[str, float]:

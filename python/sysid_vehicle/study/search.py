@@ -8,12 +8,7 @@ from dataclasses import dataclass, field
 from ..diagnose import Candidate, Diagnosis, diagnose
 from ..estimate import Driving
 from ..identify import Fit
-from .steps import (
-    alternatives,
-    exchanged,
-    first_that_holds,
-    without_idle,
-)
+from .steps import alternatives, exchanged, first_that_holds, without_idle
 
 __all__ = ["Search", "Trail"]
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .. import _core
+from ..compare import compare
 from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter, effect
 from ..estimate import Driving
@@ -66,8 +67,14 @@ def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:
         return gain, True  # what the fit never felt of an effect may well be missing elsewhere
     # It is surer than it may be there, as is the right one beside another that acts there only. But
     # what is not in the car explains far less of other driving than of that it was fitted to.
-    promised = share_explained(fit, c.fit, c.fit.driving)
-    return gain, share_explained(fit, c.fit, test) > _KEPT * promised
+    promised, seen = (_share(fit, c.fit, driving) for driving in (c.fit.driving, test))
+    return gain, seen > _KEPT * promised
+
+
+def _share(poorer: Fit, richer: Fit, driving: Driving) -> float:
+    """Of what the poorer model leaves, by the noise floor of the richer one."""
+    before = compare(poorer, driving, noise=richer.noise).error
+    return share_explained(before, compare(richer, driving).error)
 
 
 def _can_be(c: Candidate) -> bool:
@@ -110,7 +117,7 @@ def exchanged(
     nearly : mapping
         By effect of the model, what was nearly chosen instead.
     test : Driving
-        What the fit never saw: the exchange must lower the error there too.
+        What the fit never saw, and has a say (`better`).
     most_effects : int
         That the model may have.
 
