@@ -1,6 +1,8 @@
 // Score and expected information of the noise parameters along a linearised filter. Shumway &
 // Stoffer, Time Series Analysis and Its Applications (4th ed.), sec. 6.3; the information is its
 // eq. (6.70).
+#include <algorithm>
+
 #include "sysid/identify/prediction_error.hpp"
 #include "sysid/identify/run_system.hpp"
 
@@ -8,120 +10,229 @@ namespace sysid {
 
 namespace {
 
-/// Derivative of the filter's mean and covariance in the direction of one log noise parameter.
-template <int NX>
-struct Direction {
-    Vec<NX> mean = Vec<NX>::Zero();
-    Mat<NX, NX> covariance = Mat<NX, NX>::Zero();
-    Mat<NX, NX> process = Mat<NX, NX>::Zero();
-    Mat<kChannels, kChannels> sensor = Mat<kChannels, kChannels>::Zero();
-    double forget = 0.0;  // derivative of exp(-dt/tau)
-};
+/// One number for each noise parameter, side by side: what follows is done for all of them at once.
+using Lanes = Eigen::Array<double, kNoiseParameters, 1>;
+using Table = Mat<kNoiseParameters, kNoiseParameters>;
+constexpr int kTimeLane = kNoiseParameters - 1;
 
-/// d/d(log parameter) of the noise covariances.
+constexpr int motion_lane(int i) { return kChannels + i; }
+constexpr int wander_lane(int i) { return kChannels + kMotionStates + i; }
+
+/// Derivatives of the filter's mean and covariance by the logarithms of the noise parameters, along
+/// a run. Only the first `n` states take part; the others stand still and are certain.
 template <int NX>
-std::array<Direction<NX>, kNoiseParameters> directions(const Run& run, const Noise& noise) {
-    std::array<Direction<NX>, kNoiseParameters> all;
-    for (int i = 0; i < kChannels; ++i) {
-        const auto n = static_cast<std::size_t>(i);
-        all[n].sensor(i, i) = 2.0 * noise.sensor[n] * noise.sensor[n];
+class Answer {
+  public:
+    Answer(const RunSystem<NX>& system, const Run& run, const Noise& noise)
+        : n_(kStatesPlain + static_cast<int>(system.own().count)),
+          mean_(static_cast<std::size_t>(n_), Lanes::Zero()),
+          covariance_(static_cast<std::size_t>(n_ * n_), Lanes::Zero()),
+          half_(covariance_.size()),
+          process_(Mat<kStatesPlain, kNoiseParameters>::Zero()) {
+        const double forget = system.forget();
+        // d exp(-dt/tau) / d log(tau)
+        slope_ = forget * run.dt / noise.correlation_time_s;
+        for (int i = 0; i < kMotionStates; ++i) {
+            const auto m = static_cast<std::size_t>(i);
+            const int w = kMotionStates + i;
+            const double variance = noise.wander[m] * noise.wander[m];
+            process_(i, motion_lane(i)) = 2.0 * noise.motion[m] * noise.motion[m] * run.dt;
+            process_(w, wander_lane(i)) = 2.0 * variance * (1.0 - forget * forget);
+            process_(w, kTimeLane) = -2.0 * variance * forget * slope_;
+            at(w, w)[wander_lane(i)] = 2.0 * variance;  // of the stationary start
+        }
+        for (int i = 0; i < kChannels; ++i) {
+            const double s = noise.sensor[static_cast<std::size_t>(i)];
+            sensor_[i] = 2.0 * s * s;
+        }
     }
-    const double forget = std::exp(-run.dt / noise.correlation_time_s);
-    // d exp(-dt/tau) / d log(tau)
-    const double slope = forget * run.dt / noise.correlation_time_s;
-    auto& time = all[kNoiseParameters - 1];
-    time.forget = slope;
-    for (int i = 0; i < kMotionStates; ++i) {
-        const auto n = static_cast<std::size_t>(i);
-        const int w = kMotionStates + i;
-        const double variance = noise.wander[n] * noise.wander[n];
-        all[kChannels + n].process(i, i) = 2.0 * noise.motion[n] * noise.motion[n] * run.dt;
-        auto& wander = all[kChannels + kMotionStates + n];
-        wander.process(w, w) = 2.0 * variance * (1.0 - forget * forget);
-        wander.covariance(w, w) = 2.0 * variance;  // of the stationary start
-        time.process(w, w) = -2.0 * variance * forget * slope;
+
+    /// From the update at one sample to the prediction for the next one.
+    void predict(const Mat<NX, NX>& transition) {
+        const Mat<NX, NX> through = transition * keep_;
+        const Mat<NX, kChannels> gain = transition * gain_;
+        turn(through);
+        for (int i = 0; i < n_; ++i)
+            for (int j = 0; j <= i; ++j) {
+                Lanes& d = at(i, j);
+                for (int c = 0; c < kChannels; ++c) d[c] += seen_[c] * gain(i, c) * gain(j, c);
+            }
+        // The transition's own diagonal for the wandering states depends on the correlation time.
+        const Mat<kMotionStates, NX> cross =
+            slope_ * covariance_after_.template middleRows<kMotionStates>(kMotionStates) *
+            transition.transpose();
+        for (int i = 0; i < kMotionStates; ++i) {
+            const int w = kMotionStates + i;
+            for (int j = 0; j < n_; ++j)
+                at(std::max(w, j), std::min(w, j))[kTimeLane] += (j == w ? 2.0 : 1.0) * cross(i, j);
+        }
+        for (int i = 0; i < kStatesPlain; ++i) at(i, i) += process_.row(i).transpose().array();
+        for (int i = 0; i < n_; ++i)
+            for (int j = 0; j < i; ++j) at(j, i) = at(i, j);
+        std::array<Lanes, NX> moved;
+        for (int i = 0; i < n_; ++i) {
+            Lanes sum = Lanes::Zero();
+            for (int j = 0; j < n_; ++j) sum += transition(i, j) * mean_[place(j)];
+            moved[place(i)] = sum;
+        }
+        for (int i = 0; i < kMotionStates; ++i) {
+            const int w = kMotionStates + i;
+            moved[place(w)][kTimeLane] += slope_ * mean_after_[w];
+        }
+        std::copy_n(moved.begin(), n_, mean_.begin());
     }
-    return all;
-}
+
+    /// What one sample adds to the score and to the information, and the update there.
+    void update(const FilterStep<NX, kChannels>& s, const Vec<kChannels>& measured) {
+        const Mat<kChannels, NX>& H = s.update.observation;
+        const Vec<kChannels> weighed = s.update.information * s.update.innovation;
+        for (int i = 0; i < kChannels; ++i) seen_[i] = std::isnan(measured[i]) ? 0.0 : sensor_[i];
+
+        std::array<Lanes, NX * kChannels> cross;  // dP H^T
+        const auto crossed = [&](int i, int c) -> Lanes& {
+            return cross[place(i * kChannels + c)];
+        };
+        for (int i = 0; i < n_; ++i)
+            for (int c = 0; c < kChannels; ++c) {
+                Lanes sum = Lanes::Zero();
+                for (int j = 0; j < n_; ++j) sum += H(c, j) * at(i, j);
+                crossed(i, c) = sum;
+            }
+        innovate(s.update, crossed);
+
+        keep_ = Mat<NX, NX>::Identity() - s.update.gain * H;
+        gain_ = s.update.gain;
+        mean_after_ = s.mean;
+        covariance_after_ = s.covariance;
+        // x+ = x- + K e:  dx+ = (I - K H) (dx- + dP- H^T S^-1 e) - K dR S^-1 e
+        std::array<Lanes, NX> pushed;
+        for (int i = 0; i < n_; ++i) {
+            pushed[place(i)] = mean_[place(i)];
+            for (int c = 0; c < kChannels; ++c) pushed[place(i)] += weighed[c] * crossed(i, c);
+        }
+        for (int i = 0; i < n_; ++i) {
+            Lanes sum = Lanes::Zero();
+            for (int j = 0; j < n_; ++j) sum += keep_(i, j) * pushed[place(j)];
+            for (int c = 0; c < kChannels; ++c) sum[c] -= gain_(i, c) * seen_[c] * weighed[c];
+            mean_[place(i)] = sum;
+        }
+    }
+
+    const Lanes& score() const { return score_; }
+    const Table& information() const { return information_; }
+
+  private:
+    static constexpr int kPairs = kChannels * (kChannels + 1) / 2;
+
+    static std::size_t place(int i) { return static_cast<std::size_t>(i); }
+    Lanes& at(int i, int j) { return covariance_[place(i * n_ + j)]; }
+
+    /// A dP A^T, its lower triangle.
+    void turn(const Mat<NX, NX>& A) {
+        for (int i = 0; i < n_; ++i)
+            for (int j = 0; j < n_; ++j) {
+                Lanes sum = Lanes::Zero();
+                for (int m = 0; m < n_; ++m) sum += A(i, m) * at(m, j);
+                half_[place(i * n_ + j)] = sum;
+            }
+        for (int i = 0; i < n_; ++i)
+            for (int j = 0; j <= i; ++j) {
+                Lanes sum = Lanes::Zero();
+                for (int m = 0; m < n_; ++m) sum += A(j, m) * half_[place(i * n_ + m)];
+                at(i, j) = sum;
+            }
+    }
+
+    /// The derivatives of the innovation and of its covariance S, whitened by L L^T = S.
+    template <class Crossed>
+    void innovate(const Update<NX, kChannels>& u, Crossed&& crossed) {
+        using Square = Mat<kChannels, kChannels>;
+        const Mat<kChannels, NX>& H = u.observation;
+        const auto lower = u.lower.template triangularView<Eigen::Lower>();
+        const Square inverse = lower.solve(Square::Identity());
+        const Vec<kChannels> white = inverse * u.innovation;
+        std::array<std::array<Lanes, kChannels>, kChannels> change;  // H dP H^T + dR
+        std::array<Lanes, kChannels> shift;                          // -H dx
+        for (int a = 0; a < kChannels; ++a) {
+            Lanes sum = Lanes::Zero();
+            for (int i = 0; i < n_; ++i) sum -= H(a, i) * mean_[place(i)];
+            shift[place(a)] = sum;
+            for (int b = 0; b <= a; ++b) {
+                Lanes both = Lanes::Zero();
+                for (int i = 0; i < n_; ++i) both += H(a, i) * crossed(i, b);
+                if (a == b) both[a] += seen_[a];
+                change[place(a)][place(b)] = change[place(b)][place(a)] = both;
+            }
+        }
+        // Rows that make the information as a sum of squares: one for each element of L^-1 dS L^-T,
+        // and one for each of L^-1 d(innovation).
+        Eigen::Matrix<double, kNoiseParameters, kPairs + kChannels> rows;
+        Lanes score = Lanes::Zero();
+        std::array<std::array<Lanes, kChannels>, kChannels> left;
+        int row = 0;
+        for (int a = 0; a < kChannels; ++a) {
+            for (int b = 0; b < kChannels; ++b) {
+                Lanes sum = Lanes::Zero();
+                for (int c = 0; c <= a; ++c) sum += inverse(a, c) * change[place(c)][place(b)];
+                left[place(a)][place(b)] = sum;
+            }
+            for (int b = 0; b <= a; ++b) {
+                Lanes sum = Lanes::Zero();
+                for (int c = 0; c <= b; ++c) sum += inverse(b, c) * left[place(a)][place(c)];
+                const double twice = a == b ? 1.0 : 2.0;
+                score += 0.5 * twice * white[a] * white[b] * sum;
+                if (a == b) score -= 0.5 * sum;
+                rows.col(row++) = std::sqrt(0.5 * twice) * sum;
+            }
+            Lanes moved = Lanes::Zero();
+            for (int c = 0; c <= a; ++c) moved += inverse(a, c) * shift[place(c)];
+            score -= white[a] * moved;
+            rows.col(row++) = moved;
+        }
+        score_ += score;
+        information_ += rows.lazyProduct(rows.transpose());
+    }
+
+    Lanes score_ = Lanes::Zero();
+    Table information_ = Table::Zero();
+    int n_;
+    std::vector<Lanes> mean_, covariance_, half_;
+    Mat<kStatesPlain, kNoiseParameters> process_;
+    Vec<kChannels> sensor_, seen_;
+    double slope_ = 0.0;
+    Mat<NX, NX> keep_, covariance_after_;
+    Mat<NX, kChannels> gain_;
+    Vec<NX> mean_after_;
+};
 
 template <int NX>
 double score_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
-                 Eigen::Ref<Eigen::VectorXd> gradient, Eigen::Ref<Eigen::MatrixXd> information) {
+                 Lanes& score, Table& information) {
     const RunSystem<NX> system(problem.model, run, p, noise);
-    auto all = directions<NX>(run, noise);
-    Vec<NX> mean = system.initial_mean();
-    Mat<NX, NX> covariance = system.initial_covariance();
-    using Square = Mat<kChannels, kChannels>;
-    std::array<Square, kNoiseParameters> dS;
-    std::array<Vec<kChannels>, kNoiseParameters> de;
-    return filter_run<NX>(system, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
-        const auto lower = s.update.lower.template triangularView<Eigen::Lower>();
-        const Mat<kChannels, NX>& H = s.update.observation;
-        const Mat<NX, NX> keep = Mat<NX, NX>::Identity() - s.update.gain * H;
-        const Vec<kChannels> white = lower.solve(s.update.innovation);
-        const Vec<kChannels> weighed = lower.transpose().solve(white);
-        Square inverse = lower.solve(Square::Identity());  // L^-1
-        Square present = Square::Identity();
-        for (int i = 0; i < kChannels; ++i)
-            if (std::isnan(run.measurements[k][i])) present(i, i) = 0.0;
-        for (int j = 0; j < kNoiseParameters; ++j) {
-            const auto n = static_cast<std::size_t>(j);
-            Direction<NX>& d = all[n];
-            if (k > 0) {
-                Vec<NX> moved = s.transition * d.mean;
-                Mat<NX, NX> spread = s.transition * d.covariance * s.transition.transpose();
-                if (d.forget != 0.0) {
-                    // The transition's own diagonal for the wandering states depends on tau.
-                    Mat<NX, NX> turn = Mat<NX, NX>::Zero();
-                    for (int i = kMotionStates; i < kStatesPlain; ++i) turn(i, i) = d.forget;
-                    moved += turn * mean;
-                    const Mat<NX, NX> half = turn * covariance * s.transition.transpose();
-                    spread += half + half.transpose();
-                }
-                d.mean = moved;
-                d.covariance = spread + d.process;
-            }
-            const Mat<NX, kChannels> cross = d.covariance * H.transpose();
-            const Square change = H * cross + present * d.sensor * present;
-            const Vec<kChannels> shift = -H * d.mean;
-            dS[n] = inverse * change * inverse.transpose();
-            de[n] = lower.solve(shift);
-            gradient[j] += 0.5 * (white.dot(dS[n] * white) - dS[n].trace()) - white.dot(de[n]);
-            // P+ = (I - K H) P-:  dP+ = (I-KH) dP- (I-KH)^T + K dR K^T
-            const Mat<NX, kChannels> gain_change =
-                keep * cross - s.update.gain * present * d.sensor;
-            d.mean = keep * d.mean + gain_change * weighed;
-            d.covariance = keep * d.covariance * keep.transpose() +
-                           s.update.gain * present * d.sensor * s.update.gain.transpose();
-        }
-        for (int i = 0; i < kNoiseParameters; ++i) {
-            for (int j = 0; j <= i; ++j) {
-                const auto a = static_cast<std::size_t>(i);
-                const auto b = static_cast<std::size_t>(j);
-                const double info =
-                    0.5 * dS[a].cwiseProduct(dS[b].transpose()).sum() + de[a].dot(de[b]);
-                information(i, j) += info;
-                if (i != j) information(j, i) += info;
-            }
-        }
-        mean = s.mean;
-        covariance = s.covariance;
-    });
+    Answer<NX> answer(system, run, noise);
+    const double log_likelihood =
+        filter_run<NX>(system, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
+            if (k > 0) answer.predict(s.transition);
+            answer.update(s, run.measurements[k]);
+        });
+    score += answer.score();
+    information += answer.information();
+    return log_likelihood;
 }
 
 }  // namespace
 
 double noise_score(const Problem& problem, const double* p, const Noise& noise, double* gradient,
                    double* information) {
-    Eigen::VectorXd g = Eigen::VectorXd::Zero(kNoiseParameters);
-    Eigen::MatrixXd info = Eigen::MatrixXd::Zero(kNoiseParameters, kNoiseParameters);
+    Lanes score = Lanes::Zero();
+    Table info = Table::Zero();
     double log_likelihood = 0.0;
     with_state_size(problem.model.effects, [&](auto nx) {
         for (const Run& run : problem.runs)
-            log_likelihood += score_run<decltype(nx)::value>(problem, run, p, noise, g, info);
+            log_likelihood += score_run<decltype(nx)::value>(problem, run, p, noise, score, info);
     });
-    Eigen::Map<Eigen::VectorXd>(gradient, kNoiseParameters) = g;
-    Eigen::Map<Eigen::MatrixXd>(information, kNoiseParameters, kNoiseParameters) = info;
+    Eigen::Map<Lanes>{gradient} = score;
+    Eigen::Map<Table>{information} = info;
     return log_likelihood;
 }
 

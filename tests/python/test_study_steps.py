@@ -88,7 +88,7 @@ def test_held_out_driving_has_a_say_between_what_the_fit_cannot_tell_apart(
         first = replace(other, indistinguishable_from=() if told_apart else (preferred.id,))
         chosen = first_that_holds(replace(dx, ranking=(first, preferred)), baseline, driving[1])
         assert chosen is not None
-        assert chosen.id == (other.id if told_apart else preferred.id)
+        assert chosen[0].id == (other.id if told_apart else preferred.id)
 
 
 def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(
@@ -196,9 +196,10 @@ def test_a_possible_value_comes_before_an_impossible_one(
     others = tuple(c for c in dx.ranking if c.id != "aero_drag" and c.fit is not None)
     chosen = first_that_holds(replace(dx, ranking=(far, *others)), baseline, driving[1])
     assert chosen is not None
-    assert chosen.id != "aero_drag"
+    assert chosen[0].id != "aero_drag"
     alone = first_that_holds(replace(dx, ranking=(far,)), baseline, driving[1])
-    assert alone is far
+    assert alone is not None
+    assert alone[0] is far
 
 
 def test_a_search_that_ends_at_its_bound_wanted_more_than_any_car_has() -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from ..diagnose import Candidate, Diagnosis, diagnose
 from ..estimate import Driving
 from ..identify import Fit
-from .steps import alternatives, exchanged, first_that_holds, without_idle
+from .steps import alternatives, exchanged, first_that_holds
 
 __all__ = ["Search", "Trail"]
 
@@ -77,14 +77,12 @@ class Search:
         while True:
             dx = self._diagnosis(trail.fit)
             trail.diagnoses.append(dx)
-            chosen = first_that_holds(dx, trail.fit, self.test) if self.most_effects else None
-            if chosen is None:
+            step = first_that_holds(dx, trail.fit, self.test) if self.most_effects else None
+            if step is None:
                 return trail
-            assert chosen.fit is not None
+            chosen, lean = step
             trail.note(dx, chosen)
-            found = exchanged(
-                without_idle(chosen.fit), trail.nearly, self.test, most_effects=self.most_effects
-            )
+            found = exchanged(lean, trail.nearly, self.test, most_effects=self.most_effects)
             effects = set(found.model.effects)
             # One more than allowed may make another needless.
             if len(effects) > self.most_effects:

@@ -33,27 +33,32 @@ _AT_NULL = 1e-5  # of the width between the bounds
 _BETTER = 4.5  # nats, beyond the Bayesian price of the parameters: three standard errors
 
 
-def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> Candidate | None:
+def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate, Fit] | None:
     """The likeliest candidate that fits better and predicts the held-out driving better.
 
     One with a value that a car can have comes before one that only acts like something else. Among
-    those that the fitted driving cannot tell apart the held-out driving has a say too.
+    those that the fitted driving cannot tell apart the held-out driving has a say too. With it
+    comes its fit, without what is idle then.
     """
     likely = sorted(dx.significant, key=lambda c: not _can_be(c))
     first: Candidate | None = None
-    held: dict[str, float] = {}
+    held: dict[str, tuple[float, Candidate, Fit]] = {}
     for c in likely:
         if first and (c.id not in first.indistinguishable_from or _can_be(c) != _can_be(first)):
             continue
         if c.fit is None or c.statistic < 2.0 * np.log(c.fit.driving.samples):
             continue
-        if c.id not in without_idle(c.fit).model.effects:
+        lean = without_idle(c.fit)
+        if c.id not in lean.model.effects:
             continue
         gain, holds = _held_out_gain(fit, c, test)
         if holds:
             first = first or c
-            held[c.id] = _merit(c.fit) + gain
-    return None if first is None else max(likely, key=lambda c: held.get(c.id, -np.inf))
+            held[c.id] = (_merit(c.fit) + gain, c, lean)
+    if not held:
+        return None
+    _, chosen, lean = max(held.values(), key=lambda found: found[0])
+    return chosen, lean
 
 
 def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:

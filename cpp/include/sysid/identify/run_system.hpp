@@ -143,8 +143,9 @@ class RunSystem {
     Mat<kChannels, kChannels> sensors_;
 };
 
-/// State sizes for models without states of the effects' own, with a few, and with all of them.
+/// State sizes for models without states of the effects' own, with a few, with some, and with all.
 constexpr int kStatesFew = kStatesPlain + 3;
+constexpr int kStatesSome = kStatesPlain + 6;
 constexpr int kStatesMost = (kStatesFull + 8) / 9 * 9;
 
 /// Calls `use(std::integral_constant<int, NX>)` with a state size that holds the effects' states.
@@ -153,6 +154,7 @@ auto with_state_size(EffectMask effects, Use&& use) {
     const std::size_t own = active_states(effects).count;
     if (own == 0) return use(std::integral_constant<int, kStatesPlain>{});
     if (own <= 3) return use(std::integral_constant<int, kStatesFew>{});
+    if (own <= 6) return use(std::integral_constant<int, kStatesSome>{});
     return use(std::integral_constant<int, kStatesMost>{});
 }
 
@@ -165,6 +167,7 @@ double filter_run(const RunSystem<NX>& system, const KeepStep<NX>& keep);
 
 extern template double filter_run(const RunSystem<kStatesPlain>&, const KeepStep<kStatesPlain>&);
 extern template double filter_run(const RunSystem<kStatesFew>&, const KeepStep<kStatesFew>&);
+extern template double filter_run(const RunSystem<kStatesSome>&, const KeepStep<kStatesSome>&);
 extern template double filter_run(const RunSystem<kStatesMost>&, const KeepStep<kStatesMost>&);
 
 }  // namespace sysid
