@@ -4,10 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from scipy.stats import kstest
+from scipy.signal import lfilter
+from scipy.stats import chi2, kstest
 
 from sysid_vehicle import Driving, Fit, Log, Model, catalogue, drive, effect, identify, manoeuvres
-from sysid_vehicle.diagnose.score import ScoreBoard, score_board
+from sysid_vehicle.diagnose.evidence import Evidence
+from sysid_vehicle.diagnose.score import Score, ScoreBoard, score_board, score_board_of
 from sysid_vehicle.identify import refit
 
 Hidden = Callable[[str, float], Fit]
@@ -36,6 +38,30 @@ def test_a_complete_model_lacks_nothing(null_boards: list[ScoreBoard]) -> None:
     smallest = [min(b.family_p_values().values()) for b in null_boards]
     assert min(smallest) > 0.01
     assert max(smallest) > 0.2
+
+
+def white_p_value(board: ScoreBoard, score: Score) -> float:
+    """What would hold if the residuals were white."""
+    raw = score.statistic * max(score.variance_ratio, 1.0)
+    return float(chi2.sf(raw, board.directions[score.effect.id].shape[1]))
+
+
+def test_coloured_residuals_are_not_taken_for_an_effect(complete_fits: tuple[Fit, ...]) -> None:
+    """Noise that lasts for some samples has four times the variance in slow directions."""
+    fit = complete_fits[0]
+    candidates = fit.model.candidates
+    claimed = naive = 0
+    draws = 12
+    for seed in range(draws):
+        evidence = Evidence(fit, fit.driving)
+        white = np.random.default_rng(seed).standard_normal((len(evidence.residual) // 5, 5))
+        coloured = lfilter([0.8], [1.0, -0.6], white, axis=0)  # of variance 1
+        vars(evidence)["left"] = evidence.project(coloured.ravel())
+        b = score_board_of(evidence, candidates)
+        claimed += min(b.family_p_values().values()) < 0.05
+        naive += min(white_p_value(b, s) for s in b.scores) * len(b.scores) < 0.05
+    assert naive > 0.8 * draws
+    assert claimed <= 3  # at 5 % each, more would be seen by chance in one of 400 choices of seeds
 
 
 def test_family_p_values_are_never_smaller_than_single_ones(

@@ -20,7 +20,12 @@ from sysid_vehicle import (
     improve,
     manoeuvres,
 )
-from sysid_vehicle.study.held_out import error_falls, gain_in_log_likelihood, hold_out
+from sysid_vehicle.study.held_out import (
+    error_falls,
+    gain_in_log_likelihood,
+    hold_out,
+    share_explained,
+)
 from sysid_vehicle.study.improve import _alike, _small
 
 LAG = "steer_lag.time_constant_s", 0.06
@@ -209,6 +214,23 @@ def test_what_no_candidate_explains_is_not_explained(
     assert found.verdict in ("unknown", "partly_explained")
     assert not set(found.model.effects) & LOOKS_LIKE_LAG
     assert found.omnibus.p_value < 0.01 or found.train[-1].error > 1.1
+
+
+def test_one_effect_that_leaves_something_is_none(
+    start: Model, truth: Model, drives: Drives
+) -> None:
+    """A wrong mass takes up most of what an accelerometer's wrong gain leaves."""
+    wrong = {"accelerometer_scale.ax_error": 0.05, "accelerometer_scale.ay_error": 0.05}
+    car = truth.add("accelerometer_scale").with_values(wrong)
+    found = improve(start, *drives(car, 51), starts=1, candidates=["mass"])
+    assert [a.id for a in found.added] == ["mass"]
+    assert share_explained(found.train[0].error, found.train[-1].error) > 0.8
+    assert found.verdict == "unknown"
+    assert found.verdicts["mass"].finding == "proxy"
+    assert "nothing would be left" in found.verdicts["mass"].sentence
+    both = improve(start, *drives(car, 51), starts=1, candidates=["mass", "accelerometer_scale"])
+    assert [a.id for a in both.added] == ["accelerometer_scale"]
+    assert both.verdict == "explained"
 
 
 def test_what_took_up_less_than_is_left_is_doubted() -> None:

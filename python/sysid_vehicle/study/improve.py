@@ -31,6 +31,7 @@ __all__ = ["improve"]
 
 _MOST = 0.8  # share of what is missing, by which an effect has to be more than a stand-in
 _SURE = 0.01  # evidence of one effect more: at 5 % it would spoil one complete model in twenty
+_LEFT = 1e-3  # evidence of something left, beside which an effect alone is not what is missing
 
 
 def improve(
@@ -145,6 +146,8 @@ def _verdict(
         told = told.doubting(
             added, f"takes up only {max(100 * share, 0.0):.0f} % of what is missing"
         )
+    elif left.p_value < _LEFT and len(named := _named(told, added)) == 1:
+        told = told.doubting(named, "were it what is missing, nothing would be left")
     elif not complete:
         proxies = {e for e in added if told[e].finding == "proxy"}
         small = _small(_taken_up(fits, on_train), on_train[-1].error ** 2 - 1.0, proxies)
@@ -154,9 +157,14 @@ def _verdict(
     told = told.doubting(
         proxies, f"it acts like {', '.join(sorted(proxies))}, which is none either"
     )
-    if proxies == added:
+    if proxies == added or not (complete or _named(told, added)):
         return "unknown", told
     return "explained" if complete and not proxies else "partly_explained", told
+
+
+def _named(told: Verdicts, added: set[str]) -> set[str]:
+    """What was added and is said to be missing, not only to act like it or to be negligible."""
+    return {e for e in added if told[e].finding in ("missing", "one of a group")}
 
 
 def _taken_up(fits: list[Fit], on_train: list[Comparison]) -> dict[str, float]:
