@@ -120,6 +120,41 @@ TEST(Filter, SquareRootIsTheKalmanFilterOnALinearModel) {
     expect_kalman_numbers<Method::kSquareRoot>();
 }
 
+/// Mean and variance of the square of the first of N standard normal states.
+template <int N>
+Vec<2> square_by(const SigmaWeights& weights) {
+    const auto square = [](const Vec<N>& x) { return Vec<1>(x[0] * x[0]); };
+    const Mat<N, N> root = Mat<N, N>::Identity();
+    const auto t = transform<1, N>(square, Vec<N>(Vec<N>::Zero()), root, weights);
+    return {t.mean[0], t.covariance(weights)(0, 0)};
+}
+
+TEST(SigmaWeights, PointsNearByOverstateCurvatureLessTheMoreStatesThereAre) {
+    constexpr double kTruth = 2.0;  // variance of a chi-square variable
+    const Vec<2> near = square_by<13>(SigmaWeights::near(13));
+    const Vec<2> even = square_by<13>(SigmaWeights::even(13));
+    EXPECT_NEAR(near[0], 1.0, 1e-12);
+    EXPECT_NEAR(even[0], 1.0, 1e-12);
+    EXPECT_NEAR(near[1], 16.0 / 3.0, 1e-12);
+    EXPECT_NEAR(even[1], 13.0, 1e-12);
+    EXPECT_GT(near[1], kTruth);
+    EXPECT_NEAR(square_by<3>(SigmaWeights::near(3))[1], kTruth, 1e-12);
+}
+
+TEST(SigmaWeights, AnyOfThemGivesTheKalmanFilterOnALinearModel) {
+    const Record record = drive(100, 5);
+    const Vec<2> mean(0.0, 0.0);
+    const Mat<2, 2> covariance = Mat<2, 2>::Identity();
+    Filter<Wagon> even(Wagon{}, mean, covariance);
+    Filter<Wagon> near(Wagon{}, mean, covariance, {}, {}, SigmaWeights::near(2));
+    for (const Vec<2>& y : record.y) {
+        const auto& a = even.step({}, y);
+        const auto& b = near.step({}, y);
+        ASSERT_LT((a.mean - b.mean).norm(), 1e-10);
+        ASSERT_LT((a.covariance - b.covariance).norm(), 1e-10);
+    }
+}
+
 TEST(Filter, ItsCovariancesAreTrueOnMatchedSimulations) {
     double nees = 0.0, nis = 0.0, readings = 0.0;
     constexpr int kRuns = 300;

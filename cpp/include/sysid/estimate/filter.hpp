@@ -42,11 +42,9 @@ class Filter {
     using Step = FilterStep<NX, NY>;
 
     Filter(Model model, const Vec<NX>& mean, const Mat<NX, NX>& covariance,
-           Gate<NY> gate = Gate<NY>(), NoiseAdaptation adaptation = {})
-        : model_(std::move(model)),
-          gate_(gate),
-          adaptation_(adaptation),
-          weights_(SigmaWeights::even(NX)) {
+           Gate<NY> gate = Gate<NY>(), NoiseAdaptation adaptation = {},
+           const SigmaWeights& weights = SigmaWeights::even(NX))
+        : model_(std::move(model)), gate_(gate), adaptation_(adaptation), weights_(weights) {
         state_.mean = mean;
         state_.covariance = covariance;
         if (!mean.allFinite()) throw NumericalFailure("the initial mean is not finite", 0);

@@ -21,6 +21,11 @@ struct SigmaWeights {
         const double w = 1.0 / (n + 1.0);
         return {std::sqrt(n + 1.0), w, w, 0.5 * w};
     }
+    /// Points at sqrt(3) standard deviations, where along every axis they have the fourth moment of
+    /// a Gaussian however many states there are; those of `even` move outwards with N. The centre,
+    /// whose weight in the mean is negative for N > 3, has none in covariances: these stay positive
+    /// definite, and err on the large side where the model is curved.
+    static SigmaWeights near(int n) { return {std::sqrt(3.0), 1.0 - n / 3.0, 0.0, 1.0 / 6.0}; }
     /// Scaled transform of van der Merwe (2004), kappa = 0; small alpha makes huge weights.
     static SigmaWeights scaled(int n, double alpha, double beta) {
         const double scale = alpha * alpha * n;

@@ -82,14 +82,14 @@ struct ObserverSettings {
     // lateral axle forces as observer A lets them change, as a share of the load
     double force_wander = 1.0;
     // error of the tyre model, as a share of load, lateral force, and grip lost to braking
-    double error_load = 0.007, error_lateral = 0.05, error_braking = 0.3, error_time_s = 0.5;
+    double error_load = 0.0025, error_lateral = 0.06, error_braking = 0.3, error_time_s = 0.5;
     // yaw moment by drive and brakes: share of their force, at half the wheelbase
     double error_drive = 0.2;
     // what neither tyres nor road explain of yaw rate and sideslip
-    double yaw_wander_radps = 0.02, sideslip_wander_rad = 0.001;
+    double yaw_wander_radps = 0.02, sideslip_wander_rad = 0.0013;
     // logarithm of the tyre's numbers: stiffness is doubtful at first and wanders in hard driving,
     // friction changes with the road and comes back
-    double stiffness_prior = 0.4, stiffness_wander = 0.01;
+    double stiffness_prior = 1.0, stiffness_wander = 0.003;
     double friction_prior = 0.2, friction_time_s = 20.0;
     double relaxation_m = 0.6;  // relaxation length of both axles
     // gate, frozen sensors, low speed
