@@ -31,7 +31,7 @@ CARS = HERE.parent / "real_driving"
 PUBLISHED_MASS_KG, PUBLISHED_INERTIA_KGM2, PUBLISHED_STIFFNESS_NPR = 1549.8, 2315.3, 1e5
 EXCITED_MPS2 = 1.0  # lateral acceleration of driving that tells something of the tyres
 WITHIN_S = 20.0
-REAL_PARTS_S = ((150.0, 300.0), (350.0, 700.0))  # calibration with v_y; v_y hidden
+REAL_PARTS_S = ((150.0, 425.0), (425.0, 700.0))  # calibration with v_y; v_y hidden
 
 
 class Table:
@@ -232,7 +232,7 @@ def estimate_start(vehicle: sv.Vehicle) -> tuple[float, float]:
 
 
 def real_rows(table: Table, data: Path, runs: int) -> None:
-    """First laps with v_y, as an engineer would calibrate; later laps without."""
+    """The first half of the laps with v_y, as an engineer would calibrate; the others without."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # spikes in the steering angle, said to be there
         log = sv.read_log(
@@ -353,7 +353,7 @@ def main() -> int:
     table = Table()
     handling_rows(table, args.data, 1 if args.quick else 10)
     low_speed_rows(table, args.data)
-    real_rows(table, args.data, 40 if args.quick else 120)
+    real_rows(table, args.data, 40 if args.quick else 400)
     speed_rows(table, args.data)
     return 1 if table.failed else 0
 

@@ -10,7 +10,8 @@ namespace sysid {
 
 namespace {
 
-/// One number for each noise parameter, side by side: what follows is done for all of them at once.
+/// One number for each noise parameter, the sensors first: what follows is done for all of them at
+/// once.
 using Lanes = Eigen::Array<double, kNoiseParameters, 1>;
 using Table = Mat<kNoiseParameters, kNoiseParameters>;
 constexpr int kTimeLane = kNoiseParameters - 1;
@@ -88,7 +89,7 @@ class Answer {
         const Vec<kChannels> weighed = s.update.information * s.update.innovation;
         for (int i = 0; i < kChannels; ++i) seen_[i] = std::isnan(measured[i]) ? 0.0 : sensor_[i];
 
-        std::array<Lanes, NX * kChannels> cross;  // dP H^T
+        std::array<Lanes, std::size_t{NX} * kChannels> cross;  // dP H^T
         const auto crossed = [&](int i, int c) -> Lanes& {
             return cross[place(i * kChannels + c)];
         };

@@ -154,8 +154,8 @@ SideslipDual::SideslipDual(const ObservedCar& car, const ObserverSettings& setti
       settings_(settings),
       watch_(settings),
       forces_(ForceModel{car, settings}, Vec<5>::Zero(), Mat<5, 5>::Identity()),
-      tyres_(TyreModel{car, settings}, Vec<13>::Zero(), Mat<13, 13>::Identity(), {}, {},
-             SigmaWeights::near(TyreModel::kStates)) {}
+      tyres_(TyreModel{car, settings}, Vec<13>::Zero(), Mat<13, 13>::Identity(), Gate<2>(),
+             NoiseAdaptation(), SigmaWeights::near(TyreModel::kStates)) {}
 
 const SideslipEstimate& SideslipDual::step(double dt, const SensorSample& sample) {
     const SensorSample s = watch_.look(dt, sample, index_);

@@ -146,7 +146,8 @@ TEST(SigmaWeights, AnyOfThemGivesTheKalmanFilterOnALinearModel) {
     const Vec<2> mean(0.0, 0.0);
     const Mat<2, 2> covariance = Mat<2, 2>::Identity();
     Filter<Wagon> even(Wagon{}, mean, covariance);
-    Filter<Wagon> near(Wagon{}, mean, covariance, {}, {}, SigmaWeights::near(2));
+    Filter<Wagon> near(Wagon{}, mean, covariance, Gate<2>(), NoiseAdaptation(),
+                       SigmaWeights::near(2));
     for (const Vec<2>& y : record.y) {
         const auto& a = even.step({}, y);
         const auto& b = near.step({}, y);

@@ -42,7 +42,7 @@ class Filter {
     using Step = FilterStep<NX, NY>;
 
     Filter(Model model, const Vec<NX>& mean, const Mat<NX, NX>& covariance,
-           Gate<NY> gate = Gate<NY>(), NoiseAdaptation adaptation = {},
+           Gate<NY> gate = Gate<NY>(), NoiseAdaptation adaptation = NoiseAdaptation(),
            const SigmaWeights& weights = SigmaWeights::even(NX))
         : model_(std::move(model)), gate_(gate), adaptation_(adaptation), weights_(weights) {
         state_.mean = mean;
