@@ -53,7 +53,8 @@ double settled(Observer& observer) {
 
 TEST(SideslipObservers, AgreeOnASteadyCorner) {
     ObserverSettings settings;
-    settings.frozen_after_s = 1e9;  // nothing moves here
+    settings.frozen_after_s = 1e9;   // nothing moves here
+    settings.stiffness_prior = 0.4;  // the others do not doubt the tyres, which are right
     const double truth = Corner().beta;
     SideslipDual dual(car(), settings);
     SideslipUkf<Method::kUnscented> ukf(car(), settings, false);
@@ -64,6 +65,18 @@ TEST(SideslipObservers, AgreeOnASteadyCorner) {
     EXPECT_NEAR(by_ukf, truth, 0.002);
     EXPECT_NEAR(settled(ekf), by_ukf, 1e-3);
     EXPECT_NEAR(settled(root), by_ukf, 1e-9);
+}
+
+TEST(SideslipObservers, TheDualDoubtsASideslipThatOnlyTheTyresTellOf) {
+    // In a corner that never changes stiffness and sideslip cannot be told apart.
+    ObserverSettings settings;
+    settings.frozen_after_s = 1e9;
+    SideslipDual dual(car(), settings);
+    const Corner corner;
+    SideslipEstimate out;
+    for (int k = 0; k < 1000; ++k) out = dual.step(0.01, corner.sample());
+    EXPECT_LT(std::abs(out.beta_rad - corner.beta), 2.0 * out.beta_std_rad);
+    EXPECT_GT(out.beta_std_rad, 0.3 * std::abs(corner.beta));
 }
 
 TEST(SideslipObservers, AFrozenSensorIsLeftOut) {
