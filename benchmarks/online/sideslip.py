@@ -13,6 +13,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from table import Table
 
 import sysid_vehicle as sv
 from sysid_vehicle.online import (
@@ -32,17 +33,6 @@ PUBLISHED_MASS_KG, PUBLISHED_INERTIA_KGM2, PUBLISHED_STIFFNESS_NPR = 1549.8, 231
 EXCITED_MPS2 = 1.0  # lateral acceleration of driving that tells something of the tyres
 WITHIN_S = 20.0
 REAL_PARTS_S = ((150.0, 425.0), (425.0, 700.0))  # calibration with v_y; v_y hidden
-
-
-class Table:
-    def __init__(self) -> None:
-        self.failed = 0
-
-    def row(self, what: str, shown: str, target: str = "", good: bool | None = None) -> None:
-        """Print one line; `good` is None for a row without a target."""
-        verdict = "" if good is None else "ok" if good else "FAILS"
-        self.failed += good is False
-        print(f"{what:50s} {shown:52s} {target:26s} {verdict}", flush=True)
 
 
 def car(name: str) -> sv.Vehicle:
@@ -345,16 +335,21 @@ def filterpy_time(
     return (time.process_time() - begun) / samples
 
 
+def rows(table: Table, data: Path, *, quick: bool) -> None:
+    """Print everything that this file measures."""
+    handling_rows(table, data, 1 if quick else 10)
+    low_speed_rows(table, data)
+    real_rows(table, data, 40 if quick else 400)
+    speed_rows(table, data)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path, metavar="DATA", help="folder with the logs")
     parser.add_argument("--quick", action="store_true", help="one seed of noise, shorter search")
     args = parser.parse_args()
     table = Table()
-    handling_rows(table, args.data, 1 if args.quick else 10)
-    low_speed_rows(table, args.data)
-    real_rows(table, args.data, 40 if args.quick else 400)
-    speed_rows(table, args.data)
+    rows(table, args.data, quick=args.quick)
     return 1 if table.failed else 0
 
 

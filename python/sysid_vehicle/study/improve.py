@@ -146,8 +146,8 @@ def _verdict(
         told = told.doubting(
             added, f"takes up only {max(100 * share, 0.0):.0f} % of what is missing"
         )
-    elif left.p_value < _LEFT and len(named := _named(told, added)) == 1:
-        told = told.doubting(named, "were it what is missing, nothing would be left")
+    elif left.p_value < _LEFT and (alone := _alone(told, added)):
+        told = told.doubting(alone, "were it what is missing, nothing would be left")
     elif not complete:
         proxies = {e for e in added if told[e].finding == "proxy"}
         small = _small(_taken_up(fits, on_train), on_train[-1].error ** 2 - 1.0, proxies)
@@ -165,6 +165,16 @@ def _verdict(
 def _named(told: Verdicts, added: set[str]) -> set[str]:
     """What was added and is said to be missing, not only to act like it or to be negligible."""
     return {e for e in added if told[e].finding in ("missing", "one of a group")}
+
+
+def _alone(told: Verdicts, added: set[str]) -> set[str]:
+    """The effect that is named, where there is one only and nothing else acted.
+
+    A proxy beside it tells that something else is missing too, which may be all that is left.
+    """
+    named = _named(told, added)
+    proxies = {e for e in added if told[e].finding == "proxy"}
+    return named if len(named) == 1 and not proxies else set()
 
 
 def _taken_up(fits: list[Fit], on_train: list[Comparison]) -> dict[str, float]:
