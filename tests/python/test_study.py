@@ -20,13 +20,14 @@ from sysid_vehicle import (
     improve,
     manoeuvres,
 )
+from sysid_vehicle.diagnose.verdicts import EffectVerdict, Finding, Verdicts
 from sysid_vehicle.study.held_out import (
     error_falls,
     gain_in_log_likelihood,
     hold_out,
     share_explained,
 )
-from sysid_vehicle.study.improve import _alike, _small
+from sysid_vehicle.study.improve import _alike, _alone, _small
 
 LAG = "steer_lag.time_constant_s", 0.06
 LOOKS_LIKE_LAG = {
@@ -231,6 +232,17 @@ def test_one_effect_that_leaves_something_is_none(
     both = improve(start, *drives(car, 51), starts=1, candidates=["mass", "accelerometer_scale"])
     assert [a.id for a in both.added] == ["accelerometer_scale"]
     assert both.verdict == "explained"
+
+
+def test_an_effect_is_alone_where_nothing_else_acted() -> None:
+    def alone(**findings: Finding) -> set[str]:
+        each = (EffectVerdict(effect(name), found) for name, found in findings.items())
+        return _alone(Verdicts(tuple(each)), set(findings))
+
+    assert alone(mass="missing", yaw_inertia="negligible") == {"mass"}
+    assert alone(mass="one of a group") == {"mass"}
+    assert alone(mass="missing", yaw_inertia="proxy") == set()
+    assert alone(mass="missing", aero_drag="missing") == set()
 
 
 def test_what_took_up_less_than_is_left_is_doubted() -> None:
