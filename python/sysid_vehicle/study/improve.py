@@ -149,11 +149,11 @@ def _verdict(
     elif left.p_value < _LEFT and (alone := _alone(told, added)):
         told = told.doubting(alone, "were it what is missing, nothing would be left")
     elif not complete:
-        proxies = {e for e in added if told[e].finding == "proxy"}
+        proxies = _proxies(told, added)
         small = _small(_taken_up(fits, on_train), on_train[-1].error ** 2 - 1.0, proxies)
         told = told.doubting(small, "what is left unexplained is larger")
     # What only stands in for something else explains nothing, however well it fits.
-    proxies = {e for e in added if told[e].finding == "proxy"}
+    proxies = _proxies(told, added)
     told = told.doubting(
         proxies, f"it acts like {', '.join(sorted(proxies))}, which is none either"
     )
@@ -167,14 +167,17 @@ def _named(told: Verdicts, added: set[str]) -> set[str]:
     return {e for e in added if told[e].finding in ("missing", "one of a group")}
 
 
+def _proxies(told: Verdicts, added: set[str]) -> set[str]:
+    return {e for e in added if told[e].finding == "proxy"}
+
+
 def _alone(told: Verdicts, added: set[str]) -> set[str]:
     """The effect that is named, where there is one only and nothing else acted.
 
     A proxy beside it tells that something else is missing too, which may be all that is left.
     """
     named = _named(told, added)
-    proxies = {e for e in added if told[e].finding == "proxy"}
-    return named if len(named) == 1 and not proxies else set()
+    return named if len(named) == 1 and not _proxies(told, added) else set()
 
 
 def _taken_up(fits: list[Fit], on_train: list[Comparison]) -> dict[str, float]:
