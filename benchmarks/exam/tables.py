@@ -179,8 +179,11 @@ def _pairs(outcomes: Sequence[Outcome]) -> list[Row]:
     both = Rate.over(set(o["added"]) == set(o["trial"]["truth"]) for o in found)
     with_groups = Rate.over(_both_in_groups(o) for o in found)
     one = Rate.over(bool(set(o["added"]) & set(o["trial"]["truth"])) for o in found)
+    # A weave in the linear range tells nothing of a load transfer, whoever looks at it.
+    shown = Rate.over(set(o["added"]) == set(o["trial"]["truth"]) for o in found if o.get("shown"))
     return [
         ("both found, nothing else", str(both), ">= 85 %"),
+        ("  of those that the driving tells apart from one", str(shown), ""),
         ("both found or in the groups, nothing else", str(with_groups), ""),
         ("one of them found at least", str(one), ""),
     ]

@@ -8,16 +8,20 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import truths
 from design import Trial
 from rivals import separate
 
 import sysid_vehicle as sv
+from sysid_vehicle import _core
 from sysid_vehicle.diagnose import constancy
+from sysid_vehicle.identify import refine
 
 Outcome = dict[str, Any]
 
 STARTS = 3
+_SHOWN = 4.5  # nats, beyond the Bayesian price of the parameters
 
 
 def examine(trial: Trial, among: Sequence[str] | None = None) -> Outcome:
@@ -99,8 +103,27 @@ def _against(study: sv.Study, trial: Trial) -> Outcome:
     # Where the road pushes at random the true car itself errs by more than the noise floor.
     truth = replace(study.fit, model=truths.hidden(trial))
     told["true_error"] = sv.compare(truth, study.held_out, noise=study.fit.noise).error
+    if trial.kind == "pair":
+        told["shown"] = _shown(study, trial)
     for name, true in truths.true_values(trial).items():
         if name.split(".")[0] in study.model.effects:
             estimate = study.fit[name]
             told["intervals"][name] = [estimate.value, estimate.std, true]
     return told
+
+
+def _shown(study: sv.Study, trial: Trial) -> bool:
+    """Whether the driving tells of every hidden effect beside the others: three standard errors."""
+    baseline = study.fits[0]
+    model = baseline.model.add(*trial.truth).with_values(truths.true_values(trial))
+    try:
+        true = refine(model, baseline.driving, study.fit.noise)
+        poorer = [refine(true.model.drop(e), baseline.driving, true.noise) for e in trial.truth]
+    except (_core.NumericalFailure, np.linalg.LinAlgError):
+        return False
+    price = 0.5 * np.log(baseline.driving.samples)
+    return all(
+        true.log_likelihood - p.log_likelihood
+        > _SHOWN + price * (len(true.estimates) - len(p.estimates))
+        for p in poorer
+    )

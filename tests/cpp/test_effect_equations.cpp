@@ -212,7 +212,8 @@ TEST(EffectEquation, SensorErrorsAreTakenOffTheMeasuredAcceleration) {
     EXPECT_NEAR(lever.on.w.a_x, 2.0 + 0.5 * 0.35 * 0.35 + 0.3 * yaw, 1e-5);
     EXPECT_NEAR(lever.on.y[kAx], 2.0, 1e-5);
     const Pair lean("body_attitude", {0.04, 0.0}, kCornering, measured, false);
-    EXPECT_NEAR(lean.on.w.a_x + kGravity * std::sin(0.04 * lean.on.w.a_x / kGravity), 2.0, 1e-13);
+    const double angle = 0.04 * lean.on.w.a_x / kGravity;
+    EXPECT_NEAR(lean.on.w.a_x * std::cos(angle) + kGravity * std::sin(angle), 2.0, 1e-13);
 }
 
 }  // namespace

@@ -107,7 +107,10 @@ TEST(EffectEquation, SpeedSensor) {
 
 TEST(EffectEquation, BodyAttitudeAndGyroScale) {
     const Pair lean("body_attitude", {0.04, 0.06}, kCornering, kBraking);
-    const auto felt = [](double a, double k) { return a + kGravity * std::sin(k * a / kGravity); };
+    const auto felt = [](double a, double k) {
+        const double angle = k * a / kGravity;
+        return a * std::cos(angle) + kGravity * std::sin(angle);
+    };
     EXPECT_NEAR(lean.on.y[kAx], felt(lean.off.y[kAx], 0.04), 1e-12);
     EXPECT_NEAR(lean.on.y[kAy], felt(lean.off.y[kAy], 0.06), 1e-12);
     const Pair gyro("gyro_scale", {0.015}, kCornering, kDriving);

@@ -1,6 +1,7 @@
 """The missing effect is ranked first, and nothing is claimed where nothing is missing."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from sysid_vehicle import (
     identify,
     manoeuvres,
 )
+from sysid_vehicle.diagnose.diagnose import _rivals, _too_fast
 
 Hidden = Callable[[str, float], Fit]
 OFFSET = "steer_offset.offset_rad", 0.002
@@ -121,3 +123,25 @@ def test_it_prints_and_draws(found: Diagnosis) -> None:
     assert widths[-1] == max(widths) == pytest.approx(found.ranking[0].statistic)
     assert np.isfinite(widths).all()
     assert found.plot() is not ax
+
+
+def test_a_rival_that_scores_nearly_as_well_is_refitted(truth: Model, start: Model) -> None:
+    """A refit gains far more than its score, so that a score beside it would look hopeless."""
+    car = truth.add("tyre_relaxation").with_values({"tyre_relaxation.relaxation_length_m": 0.9})
+    logs = [
+        drive(car, m, seed=i, rate_hz=50.0)
+        for i, m in enumerate((manoeuvres.sine_sweep(25.0, 25.0, 3.5), manoeuvres.lap(30.0, 8.0)))
+    ]
+    fit = identify(start, logs, starts=1)
+    by_score = diagnose(fit, refits=0).ranking
+    best, found = by_score[0], diagnose(fit)
+    refitted = {c.id for c in found.ranking if c.fit is not None}
+    rivals = {c.id for c in by_score if _rivals(c, best) and not _too_fast(c)}
+    assert "tyre_relaxation" in {best.id} | rivals <= {best.id} | refitted
+    assert found.ranking[0].id == "tyre_relaxation"
+    assert found.ranking[0].value[0] == pytest.approx(0.9, abs=0.02)
+    twin = next(c for c in by_score if c.id in best.effect.twins)
+    stranger = next(c for c in by_score if c.id == "road_grade")
+    assert _rivals(replace(twin, statistic=0.5 * best.statistic), best)
+    assert not _rivals(replace(twin, statistic=0.2 * best.statistic), best)
+    assert not _rivals(replace(stranger, statistic=0.9 * best.statistic), best)

@@ -5,13 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Diagnosis, Fit, Model, diagnose, drive, identify, manoeuvres
+from sysid_vehicle import Diagnosis, Fit, Model, compare, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
-from sysid_vehicle.identify import Estimate
-from sysid_vehicle.study.held_out import gain_in_log_likelihood, share_explained
-from sysid_vehicle.study.search import Search
+from sysid_vehicle.identify import Estimate, refine
+from sysid_vehicle.study.held_out import (
+    error_falls,
+    fall_in_error,
+    gain_in_log_likelihood,
+    share_explained,
+)
+from sysid_vehicle.study.search import Search, Trail, _more
 from sysid_vehicle.study.steps import (
     _distance,
     _share,
@@ -20,6 +25,7 @@ from sysid_vehicle.study.steps import (
     exchanged,
     first_that_holds,
     lead,
+    likeliest,
     way,
     without_idle,
 )
@@ -179,11 +185,21 @@ def test_what_is_not_there_is_dropped_and_what_is_needed_stays(dx: Diagnosis) ->
     assert without_idle(idle).model.effects == ("aero_drag",)
 
 
-def test_at_its_null_value_a_bound_is_nothing() -> None:
+def test_what_is_at_a_bound_stays_only_where_it_is_needed(
+    dx: Diagnosis, driving: tuple[Driving, Driving]
+) -> None:
     drag, speed = effect("aero_drag").parameters[0], effect("rolling_resistance").parameters[1]
     inf = float("inf")
-    assert _distance(Estimate("a", 0.0, inf, "s/m", "at bound"), speed) == 0.0
-    assert _distance(Estimate("a", speed.upper, inf, "s/m", "at bound"), speed) == inf
+    for value in (0.0, speed.upper):
+        assert _distance(Estimate("a", value, inf, "s/m", "at bound"), speed) == 0.0
+    # Steering that is late by less than the filter resolves is felt by nothing, nor is it nothing.
+    fit = by_id(dx, "aero_drag")
+    late = fit.model.add("steer_delay").with_values({"steer_delay.delay_s": 0.001})
+    assert without_idle(refine(late, fit.driving, fit.noise)).model.effects == ("aero_drag",)
+    # A resistance at the end of its range is far from idle, though no error of it is known.
+    bounded = identify(fit.model.drop("aero_drag").add("rolling_resistance"), fit.driving, starts=1)
+    assert not np.isfinite(bounded["rolling_resistance.per_speed_spm"].std)
+    assert without_idle(bounded).model.effects == ("rolling_resistance",)
     assert _distance(Estimate("a", 0.3, 0.1, "m2", ""), drag) == pytest.approx(3.0)
 
 
@@ -210,3 +226,59 @@ def test_a_search_that_ends_at_its_bound_wanted_more_than_any_car_has() -> None:
     assert not possible(rolling, (0.012, most[1]), (0.001, inf))
     assert possible(rolling, (0.012, 0.5 * most[1]), (0.001, inf))  # not told, but not at a bound
     assert not possible(rolling, (-0.02, 0.0), (0.001, 0.001))
+
+
+@pytest.mark.parametrize("downforce", [1.3, 0.0])
+def test_two_that_may_hold_only_together_are_sought_together(
+    truth: Model, start: Model, downforce: float
+) -> None:
+    both = ["steer_lag", "aero_downforce"]
+    values = {
+        "steer_lag.time_constant_s": 0.06,
+        "aero_downforce.cl_a_front_m2": 0.7 * downforce,
+        "aero_downforce.cl_a_rear_m2": downforce,
+    }
+    car = truth.add(*both).with_values(values)
+    train = drive(car, manoeuvres.step_steer((17.0, 27.0), (3.0, 6.0)), seed=71)
+    test = Driving.of(drive(car, manoeuvres.handling_course(30.0, lateral_mps2=5.5), seed=72))
+    baseline = identify(start, train, starts=1)
+    alone = diagnose(baseline, candidates=both)
+    first = likeliest(alone)
+    assert first is not None
+    assert first.id == "steer_lag"
+    trail = Trail([baseline])
+    looking = replace(search(test, 2, []), candidates=both)
+    found = looking._beside_another(alone, trail)
+    if downforce == 0.0:
+        assert found is None
+        return
+    assert found is not None
+    assert found[0] is first
+    assert found[1].model.effects == tuple(both)
+    assert error_falls(baseline, found[1], test)
+    assert "aero_downforce" in trail.p_values
+    assert replace(looking, most_effects=1)._beside_another(alone, trail) is None
+    told: list[str] = []
+    silent = replace(alone, ranking=tuple(replace(c, p_value=1.0) for c in alone.ranking))
+    assert likeliest(silent) is None
+    assert replace(looking, say=told.append)._beside_another(silent, trail) is None
+
+
+def test_what_came_with_a_step_is_told(dx: Diagnosis) -> None:
+    fit = by_id(dx, "aero_drag")
+    assert _more(fit, set(), set()) == ""
+    assert _more(fit, set(), {"steer_lag"}) == " It holds together with steer_lag."
+    assert _more(fit, {"head_wind"}, set()) == " Without head_wind the model is aero_drag."
+
+
+def test_the_fall_in_error_is_by_the_richer_models_floor(
+    dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving]
+) -> None:
+    richer = by_id(dx, "aero_drag")
+    fall, error = fall_in_error(baseline, richer, driving[1])
+    assert fall > 2.0 * error > 0.0
+    before, after = (compare(f, driving[1], noise=richer.noise).error for f in (baseline, richer))
+    measured = int(np.isfinite(driving[1].measured).sum())
+    assert fall == pytest.approx(measured * (before**2 - after**2), rel=1e-6)
+    broken = replace(baseline, model=baseline.model.with_values({"B_front": float("nan")}))
+    assert fall_in_error(baseline, broken, driving[1]) == (-np.inf, 0.0)

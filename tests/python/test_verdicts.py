@@ -16,7 +16,7 @@ from sysid_vehicle import (
     verdicts,
 )
 from sysid_vehicle.diagnose import EffectVerdict, Verdicts
-from sysid_vehicle.diagnose.verdicts import _of_present
+from sysid_vehicle.diagnose.verdicts import _of_present, judge
 
 Hidden = Callable[[str, float], Fit]
 OFFSET = "steer_offset.offset_rad", 0.002
@@ -53,6 +53,28 @@ def test_what_only_acted_like_it_is_a_proxy_of_it(judged: Verdicts, found: Diagn
         assert judged[name].finding in ("proxy", "one of a group")
         assert judged[name].group == ("steer_offset",)
     assert "steer_offset" in judged[others[0]].sentence
+
+
+def test_a_rival_of_what_is_not_missing_itself_is_not_missing_either(
+    found: Diagnosis, judged: Verdicts
+) -> None:
+    (fit,) = (c.fit for c in found.ranking if c.id == "steer_offset")
+    assert fit is not None
+    both = identify(fit.model.add("aero_drag"), fit.driving, starts=1)
+    others = [c.id for c in found.significant if c.id != "steer_offset"]
+    rival = next(e for e in others if judged[e].finding == "proxy")
+
+    def of(groups: dict[str, tuple[str, ...]]) -> EffectVerdict:
+        lacked = {e.id for e in found.fit.model.candidates}
+        acted = {c.id for c in found.significant}
+        told = judge(both, lacked=lacked, groups=groups, acted=acted, alpha=0.05)
+        assert told["aero_drag"].finding not in ("missing", "one of a group")
+        return told[rival]
+
+    assert of({"steer_offset": (rival,)}).finding == "one of a group"
+    assert of({"steer_offset": (rival,)}).group == ("steer_offset",)
+    assert of({"aero_drag": (rival,)}).finding == "proxy"
+    assert of({}).finding == "proxy"
 
 
 def test_what_is_absent_is_bounded_below_what_matters(judged: Verdicts) -> None:

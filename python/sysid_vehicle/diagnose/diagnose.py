@@ -32,6 +32,7 @@ _REFITS = 5
 # make a refit slow, and what has some is scored at its typical size, not far from the refit.
 _HOPELESS = 0.15
 _HOPELESS_WITH_STATES = 0.6
+_RIVALS = 0.3  # of the score of the best, with which one that acts like it may overtake it
 _TELLS_APART = 9.0  # twice the log-likelihood, or a statistic: three standard errors
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
 
@@ -232,7 +233,11 @@ def diagnose(
         # What the best one gains tells which of the others cannot come near it.
         first = _refitted(fit, driving, few[0])
         best = max(first.statistic, few[0].statistic)
-        others = [c for c in few[1:] if c.statistic > _hopeless(c) * best and not _too_fast(c)]
+        others = [
+            c
+            for c in few[1:]
+            if not _too_fast(c) and (c.statistic > _hopeless(c) * best or _rivals(c, few[0]))
+        ]
         with ThreadPoolExecutor(workers) as pool:
             tried = [
                 first,
@@ -273,6 +278,16 @@ def _worth_refitting(significant: list[Candidate], refits: int) -> list[Candidat
 
 def _hopeless(c: Candidate) -> float:
     return _HOPELESS_WITH_STATES if c.effect.states > 1 else _HOPELESS
+
+
+def _rivals(c: Candidate, best: Candidate) -> bool:
+    """Whether it acts like the best one and scores nearly as well.
+
+    Score is held against score: at the fit a refit starts from, such effects lead it astray alike,
+    and what the first one gains when it is refitted the others may gain too.
+    """
+    alike = c.id in best.effect.twins or best.id in c.effect.twins
+    return alike and c.statistic > _RIVALS * best.statistic
 
 
 def _too_fast(c: Candidate) -> bool:

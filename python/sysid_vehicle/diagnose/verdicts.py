@@ -24,6 +24,7 @@ __all__ = ["EffectVerdict", "Finding", "Verdicts", "judge", "possible", "verdict
 
 Finding = Literal["missing", "one of a group", "proxy", "negligible", "not testable", "absent"]
 
+_NAMED: tuple[Finding, ...] = ("missing", "one of a group")
 _ORDER: tuple[Finding, ...] = (
     "missing",
     "one of a group",
@@ -122,7 +123,7 @@ class Verdicts:
         def falls(v: EffectVerdict) -> bool:
             if v.finding == "one of a group" and set(v.group) <= doubted:
                 return True
-            return v.effect.id in doubted and v.finding in ("missing", "one of a group")
+            return v.effect.id in doubted and v.finding in _NAMED
 
         told = [
             replace(v, finding="proxy", group=(), because=because) if falls(v) else v
@@ -224,7 +225,6 @@ def judge(
         scored = board.scores, board.family_p_values(seed=seed)
     family = scored[1]
     scores = {s.effect.id: s for s in scored[0]}
-    rivals = {r for g in groups.values() for r in g}
     names = tuple(e for e in final.model.effects if e in lacked)
     found = [_of_added(e, final, groups.get(e.id, ())) for e in final.model.parts if e.id in lacked]
     kept = constancy(final)
@@ -232,15 +232,18 @@ def judge(
         if v.effect.id in kept and not kept[v.effect.id].holds:
             because = f"not with one value ({kept[v.effect.id].span})"
             found[i] = replace(v, finding="proxy", group=(), because=because)
+    missing = [v.effect.id for v in found if v.finding in _NAMED]
     for effect in final.model.candidates:
         if effect.id not in lacked:
             continue
         score = scores.get(effect.id)
         verdict = _of_scored(effect, score, family.get(effect.id, 1.0) < alpha)
         if effect.id in acted and names and verdict.finding in ("absent", "not testable"):
-            kind: Finding = "one of a group" if effect.id in rivals else "proxy"
+            # A rival of what is itself a proxy, or negligible, is no better than that.
+            instead = tuple(e for e in missing if effect.id in groups.get(e, ()))
+            kind: Finding = "one of a group" if instead else "proxy"
             verdict = EffectVerdict(
-                effect, kind, verdict.value, verdict.std, verdict.bound, group=names
+                effect, kind, verdict.value, verdict.std, verdict.bound, group=instead or names
             )
         elif settled and verdict.finding == "missing":
             because = "with it, driving that no fit saw is predicted no better"

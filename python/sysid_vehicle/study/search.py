@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from ..diagnose import Candidate, Diagnosis, diagnose
+from ..diagnose import Candidate, Diagnosis, diagnose, omnibus
 from ..estimate import Driving
 from ..identify import Fit
-from .steps import alternatives, exchanged, first_that_holds
+from .steps import alternatives, exchanged, first_that_holds, likeliest
 
 __all__ = ["Search", "Trail"]
 
@@ -79,6 +79,8 @@ class Search:
             trail.diagnoses.append(dx)
             step = first_that_holds(dx, trail.fit, self.test) if self.most_effects else None
             if step is None:
+                step = self._beside_another(dx, trail)
+            if step is None:
                 return trail
             chosen, lean = step
             trail.note(dx, chosen)
@@ -89,9 +91,30 @@ class Search:
                 return trail
             if any(set(f.model.effects) == effects for f in trail.fits):
                 return trail
-            gone = set(trail.fit.model.effects) - effects
+            before = set(trail.fit.model.effects)
             trail.fits.append(found)
-            self.say(f"Added {chosen.id}: {chosen.size}." + _instead(found, gone))
+            more = _more(found, before - effects, effects - before - {chosen.id})
+            self.say(f"Added {chosen.id}: {chosen.size}.{more}")
+
+    def _beside_another(self, dx: Diagnosis, trail: Trail) -> tuple[Candidate, Fit] | None:
+        """The likeliest candidate, where it holds only together with one that is missing too.
+
+        What the other one does to the held-out driving may be larger than what the first explains.
+        As neither has been seen to hold, they count only where together they leave nothing.
+        """
+        first = likeliest(dx)
+        if first is None or first.fit is None:
+            return None
+        if len(first.fit.model.effects) >= self.most_effects:
+            return None
+        beside = self._diagnosis(first.fit)
+        step = first_that_holds(beside, trail.fit, self.test)
+        if step is None or first.id not in step[1].model.effects:
+            return None
+        if omnibus(step[1], step[1].driving).rejects:
+            return None
+        trail.note(beside, step[0])
+        return first, step[1]
 
     def _diagnosis(self, fit: Fit) -> Diagnosis:
         return diagnose(
@@ -103,8 +126,8 @@ class Search:
         )
 
 
-def _instead(fit: Fit, gone: set[str]) -> str:
-    """What the step took out of the model, and what came in its place, in words."""
-    if not gone:
-        return ""
-    return f" Without {', '.join(sorted(gone))} the model is {', '.join(fit.model.effects)}."
+def _more(fit: Fit, gone: set[str], beside: set[str]) -> str:
+    """What else a step took out of the model or put into it, in words."""
+    if gone:
+        return f" Without {', '.join(sorted(gone))} the model is {', '.join(fit.model.effects)}."
+    return f" It holds together with {', '.join(sorted(beside))}." if beside else ""

@@ -12,7 +12,7 @@ from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter, effect
 from ..estimate import Driving
 from ..identify import Estimate, Fit, refine
-from .held_out import error_falls, gain_in_log_likelihood, share_explained
+from .held_out import error_falls, fall_in_error, gain_in_log_likelihood, share_explained
 
 __all__ = [
     "alternatives",
@@ -20,6 +20,7 @@ __all__ = [
     "exchanged",
     "first_that_holds",
     "lead",
+    "likeliest",
     "way",
     "without_idle",
 ]
@@ -28,8 +29,8 @@ _IDLE = 2.6  # an effect within so many standard errors of nothing is none
 _NEAR = 0.6  # of the evidence for the chosen effect
 _ALTERNATIVES = 2
 _KEPT = 0.5  # of the share of the error that an effect explains, on driving it was not fitted to
+_DOUBT = 2.0  # standard errors
 _SAME = 0.05  # twice the nats between two fits that say the same
-_AT_NULL = 1e-5  # of the width between the bounds
 _BETTER = 4.5  # nats, beyond the Bayesian price of the parameters: three standard errors
 
 
@@ -46,7 +47,7 @@ def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate,
     for c in likely:
         if first and (c.id not in first.indistinguishable_from or _can_be(c) != _can_be(first)):
             continue
-        if c.fit is None or c.statistic < 2.0 * np.log(c.fit.driving.samples):
+        if c.fit is None or not _sound(c):
             continue
         lean = without_idle(c.fit)
         if c.id not in lean.model.effects:
@@ -61,14 +62,29 @@ def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate,
     return chosen, lean
 
 
+def likeliest(dx: Diagnosis) -> Candidate | None:
+    """The candidate that fits best, of those with evidence for them and a value a car can have."""
+    return next((c for c in dx.significant if _sound(c) and _can_be(c)), None)
+
+
+def _sound(c: Candidate) -> bool:
+    """Whether it was refitted, and gained more than its price could be by chance."""
+    return c.fit is not None and c.statistic >= 2.0 * np.log(c.fit.driving.samples)
+
+
 def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:
     """What a candidate gains on held-out driving, and whether it holds there."""
     assert c.fit is not None
     gain, error = gain_in_log_likelihood(fit, c.fit, test, same_noise=True)
-    if gain <= error or not error_falls(fit, c.fit, test):
+    fall, fall_error = fall_in_error(fit, c.fit, test)
+    if fall <= 0.0:
         return gain, False
-    own, error = gain_in_log_likelihood(fit, c.fit, test)
-    if own > error or not np.isfinite(c.std).all():
+    own, own_error = gain_in_log_likelihood(fit, c.fit, test)
+    if gain <= error:
+        # What a model lacks makes its noise large, and large noise hides what another does better.
+        # By noise of their own the other has to be better beyond doubt.
+        return gain, own > _DOUBT * own_error and fall > fall_error
+    if own > own_error or not np.isfinite(c.std).all():
         return gain, True  # what the fit never felt of an effect may well be missing elsewhere
     # It is surer than it may be there, as is the right one beside another that acts there only. But
     # what is not in the car explains far less of other driving than of that it was fitted to.
@@ -246,8 +262,6 @@ def _strength(fit: Fit, name: str) -> float:
 
 
 def _distance(found: Estimate, parameter: Parameter) -> float:
+    # Of what is at a bound, or was never felt, only the model without it can tell.
     off = abs(found.value - parameter.null_value)
-    if np.isfinite(found.std):
-        return off / found.std
-    # At a bound: nothing itself, or as far from it as a car can be.
-    return 0.0 if off < _AT_NULL * (parameter.upper - parameter.lower) else np.inf
+    return off / found.std if np.isfinite(found.std) else 0.0

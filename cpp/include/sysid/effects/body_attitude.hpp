@@ -6,12 +6,13 @@
 namespace sysid {
 
 /// The body leans out of corners and squats, and the accelerometer leans with it: it feels a part
-/// of gravity. Both signs follow from a body that gives way.
+/// of gravity, and of the acceleration only what lies along its own axis. Both signs follow from a
+/// body that gives way.
 struct BodyAttitude : Effect {
     static constexpr EffectInfo info{
         "body_attitude",
         "accelerometer tilted by roll and pitch of the body",
-        "a_x += g sin(K_pitch a_x/g), a_y += g sin(K_roll a_y/g)",
+        "a_x' = a_x cos(theta) + g sin(theta), theta = K_pitch a_x/g; a_y the same with K_roll",
         "Ryu & Gerdes, ACC 2004; Gillespie, Fundamentals of Vehicle Dynamics, ch. 6",
         "a ramp to the limit, hard braking",
         "ay_mps2, ax_mps2",
@@ -31,7 +32,9 @@ struct BodyAttitude : Effect {
         S own = felt / (1.0 + p[0]);
         for (int i = 0; i < 3; ++i) {
             using std::cos;
-            const S slope = 1.0 + p[0] * cos(p[0] * own / kGravity);
+            using std::sin;
+            const S angle = p[0] * own / kGravity;
+            const S slope = (1.0 + p[0]) * cos(angle) - angle * sin(angle);
             own = own - (tilted(p[0], own) - felt) / slope;
         }
         w.ax_input = own;
@@ -44,8 +47,10 @@ struct BodyAttitude : Effect {
 
     template <class T, class S>
     static S tilted(const T& gradient, const S& a) {
+        using std::cos;
         using std::sin;
-        return a + kGravity * sin(gradient * a / kGravity);
+        const S angle = gradient * a / kGravity;
+        return a * cos(angle) + kGravity * sin(angle);
     }
 };
 
