@@ -75,8 +75,11 @@ def _null(outcomes: Sequence[Outcome]) -> list[Row]:
     for name in MANOEUVRES:
         these = [o for o in found if o["trial"]["driving"] == name]
         rows.append((f"any effect claimed, {name}", str(Rate.over(map(_claims, these))), "5 %"))
+        rows.append(
+            ("  evidence before held-out driving", str(Rate.over(map(detected, these))), "5 %")
+        )
     rows.append(("any effect claimed, all sets", str(Rate.over(map(_claims, found))), "5 %"))
-    rows.append(("evidence before held-out driving", str(Rate.over(map(detected, found))), "5 %"))
+    rows.append(("  evidence before held-out driving", str(Rate.over(map(detected, found))), "5 %"))
     rows.append(
         ("verdict not adequate", str(Rate.over(o["verdict"] != "adequate" for o in found)), "6 %")
     )

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ from sysid_vehicle.study.held_out import (
     hold_out,
     share_explained,
 )
-from sysid_vehicle.study.improve import _alike, _alone, _small
+from sysid_vehicle.study.improve import _alone, _small, _taken_up
 
 LAG = "steer_lag.time_constant_s", 0.06
 LOOKS_LIKE_LAG = {
@@ -255,10 +256,13 @@ def test_what_took_up_less_than_is_left_is_doubted() -> None:
     assert _small({}, 1.0, set()) == set()
 
 
-def test_effects_that_act_alike_count_together() -> None:
-    assert _alike("aero_drag", "rolling_resistance")
-    assert _alike("rolling_resistance", "aero_drag")
-    assert not _alike("aero_drag", "steer_offset")
+def test_of_effects_that_act_alike_the_later_counts_for_what_it_adds(study: Study) -> None:
+    baseline = study.fits[0]
+    drag = replace(baseline, model=baseline.model.add("aero_drag"))
+    wind = replace(drag, model=drag.model.add("head_wind"))
+    errors = [replace(study.train[0], error=e) for e in (3.0, 2.0, 1.9)]
+    taken = _taken_up([baseline, drag, wind], errors)
+    assert taken == pytest.approx({"aero_drag": 5.0, "head_wind": 0.39})
 
 
 def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: Drives) -> None:
@@ -274,7 +278,7 @@ def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: D
 
 
 def test_it_stops_at_the_most_effects_allowed(start: Model, lagging: tuple[Log, Log]) -> None:
-    short = [log.between(0.0, 15.0) for log in lagging]
+    short = [log.between(0.0, 21.0) for log in lagging]
     none = improve(start, *short, starts=1, most_effects=0)
     assert none.added == ()
     assert none.verdict == "unknown"
@@ -294,7 +298,9 @@ def test_absent_channels_are_among_the_warnings(
     start: Model, lap: Log, course: Log, altered: Callable[..., Log]
 ) -> None:
     train = altered(lap.between(0.0, 12.0), without=["vy_mps"])
-    found = improve(start, train, course, starts=1, most_effects=0)
+    with pytest.warns(SysidWarning, match=r"12\.0 s usable .* too short to tell many effects"):
+        found = improve(start, train, course, starts=1, most_effects=0)
+    assert any("record 20 s or more" in w for w in found.warnings)
     assert [w for w in found.warnings if w.startswith("lap") and train.missing()["vy_mps"] in w]
 
 

@@ -19,6 +19,7 @@ from sysid_vehicle.study.held_out import (
 from sysid_vehicle.study.search import Search, Trail, _more
 from sysid_vehicle.study.steps import (
     _distance,
+    _mattering,
     _share,
     alternatives,
     better,
@@ -79,6 +80,27 @@ def test_what_fits_to_the_last_digit_alike_is_no_alternative(dx: Diagnosis) -> N
         replace(c, statistic=wind.statistic) if c.id == "aero_drag" else c for c in dx.ranking
     )
     assert [c.id for c in alternatives(replace(dx, ranking=others), wind)] == ["rolling_resistance"]
+
+
+def test_a_slope_and_a_bias_give_way_to_rolling_resistance(start: Model, truth: Model) -> None:
+    """Beside the slope the bias does to the last digit what rolling resistance does alone."""
+    car = truth.add("rolling_resistance").with_values({"rolling_resistance.coefficient": 0.02})
+    driving = Driving.of(drive(car, manoeuvres.lap(30.0), seed=63))
+    test = Driving.of(drive(car, manoeuvres.handling_course(30.0), seed=64))
+    sloping = identify(start.add("road_grade"), driving, starts=1)
+    dx = diagnose(sloping, candidates=["accelerometer_bias", "rolling_resistance"])
+    bias, rolling = (by_id(dx, name) for name in ("accelerometer_bias", "rolling_resistance"))
+    assert abs(bias.log_likelihood - rolling.log_likelihood) < 2.0
+    (chosen,) = (c for c in dx.ranking if c.id == "accelerometer_bias")
+    same = replace(next(c for c in dx.ranking if c is not chosen), statistic=chosen.statistic)
+    near = alternatives(replace(dx, ranking=(chosen, same)), chosen)
+    assert [c.id for c in near] == ["rolling_resistance"]
+    found = exchanged(bias, {chosen.id: near}, test, most_effects=4)
+    assert found.model.effects == ("rolling_resistance",)
+    # Both have two effects, but one of them hardly has a slope.
+    assert (_mattering(bias), _mattering(rolling), _mattering(found)) == (2, 1, 1)
+    assert better(rolling, bias, test)
+    assert not better(bias, rolling, test)
 
 
 def test_held_out_driving_has_a_say_between_what_the_fit_cannot_tell_apart(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy import signal
+from scipy.spatial.transform import Rotation
 
 from sysid_vehicle import InvalidInput, Model, SensorNoise, compare, identify
 from sysid_vehicle.manoeuvres import double_lane_change
@@ -28,6 +29,13 @@ def test_a_log_is_what_sensors_read(lanes: Drive14) -> None:
     share = 1.0 - np.exp(-0.001 / 0.05)
     followed = signal.lfilter([share], [1.0, share - 1.0], asked)
     assert np.std(followed - lanes["steer_rad"]) < 0.02 * np.std(asked - lanes["steer_rad"])
+    # The accelerometer turns with the body, and its axes with it.
+    felt = np.column_stack([lanes["plane_ay_mps2"] * 0.0, lanes["plane_ay_mps2"], lanes["az_mps2"]])
+    turned = Rotation.from_euler("x", lanes["roll_rad"][:, None]).inv().apply(felt)
+    np.testing.assert_allclose(log["ay_mps2"], turned[::10, 1], atol=1e-12)
+    felt = np.column_stack([lanes["plane_ax_mps2"], lanes["plane_ax_mps2"] * 0.0, lanes["az_mps2"]])
+    turned = Rotation.from_euler("y", lanes["pitch_rad"][:, None]).inv().apply(felt)
+    np.testing.assert_allclose(log["ax_mps2"], turned[::10, 0], atol=1e-12)
     with pytest.raises(InvalidInput, match="divisor"):
         to_log(SPORTS_CAR, lanes, seed=1, rate_hz=300.0)
 

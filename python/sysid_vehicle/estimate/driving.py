@@ -106,6 +106,14 @@ class Driving:
         return len(self.measured)
 
     @property
+    def usable_s(self) -> float:
+        """Usable seconds, over all stretches."""
+        lengths = (
+            (s.where.stop - s.where.start) / self.logs[s.log].rate_hz for s in self.stretches
+        )
+        return float(sum(lengths))
+
+    @property
     def present(self) -> tuple[str, ...]:
         """Measured channels that there are to predict."""
         there = np.isfinite(self.measured)
@@ -171,8 +179,5 @@ class Driving:
         return pieces
 
     def __str__(self) -> str:
-        seconds = sum(
-            (s.where.stop - s.where.start) / self.logs[s.log].rate_hz for s in self.stretches
-        )
         names = ", ".join(log.name for log in self.logs)
-        return f"{names}: {seconds:.1f} s usable in {len(self.stretches)} stretch(es)"
+        return f"{names}: {self.usable_s:.1f} s usable in {len(self.stretches)} stretch(es)"

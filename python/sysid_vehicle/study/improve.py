@@ -16,7 +16,6 @@ from ..diagnose import (
     judge,
     omnibus,
 )
-from ..effects import effect
 from ..errors import InvalidInput, warn
 from ..estimate import Driving
 from ..identify import Fit, identify
@@ -31,6 +30,7 @@ __all__ = ["improve"]
 
 _MOST = 0.8  # share of what is missing, by which an effect has to be more than a stand-in
 _SURE = 0.01  # evidence of one effect more: at 5 % it would spoil one complete model in twenty
+_SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
 _LEFT = 1e-3  # evidence of something left, beside which an effect alone is not what is missing
 
 
@@ -181,20 +181,17 @@ def _alone(told: Verdicts, added: set[str]) -> set[str]:
 
 
 def _taken_up(fits: list[Fit], on_train: list[Comparison]) -> dict[str, float]:
-    """Of the square of the error, by each effect that was added.
+    """Of the square of the error, by each effect that was added, in its turn.
 
-    Of effects that act alike the first takes up what the others could: they count together.
+    Of two that act alike the later one counts only for what the first could not take up: that much
+    may as well be a part of what is left.
     """
     taken: dict[str, float] = {}
     steps = zip(fits[:-1], fits[1:], on_train[:-1], on_train[1:], strict=True)
     for poorer, richer, before, after in steps:
         for e in set(richer.model.effects) - set(poorer.model.effects):
             taken[e] = before.error**2 - after.error**2
-    return {e: sum(t for o, t in taken.items() if o == e or _alike(o, e)) for e in taken}
-
-
-def _alike(one: str, other: str) -> bool:
-    return one in effect(other).twins or other in effect(one).twins
+    return taken
 
 
 def _small(taken: dict[str, float], left: float, proxies: set[str]) -> set[str]:
@@ -230,6 +227,12 @@ def _added(
 
 def _warnings(fit: Fit, driving: Driving) -> tuple[str, ...]:
     found = []
+    if driving.usable_s < _SHORT_S:
+        found.append(
+            f"{driving}: too short to tell many effects apart; record {_SHORT_S:.0f} s or more, "
+            "with steps, sweeps and corners near the limit"
+        )
+        warn(found[-1])
     for log in driving.logs:
         found += [f"{log.name}: {text}" for text in log.missing().values()]
     found += [f"{e.name}: {e.note} with this driving" for e in fit.estimates if e.note]

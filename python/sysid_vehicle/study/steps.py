@@ -107,14 +107,17 @@ def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
 
     Of those that were refitted: the others came nowhere near, or would take for ever. The catalogue
     says what acts like what, and the driving may add to it. What fits to the last digit as the
-    chosen one does is the same thing by another name, and no alternative.
+    chosen one does is the same thing by another name: an alternative only if there is an effect
+    already that it may make needless, as rolling resistance does a slope with a sensor's bias.
     """
+    same = 0.0 if dx.fit.model.effects else _SAME
     alike = [
         c
         for c in dx.significant
         if c.fit is not None
+        and c.id != chosen.id
         and c.statistic > _NEAR * chosen.statistic
-        and abs(c.statistic - chosen.statistic) > _SAME
+        and abs(c.statistic - chosen.statistic) >= same
         and (
             c.id in chosen.effect.twins
             or chosen.id in c.effect.twins
@@ -184,14 +187,14 @@ def better(one: Fit, other: Fit, test: Driving) -> bool:
     """Whether one fit is to be preferred, and what is new in it has values that a car can have.
 
     Both drivings speak: that of the fit, less the Bayesian price of the parameters, and the held-
-    out one, where the error must fall too. Of two that are as good the one with fewer effects is
-    preferred.
+    out one, where the error must fall too. Of two that are as good the one with fewer effects of a
+    size that matters is preferred, and then the one with fewer effects.
     """
     ones, others = set(one.model.effects), set(other.model.effects)
     if not all(_real(one, name) for name in ones - others):
         return False
     ahead = lead(one, other, test)
-    if len(ones) < len(others):
+    if (_mattering(one), len(ones)) < (_mattering(other), len(others)):
         return ahead > 0.0
     return ahead > _BETTER and error_falls(other, one, test)
 
@@ -200,6 +203,19 @@ def lead(one: Fit, other: Fit, test: Driving) -> float:
     """Log-likelihood, less the price of the parameters, that one fit is ahead on all driving."""
     return (
         _merit(one) - _merit(other) + gain_in_log_likelihood(other, one, test, same_noise=True)[0]
+    )
+
+
+def _mattering(fit: Fit) -> int:
+    """How many effects of the model have a size worth acting on."""
+    parameters = fit.model.parameters
+    return sum(
+        any(
+            abs(e.value - parameters[e.name].null_value) >= parameters[e.name].matters
+            for e in fit.estimates
+            if e.name.startswith(f"{part.id}.")
+        )
+        for part in fit.model.parts
     )
 
 

@@ -112,10 +112,13 @@ def to_log(
         torque = drive[f"drive_{wheel}_nm"] - drive[f"brake_{wheel}_nm"]
         torque = torque - numbers[f"{axle}.wheel_inertia_kgm2"] * spin_up
         force += torque / numbers[f"{axle}.radius_m"]
+    # The car's own outputs are of first order in the angles of its body; a sensor's axes turn.
+    roll, pitch, up = drive["roll_rad"], drive["pitch_rad"], drive["az_mps2"]
     columns = {
         "time_s": drive.time_s,
         **{name: drive[name] for name in ("vx_mps", "vy_mps", "yaw_rate_radps")},
-        **{name: drive[name] for name in ("ax_mps2", "ay_mps2")},
+        "ax_mps2": drive["plane_ax_mps2"] * np.cos(pitch) - up * np.sin(pitch),
+        "ay_mps2": drive["plane_ay_mps2"] * np.cos(roll) + up * np.sin(roll),
         "steer_rad": steer,
         "fx_n": force,
     }
