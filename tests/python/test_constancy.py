@@ -56,12 +56,12 @@ def test_with_an_effect_its_rivals_are_doubted() -> None:
             EffectVerdict(rolling, "one of a group", group=("aero_drag",)),
         )
     )
-    doubted = told.doubting({"aero_drag"}, "it explains little")
+    doubted = told.doubting({"aero_drag"}, "it explains little", added={"aero_drag"})
     assert [v.finding for v in doubted.all] == ["missing", "proxy", "proxy"]
     assert doubted["rolling_resistance"].sentence == (
         "something acts like it, but it explains little: look elsewhere"
     )
-    assert told.doubting((), "nothing").all == told.all
+    assert told.doubting((), "nothing", added=()).all == told.all
 
 
 def test_the_only_log_is_cut_into_pieces(hidden_fit: Callable[[str, float], Fit]) -> None:

@@ -21,6 +21,7 @@ from sysid_vehicle import (
     improve,
     manoeuvres,
 )
+from sysid_vehicle.diagnose import Omnibus
 from sysid_vehicle.diagnose.verdicts import EffectVerdict, Finding, Verdicts
 from sysid_vehicle.study.held_out import (
     error_falls,
@@ -28,7 +29,7 @@ from sysid_vehicle.study.held_out import (
     hold_out,
     share_explained,
 )
-from sysid_vehicle.study.improve import _alone, _small, _taken_up
+from sysid_vehicle.study.verdict import Left, _alone, _small, _taken_up
 
 LAG = "steer_lag.time_constant_s", 0.06
 LOOKS_LIKE_LAG = {
@@ -163,7 +164,9 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     assert told["channels"]["after"]["test"]["ay_mps2"]["nrmse"] < 1.1
     # Where the verdict does not ask for it, the shape of the unknown is not sought.
     assert study.unknown is None
-    assert sorted(told["unknown"]) == ["p_value", "strongest"]
+    assert sorted(told["unknown"]) == ["held_out", "p_value", "strongest"]
+    assert sorted(told["unknown"]["held_out"]) == ["p_value", "strongest"]
+    assert told["unknown"]["held_out"]["p_value"] > 1e-4
     delay = told["where"]["delays"]["steer"]
     assert delay["delay_s"] > 3.0 * delay["std_s"]
     assert told["regions"]
@@ -235,15 +238,32 @@ def test_one_effect_that_leaves_something_is_none(
     assert both.verdict == "explained"
 
 
-def test_an_effect_is_alone_where_nothing_else_acted() -> None:
-    def alone(**findings: Finding) -> set[str]:
+def test_an_effect_named_alone_should_have_explained_what_is_left() -> None:
+    def alone(*left: Omnibus, **findings: Finding) -> set[str]:
         each = (EffectVerdict(effect(name), found) for name, found in findings.items())
-        return _alone(Verdicts(tuple(each)), set(findings))
+        return _alone(Verdicts(tuple(each)), set(findings), left)
 
-    assert alone(mass="missing", yaw_inertia="negligible") == {"mass"}
-    assert alone(mass="one of a group") == {"mass"}
-    assert alone(mass="missing", yaw_inertia="proxy") == set()
-    assert alone(mass="missing", aero_drag="missing") == set()
+    forward, turning = (Omnibus(99.0, 9, 1e-9, target) for target in ("F_x", "M_z"))
+    assert alone(turning, mass="missing", yaw_inertia="negligible") == {"mass"}
+    assert alone(forward, mass="one of a group") == {"mass"}
+    assert alone(mass="missing") == set()
+    assert alone(turning, mass="missing", aero_drag="missing") == set()
+    # Beside a proxy something else may be missing, which may be all that is left.
+    assert alone(turning, mass="missing", yaw_inertia="proxy") == set()
+    assert alone(turning, forward, mass="missing", yaw_inertia="proxy") == {"mass"}
+
+
+def test_what_is_left_on_held_out_driving_takes_more_evidence() -> None:
+    def of(p_value: float) -> Omnibus:
+        return Omnibus(99.0, 9, p_value, "M_z")
+
+    assert Left(of(0.5)).nothing
+    assert Left(of(0.5), of(0.001)).nothing
+    assert not Left(of(0.5), of(1e-5)).nothing
+    assert not Left(of(0.005), of(0.5)).nothing
+    assert not Left(of(0.5), of(0.5), candidates=True).nothing
+    assert Left(of(0.005), of(1e-3)).evidence == ()
+    assert [o.p_value for o in Left(of(1e-4), of(1e-5)).evidence] == [1e-4, 1e-5]
 
 
 def test_what_took_up_less_than_is_left_is_doubted() -> None:

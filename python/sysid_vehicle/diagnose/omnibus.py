@@ -27,6 +27,13 @@ _LEVEL = 0.01
 _TARGETS = {"F_x": 0, "F_y": 1, "M_z": 2, "dv_x/dt": 3, "dv_y/dt": 4}
 _SENSORS = {"r": 7, "a_x": 8, "a_y": 9}
 
+_FORWARD, _SIDEWAYS, _TURNING = ("vx_mps", "ax_mps2"), ("vy_mps", "ay_mps2"), ("yaw_rate_radps",)
+_MOVES = {
+    **dict.fromkeys(("F_x", "dv_x/dt", "a_x"), _FORWARD),
+    **dict.fromkeys(("F_y", "dv_y/dt", "a_y"), _SIDEWAYS),
+    **dict.fromkeys(("M_z", "r"), _TURNING),
+}
+
 
 @dataclass(frozen=True)
 class Omnibus:
@@ -49,6 +56,11 @@ class Omnibus:
     def rejects(self) -> bool:
         """Whether the model is shown to be incomplete, at 1 %."""
         return not self.p_value > _LEVEL
+
+    @property
+    def moves(self) -> tuple[str, ...]:
+        """Measured channels that the strongest target moves first."""
+        return _MOVES[self.strongest]
 
     def __str__(self) -> str:
         if not self.rejects:

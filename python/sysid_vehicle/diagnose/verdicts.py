@@ -116,14 +116,17 @@ class Verdicts:
                 return v
         raise KeyError(f"'{effect}'; there are {', '.join(v.effect.id for v in self.all)}")
 
-    def doubting(self, effects: Iterable[str], because: str) -> Verdicts:
-        """The same, but these effects, and rivals of nothing else, are called proxies."""
-        doubted = set(effects)
+    def doubting(self, effects: Iterable[str], because: str, *, added: Iterable[str]) -> Verdicts:
+        """The same, but these effects, and rivals of nothing else, are called proxies.
+
+        What was added is no mere rival: it stands or falls by itself.
+        """
+        doubted, model = set(effects), set(added)
 
         def falls(v: EffectVerdict) -> bool:
-            if v.finding == "one of a group" and set(v.group) <= doubted:
-                return True
-            return v.effect.id in doubted and v.finding in _NAMED
+            if v.effect.id in model:
+                return v.effect.id in doubted and v.finding in _NAMED
+            return v.finding == "one of a group" and set(v.group) <= doubted
 
         told = [
             replace(v, finding="proxy", group=(), because=because) if falls(v) else v

@@ -221,7 +221,7 @@ def _remains(study: Study, truth: Model | None) -> list[str]:
     x, y, moment = noise.wander
     parts = [
         heading("What remains"),
-        paragraph(f"In the end: {study.omnibus}."),
+        paragraph(study.in_the_end),
         picture(figure, "Residuals on held-out driving, running root mean square per channel."),
         heading("Noise model", 3),
         table(("sensor", "white noise", "unit"), sensors),

@@ -83,8 +83,9 @@ class Study:
     held_out : Driving
         The driving the fits never saw.
     added : tuple of AddedEffect
-    omnibus : Omnibus
-        Whether the final model leaves anything that depends on the driving.
+    omnibus, omnibus_held_out : Omnibus
+        Whether the final model leaves anything that depends on the driving it was fitted to, or on
+        the held-out driving; the latter is not asked where nothing was added.
     verdicts : Verdicts
         What is to be said of every effect that the baseline lacks.
     seconds : float
@@ -99,6 +100,7 @@ class Study:
     held_out: Driving
     added: tuple[AddedEffect, ...]
     omnibus: Omnibus
+    omnibus_held_out: Omnibus | None
     verdicts: Verdicts
     warnings: tuple[str, ...]
     seconds: float
@@ -174,9 +176,17 @@ class Study:
         lines = [f"Verdict: {self.verdict} - {self.meaning}."]
         lines += [f"  {a}" for a in self.added]
         lines.append(text_table(self._HEAD, self._rows()))
-        lines.append(f"In the end: {self.omnibus}.")
+        lines.append(self.in_the_end)
         lines += [f"Warning: {w}" for w in self.warnings]
         return "\n".join(lines)
+
+    @property
+    def in_the_end(self) -> str:
+        """What is left on the driving of the fit, and on the other, in words."""
+        said = f"In the end: {self.omnibus}."
+        if self.omnibus_held_out is not None:
+            said += f" On the held-out driving: {self.omnibus_held_out}."
+        return said
 
     def _repr_html_(self) -> str:
         effects = "".join(f"<li>{a}</li>" for a in self.added)
@@ -207,6 +217,7 @@ class Study:
             "unknown": {
                 "p_value": self.omnibus.p_value,
                 "strongest": self.omnibus.strongest,
+                **_held_out(self.omnibus_held_out),
                 **({} if self.unknown is None else self.unknown.to_dict()),
             },
             "errors": {
@@ -227,6 +238,12 @@ class Study:
         from ..report import write_report
 
         write_report(self, Path(path))
+
+
+def _held_out(o: Omnibus | None) -> dict[str, Any]:
+    if o is None:
+        return {}
+    return {"held_out": {"p_value": o.p_value, "strongest": o.strongest}}
 
 
 def _effect(a: AddedEffect) -> dict[str, Any]:
