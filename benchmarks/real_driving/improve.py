@@ -28,7 +28,10 @@ PARTS = {
         ("handling_course.csv", 0.0, 75.0),
         ("handling_course.csv", 75.0, 1e9),
     ),
-    "tum_devbot_sim": (("data_to_train_2.csv", 0.0, 100.0), ("data_to_run.csv", 0.0, 1e9)),
+    "tum_devbot_sim": (
+        ("data_to_train_2.csv", 0.0, 100.0),
+        ("data_to_train_2.csv", 100.0, 1e9),
+    ),
 }
 SHORT = "bmw_m8_roadview"  # one lane change: too short to name anything
 

@@ -10,6 +10,7 @@ from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
+from sysid_vehicle.study import steps
 from sysid_vehicle.study.held_out import (
     error_falls,
     fall_in_error,
@@ -19,6 +20,7 @@ from sysid_vehicle.study.held_out import (
 from sysid_vehicle.study.search import Search, Trail, _more
 from sysid_vehicle.study.steps import (
     _distance,
+    _held_out_gain,
     _mattering,
     _share,
     alternatives,
@@ -117,6 +119,43 @@ def test_held_out_driving_has_a_say_between_what_the_fit_cannot_tell_apart(
         chosen = first_that_holds(replace(dx, ranking=(first, preferred)), baseline, driving[1])
         assert chosen is not None
         assert chosen[0].id == (other.id if told_apart else preferred.id)
+
+
+@pytest.mark.parametrize(
+    ("same", "own", "fall", "holds"),
+    [
+        ((90.0, 30.0), (90.0, 30.0), (9.0, 30.0), True),
+        # The error by the noise floor may not be shown to fall where the likelihood is sure,
+        ((90.0, 30.0), (90.0, 30.0), (-9.0, 30.0), True),
+        # but it must not be shown to grow,
+        ((90.0, 30.0), (90.0, 30.0), (-90.0, 30.0), False),
+        # and both noises have to be sure.
+        ((40.0, 30.0), (90.0, 30.0), (-9.0, 30.0), False),
+        ((90.0, 30.0), (40.0, 30.0), (-9.0, 30.0), False),
+        # Large noise of the poorer model hides the gain: the richer one's own has to be sure.
+        ((9.0, 30.0), (90.0, 30.0), (90.0, 30.0), True),
+        ((9.0, 30.0), (40.0, 30.0), (90.0, 30.0), False),
+        ((9.0, 30.0), (90.0, 30.0), (9.0, 30.0), False),
+    ],
+)
+def test_what_holds_on_held_out_driving(
+    monkeypatch: pytest.MonkeyPatch,
+    dx: Diagnosis,
+    baseline: Fit,
+    driving: tuple[Driving, Driving],
+    same: tuple[float, float],
+    own: tuple[float, float],
+    fall: tuple[float, float],
+    *,
+    holds: bool,
+) -> None:
+    def gain(*_: object, same_noise: bool = False) -> tuple[float, float]:
+        return same if same_noise else own
+
+    monkeypatch.setattr(steps, "gain_in_log_likelihood", gain)
+    monkeypatch.setattr(steps, "fall_in_error", lambda *_: fall)
+    (drag,) = (c for c in dx.ranking if c.id == "aero_drag")
+    assert _held_out_gain(baseline, drag, driving[1]) == (same[0], holds)
 
 
 def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(

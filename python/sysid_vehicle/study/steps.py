@@ -77,9 +77,12 @@ def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:
     assert c.fit is not None
     gain, error = gain_in_log_likelihood(fit, c.fit, test, same_noise=True)
     fall, fall_error = fall_in_error(fit, c.fit, test)
-    if fall <= 0.0:
-        return gain, False
     own, own_error = gain_in_log_likelihood(fit, c.fit, test)
+    if fall <= 0.0:
+        # Gains of the noise floor weigh the channels as no rough road would. Where the likelihood
+        # is sure by either noise, the error need only not be shown to grow.
+        sure = gain > _DOUBT * error and own > _DOUBT * own_error
+        return gain, sure and fall > -_DOUBT * fall_error
     if gain <= error:
         # What a model lacks makes its noise large, and large noise hides what another does better.
         # By noise of their own the other has to be better beyond doubt.
