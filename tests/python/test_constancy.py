@@ -61,7 +61,11 @@ def test_with_an_effect_its_rivals_are_doubted() -> None:
     assert doubted["rolling_resistance"].sentence == (
         "something acts like it, but it explains little: look elsewhere"
     )
-    assert told.doubting((), "nothing", added=()).all == told.all
+    # What was added does not fall with a rival.
+    both = {"aero_drag", "rolling_resistance"}
+    kept = told.doubting({"rolling_resistance"}, "it explains little", added=both)
+    assert [kept[e].finding for e in sorted(both)] == ["one of a group", "proxy"]
+    assert told.doubting((), "nothing").all == told.all
 
 
 def test_the_only_log_is_cut_into_pieces(hidden_fit: Callable[[str, float], Fit]) -> None:

@@ -116,10 +116,12 @@ class Verdicts:
                 return v
         raise KeyError(f"'{effect}'; there are {', '.join(v.effect.id for v in self.all)}")
 
-    def doubting(self, effects: Iterable[str], because: str, *, added: Iterable[str]) -> Verdicts:
+    def doubting(
+        self, effects: Iterable[str], because: str, *, added: Iterable[str] = ()
+    ) -> Verdicts:
         """The same, but these effects, and rivals of nothing else, are called proxies.
 
-        What was added is no mere rival: it stands or falls by itself.
+        What was `added` is no mere rival: it stands or falls by itself.
         """
         doubted, model = set(effects), set(added)
 

@@ -83,6 +83,7 @@ def verdict_on(
     # what does not depend on the driving is no effect's to explain.
     if not added:
         return ("adequate" if left.nothing else "unknown"), told
+    stand_ins = _proxies(told, added)
     share = share_explained(on_train[0].error, on_train[-1].error)
     if not left.nothing and share < _MOST:
         # Beside something larger that is not modelled no name is safe.
@@ -90,14 +91,15 @@ def verdict_on(
         told = told.doubting(added, because, added=added)
     elif not left.nothing:
         unexplained = on_train[-1].error ** 2 - 1.0
-        small = _small(_taken_up(fits, on_train), unexplained, _proxies(told, added))
+        small = _small(_taken_up(fits, on_train), unexplained, stand_ins)
         told = told.doubting(small, "what is left unexplained is larger", added=added)
         alone = _alone(told, added, left.evidence)
         told = told.doubting(alone, "were it what is missing, nothing would be left", added=added)
-    # What only stands in for something else explains nothing, however well it fits.
+    # What only stands in for something else explains nothing, however well it fits, and what cannot
+    # be told from that is no better.
+    because = f"it acts like {', '.join(sorted(stand_ins))}, which is none either"
+    told = told.doubting(stand_ins, because)
     proxies = _proxies(told, added)
-    because = f"it acts like {', '.join(sorted(proxies))}, which is none either"
-    told = told.doubting(proxies, because, added=added)
     if proxies == added or not (left.nothing or _named(told, added)):
         return "unknown", told
     return "explained" if left.nothing and not proxies else "partly_explained", told
