@@ -20,8 +20,6 @@ from .words import RANKING_HEAD, interval, quantity, ranking_rows, stages, summa
 
 __all__ = ["SECTIONS"]
 
-_HORIZONS_S = (0.5, 1.0, 2.0)
-
 
 def _verdict(study: Study, truth: Model | None) -> list[str]:
     figure = new_figure(7.0, 3.0)
@@ -130,7 +128,7 @@ def _verdicts(study: Study, truth: Model | None) -> list[str]:
 
 
 def _ahead(study: Study, truth: Model | None) -> list[str]:
-    falls = study.waterfall(_HORIZONS_S)
+    falls = study.waterfall()
     figure = new_figure(6.0, 3.4)
     falls.plot(figure.add_subplot())
     return [
