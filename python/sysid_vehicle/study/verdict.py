@@ -19,7 +19,7 @@ from .study import Verdict
 __all__ = ["SURE", "Left", "verdict_on"]
 
 SURE = 0.01  # evidence of one effect more: at 5 % it would spoil one complete model in twenty
-_MOST = 0.8  # share of what is missing, by which an effect has to be more than a stand-in
+_MOST = 0.95  # share of what is missing: stand-ins take up four fifths and more of it
 _LEFT = 1e-3  # evidence of something left, beside which an effect alone is not what is missing
 _BEYOND = 1e-4  # the same on held-out driving: tyres known only in part go on otherwise there
 
