@@ -91,6 +91,7 @@ def improve(
     on_test = [compare(f, test_driving, noise=floor) for f in fits]
     last = diagnoses[-1]
     left = Left(
+        diagnoses[0].omnibus,
         last.omnibus if last.fit is fit else omnibus(fit, train_driving),
         omnibus(fit, test_driving) if len(fits) > 1 else None,
         any(c.p_value < SURE for c in last.significant)

@@ -20,6 +20,9 @@ __all__ = ["SURE", "Left", "verdict_on"]
 
 SURE = 0.01  # evidence of one effect more: at 5 % it would spoil one complete model in twenty
 _MOST = 0.95  # share of what is missing: stand-ins take up four fifths and more of it
+_REMAINS = (
+    0.6  # share of the evidence: right ones leave less than half beside others, stand-ins most
+)
 _LEFT = 1e-3  # evidence of something left, beside which an effect alone is not what is missing
 _BEYOND = 1e-4  # the same on held-out driving: tyres known only in part go on otherwise there
 
@@ -30,13 +33,14 @@ class Left:
 
     Attributes
     ----------
-    fitted, held_out : Omnibus
-        Whether anything is left that depends on the driving; not asked of held-out driving where
-        nothing was added.
+    before, fitted, held_out : Omnibus
+        Whether anything was left by the baseline, and is left now, that depends on the driving of
+        the fit or on held-out driving; the latter is not asked where nothing was added.
     candidates : bool
         Whether there is evidence of an effect, or beyond doubt (`SURE`) of one effect more.
     """
 
+    before: Omnibus
     fitted: Omnibus
     held_out: Omnibus | None = None
     candidates: bool = False
@@ -53,8 +57,17 @@ class Left:
         return (*((self.fitted,) if self.fitted.p_value < _LEFT else ()), *beyond)
 
     @property
+    def share(self) -> float:
+        """Of the evidence against the baseline, how much there is against the final model."""
+        return _excess(self.fitted) / max(_excess(self.before), 1.0)
+
+    @property
     def _beyond(self) -> bool:
         return self.held_out is not None and self.held_out.p_value < _BEYOND
+
+
+def _excess(o: Omnibus) -> float:
+    return max(o.statistic - o.degrees, 0.0)
 
 
 def verdict_on(
@@ -88,6 +101,11 @@ def verdict_on(
     if not left.nothing and share < _MOST:
         # Beside something larger that is not modelled no name is safe.
         because = f"takes up only {max(100 * share, 0.0):.0f} % of what is missing"
+        told = told.doubting(added, because, added=added)
+    elif not left.nothing and left.share > _REMAINS:
+        because = (
+            f"with it, {100 * left.share:.0f} % of the evidence that something is missing stays"
+        )
         told = told.doubting(added, because, added=added)
     elif not left.nothing:
         unexplained = on_train[-1].error ** 2 - 1.0
