@@ -19,7 +19,7 @@ from .study import Verdict
 __all__ = ["SURE", "Left", "verdict_on"]
 
 SURE = 0.01  # evidence of one effect more: at 5 % it would spoil one complete model in twenty
-_MOST = 0.95  # share of what is missing: stand-ins take up four fifths and more of it
+_MOST = 0.9  # share of what is missing: stand-ins take up four fifths and more of it
 _REMAINS = (
     0.6  # share of the evidence: right ones leave less than half beside others, stand-ins most
 )
