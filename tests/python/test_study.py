@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,15 +20,12 @@ from sysid_vehicle import (
     improve,
     manoeuvres,
 )
-from sysid_vehicle.diagnose import Omnibus
-from sysid_vehicle.diagnose.verdicts import EffectVerdict, Finding, Verdicts
 from sysid_vehicle.study.held_out import (
     error_falls,
     gain_in_log_likelihood,
     hold_out,
     share_explained,
 )
-from sysid_vehicle.study.verdict import Left, _alone, _small, _taken_up
 
 LAG = "steer_lag.time_constant_s", 0.06
 LOOKS_LIKE_LAG = {
@@ -238,37 +234,6 @@ def test_one_effect_that_leaves_something_is_none(
     assert both.verdict == "explained"
 
 
-def test_an_effect_named_alone_should_have_explained_what_is_left() -> None:
-    def alone(*left: Omnibus, **findings: Finding) -> set[str]:
-        each = (EffectVerdict(effect(name), found) for name, found in findings.items())
-        return _alone(Verdicts(tuple(each)), set(findings), left)
-
-    forward, turning = (Omnibus(99.0, 9, 1e-9, target) for target in ("F_x", "M_z"))
-    assert alone(turning, mass="missing", yaw_inertia="negligible") == {"mass"}
-    assert alone(forward, mass="one of a group") == {"mass"}
-    assert alone(mass="missing") == set()
-    assert alone(turning, mass="missing", aero_drag="missing") == set()
-    # Beside a proxy something else may be missing, which may be all that is left.
-    assert alone(turning, mass="missing", yaw_inertia="proxy") == set()
-    assert alone(turning, forward, mass="missing", yaw_inertia="proxy") == {"mass"}
-
-
-def test_what_is_left_on_held_out_driving_takes_more_evidence() -> None:
-    def of(p_value: float, statistic: float = 99.0) -> Omnibus:
-        return Omnibus(statistic, 9, p_value, "M_z")
-
-    none = of(0.5)
-    assert Left(none, none).nothing
-    assert Left(none, none, of(0.001)).nothing
-    assert not Left(none, none, of(1e-5)).nothing
-    assert not Left(none, of(0.005), none).nothing
-    assert not Left(none, none, none, candidates=True).nothing
-    assert Left(none, of(0.005), of(1e-3)).evidence == ()
-    assert [o.p_value for o in Left(none, of(1e-4), of(1e-5)).evidence] == [1e-4, 1e-5]
-    assert Left(of(1e-9, 109.0), of(1e-5, 59.0)).share == pytest.approx(0.5)
-    assert Left(of(1e-9, 109.0), of(0.5, 5.0)).share == 0.0
-
-
 def test_what_leaves_the_evidence_as_it_was_is_a_stand_in(
     start: Model, truth: Model, drives: Drives
 ) -> None:
@@ -282,25 +247,6 @@ def test_what_leaves_the_evidence_as_it_was_is_a_stand_in(
     assert found.omnibus.rejects
     assert found.verdict == "unknown"
     assert all(found.verdicts[a.id].finding == "proxy" for a in found.added)
-
-
-def test_what_took_up_less_than_is_left_is_doubted() -> None:
-    taken = {"large": 10.0, "middle": 2.0, "tiny": 0.1}
-    assert _small(taken, 0.01, set()) == set()
-    assert _small(taken, 0.5, set()) == {"tiny"}
-    # What proxies took up is unexplained too, and so is what was doubted for it.
-    assert _small(taken, 1.95, set()) == {"tiny", "middle"}
-    assert _small(taken, 0.5, {"large"}) == {"tiny", "middle"}
-    assert _small({}, 1.0, set()) == set()
-
-
-def test_of_effects_that_act_alike_the_later_counts_for_what_it_adds(study: Study) -> None:
-    baseline = study.fits[0]
-    drag = replace(baseline, model=baseline.model.add("aero_drag"))
-    wind = replace(drag, model=drag.model.add("head_wind"))
-    errors = [replace(study.train[0], error=e) for e in (3.0, 2.0, 1.9)]
-    taken = _taken_up([baseline, drag, wind], errors)
-    assert taken == pytest.approx({"aero_drag": 5.0, "head_wind": 0.39})
 
 
 def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: Drives) -> None:
