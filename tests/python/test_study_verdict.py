@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from sysid_vehicle import Fit, Log, compare
+from sysid_vehicle import Fit, Log, Model, compare, drive, improve, manoeuvres
 from sysid_vehicle.diagnose import Omnibus
 from sysid_vehicle.diagnose.verdicts import EffectVerdict, Finding, Verdicts
 from sysid_vehicle.effects import effect
@@ -59,3 +59,24 @@ def test_of_effects_that_act_alike_the_later_counts_for_what_it_adds(fit: Fit, l
     errors = [replace(before, error=e) for e in (3.0, 2.0, 1.9)]
     taken = _taken_up([baseline, drag, wind], errors)
     assert taken == pytest.approx({"aero_drag": 5.0, "head_wind": 0.39})
+
+
+def test_tyres_that_the_fit_never_saw_do_not_speak_against_the_right_effect(
+    start: Model, truth: Model
+) -> None:
+    """A sine in the linear range is fitted, a lap held out."""
+    car = truth.add("accelerometer_scale").with_values(
+        {"accelerometer_scale.ax_error": 0.05, "accelerometer_scale.ay_error": 0.05}
+    )
+    study = improve(
+        start,
+        drive(car, manoeuvres.sine_sweep(), seed=3),
+        drive(car, manoeuvres.lap(30.0), seed=13),
+        candidates=["accelerometer_scale", "gyro_scale", "steer_ratio"],
+        starts=2,
+    )
+    assert [a.id for a in study.added] == ["accelerometer_scale"]
+    assert study.test[-1].error > 2.0  # the lap is beyond what the fit knows of the tyres
+    assert study.verdict == "explained"
+    assert study.omnibus_held_out is not None
+    assert not study.omnibus_held_out.rejects

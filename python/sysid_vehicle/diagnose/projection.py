@@ -22,7 +22,7 @@ __all__ = [
 
 _COPIED = 1e-7  # of the largest singular value, below which a direction is a copy of others
 _SINGULAR = 1e-6  # the same of the eigenvalues of an information matrix
-_LAGS = 100
+_LAGS = (10, 30, 100)
 _ROWS = 256  # samples at once, which stay in the cache
 
 
@@ -112,8 +112,9 @@ def score_terms(directions: FloatArray, e: FloatArray, sizes: FloatArray) -> Flo
 def long_run_ratios(terms: FloatArray, naive: FloatArray) -> FloatArray:
     """Long-run over naive variance of sums of terms, (samples, m), column by column.
 
-    Bartlett weights over 100 samples (Newey & West, Econometrica 1987), which are those of sums
-    over all windows of so many.
+    Bartlett weights over 10, 30 and 100 samples (Newey & West, Econometrica 1987), which are those
+    of sums over all windows of so many; the largest counts, each less what it may be by chance: few
+    lags see little of what wanders slowly, and many scatter too much to see what does not.
 
     Parameters
     ----------
@@ -122,13 +123,16 @@ def long_run_ratios(terms: FloatArray, naive: FloatArray) -> FloatArray:
         Variance of their sums, were they independent.
     """
     terms = terms - terms.mean(axis=0)
-    n, lags = len(terms), min(_LAGS, len(terms) // 10)
-    sums = np.zeros((n + 2 * lags + 2, terms.shape[1]))
-    np.cumsum(terms, axis=0, out=sums[lags + 1 : n + lags + 1])
-    sums[n + lags + 1 :] = sums[n + lags]
-    windows = sums[lags + 1 :] - sums[: n + lags + 1]
-    long_run = np.einsum("ij,ij->j", windows, windows) / (lags + 1)
-    # An estimate from so many lags scatters: what it cannot tell from 1 counts as 1.
-    uncertainty = np.sqrt(4.0 * lags / (3.0 * n))
-    ratios: FloatArray = long_run / np.maximum(naive, 1e-300) / (1.0 + 2.0 * float(uncertainty))
+    n, most = len(terms), min(max(_LAGS), len(terms) // 10)
+    sums = np.zeros((n + 2 * most + 2, terms.shape[1]))
+    np.cumsum(terms, axis=0, out=sums[most + 1 : n + most + 1])
+    sums[n + most + 1 :] = sums[n + most]
+    found = np.zeros(terms.shape[1])
+    for lags in sorted({min(lags, most) for lags in _LAGS}):
+        windows = sums[most + 1 :] - sums[most - lags : n + 2 * most + 1 - lags]
+        long_run = np.einsum("ij,ij->j", windows, windows) / (lags + 1)
+        # An estimate from so many lags scatters: what it cannot tell from 1 counts as 1.
+        uncertainty = float(np.sqrt(4.0 * lags / (3.0 * n)))
+        np.maximum(found, long_run / (1.0 + 2.0 * uncertainty), out=found)
+    ratios: FloatArray = found / np.maximum(naive, 1e-300)
     return ratios

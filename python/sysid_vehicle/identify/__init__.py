@@ -2,6 +2,17 @@
 
 from .fit import Estimate, Fit, Start
 from .identify import identify, refine, refit
+from .predictive import Prediction, predict
 from .search import METHODS
 
-__all__ = ["METHODS", "Estimate", "Fit", "Start", "identify", "refine", "refit"]
+__all__ = [
+    "METHODS",
+    "Estimate",
+    "Fit",
+    "Prediction",
+    "Start",
+    "identify",
+    "predict",
+    "refine",
+    "refit",
+]

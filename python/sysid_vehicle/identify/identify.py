@@ -73,7 +73,7 @@ def identify(
     check_excitation(list(driving.logs))
     _say_what_is_not_seen(model, driving)
     names = list(model.free_names)
-    box = _box(model, names)
+    box = free_box(model)
     p = model.vector()
     noise = first_guess(driving, model.vehicle)
     thin = driving.problem(model, most_samples=_THINNED)
@@ -125,13 +125,13 @@ def refine(
     """
     names = list(model.free_names)
     p = model.vector()
-    return _polish(model, driving, p, noise, _box(model, names), names, (), inputs)
+    return _polish(model, driving, p, noise, free_box(model), names, (), inputs)
 
 
 def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3) -> Fit:
     """Parameters alone, from a model's values, under a noise model that stays as it is."""
     names = list(model.free_names)
-    box = _box(model, names)
+    box = free_box(model)
     problem = driving.problem(model)
     p = model.vector()
     p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
@@ -145,7 +145,9 @@ def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3)
     return _summary(model, driving, problem, p, noise, box, names, (), True)
 
 
-def _box(model: Model, names: list[str]) -> Box:
+def free_box(model: Model) -> Box:
+    """The model's free parameters, in the order of their names."""
+    names = list(model.free_names)
     known = model.parameters
     bounds = np.array([model.bounds(n) for n in names])
     lower = bounds[:, 0].copy()

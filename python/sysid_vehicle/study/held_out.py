@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from .. import _core
 from .._arrays import FloatArray
 from ..errors import InvalidInput, warn
 from ..estimate import Driving
-from ..identify import Fit
+from ..identify import Fit, predict
 from ..log import Log
 
 __all__ = [
@@ -18,6 +20,7 @@ __all__ = [
     "fall_in_error",
     "gain_in_log_likelihood",
     "hold_out",
+    "serving",
     "share_explained",
 ]
 
@@ -51,22 +54,37 @@ def gain_in_log_likelihood(
 ) -> tuple[float, float]:
     """What the richer model gains on held-out driving, and the standard error of that, in nats.
 
-    Each model predicts with its own noise, or both with that of the poorer one: a richer model that
-    has only learnt larger noise gains by the first and loses by the second, and none is taken to be
-    surer than `NoiseModel.elsewhere`. The error comes from blocks of 5 s. A model that fails on the
-    held-out driving gains minus infinity.
+    Either model's parameters are as unsure as the fit left them (`predict`), so that
+    what it never saw of the tyres does not drown what an effect explains. Each model predicts with
+    its own noise, or both with that of the poorer one: a richer model that has only learnt larger
+    noise gains by the first and loses by the second, and none is taken to be surer than
+    `NoiseModel.elsewhere`. The error comes from blocks of 5 s. A model that fails on the held-out
+    driving gains minus infinity.
     """
-    pieces = []
-    for fit in (poorer, richer):
-        problem = test.problem(fit.model)
-        try:
-            noise = (poorer if same_noise else fit).noise.elsewhere(fit.model.vehicle)
-            trace = problem.trace(fit.model.vector(), noise.vector(), False)
-        except _core.NumericalFailure:
-            return -np.inf, 0.0
-        # Per sample, up to what both models share: - 1/2 (e' S^-1 e + log det S).
-        pieces.append(-0.5 * np.sum(trace["whitened"] ** 2, axis=1) + trace["log_density"])
-    return _with_error(pieces[1] - pieces[0], test)
+    try:
+        before = _density(poorer, test, poorer)
+        after = _density(richer, test, poorer if same_noise else richer)
+    except (_core.NumericalFailure, np.linalg.LinAlgError):
+        return -np.inf, 0.0
+    return _with_error(after - before, test)
+
+
+# The poorer model of all candidates of a step is the same one.
+@lru_cache(maxsize=8)
+def _density(fit: Fit, test: Driving, like: Fit) -> FloatArray:
+    """Of held-out driving under a fit, with another's noise."""
+    return predict(fit, test, like.noise.elsewhere(fit.model.vehicle)).log_density
+
+
+def serving(fit: Fit, test: Driving) -> Fit:
+    """The fit with parameters that serve held-out driving too, as far as it left them unsure.
+
+    The fit itself, where the model fails there.
+    """
+    try:
+        return replace(fit, model=predict(fit, test, fit.noise).model)
+    except (_core.NumericalFailure, np.linalg.LinAlgError):
+        return fit
 
 
 def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from ..estimate import Driving
 from ..identify import Fit, identify
 from ..log import Log
 from ..model import Model
-from .held_out import hold_out
+from .held_out import hold_out, serving
 from .search import Search
 from .steps import way
 from .study import AddedEffect, Study
@@ -93,7 +93,7 @@ def improve(
     left = Left(
         diagnoses[0].omnibus,
         last.omnibus if last.fit is fit else omnibus(fit, train_driving),
-        omnibus(fit, test_driving) if len(fits) > 1 else None,
+        omnibus(serving(fit, test_driving), test_driving) if len(fits) > 1 else None,
         any(c.p_value < SURE for c in last.significant)
         if len(fits) > 1
         else bool(last.significant),

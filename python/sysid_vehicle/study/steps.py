@@ -78,17 +78,20 @@ def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:
     gain, error = gain_in_log_likelihood(fit, c.fit, test, same_noise=True)
     fall, fall_error = fall_in_error(fit, c.fit, test)
     own, own_error = gain_in_log_likelihood(fit, c.fit, test)
+    witnesses = ((gain, error), (own, own_error), (fall, fall_error))
+    # Gains of the noise floor weigh the channels as no rough road would, and noise may be surer than
+    # it may be there: where two are sure, the third need only not speak against it.
+    sure = sum(v > _DOUBT * e for v, e in witnesses)
+    if sure >= 2 and all(v > -_DOUBT * e for v, e in witnesses):
+        return gain, True
     if fall <= 0.0:
-        # Gains of the noise floor weigh the channels as no rough road would. Where the likelihood
-        # is sure by either noise, the error need only not be shown to grow.
-        sure = gain > _DOUBT * error and own > _DOUBT * own_error
-        return gain, sure and fall > -_DOUBT * fall_error
+        return gain, False
     if gain <= error:
         # What a model lacks makes its noise large, and large noise hides what another does better.
         # By noise of their own the other has to be better beyond doubt.
         return gain, own > _DOUBT * own_error and fall > fall_error
-    if own > own_error or not np.isfinite(c.std).all():
-        return gain, True  # what the fit never felt of an effect may well be missing elsewhere
+    if own > own_error:
+        return gain, True
     # It is surer than it may be there, as is the right one beside another that acts there only. But
     # what is not in the car explains far less of other driving than of that it was fitted to.
     promised, seen = (_share(fit, c.fit, driving) for driving in (c.fit.driving, test))

@@ -1,0 +1,76 @@
+"""Other driving is predicted with parameters that are no surer than the fit left them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Fit, Log, Model, drive, identify, manoeuvres
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.identify import predict
+from sysid_vehicle.identify.predictive import _remembered
+
+
+@pytest.fixture(scope="module")
+def gentle(start: Model, truth: Model) -> Fit:
+    """Tells the cornering stiffness, and nothing of the peak."""
+    return identify(start, drive(truth, manoeuvres.sine_sweep(), seed=1), starts=2)
+
+
+def plain(fit: Fit, driving: Driving) -> float:
+    """Log density at the fitted values, in the units of `predict`."""
+    trace = driving.problem(fit.model).trace(fit.model.vector(), fit.noise.vector(), False)
+    return float(np.sum(trace["log_density"]) - 0.5 * np.sum(trace["whitened"] ** 2))
+
+
+def test_it_is_the_integral_over_the_parameters(
+    fit: Fit, truth: Model, course: Log, rng: np.random.Generator
+) -> None:
+    """By importance sampling, where hours of driving leave little unsure."""
+    # The truth is far from all bounds, at which the approximation would be a poor one.
+    long = replace(fit, model=truth, driving=Driving.of([*fit.driving.logs * 30]))
+    other = Driving.of([course] * 10)
+    found = predict(long, other, fit.noise)
+    whole = _remembered(long, other)
+    # One course stands for all of them: they are alike.
+    problem, noise = Driving.of(course).problem(fit.model), fit.noise.vector()
+    p = found.model.vector()
+    centre = p[whole.box.columns].copy()
+    _, _, learnt = problem.normal_equations(p, problem.freeze(p, noise), whole.box.columns)
+    units = whole.units(centre)
+    root = np.linalg.cholesky(
+        np.linalg.inv(whole.information + 10.0 * learnt * np.outer(units, units))
+    )
+    half_log_det = 0.5 * np.linalg.slogdet(whole.information)[1] + np.log(np.diag(root)).sum()
+    at_fit = problem.freeze(truth.vector(), noise).log_likelihood
+    terms = []
+    for z in rng.standard_normal((400, len(centre))):
+        step = root @ z
+        p[whole.box.columns] = np.where(units == 1.0, centre + step, centre * np.exp(step))
+        ahead = problem.freeze(p, noise).log_likelihood - at_fit
+        terms.append(10.0 * ahead - whole.price(p) + half_log_det + 0.5 * z @ z)
+    integral = float(np.logaddexp.reduce(terms) - np.log(len(terms)))
+    assert abs(integral) > 2.0
+    gain = found.log_density.sum() - plain(long, other)
+    assert gain == pytest.approx(integral, abs=0.3)
+
+
+def test_what_the_fit_never_saw_is_no_reason_to_fail(gentle: Fit, lap: Log, truth: Model) -> None:
+    other = Driving.of(lap)
+    found = predict(gentle, other, gentle.noise)
+    best = plain(replace(gentle, model=truth), other)
+    assert plain(gentle, other) < best - 100.0
+    assert found.log_density.sum() > best - 40.0
+    assert plain(replace(gentle, model=found.model), other) > best - 20.0
+
+
+def test_what_both_drivings_saw_lies_between(
+    fit: Fit, truth: Model, lap: Log, start: Model
+) -> None:
+    stiff = truth.with_values({"B_front": 1.02 * truth.value("B_front")})
+    other = Driving.of(drive(stiff, manoeuvres.lap(40.0), seed=1))
+    both = replace(fit, model=predict(fit, other, fit.noise).model)
+    anew = identify(start, other, starts=1)
+    one, between, two = (f.derived[0] for f in (fit, both, anew))
+    assert two.value - one.value > 5.0 * one.std
+    assert one.value + 2.0 * one.std < between.value < two.value - 2.0 * two.std
