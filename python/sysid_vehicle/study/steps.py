@@ -79,8 +79,8 @@ def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:
     fall, fall_error = fall_in_error(fit, c.fit, test)
     own, own_error = gain_in_log_likelihood(fit, c.fit, test)
     witnesses = ((gain, error), (own, own_error), (fall, fall_error))
-    # Gains of the noise floor weigh the channels as no rough road would, and noise may be surer than
-    # it may be there: where two are sure, the third need only not speak against it.
+    # Gains of the noise floor weigh the channels as no rough road would, and noise may be surer
+    # than it may be there: where two are sure, the third need only not speak against it.
     sure = sum(v > _DOUBT * e for v, e in witnesses)
     if sure >= 2 and all(v > -_DOUBT * e for v, e in witnesses):
         return gain, True
