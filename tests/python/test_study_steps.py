@@ -163,6 +163,9 @@ def test_what_holds_on_held_out_driving(
     monkeypatch.setattr(steps, "_share", lambda *a: 0.2 if a[2] is driving[1] else 0.9)
     (drag,) = (c for c in dx.ranking if c.id == "aero_drag")
     assert _held_out_gain(baseline, drag, driving[1]) == (same[0], holds)
+    # What only acts like something is worth having where the error falls.
+    monkeypatch.setattr(steps, "_can_be", lambda _: False)
+    assert _held_out_gain(baseline, drag, driving[1]) == (same[0], holds and fall[0] > 0.0)
 
 
 def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(

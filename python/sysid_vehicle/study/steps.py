@@ -80,10 +80,11 @@ def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:
     own, own_error = gain_in_log_likelihood(fit, c.fit, test)
     witnesses = ((gain, error), (own, own_error), (fall, fall_error))
     # Gains of the noise floor weigh the channels as no rough road would, and noise may be surer
-    # than it may be there: where two are sure, the third need only not speak against it.
+    # than it may be there: where two are sure, the third need only not speak against it. What only
+    # acts like something is worth having where the error falls.
     sure = sum(v > _DOUBT * e for v, e in witnesses)
     if sure >= 2 and all(v > -_DOUBT * e for v, e in witnesses):
-        return gain, True
+        return gain, fall > 0.0 or _can_be(c)
     if fall <= 0.0:
         return gain, False
     if gain <= error:
