@@ -98,11 +98,16 @@ def _naming(outcomes: Sequence[Outcome]) -> list[Row]:
         these = [o for o in every if o["trial"]["severity"] == s]
         rows.append((f"detected at severity {s:g}", str(Rate.over(map(detected, these))), ""))
     rows += [
-        ("of these named first", str(Rate.over(map(named_first, found))), ">= 97 %"),
-        ("true one in the named group", str(Rate.over(map(in_group, found))), ">= 99 %"),
+        ("of these named first", str(_rate(named_first, found)), ">= 97 %"),
+        ("  where all manoeuvres were driven", str(_rate(named_first, _with_all(found))), ""),
+        ("true one in the named group", str(_rate(in_group, found)), ">= 99 %"),
         ("mean size of the group", _mean(1 + len(o["leader_group"]) for o in found), "<= 1.3"),
     ]
     return rows
+
+
+def _with_all(outcomes: Sequence[Outcome]) -> list[Outcome]:
+    return [o for o in outcomes if o["trial"]["driving"] == "all"]
 
 
 def _mean(values: object) -> str:
@@ -179,17 +184,21 @@ def _kinematic(outcomes: Sequence[Outcome]) -> list[Row]:
 
 def _pairs(outcomes: Sequence[Outcome]) -> list[Row]:
     found = _of(outcomes, "pair")
-    both = Rate.over(set(o["added"]) == set(o["trial"]["truth"]) for o in found)
     with_groups = Rate.over(_both_in_groups(o) for o in found)
     one = Rate.over(bool(set(o["added"]) & set(o["trial"]["truth"])) for o in found)
     # A weave in the linear range tells nothing of a load transfer, whoever looks at it.
-    shown = Rate.over(set(o["added"]) == set(o["trial"]["truth"]) for o in found if o.get("shown"))
+    shown = [o for o in found if o.get("shown")]
     return [
-        ("both found, nothing else", str(both), ">= 85 %"),
-        ("  of those that the driving tells apart from one", str(shown), ""),
+        ("both found, nothing else", str(_rate(_just_these, found)), ">= 85 %"),
+        ("  of those that the driving tells apart from one", str(_rate(_just_these, shown)), ""),
+        ("  where all manoeuvres were driven", str(_rate(_just_these, _with_all(found))), ""),
         ("both found or in the groups, nothing else", str(with_groups), ""),
         ("one of them found at least", str(one), ""),
     ]
+
+
+def _just_these(o: Outcome) -> bool:
+    return set(o["added"]) == set(o["trial"]["truth"])
 
 
 def _both_in_groups(o: Outcome) -> bool:

@@ -188,7 +188,9 @@ def _signals(done: Drive) -> tuple[Array, Array, Array, Array]:
 def _rear_tyre_bump(done: Drive, s: float) -> Array:
     """A rear tyre that is stronger at one slip angle than any Magic Formula."""
     _, _, slip, _ = _signals(done)
-    bump = 250.0 * s * np.sign(slip) * np.exp(-(((np.abs(slip) - 0.035) / 0.02) ** 2))
+    # Without a jump where the car goes straight, across which force and motion never agree.
+    side = np.tanh(slip / 0.005)
+    bump = 250.0 * s * side * np.exp(-(((np.abs(slip) - 0.035) / 0.02) ** 2))
     return np.column_stack([0.0 * bump, bump, -done.model.vehicle.lr_m * bump])
 
 

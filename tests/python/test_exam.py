@@ -171,7 +171,7 @@ def test_an_exam_goes_on_where_it_was_broken_off(
 
 
 def test_what_is_outside_the_catalogue_pushes_the_car(exam: SimpleNamespace) -> None:
-    for name in ("crowned road", "cornering drag by temperature"):
+    for name in ("crowned road", "cornering drag by temperature", "rear tyre bump"):
         trial = exam.design.Trial("outside", (name,), 2.0, "sweep", "nominal", False, "hatchback")
         (log,), _, ease = exam.truths.sample(trial)
         nothing = exam.design.Trial("null", (), 1.0, "sweep", "nominal", False, "hatchback")
