@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from sysid_vehicle.diagnose.projection import (
     long_run_ratio,
@@ -61,3 +62,22 @@ def test_where_no_direction_is_left_there_are_no_terms(rng: np.random.Generator)
     e = rng.standard_normal(5 * 40)
     terms = score_terms(np.empty((len(e), 0)), e, np.empty((0, 0)))
     assert terms.shape == (40, 0)
+
+
+@pytest.mark.parametrize(("seconds", "least"), [(0.05, 0.73), (0.4, 0.45)])
+def test_colour_is_seen_whatever_its_correlation_time(
+    rng: np.random.Generator, seconds: float, least: float
+) -> None:
+    n, columns = 3000, 40
+    keep = np.exp(-0.02 / seconds)
+    white = rng.standard_normal((n, columns))
+    wander = lfilter(
+        [np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal((n, columns)), axis=0
+    )
+    variance = 1.0 + 0.6**2
+    true = (1.0 + 0.6**2 * (1.0 + keep) / (1.0 - keep)) / variance
+    found = long_run_ratios(white + 0.6 * wander, np.full(columns, n * variance))
+    # Less what it may be by chance, which is more the more lags it takes to see it.
+    assert least * true < np.median(found) < true
+    none = long_run_ratios(white, np.full(columns, float(n)))
+    assert np.mean(none > 1.0) < 0.2
