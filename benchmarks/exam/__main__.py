@@ -58,7 +58,12 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--driving", nargs="+", choices=MANOEUVRES, default=MANOEUVRES)
     parser.add_argument("--severity", nargs="+", type=float, choices=SEVERITIES, default=SEVERITIES)
-    parser.add_argument("--repeats", type=int, default=1, help="of each point of the full grid")
+    parser.add_argument(
+        "--repeats",
+        type=int,
+        default=1,
+        help="of each point of the full grid, 25 times as many where nothing is hidden",
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--only", choices=NAMES, help="this table, and the trials it needs")
@@ -71,7 +76,7 @@ def _trials(args: argparse.Namespace) -> tuple[Trial, ...]:
     if args.full or args.draw:
         trials = tuple(
             t
-            for t in full(args.repeats)
+            for t in full(args.repeats, 25 * args.repeats)
             if t.driving in args.driving and (t.severity in args.severity or t.kind == "null")
         )
         if args.draw:
