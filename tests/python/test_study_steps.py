@@ -12,6 +12,7 @@ from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
 from sysid_vehicle.study import steps
 from sysid_vehicle.study.held_out import (
+    as_sure,
     error_falls,
     fall_in_error,
     gain_in_log_likelihood,
@@ -161,11 +162,37 @@ def test_what_holds_on_held_out_driving(
     monkeypatch.setattr(steps, "fall_in_error", lambda *_: fall)
     # It explains far less of the held-out driving than of that it was fitted to.
     monkeypatch.setattr(steps, "_share", lambda *a: 0.2 if a[2] is driving[1] else 0.9)
+    monkeypatch.setattr(steps, "as_sure", lambda *_: False)
     (drag,) = (c for c in dx.ranking if c.id == "aero_drag")
     assert _held_out_gain(baseline, drag, driving[1]) == (same[0], holds)
     # What only acts like something is worth having where the error falls.
     monkeypatch.setattr(steps, "_can_be", lambda _: False)
     assert _held_out_gain(baseline, drag, driving[1]) == (same[0], holds and fall[0] > 0.0)
+
+
+def test_the_likelihood_has_the_last_word_where_noise_did_not_grow(
+    monkeypatch: pytest.MonkeyPatch,
+    dx: Diagnosis,
+    baseline: Fit,
+    driving: tuple[Driving, Driving],
+) -> None:
+    (drag,) = (c for c in dx.ranking if c.id == "aero_drag")
+    own = {"gain": 150.0}
+    monkeypatch.setattr(steps, "fall_in_error", lambda *_: (-90.0, 30.0))
+    monkeypatch.setattr(
+        steps,
+        "gain_in_log_likelihood",
+        lambda *_, same_noise=False: (-90.0 if same_noise else own["gain"], 30.0),
+    )
+    assert drag.fit is not None
+    assert as_sure(baseline, drag.fit, driving[1])
+    assert not as_sure(drag.fit, baseline, driving[1])
+    assert _held_out_gain(baseline, drag, driving[1]) == (-90.0, True)
+    own["gain"] = 90.0
+    assert _held_out_gain(baseline, drag, driving[1]) == (-90.0, False)
+    own["gain"] = 150.0
+    monkeypatch.setattr(steps, "_can_be", lambda _: False)
+    assert _held_out_gain(baseline, drag, driving[1]) == (-90.0, False)
 
 
 def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(

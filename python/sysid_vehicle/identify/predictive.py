@@ -94,10 +94,13 @@ class Prediction:
     log_density : array, shape (n,)
         Sample by sample, up to what all models share; what the parameters had to move for, and how
         unsure they were, is shared out evenly.
+    sureness : float
+        Mean log density of a sample that is just as predicted.
     """
 
     model: Model
     log_density: FloatArray
+    sureness: float
 
 
 def predict(fit: Fit, driving: Driving, noise: NoiseModel) -> Prediction:
@@ -139,7 +142,9 @@ def predict(fit: Fit, driving: Driving, noise: NoiseModel) -> Prediction:
     trace = other.problem.trace(p, noise.vector(), False)
     density = -0.5 * np.sum(trace["whitened"] ** 2, axis=1) + trace["log_density"]
     density -= (other.price(p) + other.occam(p, frozen)) / len(density)
-    return Prediction(fit.model.from_vector(p), as_float64(density))
+    return Prediction(
+        fit.model.from_vector(p), as_float64(density), float(np.mean(trace["log_density"]))
+    )
 
 
 def _remembered(fit: Fit, driving: Driving) -> _Remembered:

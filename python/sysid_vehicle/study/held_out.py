@@ -12,10 +12,11 @@ from .. import _core
 from .._arrays import FloatArray
 from ..errors import InvalidInput, warn
 from ..estimate import Driving
-from ..identify import Fit, predict
+from ..identify import Fit, Prediction, predict
 from ..log import Log
 
 __all__ = [
+    "as_sure",
     "error_falls",
     "fall_in_error",
     "gain_in_log_likelihood",
@@ -62,18 +63,30 @@ def gain_in_log_likelihood(
     driving gains minus infinity.
     """
     try:
-        before = _density(poorer, test, poorer)
-        after = _density(richer, test, poorer if same_noise else richer)
+        before = _prediction(poorer, test, poorer)
+        after = _prediction(richer, test, poorer if same_noise else richer)
     except (_core.NumericalFailure, np.linalg.LinAlgError):
         return -np.inf, 0.0
-    return _with_error(after - before, test)
+    return _with_error(after.log_density - before.log_density, test)
+
+
+def as_sure(poorer: Fit, richer: Fit, test: Driving) -> bool:
+    """Whether the richer model, with noise of its own, is no less sure of held-out driving.
+
+    What such a model gains does not come from having learnt larger noise.
+    """
+    try:
+        before, after = (_prediction(fit, test, fit) for fit in (poorer, richer))
+    except (_core.NumericalFailure, np.linalg.LinAlgError):
+        return False
+    return after.sureness >= before.sureness
 
 
 # The poorer model of all candidates of a step is the same one.
 @lru_cache(maxsize=8)
-def _density(fit: Fit, test: Driving, like: Fit) -> FloatArray:
-    """Of held-out driving under a fit, with another's noise."""
-    return predict(fit, test, like.noise.elsewhere(fit.model.vehicle)).log_density
+def _prediction(fit: Fit, test: Driving, like: Fit) -> Prediction:
+    """Of held-out driving by a fit, with another's noise."""
+    return predict(fit, test, like.noise.elsewhere(fit.model.vehicle))
 
 
 def serving(fit: Fit, test: Driving) -> Fit:

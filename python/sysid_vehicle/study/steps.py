@@ -12,7 +12,13 @@ from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter, effect
 from ..estimate import Driving
 from ..identify import Estimate, Fit, refine
-from .held_out import error_falls, fall_in_error, gain_in_log_likelihood, share_explained
+from .held_out import (
+    as_sure,
+    error_falls,
+    fall_in_error,
+    gain_in_log_likelihood,
+    share_explained,
+)
 
 __all__ = [
     "alternatives",
@@ -29,7 +35,7 @@ _IDLE = 2.6  # an effect within so many standard errors of nothing is none
 _NEAR = 0.6  # of the evidence for the chosen effect
 _ALTERNATIVES = 2
 _KEPT = 0.5  # of the share of the error that an effect explains, on driving it was not fitted to
-_DOUBT = 2.0  # standard errors
+_DOUBT, _SURE = 2.0, 4.0  # standard errors
 _SAME = 0.05  # twice the nats between two fits that say the same
 _BETTER = 4.5  # nats, beyond the Bayesian price of the parameters: three standard errors
 
@@ -85,6 +91,11 @@ def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:
     sure = sum(v > _DOUBT * e for v, e in witnesses)
     if sure >= 2 and all(v > -_DOUBT * e for v, e in witnesses):
         return gain, fall > 0.0 or _can_be(c)
+    # Coloured noise of sensors is predicted best by a model that takes it for motion: its errors
+    # one step ahead are smaller than those of the true car. The likelihood is not deceived, unless
+    # by noise that grew.
+    if own > _SURE * own_error and _can_be(c) and as_sure(fit, c.fit, test):
+        return gain, True
     if fall <= 0.0:
         return gain, False
     if gain <= error:
