@@ -20,9 +20,7 @@ __all__ = ["SURE", "Left", "verdict_on"]
 
 SURE = 0.01  # evidence of one effect more: at 5 % it would spoil one complete model in twenty
 _MOST = 0.9  # share of what is missing: stand-ins take up four fifths and more of it
-_REMAINS = (
-    0.6  # share of the evidence: right ones leave less than half beside others, stand-ins most
-)
+_REMAINS = 0.6  # of the evidence: right ones beside others leave less than half, stand-ins most
 _LEFT = 1e-3  # evidence of something left, beside which an effect alone is not what is missing
 _BEYOND = 1e-4  # the same on held-out driving: tyres known only in part go on otherwise there
 
