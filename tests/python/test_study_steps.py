@@ -23,7 +23,6 @@ from sysid_vehicle.study.steps import (
     _distance,
     _held_out_gain,
     _mattering,
-    _share,
     alternatives,
     better,
     exchanged,
@@ -135,13 +134,18 @@ def test_held_out_driving_has_a_say_between_what_the_fit_cannot_tell_apart(
         ((90.0, 30.0), (40.0, 30.0), (-9.0, 30.0), False),
         # Noise of its own may be too sure, which the others know better,
         ((90.0, 30.0), (-9.0, 30.0), (90.0, 30.0), True),
+        ((40.0, 30.0), (-9.0, 30.0), (40.0, 30.0), True),
         # but not where it speaks against it.
         ((90.0, 30.0), (-90.0, 30.0), (90.0, 30.0), False),
-        ((90.0, 30.0), (-9.0, 30.0), (40.0, 30.0), False),
-        # Large noise of the poorer model hides the gain: the richer one's own has to be sure.
-        ((9.0, 30.0), (90.0, 30.0), (90.0, 30.0), True),
-        ((9.0, 30.0), (40.0, 30.0), (90.0, 30.0), False),
+        # Large noise of the poorer model hides the gain: where the error falls the others do,
+        ((9.0, 30.0), (40.0, 30.0), (40.0, 30.0), True),
+        ((-9.0, 30.0), (40.0, 30.0), (40.0, 30.0), True),
+        # unless the gain is lost.
+        ((-90.0, 30.0), (40.0, 30.0), (40.0, 30.0), False),
+        # One alone does not.
         ((9.0, 30.0), (90.0, 30.0), (9.0, 30.0), False),
+        ((90.0, 30.0), (9.0, 30.0), (9.0, 30.0), False),
+        ((9.0, 30.0), (9.0, 30.0), (90.0, 30.0), False),
     ],
 )
 def test_what_holds_on_held_out_driving(
@@ -160,8 +164,6 @@ def test_what_holds_on_held_out_driving(
 
     monkeypatch.setattr(steps, "gain_in_log_likelihood", gain)
     monkeypatch.setattr(steps, "fall_in_error", lambda *_: fall)
-    # It explains far less of the held-out driving than of that it was fitted to.
-    monkeypatch.setattr(steps, "_share", lambda *a: 0.2 if a[2] is driving[1] else 0.9)
     monkeypatch.setattr(steps, "as_sure", lambda *_: False)
     (drag,) = (c for c in dx.ranking if c.id == "aero_drag")
     assert _held_out_gain(baseline, drag, driving[1]) == (same[0], holds)
@@ -209,13 +211,16 @@ def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(
     assert gain is not None
     assert not np.isfinite(gain["force_gain.brake_error"].std)
     # At its value in the fit, the null value, the other half spoils what this one explains.
-    assert _share(fit, gain, fit.driving) == pytest.approx(1.0, abs=0.05)
-    assert 0.2 < _share(fit, gain, test) < 0.6
+    shares = [
+        share_explained(compare(fit, d, noise=gain.noise).error, compare(gain, d).error)
+        for d in (fit.driving, test)
+    ]
+    assert shares[0] == pytest.approx(1.0, abs=0.05)
+    assert 0.2 < shares[1] < 0.6
     ahead, error = gain_in_log_likelihood(fit, gain, test)
     assert ahead > 2.0 * error > 0.0
     chosen = first_that_holds(dx, fit, test)
     assert chosen is not None
-    assert _share(gain, gain, test) == 0.0
 
 
 def test_the_share_explained_is_of_what_is_beyond_the_noise_floor() -> None:

@@ -7,18 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .. import _core
-from ..compare import compare
 from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter, effect
 from ..estimate import Driving
 from ..identify import Estimate, Fit, refine
-from .held_out import (
-    as_sure,
-    error_falls,
-    fall_in_error,
-    gain_in_log_likelihood,
-    share_explained,
-)
+from .held_out import as_sure, error_falls, fall_in_error, gain_in_log_likelihood
 
 __all__ = [
     "alternatives",
@@ -34,8 +27,7 @@ __all__ = [
 _IDLE = 2.6  # an effect within so many standard errors of nothing is none
 _NEAR = 0.6  # of the evidence for the chosen effect
 _ALTERNATIVES = 2
-_KEPT = 0.5  # of the share of the error that an effect explains, on driving it was not fitted to
-_DOUBT, _SURE = 2.0, 4.0  # standard errors
+_LEANING, _CLEAR, _SURE = 1.0, 2.0, 4.0  # standard errors
 _SAME = 0.05  # twice the nats between two fits that say the same
 _BETTER = 4.5  # nats, beyond the Bayesian price of the parameters: three standard errors
 
@@ -79,41 +71,29 @@ def _sound(c: Candidate) -> bool:
 
 
 def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:
-    """What a candidate gains on held-out driving, and whether it holds there."""
+    """What a candidate gains on held-out driving, and whether it holds there.
+
+    Three measures are asked, and none is always right: the noise of the poorer model may be so
+    large that it hides what another does better, that of the richer one surer than it may be there,
+    and the noise floor weighs the channels as no rough road would. Two have to speak for it.
+    """
     assert c.fit is not None
     gain, error = gain_in_log_likelihood(fit, c.fit, test, same_noise=True)
-    fall, fall_error = fall_in_error(fit, c.fit, test)
     own, own_error = gain_in_log_likelihood(fit, c.fit, test)
-    witnesses = ((gain, error), (own, own_error), (fall, fall_error))
-    # Gains of the noise floor weigh the channels as no rough road would, and noise may be surer
-    # than it may be there: where two are sure, the third need only not speak against it. What only
-    # acts like something is worth having where the error falls.
-    sure = sum(v > _DOUBT * e for v, e in witnesses)
-    if sure >= 2 and all(v > -_DOUBT * e for v, e in witnesses):
-        return gain, fall > 0.0 or _can_be(c)
+    fall, fall_error = fall_in_error(fit, c.fit, test)
+    measures = ((gain, error), (own, own_error), (fall, fall_error))
+
+    def two_beyond(doubt: float) -> bool:
+        return sum(v > doubt * e for v, e in measures) >= 2
+
+    if all(v > -_CLEAR * e for v, e in measures) and (
+        two_beyond(_LEANING) if fall > 0.0 else _can_be(c) and two_beyond(_CLEAR)
+    ):
+        return gain, True
     # Coloured noise of sensors is predicted best by a model that takes it for motion: its errors
     # one step ahead are smaller than those of the true car. The likelihood is not deceived, unless
     # by noise that grew.
-    if own > _SURE * own_error and _can_be(c) and as_sure(fit, c.fit, test):
-        return gain, True
-    if fall <= 0.0:
-        return gain, False
-    if gain <= error:
-        # What a model lacks makes its noise large, and large noise hides what another does better.
-        # By noise of their own the other has to be better beyond doubt.
-        return gain, own > _DOUBT * own_error and fall > fall_error
-    if own > own_error:
-        return gain, True
-    # It is surer than it may be there, as is the right one beside another that acts there only. But
-    # what is not in the car explains far less of other driving than of that it was fitted to.
-    promised, seen = (_share(fit, c.fit, driving) for driving in (c.fit.driving, test))
-    return gain, seen > _KEPT * promised
-
-
-def _share(poorer: Fit, richer: Fit, driving: Driving) -> float:
-    """Of what the poorer model leaves, by the noise floor of the richer one."""
-    before = compare(poorer, driving, noise=richer.noise).error
-    return share_explained(before, compare(richer, driving).error)
+    return gain, own > _SURE * own_error and _can_be(c) and as_sure(fit, c.fit, test)
 
 
 def _can_be(c: Candidate) -> bool:
