@@ -138,3 +138,10 @@ def test_verdicts_show_themselves(judged: Verdicts) -> None:
     assert judged.to_dict()["steer_offset"]["finding"] == "missing"
     with pytest.raises(KeyError, match="there are"):
         judged["magic"]
+
+
+def test_one_that_only_acted_like_others_names_them() -> None:
+    of = EffectVerdict(effect("mass"), "proxy", group=("steer_lag",))
+    assert of.sentence == "only acted like what steer_lag explains"
+    both = EffectVerdict(effect("mass"), "proxy", group=("steer_lag", "aero_drag"))
+    assert both.sentence == "only acted like what steer_lag, aero_drag explain"

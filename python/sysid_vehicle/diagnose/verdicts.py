@@ -79,7 +79,7 @@ class EffectVerdict:
         if self.finding == "one of a group":
             return f"missing, or else {rivals}, which this driving cannot tell from it; {size}"
         if self.finding == "proxy" and rivals:
-            return f"only acted like what {rivals} explains"
+            return f"only acted like what {rivals} explain{'s' if len(self.group) == 1 else ''}"
         if self.finding == "proxy":
             return f"something acts like it, but {self.because}: look elsewhere"
         if self.finding == "negligible":
