@@ -223,15 +223,6 @@ def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(
     assert chosen is not None
 
 
-def test_the_share_explained_is_of_what_is_beyond_the_noise_floor() -> None:
-    assert share_explained(2.0, 1.0) == 1.0
-    assert share_explained(2.0, 0.99) == 1.0
-    assert share_explained(3.0, np.sqrt(5.0)) == pytest.approx(0.5)
-    assert share_explained(2.0, 2.0) == 0.0
-    assert share_explained(2.0, 3.0) < 0.0
-    assert share_explained(1.0, 1.0) == 1.0
-
-
 def test_of_two_that_are_as_good_the_simpler_is_preferred(
     dx: Diagnosis, driving: tuple[Driving, Driving]
 ) -> None:

@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 _SHARE = 0.3
-_BLOCK_S = 5.0
+_PIECE_S, _FEWEST_PIECES = 5.0, 6
 
 
 def hold_out(
@@ -59,8 +59,8 @@ def gain_in_log_likelihood(
     what it never saw of the tyres does not drown what an effect explains. Each model predicts with
     its own noise, or both with that of the poorer one: a richer model that has only learnt larger
     noise gains by the first and loses by the second, and none is taken to be surer than
-    `NoiseModel.elsewhere`. The error comes from blocks of 5 s. A model that fails on the held-out
-    driving gains minus infinity.
+    `NoiseModel.elsewhere`. The error comes from pieces (`_with_error`). A model that fails on the
+    held-out driving gains minus infinity.
     """
     try:
         before = _prediction(poorer, test, poorer)
@@ -104,8 +104,8 @@ def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> tuple[float, float
     """By how much the sum of squared errors falls on held-out driving, and its standard error.
 
     Both models are measured by the noise floor of the richer one: noise of its own can make a model
-    likelier whose forces explain less than before. The error comes from blocks of 5 s. Where a
-    model fails there is no fall.
+    likelier whose forces explain less than before. The error comes from pieces (`_with_error`).
+    Where a model fails there is no fall.
     """
     floor = richer.noise.floor().vector()
     squares = []
@@ -119,10 +119,15 @@ def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> tuple[float, float
 
 
 def _with_error(difference: FloatArray, test: Driving) -> tuple[float, float]:
-    """The sum over all samples, and its standard error from what blocks of 5 s scatter."""
-    length = max(int(_BLOCK_S * test.logs[0].rate_hz), 1)
-    blocks = [difference[i : i + length].sum() for i in range(0, len(difference), length)]
-    return float(np.sum(difference)), float(np.std(blocks) * np.sqrt(len(blocks)))
+    """The sum over all samples, and its standard error from what pieces of the driving scatter.
+
+    They are of one length, or a steady gain would seem unsteady: 5 s, by when what disturbs a car
+    is another thing, and less where the driving is short, as few pieces tell nothing of scatter.
+    """
+    n = len(difference)
+    pieces = max(round(n / (_PIECE_S * test.logs[0].rate_hz)), _FEWEST_PIECES)
+    sums = [piece.sum() for piece in np.array_split(difference, min(pieces, n))]
+    return float(np.sum(difference)), float(np.std(sums, ddof=1) * np.sqrt(len(sums)))
 
 
 def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:

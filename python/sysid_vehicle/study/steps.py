@@ -27,7 +27,7 @@ __all__ = [
 _IDLE = 2.6  # an effect within so many standard errors of nothing is none
 _NEAR = 0.6  # of the evidence for the chosen effect
 _ALTERNATIVES = 2
-_LEANING, _CLEAR, _SURE = 1.0, 2.0, 4.0  # standard errors
+_LEANING, _CLEAR, _SURE = 1.0, 2.0, 4.5  # standard errors
 _SAME = 0.05  # twice the nats between two fits that say the same
 _BETTER = 4.5  # nats, beyond the Bayesian price of the parameters: three standard errors
 
