@@ -6,7 +6,8 @@ namespace sysid {
 
 namespace {
 
-constexpr int kSubsteps = 4;
+// More than an estimator takes: a car has no step error. Lags converge by an order less.
+constexpr int kSubsteps = 4, kSubstepsWithLags = 8;
 constexpr double kLostSideslip = 0.7;  // [rad]
 
 double towards(double from, double to, double step) {
@@ -88,6 +89,7 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
     const auto delay = static_cast<std::size_t>(std::lround(driver.reaction_s / dt));
     // Half of the reaction time is made up for by looking ahead; open-loop steering keeps its time.
     const std::size_t preview = driver.tracks_path ? 1 + delay / 2 : 1;
+    const int fewest = active_states(model.effects).count > 0 ? kSubstepsWithLags : kSubsteps;
     for (std::size_t k = 0; k < references.size(); ++k) {
         u.time_s = static_cast<double>(k) * dt;
         for (std::size_t i = 0; i < kMotionStates; ++i) push[i] = disturbance[3 * k + i];
@@ -110,7 +112,7 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
         Input next =
             hands.next(u, references[ahead], acceleration, {state[0], state[2], references[then]});
         next.time_s = u.time_s + dt;
-        const int substeps = std::max(kSubsteps, substeps_for(model, p, x[0], dt));
+        const int substeps = std::max(fewest, substeps_for(model, p, x[0], dt));
         advance(model, x, push.data(), u, next, p, dt, substeps);
         u = next;
     }

@@ -44,23 +44,30 @@ struct SingleTrack {
     HeldLoads held{};
     UserEffects user = nullptr;  // those that act; `effects` has no bits of theirs
 
-    /// Evaluates (1) to (5). `motion` = v_x, v_y, r; `push` = disturbance, see
-    /// `Push`; `aux` = auxiliary states; `rate` receives the derivatives of motion and aux.
+    /// Evaluates (1) to (5). `motion` = v_x, v_y, r; `push` = disturbance, see `Push`; `lags` =
+    /// how the auxiliary states move; `rate` receives the derivatives of the motion.
     template <class S, class T>
-    Workings<S> evaluate(const S* motion, const S* push, const S* aux, const Input& u, const T* p,
-                         S* rate, S* aux_rate) const {
-        for (int i = 0; i < kAuxiliaryStates; ++i) aux_rate[i] = S(0.0);
+    Workings<S> evaluate(const S* motion, const S* push, const Lags<S>& lags, const Input& u,
+                         const T* p, S* rate) const {
         // An accelerometer beside the centre of gravity makes the measured a_x, which stands for
         // the force, depend on the yaw acceleration it brings about. Each pass shrinks the error
         // by l_y dr/dt per a_x, a few hundredths.
         const int passes = !force_known && (effects & kReadYawAcceleration) != 0 ? 4 : 1;
         Workings<S> w;
         w.r_dot = S(0.0);
-        for (int i = 0; i < passes; ++i) once(w, motion, push, aux, u, p, aux_rate);
+        for (int i = 0; i < passes; ++i) once(w, motion, push, lags, u, p);
         rate[0] = w.a_x + w.v_y * w.r + w.gravity_x;
         rate[1] = w.a_y - w.v_x * w.r + w.gravity_y;
         rate[2] = w.r_dot;
         return w;
+    }
+
+    /// The same with the derivatives of the auxiliary states `aux`.
+    template <class S, class T>
+    Workings<S> evaluate(const S* motion, const S* push, const S* aux, const Input& u, const T* p,
+                         S* rate, S* aux_rate) const {
+        for (int i = 0; i < kAuxiliaryStates; ++i) aux_rate[i] = S(0.0);
+        return evaluate(motion, push, Lags<S>(LagStage::kRates, aux, aux_rate), u, p, rate);
     }
 
     /// What the sensors read: v_x, v_y, r, a_x, a_y.
@@ -77,18 +84,13 @@ struct SingleTrack {
         user_sensors(user, p + kBaseParameterCount, w, y);
     }
 
-    /// Fastest rate [1/s] of the motion and of the active effects, for choosing integration steps.
+    /// Fastest rate [1/s] of the motion, for choosing integration steps.
     double fastest_rate(const double* p, double v_x) const {
         const double load = car.mass_kg * car.gravity_mps2 / (car.lf_m + car.lr_m);
         const double c_f = p[kBFront] * p[kCFront] * p[kDFront] * load * car.lr_m;
         const double c_r = p[kBRear] * p[kCRear] * p[kDRear] * load * car.lf_m;
         const double yaw = (c_f * car.lf_m * car.lf_m + c_r * car.lr_m * car.lr_m) / p[kYawInertia];
-        double fastest = std::max(yaw, (c_f + c_r) / car.mass_kg) / v_x;
-        for_each_active(effects, p + kBaseParameterCount,
-                        [&](auto e, const double* own, std::size_t /*state*/) {
-                            fastest = std::max(fastest, e.rate(own, v_x));
-                        });
-        return fastest;
+        return std::max(yaw, (c_f + c_r) / car.mass_kg) / v_x;
     }
 
   private:
@@ -103,8 +105,8 @@ struct SingleTrack {
 
     // `w.r_dot` is the yaw acceleration as far as it is known.
     template <class S, class T>
-    void once(Workings<S>& w, const S* motion, const S* push, const S* aux, const Input& u,
-              const T* p, S* aux_rate) const {
+    void once(Workings<S>& w, const S* motion, const S* push, const Lags<S>& lags, const Input& u,
+              const T* p) const {
         begin(w, motion, u, p);
         const T* q = p + kBaseParameterCount;
         const auto each = [&](auto&& visit) { for_each_active(effects, q, visit); };
@@ -113,26 +115,23 @@ struct SingleTrack {
         // Backwards: what the sensors did last to the acceleration is undone first.
         for_each_active_backwards(effects, q,
                                   [&](auto e, const T* own, At) { return e.input(own, w); });
-        each([&](auto e, const T* own, At at) {
-            return e.steering(own, w, aux + at, aux_rate + at);
-        });
+        each([&](auto e, const T* own, At at) { return e.steering(own, w, lags.from(at)); });
         settle_outside_forces(w, push);
         each([&](auto e, const T* own, At) { return e.body(own, w); });
         user_body(user, q, w);
         slip_angles(w);
-        each([&](auto e, const T* own, At at) { return e.slip(own, w, aux + at, aux_rate + at); });
+        each([&](auto e, const T* own, At at) { return e.slip(own, w, lags.from(at)); });
         const S mu_f = magic_formula(w.alpha_f, front_tyre(p));
         const S mu_r = magic_formula(w.alpha_r, rear_tyre(p));
         axle_loads(w, mu_f);
         each([&](auto e, const T* own, At) { return e.loads(own, w); });
-        each([&](auto e, const T* own, At at) { return e.grip(own, w, aux + at); });
+        each([&](auto e, const T* own, At at) { return e.grip(own, w, lags.from(at).states()); });
         w.fy_f = (held.on ? S(held.front_n) : w.fz_f) * mu_f * w.grip_f;
         w.fy_r = (held.on ? S(held.rear_n) : w.fz_r) * mu_r * w.grip_r;
         each([&](auto e, const T* own, At) { return e.forces(own, w); });
         user_forces(user, q, w);
         balance(w);
-        each(
-            [&](auto e, const T* own, At at) { return e.follow(own, w, aux + at, aux_rate + at); });
+        each([&](auto e, const T* own, At at) { return e.follow(own, w, lags.from(at)); });
     }
 
     template <class S, class T>

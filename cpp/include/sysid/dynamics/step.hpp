@@ -1,4 +1,5 @@
-// One sampling interval of the model: classical Runge-Kutta with the inputs linear in between.
+// One sampling interval of the model: classical Runge-Kutta with the inputs linear in between, and
+// lags by their exact solution.
 //
 // A cruder rule would be read as a missing lag: 60 s of driving resolve about a millisecond.
 #pragma once
@@ -37,42 +38,93 @@ inline int substeps_for(const SingleTrack& model, const double* p, double v_x, d
     return static_cast<int>(std::clamp(std::ceil(dt * rate / 0.8), 1.0, 1.0 * kMostSubsteps));
 }
 
-template <class S, class T>
-ModelState<S> model_rate(const SingleTrack& model, const ModelState<S>& x, const S* push,
-                         const Input& u, const T* p) {
-    ModelState<S> rate;
-    model.evaluate(x.data(), push, x.data() + kMotionStates, u, p, rate.data(),
-                   rate.data() + kMotionStates);
-    return rate;
+/// What the lags of one model need to remember within a step.
+template <class S>
+class LagMemory {
+  public:
+    LagStep<S> begin(const ModelState<S>& x, double h) {
+        exact_.fill(false);
+        LagStep<S> step;
+        step.before = x.data() + kMotionStates;
+        step.after = after_.data();
+        step.target_start = target_start_.data();
+        step.target_middle = target_middle_.data();
+        step.target_again = target_again_.data();
+        step.rate_start = rate_start_.data();
+        step.rate_middle = rate_middle_.data();
+        step.exact = exact_.data();
+        step.h = h;
+        return step;
+    }
+    bool exact(std::size_t i) const { return exact_[i]; }
+    const S& after(std::size_t i) const { return after_[i]; }
+
+  private:
+    using States = std::array<S, kAuxiliaryStates>;
+    States after_, target_start_, target_middle_, target_again_, rate_start_, rate_middle_;
+    std::array<bool, kAuxiliaryStates> exact_{};
+};
+
+/// Stands in for it where a model has no states of its own.
+template <class S>
+struct NoLags {
+    LagStep<S> begin(const ModelState<S>& /*x*/, double /*h*/) { return {}; }
+    bool exact(std::size_t /*i*/) const { return false; }
+    S after(std::size_t /*i*/) const { return S(0.0); }
+};
+
+/// One classical Runge-Kutta step of the motion. Lags move by their exact solution between the
+/// targets of its stages, slow states with the motion.
+template <class S, class T, class Memory>
+void runge_kutta_step(const SingleTrack& model, ModelState<S>& x, const S* push, const Input& from,
+                      const Input& to, const T* p, double h, const ActiveStates& own,
+                      Memory& memory) {
+    const LagStep<S> lags = memory.begin(x, h);
+    const auto rate = [&](LagStage stage, const ModelState<S>& at, const Input& u) {
+        ModelState<S> k{};
+        S* own_rate = k.data() + kMotionStates;
+        model.evaluate(at.data(), push, Lags<S>(stage, at.data() + kMotionStates, own_rate, lags),
+                       u, p, k.data());
+        return k;
+    };
+    const auto for_moved = [&](auto&& use) {
+        for (std::size_t i = 0; i < kMotionStates; ++i) use(i);
+        for (std::size_t i : own)
+            if (!memory.exact(i)) use(kMotionStates + i);
+    };
+    const auto moved = [&](const ModelState<S>& k, double by) {
+        ModelState<S> at;
+        for_moved([&](std::size_t i) { at[i] = x[i] + by * k[i]; });
+        return at;
+    };
+    const Input half = between(from, to, 0.5);
+    const auto k1 = rate(LagStage::kStart, x, from);
+    const auto k2 = rate(LagStage::kMiddle, moved(k1, 0.5 * h), half);
+    const auto k3 = rate(LagStage::kMiddleAgain, moved(k2, 0.5 * h), half);
+    const auto k4 = rate(LagStage::kEnd, moved(k3, h), to);
+    for_moved([&](std::size_t i) { x[i] += (h / 6.0) * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]); });
+    if (own.count == 0) return;
+    // What stiff lags end at is their target at the end, of which the last stage has a guess.
+    rate(LagStage::kEnd, x, to);
+    for (std::size_t i : own)
+        if (memory.exact(i)) x[kMotionStates + i] = memory.after(i);
 }
 
 /// Moves `x` over `dt` seconds in `substeps` equal parts; `push` is held.
 template <class S, class T>
 void advance(const SingleTrack& model, ModelState<S>& x, const S* push, const Input& from,
              const Input& to, const T* p, double dt, int substeps) {
-    const double h = dt / substeps;
     const ActiveStates own = active_states(model.effects);
-    const auto moved = [&](const ModelState<S>& a, const ModelState<S>& k, double by) {
-        ModelState<S> b;
-        for (std::size_t i = 0; i < kMotionStates; ++i) b[i] = a[i] + by * k[i];
-        for (std::size_t i : own)
-            b[kMotionStates + i] = a[kMotionStates + i] + by * k[kMotionStates + i];
-        return b;
+    const auto steps = [&](auto&& memory) {
+        for (int n = 0; n < substeps; ++n)
+            runge_kutta_step(model, x, push, between(from, to, static_cast<double>(n) / substeps),
+                             between(from, to, (n + 1.0) / substeps), p, dt / substeps, own,
+                             memory);
     };
-    for (int n = 0; n < substeps; ++n) {
-        const Input u0 = between(from, to, static_cast<double>(n) / substeps);
-        const Input u1 = between(from, to, (n + 0.5) / substeps);
-        const Input u2 = between(from, to, (n + 1.0) / substeps);
-        const auto k1 = model_rate(model, x, push, u0, p);
-        const auto k2 = model_rate(model, moved(x, k1, 0.5 * h), push, u1, p);
-        const auto k3 = model_rate(model, moved(x, k2, 0.5 * h), push, u1, p);
-        const auto k4 = model_rate(model, moved(x, k3, h), push, u2, p);
-        const auto move = [&](std::size_t i) {
-            x[i] += (h / 6.0) * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
-        };
-        for (std::size_t i = 0; i < kMotionStates; ++i) move(i);
-        for (std::size_t i : own) move(kMotionStates + i);
-    }
+    if (own.count == 0)
+        steps(NoLags<S>{});
+    else
+        steps(LagMemory<S>{});
 }
 
 /// The sensors' readings in state `x`.
@@ -87,24 +139,20 @@ std::array<S, kChannels> sense(const SingleTrack& model, const ModelState<S>& x,
     return y;
 }
 
-/// Auxiliary states that have settled: the lagging quantities equal what they follow.
+/// Auxiliary states that have settled: they equal what they follow.
 template <class S, class T>
 void settle_auxiliary(const SingleTrack& model, ModelState<S>& x, const S* push, const Input& u,
                       const T* p) {
     const ActiveStates own = active_states(model.effects);
-    // Some follow others: as many rounds as there are states settle any chain of them.
-    for (std::size_t repeat = 0; repeat < own.count; ++repeat) {
-        const auto rate = model_rate(model, x, push, u, p);
-        for (std::size_t place : own) {
-            const std::size_t i = kMotionStates + place;
-            // All auxiliary states are first-order lags: rate = (target - state) / time constant.
-            ModelState<S> nudged = x;
-            nudged[i] += 1e-6;
-            const S slope = (model_rate(model, nudged, push, u, p)[i] - rate[i]) / 1e-6;
-            if (value_of(slope) == 0.0) continue;  // no active effect drives this state
-            x[i] -= rate[i] / slope;
-        }
-    }
+    if (own.count == 0) return;
+    // One round settles any chain of lags. Only slow states act before their target is known.
+    constexpr int kRounds = 12;
+    std::array<S, kMotionStates> rate;
+    LagStep<S> step;
+    step.after = x.data() + kMotionStates;
+    const Lags<S> lags(LagStage::kSettle, step.after, nullptr, step);
+    for (int round = 0; round < kRounds; ++round)
+        model.evaluate(x.data(), push, lags, u, p, rate.data());
 }
 
 }  // namespace sysid

@@ -2,14 +2,15 @@
 //
 // An effect is a struct that derives from `Effect`, states its `info`, and shadows the stages at
 // which it acts. Stages run in the order they are declared here, and within a stage in the order of
-// the catalogue, `input` in the reverse order. `p` points at the effect's own parameters, `state`
-// and `state_rate` at its own states; at the null values of the parameters nothing must change.
+// the catalogue, `input` in the reverse order. `p` points at the effect's own parameters, `lags`
+// and `state` at its own states; at the null values of the parameters nothing must change.
 #pragma once
 
 #include <cmath>
 #include <cstddef>
 
 #include "sysid/math/dual.hpp"
+#include "sysid/model/lags.hpp"
 #include "sysid/model/workings.hpp"
 
 namespace sysid {
@@ -51,19 +52,6 @@ struct EffectInfo {
     const char* through = "";
 };
 
-/// Lags act no faster than this [1/s]: minutes of driving hardly resolve a quarter of a
-/// millisecond, and integration would need ever shorter steps.
-constexpr double kFastestLag = 4000.0;
-
-template <class T>
-T resolvable(const T& time_constant) {
-    return value_of(time_constant) > 1.0 / kFastestLag ? time_constant : T(1.0 / kFastestLag);
-}
-
-inline double lag_rate(double time_constant) {
-    return time_constant > 0.0 ? 1.0 / resolvable(time_constant) : 0.0;
-}
-
 /// What a stage returns at which an effect does not act: it is left out when compiling.
 struct Idle {};
 
@@ -84,8 +72,7 @@ struct Effect {
         return {};
     }
     template <class T, class S>
-    static Idle steering(const T* /*p*/, Workings<S>& /*w*/, const S* /*state*/,
-                         S* /*state_rate*/) {
+    static Idle steering(const T* /*p*/, Workings<S>& /*w*/, Lags<S> /*lags*/) {
         return {};
     }
     template <class T, class S>
@@ -93,7 +80,7 @@ struct Effect {
         return {};
     }
     template <class T, class S>
-    static Idle slip(const T* /*p*/, Workings<S>& /*w*/, const S* /*state*/, S* /*state_rate*/) {
+    static Idle slip(const T* /*p*/, Workings<S>& /*w*/, Lags<S> /*lags*/) {
         return {};
     }
     template <class T, class S>
@@ -111,16 +98,13 @@ struct Effect {
     }
     /// Everything is known: for states that follow results.
     template <class T, class S>
-    static Idle follow(const T* /*p*/, const Workings<S>& /*w*/, const S* /*state*/,
-                       S* /*state_rate*/) {
+    static Idle follow(const T* /*p*/, const Workings<S>& /*w*/, Lags<S> /*lags*/) {
         return {};
     }
     template <class T, class S>
     static Idle sensors(const T* /*p*/, const Workings<S>& /*w*/, const S* /*state*/, S* /*y*/) {
         return {};
     }
-    /// Fastest rate [1/s] the effect adds, so that the integrator can take short enough steps.
-    static double rate(const double* /*p*/, double /*v_x*/) { return 0.0; }
 };
 
 }  // namespace sysid

@@ -20,7 +20,7 @@ struct RearToe : Effect {
     };
 
     template <class T, class S>
-    static void slip(const T* p, Workings<S>& w, const S* /*state*/, S* /*state_rate*/) {
+    static void slip(const T* p, Workings<S>& w, Lags<S> /*lags*/) {
         w.alpha_r += p[0];
     }
 };

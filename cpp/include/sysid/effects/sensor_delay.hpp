@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-
 #include "sysid/effects/effect.hpp"
 
 namespace sysid {
@@ -31,22 +29,18 @@ struct SensorDelay : Effect {
     static constexpr double state_spread = 0.3;
 
     template <class T, class S>
-    static void follow(const T* p, const Workings<S>& w, const S* state, S* state_rate) {
+    static void follow(const T* p, const Workings<S>& w, Lags<S> lags) {
         const S now[kChannels] = {w.v_x, w.v_y, w.r, w.a_x, w.a_y};
         for (int i = 0; i < kChannels; ++i) {
             const T& delay = of(p, i);
             if (value_of(delay) > 0.0)
-                state_rate[i] = (now[i] - state[i]) / resolvable(T(0.5 * delay));
+                lags.follow(static_cast<std::size_t>(i), now[i], S(lag_rate(T(0.5 * delay))));
         }
     }
     template <class T, class S>
     static void sensors(const T* p, const Workings<S>& /*w*/, const S* state, S* y) {
         for (int i = 0; i < kChannels; ++i)
             if (value_of(of(p, i)) > 0.0) y[i] = 2.0 * state[i] - y[i];
-    }
-    // Steps four times as short as a lag needs: what is read is twice the state.
-    static double rate(const double* p, double /*v_x*/) {
-        return 4.0 * std::max(lag_rate(0.5 * p[0]), lag_rate(0.5 * p[1]));
     }
 
     template <class T>

@@ -21,7 +21,7 @@ struct SteerCompliance : Effect {
     };
 
     template <class T, class S>
-    static void steering(const T* p, Workings<S>& w, const S* /*state*/, S* /*state_rate*/) {
+    static void steering(const T* p, Workings<S>& w, Lags<S> /*lags*/) {
         w.delta = w.delta - p[0] * (w.m * w.l_r / (w.l_f + w.l_r) * w.v_x * w.r);
     }
 };

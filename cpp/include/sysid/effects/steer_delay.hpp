@@ -23,16 +23,12 @@ struct SteerDelay : Effect {
     static constexpr std::size_t state_count = 2;
 
     template <class T, class S>
-    static void steering(const T* p, Workings<S>& w, const S* state, S* state_rate) {
+    static void steering(const T* p, Workings<S>& w, Lags<S> lags) {
         if (!(value_of(p[0]) > 0.0)) return;
-        const T time_constant = resolvable(T(0.25 * p[0]));
-        for (std::size_t i = 0; i < state_count; ++i) {
-            state_rate[i] = (w.delta - state[i]) / time_constant;
-            w.delta = 2.0 * state[i] - w.delta;
-        }
+        const S rate(lag_rate(T(0.25 * p[0])));
+        for (std::size_t i = 0; i < state_count; ++i)
+            w.delta = 2.0 * lags.follow(i, w.delta, rate) - w.delta;
     }
-    // Steps four times as short as a lag needs: what is read is twice the state.
-    static double rate(const double* p, double /*v_x*/) { return 4.0 * lag_rate(0.25 * p[0]); }
 };
 
 }  // namespace sysid

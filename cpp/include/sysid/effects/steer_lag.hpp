@@ -22,12 +22,9 @@ struct SteerLag : Effect {
     static constexpr std::size_t state_count = 1;
 
     template <class T, class S>
-    static void steering(const T* p, Workings<S>& w, const S* state, S* state_rate) {
-        if (!(value_of(p[0]) > 0.0)) return;
-        state_rate[0] = (w.delta - state[0]) / resolvable(p[0]);
-        w.delta = state[0];
+    static void steering(const T* p, Workings<S>& w, Lags<S> lags) {
+        if (value_of(p[0]) > 0.0) w.delta = lags.follow(0, w.delta, S(lag_rate(p[0])));
     }
-    static double rate(const double* p, double /*v_x*/) { return lag_rate(p[0]); }
 };
 
 }  // namespace sysid

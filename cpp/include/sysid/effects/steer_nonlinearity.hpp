@@ -20,7 +20,7 @@ struct SteerNonlinearity : Effect {
     };
 
     template <class T, class S>
-    static void steering(const T* p, Workings<S>& w, const S* /*state*/, S* /*state_rate*/) {
+    static void steering(const T* p, Workings<S>& w, Lags<S> /*lags*/) {
         w.delta *= 1.0 + p[0] * (w.delta * w.delta);
     }
 };

@@ -20,7 +20,7 @@ struct SteerOffset : Effect {
     };
 
     template <class T, class S>
-    static void steering(const T* p, Workings<S>& w, const S* /*state*/, S* /*state_rate*/) {
+    static void steering(const T* p, Workings<S>& w, Lags<S> /*lags*/) {
         w.delta += p[0];
     }
 };

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-
 #include "sysid/effects/effect.hpp"
 
 namespace sysid {
@@ -24,17 +22,13 @@ struct TyreRelaxation : Effect {
     static constexpr std::size_t state_count = 2;
 
     template <class T, class S>
-    static void slip(const T* p, Workings<S>& w, const S* state, S* state_rate) {
+    static void slip(const T* p, Workings<S>& w, Lags<S> lags) {
+        using std::abs;
         if (!(value_of(p[0]) > 0.0)) return;
-        S rate = w.v_x / p[0];
-        if (value_of(rate) > kFastestLag) rate = S(kFastestLag);
-        state_rate[0] = rate * (w.alpha_f - state[0]);
-        state_rate[1] = rate * (w.alpha_r - state[1]);
-        w.alpha_f = state[0];
-        w.alpha_r = state[1];
-    }
-    static double rate(const double* p, double v_x) {
-        return p[0] > 0.0 ? std::min(v_x / p[0], kFastestLag) : 0.0;
+        S rate = abs(w.v_x) / p[0];
+        if (value_of(rate) > 1.0 / kShortestLag) rate = S(1.0 / kShortestLag);
+        w.alpha_f = lags.follow(0, w.alpha_f, rate);
+        w.alpha_r = lags.follow(1, w.alpha_r, rate);
     }
 };
 

@@ -33,13 +33,13 @@ struct TyreTemperature : Effect {
         apply(1.0 - p[0] * state[1], w.mu_peak_r, w.grip_r);
     }
     template <class T, class S>
-    static void follow(const T* p, const Workings<S>& w, const S* state, S* state_rate) {
+    static void follow(const T* p, const Workings<S>& w, Lags<S> lags) {
         const S speed = 1e-3 * w.v_x;
+        const S rate(lag_rate(p[1]));
         // Force and slip angle have the same sign, so that the product needs no absolute value.
-        state_rate[0] = (speed * (w.fy_f * w.alpha_f) - state[0]) / p[1];
-        state_rate[1] = (speed * (w.fy_r * w.alpha_r) - state[1]) / p[1];
+        lags.follow_slowly(0, speed * (w.fy_f * w.alpha_f), rate);
+        lags.follow_slowly(1, speed * (w.fy_r * w.alpha_r), rate);
     }
-    static double rate(const double* p, double /*v_x*/) { return lag_rate(p[1]); }
 
     template <class S>
     static void apply(const S& left, S& peak, S& grip) {

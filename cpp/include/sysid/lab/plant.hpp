@@ -107,14 +107,28 @@ class Plant {
         if (options_.tolerance > 0.0) {
             dormand_prince(x, dt, options_.tolerance, rate);
         } else {
-            // Four times as many as an estimator takes: a car has no step error.
-            const int needed = 4 * substeps_for(model_, parameters_.data(), std::abs(x[0]), dt);
-            runge_kutta(x, dt, options_.steps > 0 ? options_.steps : needed, rate);
+            runge_kutta(x, dt, options_.steps > 0 ? options_.steps : steps_for(x, from, push, dt),
+                        rate);
         }
         model_.held = next;
     }
 
   private:
+    /// As many as keep motion and lags at a fifth of their rates: a car has no step error.
+    int steps_for(const PlantState& x, const Input& u, const Pushes& push, double dt) const {
+        const double speed = std::max(std::abs(x[0]), kLowestSpeed);
+        double fastest = model_.fastest_rate(parameters_.data(), speed);
+        PlantState rate{};
+        LagStep<double> step;
+        step.fastest = &fastest;
+        model_.evaluate(x.data(), push.data(),
+                        Lags<double>(LagStage::kRates, x.data() + kMotionStates,
+                                     rate.data() + kMotionStates, step),
+                        u, parameters_.data(), rate.data());
+        return 4 * static_cast<int>(
+                       std::clamp(std::ceil(dt * fastest / 0.8), 1.0, 1.0 * kMostSubsteps));
+    }
+
     Workings<double> workings(const PlantState& x, const Input& u, Pushes push) const {
         PlantState ignored;
         return evaluate(x, u, push, ignored);

@@ -1,0 +1,186 @@
+// States that follow a quantity with a first-order lag,  ds/dt = lambda (target - s).
+//
+// Over a step such a state has its exact solution for a target that is interpolated between the
+// stages of the Runge-Kutta rule. With z the integral of lambda over the step,
+//   s(z) = e^-z s_0 + int_0^z e^-(z-u) target(u) du,
+// which holds for any lambda: neither a short lag nor a stiff one needs shorter steps.
+// Hochbruck & Ostermann, "Exponential integrators", Acta Numerica 19 (2010), sec. 2.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "sysid/math/dual.hpp"
+
+namespace sysid {
+
+/// Rates beyond this are taken as this where a lag is integrated explicitly [1/s].
+constexpr double kFastestExplicitLag = 4000.0;
+
+/// Lags shorter than this act as this [s]: no log resolves them, and their derivative stays finite.
+constexpr double kShortestLag = 1e-6;
+
+/// Rate of a lag with this time constant [1/s].
+template <class T>
+T lag_rate(const T& time_constant) {
+    return value_of(time_constant) > kShortestLag ? 1.0 / time_constant : T(1.0 / kShortestLag);
+}
+
+/// e^-z, and of the powers theta^n of the part of a step the integrals
+/// J_n = int_0^1 z e^(-z (1 - theta)) theta^n dtheta, with their derivatives to z.
+struct LagWeights {
+    double kept, J0, J1, J2;
+    double J1_slope, J2_slope;  // dJ0/dz = kept = -d(kept)/dz
+
+    explicit LagWeights(double z) : kept(std::exp(-z)), J0(-std::expm1(-z)) {
+        if (std::abs(z) < 0.5) {
+            // J_n = n! sum_k (-1)^(k+1) z^k / (n + k)!: the recurrence below would cancel.
+            series(z, 1, J1, J1_slope);
+            series(z, 2, J2, J2_slope);
+        } else {
+            J1 = 1.0 - J0 / z;
+            J2 = 1.0 - 2.0 * J1 / z;
+            J1_slope = (J0 / z - kept) / z;
+            J2_slope = 2.0 * (J1 / z - J1_slope) / z;
+        }
+    }
+
+  private:
+    static void series(double z, int n, double& sum, double& slope) {
+        double term = 1.0;  // n! (-z)^(k-1) / (n + k)!
+        sum = slope = 0.0;
+        for (int k = 1; k <= 12; ++k) {
+            term /= n + k;
+            sum += term;
+            slope += k * term;
+            term *= -z;
+        }
+        sum *= z;
+    }
+};
+
+inline double with_slope(const double& /*z*/, double value, double /*slope*/) { return value; }
+template <int N>
+Dual<N> with_slope(const Dual<N>& z, double value, double slope) {
+    return Dual<N>::chain(z, value, slope);
+}
+
+/// The stages at which a model is evaluated while its lags move.
+enum class LagStage {
+    kRates,   // rates of the states, for explicit integration, and readings at one instant
+    kSettle,  // the states become what they follow
+    kStart,   // the four of a Runge-Kutta step
+    kMiddle,
+    kMiddleAgain,
+    kEnd,
+};
+
+/// What the lags of a model have seen of a step; arrays with an element for each state.
+template <class S>
+struct LagStep {
+    const S* before = nullptr;  // the states at the start of the step
+    S* after = nullptr;         // as far as they are known at this stage
+    S* target_start = nullptr;
+    S* target_middle = nullptr;
+    S* target_again = nullptr;
+    S* rate_start = nullptr;
+    S* rate_middle = nullptr;
+    bool* exact = nullptr;      // moved by their exact solution, not by their rates
+    double h = 0.0;             // length of the step [s]
+    double* fastest = nullptr;  // where asked for: the fastest rate in explicit integration [1/s]
+};
+
+/// How an effect moves its states. `follow` may be called anew with a better target at any stage.
+template <class S>
+class Lags {
+  public:
+    /// `state` as it is at this stage, `state_rate` receives what explicit integration needs.
+    Lags(LagStage stage, const S* state, S* state_rate, const LagStep<S>& step = {})
+        : stage_(stage), state_(state), state_rate_(state_rate), step_(step) {}
+
+    /// The same, counted from the effect's first state.
+    Lags from(std::size_t first) const {
+        Lags own = *this;
+        own.first_ = first;
+        return own;
+    }
+
+    const S* states() const { return state_ + first_; }
+
+    /// Lets the state number `i` follow `target` at `rate` [1/s]; returns where it is at this
+    /// stage.
+    S follow(std::size_t i, const S& target, const S& rate) {
+        const std::size_t n = first_ + i;
+        switch (stage_) {
+            case LagStage::kRates: {
+                const S limited = explicit_rate(rate);
+                if (step_.fastest != nullptr)
+                    *step_.fastest = std::max(*step_.fastest, value_of(limited));
+                state_rate_[n] = limited * (target - state_[n]);
+                return state_[n];
+            }
+            case LagStage::kSettle:
+                step_.after[n] = target;
+                return target;
+            case LagStage::kStart:
+                step_.exact[n] = true;
+                step_.target_start[n] = target;
+                step_.rate_start[n] = rate;
+                return state_[n];
+            case LagStage::kMiddle:
+            case LagStage::kMiddleAgain: {
+                (stage_ == LagStage::kMiddle ? step_.target_middle : step_.target_again)[n] =
+                    target;
+                step_.rate_middle[n] = rate;
+                const S z = (0.25 * step_.h) * (step_.rate_start[n] + rate);
+                const LagWeights w(value_of(z));
+                step_.after[n] =
+                    with_slope(z, w.kept, -w.kept) * step_.before[n] +
+                    with_slope(z, w.J0 - w.J1, w.kept - w.J1_slope) * step_.target_start[n] +
+                    with_slope(z, w.J1, w.J1_slope) * target;
+                return step_.after[n];
+            }
+            case LagStage::kEnd: {
+                const S z =
+                    (step_.h / 6.0) * (step_.rate_start[n] + 4.0 * step_.rate_middle[n] + rate);
+                const LagWeights w(value_of(z));
+                const auto weight = [&](double a, double b, double c) {
+                    return with_slope(z, a * w.J0 + b * w.J1 + c * w.J2,
+                                      a * w.kept + b * w.J1_slope + c * w.J2_slope);
+                };
+                step_.after[n] =
+                    with_slope(z, w.kept, -w.kept) * step_.before[n] +
+                    weight(1.0, -3.0, 2.0) * step_.target_start[n] +
+                    // The two middle stages are off by h^2/8 x'' on either side.
+                    weight(0.0, 2.0, -2.0) * (step_.target_middle[n] + step_.target_again[n]) +
+                    weight(0.0, -1.0, 2.0) * target;
+                return step_.after[n];
+            }
+        }
+        return target;
+    }
+
+    /// The same for a state that acts before its target is known, and is slow against any step: it
+    /// is moved by its rate, as the motion is.
+    void follow_slowly(std::size_t i, const S& target, const S& rate) {
+        const std::size_t n = first_ + i;
+        if (stage_ == LagStage::kSettle)
+            step_.after[n] = target;
+        else
+            state_rate_[n] = rate * (target - state_[n]);
+    }
+
+  private:
+    static S explicit_rate(const S& rate) {
+        return value_of(rate) < kFastestExplicitLag ? rate : S(kFastestExplicitLag);
+    }
+
+    LagStage stage_;
+    const S* state_;
+    S* state_rate_;
+    LagStep<S> step_;
+    std::size_t first_ = 0;
+};
+
+}  // namespace sysid
