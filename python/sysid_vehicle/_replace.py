@@ -28,13 +28,13 @@ def could_replace(target: Path, there: os.stat_result | None) -> None:
     OSError
         What the system says of the folder or of the name.
     """
-    _refuse_protected(target, there)
     with contextlib.suppress(FileNotFoundError):
         os.lstat(target)  # a name may be too long
     handle, temporary = _new_file(target)
     os.close(handle)
     if temporary is not None:
         os.unlink(temporary)
+    _refuse_protected(target, there)
 
 
 def replace_file(target: Path, there: os.stat_result | None, data: bytes) -> None:
@@ -47,7 +47,6 @@ def replace_file(target: Path, there: os.stat_result | None, data: bytes) -> Non
     OSError
         The system cannot write; the old content stands, and nothing else is left.
     """
-    _refuse_protected(target, there)
     _remove_stale(target)
     try:
         _write(target, there, data, *_new_file(target))
@@ -68,6 +67,7 @@ def _write(
     target: Path, there: os.stat_result | None, data: bytes, handle: int, temporary: Path | None
 ) -> None:
     try:
+        _refuse_protected(target, there)
         rest = memoryview(data)
         while rest:
             rest = rest[os.write(handle, rest) :]
