@@ -14,7 +14,6 @@ from design import Trial
 from rivals import separate
 
 import sysid_vehicle as sv
-from sysid_vehicle import _core
 from sysid_vehicle.diagnose import constancy
 from sysid_vehicle.identify import refine
 
@@ -119,7 +118,7 @@ def _shown(study: sv.Study, trial: Trial) -> bool:
     try:
         true = refine(model, baseline.driving, study.fit.noise)
         poorer = [refine(true.model.drop(e), baseline.driving, true.noise) for e in trial.truth]
-    except (_core.NumericalFailure, np.linalg.LinAlgError):
+    except (sv.NumericalError, np.linalg.LinAlgError):
         return False
     price = 0.5 * np.log(baseline.driving.samples)
     return all(

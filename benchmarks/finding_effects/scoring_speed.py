@@ -19,7 +19,6 @@ import numpy as np
 from recovery import OTHER_TYRES, SENSORS
 
 import sysid_vehicle as sv
-from sysid_vehicle import _core
 from sysid_vehicle.diagnose.score import score_board
 from sysid_vehicle.identify import refit
 
@@ -67,7 +66,7 @@ def main() -> None:
 
         def one(richer: sv.Model = richer) -> None:
             # The time of one that fails counts all the same.
-            with suppress(_core.NumericalFailure, np.linalg.LinAlgError):
+            with suppress(sv.NumericalError, np.linalg.LinAlgError):
                 refit(richer, driving, fit.noise)
 
         each[effect.id] = seconds(one)

@@ -8,23 +8,26 @@ namespace sysid::bindings {
 namespace {
 
 void add_run(Problem& problem, double dt, const Array& inputs, const Array& measurements,
-             double start) {
+             double start, const std::string& name) {
     const auto n = inputs.ndim() == 2 ? inputs.shape(0) : 0;
     const double* u = matrix(inputs, n, 2, "inputs");
     const double* y = matrix(measurements, n, kChannels, "measurements");
     if (n < 2) throw std::invalid_argument("inputs: expected two samples or more");
     if (!(dt > 0.0) || !std::isfinite(dt)) throw std::invalid_argument("dt: expected above zero");
+    const std::string log = name.empty() ? "" : name + ", ";
     Run run;
     run.dt = dt;
+    run.name = name;
     run.inputs.resize(static_cast<std::size_t>(n));
     run.measurements.resize(static_cast<std::size_t>(n));
     for (std::size_t k = 0; k < run.size(); ++k) {
         run.inputs[k] = {u[2 * k], u[2 * k + 1], start + static_cast<double>(k) * dt};
         if (!std::isfinite(u[2 * k]) || !std::isfinite(u[2 * k + 1]))
-            throw std::invalid_argument("inputs: not finite at sample " + std::to_string(k));
+            throw std::invalid_argument(log + "inputs: not finite at sample " + std::to_string(k));
         run.measurements[k] = Eigen::Map<const Vec<kChannels>>(y + kChannels * k);
         if (run.measurements[k].array().isInf().any())
-            throw std::invalid_argument("measurements: infinite at sample " + std::to_string(k));
+            throw std::invalid_argument(log + "measurements: infinite at sample " +
+                                        std::to_string(k));
     }
     problem.runs.push_back(std::move(run));
 }
@@ -72,7 +75,7 @@ void register_identify(py::module_& m) {
         .def(py::init([](const SingleTrack& model) { return Problem{model, {}}; }),
              py::arg("model"))
         .def("add_run", &add_run, py::arg("dt"), py::arg("inputs"), py::arg("measurements"),
-             py::arg("start") = 0.0)
+             py::arg("start") = 0.0, py::arg("name") = "")
         .def(
             "with_model",
             [](const Problem& self, const SingleTrack& model) { return Problem{model, self.runs}; },

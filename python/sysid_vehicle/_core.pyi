@@ -48,8 +48,6 @@ USER_OFFSET: int
 USER_PARAMETERS: int
 PUSHES: int
 
-class NumericalFailure(ArithmeticError): ...
-
 @type_check_only
 class _Bound(type): ...
 
@@ -99,7 +97,12 @@ class Problem(metaclass=_Bound):
     @property
     def samples(self) -> int: ...
     def add_run(
-        self, dt: float, inputs: _Array, measurements: _Array, start: float = 0.0
+        self,
+        dt: float,
+        inputs: _Array,
+        measurements: _Array,
+        start: float = 0.0,
+        name: str = "",
     ) -> None: ...
     def with_model(self, model: SingleTrack) -> Problem: ...
     def freeze(self, parameters: _Array, noise: _Array) -> FrozenFilter: ...

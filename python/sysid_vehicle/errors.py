@@ -6,9 +6,20 @@ import difflib
 import os
 import sys
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 
-__all__ = ["InvalidInput", "NumericalError", "SysidError", "SysidWarning", "near_names", "warn"]
+import numpy as np
+
+__all__ = [
+    "InvalidInput",
+    "NumericalError",
+    "SysidError",
+    "SysidWarning",
+    "explained",
+    "near_names",
+    "warn",
+]
 
 _PACKAGE_DIR = os.path.dirname(os.path.abspath(__file__)) + os.sep
 
@@ -22,7 +33,20 @@ class InvalidInput(SysidError, ValueError):
 
 
 class NumericalError(SysidError, ArithmeticError):
-    """A computation that left the range of numbers it can be trusted in."""
+    """A computation that left the range of numbers it can be trusted in.
+
+    The compiled core raises it too.
+
+    Attributes
+    ----------
+    sample : int or None
+        Where it happened, if the computation goes from sample to sample.
+    remedy : str
+        What may help; part of the message. Empty as long as no caller knows.
+    """
+
+    sample: int | None = None
+    remedy: str = ""
 
 
 class SysidWarning(UserWarning):
@@ -35,6 +59,43 @@ def warn(message: str) -> None:
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE_DIR):
         frame, level = frame.f_back, level + 1
     warnings.warn(message, SysidWarning, stacklevel=level)
+
+
+@contextmanager
+def explained(
+    where: str | Callable[[], str] = "", remedy: str | Callable[[], str] = ""
+) -> Iterator[None]:
+    """Give numerical failures inside the block what only the caller knows.
+
+    Failures of linear algebra become :class:`NumericalError` as well. A failure that has a remedy
+    already passes unchanged.
+
+    Parameters
+    ----------
+    where : str or callable
+        What failed, such as the log's name; put in front of a failure that does not say its log.
+    remedy : str or callable
+        What the user may change. Callables are asked only after a failure.
+
+    Raises
+    ------
+    NumericalError
+        The failure, with place, sample and remedy.
+    """
+    try:
+        yield
+    except (NumericalError, np.linalg.LinAlgError) as failure:
+        if isinstance(failure, NumericalError) and failure.remedy:
+            raise
+        text, sample = str(failure), getattr(failure, "sample", None)
+        place = where() if callable(where) else where
+        if place and f"(sample {sample})" not in text:  # so the core ends what it says of a log
+            text = f"{place}: {text}"
+        help_ = remedy() if callable(remedy) else remedy
+        told = NumericalError(f"{text}; {help_}" if help_ else text)
+        told.sample = sample
+        told.remedy = help_
+        raise told from failure
 
 
 def near_names(name: str, known: Iterable[str], count: int = 3) -> str:

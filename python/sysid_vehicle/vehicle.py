@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ._arguments import real
 from ._arrays import FloatArray
-from ._files import read_toml, refuse_unknown, write_text
+from ._files import as_path, read_toml, refuse_unknown, write_text
 from .errors import InvalidInput, warn
 
 __all__ = ["Tyre", "Vehicle"]
@@ -30,14 +31,15 @@ class _Range:
     above: bool = False
 
     def complaint(self, key: str, value: object) -> str | None:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
+        number = real(value)
+        if number is None:
             return f"{key} = {value!r} is not a number; give the {self.meaning} as a plain number"
-        low_ok = value > self.low if self.above else value >= self.low
-        if low_ok and value <= self.high:
+        low_ok = number > self.low if self.above else number >= self.low
+        if low_ok and number <= self.high:
             return None
         sign = ">" if self.above else ">="
         return (
-            f"{key} = {value:g} is out of range ({sign} {self.low:g} and <= {self.high:g}); "
+            f"{key} = {number:g} is out of range ({sign} {self.low:g} and <= {self.high:g}); "
             f"give the {self.meaning}"
         )
 
@@ -52,8 +54,8 @@ _TYRE_RANGES = {
 _VEHICLE_RANGES = {
     "mass_kg": _Range(1.0, 50000.0, "total mass in kilograms, driver and fuel included"),
     "yaw_inertia_kgm2": _Range(0.0, 1e7, "yaw inertia in kg m^2", above=True),
-    "lf_m": _Range(0.0, 20.0, "distance CG to front axle in metres", above=True),
-    "lr_m": _Range(0.0, 20.0, "distance CG to rear axle in metres", above=True),
+    "lf_m": _Range(0.001, 20.0, "distance CG to front axle in metres"),
+    "lr_m": _Range(0.001, 20.0, "distance CG to rear axle in metres"),
     "cg_height_m": _Range(0.0, 5.0, "height of the CG above the road in metres"),
     "track_front_m": _Range(0.0, 5.0, "front track width in metres", above=True),
     "track_rear_m": _Range(0.0, 5.0, "rear track width in metres", above=True),
@@ -180,6 +182,14 @@ class Vehicle:
     name: str = "vehicle"
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise InvalidInput(f"vehicle: name = {self.name!r} is not a text")
+        for key in ("tyre_front", "tyre_rear"):
+            if not isinstance(getattr(self, key), Tyre):
+                raise InvalidInput(
+                    f"vehicle '{self.name}': {key} = {getattr(self, key)!r} is no tyre; "
+                    "give a sysid_vehicle.Tyre"
+                )
         numbers = {key: getattr(self, key) for key in _VEHICLE_RANGES}
         if self.yaw_inertia_kgm2 is None:
             del numbers["yaw_inertia_kgm2"]
@@ -236,7 +246,7 @@ class Vehicle:
         """
         content = read_toml(path)
         where = str(path)
-        name = content.pop("name", Path(path).name.split(".")[0])
+        name = content.pop("name", as_path(path).name.split(".")[0])
         if not isinstance(name, str):
             raise InvalidInput(f"{where}: name = {name!r} is not a text; put it in quotes")
         tyre_tables = content.pop("tyre", {})

@@ -10,6 +10,7 @@ import pytest
 
 from sysid_vehicle import Driving, Fit, Log, Model, _core
 from sysid_vehicle._arrays import as_float64
+from sysid_vehicle.errors import NumericalError
 
 N = 50
 
@@ -161,9 +162,9 @@ def test_a_simulation_needs_matching_arrays(truth: Model) -> None:
 def test_parameters_that_are_no_numbers_fail_with_the_sample(
     problem: _core.Problem, fit: Fit
 ) -> None:
-    with pytest.raises(_core.NumericalFailure, match="at sample 0"):
+    with pytest.raises(NumericalError, match="at sample 0"):
         problem.freeze(np.full(_core.PARAMETERS, np.nan), fit.noise.vector())
-    assert issubclass(_core.NumericalFailure, ArithmeticError)
+    assert issubclass(NumericalError, ArithmeticError)
 
 
 def test_only_numbers_are_taken(problem: _core.Problem) -> None:

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle import _core
 from sysid_vehicle.cli import main
-from sysid_vehicle.errors import InvalidInput, SysidWarning
+from sysid_vehicle.errors import InvalidInput, NumericalError, SysidWarning
 from sysid_vehicle.online import (
     KINDS,
     CorneringRls,
@@ -121,9 +120,9 @@ def test_what_cannot_be_is_refused(vehicle, log):
         SideslipSettings(road_mps2=-1.0)
     observer = SideslipObserver(vehicle)
     observer.step(0.01, 0.0, 20.0, 0.0, 0.0, 0.0)
-    with pytest.raises(_core.NumericalFailure, match=r"ay_mps2 is infinite.* at sample 1"):
+    with pytest.raises(NumericalError, match=r"ay_mps2 is infinite.* at sample 1"):
         observer.step(0.01, 0.0, 20.0, 0.0, 0.0, np.inf)
-    with pytest.raises(_core.NumericalFailure, match="time step is not positive at sample 1"):
+    with pytest.raises(NumericalError, match="time step is not positive at sample 1"):
         observer.step(0.0, 0.0, 20.0, 0.0, 0.0, 0.0)
     with pytest.raises(InvalidInput, match=r"give \(n, 5\)"):
         observer.run(np.ones(3), np.zeros((3, 4)))

@@ -113,7 +113,7 @@ def test_all_missing_keys_are_named_at_once(car_file: Path) -> None:
         ("mass_kg = 1500", "mass_kg = nan", ["mass_kg = nan", "kilograms"]),
         ("mass_kg = 1500", 'mass_kg = "1500"', ["mass_kg = '1500'", "plain number"]),
         ("mass_kg = 1500", "mass_kg = true", ["mass_kg = True", "plain number"]),
-        ("lf_m = 1.2", "lf_m = -1.2", ["lf_m = -1.2", "> 0", "metres"]),
+        ("lf_m = 1.2", "lf_m = -1.2", ["lf_m = -1.2", ">= 0.001", "metres"]),
         ("lr_m = 1.5", "lr_m = 1500", ["lr_m = 1500", "metres"]),
         ("brake_front_share = 0.65", "brake_front_share = 65", ["brake_front_share", "0 to 1"]),
         ("yaw_inertia_kgm2 = 2500.0", "yaw_inertia_kgm2 = 2.5", ["yaw_inertia_kgm2", "2700"]),

@@ -21,6 +21,7 @@ from ..model import Model
 from ..read import ChannelMap, read_log
 from ..report import summary, write_report
 from ..study import Study, improve
+from ..user_effects import load_effects
 from ..vehicle import Vehicle
 from . import lab, mu_slip, sideslip, twin
 from .outputs import refuse_unwritable
@@ -52,6 +53,8 @@ def _demo(args: argparse.Namespace, heard: Warnings) -> None:
 
 def _compare(args: argparse.Namespace, heard: Warnings) -> None:
     refuse_unwritable([args.json], inputs=_inputs(args))
+    _define(args)
+    _define(args)
     model = Model(Vehicle.from_toml(args.vehicle), args.effects)
     logs = _read(args.logs, args.channels)
     fit = identify(model, logs, progress=_on_terminal())
@@ -84,6 +87,7 @@ def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
 
 def _improve(args: argparse.Namespace, heard: Warnings) -> None:
     refuse_unwritable([args.report, args.json], inputs=_inputs(args))
+    _define(args)
     study = _study(args, heard)
     # The warnings have gone to the error stream.
     print(study.with_warnings(()))
@@ -98,6 +102,7 @@ def _improve(args: argparse.Namespace, heard: Warnings) -> None:
 
 
 def _effects(args: argparse.Namespace, heard: Warnings) -> None:
+    _define(args)
     print("\n\n".join(str(e) for e in catalogue()))
 
 
@@ -112,6 +117,17 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
     "twin": twin.run,
     "sideslip": sideslip.run,
 }
+
+
+def _define(args: argparse.Namespace) -> None:
+    """Run the user's files that define effects, and say so: they can do whatever the user can."""
+    for path in args.define:
+        print(
+            f"sysid-vehicle: runs {path} as a Python program, with all your rights",
+            file=sys.stderr,
+            flush=True,
+        )
+        load_effects(path)
 
 
 def _study(args: argparse.Namespace, heard: Warnings) -> Study:
@@ -144,7 +160,7 @@ def _read(paths: list[Path], channels: Path | None) -> list[Log]:
 
 
 def _inputs(args: argparse.Namespace) -> list[Path]:
-    given = [*args.logs, args.vehicle, args.channels, *getattr(args, "test", [])]
+    given = [*args.logs, args.vehicle, args.channels, *getattr(args, "test", []), *args.define]
     return [path for path in given if path is not None]
 
 

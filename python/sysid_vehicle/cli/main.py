@@ -9,9 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from .. import _core
 from ..errors import SysidError
-from ..user_effects import load_effects
 from .commands import COMMANDS
 from .parser import parse
 
@@ -37,15 +35,13 @@ def main(argv: list[str] | None = None) -> int:
     args = parse(argv)
     try:
         with _warnings_as_lines() as heard:
-            for path in getattr(args, "define", ()):
-                load_effects(path)
             COMMANDS[args.command](args, heard)
         sys.stdout.flush()
     except BrokenPipeError:
         # The reader, such as `head`, has seen enough. Python would complain once more at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except (SysidError, _core.NumericalFailure, OSError) as error:
+    except (SysidError, OSError) as error:
         print(f"sysid-vehicle: error: {_one_line(str(error))}", file=sys.stderr)
         return _FAILED
     except KeyboardInterrupt:

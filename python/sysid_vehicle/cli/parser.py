@@ -93,7 +93,8 @@ def _define(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=Path,
         metavar="PY",
-        help="Python file that defines effects of your own; it is run (may be repeated)",
+        help="Python file that defines effects of your own; it is run as a program with all your "
+        "rights: give only what you trust (may be repeated)",
     )
 
 

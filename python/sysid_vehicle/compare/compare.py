@@ -11,7 +11,7 @@ import numpy as np
 from .._arrays import FloatArray
 from .._text import html_table, number, text_table
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
-from ..identify import Fit
+from ..identify import Fit, explaining
 from ..log import Log
 from .where import FailureMap, Region
 
@@ -128,6 +128,7 @@ def _running_rms(e: FloatArray, log_number: FloatArray, width: int) -> FloatArra
     return out
 
 
+@explaining
 def compare(
     fit: Fit, logs: Log | Sequence[Log] | Driving, *, noise: NoiseModel | None = None
 ) -> Comparison:

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from tqdm import tqdm
 
-from .. import _core
 from .._text import html_table, text_table, with_error
 from ..effects import Effect, effect
-from ..errors import InvalidInput
+from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refine, refit
 from ..log import Log
@@ -327,7 +326,7 @@ def _refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
         model = fit.model.add(c.effect).with_values(values)
         try:
             trial = refit(model, driving, fit.noise)
-        except (_core.NumericalFailure, np.linalg.LinAlgError):
+        except (NumericalError, np.linalg.LinAlgError):
             continue
         if best is None or trial.log_likelihood > best.log_likelihood:
             best = trial

@@ -155,7 +155,7 @@ class Driving:
                 if log.has(c) and (self.force_known or c != "ax_mps2"):
                     y[:, i] = log[c][where]
             began = where.start / log.rate_hz
-            problem.add_run(1.0 / log.rate_hz, as_float64(inputs), as_float64(y), began)
+            problem.add_run(1.0 / log.rate_hz, as_float64(inputs), as_float64(y), began, log.name)
         return problem
 
     def _pieces(self, most_samples: int | None) -> list[tuple[Log, slice, int]]:

@@ -17,9 +17,8 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.stats import norm
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
-from ..errors import InvalidInput
+from ..errors import InvalidInput, NumericalError
 
 __all__ = ["FilterRun", "FilterState", "LateMeasurements", "StateFilter", "StateModel"]
 
@@ -154,7 +153,7 @@ class StateFilter:
 
         Raises
         ------
-        NumericalFailure
+        NumericalError
             If a number is infinite or a matrix no covariance; the message gives the sample.
         """
         y = as_float64(y).copy()
@@ -296,7 +295,7 @@ class StateFilter:
             ) from None
 
     def _fail(self, what: str) -> None:
-        raise _core.NumericalFailure(f"{what} at sample {self.samples}")
+        raise NumericalError(f"{what} at sample {self.samples}")
 
 
 class LateMeasurements:

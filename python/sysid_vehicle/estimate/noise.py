@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
+from ..errors import NumericalError
 from ..vehicle import Vehicle
 from .driving import MEASURED, UNITS, Driving
 from .inputs import white_noise_std
@@ -152,7 +153,7 @@ def learn_noise(
             trial = np.clip(eta + step, low, high)
             try:
                 trial_value, g, info = problem.noise_score(p, np.exp(trial))
-            except _core.NumericalFailure:
+            except NumericalError:
                 trial_value = -np.inf
             if trial_value > value:
                 gained = trial_value - value

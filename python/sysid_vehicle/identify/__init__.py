@@ -4,6 +4,7 @@ from .fit import Estimate, Fit, Start
 from .identify import identify, refine, refit
 from .predictive import Prediction, predict
 from .search import METHODS
+from .suspects import explaining
 
 __all__ = [
     "METHODS",
@@ -11,6 +12,7 @@ __all__ = [
     "Fit",
     "Prediction",
     "Start",
+    "explaining",
     "identify",
     "predict",
     "refine",

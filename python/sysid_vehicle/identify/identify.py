@@ -10,6 +10,7 @@ from scipy.stats import qmc
 from tqdm import tqdm
 
 from .. import _core
+from .._arguments import whole
 from .._arrays import FloatArray
 from ..errors import InvalidInput, NumericalError, warn
 from ..estimate import Driving, NoiseModel, first_guess, learn_noise
@@ -17,6 +18,7 @@ from ..log import Log, check_excitation
 from ..model import Model
 from .fit import Estimate, Fit, Start
 from .search import METHODS, Box, minimise
+from .suspects import explaining
 
 __all__ = ["identify", "refine", "refit"]
 
@@ -24,6 +26,7 @@ _THINNED = 3000  # samples that decide between starts
 _SAME_OPTIMUM = 1.0  # nats
 
 
+@explaining
 def identify(
     model: Model,
     logs: Log | Sequence[Log] | Driving,
@@ -63,12 +66,14 @@ def identify(
     Raises
     ------
     InvalidInput
-        Unknown method, or nothing usable in the logs.
+        Unknown method, no starts or workers, a negative seed, or nothing usable in the logs.
     NumericalError
         No start led anywhere.
     """
     if method not in METHODS:
         raise InvalidInput(f"no optimiser is called '{method}'; there are {', '.join(METHODS)}")
+    starts, workers = whole(starts, "starts", 1), whole(workers, "workers", 1)
+    seed = whole(seed, "seed")
     driving = Driving.of(logs)
     check_excitation(list(driving.logs))
     _say_what_is_not_seen(model, driving)
@@ -85,7 +90,7 @@ def identify(
         full[box.columns] = begin
         try:
             found = minimise(thin, full, frozen, box, method=method, tolerance=0.1)
-        except (_core.NumericalFailure, np.linalg.LinAlgError):
+        except (NumericalError, np.linalg.LinAlgError):
             return begin, np.inf
         return found.x, found.cost
 
@@ -96,8 +101,7 @@ def identify(
     costs = np.array([cost for _, cost in ends])
     if not np.isfinite(costs).any():
         raise NumericalError(
-            f"{driving}: no start led to a finite likelihood; check the units and signs of the "
-            "log, and the starting tyre values of the vehicle file"
+            f"{', '.join(log.name for log in driving.logs)}: no start led to a finite likelihood"
         )
     best = int(np.nanargmin(costs))
     table = tuple(

@@ -122,7 +122,7 @@ def predict(fit: Fit, driving: Driving, noise: NoiseModel) -> Prediction:
 
     Raises
     ------
-    NumericalFailure
+    NumericalError
         The model fails on the other driving.
     """
     other = _remembered(fit, driving)

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.stats import qmc
 from tqdm import tqdm
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, BEFORE, axes_or_new, tidy
 from ..errors import InvalidInput, NumericalError
@@ -368,7 +367,7 @@ class _Designer:
         for car in self.cars():
             try:
                 seen = self.look(excitation, car)
-            except (_core.NumericalFailure, InvalidInput):
+            except (NumericalError, InvalidInput):
                 return Trial(excitation, float("inf"), ("control",), 100.0)
             worst = max(worst, seen.worst.relative)
             for what, share in self.limits.broken(seen):

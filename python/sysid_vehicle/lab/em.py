@@ -317,7 +317,7 @@ def learn_observer_noise(
             never_fall,
             accelerate,
         )
-    except _core.NumericalFailure as failure:
+    except NumericalError as failure:
         raise NumericalError(
             f"learning the noise: {failure}; check units and stiffness, or start from larger "
             "covariances"

@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
+from ..errors import NumericalError
 
 __all__ = ["NOISES", "Likelihood", "SoftRow", "learn_noise"]
 
@@ -146,7 +147,7 @@ def learn_noise(
             trial = np.clip(eta + step, low, high)
             try:
                 there = problem.noise_score(p, as_float64(np.exp(trial)))
-            except _core.NumericalFailure:
+            except NumericalError:
                 there = (-np.inf, gradient, information)
             if there[0] > value:
                 gained = there[0] - value

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.stats import qmc
 from tqdm.auto import tqdm
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, BEFORE, axes_or_new, tidy
 from ..errors import NumericalError
@@ -140,7 +139,7 @@ def _guarded(search: _Search, p: FloatArray) -> tuple[FloatArray, float]:
         # A car that spins in the model on its way costs numbers beyond all range.
         with np.errstate(over="ignore", invalid="ignore"):
             end, value = search(p)
-    except (_core.NumericalFailure, np.linalg.LinAlgError):
+    except (NumericalError, np.linalg.LinAlgError):
         return p, -np.inf
     return end, value if np.isfinite(value) else -np.inf
 

@@ -219,7 +219,7 @@ class Observer:
 def _numerical(name: str, run: Callable[[], _T]) -> _T:
     try:
         return run()
-    except _core.NumericalFailure as failure:
+    except NumericalError as failure:
         raise NumericalError(
             f"{name}: {failure}; check units and stiffness, or start from larger covariances"
         ) from failure

@@ -94,7 +94,7 @@ class CorneringRls:
 
         Raises
         ------
-        NumericalFailure
+        NumericalError
             If a value is infinite; the message gives the sample.
         """
         return self._core.step(alpha_f_rad, alpha_r_rad, ay_mps2, yaw_acceleration_radps2)

@@ -115,7 +115,7 @@ def mu_slip_ekf(
     ------
     InvalidInput
         If a setting makes no sense.
-    NumericalFailure
+    NumericalError
         If the filter leaves the range of numbers; the message gives the sample.
     """
     prior = prior or curve.prior
@@ -167,7 +167,7 @@ def mu_slip_smooth(
     ------
     InvalidInput
         If a setting makes no sense.
-    NumericalFailure
+    NumericalError
         If a round leaves the range of numbers; the message gives the sample.
     """
     prior = prior or curve.prior

@@ -113,7 +113,7 @@ class SideslipObserver:
 
         Raises
         ------
-        NumericalFailure
+        NumericalError
             If a reading is infinite, the time step is not positive, or the filter leaves the range
             of numbers; the message gives the sample.
         """
@@ -181,7 +181,7 @@ def estimate_sideslip(
     ------
     InvalidInput
         If a channel is absent or the kind is not known.
-    NumericalFailure
+    NumericalError
         If the filter leaves the range of numbers; the message gives the sample.
     """
     settings = settings if settings is not None else SideslipSettings.of(log)

@@ -8,9 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from .. import _core
 from .._arrays import FloatArray
-from ..errors import InvalidInput, warn
+from ..errors import InvalidInput, NumericalError, warn
 from ..estimate import Driving
 from ..identify import Fit, Prediction, predict
 from ..log import Log
@@ -65,7 +64,7 @@ def gain_in_log_likelihood(
     try:
         before = _prediction(poorer, test, poorer)
         after = _prediction(richer, test, poorer if same_noise else richer)
-    except (_core.NumericalFailure, np.linalg.LinAlgError):
+    except (NumericalError, np.linalg.LinAlgError):
         return -np.inf, 0.0
     return _with_error(after.log_density - before.log_density, test)
 
@@ -77,7 +76,7 @@ def as_sure(poorer: Fit, richer: Fit, test: Driving) -> bool:
     """
     try:
         before, after = (_prediction(fit, test, fit) for fit in (poorer, richer))
-    except (_core.NumericalFailure, np.linalg.LinAlgError):
+    except (NumericalError, np.linalg.LinAlgError):
         return False
     return after.sureness >= before.sureness
 
@@ -96,7 +95,7 @@ def serving(fit: Fit, test: Driving) -> Fit:
     """
     try:
         return replace(fit, model=predict(fit, test, fit.noise).model)
-    except (_core.NumericalFailure, np.linalg.LinAlgError):
+    except (NumericalError, np.linalg.LinAlgError):
         return fit
 
 
@@ -112,7 +111,7 @@ def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> tuple[float, float
     for fit in (poorer, richer):
         try:
             trace = test.problem(fit.model).trace(fit.model.vector(), floor, False)
-        except _core.NumericalFailure:
+        except NumericalError:
             return -np.inf, 0.0
         squares.append(np.sum(trace["whitened"] ** 2, axis=1))
     return _with_error(squares[0] - squares[1], test)

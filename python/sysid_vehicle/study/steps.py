@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .. import _core
 from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter, effect
+from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Estimate, Fit, refine
 from .held_out import as_sure, error_falls, fall_in_error, gain_in_log_likelihood
@@ -177,7 +177,7 @@ def _with_others(fit: Fit, name: str, others: Sequence[Candidate]) -> Fit | None
         model = model.add(c.id).with_values({f"{c.id}.{p.name}": v for p, v in values})
     try:
         return without_idle(refine(model, fit.driving, fit.noise))
-    except (_core.NumericalFailure, np.linalg.LinAlgError):
+    except (NumericalError, np.linalg.LinAlgError):
         return None
 
 

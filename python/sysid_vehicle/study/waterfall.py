@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import _core
 from .._arrays import FloatArray
 from .._style import AFTER, BEFORE, axes_or_new, tidy
 from .._text import html_table, text_table
 from ..compare import Comparison
+from ..errors import NumericalError
 from ..estimate import MEASURED, Driving, NoiseModel
 from ..identify import Fit
 
@@ -124,7 +124,7 @@ def _error(
         # Predictions that begin a twentieth of their length apart are wrong alike.
         every = max(ahead // 20, 1)
         e = problem.look_ahead(fit.model.vector(), noise.vector(), ahead, every) / spread
-    except _core.NumericalFailure:
+    except NumericalError:
         return float("inf")
     e = np.where(np.isfinite(driving.measured), e, np.nan)
     return float(np.sqrt(np.nanmean(e**2))) if np.isfinite(e).any() else float("nan")

@@ -104,7 +104,7 @@ class DoubleTrackObserver:
                 readings.dt_s,
                 self.published_sign,
             )
-        except _core.NumericalFailure as error:
+        except NumericalError as error:
             raise NumericalError(f"{error}; take smaller gains") from error
         vx, vy, r, extra = states.T
         return DoubleTrackRun(vx, vy, r, mass + extra, np.arctan2(vy, vx))

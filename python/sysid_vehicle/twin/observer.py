@@ -241,7 +241,7 @@ def observe(
             batch,
             stride,
         )
-    except _core.NumericalFailure as error:
+    except NumericalError as error:
         raise NumericalError(f"{error}; take smaller gains or a nearer first load") from error
     unknown = [] if observer.batch is None else list(observer.batch.unknowns)
     return Observation(

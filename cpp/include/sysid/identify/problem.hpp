@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "sysid/dynamics/step.hpp"
@@ -16,6 +17,7 @@ struct Run {
     double dt = 0.01;
     std::vector<Input> inputs;
     std::vector<Vec<kChannels>> measurements;  // NaN where missing
+    std::string name{};                        // of the log, for messages
     std::size_t size() const { return inputs.size(); }
 };
 

@@ -35,6 +35,7 @@ class RunSystem {
         }
     }
 
+    const Run& run() const { return run_; }
     double forget() const { return forget_; }
     const ModelState<double>& start() const { return start_; }
 

@@ -1,0 +1,129 @@
+"""What in a car or in driving is likely to blame where its filter fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+import numpy as np
+
+from ..errors import explained
+from ..estimate import Driving
+from ..log import Log
+from ..model import Model
+from .fit import Fit
+
+__all__ = ["explaining", "suspects"]
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+# From a kart to a loaded truck.
+_CARS = {
+    "mass_kg": (80.0, 50000.0),
+    "lf_m": (0.3, 8.0),
+    "lr_m": (0.3, 8.0),
+    "cg_height_m": (0.0, 2.5),
+    "drag_area_m2": (0.0, 12.0),
+}
+_TYRES = {"B": (2.0, 50.0), "C": (0.5, 2.5), "D": (0.05, 2.5), "E": (-20.0, 1.0)}
+_INERTIA_RATIO = (0.3, 3.0)  # over mass_kg * lf_m * lr_m
+_READINGS = {
+    "vx_mps": 120.0,
+    "vy_mps": 30.0,
+    "yaw_rate_radps": 5.0,
+    "ax_mps2": 50.0,
+    "ay_mps2": 50.0,
+    "steer_rad": 1.2,
+}
+_SHOWN = 4
+
+
+def suspects(model: Model | None, logs: Sequence[Log]) -> str:
+    """Name the parameters no car has, and the channels that stand still or leave all range."""
+    found = [*(_of_car(model) if model is not None else ()), *_of_driving(logs)]
+    if not found:
+        return (
+            "check the units and signs of the log, and the masses, lengths and tyres of the "
+            "vehicle file"
+        )
+    more = f" (and {len(found) - _SHOWN} more)" if len(found) > _SHOWN else ""
+    return "check " + ", ".join(found[:_SHOWN]) + more
+
+
+def explaining(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """The function, whose numerical failures name the suspects among its arguments."""
+
+    @wraps(function)
+    def call(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        given = (*args, *kwargs.values())
+        with explained(
+            lambda: ", ".join(log.name for log in _logs(given)),
+            lambda: suspects(next(_models(given), None), _logs(given)),
+        ):
+            return function(*args, **kwargs)
+
+    return call
+
+
+def _models(arguments: Iterable[object]) -> Iterator[Model]:
+    for x in arguments:
+        if isinstance(x, Model):
+            yield x
+        elif isinstance(x, Fit):
+            yield x.model
+
+
+def _logs(arguments: Iterable[object]) -> list[Log]:
+    """All logs among the arguments; those of a fit where no others are."""
+    found: list[Log] = []
+    fitted: list[Log] = []
+    for x in arguments:
+        if isinstance(x, Fit):
+            fitted += x.driving.logs
+        elif isinstance(x, Driving):
+            found += x.logs
+        elif isinstance(x, Log):
+            found.append(x)
+        elif isinstance(x, list | tuple):
+            found += [y for y in x if isinstance(y, Log)]
+    return list(dict.fromkeys(found or fitted))
+
+
+def _of_car(model: Model) -> list[str]:
+    car = model.vehicle
+    values = [(n, getattr(car, n), low, high) for n, (low, high) in _CARS.items()]
+    values += [
+        (f"{letter}_{axle}", model.value(f"{letter}_{axle}"), low, high)
+        for axle in ("front", "rear")
+        for letter, (low, high) in _TYRES.items()
+    ]
+    typical = car.mass_kg * car.lf_m * car.lr_m
+    low, high = (ratio * typical for ratio in _INERTIA_RATIO)
+    values.append(("yaw_inertia_kgm2", model.value("yaw_inertia_kgm2"), low, high))
+    return [
+        f"{name} = {value:.4g} (cars: {low:.4g} to {high:.4g})"
+        for name, value, low, high in values
+        if not low <= value <= high
+    ]
+
+
+def _of_driving(logs: Sequence[Log]) -> list[str]:
+    found = []
+    for name in (*_READINGS, "fx_n"):
+        for log in logs:
+            if not log.has(name):
+                continue
+            y = np.abs(log[name])
+            if not np.isfinite(y).any():
+                continue
+            k = int(np.nanargmax(y))
+            if y[k] > _READINGS.get(name, np.inf):
+                found.append(
+                    f"{name}, which reaches {log[name][k]:.4g} at {log['time_s'][k]:.6g} s"
+                    f" of {log.name}"
+                )
+            elif np.nanmin(log[name]) == np.nanmax(log[name]):
+                found.append(f"{name}, which stays at {log[name][k]:.4g} in {log.name}")
+    return found
