@@ -17,6 +17,8 @@ os.environ["MPLBACKEND"] = "Agg"  # before anything imports pyplot: tests open n
 
 # The same examples at each run, and no clock in the verdict: machines differ in speed.
 settings.register_profile("repeatable", derandomize=True, deadline=None, print_blob=False)
+# For hours rather than seconds, and other examples each time: `--hypothesis-profile=long`.
+settings.register_profile("long", deadline=None, max_examples=20_000, print_blob=True)
 settings.load_profile("repeatable")
 
 REPO = Path(__file__).resolve().parents[2]

@@ -56,9 +56,9 @@ def test_holds_what_it_was_given(data: Columns) -> None:
     assert log["temperature"].dtype == np.float64
 
 
-def test_dates_are_no_time_in_seconds(data: Columns) -> None:
+def test_dates_without_time_are_no_time(data: Columns) -> None:
     data["time_s"] = np.datetime64("2014-02-22") + np.arange(1001)
-    with pytest.raises(InvalidInput, match=r"time_s: .*2014-02-22.* is not a number"):
+    with pytest.raises(InvalidInput, match=r"time_s: the stamps are 8.64e\+04 s apart.*sample 0"):
         make(data)
 
 
@@ -177,6 +177,24 @@ class TestGrid:
         np.testing.assert_array_equal(log["ay_mps2"][:400], data["ay_mps2"][:400])
         np.testing.assert_array_equal(log["ay_mps2"][500:], data["ay_mps2"][500:])
         assert log.stretches() == [slice(0, 400), slice(500, 1001)]
+
+    @pytest.mark.parametrize("scale", [1e3, 1e6, 1e9])
+    @pytest.mark.parametrize("rate_hz", [5.0, 100.0, 1000.0])
+    def test_other_units_of_time(self, scale: float, rate_hz: float) -> None:
+        values = columns(np.arange(1001) / rate_hz * scale)
+        factor = {1e3: "0.001", 1e6: "1e-6", 1e9: "1e-9"}[scale]
+        with pytest.raises(InvalidInput, match=f"time_s: steps of .*factor = {factor} "):
+            make(values)
+
+    def test_time_that_nearly_repeats(self, data: Columns) -> None:
+        data["time_s"][500] = np.nextafter(data["time_s"][499], 9.0)
+        with pytest.raises(InvalidInput, match=r"time_s: nearly repeats at sample 500 \(t = 4.99"):
+            make(data)
+
+    def test_time_without_end(self, data: Columns) -> None:
+        data["time_s"][[0, -1]] = -1.7e308, 1.7e308
+        with pytest.raises(InvalidInput, match=r"time_s: goes from -1.7e\+308 to 1.7e\+308"):
+            make(data)
 
     @given(
         start=st.floats(-1e3, 1e5), rate=st.floats(20.0, 1000.0), lost=st.sets(st.integers(1, 98))

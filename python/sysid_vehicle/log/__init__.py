@@ -1,6 +1,18 @@
 """Driving logs: canonical channels on a uniform grid, checked before they are used."""
 
 from ._channels import CHANNELS, Channel
+from ._columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
 from ._log import Log, check_excitation
 
-__all__ = ["CHANNELS", "Channel", "Log", "check_excitation"]
+__all__ = [
+    "CHANNELS",
+    "Channel",
+    "Columns",
+    "Log",
+    "as_floats",
+    "as_seconds",
+    "check_excitation",
+    "listed",
+    "named_columns",
+    "seconds_of_stamps",
+]

@@ -4,29 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import InvalidInput, near_names, warn
+from ..errors import InvalidInput, warn
 from . import _checks
-from ._channels import CHANNELS, REQUIRED, FloatArray
-from ._grid import at, check_time, to_grid
+from ._channels import CHANNELS, FloatArray
+from ._columns import Columns, collect
+from ._grid import at, check_time, own_period, to_grid
+from ._held import blank_held
 from ._plausibility import check_units_and_signs
 from ._signals import fill_short_gaps, spikes
 
 _MIN_USABLE_S = 5.0
 _FILL_S = 0.1
-
-
-class Columns(Protocol):
-    """Anything with named columns: a dict of arrays, a DataFrame, ``numpy.load`` of an .npz."""
-
-    def keys(self) -> Iterable[Any]:
-        """Return the column names."""
-
-    def __getitem__(self, key: Any, /) -> Any:
-        """Return one column."""
+_FILL_SLOW_S = 0.25  # an input that is sampled more slowly is not interpolated
 
 
 @dataclass(frozen=True)
@@ -51,11 +43,13 @@ def build(data: Columns, name: str, despike: Iterable[str], check: bool) -> Buil
 
 
 def _build(data: Columns, despike: tuple[str, ...], check: bool, notes: list[str]) -> Built:
-    columns = _collect(data, notes)
+    columns = collect(data, notes)
     time_s = columns.pop("time_s")
     if time_s.size < 2:
         raise InvalidInput(f"time_s: only {time_s.size} sample(s); a log needs at least two")
     check_time(time_s)
+    if check:
+        columns = blank_held(columns, 1.0 / float(np.median(np.diff(time_s))), notes)
     notes += _checks.nan_block_notes(time_s, columns)
     for channel in despike:
         if channel not in columns:
@@ -76,88 +70,6 @@ def _build(data: Columns, despike: tuple[str, ...], check: bool, notes: list[str
     for values in channels.values():
         values.flags.writeable = False
     return Built(channels, rate_hz, uniform=not note)
-
-
-def _collect(data: Columns, notes: list[str]) -> dict[str, FloatArray]:
-    keys = list(data.keys())
-    names = [str(key) for key in keys]
-    _check_presence(names)
-    columns: dict[str, FloatArray] = {}
-    for key, name in zip(keys, names, strict=True):
-        values = _as_floats(data[key], name)
-        if values is not None:
-            columns[name] = values
-    n = columns["time_s"].size
-    for name in list(columns):
-        values = columns[name]
-        if values.size != n:
-            raise InvalidInput(
-                f"{name}: has {values.size} samples, time_s has {n}; give columns of equal length"
-            )
-        endless = np.flatnonzero(np.isinf(values))
-        if endless.size and name != "time_s":
-            raise InvalidInput(
-                f"{name}: infinite at {at(int(endless[0]), columns['time_s'])} ({endless.size} "
-                f"such samples); leave missing measurements empty or NaN"
-            )
-        if n and name in CHANNELS and name != "time_s" and np.isnan(values).all():
-            if CHANNELS[name].required:
-                raise InvalidInput(
-                    f"{name}: holds no value at any of the {n} samples; the model needs it: check "
-                    f"the column or map another one to it"
-                )
-            del columns[name]
-            notes.append(
-                f"{name}: holds no value at any of the {n} samples and is treated as absent; "
-                f"leave the column out"
-            )
-    if "fx_n" not in columns and "ax_mps2" not in columns:
-        raise InvalidInput(
-            f"fx_n and ax_mps2: both are absent, so nothing tells how the car is driven and braked "
-            f"(columns: {', '.join(names)}); give at least one of them"
-        )
-    return columns
-
-
-def _check_presence(names: list[str]) -> None:
-    missing = [channel for channel in REQUIRED if channel not in names]
-    if missing:
-        listed = ", ".join(
-            f"{channel}{near_names(channel, set(names) - set(CHANNELS))}" for channel in missing
-        )
-        raise InvalidInput(
-            f"missing column{'s' if len(missing) > 1 else ''} {listed}; rename the column, or name "
-            f"its source in a channel map (columns: {', '.join(names)})"
-        )
-    for name in names:
-        if names.count(name) > 1:
-            raise InvalidInput(f"{name}: {names.count(name)} columns have this name; keep one")
-
-
-def _as_floats(values: Any, name: str) -> FloatArray | None:
-    """Return a private float64 copy of a column; None for an extra column that is not numeric."""
-    raw = np.asarray(values)
-    try:
-        if raw.dtype.kind in "mMc":  # dates would become nanoseconds, complex numbers lose a part
-            raise TypeError
-        array = raw.astype(np.float64)
-    except (TypeError, ValueError):
-        if name not in CHANNELS:
-            return None
-        for i, value in enumerate(raw.flat):
-            try:
-                float(value)
-            except (TypeError, ValueError):
-                raise InvalidInput(
-                    f"{name}: {str(value)!r} at sample {i} is not a number; correct it, or use NaN "
-                    f"for a missing measurement"
-                ) from None
-        raise InvalidInput(f"{name}: holds {raw.dtype}; give a column of plain numbers") from None
-    if array.ndim != 1:
-        if name not in CHANNELS:
-            return None
-        raise InvalidInput(f"{name}: has shape {array.shape}; give a one-dimensional array")
-    return array
 
 
 def _handle_spikes(
@@ -197,8 +109,16 @@ def _fill_inputs(
     """
     drive = "fx_n" if "fx_n" in columns else "ax_mps2"
     for name in ("steer_rad", drive):
-        columns[name], gaps = fill_short_gaps(columns[name], max(1, round(_FILL_S * rate_hz)))
-        if gaps and name not in quiet:
+        period = own_period(time_s, columns[name])
+        longest = max(_FILL_S, period if period <= _FILL_SLOW_S else 0.0)
+        columns[name], gaps = fill_short_gaps(columns[name], max(1, round(longest * rate_hz)))
+        if gaps and period * rate_hz > 1.5:
+            notes.append(
+                f"{name}: holds a value only every {period:.3g} s and was interpolated in between, "
+                f"because the model needs this input at every sample; record it at "
+                f"{rate_hz:.4g} Hz"
+            )
+        elif gaps and name not in quiet:
             count = sum(b - a for a, b in gaps)
             notes.append(
                 f"{name}: {count} missing sample(s) in {len(gaps)} short hole(s), first at "

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from ._channels import CHANNELS, FloatArray
-from ._grid import between
+from ._grid import between, own_period
 from ._signals import filled, runs, smoothed
 
 _NAN_BLOCK_S = 0.5
@@ -20,14 +20,15 @@ _FROZEN_MISSES = {"ay_mps2": 1.0, "yaw_rate_radps": 1.0, "vx_mps": 2.0, "ax_mps2
 
 
 def nan_block_notes(time_s: FloatArray, columns: Mapping[str, FloatArray]) -> list[str]:
-    """Return one note per channel that lacks values for more than half a second on end."""
+    """Return one note per channel that lacks values for half a second and two of its periods."""
     notes = []
     for name, values in columns.items():
         if name not in CHANNELS:
             continue
-        blocks = [
-            (a, b) for a, b in runs(np.isnan(values)) if time_s[b - 1] - time_s[a] > _NAN_BLOCK_S
-        ]
+        holes = runs(np.isnan(values))
+        # Between the samples of a slow channel nothing is missing.
+        longest = max(_NAN_BLOCK_S, 2.0 * own_period(time_s, values)) if holes else 0.0
+        blocks = [(a, b) for a, b in holes if time_s[b - 1] - time_s[a] > longest]
         if not blocks:
             continue
         a, b = blocks[0]

@@ -7,10 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..errors import InvalidInput
-from ._channels import FloatArray
+from ._channels import CHANNELS, FloatArray
 
 _JITTER = 0.01  # relative step variation up to which a log counts as uniform
 _GAP_STEPS = 5.0
+_LONGEST_S = 1e18  # nanoseconds of thirty years: time beyond is broken
+_SECONDS_BELOW = 1.0
+# Steps below these look like that unit: a rate from 2.5 Hz to 2.5 kHz.
+_FINER = ((400.0, "milli", "0.001"), (4e5, "micro", "1e-6"), (np.inf, "nano", "1e-9"))
+_MIN_STEP = 1e-6  # of the usual step: below, two rows are one that was written twice
+_OWN_GAP = 1.5  # a channel is interpolated between samples that are no farther apart, in periods
 _MAX_GROWTH = 20  # a grid this many times longer than the log means a broken time channel
 
 
@@ -48,14 +54,31 @@ def check_time(time_s: FloatArray) -> None:
             f"time_s: goes back at {at(i, time_s)} after {time_s[i - 1]:.6g} s; sort the rows, "
             f"or cut the log there and read the parts as separate logs"
         )
+    span = float(time_s[-1]) - float(time_s[0])
+    if not span < _LONGEST_S:
+        raise InvalidInput(
+            f"time_s: goes from {time_s[0]:.6g} to {time_s[-1]:.6g} s (sample {time_s.size - 1}), "
+            f"which is no drive; give the time in seconds"
+        )
     typical = float(np.median(step)) if step.size else 0.0
-    if typical >= 1.0:
-        factor = "1e-6" if typical >= 1000.0 else "0.001"
-        unit = "micro" if typical >= 1000.0 else "milli"
+    if typical >= _SECONDS_BELOW:
+        unit, factor = next((u, f) for below, u, f in _FINER if typical < below)
         raise InvalidInput(
             f"time_s: steps of {typical:.4g} from sample 0 (t = {time_s[0]:.6g}) on look like "
             f"{unit}seconds; put factor = {factor} in the channel map"
         )
+    if step.size and float(step.min()) < _MIN_STEP * typical:
+        i = int(np.argmin(step)) + 1
+        raise InvalidInput(
+            f"time_s: nearly repeats at {at(i, time_s)}, {step[i - 1]:.3g} s after sample {i - 1}; "
+            f"delete one of the two rows"
+        )
+
+
+def own_period(time_s: FloatArray, values: FloatArray) -> float:
+    """Return the usual time between two samples at which a channel holds a value [s]."""
+    own = time_s[np.isfinite(values)]
+    return float(np.median(np.diff(own))) if own.size > 1 else float(time_s[-1] - time_s[0])
 
 
 def to_grid(
@@ -75,8 +98,10 @@ def to_grid(
     grid : ndarray, shape (m,)
         Uniform time.
     columns : dict of ndarray, shape (m,)
-        The columns on that grid: as they were if time was uniform to 1 %, else interpolated
-        linearly at the median rate, with NaN inside gaps of more than five steps.
+        The columns on that grid: as they were if time was uniform to 1 %. Else each is
+        interpolated linearly between its own samples, at the rate of the quickest channel, with
+        NaN in its holes and inside gaps of more than five steps. A channel that is sampled more
+        slowly than the grid keeps as many values as it had, each at the nearest grid point.
     note : str
         What was done, in words; empty if nothing had to be done.
     """
@@ -88,7 +113,11 @@ def to_grid(
     if regular or _is_rounded(time_s, mean_step):
         return even, dict(columns), ""
 
-    dt = float(np.median(step))
+    periods = {name: own_period(time_s, values) for name, values in columns.items()}
+    # Rows of several sources may lie between each other: the quickest one sets the rate.
+    dt = min(
+        (periods[name] for name in columns if name in CHANNELS), default=float(np.median(step))
+    )
     count = int(np.floor((time_s[-1] - time_s[0]) / dt + 1e-6)) + 1
     worst = int(np.argmax(step))
     if count > _MAX_GROWTH * n + 1000:
@@ -97,17 +126,51 @@ def to_grid(
             f"is {dt:.4g} s; cut the log there and read the parts as separate logs"
         )
     grid = time_s[0] + dt * np.arange(count)
-    left = np.clip(np.searchsorted(time_s, grid + 1e-6 * dt, side="right") - 1, 0, n - 2)
-    weight = np.clip((grid - time_s[left]) / step[left], 0.0, 1.0)
-    on_left, on_right = weight < 1e-6, weight > 1.0 - 1e-6
-    in_gap = (step[left] > _GAP_STEPS * dt) & ~on_left & ~on_right
-    result = {}
-    for name, values in columns.items():
-        a, b = values[left], values[left + 1]
-        mixed = np.where(on_left, a, np.where(on_right, b, (1.0 - weight) * a + weight * b))
-        mixed[in_gap] = np.nan
-        result[name] = mixed
-    return grid, result, _note(time_s, step, dt)
+    result = {
+        name: _on_grid(grid, dt, time_s, values, periods[name]) for name, values in columns.items()
+    }
+    slow = {name: p for name, p in periods.items() if name in CHANNELS and is_slow(p, dt)}
+    return grid, result, _note(time_s, step, dt, slow)
+
+
+def _on_grid(
+    grid: FloatArray, dt: float, time_s: FloatArray, values: FloatArray, period: float
+) -> FloatArray:
+    """Interpolate one channel between its own samples, never across its holes."""
+    rows = np.flatnonzero(np.isfinite(values))
+    result = np.full(grid.size, np.nan)
+    if rows.size == 0:
+        return result
+    own, known = time_s[rows], values[rows]
+    if rows.size > 1:
+        step = np.diff(own)
+        left = np.clip(np.searchsorted(own, grid + 1e-6 * dt, side="right") - 1, 0, own.size - 2)
+        weight = np.clip((grid - own[left]) / step[left], 0.0, 1.0)
+        weight[weight * step[left] < 1e-6 * dt] = 0.0
+        weight[(1.0 - weight) * step[left] < 1e-6 * dt] = 1.0
+        inside = (grid > own[0] - 1e-6 * dt) & (grid < own[-1] + 1e-6 * dt)
+        # Rows that are lost altogether may be bridged farther than values that are missing.
+        longest = np.where(np.diff(rows) == 1, max(_GAP_STEPS * dt, _OWN_GAP * period), 0.0)
+        bridged = (step <= np.maximum(longest, _OWN_GAP * period))[left]
+        known_there = inside & (bridged | (weight == 0.0) | (weight == 1.0))
+        mixed = (1.0 - weight) * known[left] + weight * known[left + 1]
+        mixed = np.where(
+            weight == 0.0, known[left], np.where(weight == 1.0, known[left + 1], mixed)
+        )
+        result[known_there] = mixed[known_there]
+    if not is_slow(period, dt) and rows.size > 1:
+        return result
+    fresh = np.full(grid.size, np.nan)
+    nearest = np.clip(np.round((own - grid[0]) / dt).astype(np.intp), 0, grid.size - 1)
+    fresh[nearest] = known  # where there is nothing to interpolate with, the sample as it is
+    both = np.isfinite(fresh) & np.isfinite(result)
+    fresh[both] = result[both]
+    return fresh
+
+
+def is_slow(period: float, dt: float) -> bool:
+    """Tell whether a channel is sampled more slowly than a grid of step `dt`."""
+    return period > _OWN_GAP * dt
 
 
 def _is_rounded(time_s: FloatArray, mean_step: float) -> bool:
@@ -122,21 +185,30 @@ def _is_rounded(time_s: FloatArray, mean_step: float) -> bool:
     return False
 
 
-def _note(time_s: FloatArray, step: FloatArray, dt: float) -> str:
+def _note(time_s: FloatArray, step: FloatArray, dt: float, slow: Mapping[str, float]) -> str:
     gaps = np.flatnonzero(step > _GAP_STEPS * dt)
     inside = step[step <= _GAP_STEPS * dt]
     # Lost rows leave whole multiples of dt; only other steps mean that values were interpolated.
-    uneven = np.flatnonzero(np.abs(inside / dt - np.round(inside / dt)) > _JITTER)
+    whole = np.maximum(np.round(inside / dt), 1.0)
+    uneven = np.flatnonzero(np.abs(inside / dt - whole) > _JITTER)
     parts = []
     if uneven.size:
         spread = f"{inside.min():.3g} to {inside.max():.3g} s"
-        parts.append(f"has steps of {spread}; all channels were resampled at {1.0 / dt:.4g} Hz")
+        apart = "".join(f", {name} at its own {1.0 / p:.3g} Hz" for name, p in slow.items())
+        parts.append(
+            f"has steps of {spread}; all channels were resampled at {1.0 / dt:.4g} Hz{apart}"
+        )
     elif gaps.size == 0:
         lost = np.flatnonzero(step > 1.5 * dt)
-        parts.append(
-            f"lacks rows in {lost.size} places, first at {at(int(lost[0]) + 1, time_s)}; "
-            f"the missing samples were interpolated"
-        )
+        if lost.size:
+            parts.append(
+                f"lacks rows in {lost.size} places, first at {at(int(lost[0]) + 1, time_s)}; "
+                f"the missing samples were interpolated"
+            )
+        else:
+            parts.append(
+                f"drifts from even steps; all channels were resampled at {1.0 / dt:.4g} Hz"
+            )
     if gaps.size:
         first = int(gaps[0])
         parts.append(

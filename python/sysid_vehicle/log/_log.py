@@ -12,9 +12,10 @@ import numpy as np
 
 from .._files import write_text
 from ..errors import InvalidInput, near_names, warn
-from ._build import Columns, build
+from ._build import build
 from ._channels import CHANNELS, FloatArray
 from ._checks import excitation_note
+from ._columns import Columns
 from ._signals import filled, runs
 
 if TYPE_CHECKING:

@@ -6,32 +6,35 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import InvalidInput
-from ..log import Log
+from ..errors import InvalidInput, warn
+from ..log import Columns, Log
 from ._channel_map import ChannelMap, Source
 from ._csv import read_table
+from ._table import table_of
 
 __all__ = ["ChannelMap", "Source", "read_log"]
 
 
 def read_log(
-    path: str | Path,
+    path: str | Path | Columns,
     channels: str | Path | Mapping[str, Any] | ChannelMap | None = None,
     *,
     name: str | None = None,
     check: bool = True,
 ) -> Log:
-    """Read a driving log from a CSV file.
+    """Read a driving log from a CSV file, or from columns in memory under other names.
 
     Parameters
     ----------
-    path : str or Path
+    path : str, Path or table
         File whose first line names the columns. An empty cell or ``nan`` is a missing measurement.
+        Lines that begin with ``#`` are comments, a second line may state units, times may be ISO
+        8601 stamps. A dict of arrays or a table (pandas, polars, Arrow) is taken as it is.
     channels : str, Path, mapping or ChannelMap, optional
         Channel map for a file with other column names or units: a TOML file, the content of its
         ``[channels]`` table, or the map itself.
     name : str, optional
-        Name of the run; the file name without its suffix otherwise.
+        Name of the run; the file name without its suffix otherwise, ``log`` for a table.
     check : bool
         As in :meth:`Log.from_arrays`.
 
@@ -58,9 +61,13 @@ def read_log(
         mapping = ChannelMap.from_dict(channels)
     else:
         mapping = ChannelMap.from_toml(channels)
-    run = Path(path).stem if name is None else name
+    run = name if name is not None else Path(path).stem if isinstance(path, (str, Path)) else "log"
+    notes: list[str] = []
     try:
-        columns = mapping.apply(read_table(path))
+        table = read_table(path) if isinstance(path, (str, Path)) else table_of(path)
+        columns = mapping.apply(table, notes)
     except InvalidInput as error:
         raise InvalidInput(f"{run}: {error}") from error
+    for note in notes:
+        warn(f"{run}: {note}")
     return Log.from_arrays(columns, name=run, despike=mapping.despiked, check=check)

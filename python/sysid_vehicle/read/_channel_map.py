@@ -13,9 +13,11 @@ import numpy.typing as npt
 
 from .._files import read_toml, refuse_unknown
 from ..errors import InvalidInput, near_names
-from ..log import CHANNELS
-from ._csv import Table
+from ..log import CHANNELS, listed
+from ._table import Table
+from ._units import factor_to
 
+_COMPARED_NAMES = 1000  # near names are sought among so many
 _SOURCE_KEYS = ("column", "factor", "offset", "despike")
 
 
@@ -111,8 +113,11 @@ class ChannelMap:
         """Canonical channels whose one-sample spikes are to be removed."""
         return tuple(channel for channel, source in self.sources.items() if source.despike)
 
-    def apply(self, table: Table) -> dict[str, npt.NDArray[np.float64]]:
+    def apply(self, table: Table, notes: list[str]) -> dict[str, npt.NDArray[np.float64]]:
         """Return the canonical channels of `table`, then its other numeric columns.
+
+        Where the map gives neither factor nor offset, a unit that the file states is converted,
+        which `notes` tells.
 
         Raises
         ------
@@ -121,24 +126,54 @@ class ChannelMap:
         """
         result: dict[str, npt.NDArray[np.float64]] = {}
         for channel, source in self.sources.items():
-            if source.column not in table.names:
-                hint = near_names(source.column, table.names)
+            if not table.counts[source.column]:
+                hint = near_names(source.column, table.names[:_COMPARED_NAMES])
                 raise InvalidInput(
                     f"{channel}: the channel map names column '{source.column}', which is not in "
-                    f"the file{hint}; columns are {', '.join(table.names)}"
+                    f"the file{hint}; columns are {listed(table.names)}"
                 )
-            result[channel] = source.factor * table.column(source.column) + source.offset
+            values = _values(table, source.column, channel)
+            if (source.factor, source.offset) == (1.0, 0.0):
+                values = values * _stated_factor(table, source.column, channel, notes)
+            with np.errstate(over="ignore", invalid="ignore"):  # what is endless is refused later
+                result[channel] = source.factor * values + source.offset
         if self.rate_hz is not None:
             result["time_s"] = np.arange(table.n) / self.rate_hz
         used = {source.column for source in self.sources.values()}
-        for name in table.names:
+        for name in dict.fromkeys(table.names):
             if name in result or name in self.absent:
                 continue
             if name in CHANNELS:
-                result[name] = table.column(name)
-            elif name not in used and table.names.count(name) == 1 and name in table.columns:
+                result[name] = _values(table, name, name) * _stated_factor(table, name, name, notes)
+            elif name not in used and table.counts[name] == 1 and name in table.columns:
                 result[name] = table.columns[name]
         return result
+
+
+def _values(table: Table, column: str, channel: str) -> npt.NDArray[np.float64]:
+    if channel == "time_s" and column in table.seconds and table.counts[column] == 1:
+        return table.seconds[column]
+    return table.column(column)
+
+
+def _stated_factor(table: Table, column: str, channel: str, notes: list[str]) -> float:
+    """Return the factor for the unit that the file states for a column; 1 if it states none."""
+    if column not in table.units or column in table.seconds:
+        return 1.0
+    unit, si_unit = table.units[column], CHANNELS[channel].unit
+    factor = factor_to(si_unit, unit)
+    if factor is None:
+        notes.append(
+            f"{channel}: the row of units states '{unit}', which is no known unit for it; it was "
+            f"taken as {si_unit}: put its factor in the channel map"
+        )
+        return 1.0
+    if factor != 1.0:
+        notes.append(
+            f"{channel}: the row of units states '{unit}' and it was converted; put factor = "
+            f"{factor:.7g} for {channel} in the channel map to confirm it"
+        )
+    return factor
 
 
 def _source(entry: Mapping[str, Any], channel: str, where: str) -> Source:

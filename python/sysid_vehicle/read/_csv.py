@@ -5,56 +5,30 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from .._files import read_text
 from ..errors import InvalidInput
-
-
-@dataclass(frozen=True)
-class Table:
-    """Columns of a CSV file; cells that are no numbers are noted by line, not yet an error."""
-
-    names: tuple[str, ...]
-    columns: dict[str, npt.NDArray[np.float64]]
-    not_numbers: dict[str, tuple[str, int, int]]
-    n: int
-
-    def column(self, name: str) -> npt.NDArray[np.float64]:
-        """Return one column.
-
-        Raises
-        ------
-        InvalidInput
-            If it holds a cell that is not a number, or if several columns have this name.
-        """
-        if self.names.count(name) > 1:
-            raise InvalidInput(
-                f"{name}: {self.names.count(name)} columns have this name; rename or delete one"
-            )
-        if name in self.not_numbers:
-            cell, line, sample = self.not_numbers[name]
-            raise InvalidInput(
-                f"{name}: '{cell}' in line {line} (sample {sample}) is not a number; correct the "
-                f"cell, or empty it for a missing measurement"
-            )
-        return self.columns[name]
+from ..log import seconds_of_stamps
+from ._formats import read_text_table
+from ._table import BadCell, Table
+from ._units import is_unit
 
 
 def read_table(path: str | Path) -> Table:
     """Read a CSV file whose first line names the columns (comma, semicolon or tab between).
+
+    Lines that begin with ``#`` are comments; where only they come before the numbers the last of
+    them names the columns. A second line of units is kept with the columns.
 
     Raises
     ------
     InvalidInput
         If the file cannot be read, has no header or no rows, or a row has the wrong length.
     """
-    text = read_text(path).replace("\r\n", "\n").replace("\r", "\n")
-    header, _, body = text.partition("\n")
+    text = read_text_table(path).replace("\r\n", "\n").replace("\r", "\n")
+    header, body, first_line = _split(text)
     delimiter = max(",;\t", key=header.count)
     _, cells = next(_rows(header, delimiter, 1), (1, []))
     names = tuple(name.strip() for name in cells)
@@ -65,13 +39,51 @@ def read_table(path: str | Path) -> Table:
             f"the first line holds numbers ({', '.join(names[:3])}, ...); put a line with the "
             f"column names before it"
         )
+    units, body, first_line = _units_row(body, delimiter, names, first_line)
     if not body.strip():
         raise InvalidInput("there are no rows below the column names; record the log again")
     # With semicolons or tabs between cells a comma inside a cell is a decimal comma.
     if delimiter != "," and "," in body:
         body = body.replace(",", ".")
-    fast = _read_fast(body, delimiter, names)
-    return fast if fast is not None else _read_slow(body, delimiter, names)
+    table = _read_fast(body, delimiter, names, units)
+    return table if table is not None else _read_slow(body, delimiter, names, units, first_line)
+
+
+def _split(text: str) -> tuple[str, str, int]:
+    """Return header, body and the number of the body's first line; comments become empty lines."""
+    lines = text.split("\n")
+    header, at = "", 0
+    while at < len(lines) and lines[at].startswith("#"):
+        at += 1
+    if at < len(lines):
+        header = lines[at]
+    if 0 < at < len(lines):
+        named = lines[at - 1].lstrip("# ")
+        delimiter = max(",;\t", key=header.count)
+        numbers = all(_is_number(cell) for cell in header.split(delimiter) if cell.strip())
+        if numbers and header.strip() and named.count(delimiter) == header.count(delimiter):
+            header, at = named, at - 1
+    rest = lines[at + 1 :]
+    if any(line.startswith("#") for line in rest):
+        rest = ["" if line.startswith("#") else line for line in rest]
+    return header, "\n".join(rest), at + 2
+
+
+def _units_row(
+    body: str, delimiter: str, names: tuple[str, ...], first_line: int
+) -> tuple[dict[str, str], str, int]:
+    """Take a row of units off the body: no numbers in it, and mostly units that are known."""
+    row, _, rest = body.partition("\n")
+    try:
+        _, cells = next(_rows(row, delimiter, first_line), (first_line, []))
+    except InvalidInput:  # is told of where the rows are read
+        return {}, body, first_line
+    told = [cell.strip() for cell in cells if cell.strip()]
+    known = sum(is_unit(cell) for cell in told)
+    if len(cells) != len(names) or any(map(_is_number, told)) or 2 * known <= len(told):
+        return {}, body, first_line
+    units = {name: cell.strip() for name, cell in zip(names, cells, strict=True) if cell.strip()}
+    return units, rest, first_line + 1
 
 
 def _is_number(text: str) -> bool:
@@ -86,7 +98,9 @@ def _unique(names: tuple[str, ...]) -> Collection[str]:
     return dict.fromkeys(names)
 
 
-def _read_fast(body: str, delimiter: str, names: tuple[str, ...]) -> Table | None:
+def _read_fast(
+    body: str, delimiter: str, names: tuple[str, ...], units: dict[str, str]
+) -> Table | None:
     """Read a body of numbers only; None if anything else is in it."""
     try:
         values = np.loadtxt(
@@ -96,8 +110,9 @@ def _read_fast(body: str, delimiter: str, names: tuple[str, ...]) -> Table | Non
         return None
     if values.shape[1] != len(names):
         return None
-    columns = {name: np.ascontiguousarray(values[:, names.index(name)]) for name in _unique(names)}
-    return Table(names, columns, {}, values.shape[0])
+    first = {name: k for k, name in reversed(list(enumerate(names)))}
+    columns = {name: np.ascontiguousarray(values[:, first[name]]) for name in _unique(names)}
+    return Table(names, columns, {}, values.shape[0], units)
 
 
 def _rows(text: str, delimiter: str, first_line: int) -> Iterator[tuple[int, list[str]]]:
@@ -113,10 +128,12 @@ def _rows(text: str, delimiter: str, first_line: int) -> Iterator[tuple[int, lis
         ) from error
 
 
-def _read_slow(body: str, delimiter: str, names: tuple[str, ...]) -> Table:
+def _read_slow(
+    body: str, delimiter: str, names: tuple[str, ...], units: dict[str, str], first_line: int
+) -> Table:
     rows: list[list[str]] = []
     lines: list[int] = []
-    for line, row in _rows(body, delimiter, 2):
+    for line, row in _rows(body, delimiter, first_line):
         if not row or not any(cell.strip() for cell in row):
             continue
         if len(row) != len(names):
@@ -126,13 +143,20 @@ def _read_slow(body: str, delimiter: str, names: tuple[str, ...]) -> Table:
             )
         rows.append(row)
         lines.append(line)
-    columns, not_numbers = {}, {}
+    if not rows:
+        raise InvalidInput(
+            "there are only empty cells below the column names; record the log again"
+        )
+    columns, not_numbers, seconds = {}, {}, {}
     for name, cells in zip(names, zip(*rows, strict=True), strict=True):
         try:
             values = np.array([float(cell) if cell.strip() else np.nan for cell in cells])
         except ValueError:
             first = next(k for k, c in enumerate(cells) if c.strip() and not _is_number(c))
-            not_numbers[name] = (cells[first].strip(), lines[first], first)
+            not_numbers[name] = BadCell(cells[first].strip(), first, lines[first])
+            stamps = seconds_of_stamps(cells)
+            if stamps is not None:
+                seconds[name] = stamps
         else:
             columns[name] = values
-    return Table(names, columns, not_numbers, len(rows))
+    return Table(names, columns, not_numbers, len(rows), units, seconds)

@@ -1,0 +1,121 @@
+"""Channels that are sampled more slowly than the log: empty in between, or held."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+from sysid_vehicle.errors import SysidWarning
+from sysid_vehicle.log import Log
+from sysid_vehicle.log._held import held_rows
+
+Columns = dict[str, np.ndarray]
+
+
+def columns(time_s: np.ndarray) -> Columns:
+    """Smooth functions of time, no car: only for tests without the checks of a car."""
+    return {
+        "time_s": time_s,
+        "vx_mps": 20.0 + 0.5 * time_s,
+        "yaw_rate_radps": 0.1 * np.sin(time_s),
+        "ay_mps2": 2.0 * np.sin(time_s),
+        "ax_mps2": np.full_like(time_s, 0.5),
+        "steer_rad": 0.05 * np.sin(time_s),
+    }
+
+
+def make(data: Columns, **options: object) -> Log:
+    return Log.from_arrays(data, name="run 1", check=False, **options)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def data() -> Columns:
+    return columns(np.arange(1001) * 0.01)
+
+
+class TestEmptyInBetween:
+    @pytest.mark.parametrize(("every", "rate_hz"), [(2, 50.0), (5, 20.0), (10, 10.0), (100, 1.0)])
+    @pytest.mark.parametrize("jitter", [0.0, 0.01, 0.3])
+    def test_slow_channel_keeps_its_samples(
+        self, rng: np.random.Generator, every: int, rate_hz: float, jitter: float
+    ) -> None:
+        time_s = 0.01 * (np.arange(2001) + jitter * rng.uniform(-1.0, 1.0, 2001))
+        values = columns(time_s)
+        values["vy_mps"] = np.where(np.arange(2001) % every == 0, 0.3 * np.sin(time_s), np.nan)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            log = make(values)
+        known = np.isfinite(log["vy_mps"])
+        assert np.count_nonzero(known) == pytest.approx(2000 / every + 1, abs=1)
+        exact = 0.3 * np.sin(log["time_s"][known])
+        # A line over a period, or for lone samples the value half a step away.
+        bound = 0.3 * max(1.0 / rate_hz**2 / 8, 0.0 if every < 100 else 0.008)
+        np.testing.assert_allclose(log["vy_mps"][known], exact, atol=1.2 * bound)
+        assert np.isfinite(log["ay_mps2"]).all()
+        assert len(caught) == (1 if jitter else 0)
+        if jitter:
+            own = re.search(r"vy_mps at its own ([\d.]+) Hz", str(caught[0].message))
+            assert own is not None
+            assert float(own[1]) == pytest.approx(rate_hz, rel=0.02)
+
+    def test_rows_of_several_sources(self, rng: np.random.Generator) -> None:
+        """A 100 Hz sensor and a 20 Hz one whose rows lie in between."""
+        fast, slow = 0.01 * np.arange(1001), 0.05 * np.arange(1, 200) + 0.0037
+        time_s = np.sort(np.concatenate((fast, slow)))
+        is_slow = np.isin(time_s, slow)
+        values = columns(time_s)
+        for name in values:
+            if name != "time_s":
+                values[name][is_slow if name != "vx_mps" else ~is_slow] = np.nan
+        with pytest.warns(SysidWarning, match=r"resampled at 100 Hz, vx_mps at its own 20 Hz"):
+            log = make(values)
+        assert (log.n, round(log.rate_hz)) == (1001, 100)
+        assert np.isfinite(log["ay_mps2"]).all()
+        known = np.isfinite(log["vx_mps"])
+        assert np.count_nonzero(known) == 199
+        np.testing.assert_allclose(
+            log["vx_mps"][known], 20.0 + 0.5 * log["time_s"][known], atol=0.5 * 0.005
+        )
+
+    def test_slow_input_is_interpolated_and_told(self, data: Columns) -> None:
+        data["steer_rad"][np.arange(1001) % 20 != 0] = np.nan
+        with pytest.warns(SysidWarning, match=r"steer_rad: holds a value only every 0.2 s"):
+            log = make(data)
+        np.testing.assert_allclose(log["steer_rad"], 0.05 * np.sin(data["time_s"]), atol=3e-4)
+
+
+class TestHeld:
+    """A slow channel that the logger repeats until its next sample."""
+
+    @pytest.mark.parametrize("rows", [2, 4, 10, 10 / 3, 50])
+    def test_only_fresh_samples_count(self, rows: float, rng: np.random.Generator) -> None:
+        values = columns(np.arange(4001) * 0.01)
+        true = values["ay_mps2"] + rng.normal(0.0, 0.05, 4001)
+        _, first, of = np.unique(
+            np.floor(np.arange(4001) / rows + 1e-9), return_index=True, return_inverse=True
+        )
+        fresh = first[of]
+        values["ay_mps2"] = true[fresh]
+        with pytest.warns(SysidWarning) as caught:
+            log = Log.from_arrays(values, name="run 1")
+        text = str(caught[0].message)
+        assert f"ay_mps2: each value is held for {rows:.3g} samples" in text
+        assert f"a channel of {100 / rows:.3g} Hz in a log of 100 Hz" in text
+        known = np.flatnonzero(np.isfinite(log["ay_mps2"]))
+        np.testing.assert_array_equal(known, np.unique(fresh))
+        np.testing.assert_array_equal(log["ay_mps2"][known], true[known])
+
+    @pytest.mark.parametrize("quantum", [1e-3, 0.01, 0.1, 0.5, 1.0])
+    @pytest.mark.parametrize("noise", [0.0, 0.01, 0.3])
+    def test_coarse_channels_are_not_held(
+        self, quantum: float, noise: float, rng: np.random.Generator
+    ) -> None:
+        time_s = np.arange(6001) * 0.01
+        for true in (
+            20.0 + 0.7 * time_s,
+            4.0 * np.sin(0.5 * time_s),
+            20.0 + 5.0 * np.sin(0.3 * time_s) + np.sin(1.7 * time_s),
+        ):
+            values = true + rng.normal(0.0, noise, 6001) if noise else true
+            assert held_rows(np.round(values / quantum) * quantum) == 0.0
