@@ -1,6 +1,7 @@
 // Estimators of friction over slip; one class of kernels per curve.
 #include "arrays.hpp"
 #include "register.hpp"
+#include "stateful.hpp"
 #include "sysid/online/mu_slip.hpp"
 
 namespace sysid::bindings {
@@ -185,21 +186,29 @@ void register_curve(py::module_& m, const char* kernels_name, const char* filter
     add_estimators(kernels);
 
     using Filter = CurveFilter<Curve>;
-    py::class_<Filter>(m, filter_name)
+    using Held = Guarded<Filter>;
+    py::class_<Held> bound(m, filter_name);
+    bound
         .def(py::init([](const Array& mean, const Array& covariance, double noise_std, bool pseudo,
                          int iterations, const Array& drift_std) {
-                 return Filter(to_prior<Curve>(mean, covariance),
-                               to_settings<Curve>(noise_std, pseudo, iterations, drift_std));
+                 return std::make_unique<Held>(
+                     to_prior<Curve>(mean, covariance),
+                     to_settings<Curve>(noise_std, pseudo, iterations, drift_std));
              }),
              py::arg("mean"), py::arg("covariance"), py::arg("noise_std"), py::arg("pseudo_noise"),
              py::arg("iterations"), py::arg("drift_std"))
         .def(
-            "update", [](Filter& self, double slip, double mu) { self.update(slip, mu); },
+            "update",
+            [](Held& self, double slip, double mu) {
+                self.with([&](Filter& filter) { filter.update(slip, mu); });
+            },
             py::arg("slip"), py::arg("mu"))
-        .def_property_readonly("mean", [](const Filter& f) { return to_array<n>(f.mean()); })
+        .def_property_readonly("mean", [](Held& f) { return to_array<n>(f.snapshot().mean()); })
         .def_property_readonly("covariance",
-                               [](const Filter& f) { return to_array<n>(f.covariance()); })
-        .def_property_readonly("readings", &Filter::readings);
+                               [](Held& f) { return to_array<n>(f.snapshot().covariance()); })
+        .def_property_readonly("readings", [](Held& f) { return f.snapshot().readings(); });
+    add_state(bound,
+              [] { return Filter({CurveVec<Curve>::Zero(), CurveMat<Curve>::Identity()}, {}); });
 }
 
 }  // namespace

@@ -1,12 +1,37 @@
 #include "sysid/online/published_dual.hpp"
 
+#include <cstdio>
+
 namespace sysid {
 
+namespace {
+
+std::string shown(double v) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.4g", v);
+    return text.data();
+}
+
+}  // namespace
+
 const SideslipEstimate& PublishedDual::step(double dt, const SensorSample& s) {
-    if (!(dt > 0.0)) throw NumericalFailure("the time step is not positive", index_);
-    for (const double v : {s.steer_rad, s.vx_mps, s.yaw_rate_radps, s.ax_mps2, s.ay_mps2})
-        if (!std::isfinite(v))
-            throw NumericalFailure("the published observer needs every sensor", index_);
+    check_sample(dt, s, index_);
+    if (dt > kForgottenAfterS)
+        throw NumericalFailure(
+            "the published observer cannot bridge " + shown(dt) + " s: begin another one", index_);
+    const auto readings = readings_of(s);
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+        const SensorRange& range = kSensorRanges[i];
+        if (std::isnan(readings[i]))
+            throw NumericalFailure(std::string("the published observer needs every sensor, and ") +
+                                       range.channel + " is missing",
+                                   index_);
+        if (std::abs(readings[i]) > range.most)
+            throw NumericalFailure(std::string(range.channel) + " = " + shown(readings[i]) +
+                                       " is beyond what a car does (" + shown(range.most) +
+                                       "): leave the sample out, or give the range in SI units",
+                                   index_);
+    }
     if (index_++ == 0) {  // the first call only sets up
         out_.beta_rad = tyres_.x[0];
         return out_;
@@ -60,6 +85,8 @@ const SideslipEstimate& PublishedDual::step(double dt, const SensorSample& s) {
         Vec<3>(1e-13, 1e-10, 1e-10).asDiagonal(), Vec<3>(forces_.x[2], forces_.x[3], s.ay_mps2),
         Vec<3>(1e3, 1e3, 1e-1).asDiagonal(), at);
 
+    if (!(std::abs(tyres_.x[0]) < kMostSideslipRad))
+        throw NumericalFailure("the published observer has diverged: begin another one", at);
     out_.beta_rad = tyres_.x[0];
     out_.beta_std_rad = std::sqrt(std::max(tyres_.P(0, 0), 0.0));
     out_.vx_mps = forces_.x[0];

@@ -8,6 +8,7 @@ constexpr double kSlowestMps = 1.0;  // keeps what divides by speed finite
 constexpr double kFullUse = 0.3;     // lateral force over load at which tyres tell all they can
 constexpr double kMostStiffness = 1.6, kMostFriction = 0.8;  // of the logarithms
 constexpr double kSteerUnknown = 0.15;                       // wander of its angle [rad/sqrt(s)]
+constexpr double kBlindSideslip = 0.1, kBlindYawRate = 0.5;  // doubt of a start without sensors
 
 double share_of(double dt, double time_s) { return std::exp(-dt / time_s); }
 
@@ -165,13 +166,39 @@ const SideslipEstimate& SideslipDual::step(double dt, const SensorSample& sample
         started_ = false;
         out_ = rolling_without_slip(car_.data.lf_m, car_.data.lr_m, s);
     } else {
-        if (!started_) start(dt, s);
-        run_tyres(dt, s);
-        run_forces(dt, s);
+        const bool fresh = !started_ || dt > kForgottenAfterS;
+        if (fresh) start(dt, s);
+        run(fresh ? std::min(dt, kLongestStepS) : dt, s);
+        const bool again = lost();
+        if (again) start(dt, s);
         report();
+        if (again || watch_.refused()) out_.mode = ObserverMode::kCoasting;
     }
     ++index_;
     return out_;
+}
+
+void SideslipDual::run(double dt, const SensorSample& s) {
+    const double steer = input_.steer, vx = input_.vx;
+    in_short_steps(dt, [&](double part, double share) {
+        if (share < 1.0) {
+            const double speed = vx + share * (s.vx_mps - vx), none = std::nan("");
+            const SensorSample between{
+                steer + share * (s.steer_rad - steer), speed, none, none, none,
+            };
+            run_tyres(part, between);
+            run_forces(part, between);
+        } else {
+            run_tyres(part, s);
+            run_forces(part, s);
+        }
+    });
+}
+
+bool SideslipDual::lost() const {
+    const auto& b = tyres_.state();
+    return !(std::abs(b.mean[TyreModel::kBeta]) < kMostSideslipRad &&
+             b.covariance(TyreModel::kBeta, TyreModel::kBeta) < squared(kMostSideslipRad));
 }
 
 void SideslipDual::start(double dt, const SensorSample& s) {
@@ -206,9 +233,11 @@ void SideslipDual::start(double dt, const SensorSample& s) {
          {TyreModel::kRoad, TyreModel::kErrorF, TyreModel::kErrorR, TyreModel::kDrive})
         b[i] = 0.0;
     const double stiff = settings_.stiffness_prior, grip = settings_.friction_prior;
-    doubt << 0.01 + std::abs(slip_r), 0.1, 0.005 + std::abs(slip_f), 0.005 + std::abs(slip_r),
-        stiff, stiff, grip, grip, settings_.road_mps2,
-        first ? settings_.roll_share : std::sqrt(roll_variance), 1.0, 1.0, 1.0;
+    const bool blind = std::isnan(s.yaw_rate_radps) || std::isnan(s.ay_mps2);
+    const double unseen = blind ? kBlindSideslip : 0.0;
+    doubt << 0.01 + std::abs(slip_r) + unseen, blind ? kBlindYawRate : 0.1,
+        0.005 + std::abs(slip_f), 0.005 + std::abs(slip_r), stiff, stiff, grip, grip,
+        settings_.road_mps2, first ? settings_.roll_share : std::sqrt(roll_variance), 1.0, 1.0, 1.0;
     Mat<13, 13> P = doubt.cwiseAbs2().asDiagonal();
     // What was learnt of the car outlives a stop.
     if (!first) P.block<4, 4>(TyreModel::kStiffF, TyreModel::kStiffF) = learnt;

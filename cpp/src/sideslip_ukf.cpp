@@ -6,6 +6,7 @@ namespace {
 
 constexpr double kSlowestMps = 1.0;
 constexpr double kSharingTime_s = 0.1;
+constexpr double kBlindBraking_mps2 = 5.0;  // how fast a speed may change that is not measured
 
 double slope(const TyreCoefficients<double>& t) { return t.B * t.C * t.D; }
 
@@ -93,7 +94,8 @@ SideslipUkf<method>::SideslipUkf(const ObservedCar& car, const ObserverSettings&
       settings_(settings),
       watch_(settings),
       filter_(SideslipModel{car, settings, linear}, Vec<3>::Zero(), Mat<3, 3>::Identity(),
-              Gate<2>(settings.gate_probability, 1)) {}
+              Gate<2>(settings.gate_probability, 1)),
+      linear_(linear) {}
 
 template <Method method>
 const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample& sample) {
@@ -104,7 +106,44 @@ const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample&
         out_ = rolling_without_slip(car_.data.lf_m, car_.data.lr_m, s);
         return out_;
     }
-    if (!started_) start(s);
+    rate_gap_s_ = std::isnan(s.yaw_rate_radps) ? rate_gap_s_ + dt : 0.0;
+    speed_gap_s_ = std::isnan(s.vx_mps) ? speed_gap_s_ + dt : 0.0;
+    const bool fresh = !started_ || dt > kForgottenAfterS;
+    if (fresh) start(s);
+    // What is known at the ends of a long step is taken to change evenly between them.
+    SensorSample now = s;
+    if (speed_gap_s_ > 0.0) now.vx_mps = input_.vx;
+    now.vx_mps = std::max(now.vx_mps, kSlowestMps);
+    if (rate_gap_s_ > 0.0)
+        now.yaw_rate_radps =
+            std::isnan(s.ay_mps2) ? input_.yaw_rate : s.ay_mps2 / now.vx_mps;  // a steady corner
+    const SideslipModel::Input before = input_;
+    in_short_steps(fresh ? std::min(dt, kLongestStepS) : dt, [&](double part, double share) {
+        SensorSample at = now;
+        if (share < 1.0) {
+            at.steer_rad = before.steer + share * (now.steer_rad - before.steer);
+            at.vx_mps = before.vx + share * (now.vx_mps - before.vx);
+            at.yaw_rate_radps = before.yaw_rate + share * (now.yaw_rate_radps - before.yaw_rate);
+            at.ax_mps2 = at.ay_mps2 = std::nan("");
+        }
+        run(part, at);
+    });
+    const bool again = lost();
+    if (again) start(s);
+    report(s);
+    if (again || watch_.refused()) out_.mode = ObserverMode::kCoasting;
+    return out_;
+}
+
+template <Method method>
+bool SideslipUkf<method>::lost() const {
+    const auto& now = filter_.state();
+    return !(std::abs(now.mean[0]) < kMostSideslipRad &&
+             now.covariance(0, 0) < kMostSideslipRad * kMostSideslipRad);
+}
+
+template <Method method>
+void SideslipUkf<method>::run(double dt, const SensorSample& s) {
     SideslipModel::Input& u = input_;
     u.dt = dt;
     u.steer_before = u.steer;
@@ -112,21 +151,16 @@ const SideslipEstimate& SideslipUkf<method>::step(double dt, const SensorSample&
     u.yaw_rate_before = u.yaw_rate;
     u.steer = s.steer_rad;
     u.steer_std = std::min(watch_.steer_gap_s(), 0.1);
-    if (!std::isnan(s.vx_mps)) u.vx = std::max(s.vx_mps, kSlowestMps);
-    rate_gap_s_ = std::isnan(s.yaw_rate_radps) ? rate_gap_s_ + dt : 0.0;
-    if (rate_gap_s_ == 0.0) {
-        u.yaw_rate = s.yaw_rate_radps;
-    } else if (!std::isnan(s.ay_mps2)) {
-        u.yaw_rate = s.ay_mps2 / u.vx;  // a steady corner
-    }
-    u.yaw_rate_std = rate_gap_s_ == 0.0 ? settings_.yaw_rate_radps : 0.2;
+    u.vx = s.vx_mps;
+    u.yaw_rate = s.yaw_rate_radps;
+    const double sensor = rate_gap_s_ == 0.0 ? settings_.yaw_rate_radps : 0.2;
+    const double by_speed = u.yaw_rate * std::min(kBlindBraking_mps2 * speed_gap_s_ / u.vx, 1.0);
+    u.yaw_rate_std = std::hypot(sensor, by_speed);
     const Vec<3>& x = filter_.state().mean;
     const AxleLoads loads = axle_loads(car_, (x[1] + x[2]) / car_.data.mass_kg, 0.0);
     u.fz_f = loads.fz_f;
     u.fz_r = loads.fz_r;
     filter_.step(u, Vec<2>(s.ax_mps2, s.ay_mps2));
-    report(s);
-    return out_;
 }
 
 template <Method method>
@@ -135,10 +169,13 @@ void SideslipUkf<method>::start(const SensorSample& s) {
     const double r = std::isnan(s.yaw_rate_radps) ? 0.0 : s.yaw_rate_radps;
     const double ax = std::isnan(s.ax_mps2) ? 0.0 : s.ax_mps2;
     const AxleLoads loads = axle_loads(car_, ax, 0.0);
-    const double beta = car_.data.lr_m * r / vx - vx * r / (kGravity * slope(car_.rear));
+    const double slip_r = vx * r / (kGravity * slope(car_.rear));
+    const double beta = std::clamp(car_.data.lr_m * r / vx - slip_r, -0.5, 0.5);
+    const double doubt =
+        std::isnan(s.yaw_rate_radps) ? 0.1 : std::max(0.03, 0.5 * std::abs(slip_r));
     const double weight = car_.data.mass_kg * kGravity;
     filter_.restart(Vec<3>(beta, loads.fx_f, loads.fx_r),
-                    Vec<3>(0.03, 0.2 * weight, 0.2 * weight).cwiseAbs2().asDiagonal());
+                    Vec<3>(doubt, 0.2 * weight, 0.2 * weight).cwiseAbs2().asDiagonal());
     input_ = {};
     input_.steer = s.steer_rad;
     input_.vx = vx;

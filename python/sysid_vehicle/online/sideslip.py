@@ -75,6 +75,13 @@ class SideslipObserver:
     saturate (Pacejka, *Tire and Vehicle Dynamics*, 3rd ed., eq. 4.6), loads move with the
     acceleration, braking takes its share of the grip, and stiffness and friction of both axles are
     states, as is what the tyre model does not explain. The standard deviation covers all of it.
+
+    Readings that no car gives, by their size or by how fast they change, are refused: the tyre
+    model stands in, and `mode` says so. Steps beyond 0.05 s are divided. After a step of more than
+    1 s, or where the estimate leaves 1.2 rad, the motion begins again with its full doubt, and what
+    was learnt of the tyres stays. The published kind, which needs every reading, raises instead.
+
+    Calls from several threads take turns. An observer pickles and copies with its state.
     """
 
     def __init__(
@@ -115,7 +122,8 @@ class SideslipObserver:
         ------
         NumericalError
             If a reading is infinite, the time step is not positive, or the filter leaves the range
-            of numbers; the message gives the sample.
+            of numbers; the message gives the sample. The published kind also raises for a reading
+            that is missing or that no car gives, and for a step of more than 1 s.
         """
         return SideslipEstimate._make(
             self._core.step(dt_s, steer_rad, vx_mps, yaw_rate_radps, ax_mps2, ay_mps2)

@@ -85,6 +85,13 @@ class Filter {
     Vec<NY> noise_scale() const { return scale_; }
     Model& model() { return model_; }
 
+    /// What the next step depends on, for `StateWriter` and `StateReader`; the model and the
+    /// weights are those of the constructor.
+    template <class Row>
+    void remember(Row& row) {
+        row(gate_, state_.mean, state_.covariance, root_, scale_, index_);
+    }
+
   private:
     void predict(const Input& input) {
         const auto f = [&](const Vec<NX>& x) {

@@ -57,6 +57,13 @@ class Gate {
         return refusals;
     }
 
+    /// What it remembers, for `StateWriter` and `StateReader`.
+    template <class Row>
+    void remember(Row& row) {
+        row(bound_squared_, patience_);
+        for (int& count : refused_) row(count);
+    }
+
   private:
     double bound_squared_ = 0.0;  // 0: everything passes
     int patience_ = 1;

@@ -99,6 +99,11 @@ class CorneringRls {
     std::size_t samples() const { return index_; }
     std::size_t used() const { return used_; }
 
+    template <class Row>
+    void remember(Row& row) {
+        row(settings_, theta_, P_, index_, used_);
+    }
+
   private:
     CorneringRlsSettings settings_;
     Vec<2> theta_;

@@ -130,6 +130,12 @@ class CurveFilter {
     const CurveMat<Curve>& covariance() const { return covariance_; }
     std::size_t readings() const { return readings_; }
 
+    template <class Row>
+    void remember(Row& row) {
+        auto& s = settings_;
+        row(mean_, covariance_, s.noise_std, s.pseudo_noise, s.iterations, s.drift_std, readings_);
+    }
+
     CurveStep<Curve> update(double slip, double mu) {
         constexpr int n = Curve::kParameters;
         CurveStep<Curve> out;

@@ -1,13 +1,9 @@
-// What every sideslip observer takes and gives at a sample, what it assumes about sensors, road and
-// tyre model, and how it looks after its sensors.
+// What every sideslip observer takes and gives at a sample, and what it assumes about sensors, road
+// and tyre model.
 #pragma once
 
 #include <array>
 #include <cmath>
-#include <string>
-
-#include "sysid/math/errors.hpp"
-#include "sysid/math/linear.hpp"
 
 namespace sysid {
 
@@ -33,6 +29,12 @@ struct SideslipEstimate {
     double observed = 0.0;          // readings that it is made of
     double log_likelihood = 0.0;
     ObserverMode mode = ObserverMode::kRunning;
+
+    template <class Row>
+    void remember(Row& row) {
+        row(beta_rad, beta_std_rad, vx_mps, yaw_rate_radps, fyf_n, fyr_n, fx_n, cf_npr, cr_npr,
+            cf_std_npr, cr_std_npr, mu_f, mu_r, nis, observed, log_likelihood, mode);
+    }
 };
 constexpr std::size_t kEstimateColumns = 17;
 
@@ -99,64 +101,6 @@ struct ObserverSettings {
     double fx_wander = 0.3;
     // the three-state observer: errors of the sideslip rate and of the lateral acceleration
     double beta_wander_radps = 0.004, model_ay_mps2 = 0.3;
-};
-
-/// Fills gaps of the inputs, notices sensors that stand still, decides whether the car is fast
-/// enough.
-class SensorWatch {
-  public:
-    explicit SensorWatch(const ObserverSettings& settings) : settings_(settings) {
-        last_.fill(std::nan(""));
-        still_s_.fill(0.0);
-    }
-
-    /// The sample without frozen channels, and with the steering angle held over gaps.
-    SensorSample look(double dt, SensorSample s, std::size_t sample) {
-        if (!(dt > 0.0) || !std::isfinite(dt))
-            throw NumericalFailure("the time step is not positive", sample);
-        check(s.steer_rad, "steer_rad", sample);
-        check(s.vx_mps, "vx_mps", sample);
-        check(s.yaw_rate_radps, "yaw_rate_radps", sample);
-        check(s.ax_mps2, "ax_mps2", sample);
-        check(s.ay_mps2, "ay_mps2", sample);
-        steer_gap_s_ = std::isnan(s.steer_rad) ? steer_gap_s_ + dt : 0.0;
-        if (steer_gap_s_ == 0.0) steer_ = s.steer_rad;
-        s.steer_rad = steer_;
-        drop_if_frozen(0, s.yaw_rate_radps, dt);
-        drop_if_frozen(1, s.ax_mps2, dt);
-        drop_if_frozen(2, s.ay_mps2, dt);
-        return s;
-    }
-
-    double steer_gap_s() const { return steer_gap_s_; }
-
-    /// Hysteresis keeps the mode from flickering.
-    bool fast_enough(double speed) {
-        if (!std::isnan(speed))
-            running_ = speed > (running_ ? settings_.stop_below_mps : settings_.go_above_mps);
-        return running_;
-    }
-
-  private:
-    static void check(double value, const char* channel, std::size_t sample) {
-        if (std::isinf(value))
-            throw NumericalFailure(
-                std::string(channel) + " is infinite (NaN marks a missing value)", sample);
-    }
-
-    void drop_if_frozen(std::size_t i, double& value, double dt) {
-        if (std::isnan(value)) return;
-        still_s_[i] = value == last_[i] ? still_s_[i] + dt : 0.0;
-        last_[i] = value;
-        // A true zero is what a noise-free simulation gives on a straight.
-        if (value != 0.0 && still_s_[i] > settings_.frozen_after_s) value = std::nan("");
-    }
-
-    ObserverSettings settings_;
-    std::array<double, 3> last_{};
-    std::array<double, 3> still_s_{};
-    double steer_ = 0.0, steer_gap_s_ = 0.0;
-    bool running_ = false;
 };
 
 }  // namespace sysid

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "sysid/estimate/unscented.hpp"
-#include "sysid/online/observer.hpp"
+#include "sysid/online/sensor_watch.hpp"
 #include "sysid/online/tyre_forces.hpp"
 
 namespace sysid {
@@ -13,6 +13,11 @@ template <int N, int M>
 struct PublishedUkf {
     Vec<N> x = Vec<N>::Constant(1e-4);
     Mat<N, N> P = Mat<N, N>::Identity();
+
+    template <class Row>
+    void remember(Row& row) {
+        row(x, P);
+    }
 
     /// Column of the deviations of the sigma points from the mean, in the published order.
     static Vec<N> deviation(const Mat<N, N>& L, double spread, int column) {
@@ -56,9 +61,15 @@ class PublishedDual {
     PublishedDual(const ObservedCar& car, double cf_npr, double cr_npr)
         : car_(car), cf_(cf_npr), cr_(cr_npr) {}
 
-    /// Uses one sample; no element may be missing.
+    /// Uses one sample; no element may be missing, or beyond what a car does. Throws where the
+    /// published filter has diverged.
     const SideslipEstimate& step(double dt, const SensorSample& sample);
     std::size_t samples() const { return index_; }
+
+    template <class Row>
+    void remember(Row& row) {
+        row(car_, cf_, cr_, forces_, tyres_, out_, index_);
+    }
 
   private:
     ObservedCar car_;

@@ -16,7 +16,7 @@
 #pragma once
 
 #include "sysid/estimate/filter.hpp"
-#include "sysid/online/observer.hpp"
+#include "sysid/online/sensor_watch.hpp"
 #include "sysid/online/tyre_forces.hpp"
 
 namespace sysid {
@@ -94,8 +94,17 @@ class SideslipDual {
     const SideslipEstimate& step(double dt, const SensorSample& sample);
     std::size_t samples() const { return index_; }
 
+    template <class Row>
+    void remember(Row& row) {
+        row(car_, settings_);
+        if constexpr (Row::kReads) *this = SideslipDual(car_, settings_);
+        row(watch_, forces_, tyres_, input_, out_, index_, started_);
+    }
+
   private:
     void start(double dt, const SensorSample& s);
+    void run(double dt, const SensorSample& s);
+    bool lost() const;
     void run_tyres(double dt, const SensorSample& s);
     void run_forces(double dt, const SensorSample& s);
     void report();

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "sysid/estimate/filter.hpp"
-#include "sysid/online/observer.hpp"
+#include "sysid/online/sensor_watch.hpp"
 #include "sysid/online/tyre_forces.hpp"
 
 namespace sysid {
@@ -46,8 +46,17 @@ class SideslipUkf {
     const SideslipEstimate& step(double dt, const SensorSample& sample);
     std::size_t samples() const { return index_; }
 
+    template <class Row>
+    void remember(Row& row) {
+        row(car_, settings_, linear_);
+        if constexpr (Row::kReads) *this = SideslipUkf(car_, settings_, linear_);
+        row(watch_, filter_, input_, out_, index_, rate_gap_s_, speed_gap_s_, started_);
+    }
+
   private:
     void start(const SensorSample& s);
+    void run(double dt, const SensorSample& s);
+    bool lost() const;
     void report(const SensorSample& s);
 
     ObservedCar car_;
@@ -57,8 +66,8 @@ class SideslipUkf {
     SideslipModel::Input input_;
     SideslipEstimate out_;
     std::size_t index_ = 0;
-    double rate_gap_s_ = 0.0;
-    bool started_ = false;
+    double rate_gap_s_ = 0.0, speed_gap_s_ = 0.0;
+    bool started_ = false, linear_ = false;
 };
 
 }  // namespace sysid

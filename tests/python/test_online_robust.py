@@ -1,0 +1,200 @@
+"""Online estimators under threads, pickling, absurd readings and long gaps."""
+
+import copy
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle import _core
+from sysid_vehicle.online import KINDS, CorneringRls, MuSlipFilter, SideslipObserver
+
+SENSORS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+THREADS = 4
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return sv.example_vehicle()
+
+
+@pytest.fixture(scope="module")
+def log(vehicle):
+    return sv.drive(sv.Model(vehicle), sv.manoeuvres.handling_course(), seed=1).between(0.0, 30.0)
+
+
+@pytest.fixture(scope="module")
+def sensors(log):
+    return np.nan_to_num(np.column_stack([log[name] for name in SENSORS]), nan=0.0)
+
+
+@pytest.fixture(scope="module")
+def dt(log):
+    return np.full(log.n, 1.0 / log.rate_hz)
+
+
+def slips(n):
+    rng = np.random.default_rng(0)
+    alpha = 0.01 * rng.standard_normal((n, 2))
+    return np.column_stack([alpha, 100.0 * alpha.sum(axis=1), 10.0 * (alpha[:, 0] - alpha[:, 1])])
+
+
+def in_threads(calls):
+    with ThreadPoolExecutor(len(calls)) as pool:
+        return [future.result() for future in [pool.submit(call) for call in calls]]
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_calls_on_one_observer_take_turns(vehicle, dt, sensors, kind):
+    alone = SideslipObserver(vehicle, kind=kind)
+    wanted = sorted(alone.run(dt, sensors)[:, 0].tolist() for _ in range(THREADS))
+    shared = SideslipObserver(vehicle, kind=kind)
+    found = in_threads([lambda: shared.run(dt, sensors)] * THREADS)
+    assert sorted(run[:, 0].tolist() for run in found) == wanted
+    assert shared.samples == THREADS * len(dt)
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_one_observer_for_each_thread_is_like_one_alone(vehicle, dt, sensors, kind):
+    alone = SideslipObserver(vehicle, kind=kind).run(dt, sensors)
+    observers = [SideslipObserver(vehicle, kind=kind) for _ in range(THREADS)]
+    for found in in_threads([lambda o=o: o.run(dt, sensors) for o in observers]):
+        assert np.array_equal(found, alone, equal_nan=True)
+
+
+def test_least_squares_and_friction_filter_take_turns(vehicle):
+    readings = slips(20000)
+    alone, shared = CorneringRls(vehicle), CorneringRls(vehicle)
+    wanted = sorted(alone.run(readings)[:, 0].tolist() for _ in range(THREADS))
+    found = in_threads([lambda: shared.run(readings)] * THREADS)
+    assert sorted(run[:, 0].tolist() for run in found) == wanted
+
+    friction, one = MuSlipFilter(0.04), MuSlipFilter(0.04)
+
+    def update(which, n):
+        for _ in range(n):
+            which.update(0.05, 0.4)
+
+    in_threads([lambda: update(friction, 500)] * THREADS)
+    update(one, 500 * THREADS)
+    assert friction.readings == one.readings == 500 * THREADS
+    assert np.array_equal(friction.mean, one.mean)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda o: pickle.loads(pickle.dumps(o))])
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_a_copy_goes_on_where_the_observer_stood(vehicle, dt, sensors, kind, copied):
+    observer = SideslipObserver(vehicle, kind=kind)
+    half = len(dt) // 2
+    observer.run(dt[:half], sensors[:half])
+    other = copied(observer)
+    assert other.vehicle == observer.vehicle
+    assert other.samples == half
+    wanted = observer.run(dt[half:], sensors[half:])
+    assert np.array_equal(other.run(dt[half:], sensors[half:]), wanted, equal_nan=True)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda o: pickle.loads(pickle.dumps(o))])
+def test_copies_of_the_other_estimators_go_on_too(vehicle, copied):
+    readings = slips(200)
+    rls = CorneringRls(vehicle)
+    rls.run(readings[:100])
+    other = copied(rls)
+    assert other.used == rls.used > 0
+    assert np.array_equal(other.run(readings[100:]), rls.run(readings[100:]))
+
+    friction = MuSlipFilter(0.04, drift_std=(0.01, 0.02))
+    friction.update(0.05, 0.4)
+    twin = copied(friction)
+    for each in (friction, twin):
+        each.update(0.08, 0.6)
+    assert twin.readings == friction.readings == 2
+    assert np.array_equal(twin.mean, friction.mean)
+    assert np.array_equal(twin.covariance, friction.covariance)
+
+
+def test_a_state_of_another_version_is_refused(vehicle):
+    core = SideslipObserver(vehicle)._core
+    state = core.__getstate__()
+    for other in (state[:-1], np.append(state, 0.0)):
+        with pytest.raises(ValueError, match="made by another version"):
+            type(core).__new__(type(core)).__setstate__(other)
+
+
+FOLLOWED = sorted(set(KINDS) - {"published"})
+
+
+@pytest.mark.parametrize("value", [1e30, -1e30, 200.0, 5e3])
+@pytest.mark.parametrize("column", range(5))
+@pytest.mark.parametrize("kind", FOLLOWED)
+def test_one_absurd_reading_does_little_harm_and_is_told(vehicle, dt, sensors, kind, column, value):
+    clean = SideslipObserver(vehicle, kind=kind).run(dt, sensors)
+    at = int(np.argmax(np.abs(sensors[:, 4]) > 3.0))
+    spoilt = sensors.copy()
+    spoilt[at, column] = value
+    found = SideslipObserver(vehicle, kind=kind).run(dt, spoilt)
+    assert np.isfinite(found[:, :2]).all()
+    assert np.degrees(np.abs(found[:, 0] - clean[:, 0])).max() < 1.0
+    assert found[at, -1] == 2.0
+    assert found[at, 1] > 0.999 * clean[at, 1]  # nothing is learnt from it
+
+
+@pytest.mark.parametrize("column", range(5))
+@pytest.mark.parametrize("kind", FOLLOWED)
+def test_absurd_readings_on_and_on_leave_a_doubtful_but_possible_sideslip(
+    vehicle, dt, sensors, kind, column
+):
+    spoilt = sensors.copy()
+    half = len(dt) // 2
+    spoilt[half:, column] = 1e30 * (-1.0) ** np.arange(len(dt) - half)
+    found = SideslipObserver(vehicle, kind=kind).run(dt, spoilt)
+    assert np.isfinite(found[:, :2]).all()
+    assert np.abs(found[:, 0]).max() < 1.2
+    assert (found[half:, -1] == 2.0).all()
+    usual = SideslipObserver(vehicle, kind=kind).run(dt, sensors)
+    # The dual observer has the longitudinal force from the speed, too.
+    least = 0.9 if (kind, column) == ("dual", 3) else 1.0
+    assert found[half + 20 :, 1].mean() > least * usual[half + 20 :, 1].mean()
+
+
+@pytest.mark.parametrize("kind", FOLLOWED)
+def test_a_yaw_rate_that_jumps_and_returns_is_refused(vehicle, dt, sensors, kind):
+    clean = SideslipObserver(vehicle, kind=kind).run(dt, sensors)
+    at = int(np.argmax(np.abs(sensors[:, 4]) > 3.0))
+    spoilt = sensors.copy()
+    spoilt[at : at + 3, 2] += 4.0  # no car turns so fast of a sudden
+    found = SideslipObserver(vehicle, kind=kind).run(dt, spoilt)
+    assert (found[at : at + 3, -1] == 2.0).all()
+    assert np.degrees(np.abs(found[:, 0] - clean[:, 0])).max() < 1.0
+
+
+@pytest.mark.parametrize("gap_s", [0.3, 0.9, 10.0, 1e4])
+@pytest.mark.parametrize("kind", FOLLOWED)
+def test_a_long_step_is_bridged_or_begins_again(vehicle, log, dt, sensors, kind, gap_s):
+    at = int(np.argmax(np.abs(sensors[:, 4]) > 3.0))
+    observer = SideslipObserver(vehicle, kind=kind)
+    before = observer.run(dt[:at], sensors[:at])
+    after = observer.step(gap_s, *sensors[at])
+    truth = np.arctan2(log["vy_mps"], log["vx_mps"])
+    assert abs(after.beta_rad - truth[at]) < 3.0 * after.beta_std_rad + np.radians(1.0)
+    assert abs(after.beta_rad) < 0.3
+    if gap_s >= 1.0:
+        assert after.beta_std_rad > 2.0 * before[-1, 1]
+    later = observer.run(dt[at + 1 :], sensors[at + 1 :])
+    assert np.isfinite(later[:, :2]).all()
+    assert np.degrees(np.abs(later[500:, 0] - truth[at + 501 :])).max() < 3.0
+
+
+def test_the_published_observer_refuses_what_cannot_be(vehicle, dt, sensors):
+    observer = SideslipObserver(vehicle, kind="published")
+    observer.run(dt[:100], sensors[:100])
+    for column, name in enumerate(SENSORS):
+        absurd = sensors[100].copy()
+        absurd[column] = 1e30
+        with pytest.raises(_core.NumericalFailure, match=rf"{name} = 1e\+30 is beyond"):
+            observer.step(0.01, *absurd)
+    with pytest.raises(_core.NumericalFailure, match="cannot bridge 10 s"):
+        observer.step(10.0, *sensors[100])
+    assert np.isfinite(observer.run(dt[100:], sensors[100:])[:, :2]).all()
