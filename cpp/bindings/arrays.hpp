@@ -6,9 +6,13 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <atomic>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "sysid/math/interrupt.hpp"
 
 namespace sysid::bindings {
 
@@ -43,10 +47,37 @@ inline Array copy_of(const std::vector<double>& values, std::size_t columns) {
     return out;
 }
 
+/// Ends the work of the threads that follow it, in the middle of a kernel. Where the thread that
+/// makes it follows another one, it is set together with that.
+class Stop {
+  public:
+    Stop();
+    void set() { flag_->asked = true; }
+    bool is_set() const { return flag_->is_set(); }
+    /// From now on kernels of this thread end when it is set.
+    void follow() const;
+
+  private:
+    friend void answer_interrupts();
+    struct Flag {
+        std::atomic<bool> asked{false};
+        std::shared_ptr<const Flag> outer;
+        bool is_set() const { return asked || (outer != nullptr && outer->is_set()); }
+    };
+    static std::shared_ptr<const Flag>& followed();
+    std::shared_ptr<Flag> flag_ = std::make_shared<Flag>();
+};
+
+/// What kernels ask about every 50 ms: handlers of signals, which Python runs in the main thread
+/// only, and the `Stop` that this thread follows.
+void answer_interrupts();
+
 /// Runs a kernel without the interpreter lock. No Python object may be touched inside.
 template <class Kernel>
 auto unlocked(Kernel&& kernel) {
     const py::gil_scoped_release released;
+    const InterruptGuard guard(&answer_interrupts);
+    poll_interrupt();  // for rows of kernels that are too short to ask
     return kernel();
 }
 

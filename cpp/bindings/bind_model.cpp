@@ -102,8 +102,16 @@ using Act = std::pair<int, std::vector<Step>>;
 Formula formula(const std::vector<Step>& steps) {
     std::vector<Instruction> all;
     all.reserve(steps.size());
-    for (const auto& [operation, from, constant] : steps)
+    for (const auto& [operation, from, constant] : steps) {
+        if (operation < 0 || operation >= static_cast<int>(Operation::kOperations))
+            throw std::invalid_argument("formula: there is no such operation");
+        // Places that an operation does not read are zero; they are looked up all the same.
+        if (operation > static_cast<int>(Operation::kParameter))
+            for (const std::size_t place : from)
+                if (place >= all.size())
+                    throw std::invalid_argument("formula: a step reads a later one");
         all.push_back({static_cast<Operation>(operation), from, constant});
+    }
     return {std::move(all), kUserParameters};
 }
 

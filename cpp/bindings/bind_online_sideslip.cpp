@@ -86,6 +86,7 @@ void add_calls(py::class_<Guarded<Observer>>& bound, Blank&& blank) {
                 double* to = out.mutable_data();
                 self.with([&](Observer& observer) {
                     for (std::size_t k = 0; k < n; ++k, s += 5) {
+                        poll_interrupt(k);
                         const auto row =
                             columns_of(observer.step(step[k], {s[0], s[1], s[2], s[3], s[4]}));
                         to = std::copy(row.begin(), row.end(), to);
@@ -147,6 +148,7 @@ void register_cornering_rls(py::module_& m) {
                 double* to = out.mutable_data();
                 self.with([&](CorneringRls& rls) {
                     for (std::size_t k = 0; k < n; ++k, r += 4) {
+                        poll_interrupt(k);
                         const bool used = rls.step(r[0], r[1], r[2], r[3]);
                         const auto& P = rls.covariance();
                         for (const double v : {

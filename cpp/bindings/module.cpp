@@ -43,6 +43,7 @@ PYBIND11_MODULE(_core, m) {
     using namespace sysid::bindings;
     m.attr("__version__") = SYSID_VERSION;
     py::register_local_exception_translator(&raise_public);
+    register_interrupts(m);
     register_model(m);
     register_simulate(m);
     register_identify(m);

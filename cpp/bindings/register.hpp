@@ -4,6 +4,7 @@
 
 namespace sysid::bindings {
 
+void register_interrupts(pybind11::module_& m);
 void register_model(pybind11::module_& m);
 void register_simulate(pybind11::module_& m);
 void register_identify(pybind11::module_& m);

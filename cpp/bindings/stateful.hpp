@@ -11,8 +11,8 @@
 
 namespace sysid::bindings {
 
-/// One object and its lock. The interpreter lock is given up before the object's is waited for, and
-/// the object's is given up before the interpreter's is taken again: neither waits for the other.
+/// One object and its lock. Nobody who waits for the object's lock holds the interpreter's, so that a
+/// kernel which has the object may take the interpreter's to ask for signals.
 template <class T>
 class Guarded {
   public:

@@ -4,6 +4,8 @@
 
 #include "sysid/lab/tyre_likelihood.hpp"
 #include "sysid/math/errors.hpp"
+#include "sysid/math/interrupt.hpp"
+#include "sysid/math/linear.hpp"
 
 namespace sysid::lab {
 
@@ -97,6 +99,7 @@ void run_filter(const GreyBoxCar& car, const TyreRun& run, const double* p,
     cov[2][2] = S(0.04);
     GreyBoxSlope slope;
     for (std::size_t k = 0; k < run.size(); ++k) {
+        poll_interrupt(k);
         State at{value_of(x[0]), value_of(x[1]), value_of(x[2])};
         if (k > 0) {
             Tangent<kGreyStates> phi{{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
@@ -145,10 +148,15 @@ void run_filter(const GreyBoxCar& car, const TyreRun& run, const double* p,
             variance += noise[c] * noise[c];
             std::array<S, kGreyStates> gain;
             for (std::size_t i = 0; i < kGreyStates; ++i) gain[i] = seen[i] / variance;
+            // Of a reading surer than this the difference below leaves what rounding makes of it;
+            // each variance then keeps a share that is larger.
+            const bool sure = value_of(noise[c] * noise[c]) < kSurest * value_of(variance);
             for (std::size_t i = 0; i < kGreyStates; ++i) {
                 x[i] += gain[i] * error;
+                const double kept = sure ? 0.1 * kSurest * value_of(cov[i][i]) : 0.0;
                 for (std::size_t j = 0; j <= i; ++j)
                     cov[i][j] = cov[j][i] = cov[i][j] - gain[i] * seen[j];
+                cov[i][i] += kept;
             }
             visit(k, c, error, variance, gain);
         }
@@ -163,6 +171,7 @@ void run_mean(const GreyBoxCar& car, const TyreRun& run, const double* p,
               const std::vector<FrozenGain>& gains, Keep&& keep) {
     State x = first_state(run);
     for (std::size_t k = 0; k < run.size(); ++k) {
+        poll_interrupt(k);
         if (k > 0) {
             const auto& u = run.inputs[k - 1];
             grey_box_step(car, x, u, p, run.dt, grey_box_substeps(car, u, p, x[0], run.dt));
@@ -189,6 +198,7 @@ void run_tangent(const GreyBoxCar& car, const TyreRun& run, const double* p,
     GreyBoxSlope slope;
     std::array<double, kTyreParameters> by;
     for (std::size_t k = 0; k < run.size(); ++k) {
+        poll_interrupt(k);
         if (k > 0) step_with_tangent(car, x, tangent, run.inputs[k - 1], p, run.dt);
         for (std::size_t c = 0; c < kGreyChannels; ++c) {
             const double per_std = gains[k].per_std[c];
@@ -371,6 +381,7 @@ void TyreProblem::look_ahead(const double* p, const FrozenGains& gains, std::siz
             }
         } else {
             for (std::size_t k = ahead; k < n; ++k) {
+                poll_interrupt();
                 State x = filtered_at(k - ahead);
                 for (std::size_t j = k - ahead; j < k; ++j) go_on(x, j);
                 read(x, run.inputs[k], out + k * kGreyChannels);

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "sysid/estimate/smoother.hpp"
+#include "sysid/math/interrupt.hpp"
 #include "sysid/online/mu_slip.hpp"
 
 namespace sysid {
@@ -108,8 +109,10 @@ std::vector<CurveStep<Curve>> filter_curve(const CurveReadings& readings,
     CurveFilter<Curve> filter(prior, settings);
     std::vector<CurveStep<Curve>> steps;
     steps.reserve(readings.size());
-    for (std::size_t k = 0; k < readings.size(); ++k)
+    for (std::size_t k = 0; k < readings.size(); ++k) {
+        poll_interrupt(k);
         steps.push_back(filter.update(readings.slip[k], readings.mu[k]));
+    }
     return steps;
 }
 

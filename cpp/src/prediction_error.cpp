@@ -1,13 +1,17 @@
 #include "sysid/identify/prediction_error.hpp"
 
+#include <algorithm>
+
 #include "sysid/identify/run_system.hpp"
+#include "sysid/math/interrupt.hpp"
 
 namespace sysid {
 
 namespace {
 
-constexpr int kWidth = 8;   // directions differentiated in one pass
-constexpr int kNarrow = 4;  // in a pass for the few that are left over
+constexpr int kWidth = 8;      // directions differentiated in one pass
+constexpr int kNarrow = 4;     // in a pass for the few that are left over
+constexpr double kTurn = 1.6;  // of the fastest rate in a part of an interval, see `substeps_for`
 using Wide = Dual<kWidth>;
 
 template <int NX>
@@ -29,6 +33,8 @@ void freeze_run(const Problem& problem, const Run& run, const double* p, const N
             steps[k].whitener =
                 s.update.lower.template triangularView<Eigen::Lower>().solve(present);
             filter.observed += static_cast<std::size_t>(s.update.observed);
+            if (k + 1 < run.size())
+                steps[k + 1].substeps = substeps_for(problem.model, p, s.mean[0], run.dt);
         });
 }
 
@@ -53,9 +59,12 @@ void run_frozen(const SingleTrack& model, const Run& run, const double* p_values
         disturb(k, push);
     };
     for (std::size_t k = 0; k < run.size(); ++k) {
+        poll_interrupt(k);
         fill_push(k);
         if (k > 0) {
-            const int substeps = substeps_for(model, p_values, value_of(x[0]), run.dt);
+            // More of them only far from where the filter was frozen, where fewer were unstable.
+            const int substeps = std::max(
+                steps[k].substeps, substeps_for(model, p_values, value_of(x[0]), run.dt, kTurn));
             advance(model, x, push.data(), run.inputs[k - 1], run.inputs[k], p, run.dt, substeps);
             for (S& w : wander) w = forget * w;
             fill_push(k);

@@ -1,3 +1,4 @@
+#include "sysid/math/interrupt.hpp"
 #include "sysid/simulate/simulator.hpp"
 
 #include <cmath>
@@ -91,6 +92,7 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
     const std::size_t preview = driver.tracks_path ? 1 + delay / 2 : 1;
     const int fewest = active_states(model.effects).count > 0 ? kSubstepsWithLags : kSubsteps;
     for (std::size_t k = 0; k < references.size(); ++k) {
+        poll_interrupt(k);
         u.time_s = static_cast<double>(k) * dt;
         for (std::size_t i = 0; i < kMotionStates; ++i) push[i] = disturbance[3 * k + i];
         const auto y = sense(model, x, push.data(), u, p);

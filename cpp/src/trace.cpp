@@ -3,6 +3,7 @@
 #include "sysid/estimate/smoother.hpp"
 #include "sysid/identify/prediction_error.hpp"
 #include "sysid/identify/run_system.hpp"
+#include "sysid/math/interrupt.hpp"
 
 namespace sysid {
 
@@ -60,6 +61,7 @@ void look_ahead_run(const Problem& problem, const Run& run, const double* p, con
     std::fill(errors, errors + run.size() * kChannels, std::nan(""));
     const std::array<double, kPushes> calm{};
     for (std::size_t k = 0; k + ahead < run.size(); k += every) {
+        poll_interrupt();
         ModelState<double> x = system.start();
         for (int i = 0; i < kMotionStates; ++i) x[static_cast<std::size_t>(i)] = means[k][i];
         for (std::size_t i = 0; i < system.own().count; ++i)

@@ -97,13 +97,16 @@ const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* t
         const auto slope = slopes_.row(at(c));
         const double variance =
             early * early * std::max(power_[at(c)], channels_[c].noise * channels_[c].noise);
-        gain_.noalias() = P_ * slope.transpose();
-        gain_ /= variance + slope.dot(gain_);
+        learnt_.noalias() = P_ * slope.transpose();
+        const double expected = variance + slope.dot(learnt_);
+        gain_ = learnt_ / expected;
         const double limit = settings_.clip * std::sqrt(variance);
         const double e = std::clamp(residual_[at(c)], -limit, limit);
         // Channels follow one another: the next sees what this one has already mended.
-        learnt_.noalias() = slope * P_;
-        P_.noalias() -= gain_ * learnt_;
+        // Joseph's form, which stays symmetric and positive (see `estimate/kalman.hpp`).
+        learnt_ -= (0.5 * expected) * gain_;
+        P_.noalias() -= gain_ * learnt_.transpose();
+        P_.noalias() -= learnt_ * gain_.transpose();
         for (std::size_t j = 0; j < n; ++j) {
             const BatchParameter& p = parameters_[j];
             double& value = estimate[static_cast<std::size_t>(p.parameter)];

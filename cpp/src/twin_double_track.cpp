@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "sysid/math/errors.hpp"
+#include "sysid/math/interrupt.hpp"
 #include "sysid/model/tyre.hpp"
 #include "sysid/twin/double_track.hpp"
 
@@ -62,6 +63,7 @@ std::vector<double> observe_double_track(const DoubleTrackData& car, const Doubl
     std::array<double, 4> s = start;
     std::array<double, 10> held{};  // readings that are missing stay at their last value
     for (std::size_t k = 0; k < n; ++k) {
+        poll_interrupt(k);
         const double* y = measured + k * kReadings;
         for (std::size_t i = 0; i < held.size(); ++i)
             if (!std::isnan(y[i])) held[i] = y[i];

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sysid/math/interrupt.hpp"
 #include "sysid/twin/drive14.hpp"
 
 namespace sysid {
@@ -33,6 +34,7 @@ Drive14 drive14(const Vehicle14& car, const Driver& driver, const Pedals& pedals
     const std::size_t preview = driver.tracks_path ? delay / 2 + 1 : 1;
     std::vector<std::array<double, 2>> seen;  // speed and yaw rate
     for (std::size_t k = 0; k < n; ++k) {
+        poll_interrupt(k);
         seen.push_back({x[state14::Vx], x[state14::R]});
         const std::size_t then = k > delay ? k - delay : 0;
         const std::size_t ahead = std::min(k + preview, n - 1);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "sysid/math/interrupt.hpp"
 #include "sysid/math/linear.hpp"
 #include "sysid/twin/vehicle14.hpp"
 
@@ -121,6 +122,7 @@ void simulate14(const Vehicle14& car, State14& x, const Input14* inputs, std::si
                 double* states, double* outputs) {
     Output14 y;
     for (std::size_t k = 0; k < n; ++k) {
+        poll_interrupt(k);
         states = std::copy_n(x.begin(), kTwinStates, states);
         car.read_and_step(x, inputs[k], dt, y);
         outputs = std::copy(y.begin(), y.end(), outputs);

@@ -2,6 +2,7 @@
 #include <stdexcept>
 
 #include "sysid/math/errors.hpp"
+#include "sysid/math/interrupt.hpp"
 #include "sysid/twin/observer.hpp"
 
 namespace sysid {
@@ -33,6 +34,7 @@ Observation observe14(const Vehicle14& twin, const State14& start, const Input14
     LoadVector estimate = to_vector(twin.load());
     Observation seen;
     for (std::size_t k = 0; k < n; ++k) {
+        poll_interrupt(k);
         const double* car = measured + k * kReadings;
         const Steered steered(inputs[k]);
         for (std::size_t t = 0; t < count; ++t) {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ import numpy as np
 from tqdm import tqdm
 
 from .._text import html_table, text_table, with_error
+from .._threads import Workers
 from ..effects import Effect, effect
 from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving
@@ -237,7 +237,7 @@ def diagnose(
             for c in few[1:]
             if not _too_fast(c) and (c.statistic > _hopeless(c) * best or _rivals(c, few[0]))
         ]
-        with ThreadPoolExecutor(workers) as pool:
+        with Workers(workers) as pool:
             tried = [
                 first,
                 *tqdm(

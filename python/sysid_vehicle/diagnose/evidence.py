@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
+from .._threads import Workers
 from ..estimate import Driving
 from ..identify import Fit
 from .projection import orthonormal_basis, pseudo_inverse, variance_ratio
@@ -117,7 +117,7 @@ class Evidence:
             G = problem.signal_sensitivities(p, frozen, as_float64(signals[:, few]), numbers[few])
             out[:, few] = G - basis @ (basis.T @ G) if projected else G
 
-        with ThreadPoolExecutor(2) as pool:
+        with Workers(2) as pool:
             list(pool.map(some, range(0, len(numbers), _AT_ONCE)))
         return out
 

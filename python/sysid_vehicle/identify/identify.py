@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from scipy.stats import qmc
@@ -12,6 +11,7 @@ from tqdm import tqdm
 from .. import _core
 from .._arguments import whole
 from .._arrays import FloatArray
+from .._threads import Workers
 from ..errors import InvalidInput, NumericalError, warn
 from ..estimate import Driving, NoiseModel, first_guess, learn_noise
 from ..log import Log, check_excitation
@@ -94,7 +94,7 @@ def identify(
             return begin, np.inf
         return found.x, found.cost
 
-    with ThreadPoolExecutor(workers) as pool:
+    with Workers(workers) as pool:
         ends = list(
             tqdm(pool.map(search, begins), total=len(begins), desc="starts", disable=not progress)
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from html import escape
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ from tqdm import tqdm
 
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, BEFORE, axes_or_new, tidy
+from .._threads import Workers
 from ..errors import InvalidInput, NumericalError
 from ..manoeuvres import peak_lateral_mps2
 from ..model import Model
@@ -256,7 +256,7 @@ def design_excitation(
     points = qmc.Sobol(len(box), seed=seed).random(1 << (spread - 1).bit_length())[:spread]
     rng = np.random.default_rng(seed)
     with (
-        ThreadPoolExecutor(workers) as pool,
+        Workers(workers) as pool,
         tqdm(total=trials, desc="excitations", disable=not progress) as bar,
     ):
         while len(tried) < trials:

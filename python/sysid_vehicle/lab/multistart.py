@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ from tqdm.auto import tqdm
 
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, BEFORE, axes_or_new, tidy
+from .._threads import Workers
 from ..errors import NumericalError
 from ..identify.search import Box
 from .descent import descend, settle, walk
@@ -126,7 +126,7 @@ class _Runner:
         width = self.box.upper - self.box.lower
         place = np.round((points[:, self.box.columns] - self.box.lower) / width / _SAME_POINT)
         _, first, which = np.unique(place, axis=0, return_index=True, return_inverse=True)
-        with ThreadPoolExecutor(self.workers) as pool:
+        with Workers(self.workers) as pool:
             found = pool.map(lambda i: _guarded(search, points[i]), first)
             bar = tqdm(found, total=len(first), desc="searches", disable=not self.progress)
             ends, values = zip(*bar, strict=True)

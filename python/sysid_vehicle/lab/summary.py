@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 from tqdm.auto import tqdm
 
 from .._arrays import FloatArray, as_float64
+from .._threads import Workers
 from ..identify import Estimate
 from ..identify.search import Box
 from .descent import descend
@@ -130,7 +130,7 @@ def with_profiles(
             return profile(objective, fit.parameters, gains, box, fit.covariance, what)
 
     wanted = quantities([e.name for e in fit.estimates])
-    with ThreadPoolExecutor(workers) as pool:
+    with Workers(workers) as pool:
         found = list(
             tqdm(pool.map(one, wanted), total=len(wanted), desc="profiles", disable=not progress)
         )

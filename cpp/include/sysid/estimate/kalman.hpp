@@ -21,6 +21,7 @@
 #include <type_traits>
 
 #include "sysid/math/errors.hpp"
+#include "sysid/math/interrupt.hpp"
 #include "sysid/math/linear.hpp"
 
 namespace sysid {
@@ -137,6 +138,58 @@ class LogDensity {
     double product_ = 1.0;
 };
 
+/// After an update with a reading surer than `kSurest`: where a variance fell by that much, all get
+/// a share of what they were, larger than the rounding of the update.
+template <int NX>
+void keep_positive(const Mat<NX, NX>& before, Mat<NX, NX>& P) {
+    if ((P.diagonal().array() < kSurest * before.diagonal().array()).any())
+        P.diagonal() += 0.1 * kSurest * before.diagonal();
+}
+
+/// For a covariance that lost its positive definiteness where a reading needs it.
+template <int NX>
+void restore_positive(Mat<NX, NX>& P, std::size_t sample) {
+    if (std::isnan(lift_correlations<NX>(P, 0.1 * kSurest)))
+        throw NumericalFailure("the covariance is not finite", sample);
+}
+
+/// The algebra of an update, for an innovation and an observation that are in `u`. False, and
+/// nothing changed, where the covariance of the innovation is not positive definite.
+template <int NX, int NY, int D>
+bool joseph_update(Vec<NX>& x, Mat<NX, NX>& P, const Mat<NY, NY>& noise, Update<NX, NY>& u) {
+    const bool whole = u.observed == NY;
+    const auto seen = [&](const auto& X) {
+        return whole ? seen_by<D>(X, u.observation) : seen_by<0>(X, u.observation);
+    };
+    const Mat<NX, NY> cross = seen(P);
+    const Mat<NY, NX> crossed = cross.transpose();
+    const Mat<NY, NY> S = seen(crossed) + noise;
+    Mat<NY, NY> whitening;
+    if (!cholesky<NY>(S, u.lower, whitening)) return false;
+    u.information.noalias() = whitening.transpose() * whitening;
+    u.gain.noalias() = cross * u.information;
+    const Vec<NY> whitened = whitening * u.innovation;
+    u.squares = whitened.squaredNorm();
+    u.determinant = u.lower.diagonal().prod();
+    u.determinant *= u.determinant;
+    x += u.gain * u.innovation;
+    // (I - K H) P (I - K H)' + K R K', multiplied from the left, then from the right.
+    const Mat<NX, NX> left = P - u.gain * crossed;
+    const Mat<NX, NY> rest = seen(left) - u.gain * noise;
+    const auto finish = [&] {
+        P.noalias() = left - rest * u.gain.transpose();
+        symmetrise(P);
+    };
+    if ((noise.diagonal().array() < kSurest * S.diagonal().array()).any()) {
+        const Mat<NX, NX> before = P;
+        finish();
+        keep_positive<NX>(before, P);
+    } else {
+        finish();
+    }
+    return true;
+}
+
 /// Updates mean and covariance with the elements of `y` that are there (Joseph form). The first `D`
 /// readings are states.
 template <int NX, int NY, int D = 0>
@@ -158,28 +211,12 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
             ++u.observed;
         }
     }
-    const bool whole = u.observed == NY;
-    const auto seen = [&](const auto& X) {
-        return whole ? seen_by<D>(X, u.observation) : seen_by<0>(X, u.observation);
-    };
-    const Mat<NX, NY> cross = seen(P);
-    const Mat<NY, NX> crossed = cross.transpose();
-    const Mat<NY, NY> S = seen(crossed) + noise;
-    Mat<NY, NY> whitening;
-    if (!u.innovation.allFinite() || !cholesky<NY>(S, u.lower, whitening))
+    if (!u.innovation.allFinite())
+        throw NumericalFailure("the expected reading is not finite", sample);
+    if (joseph_update<NX, NY, D>(x, P, noise, u)) return;
+    restore_positive(P, sample);
+    if (!joseph_update<NX, NY, D>(x, P, noise, u))
         throw NumericalFailure("the innovation covariance is not positive definite", sample);
-    u.information.noalias() = whitening.transpose() * whitening;
-    u.gain.noalias() = cross * u.information;
-    const Vec<NY> whitened = whitening * u.innovation;
-    u.squares = whitened.squaredNorm();
-    u.determinant = u.lower.diagonal().prod();
-    u.determinant *= u.determinant;
-    x += u.gain * u.innovation;
-    // (I - K H) P (I - K H)' + K R K', multiplied from the left, then from the right.
-    const Mat<NX, NX> left = P - u.gain * crossed;
-    const Mat<NX, NY> rest = seen(left) - u.gain * noise;
-    P.noalias() = left - rest * u.gain.transpose();
-    symmetrise(P);
 }
 
 /// An update with one reading after the other, which gives the same where their noise is not
@@ -215,24 +252,43 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
         }
         ++u.observed;
         Vec<NX> cross;
-        double variance = R(j, j), innovation = y[j] - expected[j];
-        if (j < D) {
-            cross = P.col(j);
-            variance += cross[j];
+        double variance, innovation = y[j] - expected[j];
+        const auto look = [&] {
+            variance = R(j, j);
+            if (j < D) {
+                cross = P.col(j);
+                variance += cross[j];
+            } else {
+                cross.noalias() = P * H.row(j).transpose();
+                variance += H.row(j) * cross;
+            }
+        };
+        look();
+        if (j < D)
             innovation -= x[j] - before[j];
-        } else {
-            cross.noalias() = P * H.row(j).transpose();
-            variance += H.row(j) * cross;
+        else
             innovation -= H.row(j) * (x - before);
+        if (!std::isfinite(innovation))
+            throw NumericalFailure("the expected reading is not finite", sample);
+        if (!(variance > 0.0)) {
+            restore_positive(P, sample);
+            look();
+            if (!(variance > 0.0))
+                throw NumericalFailure("the innovation covariance is not positive definite",
+                                       sample);
         }
-        if (!std::isfinite(innovation) || !(variance > 0.0))
-            throw NumericalFailure("the innovation covariance is not positive definite", sample);
         const double information = 1.0 / variance;
         const Vec<NX> gain = cross * information;
         // The Joseph form (I - k h') P (I - k h')' + R k k' is P - k c' - c k' + s k k', with
         // c = P h and the variance s of the innovation; written so it stays symmetric.
         const Vec<NX> half = cross - (0.5 * variance) * gain;
-        P -= gain.lazyProduct(half.transpose()) + half.lazyProduct(gain.transpose());
+        if (R(j, j) < kSurest * variance) {
+            const Mat<NX, NX> before_it = P;
+            P -= gain.lazyProduct(half.transpose()) + half.lazyProduct(gain.transpose());
+            keep_positive<NX>(before_it, P);
+        } else {
+            P -= gain.lazyProduct(half.transpose()) + half.lazyProduct(gain.transpose());
+        }
         x += gain * innovation;
         u.squares += innovation * innovation * information;
         u.determinant *= variance;
@@ -274,6 +330,7 @@ double extended_kalman_filter(const System& system, const Vec<NX>& mean,
     step.predicted_mean = x = mean;
     step.predicted_covariance = P = covariance;
     for (std::size_t k = 0; k < system.size(); ++k) {
+        poll_interrupt(k);
         if (k > 0 || predict_first) {
             step.predicted_mean = system.predict(k, x, step.transition, Q);
             propagate<MovingStates<System, NX>::value>(step.transition, P);

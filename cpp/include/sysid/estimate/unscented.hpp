@@ -42,16 +42,9 @@ Mat<N, N> factor_of(const Mat<N, N>& P, std::size_t sample) {
     Mat<N, N> lower, inverse;
     if (!P.allFinite()) throw NumericalFailure("the covariance is not finite", sample);
     if (cholesky<N>(P, lower, inverse)) return lower;
-    const Vec<N> size = P.diagonal().cwiseAbs().cwiseSqrt();
-    const Vec<N> unit = size.cwiseMax(1e-150);
-    const Mat<N, N> correlation =
-        unit.cwiseInverse().asDiagonal() * P * unit.cwiseInverse().asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<Mat<N, N>> eigen(correlation);
-    if (!(eigen.eigenvalues()[0] > -kRounding))
+    Mat<N, N> mended = P;
+    if (!(lift_correlations<N>(mended, 1e-3 * kRounding) > -kRounding))
         throw NumericalFailure("the covariance is not positive definite", sample);
-    const Vec<N> lifted = eigen.eigenvalues().cwiseMax(1e-3 * kRounding);
-    const Mat<N, N> mended = unit.asDiagonal() * eigen.eigenvectors() * lifted.asDiagonal() *
-                             eigen.eigenvectors().transpose() * unit.asDiagonal();
     if (!cholesky<N>(mended, lower, inverse))
         throw NumericalFailure("the covariance is not positive definite", sample);
     return lower;

@@ -14,8 +14,10 @@ namespace sysid {
 
 /// Filter gains of every sample: the correction of (v_x, v_y, r, F_x, F_y, M_z, auxiliary states)
 /// and the inverse Cholesky factor that whitens the innovation. Zero where a measurement is
-/// missing.
+/// missing. The parts into which the interval before the sample is cut are kept as well: were they
+/// counted anew, residuals would jump where a parameter makes it one more.
 struct FrozenStep {
+    int substeps = 1;
     Mat<kStatesFull, kChannels> gain;
     Mat<kChannels, kChannels> whitener;
 };

@@ -18,6 +18,7 @@
 #include "sysid/lab/plant.hpp"
 #include "sysid/lab/sensors.hpp"
 #include "sysid/lab/track.hpp"
+#include "sysid/math/interrupt.hpp"
 
 namespace sysid::lab {
 
@@ -102,6 +103,7 @@ class ClosedLoop {
         LoopRecord out;
         out.lost_at = wanted.size();
         for (std::size_t k = 0; k < wanted.size(); ++k) {
+            poll_interrupt(k);
             Plant::Pushes outside{};
             std::copy(push + 3 * k, push + 3 * k + 3, outside.begin());
             perfect_.push_back(readings(x, outside));

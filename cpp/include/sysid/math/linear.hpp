@@ -45,4 +45,19 @@ bool cholesky(const Mat<N, N>& S, Mat<N, N>& lower, Mat<N, N>& inverse) {
     return true;
 }
 
+/// A reading surer than the prediction by more than this would leave of some variances what
+/// rounding made of them.
+constexpr double kSurest = 1e-12;
+
+/// Makes a covariance again of a symmetric matrix that rounding took its positive definiteness:
+/// eigenvalues of its correlations below `least` become `least`, which never makes anything surer.
+/// Returns the lowest eigenvalue there was; NaN, and `P` untouched,
+/// where an element is not finite.
+double lift_correlations(double* P, int n, double least);
+
+template <int N>
+double lift_correlations(Mat<N, N>& P, double least) {
+    return lift_correlations(P.data(), N, least);
+}
+
 }  // namespace sysid

@@ -64,9 +64,8 @@ class BatchEstimator {
     BatchSettings settings_;
     double dt_, time_s_ = 0.0;
     Eigen::MatrixXd P_, slopes_, held_;  // held_: low-pass of the residual and of each sensitivity
-    Eigen::VectorXd power_, gain_, residual_, moved_;
+    Eigen::VectorXd power_, gain_, learnt_, residual_, moved_;
     Eigen::VectorXd since_s_, heard_;  // of each channel: since its last reading; its readings
-    Eigen::RowVectorXd learnt_;
 };
 
 }  // namespace sysid

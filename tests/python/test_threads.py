@@ -1,0 +1,97 @@
+"""Several threads work with the same objects and get what one alone gets, to the last bit."""
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Fit, Log, Model, Vehicle, compare, diagnose, drive, identify
+from sysid_vehicle import manoeuvres as drives
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.online import SideslipObserver, estimate_sideslip
+
+_THREADS = 4
+
+
+def side_by_side(work: Callable[[], object], threads: int = _THREADS) -> list[object]:
+    """Results of the same work, all begun at once."""
+    begin = threading.Barrier(threads)
+
+    def one() -> object:
+        begin.wait()
+        return work()
+
+    with ThreadPoolExecutor(threads) as pool:
+        return [future.result() for future in [pool.submit(one) for _ in range(threads)]]
+
+
+@pytest.fixture(scope="module")
+def short(truth: Model) -> Log:
+    return drive(truth, drives.lap(15.0), seed=3)
+
+
+def _identified(start: Model, log: Log) -> list[float]:
+    fit = identify(start, log, starts=2, workers=2)
+    return [fit.log_likelihood, *(e.value for e in fit.estimates)]
+
+
+def test_identify(start: Model, short: Log) -> None:
+    alone = _identified(start, short)
+    assert all(found == alone for found in side_by_side(lambda: _identified(start, short)))
+
+
+def test_simulate(truth: Model) -> None:
+    manoeuvre = drives.double_lane_change()
+    alone = drive(truth, manoeuvre, seed=4)
+    for found in side_by_side(lambda: drive(truth, manoeuvre, seed=4)):
+        assert isinstance(found, Log)
+        for channel in alone.channels:
+            np.testing.assert_array_equal(found[channel], alone[channel])
+
+
+def test_filter(start: Model, short: Log, fit: Fit) -> None:
+    driving = Driving.of(short)  # its arrays are made when they are first asked for
+    problem = driving.problem(start)
+    p, noise = start.vector(), fit.noise.vector()
+    alone = problem.trace(p, noise, True)
+    for found in side_by_side(lambda: problem.trace(p, noise, True)):
+        assert isinstance(found, dict)
+        np.testing.assert_array_equal(found["state"], alone["state"])
+        assert found["log_likelihood"] == alone["log_likelihood"]
+
+
+def test_what_is_made_when_it_is_first_asked_for(start: Model, short: Log) -> None:
+    driving = Driving.of(short)
+    alone = Driving.of(short).inputs
+    for found in side_by_side(lambda: driving.inputs):
+        np.testing.assert_array_equal(found, alone)
+
+
+def test_compare_and_score(fit: Fit, course: Log) -> None:
+    alone = str(compare(fit, course))
+    assert all(found == alone for found in side_by_side(lambda: str(compare(fit, course))))
+
+    def scored() -> list[tuple[str, float]]:
+        return [(c.id, c.statistic) for c in diagnose(fit, course, refits=0).ranking]
+
+    one = scored()
+    assert all(found == one for found in side_by_side(scored))
+
+
+def test_sideslip_observers_of_the_same_car(car: Vehicle, short: Log) -> None:
+    alone = estimate_sideslip(car, short).beta_rad
+    for found in side_by_side(lambda: estimate_sideslip(car, short).beta_rad):
+        np.testing.assert_array_equal(found, alone)
+
+
+def test_copies_of_an_observer(car: Vehicle, short: Log) -> None:
+    sensors = np.column_stack(
+        [short[c] for c in ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")]
+    )
+    dt = np.full(short.n, 1.0 / short.rate_hz)
+    observer = SideslipObserver(car)
+    alone = observer.copy().run(dt, sensors)
+    for found in side_by_side(lambda: observer.copy().run(dt, sensors)):
+        np.testing.assert_array_equal(found, alone)
