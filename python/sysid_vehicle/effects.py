@@ -6,7 +6,7 @@ nothing is repeated here. Effects that users define stand beside them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from html import escape
 from typing import Any
@@ -33,7 +33,7 @@ class Parameter:
     lower, upper : float
         Bounds of the search.
     column : int
-        Place in the core's parameter vector.
+        Place in the core's parameter vector; no part of what the parameter is.
     typical_low, typical_high : float
         Where most cars lie that have the effect.
     mirrored : bool
@@ -54,7 +54,7 @@ class Parameter:
     typical_high: float
     mirrored: bool
     scan: str
-    column: int
+    column: int = field(compare=False)
 
     @property
     def one_sided(self) -> bool:
@@ -76,7 +76,7 @@ class Effect:
     Attributes
     ----------
     index : int
-        Place in the catalogue, or among the effects of users.
+        Place in the catalogue, or among the effects of users; no part of what the effect is.
     moves : str
         Measured channels it moves first.
     excited_by : str
@@ -104,7 +104,7 @@ class Effect:
     excited_by: str
     moves: str
     parameters: tuple[Parameter, ...]
-    index: int
+    index: int = field(compare=False)
     scored_at_typical: bool
     needs_force: bool
     needs: tuple[str, ...]
@@ -112,6 +112,34 @@ class Effect:
     through: str
     states: int
     acts: tuple[tuple[int, Any], ...] = ()
+
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
+        """An effect of the catalogue by its name, whose places may differ; others by value."""
+        if _by_id().get(self.id) == self:
+            return effect, (self.id,)
+        return Effect, tuple(getattr(self, f.name) for f in fields(self))
+
+    def seated(self, taken: set[int]) -> Effect:
+        """The same effect, if a user's at a place that is not taken; that is taken then.
+
+        Raises
+        ------
+        InvalidInput
+            All places are taken.
+        """
+        if not self.acts:
+            return self
+        free = (i for i in (self.index, *range(_core.USER_EFFECTS)) if i >= 0 and i not in taken)
+        place = next(free, None)
+        if place is None:
+            raise InvalidInput(
+                f"effect '{self.id}': there is room for {_core.USER_EFFECTS} effects of your own; "
+                "forget one with forget_effect"
+            )
+        taken.add(place)
+        first = _core.USER_OFFSET + place * _core.USER_PARAMETERS
+        parameters = tuple(replace(p, column=first + i) for i, p in enumerate(self.parameters))
+        return replace(self, index=place, parameters=parameters)
 
     @property
     def bit(self) -> int:
@@ -201,16 +229,7 @@ def register(made: Effect) -> Effect:
     InvalidInput
         All places are taken.
     """
-    taken = {e.index for e in _users.values() if e.id != made.id}
-    free = next((i for i in range(_core.USER_EFFECTS) if i not in taken), None)
-    if free is None:
-        raise InvalidInput(
-            f"effect '{made.id}': there is room for {_core.USER_EFFECTS} effects of your own; "
-            "forget one with forget_effect"
-        )
-    first = _core.USER_OFFSET + free * _core.USER_PARAMETERS
-    parameters = tuple(replace(p, column=first + i) for i, p in enumerate(made.parameters))
-    _users[made.id] = replace(made, index=free, parameters=parameters)
+    _users[made.id] = made.seated({e.index for e in _users.values() if e.id != made.id})
     return _users[made.id]
 
 

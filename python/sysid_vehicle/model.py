@@ -32,6 +32,10 @@ class Model:
         What is known beforehand; its tyres are starting values.
     effects : tuple of str
         Ids of the effects that act.
+    parts : tuple of Effect
+        The effects themselves, as they were defined when the model was made: a model keeps its
+        own, whatever is defined or forgotten later. Those of `effects` that are not given here are
+        looked up.
     values : mapping of str to float
         Values of parameters by full name (`B_front`, `steer_lag.time_constant_s`), where they
         differ from the vehicle's, or from the null values of effects.
@@ -40,12 +44,27 @@ class Model:
     vehicle: Vehicle
     effects: tuple[str, ...] = ()
     values: Mapping[str, float] = field(default_factory=dict)
+    parts: tuple[Effect, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
-        ids = tuple(effect(e).id for e in self.effects)
+        vehicle: object = self.vehicle
+        if not isinstance(vehicle, Vehicle):
+            raise InvalidInput(
+                f"a model is made of a Vehicle, not of {type(vehicle).__name__}; "
+                "Vehicle.from_toml reads one"
+            )
+        names: object = self.effects
+        if isinstance(names, str):
+            raise InvalidInput(f"effects = {names!r}: give a tuple of names")
+        own = {e.id: e for e in self.parts}
+        found = [own.get(e) or effect(e) for e in self.effects]
+        ids = tuple(e.id for e in found)
         if len(set(ids)) != len(ids):
             raise InvalidInput(f"an effect is named twice: {', '.join(ids)}")
+        taken: set[int] = set()
         object.__setattr__(self, "effects", ids)
+        object.__setattr__(self, "parts", tuple(e.seated(taken) for e in found))
+        object.__setattr__(self, "values", dict(self.values))
         known = self.names
         for name in self.values:
             if name not in known:
@@ -55,11 +74,14 @@ class Model:
 
     def add(self, *names: str | Effect) -> Model:
         """The same model with more effects, at their null values."""
-        return replace(self, effects=(*self.effects, *(effect(n).id for n in names)))
+        new = [effect(n) for n in names]
+        return replace(
+            self, effects=(*self.effects, *(e.id for e in new)), parts=(*self.parts, *new)
+        )
 
     def drop(self, *names: str | Effect) -> Model:
         """The same model with fewer effects."""
-        gone = {effect(n).id for n in names}
+        gone = {n if n in self.effects else effect(n).id for n in names}
         kept = tuple(e for e in self.effects if e not in gone)
         values = {k: v for k, v in self.values.items() if k.split(".")[0] not in gone}
         return replace(self, effects=kept, values=values)
@@ -67,11 +89,6 @@ class Model:
     def with_values(self, values: Mapping[str, float]) -> Model:
         """The same model with some parameters at other values."""
         return replace(self, values={**self.values, **values})
-
-    @property
-    def parts(self) -> tuple[Effect, ...]:
-        """The effects that act."""
-        return tuple(effect(e) for e in self.effects)
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -96,11 +113,22 @@ class Model:
     def candidates(self) -> tuple[Effect, ...]:
         """Effects of the catalogue that could be added."""
         unknown_inertia = self.vehicle.yaw_inertia_kgm2 is None
-        return tuple(
+        return self.seated(
             e
             for e in catalogue()
             if e.id not in self.effects and not (unknown_inertia and e.id == "yaw_inertia")
         )
+
+    def seated(self, others: Iterable[Effect]) -> tuple[Effect, ...]:
+        """Other effects at places of the parameter vector that those of the model leave free.
+
+        Raises
+        ------
+        InvalidInput
+            There are more effects of users than places.
+        """
+        taken = {e.index for e in self.parts if e.acts}
+        return tuple(e.seated(taken) for e in others)
 
     def bounds(self, name: str) -> tuple[float, float]:
         """Lower and upper bound of a parameter."""
@@ -130,10 +158,10 @@ class Model:
         # I_z = m l_f l_r is the usual first guess: Milliken & Milliken, ch. 5.
         return self.vehicle.mass_kg * self.vehicle.lf_m * self.vehicle.lr_m
 
-    def vector(self) -> FloatArray:
+    def vector(self, also: Iterable[Effect] = ()) -> FloatArray:
         """The core's parameter vector; effects that do not act stand at their null values."""
         p = np.zeros(_core.PARAMETERS)
-        for e in catalogue():
+        for e in (*catalogue(), *also):
             for parameter in e.parameters:
                 p[parameter.column] = parameter.null_value
         for name, parameter in self.parameters.items():

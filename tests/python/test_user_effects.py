@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +15,10 @@ import pytest
 import sysid_vehicle as sv
 from sysid_vehicle import _core
 from sysid_vehicle.cli import main
+from sysid_vehicle.diagnose.evidence import Evidence
+from sysid_vehicle.diagnose.sensitivity import sensitivities
 from sysid_vehicle.formula import SIGNALS, TARGETS, trace
+from sysid_vehicle.identify import refine
 from sysid_vehicle.model import Model
 
 WIND = [sv.parameter("gain", "N s2/m2", typical=0.6, lower=-5.0, upper=5.0)]
@@ -252,3 +259,107 @@ def test_the_command_line_takes_a_file(tmp_path: Path, capsys: pytest.CaptureFix
     path.write_text("import nothing_like_it\n")
     assert main(["effects", "--define", str(path)]) == 2
     assert "mine.py: ModuleNotFoundError" in capsys.readouterr().err
+
+
+def answer(model: Model) -> np.ndarray:
+    """What a model that is driven in the open reads."""
+    drive = sv.simulate.drive_truth(
+        model, sv.manoeuvres.sine_sweep(), seed=1, noise=sv.SensorNoise.none()
+    )
+    return np.column_stack([drive.log[c] for c in ("vx_mps", "yaw_rate_radps", "ay_mps2")])
+
+
+def side_wind(id_: str, power: int) -> sv.Effect:
+    return sv.define_effect(
+        id_, title=f"wind {power}", parameters=WIND, force_y=lambda d, p: p.gain * d.v_x**power
+    )
+
+
+def test_a_model_keeps_its_effects_whatever_is_defined_or_forgotten_later() -> None:
+    car = sv.example_vehicle()
+    old = Model(car).add(side_wind("wind", 2)).with_values({"wind.gain": 0.8})
+    before = answer(old)
+    new = Model(car).add(side_wind("wind", 1)).with_values({"wind.gain": 0.8})
+    assert old != new
+    np.testing.assert_array_equal(answer(old.with_values({})), before)
+    assert not np.allclose(answer(new), before)
+    sv.forget_effect("wind")
+    np.testing.assert_array_equal(answer(old), before)
+    assert old.parts[0].title == "wind 2"
+    assert old.drop("wind") == Model(car)
+    side_wind("other", 1)
+    assert old == Model(car).add(side_wind("wind", 2)).with_values({"wind.gain": 0.8})
+
+
+def test_a_fit_keeps_its_effects(fit: sv.Fit, lap: sv.Log) -> None:
+    model = fit.model.add(side_wind("wind", 2)).with_values({"wind.gain": 0.1})
+    mine = refine(model, fit.driving, fit.noise)
+    before, text = sv.compare(mine, lap).error, str(mine)
+    side_wind("wind", 1)
+    assert (sv.compare(mine, lap).error, str(mine)) == (before, text)
+    sv.forget_effect("wind")
+    assert (sv.compare(mine, lap).error, str(mine)) == (before, text)
+
+
+def test_effects_at_one_place_move_apart() -> None:
+    car = sv.example_vehicle()
+    first = Model(car).add(side_wind("first", 2)).with_values({"first.gain": 0.8})
+    sv.forget_effect("first")
+    second = side_wind("second", 1)
+    assert second.index == first.parts[0].index
+    (candidate,) = (e for e in first.candidates if e.id == "second")
+    assert candidate == second
+    assert candidate.index != first.parts[0].index
+    both = first.add("second").with_values({"second.gain": 0.5})
+    side_wind("first", 2)
+    again = Model(car).add("second", "first").with_values({"first.gain": 0.8, "second.gain": 0.5})
+    np.testing.assert_allclose(answer(both), answer(again), rtol=1e-12)
+
+
+def test_candidates_are_scored_apart_from_what_the_model_keeps(fit: sv.Fit) -> None:
+    def columns(model: Model, effect: sv.Effect) -> np.ndarray:
+        evidence = Evidence(sv.Fit(**{**vars(fit), "model": model}), fit.driving)
+        return sensitivities(evidence, [effect]).columns
+
+    first, second = side_wind("first", 2), side_wind("second", 1)
+    with_first = fit.model.add(first).with_values({"first.gain": 0.3})
+    expected = columns(with_first, second)
+    sv.forget_effect("first")
+    sv.forget_effect("second")
+    np.testing.assert_array_equal(columns(with_first, side_wind("second", 1)), expected)
+
+
+_ELSEWHERE = """
+import pickle, sys
+import numpy as np
+import sysid_vehicle as sv
+if sys.argv[3] == "another":
+    sv.define_effect("wind", title="another", force_x=lambda d, p: p.force + 0.0 * d.v_x,
+                     parameters=[sv.parameter("force", "N", typical=9.0, lower=0, upper=10)])
+model, before = pickle.load(open(sys.argv[1], "rb"))
+drive = sv.simulate.drive_truth(
+    model, sv.manoeuvres.sine_sweep(), seed=1, noise=sv.SensorNoise.none()
+)
+now = np.column_stack([drive.log[c] for c in ("vx_mps", "yaw_rate_radps", "ay_mps2")])
+np.testing.assert_array_equal(now, before)
+assert model.parts[0].title == "wind 2"
+print(model, file=open(sys.argv[2], "w"))
+"""
+
+
+@pytest.mark.parametrize("defined", ["nothing", "another"])
+def test_a_model_means_the_same_in_another_process(tmp_path: Path, defined: str) -> None:
+    model = Model(sv.example_vehicle()).add(side_wind("wind", 2)).with_values({"wind.gain": 0.8})
+    (tmp_path / "model").write_bytes(pickle.dumps((model, answer(model))))
+    given = [str(tmp_path / "model"), str(tmp_path / "text"), defined]
+    subprocess.run([sys.executable, "-c", _ELSEWHERE, *given], check=True)
+    assert (tmp_path / "text").read_text() == f"{model}\n"
+
+
+def test_effects_are_copied_by_what_they_are() -> None:
+    mine, known = side_wind("wind", 2), sv.effect("mass")
+    for copied in (copy.deepcopy(mine), pickle.loads(pickle.dumps(mine))):
+        assert copied == mine
+        assert copied.columns == mine.columns
+    assert copy.deepcopy(known) is pickle.loads(pickle.dumps(known)) is known
+    assert b"equation" not in pickle.dumps(known)

@@ -50,7 +50,8 @@ def sensitivities(evidence: Evidence, candidates: Sequence[Effect]) -> Sensitivi
     candidates : sequence of Effect
     """
     driving = evidence.driving
-    possible = tuple(e for e in candidates if driving.force_known or not e.needs_force)
+    model = evidence.fit.model
+    possible = model.seated(e for e in candidates if driving.force_known or not e.needs_force)
     long = duration(driving)
     ends = np.cumsum([0, *(_width(e, long) for e in possible)])
     places = {
@@ -58,7 +59,7 @@ def sensitivities(evidence: Evidence, candidates: Sequence[Effect]) -> Sensitivi
     }
     # In place: most of the work is in passing over so many numbers.
     out = np.empty((len(evidence.residual), int(ends[-1])))
-    p, model = evidence.fit.model.vector(), evidence.fit.model
+    p = model.vector(possible)
 
     def acting(*effects: Effect) -> _core.Problem:
         return evidence.problem.with_model(

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..diagnose import Candidate, Diagnosis, possible
-from ..effects import Parameter, effect
+from ..effects import Parameter
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Estimate, Fit, refine
@@ -174,7 +174,7 @@ def _with_others(fit: Fit, name: str, others: Sequence[Candidate]) -> Fit | None
     model = fit.model.drop(name)
     for c in others:
         values = zip(c.effect.parameters, c.value, strict=True)
-        model = model.add(c.id).with_values({f"{c.id}.{p.name}": v for p, v in values})
+        model = model.add(c.effect).with_values({f"{c.id}.{p.name}": v for p, v in values})
     try:
         return without_idle(refine(model, fit.driving, fit.noise))
     except (NumericalError, np.linalg.LinAlgError):
@@ -219,7 +219,7 @@ def _mattering(fit: Fit) -> int:
 
 def _real(fit: Fit, name: str) -> bool:
     """Whether an effect of the model has a value that a car can have."""
-    found = effect(name)
+    found = next(e for e in fit.model.parts if e.id == name)
     estimates = [fit[f"{name}.{p.name}"] for p in found.parameters]
     return possible(found, [e.value for e in estimates], [e.std for e in estimates])
 
