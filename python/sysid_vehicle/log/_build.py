@@ -13,7 +13,7 @@ from ._channels import CHANNELS, FloatArray
 from ._columns import Columns, collect
 from ._grid import at, check_time, own_period, to_grid
 from ._held import blank_held
-from ._plausibility import check_units_and_signs
+from ._plausibility import check_coherence
 from ._signals import fill_short_gaps, spikes
 
 _MIN_USABLE_S = 5.0
@@ -136,7 +136,8 @@ def _check(channels: dict[str, FloatArray], rate_hz: float, notes: list[str]) ->
             f"{time_s.size - 1}, t = {time_s[0]:.6g} to {time_s[-1]:.6g} s, car moving, steering "
             f"known); at least {_MIN_USABLE_S:g} s are needed, 30 s with corners are good"
         )
-    check_units_and_signs(channels, rate_hz)
+    with np.errstate(over="ignore"):
+        notes += check_coherence(channels, rate_hz)
     dull = _checks.excitation_note(channels, rate_hz)
     notes += _checks.low_rate_note(rate_hz)
     notes += _checks.frozen_notes(channels, rate_hz, excited=not dull)

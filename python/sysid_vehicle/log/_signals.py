@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ._channels import FloatArray
@@ -96,35 +94,3 @@ def spikes(values: FloatArray) -> np.ndarray:
     second = np.pad(np.abs(np.diff(x, 2)), 1, mode="edge")
     noise = _local_median(second, candidates)
     return candidates[deviation[candidates] > _SPIKE_NOISE * noise]
-
-
-@dataclass(frozen=True)
-class Relation:
-    """How one channel follows another: `ratio` = median of y / x where x is large."""
-
-    ratio: float
-    cosine: float
-    correlation: float
-
-    @property
-    def together(self) -> bool:
-        """Whether both clearly move alike."""
-        return self.cosine > 0.8 and self.correlation > 0.5
-
-    @property
-    def opposed(self) -> bool:
-        """Whether both clearly move against each other, not only by an offset."""
-        return self.cosine < -0.5 and self.correlation < 0.2
-
-
-def relation(x: FloatArray, y: FloatArray) -> Relation:
-    """Compare two channels of equal length, insensitive to their scales."""
-    large = np.abs(x) >= np.percentile(np.abs(x), 75)
-    large &= x != 0.0
-    ratio = float(np.median(y[large] / x[large])) if large.any() else float("nan")
-    return Relation(ratio, _cosine(x, y), _cosine(x - x.mean(), y - y.mean()))
-
-
-def _cosine(x: FloatArray, y: FloatArray) -> float:
-    size = float(np.linalg.norm(x) * np.linalg.norm(y))
-    return float(x @ y) / size if size > 0.0 else 0.0

@@ -18,17 +18,21 @@ from ._table import Table
 from ._units import factor_to
 
 _COMPARED_NAMES = 1000  # near names are sought among so many
-_SOURCE_KEYS = ("column", "factor", "offset", "despike")
+_SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s")
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where a canonical channel comes from: ``value = factor * column + offset``."""
+    """Where a canonical channel comes from: ``value = factor * column + offset``.
+
+    `delay_s` is how late the column is [s]: its values are taken from so much later in the file.
+    """
 
     column: str
     factor: float = 1.0
     offset: float = 0.0
     despike: bool = False
+    delay_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,7 @@ class ChannelMap:
         """Read a channel map, a TOML file with the table ``[channels]``.
 
         Each entry is the name of the source column, a table with ``column``, ``factor`` (1),
-        ``offset`` (0) and ``despike`` (false), or ``false`` to ignore the channel;
+        ``offset`` (0), ``despike`` (false) and ``delay_s`` (0), or ``false`` to ignore the channel;
         ``time_s = { rate_hz = 100 }`` numbers the rows of a file without time.
 
         Raises
@@ -139,6 +143,12 @@ class ChannelMap:
                 result[channel] = source.factor * values + source.offset
         if self.rate_hz is not None:
             result["time_s"] = np.arange(table.n) / self.rate_hz
+        elif "time_s" not in result and "time_s" in table.counts:
+            factor = _stated_factor(table, "time_s", "time_s", notes)
+            result["time_s"] = factor * _values(table, "time_s", "time_s")
+        for channel, source in self.sources.items():
+            if source.delay_s and "time_s" in result:
+                result[channel] = _earlier(result["time_s"], result[channel], source.delay_s)
         used = {source.column for source in self.sources.values()}
         for name in dict.fromkeys(table.names):
             if name in result or name in self.absent:
@@ -154,6 +164,20 @@ def _values(table: Table, column: str, channel: str) -> npt.NDArray[np.float64]:
     if channel == "time_s" and column in table.seconds and table.counts[column] == 1:
         return table.seconds[column]
     return table.column(column)
+
+
+def _earlier(
+    time_s: npt.NDArray[np.float64], values: npt.NDArray[np.float64], delay_s: float
+) -> npt.NDArray[np.float64]:
+    """Return the values that were written `delay_s` later; beyond the ends nothing is known."""
+    known = np.isfinite(values) & np.isfinite(time_s)
+    if np.count_nonzero(known) < 2 or not (np.diff(time_s) > 0.0).all():
+        return values  # the log is refused for it
+    shifted = np.interp(time_s + delay_s, time_s[known], values[known], np.nan, np.nan)
+    # A hole stays one, and a slow channel keeps as many samples as it has.
+    nearest = np.clip(np.searchsorted(time_s, time_s + delay_s - 1e-9), 0, time_s.size - 1)
+    result: npt.NDArray[np.float64] = np.where(known[nearest], shifted, np.nan)
+    return result
 
 
 def _stated_factor(table: Table, column: str, channel: str, notes: list[str]) -> float:
@@ -189,7 +213,10 @@ def _source(entry: Mapping[str, Any], channel: str, where: str) -> Source:
     factor = _number(entry, "factor", 1.0, where)
     if factor == 0.0:
         raise InvalidInput(f"{where}: factor = 0 would erase the channel; give its unit factor")
-    return Source(column, factor, _number(entry, "offset", 0.0, where), despike)
+    delay_s = _number(entry, "delay_s", 0.0, where)
+    if delay_s and channel == "time_s":
+        raise InvalidInput(f"{where}: delay_s has no meaning for the time; give it for a channel")
+    return Source(column, factor, _number(entry, "offset", 0.0, where), despike, delay_s)
 
 
 def _number(entry: Mapping[str, Any], key: str, default: float, where: str) -> float:

@@ -1,0 +1,115 @@
+"""What no car does: values beyond every range, and jumps from sample to sample."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InvalidInput
+from ._channels import CHANNELS, DEG, FloatArray
+from ._grid import at
+from ._signals import filled, median_of_five
+
+_MIN_RATE_HZ = 18.0
+_DRIVEN_MPS = 15.0
+_LEAST_FORCE_N = 30.0  # drag alone takes more at that speed
+# Force that holds a speed at most: rolling and climbing of a lorry, and the drag of 10 m2.
+_HOLDING_N, _HOLDING_NS2PM2 = 5e4, 6.2
+
+
+@dataclass(frozen=True)
+class _Range:
+    """Largest magnitude of a channel, largest white noise, and what the channel may be instead."""
+
+    largest: float
+    noise: float
+    likely: str
+
+
+_RANGES = {
+    "vx_mps": _Range(150.0, 2.0, "if it is in km/h, put factor = 0.2777778"),
+    "vy_mps": _Range(60.0, 1.5, "if it is in km/h, put factor = 0.2777778"),
+    "yaw_rate_radps": _Range(10.0, 0.5, f"if it is in degrees per second, put factor = {DEG}"),
+    "ax_mps2": _Range(60.0, 15.0, "if it is in mg, put factor = 0.00980665"),
+    "ay_mps2": _Range(60.0, 15.0, "if it is in mg, put factor = 0.00980665"),
+    "steer_rad": _Range(
+        1.2,
+        0.1,
+        f"if it is in degrees, put factor = {DEG}; if it is the angle of the steering wheel, "
+        f"divide the factor by the steering ratio",
+    ),
+    "fx_n": _Range(1e6, 1e6, "if it is in mN, put factor = 0.001"),
+}
+
+
+def check_ranges(columns: Mapping[str, FloatArray], rate_hz: float) -> list[str]:
+    """Refuse a channel that leaves its range for longer than a spike; warn of spikes beyond it.
+
+    Raises
+    ------
+    InvalidInput
+        If more than two samples in five lie beyond what a car does, or if the channel jumps from
+        sample to sample as no car moves.
+    """
+    notes = []
+    time_s = columns["time_s"]
+    for name, limits in _RANGES.items():
+        if name not in columns:
+            continue
+        values = columns[name]
+        size = np.abs(median_of_five(filled(values)))
+        if size.max() > limits.largest:
+            i = int(np.argmax(size))
+            raise InvalidInput(
+                f"{name}: {filled(values)[i]:.4g} {CHANNELS[name].unit} at {at(i, time_s)} is no "
+                f"value of a car (at most {limits.largest:g}): {limits.likely} in the channel map"
+            )
+        lone = np.flatnonzero(np.abs(values) > limits.largest)
+        if lone.size:
+            notes.append(
+                f"{name}: {lone.size} impossible value(s), first {values[lone[0]]:.4g} "
+                f"{CHANNELS[name].unit} at {at(int(lone[0]), time_s)}: put despike = true for "
+                f"{name} in the channel map"
+            )
+        if rate_hz > _MIN_RATE_HZ:
+            _check_jumps(name, values, limits.noise, time_s)
+    if "fx_n" in columns:
+        _check_force(columns)
+    return notes
+
+
+def _check_jumps(name: str, values: FloatArray, largest: float, time_s: FloatArray) -> None:
+    """Refuse a channel whose usual second difference is that of large white noise."""
+    known = values[np.isfinite(values)]
+    if known.size < 50 or known.size < 0.5 * values.size:  # slow channels move between samples
+        return
+    second = np.abs(np.diff(known, 2))
+    noise = 1.4826 * float(np.median(second)) / 6.0**0.5
+    if noise > largest:
+        i = int(np.argmax(np.abs(np.diff(filled(values)))))
+        raise InvalidInput(
+            f"{name}: jumps from sample to sample by {2.0**0.5 * noise:.3g} {CHANNELS[name].unit}, "
+            f"most at {at(i, time_s)}; no car moves so: check the column, and that its rows are in "
+            f"the order of time"
+        )
+
+
+def _check_force(columns: Mapping[str, FloatArray]) -> None:
+    force, speed = filled(columns["fx_n"]), filled(columns["vx_mps"])
+    typical, largest = float(np.median(speed)), float(np.abs(force).max())
+    if typical > _DRIVEN_MPS and 0.0 < largest < _LEAST_FORCE_N and np.ptp(force) > 0.0:
+        raise InvalidInput(
+            f"fx_n: is at most {largest:.3g} N over samples 0 to {force.size - 1} at "
+            f"{typical:.3g} m/s, where drag alone takes more: if it is in kN, put factor = 1000 "
+            f"in the channel map"
+        )
+    usual = float(np.median(np.abs(force)))
+    if usual > _HOLDING_N + _HOLDING_NS2PM2 * typical**2:
+        i = int(np.argmax(np.abs(force)))
+        raise InvalidInput(
+            f"fx_n: is {usual:.4g} N half of the time (largest at {at(i, columns['time_s'])}), "
+            f"more than any car needs at {typical:.3g} m/s; if it is in mN, put factor = 0.001 in "
+            f"the channel map"
+        )

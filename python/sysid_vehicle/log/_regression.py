@@ -1,0 +1,196 @@
+"""Robust regression with priors, and the lag at which one side of an equation fits the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._channels import FloatArray
+
+_PASSES = 5
+_HUBER = 2.5  # residuals beyond so many robust deviations lose weight
+_BLOCK = 6  # windows that are taken as dependent when deviations are estimated
+_STEP_S = 0.01
+_REACH_S = 0.28
+_COARSE_S = 0.04
+_TINY = 1e-12
+
+Sides = Callable[[float], tuple[FloatArray, FloatArray]]
+
+
+@dataclass(frozen=True)
+class Regression:
+    """``y = X b`` fitted robustly.
+
+    Attributes
+    ----------
+    coefficients : ndarray, shape (p,)
+        The maximum of the posterior.
+    deviations : ndarray, shape (p,)
+        Their standard deviations, from the scores of blocks of rows (White, *Econometrica* 48
+        (1980), for dependent rows).
+    weights : ndarray, shape (n,)
+        Huber weights of the rows.
+    scale : float
+        Robust standard deviation of the residuals.
+    coherence : float
+        Squared correlation of `y` with the first column, the other columns taken out of both.
+    """
+
+    coefficients: FloatArray
+    deviations: FloatArray
+    weights: FloatArray
+    scale: float
+    coherence: float
+
+
+@dataclass(frozen=True)
+class Lag:
+    """Lag at which two sides of an equation fit, with standard deviation, both in s.
+
+    `gain` is the misfit without a lag over that with it, `evidence` their difference in units of
+    the variance of the residuals.
+    """
+
+    seconds: float
+    deviation: float
+    gain: float
+    evidence: float
+
+    def beyond(self, late_s: float, early_s: float) -> bool:
+        """Whether the lag surely leaves ``-early_s .. late_s`` and lies inside what was tried."""
+        sure = abs(self.seconds) - 3.0 * self.deviation
+        limit = late_s if self.seconds > 0.0 else early_s
+        return sure > limit and abs(self.seconds) < _REACH_S - 0.5 * _COARSE_S
+
+
+def regress(y: FloatArray, x: FloatArray, mean: FloatArray, spread: FloatArray) -> Regression:
+    """Fit ``y = x b`` with Huber's weights and independent normal priors.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n,)
+    x : ndarray, shape (n, p)
+    mean, spread : ndarray, shape (p,)
+        Prior of each coefficient; an infinite spread leaves it free.
+    """
+    weights, scale, b = np.ones(y.size), float(np.std(y)) + _TINY, mean
+    for _ in range(_PASSES):
+        b = _solve(y, x, mean, spread, weights, scale)
+        residual = y - x @ b
+        scale = 1.4826 * float(np.median(np.abs(residual - np.median(residual)))) + _TINY
+        weights = np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(residual), _TINY))
+    _, deviations = _sandwich(x, y - x @ b, spread, weights, scale)
+    return Regression(b, deviations, weights, scale, _coherence(y, x, weights))
+
+
+def find_lag(sides: Sides, mean: FloatArray, spread: FloatArray, usable: np.ndarray) -> Lag:
+    """Return the lag at which both sides fit best.
+
+    Parameters
+    ----------
+    sides : callable
+        Gives ``y`` and ``X`` for a lag [s].
+    mean, spread : ndarray, shape (p,)
+        As in :func:`regress`.
+    usable : ndarray of bool, shape (n,)
+        Rows to use.
+
+    Notes
+    -----
+    The misfit is profiled over lags from -0.28 to 0.28 s; from its least value Gauss-Newton goes
+    on, with the lag as one more coefficient, from which its deviation comes too.
+    """
+
+    def rows(lag_s: float) -> tuple[FloatArray, FloatArray]:
+        y, x = sides(lag_s)
+        return y[usable], x[usable]
+
+    start = regress(*rows(0.0), mean, spread)
+    lags = np.arange(-_REACH_S, _REACH_S + 0.5 * _COARSE_S, _COARSE_S)
+    profile = [_misfit(*rows(lag), mean, spread, start) for lag in lags]
+    lag = float(lags[int(np.argmin(profile))])
+    deviation = 0.0
+    for _ in range(2):
+        y, x = rows(lag)
+        (y1, x1), (y0, x0) = rows(lag + _STEP_S), rows(lag - _STEP_S)
+        now = regress(y, x, mean, spread)
+        b = now.coefficients
+        slope = ((y1 - x1 @ b) - (y0 - x0 @ b)) / (2.0 * _STEP_S)
+        step, deviations = _sandwich(
+            np.column_stack([x, -slope]),
+            y - x @ b,
+            np.append(spread, np.inf),
+            now.weights,
+            now.scale,
+            np.append(mean - b, 0.0),
+        )
+        deviation = float(deviations[-1])
+        lag = float(np.clip(lag + np.clip(step[-1], -_COARSE_S, _COARSE_S), -0.4, 0.4))
+    best = max(_misfit(*rows(lag), mean, spread, start), _TINY)
+    worse = _misfit(*rows(0.0), mean, spread, start)
+    # The weights' sum stands for the number of rows that count.
+    variance = best / max(float(start.weights.sum()), 1.0)
+    return Lag(lag, deviation, worse / best, (worse - best) / variance)
+
+
+def _precision(spread: FloatArray) -> FloatArray:
+    return np.where(np.isfinite(spread), 1.0 / np.square(spread), 0.0)
+
+
+def _solve(
+    y: FloatArray,
+    x: FloatArray,
+    mean: FloatArray,
+    spread: FloatArray,
+    weights: FloatArray,
+    scale: float,
+) -> FloatArray:
+    """Return the coefficients for given weights and scale."""
+    prior = _precision(spread)
+    matrix = x.T @ (x * weights[:, None]) / scale**2 + np.diag(prior)
+    matrix += np.diag(_TINY * np.diag(matrix) + 1e-200)
+    right = x.T @ (weights * y) / scale**2 + prior * mean
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0], dtype=np.float64)
+
+
+def _sandwich(
+    x: FloatArray,
+    residual: FloatArray,
+    spread: FloatArray,
+    weights: FloatArray,
+    scale: float,
+    offset: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the step to the best coefficients, and their deviations from blocks of scores."""
+    prior = _precision(spread)
+    matrix = x.T @ (x * weights[:, None]) / scale**2 + np.diag(prior)
+    inverse = np.linalg.pinv(matrix, hermitian=True)
+    scores = x * (residual * weights)[:, None] / scale**2
+    right = scores.sum(axis=0) + (0.0 if offset is None else prior * offset)
+    starts = np.arange(0, residual.size, _BLOCK)
+    blocks = np.add.reduceat(scores, starts, axis=0)
+    # Few blocks have fitted residuals that are too small.
+    few = starts.size / max(starts.size - x.shape[1], 1)
+    covariance = inverse @ (few * blocks.T @ blocks + np.diag(prior)) @ inverse
+    return inverse @ right, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def _misfit(
+    y: FloatArray, x: FloatArray, mean: FloatArray, spread: FloatArray, start: Regression
+) -> float:
+    b = _solve(y, x, mean, spread, start.weights, start.scale)
+    prior = _precision(spread) @ np.square(b - mean)
+    return float(start.weights @ np.square(y - x @ b) + start.scale**2 * prior)
+
+
+def _coherence(y: FloatArray, x: FloatArray, weights: FloatArray) -> float:
+    root = np.sqrt(weights)
+    others = x[:, 1:] * root[:, None]
+    pair = np.column_stack([y, x[:, 0]]) * root[:, None]
+    if others.shape[1]:
+        pair = pair - others @ np.linalg.lstsq(others, pair, rcond=None)[0]
+    size = float(pair[:, 0] @ pair[:, 0]) * float(pair[:, 1] @ pair[:, 1])
+    return float(pair[:, 0] @ pair[:, 1]) ** 2 / size if size > 0.0 else 0.0
