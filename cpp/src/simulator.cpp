@@ -74,15 +74,19 @@ class Hands {
 
 Drive simulate(const SingleTrack& model, const double* p, double dt,
                const std::vector<Reference>& references, const Driver& driver,
-               const double* disturbance, double initial_speed) {
+               const double* disturbance, const Beginning& beginning) {
     Drive out;
     out.lost_at = references.size();
     Hands hands(model, driver, dt);
     ModelState<double> x{};
-    x[0] = initial_speed;
+    x[0] = beginning.v_x;
+    x[1] = beginning.v_y;
+    x[2] = beginning.yaw_rate;
     Input u{
-        std::clamp(references.front().steer_rad, -driver.steer_limit_rad, driver.steer_limit_rad),
-        0.5 * model.car.air_density_kgpm3 * model.car.drag_area_m2 * initial_speed * initial_speed,
+        std::clamp(references.front().steer_rad + beginning.steer_rad, -driver.steer_limit_rad,
+                   driver.steer_limit_rad),
+        0.5 * model.car.air_density_kgpm3 * model.car.drag_area_m2 * beginning.v_x * beginning.v_x,
+        beginning.time_s,
     };
     std::array<double, kPushes> push{};
     settle_auxiliary(model, x, push.data(), u, p);
@@ -93,7 +97,7 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
     const int fewest = active_states(model.effects).count > 0 ? kSubstepsWithLags : kSubsteps;
     for (std::size_t k = 0; k < references.size(); ++k) {
         poll_interrupt(k);
-        u.time_s = static_cast<double>(k) * dt;
+        u.time_s = beginning.time_s + static_cast<double>(k) * dt;
         for (std::size_t i = 0; i < kMotionStates; ++i) push[i] = disturbance[3 * k + i];
         const auto y = sense(model, x, push.data(), u, p);
         out.inputs.insert(out.inputs.end(), {u.steer_rad, u.longitudinal});

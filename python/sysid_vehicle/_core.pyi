@@ -240,6 +240,10 @@ def simulate(
     driver: Driver,
     disturbance: _Array,
     initial_speed: float,
+    initial_vy: float = 0.0,
+    initial_yaw_rate: float = 0.0,
+    initial_steer: float = 0.0,
+    start: float = 0.0,
 ) -> tuple[_Array, _Array, _Array, int]: ...
 
 # --- lab observer

@@ -15,7 +15,7 @@ Drive drive_along(const std::vector<Reference>& references, const Driver& driver
         pushes.insert(pushes.end(), disturbance.begin(), disturbance.end());
     const Parameters p = typical_parameters();
     return simulate({saloon(), effects}, p.data(), kStep, references, driver, pushes.data(),
-                    initial_speed);
+                    {initial_speed});
 }
 
 std::size_t samples(const Drive& drive) { return drive.inputs.size() / 2; }

@@ -74,13 +74,6 @@ class Information:
         noncentrality = float(psi @ self.about(effect, *rivals) @ psi)
         return float(np.sqrt(max(noncentrality, 0.0)))
 
-    def hidden_by_fit(self, effect: str, size: Sequence[float]) -> dict[str, float]:
-        """What the fitted parameters take up of an effect of this size that is not modelled."""
-        known = list(range(len(self.fitted)))
-        shift = self._solve(known, self.matrix[np.ix_(known, self._of(effect))])
-        moved = as_float64(shift @ self._along(effect, size))
-        return dict(zip(self.fitted, map(float, moved), strict=True))
-
     def _of(self, effect: str) -> list[int]:
         at = len(self.fitted)
         for e, width in zip(self.effects, self.widths, strict=True):

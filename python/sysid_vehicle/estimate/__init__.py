@@ -3,7 +3,7 @@
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
 from .driving import MEASURED, UNITS, Driving
 from .filters import FilterRun, FilterState, LateMeasurements, StateFilter, StateModel
-from .noise import NoiseModel, first_guess, learn_noise
+from .noise import NoiseModel, first_guess, generous, learn_noise
 
 __all__ = [
     "MEASURED",
@@ -17,6 +17,7 @@ __all__ = [
     "StateFilter",
     "StateModel",
     "first_guess",
+    "generous",
     "learn_noise",
     "nees_check",
     "nis_check",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from html import escape
 
@@ -14,7 +15,7 @@ from ..vehicle import Vehicle
 from .driving import MEASURED, UNITS, Driving
 from .inputs import white_noise_std
 
-__all__ = ["NoiseModel", "first_guess", "learn_noise"]
+__all__ = ["NoiseModel", "first_guess", "generous", "learn_noise"]
 
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
@@ -121,9 +122,14 @@ def first_guess(driving: Driving, vehicle: Vehicle) -> NoiseModel:
     sensors = [
         max(white_noise_std(y), s) for y, s in zip(driving.measured.T, _SMALLEST, strict=True)
     ]
+    return generous(sensors, vehicle)
+
+
+def generous(sensor: Sequence[float], vehicle: Vehicle) -> NoiseModel:
+    """These sensors, and a motion that is disturbed so much that it follows whatever they say."""
     weight = vehicle.mass_kg * 9.81
     wander = (0.02 * weight, 0.04 * weight, 0.02 * weight * vehicle.wheelbase_m / 2.0)
-    return NoiseModel(tuple(sensors), (0.02, 0.02, 0.01), wander, 0.3)
+    return NoiseModel(tuple(map(float, sensor)), (0.02, 0.02, 0.01), wander, 0.3)
 
 
 def learn_noise(

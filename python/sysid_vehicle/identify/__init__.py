@@ -1,7 +1,7 @@
 """Identification of parameters and noise from driving."""
 
 from .fit import Estimate, Fit, Start
-from .identify import identify, refine, refit
+from .identify import free_box, identify, refine, refit, settle
 from .predictive import Prediction, predict
 from .search import METHODS
 from .suspects import explaining
@@ -13,8 +13,10 @@ __all__ = [
     "Prediction",
     "Start",
     "explaining",
+    "free_box",
     "identify",
     "predict",
     "refine",
     "refit",
+    "settle",
 ]

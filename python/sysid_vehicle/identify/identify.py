@@ -16,6 +16,7 @@ from ..errors import InvalidInput, NumericalError, warn
 from ..estimate import Driving, NoiseModel, first_guess, learn_noise
 from ..log import Log, check_excitation
 from ..model import Model
+from ..vehicle import Vehicle
 from .fit import Estimate, Fit, Start
 from .search import METHODS, Box, minimise
 from .suspects import explaining
@@ -204,24 +205,43 @@ def _polish(
     starts: tuple[Start, ...],
     inputs: FloatArray | None = None,
 ) -> Fit:
-    """Alternate between noise and parameters until the likelihood stands still."""
+    """Noise and parameters of maximum likelihood, from values that are already near."""
     problem = driving.problem(model, other_inputs=inputs)
     # Noise needs fewer samples than parameters do; the last word has all of them.
     thin = driving.problem(model, most_samples=_THINNED, other_inputs=inputs)
-    p = p.copy()
-    p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
-    converged = False
-    best = -np.inf
-    for round_ in range(10):
-        noise, _ = learn_noise(thin, p, noise, model.vehicle, rounds=6 if round_ == 0 else 3)
-        frozen = problem.freeze(p, noise.vector())
-        if frozen.log_likelihood < best + 0.5:
-            converged = True
-            break
-        best = frozen.log_likelihood
-        p[box.columns] = minimise(problem, p, frozen, box, rounds=8, tolerance=0.05).x
+    p, noise, converged = settle(problem, thin, model.vehicle, p, noise, box)
     noise, _ = learn_noise(problem, p, noise, model.vehicle, rounds=1)
     return _summary(model, driving, problem, p, noise, box, names, starts, converged)
+
+
+def settle(
+    problem: _core.Problem,
+    thin: _core.Problem,
+    vehicle: Vehicle,
+    p: FloatArray,
+    noise: NoiseModel,
+    box: Box,
+    *,
+    rounds: int = 10,
+) -> tuple[FloatArray, NoiseModel, bool]:
+    """Alternate between noise, learned on `thin`, and parameters until the likelihood stands still.
+
+    Returns
+    -------
+    tuple of array, NoiseModel and bool
+        The core's parameter vector, the noise, and whether it came to a stand.
+    """
+    p = p.copy()
+    p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
+    best = -np.inf
+    for round_ in range(rounds):
+        noise, _ = learn_noise(thin, p, noise, vehicle, rounds=6 if round_ == 0 else 3)
+        frozen = problem.freeze(p, noise.vector())
+        if frozen.log_likelihood < best + 0.5:
+            return p, noise, True
+        best = frozen.log_likelihood
+        p[box.columns] = minimise(problem, p, frozen, box, rounds=8, tolerance=0.05).x
+    return p, noise, False
 
 
 def _summary(

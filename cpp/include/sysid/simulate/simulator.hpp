@@ -32,6 +32,15 @@ struct Driver {
     bool tracks_path = true;  // false: only the open-loop steering
 };
 
+/// How the car moves, and where the steering stands, when the drive begins.
+struct Beginning {
+    double v_x = 20.0;
+    double v_y = 0.0;
+    double yaw_rate = 0.0;
+    double steer_rad = 0.0;  // beside the open-loop steering of the first reference
+    double time_s = 0.0;     // since the log began
+};
+
 /// Samples of a finished drive, row after row.
 struct Drive {
     std::vector<double> inputs;   // samples x (steer, force)
@@ -43,6 +52,6 @@ struct Drive {
 /// `disturbance`: samples x (F_x, F_y, M_z). The drive ends where the car is lost.
 Drive simulate(const SingleTrack& model, const double* p, double dt,
                const std::vector<Reference>& references, const Driver& driver,
-               const double* disturbance, double initial_speed);
+               const double* disturbance, const Beginning& beginning);
 
 }  // namespace sysid
