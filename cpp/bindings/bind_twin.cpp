@@ -1,4 +1,6 @@
 // The twin: car, tyres, loads, observer loops.
+#include <cmath>
+
 #include "arrays.hpp"
 #include "register.hpp"
 #include "sysid/twin/double_track.hpp"
@@ -9,6 +11,9 @@ namespace sysid::bindings {
 
 namespace {
 
+// Of any simulator's row of readings; the arrays are checked again where rows come in.
+constexpr std::size_t kMostReadings = 1'000'000;
+
 const Input14* inputs_of(const Array& a) {
     return reinterpret_cast<const Input14*>(
         matrix(a, a.ndim() == 2 ? a.shape(0) : 0, kTwinInputs, "inputs"));
@@ -16,6 +21,29 @@ const Input14* inputs_of(const Array& a) {
 
 const Input14& input_of(const Array& a) {
     return *reinterpret_cast<const Input14*>(matrix(a, 1, kTwinInputs, "input"));
+}
+
+/// A place that crossed as a number.
+std::size_t place(double value, std::size_t size, const std::string& what) {
+    // Asked so that what is no number is refused before it is cast.
+    if (!(value >= 0.0 && value < static_cast<double>(size) && value == std::floor(value)))
+        throw std::invalid_argument(what + " " + std::to_string(value) +
+                                    " is not a whole number from 0 to " + std::to_string(size - 1));
+    return static_cast<std::size_t>(value);
+}
+
+double step_of(double dt) {
+    if (!(dt > 0.0 && std::isfinite(dt)))
+        throw std::invalid_argument("dt: the step must be positive and finite");
+    return dt;
+}
+
+/// Readings of car and twin for laws that need so many.
+const double* readings(const Array& a, std::size_t least, const char* name) {
+    if (a.ndim() != 1 || a.size() < static_cast<py::ssize_t>(least))
+        throw std::invalid_argument(std::string(name) + ": expected " + std::to_string(least) +
+                                    " values or more, got " + std::to_string(a.size()));
+    return a.data();
 }
 
 State14 state_of(const Array& a) {
@@ -106,7 +134,7 @@ void register_vehicle(py::module_& m) {
             "step",
             [](const Vehicle14& v, const Array& x, const Array& u, double dt) {
                 State14 state = state_of(x);
-                v.step(state, input_of(u), dt);
+                v.step(state, input_of(u), step_of(dt));
                 return row(state);
             },
             py::arg("state"), py::arg("input"), py::arg("dt"))
@@ -122,6 +150,7 @@ void register_vehicle(py::module_& m) {
                 State14 x = state_of(start);
                 const Input14* u = inputs_of(inputs);
                 const auto n = static_cast<std::size_t>(inputs.shape(0));
+                step_of(dt);
                 Array states = empty(n, kTwinStates), outputs = empty(n, kTwinOutputs);
                 double *to_states = states.mutable_data(), *to_outputs = outputs.mutable_data();
                 unlocked([&] { simulate14(v, x, u, n, dt, to_states, to_outputs); });
@@ -137,6 +166,8 @@ void register_vehicle(py::module_& m) {
                 const double* r = matrix(references, n, 3, "references");
                 const Input14* u = inputs_of(base);
                 if (base.shape(0) != n) throw std::invalid_argument("base: as long as references");
+                if (!(driver.reaction_s >= 0.0 && driver.reaction_s < step_of(dt) * 1e9))
+                    throw std::invalid_argument("driver: reaction_s must not be negative");
                 std::vector<Reference> wanted;
                 wanted.reserve(static_cast<std::size_t>(n));
                 for (py::ssize_t k = 0; k < n; ++k)
@@ -187,25 +218,26 @@ void register_laws(py::module_& m) {
              py::arg("schedule"))
         .def(
             "update",
-            [](ParameterLaws& laws, const Array& car, const Array& twin, LoadVector parameters) {
-                const auto n = static_cast<std::size_t>(car.size());
-                laws.update(vector(car, n, "car"), vector(twin, n, "twin"), parameters);
+            [](ParameterLaws& laws, const Array& car, const Array& twin, Estimates parameters) {
+                const std::size_t n = laws.readings();
+                laws.update(readings(car, n, "car"), readings(twin, n, "twin"), parameters);
                 return parameters;
             },
             py::arg("car"), py::arg("twin"), py::arg("parameters"))
         .def_property_readonly("stage", &ParameterLaws::stage);
     py::class_<BatchEstimator>(m, "BatchEstimator")
-        .def(py::init([](const std::vector<std::array<double, 6>>& parameters,
+        .def(py::init([](const std::vector<std::array<double, 7>>& parameters,
                          const std::vector<std::array<double, 3>>& channels, double dt,
                          const std::array<double, 5>& s) {
                  std::vector<BatchParameter> ps;
                  ps.reserve(parameters.size());
                  for (const auto& p : parameters)
-                     ps.push_back({static_cast<int>(p[0]), p[1], p[2], p[3], p[4], p[5]});
+                     ps.push_back({static_cast<int>(place(p[0], kEstimates, "batch: parameter")),
+                                   p[1], p[2], p[3], p[4], p[5], p[6] != 0.0});
                  std::vector<BatchChannel> cs;
                  cs.reserve(channels.size());
                  for (const auto& c : channels)
-                     cs.push_back({static_cast<std::size_t>(c[0]), c[1], c[2]});
+                     cs.push_back({place(c[0], kMostReadings, "batch: reading"), c[1], c[2]});
                  return BatchEstimator(std::move(ps), std::move(cs), dt,
                                        {s[0], s[1], s[2], s[3], s[4]});
              }),
@@ -213,7 +245,8 @@ void register_laws(py::module_& m) {
         .def("of_twin", &BatchEstimator::of_twin, py::arg("which"), py::arg("estimate"))
         .def(
             "update",
-            [](BatchEstimator& batch, const Array& car, const Array& twins, LoadVector estimate) {
+            [](BatchEstimator& batch, const Array& car, const Array& twins, Estimates estimate) {
+                readings(car, batch.readings(), "car");
                 const auto n = static_cast<std::size_t>(car.size());
                 const double* y = matrix(twins, static_cast<py::ssize_t>(batch.twins()),
                                          static_cast<py::ssize_t>(n), "twins");
@@ -224,7 +257,7 @@ void register_laws(py::module_& m) {
             },
             py::arg("car"), py::arg("twins"), py::arg("estimate"))
         .def_property_readonly("spread", [](const BatchEstimator& batch) {
-            const Eigen::VectorXd spread = batch.covariance().diagonal().cwiseSqrt();
+            const Eigen::VectorXd spread = batch.spread();
             Array out(spread.size());
             std::copy(spread.data(), spread.data() + spread.size(), out.mutable_data());
             return out;
@@ -237,15 +270,15 @@ void register_observers(py::module_& m) {
         [](const Vehicle14& twin, const Array& start, const Array& inputs, const Array& measured,
            double dt, const std::vector<std::array<double, 4>>& gains,
            const std::optional<ParameterLaws>& laws, const std::optional<BatchEstimator>& batch,
-           std::size_t stride) {
+           std::size_t stride, const std::vector<std::size_t>& scaled) {
             const Input14* u = inputs_of(inputs);
             const auto n = inputs.shape(0);
             const double* y = matrix(measured, n, kReadings, "measured");
-            ObserverSettings settings{{}, laws, batch, stride};
+            TwinObserverSettings settings{{}, laws, batch, stride, scaled};
             for (const auto& g : gains)
                 settings.gains.push_back({
-                    static_cast<std::size_t>(g[0]),
-                    static_cast<std::size_t>(g[1]),
+                    place(g[0], kReadings, "gains: reading"),
+                    place(g[1], kTwinStatesWithTyres, "gains: state"),
                     g[2],
                     g[3] != 0.0,
                 });
@@ -254,11 +287,11 @@ void register_observers(py::module_& m) {
                 return observe14(twin, x, u, y, static_cast<std::size_t>(n), dt,
                                  std::move(settings));
             });
-            return py::make_tuple(copy_of(seen.loads, kLoadParameters),
+            return py::make_tuple(copy_of(seen.loads, kEstimates),
                                   copy_of(seen.readings, kTwinOutputs), seen.stages, seen.spread);
         },
         py::arg("twin"), py::arg("start"), py::arg("inputs"), py::arg("measured"), py::arg("dt"),
-        py::arg("gains"), py::arg("laws"), py::arg("batch"), py::arg("stride"));
+        py::arg("gains"), py::arg("laws"), py::arg("batch"), py::arg("stride"), py::arg("scaled"));
     m.def(
         "observe_double_track",
         [](const std::array<double, 10>& car, const std::array<double, 8>& front,
@@ -279,8 +312,8 @@ void register_observers(py::module_& m) {
             const auto n = inputs.shape(0);
             const double* y = matrix(measured, n, kReadings, "measured");
             return copy_of(unlocked([&] {
-                               return observe_double_track(data, k, start, u, y,
-                                                           static_cast<std::size_t>(n), dt);
+                               return observe_double_track(
+                                   data, k, start, u, y, static_cast<std::size_t>(n), step_of(dt));
                            }),
                            4);
         },
@@ -295,6 +328,7 @@ void register_twin(py::module_& m) {
     m.attr("TWIN_INPUTS") = kTwinInputs;
     m.attr("TWIN_OUTPUTS") = kTwinOutputs;
     m.attr("TWIN_READINGS") = kReadings;
+    m.attr("TWIN_ESTIMATES") = kEstimates;
     register_data(m);
     register_vehicle(m);
     register_laws(m);

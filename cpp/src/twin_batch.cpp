@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "sysid/twin/batch.hpp"
@@ -17,10 +19,34 @@ BatchEstimator::BatchEstimator(std::vector<BatchParameter> parameters,
       channels_(std::move(channels)),
       settings_(settings),
       dt_(dt) {
+    for (const BatchParameter& p : parameters_) {
+        if (p.parameter < 0 || p.parameter >= static_cast<int>(kEstimates))
+            throw std::invalid_argument("batch: parameter " + std::to_string(p.parameter) +
+                                        " is not one of " + std::to_string(kEstimates));
+        const bool good = std::isfinite(p.step) && p.step != 0.0 && std::isfinite(p.spread) &&
+                          p.spread > 0.0 && p.walk >= 0.0 && p.lower <= p.upper;
+        if (!good)
+            throw std::invalid_argument(
+                "batch: steps must not be zero, spreads must be positive, limits in their order");
+    }
+    for (const BatchChannel& c : channels_)
+        if (!(c.noise > 0.0 && c.high_pass_hz >= 0.0))
+            throw std::invalid_argument("batch: the noise of every channel must be positive");
+    if (!(dt > 0.0 && settings.residual_s > 0.0 && settings.clip > 0.0 &&
+          settings.forgetting >= 0.0 && settings.block_s > 0.0))
+        throw std::invalid_argument("batch: step, times and clip must be positive");
     const auto n = at(parameters_.size());
     const auto m = at(channels_.size());
     // In units of each parameter's spread, so that kilograms and metres mix.
     P_ = Eigen::MatrixXd::Identity(n, n);
+    leaning_.setZero(n);
+    for (std::size_t j = 0; j < parameters_.size(); ++j) {
+        if (!parameters_[j].considered) continue;
+        if (leaning_.any()) throw std::invalid_argument("batch: only one number can be considered");
+        // Without a variance of its own it has no gain.
+        leaning_(at(j)) = 1.0;
+        P_(at(j), at(j)) = 0.0;
+    }
     slopes_.setZero(m, n);
     held_.setZero(m, n + 1);
     power_.setZero(m);
@@ -30,19 +56,34 @@ BatchEstimator::BatchEstimator(std::vector<BatchParameter> parameters,
     learnt_.setZero(n);
     gain_.setZero(n);
     moved_.setZero(n);
+    slope_.setZero(n);
+    scores_.setZero(n, n);
+    score_.setZero(n);
 }
 
-LoadVector BatchEstimator::of_twin(std::size_t which, const LoadVector& estimate) const {
-    LoadVector v = estimate;
+std::size_t BatchEstimator::readings() const {
+    std::size_t most = 0;
+    for (const BatchChannel& c : channels_) most = std::max(most, c.channel + 1);
+    return most;
+}
+
+Eigen::VectorXd BatchEstimator::spread() const {
+    const Eigen::MatrixXd B = scores_ + score_ * score_.transpose();
+    const Eigen::VectorXd shown = (P_ * B * P_).diagonal();
+    return (P_.diagonal().cwiseMax(shown) + leaning_.cwiseAbs2()).cwiseSqrt();
+}
+
+Estimates BatchEstimator::of_twin(std::size_t which, const Estimates& estimate) const {
+    Estimates v = estimate;
     if (which > 0) {
-        const BatchParameter& p = parameters_[which - 1];
+        const BatchParameter& p = parameters_.at(which - 1);
         v[static_cast<std::size_t>(p.parameter)] += p.step;
     }
     return v;
 }
 
 const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* twins,
-                                              std::size_t stride, LoadVector& estimate) {
+                                              std::size_t stride, Estimates& estimate) {
     const std::size_t n = parameters_.size();
     moved_.setZero();
     time_s_ += dt_;
@@ -80,8 +121,12 @@ const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* t
     if (learning_s <= 0.0) return moved_;
 
     const double forgotten = settings_.forgetting * dt_ / (learning_s + settings_.residual_s);
-    P_ /= std::max(1.0 - forgotten, 0.5);
+    const double kept = std::max(1.0 - forgotten, 0.5);
+    P_ /= kept;
+    score_ *= kept;
+    scores_ *= kept * kept;
     for (std::size_t j = 0; j < n; ++j) {
+        if (parameters_[j].considered) continue;
         const double walk = parameters_[j].walk / parameters_[j].spread;
         P_(at(j), at(j)) += walk * walk * dt_;
         // A direction nobody excites must not drift open: it cannot be known worse than at first.
@@ -94,31 +139,43 @@ const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* t
     const double early = std::max(1.0, settings_.gentle_s / learning_s);
     for (std::size_t c = 0; c < channels_.size(); ++c) {
         if (std::isnan(residual_[at(c)])) continue;
-        const auto slope = slopes_.row(at(c));
+        slope_ = slopes_.row(at(c));
         const double variance =
             early * early * std::max(power_[at(c)], channels_[c].noise * channels_[c].noise);
-        learnt_.noalias() = P_ * slope.transpose();
-        const double expected = variance + slope.dot(learnt_);
-        gain_ = learnt_ / expected;
         const double limit = settings_.clip * std::sqrt(variance);
         const double e = std::clamp(residual_[at(c)], -limit, limit);
+        score_.noalias() += slope_.transpose() * (e / variance);
         // Channels follow one another: the next sees what this one has already mended.
-        // Joseph's form, which stays symmetric and positive (see `estimate/kalman.hpp`).
-        learnt_ -= (0.5 * expected) * gain_;
-        P_.noalias() -= gain_ * learnt_.transpose();
-        P_.noalias() -= learnt_ * gain_.transpose();
-        for (std::size_t j = 0; j < n; ++j) {
-            const BatchParameter& p = parameters_[j];
-            double& value = estimate[static_cast<std::size_t>(p.parameter)];
-            const double before = value;
-            value = std::clamp(value + gain_[at(j)] * e * p.spread, p.lower, p.upper);
-            const double moved = (value - before) / p.spread;
-            moved_[at(j)] += (value - before) / p.step;
-            for (std::size_t d = c + 1; d < channels_.size(); ++d)
-                residual_[at(d)] -= slopes_(at(d), at(j)) * moved;
-        }
+        learn(c, e, variance, estimate);
+    }
+    if (learning_s - block_began_s_ >= settings_.block_s) {
+        block_began_s_ = learning_s;
+        scores_.noalias() += score_ * score_.transpose();
+        score_.setZero();
     }
     return moved_;
+}
+
+void BatchEstimator::learn(std::size_t channel, double error, double variance,
+                           Estimates& estimate) {
+    learnt_.noalias() = P_ * slope_.transpose();
+    const double expected = variance + slope_.dot(learnt_);
+    gain_ = learnt_ / expected;
+    // Joseph's form, which stays symmetric and positive (see `estimate/kalman.hpp`).
+    learnt_ -= (0.5 * expected) * gain_;
+    P_.noalias() -= gain_ * learnt_.transpose();
+    P_.noalias() -= learnt_ * gain_.transpose();
+    leaning_ -= gain_ * slope_.dot(leaning_);
+    for (std::size_t j = 0; j < parameters_.size(); ++j) {
+        const BatchParameter& p = parameters_[j];
+        double& value = estimate[static_cast<std::size_t>(p.parameter)];
+        const double before = value;
+        value = std::clamp(value + gain_[at(j)] * error * p.spread, p.lower, p.upper);
+        const double moved = (value - before) / p.spread;
+        moved_[at(j)] += (value - before) / p.step;
+        for (std::size_t d = channel + 1; d < channels_.size(); ++d)
+            residual_[at(d)] -= slopes_(at(d), at(j)) * moved;
+    }
 }
 
 }  // namespace sysid

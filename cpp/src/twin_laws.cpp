@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "sysid/twin/laws.hpp"
 
@@ -21,15 +22,26 @@ double Derivative::operator()(double value) {
 ParameterLaws::ParameterLaws(std::vector<ParameterLaw> laws, double dt,
                              std::size_t yaw_rate_channel, double derivative_hz, Schedule schedule)
     : laws_(std::move(laws)), schedule_(schedule), dt_(dt), yaw_rate_channel_(yaw_rate_channel) {
+    if (!(dt > 0.0 && derivative_hz > 0.0))
+        throw std::invalid_argument("laws: the step and the derivative's corner must be positive");
     stage_ = std::numeric_limits<int>::max();
     for (const ParameterLaw& law : laws_) {
+        if (law.parameter < 0 || law.parameter >= kLoadParameters)
+            throw std::invalid_argument("laws: parameter " + std::to_string(law.parameter) +
+                                        " is not one of " + std::to_string(kLoadParameters));
         working_.push_back({Derivative(derivative_hz, dt), Derivative(derivative_hz, dt)});
         stage_ = std::min(stage_, law.stage);
         last_stage_ = std::max(last_stage_, law.stage);
     }
 }
 
-void ParameterLaws::update(const double* car, const double* twin, LoadVector& parameters) {
+std::size_t ParameterLaws::readings() const {
+    std::size_t most = yaw_rate_channel_;
+    for (const ParameterLaw& law : laws_) most = std::max(most, law.channel);
+    return most + 1;
+}
+
+void ParameterLaws::update(const double* car, const double* twin, Estimates& parameters) {
     const double yaw_rate = std::abs(car[yaw_rate_channel_]);
     for (std::size_t i = 0; i < laws_.size(); ++i) {
         const ParameterLaw& law = laws_[i];

@@ -27,7 +27,10 @@ int Vehicle14::parts(const State14& x, const Input14& u, double dt) const {
             pace += u.brake_nm[i] / kStandingWheel * w_.per_inertia[i];
         fastest = std::max(fastest, pace);
     }
-    return static_cast<int>(std::clamp(std::ceil(fastest * dt / kStable), 1.0, kMostParts));
+    const double wanted = std::ceil(fastest * dt / kStable);
+    // Asked so that a state that is no number takes one part; the caller sees where it leads.
+    if (!(wanted > 1.0)) return 1;
+    return wanted < kMostParts ? static_cast<int>(wanted) : static_cast<int>(kMostParts);
 }
 
 void Vehicle14::step(State14& x, const Input14& u, double dt) const {

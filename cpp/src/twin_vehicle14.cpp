@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "sysid/twin/vehicle14.hpp"
 
@@ -12,6 +13,22 @@ using namespace state14;
 template <class T>
 T beyond(T travel, T limit) {
     return larger(travel - limit, T(0.0)) - larger(-limit - travel, T(0.0));
+}
+
+/// Of the tensor with -J_xy and so on beside its diagonal: xx, yy, zz, xy, xz, yz.
+std::array<double, 6> inverse_inertia(const Load& l) {
+    const double xx = l.jyy_kgm2 * l.jzz_kgm2 - l.jyz_kgm2 * l.jyz_kgm2;
+    const double xy = l.jxy_kgm2 * l.jzz_kgm2 + l.jxz_kgm2 * l.jyz_kgm2;
+    const double xz = l.jxy_kgm2 * l.jyz_kgm2 + l.jxz_kgm2 * l.jyy_kgm2;
+    const double yy = l.jxx_kgm2 * l.jzz_kgm2 - l.jxz_kgm2 * l.jxz_kgm2;
+    const double yz = l.jxx_kgm2 * l.jyz_kgm2 + l.jxy_kgm2 * l.jxz_kgm2;
+    const double zz = l.jxx_kgm2 * l.jyy_kgm2 - l.jxy_kgm2 * l.jxy_kgm2;
+    const double all = l.jxx_kgm2 * xx - l.jxy_kgm2 * xy - l.jxz_kgm2 * xz;
+    if (!(l.jxx_kgm2 > 0.0 && zz > 0.0 && all > 0.0))
+        throw std::invalid_argument(
+            "the moments of inertia must be positive and the products small beside them");
+    const double per = 1.0 / all;
+    return {per * xx, per * yy, per * zz, per * xy, per * xz, per * yz};
 }
 
 }  // namespace
@@ -34,6 +51,7 @@ Vehicle14::OfWheels::OfWheels(const CarData& car) : tyre(car.front.tyre, car.rea
     stop = take(&AxleData::stop_npm);
     roll_centre = take(&AxleData::roll_centre_m);
     link = roll_centre / half_track;
+    lean = Wheels(car.front.radius_m, car.rear.radius_m) / half_track;
     anti_slope = take(&AxleData::anti_slope);
     unsprung = take(&AxleData::unsprung_kg);
     per_unsprung = Wheels(1.0) / unsprung;
@@ -70,17 +88,24 @@ Vehicle14::Vehicle14(const CarData& car, const Load& load) : car_(car), w_(car),
 }
 
 void Vehicle14::set_load(const Load& load) {
+    const double unsprung = sum(w_.unsprung);
+    if (!(load.mass_kg > unsprung))
+        throw std::invalid_argument("a mass of " + std::to_string(load.mass_kg) +
+                                    " kg is not more than its unsprung part of " +
+                                    std::to_string(unsprung) + " kg");
+    inverse_ = inverse_inertia(load);
     load_ = load;
-    sprung_ = load.mass_kg - 2.0 * (car_.front.unsprung_kg + car_.rear.unsprung_kg);
+    sprung_ = load.mass_kg - unsprung;
+    sprung_height_ = (load.mass_kg * load.cg_z_m - sum(w_.unsprung * w_.radius)) / sprung_;
     x_ = {-load.cg_x_m, -car_.wheelbase_m - load.cg_x_m};
     y_ = w_.half_track - load.cg_y_m;
-    tilt_ = Wheels(load.cg_z_m) - w_.roll_centre;
+    tilt_ = Wheels(sprung_height_) - w_.roll_centre;
 }
 
 void Vehicle14::rates(const State14& x, const Input14& u, const Steered& steered, State14& rate,
                       Output14* out) const {
     const double vx = x[Vx], vy = x[Vy], vz = x[Vz], p = x[P], q = x[Q], r = x[R];
-    const double h = load_.cg_z_m;
+    const double h = load_.cg_z_m, h_s = sprung_height_;
     const double pressure = 0.5 * car_.air_density_kgpm3 * vx * std::abs(vx);
     const double tilted = 0.5 * (x[Roll] * x[Roll] + x[Pitch] * x[Pitch]);
     const Wheels height = Wheels::at(&x[kWheelHeight]);
@@ -96,7 +121,10 @@ void Vehicle14::rates(const State14& x, const Input14& u, const Steered& steered
 
     // Slip, in the axes of the wheel.
     const Wheels along = Wheels(vx - h * q) - y_ * r - w_.anti_slope * opening;
-    const Wheels across = x_ * r + (vy + h * p) - w_.link * opening;
+    const Wheels sideways = Wheels(h_s * p) - w_.link * opening;
+    const double shift =
+        sum(w_.unsprung * (sideways - w_.lean * wheel_rate)) * (1.0 / load_.mass_kg);
+    const Wheels across = x_ * r + (vy - shift) + sideways;
     const Wheels c = steered.cosine, s = steered.sine;
     const Wheels v_l = c * along + s * across;
     const Wheels v_t = c * across - s * along;
@@ -116,41 +144,52 @@ void Vehicle14::rates(const State14& x, const Input14& u, const Steered& steered
     const Wheels fx = c * tyre.fx - s * tyre.fy;
     const Wheels fy = s * tyre.fx + c * tyre.fy;
 
-    // Suspension and links, eq. (3).
+    const double ground_x = sum(fx), ground_y = sum(fy);
+    const double force_x = u.force_n[0] - car_.drag_area_m2 * pressure + ground_x;
+    const double plane_ax = force_x / load_.mass_kg;
+    const double plane_ay = (u.force_n[1] + ground_y) / load_.mass_kg;
+
+    // Suspension and links, eq. (3): what an unsprung mass needs to turn with the car stays there.
+    const Wheels own = w_.unsprung * plane_ay;
+    const Wheels carried = fy - own;
     const Wheels damping = choose(opening < 0.0, w_.bump, w_.rebound);
     const Wheels on_body = design_load_ - w_.weight - w_.spring * travel -
                            w_.stop * beyond(travel, w_.travel) - damping * opening -
-                           w_.anti_roll * (travel - across_axle(travel)) - w_.link * fy -
+                           w_.anti_roll * (travel - across_axle(travel)) - w_.link * carried -
                            w_.anti_slope * fx;
     const Wheels against = Wheels::at(u.brake_nm.data()) + w_.rolling * load;
     const Wheels turning = spin / root(spin * spin + kStandingWheel * kStandingWheel);
     wheel_rate.put(&rate[kWheelHeight]);
-    ((load - on_body) * w_.per_unsprung - kTwinGravity).put(&rate[kWheelHeightRate]);
+    ((load - on_body + w_.lean * own) * w_.per_unsprung - kTwinGravity)
+        .put(&rate[kWheelHeightRate]);
     spin.put(&rate[kWheelAngle]);
     ((Wheels::at(u.drive_nm.data()) - turning * against - w_.radius * tyre.fx) * w_.per_inertia)
         .put(&rate[kWheelSpeed]);
 
-    const double ground_x = sum(fx), ground_y = sum(fy);
     const double lift_front = car_.front.lift_area_m2 * pressure;
     const double lift_rear = car_.rear.lift_area_m2 * pressure;
-    const double force_x = u.force_n[0] - car_.drag_area_m2 * pressure + ground_x;
-    const double force_y = u.force_n[1] + ground_y;
     const double force_z =
         u.force_n[2] - sprung_ * kTwinGravity + sum(on_body) + lift_front + lift_rear;
-    const double moment_x = u.moment_nm[0] + sum(arm_y * on_body) + h * ground_y;
+    const double moment_x =
+        u.moment_nm[0] + sum(arm_y * on_body) + h_s * sum(carried) + (h_s - h) * u.force_n[1];
     const double moment_y = u.moment_nm[1] - sum(arm_x * on_body) - h * ground_x -
                             x_[0] * lift_front - x_[2] * lift_rear;
     const double moment_z = u.moment_nm[2] + sum(x_ * fy - y_ * fx);
 
-    const double plane_ax = force_x / load_.mass_kg;
-    const double plane_ay = force_y / load_.mass_kg;
     const double az = force_z / sprung_;
     rate[Vx] = plane_ax + r * vy;
     rate[Vy] = plane_ay - r * vx;
     rate[Vz] = az;
-    rate[P] = (moment_x + (load_.jyy_kgm2 - load_.jzz_kgm2) * q * r) / load_.jxx_kgm2;
-    rate[Q] = (moment_y + (load_.jzz_kgm2 - load_.jxx_kgm2) * p * r) / load_.jyy_kgm2;
-    rate[R] = (moment_z + (load_.jxx_kgm2 - load_.jyy_kgm2) * p * q) / load_.jzz_kgm2;
+    const double spin_x = load_.jxx_kgm2 * p - load_.jxy_kgm2 * q - load_.jxz_kgm2 * r;
+    const double spin_y = load_.jyy_kgm2 * q - load_.jxy_kgm2 * p - load_.jyz_kgm2 * r;
+    const double spin_z = load_.jzz_kgm2 * r - load_.jxz_kgm2 * p - load_.jyz_kgm2 * q;
+    const double left_x = moment_x + r * spin_y - q * spin_z;
+    const double left_y = moment_y + p * spin_z - r * spin_x;
+    const double left_z = moment_z + q * spin_x - p * spin_y;
+    const auto& [ixx, iyy, izz, ixy, ixz, iyz] = inverse_;
+    rate[P] = ixx * left_x + ixy * left_y + ixz * left_z;
+    rate[Q] = ixy * left_x + iyy * left_y + iyz * left_z;
+    rate[R] = ixz * left_x + iyz * left_y + izz * left_z;
     rate[Z] = vz;
     rate[Roll] = p;
     rate[Pitch] = q;
@@ -204,7 +243,9 @@ Output14 Vehicle14::output(const State14& x, const Input14& u, const Steered& st
 double Vehicle14::energy(const State14& x, const Input14& u) const {
     double e = load_.mass_kg * (x[Vx] * x[Vx] + x[Vy] * x[Vy]) + sprung_ * x[Vz] * x[Vz] +
                load_.jxx_kgm2 * x[P] * x[P] + load_.jyy_kgm2 * x[Q] * x[Q] +
-               load_.jzz_kgm2 * x[R] * x[R];
+               load_.jzz_kgm2 * x[R] * x[R] -
+               2.0 * (load_.jxy_kgm2 * x[P] * x[Q] + load_.jxz_kgm2 * x[P] * x[R] +
+                      load_.jyz_kgm2 * x[Q] * x[R]);
     e = 0.5 * e + sprung_ * kTwinGravity * x[Z];
     const double tilted = 0.5 * (x[Roll] * x[Roll] + x[Pitch] * x[Pitch]);
     const Wheels height = Wheels::at(&x[kWheelHeight]), spin = Wheels::at(&x[kWheelSpeed]);

@@ -21,6 +21,7 @@ from ._core_sideslip import SideslipUkf as SideslipUkf
 from ._core_sideslip import _SideslipObserver as _SideslipObserver
 from ._core_sideslip import _SideslipUkf as _SideslipUkf
 from ._core_sideslip import sideslip_defaults as sideslip_defaults
+from ._core_twin import TWIN_ESTIMATES as TWIN_ESTIMATES
 from ._core_twin import TWIN_INPUTS as TWIN_INPUTS
 from ._core_twin import TWIN_OUTPUTS as TWIN_OUTPUTS
 from ._core_twin import TWIN_READINGS as TWIN_READINGS

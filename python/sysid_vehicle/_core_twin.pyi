@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from ._core import Driver, _Array, _Bound
 
+TWIN_ESTIMATES: int
 TWIN_INPUTS: int
 TWIN_OUTPUTS: int
 TWIN_READINGS: int
@@ -129,6 +130,7 @@ def observe14(
     laws: ParameterLaws | None,
     batch: BatchEstimator | None,
     stride: int,
+    scaled: Sequence[int],
 ) -> tuple[_Array, _Array, list[int], list[float]]: ...
 def observe_double_track(
     car: Sequence[float],

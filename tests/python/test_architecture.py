@@ -201,6 +201,65 @@ def test_the_check_sees_an_include_that_points_back() -> None:
     assert back == ["cpp/src/simulator.cpp:1 simulate includes identify, which comes after it"]
 
 
+_OPENED = re.compile(
+    r"\bnamespace(?P<space>[\w\s:]*)\{"
+    r"|(?<!enum )\b(?:struct|class|union|enum(?: class)?)\s+(?P<type>\w+)(?:\s*final)?"
+    r"(?:\s*:[^;{}()]*)?\s*\{"
+    r"|(?P<open>\{)|(?P<close>\})"
+)
+
+
+def cpp_types(text: str) -> list[str]:
+    """Qualified names of the types that a text defines where other files can see them."""
+    text = re.sub(r"//[^\n]*|/\*.*?\*/", "", text, flags=re.DOTALL)
+    text = re.sub(r'"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'', '""', text)
+    # `<...>` of a template's head could hold a default of the form `class T`.
+    text = re.sub(r"template\s*<[^{};]*?>\s*(?=struct|class|union)", "", text)
+    scopes: list[str | None] = []
+    found = []
+    for match in _OPENED.finditer(text):
+        if match["close"]:
+            if scopes:
+                scopes.pop()
+        elif match["space"] is not None:
+            # What has no name is seen by no other file.
+            scopes.append(match["space"].strip() or None)
+        elif match["type"]:
+            if None not in scopes:
+                found.append("::".join([*(s for s in scopes if s), match["type"]]))
+            scopes.append(match["type"])
+        else:
+            scopes.append(None)
+    return found
+
+
+def test_no_two_files_define_a_type_of_one_name() -> None:
+    """Two definitions of one name are one to the linker: either may be taken for both."""
+    where: dict[str, list[str]] = {}
+    for path in [*CPP_FILES, *sorted((REPO / "cpp/bindings").glob("*.[ch]pp"))]:
+        for found in set(cpp_types(path.read_text(encoding="utf-8"))):
+            where.setdefault(found, []).append(name(path))
+    assert len(where) > 100
+    assert "sysid::TwinObserverSettings" in where
+    assert {found: files for found, files in where.items() if len(files) > 1} == {}
+
+
+def test_the_check_sees_types_that_others_see_and_no_others() -> None:
+    text = """
+    namespace sysid { // struct InAComment {}
+    struct Forward;
+    template <class T> struct Pair { T a; struct Inner { int x; }; };
+    enum class Kind : int { kOne };
+    namespace { struct Hidden { int x; }; }
+    inline int f(struct Pair<int> p) { struct Local { int x; }; return sizeof(Local); }
+    namespace online { class Settings final : public Pair<int> { int b; }; }
+    }
+    """
+    assert cpp_types(text) == [
+        "sysid::Pair", "sysid::Pair::Inner", "sysid::Kind", "sysid::online::Settings",
+    ]  # fmt: skip
+
+
 def test_no_file_is_too_long_to_read() -> None:
     suffixes = {".py", ".pyi", ".cpp", ".hpp", ".cmake"}
     lines = {

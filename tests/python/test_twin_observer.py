@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_vehicle import InvalidInput, NumericalError, manoeuvres
+from sysid_vehicle import InvalidInput, NumericalError, SysidWarning, manoeuvres
 from sysid_vehicle.twin import (
     LOADED_SUV,
     NOMINAL_SUV,
@@ -105,7 +105,8 @@ def test_the_mass_converges_by_the_published_law_with_its_sign_mended(town: Driv
 def test_the_printed_sign_diverges(town: Drive14) -> None:
     readings = measure(town, ["ax_mps2"])
     observer = Observer(laws=[mass_law(150.0, published_sign=True)])
-    found = observe(TwinCar(), LIGHT, town.inputs, readings, observer, speed_mps=12.0)
+    with pytest.warns(SysidWarning, match=r"mass_kg = \d+\.?\d* stands at its limit"):
+        found = observe(TwinCar(), LIGHT, town.inputs, readings, observer, speed_mps=12.0)
     assert found.error_percent("mass_kg", LOADED_SUV.mass_kg, MASS_CHANGE) > 200.0
 
 
@@ -134,11 +135,11 @@ def test_the_gradient_law_converges_too(sweep: Drive14) -> None:
 
 def test_twins_side_by_side_find_what_the_published_laws_cannot(sweep: Drive14) -> None:
     """Mass, centre of mass and inertia at once, from readings with a tenth of noise."""
-    names = ("mass_kg", "jxx_kgm2", "jzz_kgm2", "cg_x_m", "cg_y_m", "cg_z_m")
+    names = ("mass_kg", "jxx_kgm2", "jzz_kgm2", "cg_x_m", "cg_y_m", "cg_z_m", "jxz_kgm2")
     readings = measure(sweep, ["ay_mps2", "roll_rate_radps", "yaw_rate_radps"], snr=10.0, seed=4)
     observer = Observer(batch=SideBySide(unknowns(*names), readings.noise))
     found = observe(TwinCar(), NOMINAL_SUV, sweep.inputs, readings, observer, speed_mps=22.0)
-    for name in ("mass_kg", "jxx_kgm2", "jzz_kgm2", "cg_x_m", "cg_z_m"):
+    for name in ("mass_kg", "jxx_kgm2", "jzz_kgm2", "cg_x_m", "cg_z_m", "jxz_kgm2"):
         true, nominal = getattr(LOADED_SUV, name), getattr(NOMINAL_SUV, name)
         assert found.error_percent(name, true, true - nominal) < 10.0, name
         assert abs(found.last(name) - true) < 6.0 * found.spread[name], name
@@ -156,7 +157,9 @@ def test_stages_follow_one_another(town: Drive14) -> None:
     laws = [mass_law(150.0), inertia_law("jzz_kgm2", 100.0, stage=1)]
     schedule = Schedule(excited_s=20.0, window_s=5.0, relative_rate_ps=3e-3)
     observer = Observer(laws=laws, schedule=schedule)
-    found = observe(TwinCar(), LIGHT, town.inputs, readings, observer, speed_mps=12.0)
+    with pytest.warns(SysidWarning, match="yaw_rate_radps: the car follows the twin by"):
+        # The second stage has seconds only, and its inertia is far off at the end.
+        found = observe(TwinCar(), LIGHT, town.inputs, readings, observer, speed_mps=12.0)
     began = found.time_s[np.argmax(found.stages > 0)]
     assert 20.0 < began < 60.0
     inertia = found.parameters["jzz_kgm2"]

@@ -56,6 +56,7 @@ from .logs import single_track, to_log
 from .observer import STATES, Observation, Observer, StateGain, observe
 from .protocol import Twin, observe_with
 from .readings import READINGS, Readings, measure, noisy_road
+from .residuals import ChannelResidual
 
 __all__ = [
     "INPUTS",
@@ -71,6 +72,7 @@ __all__ = [
     "Box",
     "Calibration",
     "CallableTwin",
+    "ChannelResidual",
     "DoubleTrackObserver",
     "DoubleTrackRun",
     "Drive14",

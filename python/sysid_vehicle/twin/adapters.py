@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
-from ..errors import InvalidInput
+from ..errors import InvalidInput, near_names
 from .car import LOAD_NAMES, Load, TwinCar
 from .drives import INPUTS, OUTPUTS
 from .observer import STATES
@@ -45,6 +47,24 @@ class NativeTwin:
         self._state = self._core.rest(speed_mps)
         self._wrench = np.zeros(6)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Car, load, states and push, for a copy or another process."""
+        return {
+            "car": self.car,
+            "dt_s": self.dt_s,
+            "load": list(self._core.load),
+            "state": self._state,
+            "wrench": self._wrench,
+            "capabilities": self.capabilities,
+        }
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        self.car, self.dt_s = kept["car"], kept["dt_s"]
+        self.capabilities = kept["capabilities"]
+        self._core = self.car.core()
+        self._core.load = kept["load"]
+        self._state, self._wrench = kept["state"].copy(), kept["wrench"].copy()
+
     def _inputs(self, inputs: FloatArray) -> FloatArray:
         if not self._wrench.any():
             return as_float64(inputs).reshape(1, -1)
@@ -65,8 +85,21 @@ class NativeTwin:
         return dict(zip(LOAD_NAMES, self._core.load, strict=True))
 
     def set_parameters(self, values: Mapping[str, float]) -> None:
-        """Change its load."""
-        self._core.load = list({**self.get_parameters(), **values}.values())
+        """Change its load.
+
+        Raises
+        ------
+        InvalidInput
+            If a name is unknown, or no body has such a load.
+        """
+        load = self.get_parameters()
+        for name in values:
+            if name not in load:
+                raise InvalidInput(f"there is no parameter '{name}'{near_names(name, load)}")
+        try:
+            self._core.load = list({**load, **values}.values())
+        except ValueError as error:
+            raise InvalidInput(f"{self.car.name}: {error}") from error
 
     def get_state(self) -> FloatArray:
         """Its states."""
@@ -90,13 +123,13 @@ class NativeTwin:
 
     def clone(self) -> NativeTwin:
         """Make another that stands here."""
-        other = NativeTwin(self.car, Load(*self._core.load), 0.0, dt_s=self.dt_s)
-        other._state = self._state.copy()
-        return other
+        return copy.copy(self)
 
 
 class CallableTwin:
     """A twin made of two functions of state, inputs and parameters.
+
+    It pickles if its functions do: functions of a module do, those made in place do not.
 
     Parameters
     ----------

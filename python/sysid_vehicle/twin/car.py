@@ -10,7 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 
+import numpy as np
+
 from .. import _core
+from .._arrays import FloatArray
 from ..errors import InvalidInput, near_names
 
 __all__ = [
@@ -35,6 +38,13 @@ class PointMass:
     z_m: float
 
 
+LOAD_NAMES = (
+    *("mass_kg", "jxx_kgm2", "jyy_kgm2", "jzz_kgm2", "cg_x_m", "cg_y_m", "cg_z_m"),
+    *("jxy_kgm2", "jxz_kgm2", "jyz_kgm2"),
+)
+"""Names of the numbers of a load, in their order."""
+
+
 @dataclass(frozen=True)
 class Load:
     """Mass, moments of inertia and centre of mass of a car with what it carries.
@@ -48,11 +58,15 @@ class Load:
     cg_x_m, cg_y_m, cg_z_m : float
         Centre of mass ahead of the front axle (negative inside the wheelbase), to the left, and
         above the ground.
+    jxy_kgm2, jxz_kgm2, jyz_kgm2 : float
+        Products of inertia, the sums of mass times both distances from the centre of mass; the
+        inertia tensor has their negatives.
 
     Raises
     ------
     InvalidInput
-        If a mass or a moment of inertia is not positive.
+        If a mass or a moment of inertia is not positive, a number is not finite, or the products
+        are too large for the moments.
     """
 
     mass_kg: float
@@ -62,16 +76,38 @@ class Load:
     cg_x_m: float
     cg_y_m: float
     cg_z_m: float
+    jxy_kgm2: float = 0.0
+    jxz_kgm2: float = 0.0
+    jyz_kgm2: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in LOAD_NAMES:
+            if not np.isfinite(getattr(self, name)):
+                raise InvalidInput(f"load: {name} = {getattr(self, name)!r}; give a finite number")
         for name in ("mass_kg", "jxx_kgm2", "jyy_kgm2", "jzz_kgm2", "cg_z_m"):
             if not getattr(self, name) > 0.0:
                 raise InvalidInput(
                     f"load: {name} = {getattr(self, name)!r}; give a positive number"
                 )
+        if not np.linalg.eigvalsh(self.inertia())[0] > 0.0:
+            raise InvalidInput(
+                "load: no body has such products of inertia; jxy, jxz and jyz must be small beside "
+                "the moments"
+            )
+
+    def inertia(self) -> FloatArray:
+        """The inertia tensor about the centre of mass [kg m2], shape (3, 3)."""
+        xy, xz, yz = self.jxy_kgm2, self.jxz_kgm2, self.jyz_kgm2
+        return np.array(
+            [
+                [self.jxx_kgm2, -xy, -xz],
+                [-xy, self.jyy_kgm2, -yz],
+                [-xz, -yz, self.jzz_kgm2],
+            ]
+        )
 
     def vector(self) -> list[float]:
-        """The seven numbers in the order of the fields."""
+        """The ten numbers in the order of the fields."""
         return [float(v) for v in dataclasses.astuple(self)]
 
     def replace(self, **changes: float) -> Load:
@@ -88,19 +124,29 @@ class Load:
         return Load(*_core.loaded(self.vector(), points))
 
 
-LOAD_NAMES = tuple(f.name for f in dataclasses.fields(Load))
-
 NOMINAL_SUV = Load(*_core.TwinCar().design)
 """Table 1 of the paper: a sport utility vehicle with its driver."""
 
 # Table 3 cannot come out of table 2 by any positions (J_xx + J_yy - J_zz falls, which no added mass
-# can do), so it is taken as given.
-LOADED_SUV = Load(2480.8, 901.9, 4394.4, 4760.0, -1.316, 0.016, 0.684)
+# can do), so it is taken as given. It has no products of inertia: these are table 1's and those of
+# the added mass at the one place that takes the centre from table 1's to table 3's.
+LOADED_SUV = Load(
+    2480.8, 901.9, 4394.4, 4760.0, -1.316, 0.016, 0.684,
+    jxy_kgm2=-15.58, jxz_kgm2=-39.12, jyz_kgm2=13.38,
+)  # fmt: skip
 """Table 3 of the paper: the same car with five people's luggage and weight in it."""
 
 
 SPORTS_CAR_LOAD = Load(1391.29, 328.281, 1698.21, 1864.95, -1.5714, 0.0, 0.4622)
 """Table 7 of the paper: the car of its experiments."""
+
+
+_POSITIVE = frozenset(
+    {
+        *("wheelbase_m", "track_m", "unsprung_kg", "tyre_npm", "radius_m", "wheel_inertia_kgm2"),
+        *("nominal_load_n", "load_at_peak_stiffness", "friction_x", "friction_y", "shape"),
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -137,6 +183,11 @@ class TwinCar:
                     f"{self.name}: there is no '{name}'{near_names(name, known)}; names are those "
                     f"of TwinCar().numbers()"
                 )
+        for name, value in self._spelt_out().items():
+            last = name.rsplit(".", 1)[-1]
+            if not np.isfinite(value) or (last in _POSITIVE and not value > 0.0):
+                needed = "a positive" if last in _POSITIVE else "a finite"
+                raise InvalidInput(f"{self.name}: {name} = {value!r}; give {needed} number")
 
     def _spelt_out(self) -> dict[str, float]:
         out: dict[str, float] = {}
@@ -183,7 +234,10 @@ class TwinCar:
             for part in path:
                 item = getattr(item, part)
             setattr(item, last, value)
-        return _core.Vehicle14(car, (load or self.design).vector())
+        try:
+            return _core.Vehicle14(car, (load or self.design).vector())
+        except ValueError as error:
+            raise InvalidInput(f"{self.name}: {error}; take another load") from error
 
     def __str__(self) -> str:
         lines = [f"{self.name}: 14 degrees of freedom, {self.design.mass_kg:g} kg as designed"]

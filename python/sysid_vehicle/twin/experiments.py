@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..errors import InvalidInput
-from .car import LOADED_SUV, NOMINAL_SUV, Load, TwinCar
-from .drives import Drive14, rough_road, swept_steer, urban_cycle
+from .car import LOAD_NAMES, LOADED_SUV, NOMINAL_SUV, Load, TwinCar
+from .drives import INPUTS, Drive14, rough_road, swept_steer, urban_cycle
 from .laws import ParameterLaw, SideBySide, inertia_law, mass_law, unknowns
 from .observer import Observation, Observer, observe
 from .readings import Readings, measure, noisy_road
@@ -30,6 +30,7 @@ __all__ = ["LoadExperiment", "estimate_mass", "estimate_pitch", "estimate_roll_y
 Law = Literal["side_by_side", "published", "gradient"]
 Mass = Literal["known", "stage_1", "wrong"]
 
+_TORQUES = [i for i, name in enumerate(INPUTS) if name.startswith(("drive_", "brake_"))]
 # A sensor is never believed to be better than this.
 _FLOOR = {
     "ax_mps2": 2e-3,
@@ -80,14 +81,16 @@ class LoadExperiment:
             "experiment": self.name,
             "parameters": {
                 n: {
-                    "true": getattr(self.true, n),
-                    "nominal": getattr(self.nominal, n),
+                    "true": getattr(self.true, n, None),
+                    "nominal": getattr(self.nominal, n, None),
                     "first": float(self.found.parameters[n][0]),
                     "found": self.found.last(n),
+                    "spread": self.found.spread.get(n),
                     "error_percent_of_change": self.error_percent(n) if n in self.names else None,
                 }
                 for n in dict.fromkeys((*self.names, *self.found.moved()))
             },
+            "contradictions": list(self.found.contradictions),
         }
 
     def plot(self, name: str, *, ax: Axes | None = None) -> Axes:
@@ -98,9 +101,11 @@ class LoadExperiment:
         lines = [f"{self.name}: {self.drive}"]
         for n in dict.fromkeys((*self.names, *self.found.moved())):
             error = f"{self.error_percent(n):8.2f} % of the change" if n in self.names else ""
+            true = f", true {getattr(self.true, n):10.5g}" if hasattr(self.true, n) else ""
+            wide = f" +- {self.found.spread[n]:<8.3g}" if n in self.found.spread else ""
             lines.append(
-                f"  {n:10s} {self.found.parameters[n][0]:10.5g} -> {self.found.last(n):10.5g}, "
-                f"true {getattr(self.true, n):10.5g} {error}"
+                f"  {n:11s} {self.found.parameters[n][0]:10.5g} -> {self.found.last(n):10.5g}"
+                f"{wide}{true} {error}"
             )
         return "\n".join(lines)
 
@@ -135,9 +140,12 @@ def _first(names: Sequence[str], errors: Sequence[float] | None) -> dict[str, fl
     return out
 
 
-def _batch(readings: Readings, channels: Sequence[str], names: Sequence[str]) -> Observer:
+def _batch(
+    readings: Readings, channels: Sequence[str], names: Sequence[str], doubt: float = 0.0
+) -> Observer:
+    """Twins side by side; unless doubted, the torques are exact, as the paper's twin has them."""
     noise = {c: max(readings.noise[c], _FLOOR[c]) for c in channels}
-    return Observer(batch=SideBySide(unknowns(*names), noise))
+    return Observer(batch=SideBySide(unknowns(*names), noise, input_doubt=doubt))
 
 
 def estimate_mass(
@@ -148,6 +156,8 @@ def estimate_mass(
     seed: int = 0,
     first_error: Sequence[float] | None = None,
     duration_s: float = 180.0,
+    torque_error: float = 0.0,
+    torque_doubt: float = 0.0,
 ) -> LoadExperiment:
     """Estimate the mass in town: table 4, figures 4 and 5.
 
@@ -166,18 +176,33 @@ def estimate_mass(
         First error of the mass in parts of the change; -1, the unloaded car's, by default.
     duration_s : float
         Length of the drive.
+    torque_error : float
+        The twin is told torques that are larger by this part.
+    torque_doubt : float
+        Standard deviation of such an error, which twins side by side then consider.
+
+    Raises
+    ------
+    InvalidInput
+        If the error or the doubt of the torques is no part of one.
     """
+    if not (abs(torque_error) < 1.0 and 0.0 <= torque_doubt < 1.0):
+        raise InvalidInput(
+            f"torque_error = {torque_error!r}, torque_doubt = {torque_doubt!r}; give parts of one"
+        )
     drive = _town(duration_s)
     first = LOADED_SUV.replace(**_first(["mass_kg"], first_error), **_centre(wrong_cg))
+    told = drive.inputs.copy()
+    told[:, _TORQUES] *= 1.0 + torque_error
     channels = ["ax_mps2", "pitch_rate_radps"] if law == "side_by_side" else ["ax_mps2"]
     readings = measure(drive, channels, snr=snr, seed=seed)
     if law == "side_by_side":
-        observer = _batch(readings, channels, ["mass_kg", "cg_x_m", "cg_z_m"])
+        observer = _batch(readings, channels, ["mass_kg", "cg_x_m", "cg_z_m"], torque_doubt)
     elif law == "published":
         observer = Observer(laws=[mass_law(150.0, yaw_rate_below_radps=np.inf)])
     else:
         observer = Observer(laws=[mass_law(400.0, kind="gradient", yaw_rate_below_radps=np.inf)])
-    found = observe(TwinCar(), first, drive.inputs, readings, observer, speed_mps=_speed(drive))
+    found = observe(TwinCar(), first, told, readings, observer, speed_mps=_speed(drive))
     return LoadExperiment("mass", drive, readings, found, ("mass_kg",), LOADED_SUV, NOMINAL_SUV)
 
 
@@ -211,6 +236,8 @@ def estimate_roll_yaw(
     )
     channels = ["roll_rate_radps", "yaw_rate_radps"]
     looked_for = [*names, *_unsure(mass, wrong_cg)]
+    if wrong_cg:
+        looked_for += ["jxy_kgm2", "jxz_kgm2", "jyz_kgm2"]
     if law == "side_by_side" and len(looked_for) > 2:
         channels.append("ay_mps2")
     readings = measure(drive, channels, snr=snr, seed=seed)
@@ -288,7 +315,7 @@ def _laws(law: Law, snr: float, gains: dict[str, tuple[float, float, float]]) ->
 
 def _centre(wrong: bool) -> dict[str, float]:
     load = NOMINAL_SUV if wrong else LOADED_SUV
-    return {"cg_x_m": load.cg_x_m, "cg_y_m": load.cg_y_m, "cg_z_m": load.cg_z_m}
+    return {name: getattr(load, name) for name in LOAD_NAMES[4:]}
 
 
 @lru_cache(maxsize=64)

@@ -4,15 +4,21 @@ What an FMU can do depends on how it was exported. For model exchange its contin
 set; for co-simulation only inputs and tunable parameters can, so that states are corrected only
 where it takes a push as an input. Twins side by side need copies of it: for model exchange a
 second instance with the same states, for co-simulation one that can be serialised.
+
+An FMU is a library of native code: it runs with all the rights of this process and is not checked
+in any way. Load those only whose maker you trust.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import shutil
+import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 
@@ -52,8 +58,33 @@ class FMUVariables:
     states: Sequence[str] = ()
 
 
+class _Alive:
+    """An FMU's instance and the folder it is unpacked in; ended together, and once."""
+
+    def __init__(self, folder: str) -> None:
+        self.folder = folder
+        self.fmu: Any = None
+
+    def end(self) -> None:
+        fmu, self.fmu = self.fmu, None
+        try:
+            if fmu is not None:
+                # An instance that is still being set up may refuse to be terminated.
+                with contextlib.suppress(Exception):
+                    fmu.terminate()
+                fmu.freeInstance()
+        finally:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+
 class FMUTwin:
     """An FMU as a twin.
+
+    It runs the native code in the file, with all the rights of this process: load no FMU that you
+    do not trust. It is unpacked into a folder of its own, which is deleted when the twin is closed,
+    by `close` or at the end of a ``with`` block, when it is collected, or when Python ends. The
+    instance lives in that code: it can be cloned if the FMU can, but neither pickled nor sent to
+    another process.
 
     Parameters
     ----------
@@ -88,7 +119,9 @@ class FMUTwin:
         self._description = fmpy.read_model_description(str(path))
         self._version = 3 if self._description.fmiVersion.startswith("3") else 2
         self.kind = _kind(self._description, kind, str(path))
-        self._folder = fmpy.extract(str(path))
+        self._alive = _Alive(fmpy.extract(str(path)))
+        # Whoever lets go of the twin, or stops half-way through its making, leaves nothing behind.
+        self._finalizer = weakref.finalize(self, self._alive.end)
         self.input_names = tuple(variables.inputs)
         self.output_names = tuple(variables.outputs)
         self.parameter_names = tuple(variables.parameters)
@@ -96,7 +129,6 @@ class FMUTwin:
         self._outputs = self._references(variables.outputs.values())
         self._parameters = self._references(variables.parameters.values(), tunable=True)
         self._push = self._references([*variables.force_n, *variables.moment_nm])
-        self._fmu: Any = None
         self._time = 0.0
         self._start()
         count = int(self._description.numberOfContinuousStates or 0)
@@ -105,6 +137,39 @@ class FMUTwin:
             raise InvalidInput(f"{path} has {count} states but {len(names)} names were given")
         self.state_names = names if self.kind == "model_exchange" else ()
         self.capabilities = self._capabilities()
+
+    @property
+    def _fmu(self) -> Any:
+        if self._alive.fmu is None:
+            raise InvalidInput(f"{self._path}: this twin is closed; make it anew from the file")
+        return self._alive.fmu
+
+    def close(self) -> None:
+        """End the instance and delete its folder; a second time does nothing."""
+        self._finalizer()
+
+    def __enter__(self) -> FMUTwin:
+        """Give itself; the end of the block closes it."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __reduce_ex__(self, protocol: object) -> NoReturn:
+        raise TypeError(
+            f"{self._path}: an FMU's instance lives in native code and cannot be pickled; make it "
+            f"anew from the file in the other process, or take clone() for a copy in this one"
+        )
+
+    def __copy__(self) -> FMUTwin:
+        return self.__deepcopy__({})
+
+    def __deepcopy__(self, _: object) -> FMUTwin:
+        if "clone" not in self.capabilities:
+            raise TypeError(
+                f"{self._path}: this FMU gives no copy of its state; make it anew from the file"
+            )
+        return self.clone()
 
     def _capabilities(self) -> frozenset[str]:
         offer = (
@@ -145,8 +210,8 @@ class FMUTwin:
     def _start(self) -> None:
         from fmpy.simulation import instantiate_fmu
 
-        self._fmu = instantiate_fmu(
-            self._folder,
+        self._alive.fmu = instantiate_fmu(
+            self._alive.folder,
             self._description,
             "ModelExchange" if self.kind == "model_exchange" else "CoSimulation",
             require_functions=False,

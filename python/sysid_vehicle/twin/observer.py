@@ -5,7 +5,7 @@ Dettu et al. (2023), eqs. (1) to (5). On the built-in twin the whole loop runs i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Literal
@@ -15,11 +15,13 @@ import numpy as np
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, TRUTH, axes_or_new, tidy
-from ..errors import InvalidInput, NumericalError
+from ..errors import InvalidInput, NumericalError, warn
 from .car import LOAD_NAMES, Load, TwinCar
-from .drives import OUTPUTS
-from .laws import ParameterLaw, Schedule, SideBySide, place_of
+from .checks import checked_rows, checked_step, checked_stride
+from .drives import INPUTS, OUTPUTS
+from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, place_of
 from .readings import READINGS, Readings
+from .residuals import ChannelResidual, contradictions, residual_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["STATES", "Observation", "Observer", "StateGain", "observe"]
 
 _WHEELS = ("fl", "fr", "rl", "rr")
+_FASTEST_MPS = 150.0
 STATES = (
     *("x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad"),
     *("vx_mps", "vy_mps", "vz_mps", "roll_rate_radps", "pitch_rate_radps", "yaw_rate_radps"),
@@ -130,7 +133,13 @@ class Observation:
     stages : ndarray, shape (m,)
         Stage of the schedule.
     spread : mapping of str to float
-        Standard deviation of what was looked for side by side, as least squares see it at the end.
+        Standard deviation of what was looked for side by side at the end: that of least squares,
+        wider where residuals are not white, and no less than that of the first guess where they
+        contradict the result.
+    residuals : tuple of ChannelResidual
+        Of the channels that taught something, over the second half.
+    contradictions : tuple of str
+        What speaks against the estimates, with the remedy; a warning said so too.
     """
 
     time_s: FloatArray
@@ -138,6 +147,8 @@ class Observation:
     outputs: dict[str, FloatArray]
     stages: FloatArray
     spread: dict[str, float]
+    residuals: tuple[ChannelResidual, ...] = ()
+    contradictions: tuple[str, ...] = ()
 
     def last(self, name: str, window_s: float = 1.0) -> float:
         """Mean of a parameter over the last seconds."""
@@ -174,6 +185,8 @@ class Observation:
             spread = f" +- {self.spread[name]:.3g}" if name in self.spread else ""
             first = self.parameters[name][0]
             lines.append(f"  {name:12s} {first:10.5g} -> {self.last(name):.5g}{spread}")
+        lines += [f"  {residual}" for residual in self.residuals]
+        lines += [f"  NOT TO BE BELIEVED: {text}" for text in self.contradictions]
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
@@ -216,41 +229,122 @@ def observe(
     Raises
     ------
     InvalidInput
-        If inputs and readings differ in length, nothing would be recorded, or the first speed is
-        unknown.
+        If inputs or readings have another shape, hold a number that is not finite or beyond what
+        its unit can mean, differ in length, or the first speed is unknown; the message names
+        channel, sample and remedy.
     NumericalError
         If the twin overturned or left the range of numbers; the message names the time.
+
+    Warns
+    -----
+    SysidWarning
+        If residuals contradict the estimates, or an estimate stands at its limit.
     """
-    n, dt = len(readings.values), readings.dt_s
-    if len(inputs) != n:
-        raise InvalidInput(f"{len(inputs)} rows of inputs but {n} of readings; give equally many")
-    if stride < 1:
-        raise InvalidInput(f"stride = {stride}; give a whole number from one up")
+    dt = checked_step(readings.dt_s)
+    rows = checked_rows(inputs, INPUTS, "inputs", dt)
+    values = checked_rows(readings.values, READINGS, "readings", dt, missing=True)
+    if len(rows) != len(values):
+        raise InvalidInput(
+            f"{len(rows)} rows of inputs but {len(values)} of readings; give equally many"
+        )
+    stride = checked_stride(stride)
     twin = car.core(load)
-    start = twin.rest(_first_speed(car, readings) if speed_mps is None else speed_mps)
-    batch = None if observer.batch is None else observer.batch.core(LOAD_NAMES, READINGS, dt)
+    speed = _first_speed(car, readings) if speed_mps is None else float(speed_mps)
+    if not abs(speed) <= _FASTEST_MPS:
+        raise InvalidInput(f"speed_mps = {speed!r}; give a speed up to {_FASTEST_MPS:g} m/s")
+    batch = observer.batch
     try:
+        start = twin.rest(speed)
         loads, outputs, stages, spread = _core.observe14(
             twin,
             start,
-            as_float64(inputs),
-            as_float64(readings.values),
+            rows,
+            values,
             dt,
             [g.row(READINGS, STATES) for g in observer.gains],
             observer.core_laws(LOAD_NAMES, READINGS, dt),
-            batch,
+            None if batch is None else batch.core(LOAD_NAMES, READINGS, dt, INPUTS),
             stride,
+            [] if batch is None else batch.scaled(INPUTS),
         )
     except NumericalError as error:
         raise NumericalError(f"{error}; take smaller gains or a nearer first load") from error
-    unknown = [] if observer.batch is None else list(observer.batch.unknowns)
-    return Observation(
+    except InvalidInput:
+        raise
+    except ValueError as error:
+        raise InvalidInput(f"{car.name}: {error}") from error
+    if not (np.isfinite(loads).all() and np.isfinite(outputs).all()):
+        sample = int(np.argmin(np.isfinite(outputs).all(axis=1))) * stride
+        raise NumericalError(
+            f"the twin left the range of numbers by sample {sample}, t = {sample * dt:.6g} s; take "
+            f"smaller gains or a nearer first load"
+        )
+    return judged(
+        observer,
+        INPUTS,
         as_float64(np.arange(len(loads)) * (stride * dt)),
         {name: loads[:, i] for i, name in enumerate(LOAD_NAMES)},
         {name: outputs[:, i] for i, name in enumerate(OUTPUTS)},
         np.asarray(stages, dtype=np.float64),
-        {u.parameter: s * u.spread for u, s in zip(unknown, spread, strict=True)},
+        spread,
+        {name: values[::stride, i] for i, name in enumerate(READINGS)},
     )
+
+
+def judged(
+    observer: Observer,
+    inputs: Sequence[str],
+    time_s: FloatArray,
+    parameters: dict[str, FloatArray],
+    outputs: dict[str, FloatArray],
+    stages: FloatArray,
+    spread: Sequence[float],
+    car: Mapping[str, FloatArray],
+) -> Observation:
+    """An observation with what its residuals say of it; a warning where they contradict it.
+
+    Parameters
+    ----------
+    observer : Observer
+        What corrected the twin.
+    inputs : sequence of str
+        Of the twin.
+    time_s, parameters, outputs, stages : ndarray, mappings of them
+        As `Observation` has them.
+    spread : sequence of float
+        Of the batch's unknowns, in parts of their first spread.
+    car : mapping of str to ndarray, shape (m,)
+        Readings at the recorded times.
+    """
+    batch = observer.batch
+    unknown = () if batch is None else batch.looked_for(inputs)
+    estimated = [u for u in unknown if u.parameter != INPUT_SCALE]
+    laws = [law for law in observer.laws if float(np.ptp(parameters[law.parameter])) > 0.0]
+    noise = {law.channel: float("nan") for law in laws}
+    filtered: set[str] = set()
+    if batch is not None:
+        noise.update(batch.channels)
+        filtered = {name for name, hz in batch.high_pass_hz.items() if hz > 0.0}
+    step = float(time_s[1]) if len(time_s) > 1 else 1.0
+    residuals = tuple(
+        found
+        for name, told in noise.items()
+        if name not in filtered
+        and (found := residual_of(name, car[name], outputs[name], told, step)) is not None
+    )
+    limits = {law.parameter: (law.lower, law.upper) for law in laws}
+    limits.update({u.parameter: (u.lower, u.upper) for u in estimated})
+    against = contradictions(residuals, parameters, limits)
+    wide = {}
+    for u, s in zip(estimated, spread, strict=False):
+        wide[u.parameter] = float(s) * u.spread
+        if against:
+            wide[u.parameter] = max(wide[u.parameter], u.spread)
+        if not u.lower < parameters[u.parameter][-1] < u.upper:
+            wide[u.parameter] = max(wide[u.parameter], 0.5 * (u.upper - u.lower))
+    if against:
+        warn("the residuals contradict what the twin found: " + "; ".join(against))
+    return Observation(time_s, parameters, outputs, stages, wide, residuals, against)
 
 
 def _first_speed(car: TwinCar, readings: Readings) -> float:

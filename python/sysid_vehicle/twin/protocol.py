@@ -20,12 +20,14 @@ import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
-from .observer import Observation, Observer
+from .car import LOAD_NAMES
+from .checks import checked_step, checked_stride
+from .observer import Observation, Observer, judged
 
 __all__ = ["CAPABILITIES", "Twin", "observe_with"]
 
 CAPABILITIES = ("parameters", "state", "wrench", "snapshot", "clone")
-_MOST_PARAMETERS = 7
+_MOST_PARAMETERS = len(LOAD_NAMES)
 # Velocity: (force or moment, axis, what resists it). The horizontal axes move the whole mass.
 _PUSHES = {
     "vx_mps": (0, 0, "mass_kg"),
@@ -123,33 +125,41 @@ def observe_with(
     NumericalError
         If an output of the twin is no number any more; the message names the time.
     """
+    dt, names = checked_step(twin.dt_s), twin.parameter_names
+    inputs = _inputs(twin, inputs, dt)
     n = len(inputs)
-    inputs = as_float64(inputs)
-    if inputs.ndim != 2 or inputs.shape[1] != len(twin.input_names):
-        raise InvalidInput(
-            f"inputs have shape {inputs.shape}; the twin takes (n, {len(twin.input_names)})"
-        )
-    if stride < 1:
-        raise InvalidInput(f"stride = {stride}; give a whole number from one up")
-    read = _table(twin, measured, n)
+    stride = checked_stride(stride)
+    read = _table(twin, measured, n, dt)
     _check(twin, observer)
-    dt, names = twin.dt_s, twin.parameter_names
     laws = observer.core_laws(names, twin.output_names, dt)
-    batch = None
+    batch, scaled, count = None, [], 1
     if observer.batch is not None:
-        batch = observer.batch.core(names, twin.output_names, dt)
+        batch = observer.batch.core(names, twin.output_names, dt, twin.input_names)
+        scaled = observer.batch.scaled(twin.input_names)
+        count += len(observer.batch.looked_for(twin.input_names))
     parameters = twin.get_parameters() if "parameters" in twin.capabilities else {}
     estimate = [parameters.get(name, 0.0) for name in names]
-    estimate += [0.0] * (_MOST_PARAMETERS - len(estimate))
-    count = 1 + (0 if observer.batch is None else len(observer.batch.unknowns))
+    estimate += [0.0] * (_MOST_PARAMETERS - len(estimate)) + [1.0]
     twins = [twin, *(twin.clone() for _ in range(count - 1))]
-    if batch is not None:
+    told = np.repeat(inputs[:1], count, axis=0)
+    scales = np.ones((count, 1))
+
+    def put() -> None:
         for j, t in enumerate(twins):
-            t.set_parameters(_named(names, batch.of_twin(j, estimate)))
+            own = estimate if batch is None else batch.of_twin(j, estimate)
+            t.set_parameters(_named(names, own))
+            scales[j] = own[-1]
+
+    if batch is not None:
+        put()
     gains = [g.row(twin.output_names, _correctable(twin)) for g in observer.gains]
     kept: list[tuple[list[float], FloatArray, int]] = []
     for k in range(n):
-        outputs = np.array([t.outputs(inputs[k]) for t in twins], dtype=np.float64)
+        told[:] = inputs[k]
+        told[:, scaled] *= scales
+        outputs = np.array(
+            [t.outputs(u) for t, u in zip(twins, told, strict=True)], dtype=np.float64
+        )
         if not np.all(np.isfinite(outputs[0])):
             where = twin.output_names[int(np.flatnonzero(~np.isfinite(outputs[0]))[0])]
             raise NumericalError(
@@ -167,22 +177,21 @@ def observe_with(
             estimate, moved = batch.update(read[k], outputs, estimate)
             if "state" in twin.capabilities and np.any(moved):
                 _follow(twins, moved)
-        for j, t in enumerate(twins):
-            if batch is not None:
-                t.set_parameters(_named(names, batch.of_twin(j, estimate)))
-            elif laws is not None:
-                t.set_parameters(_named(names, estimate))
-            t.step(inputs[k])
-    unknown = [] if observer.batch is None else list(observer.batch.unknowns)
-    spread = [] if batch is None else batch.spread.tolist()
+        if batch is not None or laws is not None:
+            put()
+        for t, u in zip(twins, told, strict=True):
+            t.step(u)
     history = np.array([row[0] for row in kept])
     seen = np.array([row[1] for row in kept])
-    return Observation(
+    return judged(
+        observer,
+        twin.input_names,
         as_float64(np.arange(len(kept)) * (stride * dt)),
         {name: history[:, i] for i, name in enumerate(names)},
         {name: seen[:, i] for i, name in enumerate(twin.output_names)},
         np.array([float(row[2]) for row in kept]),
-        {u.parameter: s * u.spread for u, s in zip(unknown, spread, strict=True)},
+        [] if batch is None else batch.spread.tolist(),
+        {name: read[::stride, i] for i, name in enumerate(twin.output_names)},
     )
 
 
@@ -190,14 +199,40 @@ def _named(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
     return dict(zip(names, values, strict=False))
 
 
-def _table(twin: Twin, measured: Mapping[str, FloatArray], n: int) -> FloatArray:
+def _inputs(twin: Twin, inputs: FloatArray, dt: float) -> FloatArray:
+    try:
+        rows = as_float64(inputs)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"inputs are no table of real numbers: {error}") from error
+    if rows.ndim != 2 or rows.shape[1] != len(twin.input_names) or len(rows) == 0:
+        raise InvalidInput(
+            f"inputs have shape {rows.shape}; the twin takes (n, {len(twin.input_names)}), n at "
+            f"least one"
+        )
+    if not np.all(np.isfinite(rows)):
+        k, column = map(int, np.argwhere(~np.isfinite(rows))[0])
+        raise InvalidInput(
+            f"inputs: {twin.input_names[column]} is {rows[k, column]} at sample {k}, "
+            f"t = {k * dt:.6g} s; fill gaps before"
+        )
+    return rows
+
+
+def _table(twin: Twin, measured: Mapping[str, FloatArray], n: int, dt: float) -> FloatArray:
     read = np.full((n, len(twin.output_names)), np.nan)
     for name, values in measured.items():
         if name not in twin.output_names:
             continue  # a sensor that the twin has no counterpart of teaches nothing
         if len(values) != n:
             raise InvalidInput(f"measured '{name}' has {len(values)} samples; the inputs have {n}")
-        read[:, twin.output_names.index(name)] = values
+        column = as_float64(values)
+        if np.isinf(column).any():
+            k = int(np.argmax(np.isinf(column)))
+            raise InvalidInput(
+                f"measured '{name}' is {column[k]} at sample {k}, t = {k * dt:.6g} s; put NaN "
+                f"where nothing was read"
+            )
+        read[:, twin.output_names.index(name)] = column
     return read
 
 

@@ -23,6 +23,9 @@ struct BatchParameter {
     double spread = 1.0;  // standard deviation of the first guess
     double walk = 0.0;    // per root of a second: how far the truth may wander
     double lower = 0.0, upper = 0.0;
+    // Not estimated but considered: the first guess stays, the others are estimated as if it were
+    // exact, and their spreads hold what its doubt does to them. At most one.
+    bool considered = false;
 };
 
 struct BatchChannel {
@@ -39,26 +42,41 @@ struct BatchSettings {
     // Before this time data count less, by the square of their age: the first steps from a wrong
     // guess are long, and what was learnt along them must not be believed too soon.
     double gentle_s = 20.0;
+    // Residuals further apart than this count as independent of one another, see `spread`.
+    double block_s = 4.0;
 };
 
 class BatchEstimator {
   public:
+    /// Throws std::invalid_argument if a parameter, a step, a spread or a time is out of range.
     BatchEstimator(std::vector<BatchParameter> parameters, std::vector<BatchChannel> channels,
                    double dt, BatchSettings settings = {});
 
     std::size_t twins() const { return parameters_.size() + 1; }
 
     /// The parameters of twin number `which`; number 0 stands at the estimate.
-    LoadVector of_twin(std::size_t which, const LoadVector& estimate) const;
+    Estimates of_twin(std::size_t which, const Estimates& estimate) const;
 
     /// One step: `car` and, for each twin, `stride` readings, NaN where the car has none. Gives how
     /// far each parameter went, in steps between the twins.
     const Eigen::VectorXd& update(const double* car, const double* twins, std::size_t stride,
-                                  LoadVector& estimate);
+                                  Estimates& estimate);
 
     const Eigen::MatrixXd& covariance() const { return P_; }
 
+    /// Standard deviations in parts of the first spread: of least squares, or, where more, those
+    /// that the sums of slope times residual over blocks show (White's and Huber's sandwich
+    /// P B P). Residuals that are not white, or that go with the slopes, widen them. The doubt of
+    /// what is considered comes on top: how the estimates lean on it goes along with them (Bierman,
+    /// Factorization Methods for Discrete Sequential Estimation (1977), ch. VIII).
+    Eigen::VectorXd spread() const;
+
+    /// How many readings a row must have.
+    std::size_t readings() const;
+
   private:
+    void learn(std::size_t channel, double error, double variance, Estimates& estimate);
+
     std::vector<BatchParameter> parameters_;
     std::vector<BatchChannel> channels_;
     BatchSettings settings_;
@@ -66,6 +84,11 @@ class BatchEstimator {
     Eigen::MatrixXd P_, slopes_, held_;  // held_: low-pass of the residual and of each sensitivity
     Eigen::VectorXd power_, gain_, learnt_, residual_, moved_;
     Eigen::VectorXd since_s_, heard_;  // of each channel: since its last reading; its readings
+    Eigen::RowVectorXd slope_;
+    Eigen::VectorXd leaning_;  // of the estimates, per spread of what is considered
+    Eigen::MatrixXd scores_;   // B: squares of the blocks' sums
+    Eigen::VectorXd score_;    // of the block that runs
+    double block_began_s_ = 0.0;
 };
 
 }  // namespace sysid

@@ -62,11 +62,15 @@ class Derivative {
 
 class ParameterLaws {
   public:
+    /// Throws std::invalid_argument if a law's parameter, channel or a time is out of range.
     ParameterLaws(std::vector<ParameterLaw> laws, double dt, std::size_t yaw_rate_channel,
                   double derivative_hz = 20.0, Schedule schedule = {});
 
     /// One step: `car` and `twin` hold the readings, NaN where there is none.
-    void update(const double* car, const double* twin, LoadVector& parameters);
+    void update(const double* car, const double* twin, Estimates& parameters);
+
+    /// How many readings a row must have.
+    std::size_t readings() const;
 
     /// The stage whose laws act; laws of earlier stages have done their work.
     int stage() const { return stage_; }

@@ -21,22 +21,26 @@ struct StateGain {
 
 /// What the observer recorded, every `stride` samples.
 struct Observation {
-    std::vector<double> loads;     // seven per row, in the order of `LoadParameter`
+    std::vector<double> loads;     // kEstimates per row: a load and the scale of the inputs
     std::vector<double> readings;  // kTwinOutputs per row: the twin before its correction
     std::vector<int> stages;
     std::vector<double> spread;  // of the batch, in parts of the first spread
 };
 
-struct ObserverSettings {
+struct TwinObserverSettings {
     std::vector<StateGain> gains;
     std::optional<ParameterLaws> laws;
     std::optional<BatchEstimator> batch;
     std::size_t stride = 10;
+    /// Inputs that the estimated scale multiplies, by their places in `Input14`; not the steering.
+    std::vector<std::size_t> scaled;
 };
 
 /// Runs the observer over `n` samples; `measured` has kReadings columns, NaN where nothing was
-/// read.
+/// read. Throws std::invalid_argument if a place among readings, states or inputs is out of range,
+/// and NumericalFailure where the twin is lost or its load is no body's.
 Observation observe14(const Vehicle14& twin, const State14& start, const Input14* inputs,
-                      const double* measured, std::size_t n, double dt, ObserverSettings settings);
+                      const double* measured, std::size_t n, double dt,
+                      TwinObserverSettings settings);
 
 }  // namespace sysid

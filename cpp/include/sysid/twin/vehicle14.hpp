@@ -4,19 +4,31 @@
 // ISO 8855 axes. v_x, v_y lie in the horizontal frame that yaws with the car, at the centre of
 // mass; roll, pitch and yaw rate are the derivatives of the angles. Displacements count from the
 // design position, in which the car of the design load rests on flat ground.
-// With corner i at (x_i, y_i) from the centre of mass, h its height, h' = h - h_rc:
+// With corner i at (x_i, y_i) from the centre of mass, h the height of the whole car's and
+// h_s = (M h - sum m_u R)/m_s of the sprung mass's, h' = h_s - h_rc, a_y = dv_y + r v_x:
 //   c_i = z + y_i phi - x_i theta + h'/2 (phi^2 + theta^2)        corner of the body         (1)
-//   v_t = v_y + x_i r + h p + g_i (dz_u - dc_i),  v_l = v_x - y_i r - h q + a_i (dz_u - dc_i)  (2)
-//   F_b = F_s - g_i F_y - a_i F_x                                 on the body at the corner  (3)
+//   v_t = v_y + x_i r + h_s p + g_i (dz_u - dc_i) - sum m_u e/M,
+//   v_l = v_x - y_i r - h q + a_i (dz_u - dc_i)                                              (2)
+//   F_b = F_s - g_i (F_y - m_u a_y) - a_i F_x                     on the body at the corner  (3)
 //   M (dv_x - r v_y) = sum F_x - drag,  M (dv_y + r v_x) = sum F_y,  m_s dv_z = sum F_b - m_s g
-//   J_xx dp = sum (y_i + h' phi) F_b + h sum F_y + (J_yy - J_zz) q r                         (4)
-//   J_yy dq = -sum (x_i - h' theta) F_b - h sum F_x + (J_zz - J_xx) p r
-//   J_zz dr = sum (x_i F_y - y_i F_x) + (J_xx - J_yy) p q
-//   m_u ddz_u = F_z - F_b - m_u g,  I_w dOmega = T_d - s (T_b + f_r F_z R) - R F_x           (5)
+//   J (dp, dq, dr) + (p, q, r) x J (p, q, r) = moment, with                                  (4)
+//     moment_x = sum (y_i + h' phi) F_b + h_s sum (F_y - m_u a_y)
+//     moment_y = -sum (x_i - h' theta) F_b - h sum F_x
+//     moment_z = sum (x_i F_y - y_i F_x)
+//   m_u ddz_u = F_z - F_b - m_u g + R/y_i m_u a_y,                                           (5)
+//   I_w dOmega = T_d - s (T_b + f_r F_z R) - R F_x
+// An unsprung mass has its centre at the height R of the wheel's. It goes sideways with the wheel,
+// not with the body: e = h_s p + g_i (dz_u - dc_i) - R/y_i dz_u is its lateral speed less the
+// sprung mass's. The force m_u a_y that takes it round a bend therefore passes by the springs, and
+// a steady roll angle is phi = m_s h' a_y/(K - m_s g h') with the stiffness K of the springs.
+// That, and m_u a_y R as the load transfer of the unsprung mass: Barton and Fieldhouse, Automotive
+// Chassis Engineering (2018), eq. (3.18) and the example beside it. J_xx is all that resists p.
+// A sideways push acts on the body at the height h.
 // g_i = h_rc/y_i and a_i (anti-dive, anti-squat) are the slopes of the path of the contact point;
-// as they stand in (2) and in (3) alike, the suspension neither makes nor loses energy. The square
-// in (1) is what makes weight tilt a rolled body.
-// Shim and Ghike, Vehicle System Dynamics 45 (2007) 435, extended by the link slopes.
+// as they stand in (2) and in (3) to (5) alike, the suspension neither makes nor loses energy. The
+// square in (1) is what makes weight tilt a rolled body.
+// Shim and Ghike, Vehicle System Dynamics 45 (2007) 435, extended by the link slopes and by the
+// unsprung masses' own lever.
 #pragma once
 
 #include <array>
@@ -106,7 +118,8 @@ class Vehicle14 {
 
     const CarData& car() const { return car_; }
     const Load& load() const { return load_; }
-    /// Takes another load from now on; the springs keep their free lengths.
+    /// Takes another load from now on; the springs keep their free lengths. Throws
+    /// std::invalid_argument if no body has such a mass or such moments of inertia.
     void set_load(const Load& load);
 
     /// The state of rest of this load at speed `vx` on flat ground, wheels rolling freely.
@@ -142,7 +155,7 @@ class Vehicle14 {
     /// What the equations take of the axles, for all wheels at once.
     struct OfWheels {
         OfWheels(const CarData& car);
-        Wheels half_track, spring, bump, rebound, anti_roll, travel, stop, roll_centre, link,
+        Wheels half_track, spring, bump, rebound, anti_roll, travel, stop, roll_centre, link, lean,
             anti_slope, unsprung, per_unsprung, weight, tyre_spring, tyre_damping, radius, inertia,
             per_inertia, rolling, relaxation;
         TyreCurve<Wheels> tyre;
@@ -156,7 +169,8 @@ class Vehicle14 {
     double fastest_relaxation_ = 0.0;    // per speed
     Wheels design_load_;                 // of the wheels, at the design position
     Wheels x_, y_, tilt_;
-    double sprung_ = 0.0;
+    double sprung_ = 0.0, sprung_height_ = 0.0;
+    std::array<double, 6> inverse_{};  // of the inertia tensor: xx, yy, zz, xy, xz, yz
 };
 
 /// Runs a car over `n` rows of inputs: its first 28 states and its outputs at each sample, row by

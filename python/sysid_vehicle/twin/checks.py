@@ -1,0 +1,127 @@
+"""What an observer is given, checked before anything runs: shapes, numbers, plausible sizes."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from .._arrays import FloatArray, as_float64
+from ..errors import InvalidInput
+
+__all__ = ["checked_rows", "checked_step", "checked_stride"]
+
+_LONGEST_STEP_S = 0.1
+# The most that a name of this beginning or ending can mean, in the units of the name.
+_MOST = (
+    ("steer_", 2.0),
+    ("drive_", 1e5),
+    ("brake_", 1e5),
+    ("road_rate_", 1e3),
+    ("road_", 1e2),
+    ("force_", 1e7),
+    ("moment_", 1e7),
+    ("wheel_speed_", 2e3),
+    ("_acceleration_radps2", 1e5),
+    ("_rate_radps", 1e2),
+    ("_mps2", 1e3),
+    ("_mps", 3e2),
+    ("sideslip_", 4.0),
+)
+
+
+def checked_rows(
+    values: npt.ArrayLike, names: Sequence[str], what: str, dt_s: float, *, missing: bool = False
+) -> FloatArray:
+    """Rows of numbers with one column per name, none of them absurd.
+
+    Parameters
+    ----------
+    values : array_like, shape (n, len(names))
+        At least one row.
+    names : sequence of str
+        Of the columns.
+    what : str
+        What the rows are, for messages.
+    dt_s : float
+        Step, for messages.
+    missing : bool
+        Whether NaN stands for what was not read; without it NaN is refused.
+
+    Raises
+    ------
+    InvalidInput
+        If the shape is another, or a number is not finite or beyond what its unit can mean; the
+        message names column, sample, time and remedy.
+    """
+    try:
+        rows = as_float64(values)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"{what} are no table of real numbers: {error}") from error
+    if rows.ndim != 2 or rows.shape[1] != len(names):
+        raise InvalidInput(
+            f"{what} have shape {rows.shape}; give (n, {len(names)}), columns {names[0]} to "
+            f"{names[-1]}"
+        )
+    if len(rows) == 0:
+        raise InvalidInput(f"{what} have no row; give at least one sample")
+    # Extremes of columns first: they show what is wrong without a table of the size of the rows.
+    largest, smallest = (np.fmax, np.fmin) if missing else (np.maximum, np.minimum)
+    high, low = largest.reduce(rows, axis=0), smallest.reduce(rows, axis=0)
+    most = np.array([_most(name) for name in names])
+    if np.all((np.isnan(high) & missing) | ((high <= most) & (low >= -most))):
+        return rows
+    bad = np.isinf(rows) if missing else ~np.isfinite(rows)
+    if bad.any():
+        sample, column = map(int, np.argwhere(bad)[0])
+        remedy = "put NaN where nothing was read" if missing else "fill gaps before"
+        raise InvalidInput(
+            f"{what}: {names[column]} is {rows[sample, column]} at sample {sample}, "
+            f"t = {sample * dt_s:.6g} s; {remedy}"
+        )
+    sample, column = map(int, np.argwhere(np.abs(rows) > most)[0])
+    raise InvalidInput(
+        f"{what}: {names[column]} is {rows[sample, column]:g} at sample {sample}, "
+        f"t = {sample * dt_s:.6g} s, beyond {most[column]:g}; check its unit"
+    )
+
+
+def checked_step(dt_s: float) -> float:
+    """A step that a car can be integrated with.
+
+    Raises
+    ------
+    InvalidInput
+        If it is not between zero and a tenth of a second.
+    """
+    if not 0.0 < dt_s <= _LONGEST_STEP_S:
+        raise InvalidInput(
+            f"dt_s = {dt_s!r}; give seconds, more than zero and at most {_LONGEST_STEP_S:g}"
+        )
+    return float(dt_s)
+
+
+def checked_stride(stride: int) -> int:
+    """Every how many samples something is recorded.
+
+    Raises
+    ------
+    InvalidInput
+        If it is no whole number from one up.
+    """
+    try:
+        whole = operator.index(stride)
+    except TypeError:
+        whole = 0
+    if whole < 1:
+        raise InvalidInput(f"stride = {stride!r}; give a whole number from one up")
+    return whole
+
+
+def _most(name: str) -> float:
+    for part, most in _MOST:
+        if name.startswith(part) or name.endswith(part):
+            return most
+    raise InvalidInput(f"there is no plausible size for '{name}'; name it as this package does")
