@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from sysid_vehicle.errors import InvalidInput
 from sysid_vehicle.lab import (
@@ -13,6 +14,7 @@ from sysid_vehicle.lab import (
 )
 from sysid_vehicle.lab.box import box_of
 from sysid_vehicle.lab.projection import Regression, SoftRows
+from sysid_vehicle.lab.regression_search import RegressionTask
 from sysid_vehicle.lab.tyre_fit import PARAMETERS
 from sysid_vehicle.lab.tyre_shape import friction
 
@@ -56,6 +58,100 @@ def test_other_optimisers(method: str) -> None:
     here = regress_tyres(CAR, told, starts=4)
     there = regress_tyres(CAR, told, starts=4, method=method)
     assert there.value == pytest.approx(here.value, rel=2e-3)
+
+
+def sliding(seed: int, n: int) -> tuple[GreyBoxVehicle, TyreMotion]:
+    """Any car on any tyres, each axle swept over slip angles of its own."""
+    rng = np.random.default_rng(seed)
+    mass, lf, lr = rng.uniform(600.0, 2500.0), *rng.uniform(1.0, 1.6, 2)
+    car = GreyBoxVehicle(mass, mass * lf * lr, lf, lr)
+    front, rear = (rng.uniform([6.0, 1.1, 0.7, -2.0], [25.0, 2.0, 1.7, 0.9]) for _ in range(2))
+    t = np.linspace(0.0, 60.0, n)
+    v_x, r = 25.0 + 5.0 * np.sin(0.3 * t), 0.3 * np.sin(0.8 * t)
+    slip_f = rng.uniform(0.05, 0.2) * np.sin(rng.uniform(0.5, 2.0) * t)
+    slip_r = rng.uniform(0.05, 0.2) * np.sin(rng.uniform(0.5, 2.0) * t + 1.0)
+    v_y = lr * r - v_x * np.tan(slip_r)
+    steer = slip_f + np.arctan((v_y + lf * r) / v_x)
+    load_f, load_r = mass * 9.81 * np.array([lr, lf]) / (lf + lr)
+    force = load_f * friction(slip_f, front) + load_r * friction(slip_r, rear)
+    a_y = force / mass + 0.05 * rng.normal(size=n)
+    told = np.column_stack([v_x, v_y, r, steer, np.full(n, load_f), np.full(n, load_r)])
+    return car, TyreMotion(told, a_y)
+
+
+def least_found(car: GreyBoxVehicle, told: TyreMotion, starts: int) -> float:
+    """Give the least plain loss that SciPy finds, with a model written apart."""
+    v_x, v_y, r, steer, load_f, load_r = told.motion.T
+    slip_f = steer - np.arctan((v_y + car.lf_m * r) / v_x)
+    slip_r = -np.arctan((v_y - car.lr_m * r) / v_x)
+    box = box_of(PARAMETERS[:8], {})
+
+    def errors(p: np.ndarray) -> np.ndarray:
+        force = load_f * friction(slip_f, p[:4]) + load_r * friction(slip_r, p[4:])
+        return told.ay_mps2 - force / car.mass_kg
+
+    rng = np.random.default_rng(0)
+    usual = np.array([[5.0, 1.1, 0.6, -2.0] * 2, [25.0, 2.0, 1.8, 0.9] * 2])
+    found = [
+        least_squares(
+            errors,
+            rng.uniform(*usual),
+            bounds=(box.lower, box.upper),
+            x_scale="jac",
+            ftol=1e-12,
+            xtol=1e-12,
+            gtol=1e-12,
+            max_nfev=200,
+        ).cost
+        for _ in range(starts)
+    ]
+    return 2.0 * min(found)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_defaults_end_no_higher_than_another_optimiser(seed: int) -> None:
+    car, told = sliding(seed, 2000)
+    least = least_found(car, told, 6)
+    assert regress_tyres(car, told).value <= least * (1.0 + 1e-6)
+
+
+def test_side_valley_of_few_samples_is_left() -> None:
+    # On every 25th sample another curvature of the rear tyre fits better.
+    told = motion(20000, noise=0.1, seed=1, published=True)
+    fits = [regress_tyres(CAR, told, projection=p) for p in (True, False)]
+    values = [fit.value for fit in fits]
+    assert max(values) <= min(values) * (1.0 + 1e-8)
+
+
+def test_joint_loss_prefers_the_likelier_end() -> None:
+    told = motion(3000, noise=0.05, seed=3, published=False)
+    fit = regress_tyres(CAR, told, loss="joint", starts=8)
+    one = np.ones(told.n)
+    loss = told.loss(CAR, one, one, projects_steer=True)
+    likelihood = []
+    for end in fit.starts.end:
+        p = fit.parameters.copy()
+        p[:8] = end
+        squares = np.mean(loss.residuals(p) ** 2, axis=0)
+        likelihood.append(-0.5 * told.n * np.sum(np.log(squares)))
+    assert fit.starts.log_likelihood == pytest.approx(np.array(likelihood), rel=1e-7)
+    assert fit.parameters[:8] == pytest.approx(fit.starts.end[int(np.argmax(likelihood))])
+
+
+def test_regularised_loss_is_the_same_from_every_start() -> None:
+    told = motion(noise=0.05, published=True)
+    fit = regress_tyres(
+        CAR, told, loss="regularised", start=PUBLISHED_START, box=PUBLISHED_BOX, starts=4
+    )
+    given = np.zeros(len(PARAMETERS))
+    given[:8] = [PUBLISHED_START[n] for n in PARAMETERS[:8]]
+    box = box_of(PARAMETERS[:8], PUBLISHED_BOX)
+    task = RegressionTask(CAR, told, "regularised", box, True, "gauss-newton", given)
+    for end, merit in zip(fit.starts.end, fit.starts.log_likelihood, strict=True):
+        p = given.copy()
+        p[:8] = end
+        assert -2.0 * merit == pytest.approx(task.at(p), rel=1e-6)
+    assert fit.value == pytest.approx(-2.0 * np.max(fit.starts.log_likelihood))
 
 
 def test_regularised_loss_is_the_published_sum() -> None:
@@ -124,7 +220,7 @@ def test_eliminated_parameters_are_the_best_ones() -> None:
 
 def test_eliminated_parameters_stay_in_their_bounds() -> None:
     told = motion(noise=0.02, published=True)
-    fit = regress_tyres(CAR, told, box={"D_front": (0.1, 1.2)}, residual_terms=True)
+    fit = regress_tyres(CAR, told, box={"D_front": (0.1, 1.2)}, residual_terms=True, starts=1)
     assert fit.parameters[2] == pytest.approx(1.2)
 
 

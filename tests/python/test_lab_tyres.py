@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from sysid_vehicle import Log
 from sysid_vehicle.cli import main
@@ -19,8 +20,9 @@ from sysid_vehicle.lab import (
     hold_value,
     identify_tyres,
 )
-from sysid_vehicle.lab.box import BOX
+from sysid_vehicle.lab.box import BOX, box_of
 from sysid_vehicle.lab.tyre_fit import strongest_correlations
+from sysid_vehicle.lab.tyre_objective import objective_of
 from sysid_vehicle.lab.tyre_shape import look_alike, peak_slip, stiffness, top
 
 CAR = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6)
@@ -119,6 +121,37 @@ def test_gentle_driving_determines_the_stiffness_alone() -> None:
     assert abs(correlation) > 0.9
     assert name[0] in "BCDE"
     assert other[0] in "BCDE"
+
+
+@pytest.mark.parametrize(("seed", "steer_rad"), [(1, 0.02), (2, 0.03), (3, 0.04)])
+def test_ends_at_the_bottom_of_the_valley(seed: int, steer_rad: float) -> None:
+    # Below the peak B, C, D and E copy each other: damped steps gain little long before the bottom.
+    log = driven(seed, steer_rad, seconds=10.0)
+    fit = identify_tyres(CAR, log, starts=1, profiles=False)
+    objective = objective_of(CAR, [log])
+    box = box_of([e.name for e in fit.estimates], {})
+    gains = objective.problem.freeze(fit.parameters, fit.noise)
+
+    def full(x: np.ndarray) -> np.ndarray:
+        p = fit.parameters.copy()
+        p[box.columns] = x
+        return p
+
+    polished = least_squares(
+        lambda x: objective.residuals(full(x), gains),
+        np.clip(fit.parameters[box.columns], box.lower + 1e-9, box.upper - 1e-9),
+        jac=lambda x: -objective.sensitivities(full(x), gains, box.columns),
+        bounds=(box.lower, box.upper),
+        x_scale="jac",
+        ftol=1e-14,
+        xtol=1e-14,
+        gtol=1e-14,
+        max_nfev=60,
+    )
+    here = objective.half_sum_of_squares(fit.parameters, gains)
+    assert here - polished.cost < 1e-3
+    there = objective.problem.freeze(full(polished.x), fit.noise).log_likelihood
+    assert there < fit.log_likelihood + 1e-3
 
 
 def test_profile_agrees_with_information_where_all_is_well_known() -> None:

@@ -18,8 +18,8 @@ from .._arrays import FloatArray, as_float64
 from .._style import AFTER, FLOOR, axes_or_new, tidy
 from .._text import number
 from ..identify.search import Box
-from .descent import minimum
 from .likelihood import Likelihood
+from .valley import down_the_valley
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,6 +32,7 @@ LEVEL = 1.96
 _CLOSE = 0.04  # of the level
 _POINTS = 14  # on each side
 _ROUNDS = 20
+_ENOUGH = 0.01  # nats
 _STIFF = 30.0  # how much harder the wish pulls than the data
 _BETTER = 0.1  # nats
 _STEP = 3.0  # most by which the distance grows from one point to the next
@@ -270,16 +271,13 @@ def _pinned(
         others = [j for j in range(len(box.columns)) if j != i]
         there[what.column] = target
         inner = Box([box.columns[j] for j in others], box.lower[others], box.upper[others])
-        found = minimum(objective, there, gains, inner, rounds=_ROUNDS)
-        there[inner.columns] = found.x
-        return there, found.cost - best
+        there = down_the_valley(objective, there, gains, inner, tolerance=_ENOUGH, rounds=_ROUNDS)
+        return there, objective.half_sum_of_squares(there, gains) - best
     weight = _STIFF / std
 
     def wish(p: FloatArray) -> tuple[float, FloatArray]:
         return weight * (what.of(p) - target), weight * what.slope(p)
 
-    found = minimum(
-        replace(objective, soft=(*objective.soft, wish)), there, gains, box, rounds=_ROUNDS
-    )
-    there[box.columns] = found.x
+    wished = replace(objective, soft=(*objective.soft, wish))
+    there = down_the_valley(wished, there, gains, box, tolerance=_ENOUGH, rounds=_ROUNDS)
     return there, objective.half_sum_of_squares(there, gains) - best

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._text import html_table, number, text_table
 from ..errors import InvalidInput
 from ..identify import METHODS
-from ..identify.search import Box, minimise
 from .box import BOX, GIVEN, box_of, first_point
 from .motion import TyreMotion
 from .multistart import Ends, start_points
-from .projection import Regression, SoftRows
+from .regression_search import RegressionTask, search
 from .tyre_data import GreyBoxVehicle
 from .tyre_fit import PARAMETERS
 
@@ -40,13 +37,6 @@ PUBLISHED_BOX = BOX | {
 _TYRE_START = {"B": 30.0, "C": 1.0, "D": 1.0, "E": 1.0}
 PUBLISHED_START = {f"{x}_{axle}": v for axle in ("front", "rear") for x, v in _TYRE_START.items()}
 
-_PRIOR_WEIGHT = 0.1
-_PRIOR_OF_RESIDUAL_TERMS = 0.1  # relative to that of the tyres
-_SIMILARITY_WEIGHT = 1000.0
-_FLOOR = 1e-6  # of the variance of a_y [m2/s4]
-_COARSE = 800  # samples of a first search
-_PASSES = 3  # over the sizes of the errors, joint loss
-
 
 @dataclass(frozen=True, eq=False)
 class TyreRegression:
@@ -61,7 +51,8 @@ class TyreRegression:
     value : float
         The loss there, summed over all samples.
     starts : Ends
-        With minus half the loss in place of the log-likelihood.
+        With minus half the loss in place of the log-likelihood; for the joint loss, whose weights
+        are worked out at every end, the log-likelihood itself up to a constant.
     """
 
     loss: str
@@ -104,15 +95,19 @@ def regress_tyres(
     box: Mapping[str, tuple[float, float]] | None = None,
     residual_terms: bool = False,
     projection: bool = True,
-    starts: int = 1,
+    starts: int = 16,
     method: str = "gauss-newton",
     seed: int = 0,
 ) -> TyreRegression:
     """Fit B, C, D, E of both axles to accelerations, the motion being taken as exact.
 
-    It takes milliseconds, and is as good as the motion it is given: `identify_tyres` does not need
-    that assumption, and has intervals. The published losses have no projection of the front force
-    onto the car's lateral axis; the joint one has.
+    It takes about a second, some milliseconds from one start, and is as good as the motion it is
+    given: `identify_tyres` does not need that assumption, and has intervals. The published losses
+    have no projection of the front force onto the car's lateral axis; the joint one has.
+
+    Tyres of other curvature are minima of their own, often of nearly the same loss, and a quarter
+    of the starts or fewer may lead to the lowest: from one start the search finds the minimum next
+    to it, no more.
 
     Parameters
     ----------
@@ -129,7 +124,8 @@ def regress_tyres(
     projection : bool
         Work D and P out wherever the search goes, instead of searching for them too.
     starts : int
-        The given point, and others that fill the whole box evenly.
+        The given point, and others that fill the whole box evenly. The regularised loss draws all
+        of them towards the given one.
     method : str
         `gauss-newton`, `nlopt` or `scipy`.
     seed : int
@@ -158,111 +154,8 @@ def regress_tyres(
     p = first_point(GIVEN if start is None else start)
     p[bounds.columns] = np.clip(p[bounds.columns], bounds.lower, bounds.upper)
     begins = start_points(p[bounds.columns], bounds, list(range(8)), starts, seed)
-    ends = [
-        descend_regression(vehicle, motion, p, b, bounds, loss, projection, method) for b in begins
-    ]
-    values = np.array([-0.5 * value for _, value in ends])
-    table = Ends(
-        tuple(free), begins, as_float64([q[bounds.columns] for q, _ in ends]), as_float64(values)
-    )
-    best = int(np.argmax(values))
-    return TyreRegression(loss, ends[best][0], ends[best][1], table)
-
-
-def descend_regression(
-    vehicle: GreyBoxVehicle,
-    motion: TyreMotion,
-    p: FloatArray,
-    begin: FloatArray,
-    box: Box,
-    loss: str,
-    projection: bool = True,
-    method: str = "gauss-newton",
-) -> tuple[FloatArray, float]:
-    """Search from one start.
-
-    Returns
-    -------
-    p : array, shape (parameters,)
-    loss : float
-    """
-    start = p.copy()
-    start[box.columns] = begin
-    p = start.copy()
-    if motion.n > 2 * _COARSE:
-        # The way to the valley needs few samples, the place in it all of them.
-        p, _ = descend_regression(
-            vehicle, motion.thinned(_COARSE), p, begin, box, loss, projection, method
-        )
-    kept = [not projection or PARAMETERS[c][0] in "BCE" for c in box.columns]
-    inner = Box(
-        [c for c, k in zip(box.columns, kept, strict=True) if k], box.lower[kept], box.upper[kept]
-    )
-    worked_out = [not k for k in kept]
-    linear = [c for c, k in zip(box.columns, kept, strict=True) if not k]
-    ay, yaw = _first_weights(motion, loss)
-    soft = _wishes(start) if loss == "regularised" else SoftRows.none(len(p))
-    value = np.inf
-    for _ in range(_PASSES if loss == "joint" else 1):
-        problem = Regression(
-            motion.loss(vehicle, ay, yaw, projects_steer=loss == "joint"),
-            soft,
-            linear,
-            box.lower[worked_out],
-            box.upper[worked_out],
-        )
-        # `minimise` asks no more of a problem than `Regression` gives it.
-        found = minimise(
-            cast(_core.Problem, problem),
-            p,
-            cast(_core.FrozenFilter, None),
-            inner,
-            method=method,
-            rounds=60,
-            tolerance=_tolerance(motion, loss),
-        )
-        p[inner.columns] = found.x
-        p = problem.complete(p)
-        value = 2.0 * found.cost
-        if loss == "joint":
-            errors = problem.loss.residuals(p) / np.column_stack([ay, yaw])
-            size = np.sqrt(np.mean(errors**2, axis=0)) + 1e-9
-            ay, yaw = (np.full(motion.n, 1.0 / s) for s in size)
-    return p, value
-
-
-def _first_weights(motion: TyreMotion, loss: str) -> tuple[FloatArray, FloatArray]:
-    one, none = np.ones(motion.n), np.zeros(motion.n)
-    if loss == "plain":
-        return one, none
-    if loss == "joint":
-        rate = motion.yaw_acc_radps2
-        assert rate is not None  # callers have seen to it
-        return one / (0.1 * np.std(motion.ay_mps2) + 1e-6), one / (0.1 * np.std(rate) + 1e-6)
-    variance = motion.ay_variance if motion.ay_variance is not None else one
-    return as_float64(1.0 / np.sqrt(np.maximum(variance, _FLOOR))), none
-
-
-def _tolerance(motion: TyreMotion, loss: str) -> float:
-    """Gain of half the loss that ends a search."""
-    if loss != "plain":
-        return 1e-3
-    return 1e-8 * float(np.sum(motion.ay_mps2**2))
-
-
-def _wishes(start: FloatArray) -> SoftRows:
-    scale = np.where(start == 0.0, 1.0, np.abs(start))
-    rows, target = [], []
-    for i in range(11):
-        weight = np.sqrt(_PRIOR_WEIGHT) * (1.0 if i < 8 else _PRIOR_OF_RESIDUAL_TERMS) / scale[i]
-        row = np.zeros(len(start))
-        row[i] = weight
-        rows.append(row)
-        target.append(weight * start[i])
-    for i in range(4):
-        row = np.zeros(len(start))
-        row[i] = np.sqrt(_SIMILARITY_WEIGHT) / scale[i]
-        row[i + 4] = -row[i]
-        rows.append(row)
-        target.append(0.0)
-    return SoftRows(as_float64(rows), as_float64(target))
+    task = RegressionTask(vehicle, motion, loss, bounds, projection, method, p)
+    ends, values, merits = search(task, begins)
+    table = Ends(tuple(free), begins, as_float64(ends[:, bounds.columns]), merits)
+    best = int(np.argmax(merits))
+    return TyreRegression(loss, ends[best], float(values[best]), table)

@@ -12,7 +12,7 @@ from .._arrays import FloatArray, as_float64
 from .._threads import Workers
 from ..identify import Estimate
 from ..identify.search import Box
-from .descent import descend
+from .descent import bottom, descend
 from .likelihood import Likelihood
 from .multistart import Ends
 from .profile import Profile, Quantity, profile
@@ -25,6 +25,7 @@ __all__ = ["box_covariance", "quantities", "summary", "with_profiles", "with_riv
 _SPREAD_OF_BOX = np.sqrt(1.0 / 12.0)  # standard deviation of a uniform over a box of width 1
 _UNKNOWN = 0.2  # of the width
 _LEVEL_NATS = 1.92  # half the 95 % quantile of chi-square with one degree of freedom
+_HOPELESS = 5.0  # nats that the way to the bottom of a valley does not gain
 _BEYOND = 25.0  # squared distance in standard deviations
 _WIDE = 0.5  # of the width, for an interval
 
@@ -42,7 +43,7 @@ def summary(
     """Result with the uncertainties that the information matrix gives."""
     gains = objective.problem.freeze(p, noise)
     _, _, information = objective.normal_equations(p, gains, box.columns)
-    covariance = box_covariance(information, box)
+    covariance = box_covariance(information, box, p[box.columns])
     width = box.upper - box.lower
     margin = 1e-6 * width
     estimates = []
@@ -71,19 +72,33 @@ def with_rivals(
     objective: Likelihood,
     rivals: Sequence[FloatArray],
     box: Box,
+    passed: FloatArray | None = None,
 ) -> TyreFit:
-    """Add the other optima that the data cannot rule out at 95 %."""
+    """Add the other optima that the data cannot rule out at 95 %.
+
+    `passed` is a point on the way to the optimum: where the valley bends, the information matrix
+    at its bottom does not reach there. A profile follows the bend and needs no such point.
+    """
     kept = []
     best = fit.log_likelihood - objective.prior_cost(fit.parameters)
-    for p in rivals:
-        there, value = descend(objective, p, fit.noise, box)
-        apart = (there - fit.parameters)[box.columns]
+
+    def keep(p: FloatArray, value: float) -> None:
+        apart = (p - fit.parameters)[box.columns]
         # What lies on the same slope is in the interval already.
         beyond = float(apart @ np.linalg.solve(fit.covariance, apart)) > _BEYOND
         if value > best - _LEVEL_NATS and beyond:
-            gains = objective.problem.freeze(there, fit.noise)
-            _, _, information = objective.normal_equations(there, gains, box.columns)
-            kept.append(Rival(there, best - value, box_covariance(information, box)))
+            gains = objective.problem.freeze(p, fit.noise)
+            _, _, information = objective.normal_equations(p, gains, box.columns)
+            kept.append(Rival(p, best - value, box_covariance(information, box, p[box.columns])))
+
+    for p in rivals:
+        there, value = descend(objective, p, fit.noise, box)
+        if value > best - _HOPELESS:
+            there, value = bottom(objective, there, fit.noise, box)
+        keep(there, value)
+    if passed is not None:
+        gains = objective.problem.freeze(passed, fit.noise)
+        keep(passed, gains.log_likelihood - objective.prior_cost(passed))
     return replace(fit, rivals=tuple(kept))
 
 
@@ -155,13 +170,16 @@ def _note(estimate: Estimate, found: Profile, width: float) -> str:
     return "" if estimate.note == "not determined" else estimate.note
 
 
-def box_covariance(information: FloatArray, box: Box) -> FloatArray:
+def box_covariance(information: FloatArray, box: Box, x: FloatArray) -> FloatArray:
     """Covariance from the information of the data and that of having looked in the box only.
 
     Without the second, coefficients that copy each other would have no covariance at all, and the
-    combinations that are known none either.
+    combinations that are known none either. It is that of a uniform over the box, about the
+    estimate `x`: an estimate at a bound is further from the rest of the box than one amid it.
     """
-    per_std = 1.0 / (_SPREAD_OF_BOX * (box.upper - box.lower))
+    width = box.upper - box.lower
+    spread = np.hypot(_SPREAD_OF_BOX * width, x - 0.5 * (box.lower + box.upper))
+    per_std = 1.0 / spread
     total = information + np.diag(per_std**2)
     scale = np.sqrt(np.diag(total))
     inverse = np.linalg.inv(total / np.outer(scale, scale))

@@ -69,7 +69,7 @@ class TyreBand:
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """Another optimum that the data cannot rule out.
+    """Another optimum, or another part of the same valley, that the data cannot rule out.
 
     Attributes
     ----------

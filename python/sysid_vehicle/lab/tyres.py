@@ -9,10 +9,10 @@ from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..identify import METHODS
 from .box import box_of, first_point
-from .descent import descend, settle
+from .descent import descend, settle, settle_finely
 from .motion import TyreMotion
 from .multistart import multistart, start_points
-from .regression import descend_regression
+from .regression_search import descend_regression
 from .summary import summary, with_profiles, with_rivals
 from .tyre_data import GreyBoxVehicle, TyreLog
 from .tyre_fit import PARAMETERS, TyreFit
@@ -108,10 +108,16 @@ def identify_tyres(
             p, value = end, there
         else:
             rivals.append(end)
-    for _ in range(_BETTER_FOUND):
-        p, noise, value = settle(whole, p, noise, box, method=method)
+    for left in reversed(range(_BETTER_FOUND)):
+        passed, noise, value = settle(whole, p, noise, box, method=method)
+        p, noise, value = settle_finely(whole, passed, noise, box, value)
         fit = summary(vehicle, several, whole, p, noise, box, free, ends)
-        fit = with_rivals(fit, whole, rivals, box)
+        fit = with_rivals(fit, whole, rivals, box, None if profiles else passed)
+        ahead = min(fit.rivals, key=lambda rival: rival.lost, default=None)
+        if ahead is not None and ahead.lost < 0.0 and left:
+            rivals = [p, *(r.parameters for r in fit.rivals if r is not ahead)]
+            p = ahead.parameters
+            continue
         if not profiles:
             return fit
         fit, better = with_profiles(fit, whole, box, workers=workers, progress=progress)
@@ -146,7 +152,7 @@ def _regression(
     box = box_of(PARAMETERS[:8], {})
 
     def search(p: FloatArray) -> tuple[FloatArray, float]:
-        end, loss = descend_regression(vehicle, motion, p, p[box.columns], box, "joint")
+        end, loss = descend_regression(vehicle, motion, p, box)
         return end, -0.5 * loss
 
     return search

@@ -1,0 +1,183 @@
+"""The way down a narrow, bent valley: least squares with geodesic acceleration.
+
+B, C, D and E copy each other where driving stays below the peak. Steps of Gauss and Newton are
+tangents of that valley: either they leave it or they are short. A step that bends with the
+residuals follows it (Transtrum & Sethna, arXiv:1201.5885, 2012).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import lsq_linear
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from ..identify.search import Box
+from .likelihood import Likelihood
+
+__all__ = ["down_the_valley"]
+
+_LEAST_DAMPING = 1e-13
+_TRIALS = 14
+_PROBE = 0.1  # of the step: where the second derivative is taken
+_BENT = 1.5  # twice the bend over the step, beyond which the expansion means nothing
+_TINY = 1e-14
+
+
+@dataclass(frozen=True)
+class _Slope:
+    """Derivatives at a point, by the logarithm of what is positive, scaled to unit curvature."""
+
+    to_lower: FloatArray
+    to_upper: FloatArray
+    scale: FloatArray
+    by: FloatArray  # minus the derivatives of the residuals, shape (residuals, free)
+    gradient: FloatArray  # downhill
+    curvature: FloatArray
+
+    def step(self, damping: float) -> FloatArray:
+        """Minimum of the damped quadratic model over the box."""
+        values, vectors = np.linalg.eigh(self.curvature + damping * np.eye(len(self.scale)))
+        root = np.sqrt(np.maximum(values, _TINY))
+        found = lsq_linear(
+            root[:, None] * vectors.T,
+            (vectors.T @ self.gradient) / root,
+            bounds=(np.minimum(self.to_lower, -_TINY), np.maximum(self.to_upper, _TINY)),
+            method="bvls",
+        )
+        return as_float64(found.x)
+
+    def gain(self, step: FloatArray) -> float:
+        """What the quadratic model promises."""
+        return float(self.gradient @ step - 0.5 * step @ self.curvature @ step)
+
+    def bend(self, step: FloatArray, second: FloatArray, damping: float) -> FloatArray:
+        """Second-order part of a step, from the residuals' second derivative along it."""
+        free = (step > self.to_lower + _TINY) & (step < self.to_upper - _TINY)
+        out = np.zeros_like(step)
+        normal = self.curvature[np.ix_(free, free)] + (damping + _TINY) * np.eye(int(free.sum()))
+        out[free] = np.linalg.solve(normal, self.by[:, free].T @ second)
+        return out
+
+
+@dataclass(frozen=True)
+class _Valley:
+    """Residuals as a function of the free parameters, with gains that stay as they are."""
+
+    objective: Likelihood
+    p: FloatArray
+    gains: _core.FrozenGains
+    box: Box
+
+    @property
+    def positive(self) -> npt.NDArray[np.bool_]:
+        """Which parameters move on a logarithmic scale."""
+        return np.asarray(self.box.lower > 0.0)
+
+    def full(self, x: FloatArray) -> FloatArray:
+        out = self.p.copy()
+        out[self.box.columns] = x
+        return out
+
+    def residuals(self, x: FloatArray) -> FloatArray | None:
+        """None where the car spins in the model."""
+        try:
+            found = self.objective.residuals(self.full(x), self.gains)
+        except _core.NumericalFailure:
+            return None
+        return found if np.isfinite(found).all() else None
+
+    def moved(self, x: FloatArray, step: FloatArray) -> FloatArray:
+        there = np.where(self.positive, x * np.exp(np.where(self.positive, step, 0.0)), x + step)
+        return as_float64(np.clip(there, self.box.lower, self.box.upper))
+
+    def slope(self, x: FloatArray, residuals: FloatArray) -> _Slope:
+        unit = np.where(self.positive, x, 1.0)
+        by = self.objective.sensitivities(self.full(x), self.gains, self.box.columns) * unit
+        scale = np.sqrt(np.maximum(np.einsum("ij,ij->j", by, by), 1e-12))
+        by = by / scale
+        lower, upper = self.box.lower - x, self.box.upper - x
+        lower[self.positive] = np.log(self.box.lower[self.positive] / x[self.positive])
+        upper[self.positive] = np.log(self.box.upper[self.positive] / x[self.positive])
+        return _Slope(lower * scale, upper * scale, scale, by, by.T @ residuals, by.T @ by)
+
+    def bent(
+        self, x: FloatArray, residuals: FloatArray, slope: _Slope, damping: float
+    ) -> tuple[FloatArray, float] | None:
+        """Give a step that follows the valley, and what its tangent promises.
+
+        None where the valley bends too much for a step of that length.
+        """
+        tangent = slope.step(damping)
+        probe = self.residuals(self.moved(x, _PROBE * tangent / slope.scale))
+        if probe is None:
+            return None
+        second = 2.0 / _PROBE * ((probe - residuals) / _PROBE + slope.by @ tangent)
+        bend = slope.bend(tangent, second, damping)
+        if 2.0 * np.linalg.norm(bend) > _BENT * np.linalg.norm(tangent):
+            return None
+        step = np.clip(tangent + 0.5 * bend, slope.to_lower, slope.to_upper)
+        return as_float64(step / slope.scale), slope.gain(tangent)
+
+
+def down_the_valley(
+    objective: Likelihood,
+    p: FloatArray,
+    gains: _core.FrozenGains,
+    box: Box,
+    *,
+    tolerance: float = 1e-4,
+    rounds: int = 100,
+) -> FloatArray:
+    """Least squares of the prediction errors, with gains that stay as they are, to the very bottom.
+
+    It ends where the undamped step promises less than `tolerance`: that a damped one gains little
+    says nothing where the parameters copy each other, for damping is what makes it short.
+
+    Parameters
+    ----------
+    objective : Likelihood
+    p : array, shape (parameters,)
+    gains : FrozenGains
+    box : Box
+    tolerance : float
+        In nats.
+    rounds : int
+        Most steps.
+
+    Returns
+    -------
+    array, shape (parameters,)
+    """
+    valley = _Valley(objective, p, gains, box)
+    x = as_float64(np.clip(p[box.columns], box.lower, box.upper))
+    residuals = valley.residuals(x)
+    if residuals is None:
+        return p
+    cost, damping = 0.5 * float(residuals @ residuals), 1e-3
+    for _ in range(rounds):
+        slope = valley.slope(x, residuals)
+        if slope.gain(slope.step(_LEAST_DAMPING)) < tolerance:
+            break
+        for _ in range(_TRIALS):
+            found = valley.bent(x, residuals, slope, damping)
+            if found is None:
+                damping *= 4.0
+                continue
+            trial = valley.moved(x, found[0])
+            there = valley.residuals(trial)
+            value = np.inf if there is None else 0.5 * float(there @ there)
+            if there is not None and value < cost:
+                kept = (cost - value) / max(found[1], 1e-300)
+                # What keeps its promise may reach further next time.
+                damping *= 0.1 if kept > 0.5 else 0.33 if kept > 0.25 else 1.5
+                damping = max(damping, _LEAST_DAMPING)
+                x, residuals, cost = trial, there, value
+                break
+            damping *= 5.0
+        else:
+            break
+    return valley.full(x)
