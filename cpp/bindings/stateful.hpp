@@ -11,8 +11,8 @@
 
 namespace sysid::bindings {
 
-/// One object and its lock. Nobody who waits for the object's lock holds the interpreter's, so that a
-/// kernel which has the object may take the interpreter's to ask for signals.
+/// One object and its lock. Nobody who waits for the object's lock holds the interpreter's, so that
+/// a kernel which has the object may take the interpreter's to ask for signals.
 template <class T>
 class Guarded {
   public:

@@ -1,7 +1,8 @@
-#include "sysid/math/interrupt.hpp"
 #include "sysid/simulate/simulator.hpp"
 
 #include <cmath>
+
+#include "sysid/math/interrupt.hpp"
 
 namespace sysid {
 

@@ -186,9 +186,9 @@ TEST(Covariances, OfTheLaboratorysGreyBox) {
     }
     lab::TyreProblem problem(car);
     problem.add_run(run);
-    std::array<double, lab::kTyreParameters> p{};
-    const std::array<double, 8> tyres{10.0, 1.4, 1.0, 0.0, 11.0, 1.4, 1.0, 0.0};
-    std::copy(tyres.begin(), tyres.end(), p.begin());
+    // Tyres, what the drag is made of, then factors of mass and inertia.
+    const std::array<double, lab::kTyreParameters> p{10.0, 1.4, 1.0, 0.0, 11.0, 1.4, 1.0,
+                                                     0.0,  0.0, 0.0, 0.0, 1.0,  1.0, 1.0};
     for (const double ratio : kRatios) {
         SCOPED_TRACE(ratio);
         std::array<double, lab::kGreyNoises> noise{0.05, 0.05, 0.005, 0.1, 0.5, 0.5, 0.1};

@@ -105,28 +105,32 @@ TEST_P(Derivatives, AgreeWithDifferencesAnywhere) {
     EXPECT_LE(kinks, kPlaces * kOutputs / 100) << "differences tell nothing there";
 }
 
-// A relaxation length says how many parts an interval needs. Were they counted anew for each value,
+// A stiffness says how many parts an interval needs. Were they counted anew for each value,
 // residuals would jump, and no derivative would tell of it.
 TEST(Residuals, DoNotJumpWhereAnIntervalNeedsOnePartMore) {
     const SingleTrack model{saloon(), mask_of({"tyre_relaxation"})};
     Parameters p = typical_parameters();
-    const std::size_t column = parameter_of("tyre_relaxation");
     Problem problem{model, {}};
-    problem.runs.push_back(noisy_run(model, p, 300, 0.01, 5));
-    for (int n = 0; n < 40; ++n) {
-        p[column] = 0.20 + 0.005 * n;
-        const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
-        Eigen::VectorXd exact(static_cast<Eigen::Index>(problem.samples() * kChannels));
-        sensitivities(problem, p.data(), filter, {static_cast<int>(column)}, exact.data());
-        const auto f = [&](double value) {
-            Parameters q = p;
-            q[column] = value;
-            Eigen::VectorXd out(exact.size());
-            residuals(problem, q.data(), filter, out.data());
-            return out;
-        };
-        const Eigen::VectorXd differences = central_difference(f, p[column], 1e-3 * p[column]);
-        EXPECT_LT((exact + differences).norm(), 1e-4 * exact.norm()) << p[column];
+    problem.runs.push_back(noisy_run(model, p, 200, 0.1, 5));
+    const std::size_t relaxation = parameter_of("tyre_relaxation");
+    for (const std::size_t column : {std::size_t{kBFront}, std::size_t{kYawInertia}, relaxation}) {
+        const double usual = p[column];
+        for (int n = 0; n < 40; ++n) {
+            p[column] = usual * (0.8 + 0.01 * n);
+            const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
+            Eigen::VectorXd exact(static_cast<Eigen::Index>(problem.samples() * kChannels));
+            sensitivities(problem, p.data(), filter, {static_cast<int>(column)}, exact.data());
+            const auto f = [&](double value) {
+                Parameters q = p;
+                q[column] = value;
+                Eigen::VectorXd out(exact.size());
+                residuals(problem, q.data(), filter, out.data());
+                return out;
+            };
+            const Eigen::VectorXd differences = central_difference(f, p[column], 1e-3 * p[column]);
+            EXPECT_LT((exact + differences).norm(), 1e-4 * exact.norm()) << column << ", " << n;
+        }
+        p[column] = usual;
     }
 }
 

@@ -64,8 +64,8 @@ def test_filter(start: Model, short: Log, fit: Fit) -> None:
 
 def test_what_is_made_when_it_is_first_asked_for(start: Model, short: Log) -> None:
     driving = Driving.of(short)
-    alone = Driving.of(short).inputs
-    for found in side_by_side(lambda: driving.inputs):
+    alone = Driving.of(short).measured
+    for found in side_by_side(lambda: driving.measured):
         np.testing.assert_array_equal(found, alone)
 
 
