@@ -12,6 +12,7 @@ from trial import Outcome
 
 Row = tuple[str, str, str]
 TIMING = ("steer_lag", "tyre_relaxation")
+QUIET = ("adequate", "not_testable")
 _TOLD = ("missing", "one of a group")
 
 
@@ -81,7 +82,7 @@ def _null(outcomes: Sequence[Outcome]) -> list[Row]:
     rows.append(("any effect claimed, all sets", str(Rate.over(map(_claims, found))), "5 %"))
     rows.append(("  evidence before held-out driving", str(Rate.over(map(detected, found))), "5 %"))
     rows.append(
-        ("verdict not adequate", str(Rate.over(o["verdict"] != "adequate" for o in found)), "6 %")
+        ("verdict not adequate", str(Rate.over(o["verdict"] not in QUIET for o in found)), "6 %")
     )
     return rows
 

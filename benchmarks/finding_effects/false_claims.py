@@ -36,7 +36,7 @@ def main() -> None:
             study = sv.improve(model, train, test, seed=seed)
             claimed += [a.id for a in study.added[:1]]
             evidence += bool(study.diagnoses[0].significant)
-            verdicts += study.verdict != "adequate"
+            verdicts += study.verdict not in ("adequate", "not_testable")
         runs += args.seeds
         claims += len(claimed)
         print(

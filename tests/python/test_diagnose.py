@@ -13,6 +13,7 @@ from sysid_vehicle import (
     InvalidInput,
     Model,
     catalogue,
+    compare,
     diagnose,
     drive,
     identify,
@@ -46,7 +47,11 @@ def test_its_size_is_that_of_the_refit(found: Diagnosis) -> None:
     assert abs(estimate.value - OFFSET[1]) < 4.0 * estimate.std
     gain = 2.0 * (first.fit.log_likelihood - found.fit.log_likelihood)
     assert first.statistic == pytest.approx(gain, rel=1e-12)
-    assert first.predicted_error < 1.02
+    # What `compare` prints of the model with it, without it far above.
+    assert first.error == compare(first.fit, found.driving).error
+    assert first.error < 1.02 < 1.2 < found.error
+    assert all(np.isnan(c.error) == (c.fit is None) for c in found.ranking)
+    assert f"{first.error:.3f}" in str(found)
 
 
 def test_every_candidate_is_ranked_once(found: Diagnosis) -> None:

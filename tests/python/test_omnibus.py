@@ -5,8 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit
+from sysid_vehicle import Driving, Fit, Log, Model, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import Omnibus, omnibus
+from sysid_vehicle.diagnose.evidence import Evidence
+from sysid_vehicle.diagnose.omnibus import _virtual
 from sysid_vehicle.identify import refine
 
 
@@ -38,6 +40,24 @@ def test_a_hidden_effect_is_left(
     added = fit.model.add(name.split(".")[0]).with_values({name: 0.8 * value})
     after = refine(added, fit.driving, fit.noise.floor())
     assert omnibus(after, after.driving).p_value > 0.001
+
+
+@pytest.mark.filterwarnings("ignore:.*no values at:sysid_vehicle.SysidWarning")
+def test_a_gap_inside_a_log_is_no_turn_of_the_wheel(truth: Model) -> None:
+    """What was known before a gap says nothing of what comes after it."""
+    log = drive(truth, manoeuvres.lap(20.0), seed=3, rate_hz=50.0)
+    columns = {c: log[c].copy() for c in log.channels}
+    turned = int(np.argmax(np.abs(log["steer_rad"])))
+    columns["steer_rad"][turned - 100 : turned] = np.nan
+    gap = Log.from_arrays(columns, name="gap", check=False)
+    evidence = Evidence(identify(truth, gap, starts=1), Driving.of(gap))
+    assert len(evidence.driving.stretches) == 2
+    first = turned - 100
+    _, signals, _ = _virtual(evidence)
+    assert not signals[first].any(), "nothing was known yet"
+    turn = signals[:, 11]  # of the first target: the last of its shapes
+    assert turn[first + 1] == 0.0, "the jump over the gap"
+    assert np.abs(turn[first + 2 :]).max() > 0.0
 
 
 def test_it_speaks_plainly() -> None:

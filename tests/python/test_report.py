@@ -12,10 +12,11 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle import _style
+from sysid_vehicle.demo.story import findings
 from sysid_vehicle.report import figures, write_report
 from sysid_vehicle.report.excerpt import worst_excerpt
 from sysid_vehicle.report.tyres import driven_slip, identified_curves, model_curves
-from sysid_vehicle.report.words import interval, quantity, summary
+from sysid_vehicle.report.words import interval, quantity, ranking_title, summary
 
 TRUTH = (
     sv.Model(sv.example_vehicle())
@@ -116,9 +117,15 @@ def test_a_report_tells_where_it_fails_and_the_shape_of_what_is_unknown(
     study: sv.Study, nothing_added: sv.Study, written: Path, tmp_path: Path
 ) -> None:
     text = " ".join(read(written).text)
-    assert "Where, when and how fast the baseline fails" in text
-    for line in study.where.lines:
-        assert line[1:] in text
+    assert "Where, when and how fast the model fails" in text
+    assert [title for title, _ in study.where_lines] == [
+        "Where the baseline fails",
+        "Where the final model (with tyre_load_sensitivity) fails",
+    ]
+    for title, lines in study.where_lines:
+        assert title in text
+        for line in lines:
+            assert line[1:] in text
     assert "The shape of what is missing" not in text
     nothing_added.report(tmp_path / "unknown.html")
     text = " ".join(read(tmp_path / "unknown.html").text)
@@ -219,6 +226,48 @@ def test_the_summary_has_three_sentences_with_the_figures(
     assert f"from {study.test[0].error:.2f} to {study.test[-1].error:.2f}" in errors
     assert "tyre_load_sensitivity" in summary(nothing_added)[1]
     assert "fell" not in summary(nothing_added)[2]
+
+
+def test_an_error_that_rose_did_not_fall(study: sv.Study) -> None:
+    def errors(before: float, after: float) -> str:
+        first, last = (
+            replace(c, error=e) for c, e in zip(study.test, (before, after), strict=True)
+        )
+        return summary(replace(study, test=(first, last)))[2]
+
+    assert "fell from 1.32 to 1.22" in errors(1.32, 1.22)
+    assert "rose from 1.22 to 1.32" in errors(1.22, 1.32)
+    assert "stayed at 1.22" in errors(1.221, 1.219)
+
+
+def test_what_cannot_be_told_apart_is_named_together(study: sv.Study, tmp_path: Path) -> None:
+    group = replace(study.added[0], confounded_with=("longitudinal_load_transfer",))
+    either = replace(study, added=(group,))
+    together = "or else longitudinal_load_transfer, which this driving cannot tell from it"
+    assert together in str(either)
+    assert together in either._repr_html_()
+    assert together in summary(either)[1]
+    assert together in ranking_title(either)
+    assert together in "\n".join(findings(either))
+    assert either.steps[1] == "+ tyre_load_sensitivity or longitudinal_load_transfer"
+    (told,) = either.to_dict()["effects"]
+    assert told["confounded_with"] == ["longitudinal_load_transfer"]
+    path = tmp_path / "either.html"
+    either.report(path)
+    text = " ".join(read(path).text)
+    assert together in text
+    assert "+ tyre_load_sensitivity or longitudinal_load_transfer" in str(either.waterfall())
+
+
+def test_a_stand_in_is_not_said_to_be_missing(study: sv.Study) -> None:
+    """Nothing is left, and still something is missing: the text says how both can be."""
+    stand_in = replace(study.added[0], stands_in="no car has such a value")
+    unknown = replace(study, verdict="unknown", added=(stand_in,))
+    assert "nothing left" in unknown.in_the_end
+    assert "taken up by stand-ins: tyre_load_sensitivity" in unknown.in_the_end
+    assert "it only stands in for something else: no car has such a value" in str(unknown)
+    assert "most likely missing" not in ranking_title(unknown)
+    assert "most likely missing" in ranking_title(study)
 
 
 def test_bars_are_as_high_as_the_errors(study: sv.Study) -> None:

@@ -2,11 +2,12 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, Model, drive, identify, manoeuvres, where
+from sysid_vehicle import Driving, Fit, Model, drive, identify, manoeuvres, where
 from sysid_vehicle.diagnose import Where
 from sysid_vehicle.diagnose.change_points import change_points
 from sysid_vehicle.diagnose.coherence import coherence
@@ -92,11 +93,38 @@ def test_a_late_steering_is_timed(truth: Model) -> None:
     assert np.max(np.abs(z)) < 5.0
 
 
+def test_a_car_without_delay_has_none_at_any_rate(truth: Model) -> None:
+    z = []
+    for rate_hz in (10.0, 20.0, 50.0, 100.0):
+        log = drive(truth, manoeuvres.lap(30.0), seed=203, rate_hz=rate_hz)
+        for c in coherence(Evidence(identify(truth, log, starts=1), Driving.of(log))):
+            assert c.delay is not None
+            assert not c.delay.significant, (rate_hz, c.input)
+            assert c.delay.alone
+            z.append(c.delay.delay_s / c.delay.std_s)
+    # Fewer than six of eight 95 % intervals hold nothing six times in a thousand.
+    assert np.count_nonzero(np.abs(z) < 1.96) >= 6
+
+
+def test_a_delay_that_something_else_feigns_is_not_claimed(
+    hidden_fit: Callable[[str, float], Fit],
+) -> None:
+    fit = hidden_fit("tyre_load_sensitivity.sensitivity", 0.25)
+    steer = coherence(Evidence(fit, fit.driving))[0]
+    assert steer.delay is not None
+    assert not steer.delay.alone, "with any delay the load sensitivity is left"
+    told = str(replace(steer, delay=replace(steer.delay, delay_s=0.1)))
+    assert "the car answers it 100" in told
+    assert "leaves something that depends on the driving" in told
+    assert "later than the model" not in told
+
+
 def test_a_late_steering_is_told(delayed: Where) -> None:
     steer, force = delayed.coherence
     assert steer.delay is not None
     assert steer.delay.significant
     assert steer.delay.linear
+    assert steer.delay.alone
     assert steer.peak[2] > steer.threshold
     assert "later than the model" in str(delayed)
     assert force.delay is not None

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .._files import write_json
+from .._text import text_table
 from ..compare import Comparison, compare
 from ..demo import run_demo
 from ..diagnose import where
@@ -19,7 +20,7 @@ from ..identify import Fit, identify
 from ..log import Log
 from ..model import Model
 from ..read import ChannelMap, read_log
-from ..report import summary, write_report
+from ..report import RANKING_HEAD, ranking_rows, ranking_title, summary, write_report
 from ..study import Study, improve
 from ..user_effects import load_effects
 from ..vehicle import Vehicle
@@ -72,11 +73,15 @@ def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
     refuse_unwritable([args.json], inputs=_inputs(args))
     study = _study(args, heard)
     print(study.test[0])
-    print(study.where)
     print()
-    print(study.diagnoses[0])
+    print(ranking_title(study))
+    rows = [[cell.replace("±", "+-") for cell in row] for row in ranking_rows(study, most=12)]
+    print(text_table(RANKING_HEAD, rows))
     print()
     print(" ".join(summary(study)))
+    print(study.in_the_end)
+    print()
+    _print_where(study)
     if study.unknown is not None:
         print(study.unknown)
     print()
@@ -91,7 +96,7 @@ def _improve(args: argparse.Namespace, heard: Warnings) -> None:
     study = _study(args, heard)
     # The warnings have gone to the error stream.
     print(study.with_warnings(()))
-    print(study.where)
+    _print_where(study)
     if study.unknown is not None:
         print(study.unknown)
     print(study.fit)
@@ -99,6 +104,11 @@ def _improve(args: argparse.Namespace, heard: Warnings) -> None:
         study.to_json(args.json)
     write_report(study, args.report)
     print(f"Report: {args.report}")
+
+
+def _print_where(study: Study) -> None:
+    for title, lines in study.where_lines:
+        print("\n".join([title, *(f"  {line}" for line in lines)]))
 
 
 def _effects(args: argparse.Namespace, heard: Warnings) -> None:
@@ -182,5 +192,6 @@ def _comparison(c: Comparison, fit: Fit, heard: Warnings) -> dict[str, Any]:
             for r in c.regions
         ],
         "parameters": {e.name: e.to_dict() for e in (*fit.estimates, *fit.derived)},
+        "unrelated": c.unrelated,
         "warnings": list(heard),
     }

@@ -1,6 +1,7 @@
 """Comparison of a fitted model with driving."""
 
 from .compare import ChannelScore, Comparison, compare
+from .unrelated import unrelated
 from .where import FailureMap, Region
 
-__all__ = ["ChannelScore", "Comparison", "FailureMap", "Region", "compare"]
+__all__ = ["ChannelScore", "Comparison", "FailureMap", "Region", "compare", "unrelated"]

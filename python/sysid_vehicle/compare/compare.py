@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from .._text import html_table, number, text_table
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..identify import Fit, explaining
 from ..log import Log
+from .unrelated import unrelated
 from .where import FailureMap, Region
 
 if TYPE_CHECKING:
@@ -62,6 +64,8 @@ class Comparison:
         Normalised one-step-ahead residuals; NaN where nothing was measured.
     log_likelihood : float
         Of the driving under the model and the noise it was fitted with.
+    unrelated : dict of str to str
+        Channels that contradict the others, which no effect of a car explains, and how.
     """
 
     title: str
@@ -73,6 +77,7 @@ class Comparison:
     log_number: FloatArray
     residual: FloatArray
     log_likelihood: float
+    unrelated: dict[str, str] = field(default_factory=dict)
 
     _HEAD = ("channel", "rmse", "noise floor", "rmse / floor", "R2", "unit")
 
@@ -87,14 +92,17 @@ class Comparison:
 
     def __str__(self) -> str:
         parts = [self._headline(), text_table(self._HEAD, self._rows())]
+        parts += [f"Something else is wrong: {text}" for text in self.unrelated.values()]
         if self.regions:
             parts.append("Where it fails most")
             parts += [f"  {r}" for r in self.regions]
         return "\n".join(parts)
 
     def _repr_html_(self) -> str:
-        where = "".join(f"<li>{r}</li>" for r in self.regions)
-        return f"<p>{self._headline()}</p>{html_table(self._HEAD, self._rows())}<ul>{where}</ul>"
+        lines = [*self.unrelated.values(), *map(str, self.regions)]
+        where = "".join(f"<li>{escape(line)}</li>" for line in lines)
+        table = html_table(self._HEAD, self._rows())
+        return f"<p>{escape(self._headline())}</p>{table}<ul>{where}</ul>"
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """The map of where the model fails."""
@@ -169,6 +177,7 @@ def compare(
             float(1.0 - np.mean(e**2) / spread) if spread > 0 else float("nan"),
         )
     failures = FailureMap.of(driving, white)
+    own = problem.trace(p, fit.noise.vector(), False)
     title = f"{', '.join(fit.model.effects) or 'baseline'} on {driving}"
     return Comparison(
         title,
@@ -179,5 +188,6 @@ def compare(
         driving.channel("time_s"),
         driving.log_number,
         normalised,
-        float(problem.freeze(p, fit.noise.vector()).log_likelihood),
+        float(own["log_likelihood"]),
+        unrelated(driving, own["innovation"], own["spread"]),
     )

@@ -37,16 +37,15 @@ def findings(study: Study) -> list[str]:
     told.append(_added(study))
     if study.added:
         told.append(_errors("5. The improved model on the other course", study.test[-1]))
-    steps = ["baseline", *(f"+ {a.id}" for a in study.added)]
     rows = [
         [label, f"{a.error:.3f}", f"{b.error:.3f}"]
-        for label, a, b in zip(steps, study.train, study.test, strict=True)
+        for label, a, b in zip(study.steps, study.train, study.test, strict=True)
     ]
     told.append(
         "Error of all channels together, one step ahead; the noise floor is 1\n"
         + text_table(("model", "lap", "other course"), rows)
     )
-    told.append(f"Verdict - {summary(study)[0]}\nIn the end: {study.omnibus}.")
+    told.append(f"Verdict - {summary(study)[0]}\n{study.in_the_end}")
     return told
 
 
@@ -59,7 +58,7 @@ def _errors(title: str, c: Comparison) -> str:
 def _where(study: Study) -> str:
     regions = study.test[0].regions
     if not regions:
-        return "2. Where it fails: nowhere in particular, it is at the noise floor"
+        return "2. Where it fails: no part of the driving stands out from the noise floor"
     return "\n".join(["2. Where it fails most", *(f"  {r}" for r in regions)])
 
 
@@ -100,7 +99,8 @@ def revelation(study: Study, truth: Model) -> str:
             [e.name, quantity(true[e.name]), quantity(e.value), interval(e), unit(e.unit).strip()]
             for e in (*shown, *study.fit.derived)
         ]
-        lines.append("Found.")
+        own = next(a for a in study.added if a.id == hidden.id)
+        lines.append(f"Found; {own.reserve}." if own.reserve else "Found.")
         lines.append(text_table(("parameter", "truth", "found", "95 % interval", "unit"), rows))
         beside = [e for e in study.model.effects if e != hidden.id]
         if beside:
@@ -121,6 +121,6 @@ def _why_not(study: Study, hidden: str) -> str:
         return f"this driving cannot tell it from {', '.join(sorted(twins))}, which the model got."
     if study.added:
         return f"the model got {', '.join(study.model.effects)} instead."
-    if study.verdict == "adequate":
+    if study.verdict in ("adequate", "not_testable"):
         return "this driving does not show it; the fitted tyres make up for it."
     return "the study saw that something is missing, but could not say what."

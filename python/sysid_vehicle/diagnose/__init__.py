@@ -1,21 +1,26 @@
 """Diagnosis: which physical effect a model is missing, or that none explains what is left."""
 
 from .change_points import ChangePoint
-from .coherence import Coherence
+from .coherence import INPUTS, Coherence, coherence
 from .constancy import Constancy, constancy
+from .coordinates import blocks
 from .delay import Delay
-from .diagnose import Candidate, Diagnosis, considered, diagnose
+from .diagnose import considered, diagnose
+from .diagnosis import Candidate, Diagnosis
+from .evidence import Evidence
 from .force_map import ForceMap
 from .hiding import Bias, BiasReport, bias_report
 from .next_drive import DriveLimits, NextDrive, Suggestion, separations, suggest_manoeuvre
 from .omnibus import Omnibus, omnibus
+from .possible import Size, possible
 from .proposals import Proposal
 from .shape import Curve, Surface
 from .unknown import Unknown, unknown
-from .verdicts import EffectVerdict, Verdicts, judge, possible, verdicts
+from .verdicts import EffectVerdict, Verdicts, judge, verdicts
 from .where import Where, where
 
 __all__ = [
+    "INPUTS",
     "Bias",
     "BiasReport",
     "Candidate",
@@ -27,16 +32,20 @@ __all__ = [
     "Diagnosis",
     "DriveLimits",
     "EffectVerdict",
+    "Evidence",
     "ForceMap",
     "NextDrive",
     "Omnibus",
     "Proposal",
+    "Size",
     "Suggestion",
     "Surface",
     "Unknown",
     "Verdicts",
     "Where",
     "bias_report",
+    "blocks",
+    "coherence",
     "considered",
     "constancy",
     "diagnose",

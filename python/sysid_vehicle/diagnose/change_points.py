@@ -131,7 +131,7 @@ def _search(
     """The change that stands out most in samples of a segment, if any does."""
     begin, end = segment
     channels = len(residual) // driving.samples
-    rate = driving.logs[0].rate_hz
+    rate = driving.mean_rate_hz
     step = max(round(_STEP_S * rate), -(-driving.samples // _MOST_STEPS), 1)
     steps, edge = (end - begin) // step, max(round(_LEAST_S * rate / step), 1)
     if steps < 2 * edge + 2:
@@ -187,7 +187,7 @@ def _read(
     something else is wrong then.
     """
     driving = evidence.driving
-    rate = driving.logs[0].rate_hz
+    rate = driving.mean_rate_hz
     reach = max(round(_NEAR_S * rate), 2 * driving.samples // _MOST_STEPS)
     fine = max(2 * reach // _FINE, 1)
     tried = list(range(max(about - reach, 0), min(about + reach, driving.samples), fine))

@@ -22,11 +22,12 @@ from .evidence import Evidence
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Coherence", "coherence"]
+__all__ = ["INPUTS", "Coherence", "coherence"]
 
 _WINDOW_S = 5.0
 _LEVEL = 0.05
-_WORDS = {"steer": "steering", "force": "wheel force"}
+INPUTS = {"steer": "steering", "force": "wheel force"}
+"""Inputs of the model, in words."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,7 @@ class Coherence:
     threshold : float
         Exceeded anywhere by chance in 5 % of complete models.
     delay : Delay or None
-        None where the input hardly moved.
+        None where the input hardly moved, or where it was not sought.
     """
 
     input: str
@@ -61,16 +62,14 @@ class Coherence:
 
     def __str__(self) -> str:
         channel, f, c = self.peak
-        name = _WORDS[self.input]
+        name = INPUTS[self.input]
         if c > self.threshold:
             text = f"residuals of {channel} follow the {name} at {f:.1f} Hz (coherence {c:.2f})"
         else:
             text = f"no residual follows the {name}"
         if self.delay is not None and self.delay.significant:
             d = self.delay
-            sooner = "later" if d.delay_s > 0 else "sooner"
-            size = f"{1e3 * abs(d.delay_s):.0f} +- {1e3 * d.std_s:.1g} ms"
-            text += f"; the car answers it {size} {sooner} than the model"
+            text += f"; {d.answers()}"
             if not d.linear:
                 text += ", but not equally at all frequencies"
         return text
@@ -86,7 +85,7 @@ class Coherence:
         ax.axhline(self.threshold, color="0.4", ls="--", lw=1.0, label="by chance, 95 %")
         ax.set_ylim(0.0, 1.0)
         ax.legend(frameon=False, fontsize="small", ncols=2)
-        return tidy(ax, xlabel="frequency [Hz]", ylabel=f"coherence with the {_WORDS[self.input]}")
+        return tidy(ax, xlabel="frequency [Hz]", ylabel=f"coherence with the {INPUTS[self.input]}")
 
     def plot_phase(self, ax: Axes | None = None) -> Axes:
         """Draw by how much the car lags the model, and the delay that fits."""
@@ -107,53 +106,58 @@ class Coherence:
             )
             ax.legend(frameon=False, loc="upper left")
         return tidy(
-            ax, xlabel="frequency [Hz]", ylabel=f"lag behind the {_WORDS[self.input]} [deg]"
+            ax, xlabel="frequency [Hz]", ylabel=f"lag behind the {INPUTS[self.input]} [deg]"
         )
 
 
-def coherence(evidence: Evidence, *, seed: int = 0) -> tuple[Coherence, ...]:
+def coherence(evidence: Evidence, *, delays: bool = True, seed: int = 0) -> tuple[Coherence, ...]:
     """Coherence with the steering angle and, where it is known, with the wheel force.
 
     Parameters
     ----------
     evidence : Evidence
+    delays : bool
+        Whether to seek delays.
     seed : int
         Of the draws of noise of the inputs, which widens the intervals of delays.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed) if delays else None
     names = ("steer", "force") if evidence.driving.force_known else ("steer",)
     inputs = evidence.driving.inputs()
     return tuple(_with(evidence, inputs, i, name, rng) for i, name in enumerate(names))
 
 
 def _with(
-    evidence: Evidence, inputs: FloatArray, which: int, name: str, rng: np.random.Generator
+    evidence: Evidence, inputs: FloatArray, which: int, name: str, rng: np.random.Generator | None
 ) -> Coherence:
     driving = evidence.driving
-    rate = driving.logs[0].rate_hz
     e = evidence.residual.reshape(driving.samples, -1)
     pieces = pieces_of(driving)
-    length = min(round(_WINDOW_S * rate), max(end - begin for begin, end, _ in pieces) // 3)
+    # Windows of one duration have one grid of frequencies, whatever the rate.
+    window_s = min(_WINDOW_S, max((end - begin) / rate for begin, end, rate in pieces) / 3.0)
+    band = min(
+        int(np.floor(min(HIGHEST_HZ, 0.5 * rate) * window_s + 1e-6)) for _, _, rate in pieces
+    )
+    f = np.arange(1, band + 1) / window_s
     windows, cross, own, of_e = 0, 0.0, 0.0, 0.0
-    f = np.zeros(0)
-    how = {"fs": rate, "nperseg": length, "axis": 0}
-    for begin, end, own_rate in pieces:
-        if end - begin < length or own_rate != rate:
+    for begin, end, rate in pieces:
+        length = round(window_s * rate)
+        if end - begin < length:
             continue
+        how = {"fs": rate, "nperseg": length, "axis": 0}
         u = inputs[begin:end, which : which + 1]
         count = 2 * (end - begin) // length - 1
-        f, p = csd(u, e[begin:end], **how)
-        cross = cross + count * p
-        own = own + count * welch(u, **how)[1]
-        of_e = of_e + count * welch(e[begin:end], **how)[1]
+        inside = slice(1, band + 1)
+        cross = cross + count * csd(u, e[begin:end], **how)[1][inside]
+        own = own + count * welch(u, **how)[1][inside]
+        of_e = of_e + count * welch(e[begin:end], **how)[1][inside]
         windows += count
-    band = (f > 0.0) & (f <= HIGHEST_HZ)
     with np.errstate(invalid="ignore", divide="ignore"):
-        gamma = np.nan_to_num((np.abs(cross) ** 2 / (own * of_e))[band])
+        gamma = np.nan_to_num(np.abs(cross) ** 2 / (own * of_e))
     there = {c: gamma[:, i] for i, c in enumerate(MEASURED) if c in driving.present}
     # Windows that overlap by half are worth 11/18 of as many independent ones (Welch 1967).
     effective = max(1.0 + (windows - 1) * 11.0 / 18.0, 2.0)
-    tests = len(there) * int(band.sum())
+    tests = len(there) * band
     threshold = 1.0 - (_LEVEL / tests) ** (1.0 / (effective - 1.0))
-    late = delay(evidence, inputs, which, pieces, rng)
-    return Coherence(name, as_float64(f[band]), there, float(threshold), late)
+    late = None if rng is None else delay(evidence, inputs, which, pieces, rng)
+    return Coherence(name, as_float64(f), there, float(threshold), late)

@@ -101,8 +101,7 @@ def _pieces(driving: Driving) -> list[FloatArray]:
     """Masks over the residuals: the logs, or equal parts of the only one."""
     number = driving.log_number
     if len(driving.logs) == 1:
-        seconds = driving.samples / driving.logs[0].rate_hz
-        count = min(int(seconds / _PIECE_S), _MOST_PIECES)
+        count = min(int(driving.usable_s / _PIECE_S), _MOST_PIECES)
         number = np.floor(np.arange(driving.samples) * count / max(driving.samples, 1))
     return [np.repeat(number == i, _core.CHANNELS) for i in np.unique(number)]
 

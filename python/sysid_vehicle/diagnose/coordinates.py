@@ -5,12 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from .._arrays import FloatArray, as_float64
 from ..estimate import Driving
 from ..identify import Fit
 
-__all__ = ["COORDINATES", "Coordinate", "coordinates", "late", "running_time"]
+__all__ = [
+    "COORDINATES",
+    "Coordinate",
+    "begins",
+    "blocks",
+    "coordinates",
+    "late",
+    "running_time",
+]
 
 
 @dataclass(frozen=True)
@@ -75,11 +84,20 @@ def coordinates(fit: Fit, driving: Driving, state: FloatArray) -> dict[str, Floa
 
 def running_time(driving: Driving) -> FloatArray:
     """Seconds driven until each sample, without what lies between stretches."""
-    steps = [
-        np.full(s.where.stop - s.where.start, 1.0 / driving.logs[s.log].rate_hz)
-        for s in driving.stretches
-    ]
-    return as_float64(np.cumsum(np.concatenate(steps)))
+    return as_float64(np.cumsum(1.0 / driving.sample_rate_hz))
+
+
+def blocks(driving: Driving, seconds: float) -> npt.NDArray[np.intp]:
+    """First samples of blocks of so many seconds driven, whatever the rates of the logs."""
+    middle = running_time(driving) - 0.5 / driving.sample_rate_hz
+    block = np.floor(middle / seconds)
+    return np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1])
+
+
+def begins(driving: Driving) -> npt.NDArray[np.intp]:
+    """First samples of the stretches."""
+    lengths = [s.where.stop - s.where.start for s in driving.stretches]
+    return np.cumsum([0, *lengths[:-1]])
 
 
 def late(driving: Driving, signal: FloatArray, first: float = 0.0) -> FloatArray:
@@ -88,8 +106,5 @@ def late(driving: Driving, signal: FloatArray, first: float = 0.0) -> FloatArray
     The first sample of a stretch, of which nothing was known, gets `first`.
     """
     out = np.concatenate([signal[:1], signal[:-1]])
-    at = 0
-    for s in driving.stretches:
-        out[at] = first
-        at += s.where.stop - s.where.start
+    out[begins(driving)] = first
     return as_float64(out)

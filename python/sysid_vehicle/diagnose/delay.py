@@ -30,6 +30,7 @@ from ..estimate import Driving
 from ..estimate.inputs import quiet, white_noise_std
 from ..identify import refine
 from .evidence import Evidence, solve
+from .omnibus import omnibus_of
 
 __all__ = ["HIGHEST_HZ", "Delay", "Piece", "delay", "pieces_of"]
 
@@ -56,6 +57,9 @@ class Delay:
     linear : bool
         Whether the phases lie on one line as closely as their errors allow: a delay, not a lag or
         a gain that changes with frequency.
+    alone : bool
+        Whether nothing is left that depends on the driving once the delay is put in. Where
+        something is, what the model lacks may look like a delay that is not there.
     """
 
     delay_s: float
@@ -64,6 +68,7 @@ class Delay:
     phase_rad: FloatArray
     phase_std_rad: FloatArray
     linear: bool
+    alone: bool
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -74,6 +79,34 @@ class Delay:
     def significant(self) -> bool:
         """Whether it differs from none by three standard errors."""
         return abs(self.delay_s) > 3.0 * self.std_s
+
+    def to_dict(self) -> dict[str, object]:
+        """The findings, ready for JSON."""
+        return {
+            "delay_s": self.delay_s,
+            "std_s": self.std_s,
+            "linear": self.linear,
+            "alone": self.alone,
+        }
+
+    def answers(self, behind: str = "the model", what: str = "it") -> str:
+        """How late the car answers an input, in words.
+
+        Parameters
+        ----------
+        behind : str
+            The model that was compared with.
+        what : str
+            The input.
+        """
+        sooner = "later" if self.delay_s > 0 else "sooner"
+        size = f"{1e3 * abs(self.delay_s):.0f} +- {1e3 * self.std_s:.1g} ms {sooner}"
+        if self.alone:
+            return f"the car answers {what} {size} than {behind}"
+        return (
+            f"{behind} fits best where the car answers {what} {size}, but that leaves something "
+            "that depends on the driving: what the model lacks may look like a delay"
+        )
 
 
 def pieces_of(driving: Driving) -> list[Piece]:
@@ -116,7 +149,8 @@ def delay(
         return None
     f, phase, phase_std, linear = found
     put_in = 2.0 * np.pi * f * (total - step)
-    return Delay(total, std, f, as_float64(phase + put_in), phase_std, linear)
+    alone = not omnibus_of(evidence).rejects
+    return Delay(total, std, f, as_float64(phase + put_in), phase_std, linear, alone)
 
 
 def _later(

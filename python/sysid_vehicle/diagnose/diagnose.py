@@ -1,30 +1,27 @@
-"""Name the physical effect that a fitted model is missing."""
+"""Rank the physical effects that a fitted model may be missing."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 from tqdm import tqdm
 
-from .._text import html_table, text_table, with_error
 from .._threads import Workers
+from ..compare import compare
 from ..effects import Effect, effect
-from ..errors import InvalidInput, NumericalError
+from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refine, refit
 from ..log import Log
 from ..model import Model
+from .diagnosis import Candidate, Diagnosis
 from .evidence import Evidence
-from .omnibus import Omnibus, omnibus_of
+from .omnibus import omnibus_of
 from .score import Score, ScoreBoard, score_board_of
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-__all__ = ["Candidate", "Diagnosis", "considered", "diagnose"]
+__all__ = ["considered", "diagnose"]
 
 _REFITS = 5
 # Of the best statistic: what scores less than this share does not overtake it. States of their own
@@ -34,145 +31,6 @@ _HOPELESS_WITH_STATES = 0.6
 _RIVALS = 0.3  # of the score of the best, with which one that acts like it may overtake it
 _TELLS_APART = 9.0  # twice the log-likelihood, or a statistic: three standard errors
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """One effect that may be missing.
-
-    Attributes
-    ----------
-    statistic : float
-        Score statistic; after a refit, twice the gain in log-likelihood.
-    p_value : float
-        Of the baseline being complete, corrected for testing all effects.
-    value, std : tuple of float
-        Parameters, predicted or refitted.
-    predicted_error : float
-        One-step error with the effect, where 1 is what the present noise model expects.
-    retained : float
-        Share of the effect that the fitted parameters cannot copy.
-    indistinguishable_from : tuple of str
-        Effects that this driving cannot tell from it.
-    fit : Fit or None
-        The model with the effect, where it was refitted.
-    """
-
-    effect: Effect
-    statistic: float
-    p_value: float
-    value: tuple[float, ...]
-    std: tuple[float, ...]
-    predicted_error: float
-    retained: float
-    variance_ratio: float
-    indistinguishable_from: tuple[str, ...] = ()
-    fit: Fit | None = None
-
-    @property
-    def id(self) -> str:
-        """Id of the effect."""
-        return self.effect.id
-
-    @property
-    def size(self) -> str:
-        """Its parameters with standard errors, in words."""
-        return ", ".join(
-            f"{p.name} {with_error(v, s)} {p.unit}"
-            for p, v, s in zip(self.effect.parameters, self.value, self.std, strict=True)
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
-    """Effects ranked by the evidence that they are missing.
-
-    Attributes
-    ----------
-    ranking : tuple of Candidate
-        All candidates, the most likely first.
-    omnibus : Omnibus
-        Whether anything at all is left.
-    alpha : float
-        Rate of false claims accepted, over all effects together.
-    scores : tuple of Score
-        The tests that the ranking began with, beside the fit as it is.
-    family : dict of str to float
-        Their p-values by effect, corrected for testing all of them.
-    """
-
-    fit: Fit
-    ranking: tuple[Candidate, ...]
-    omnibus: Omnibus
-    alpha: float
-    scores: tuple[Score, ...]
-    family: dict[str, float]
-
-    @property
-    def significant(self) -> tuple[Candidate, ...]:
-        """Candidates for which there is evidence."""
-        return tuple(c for c in self.ranking if c.p_value < self.alpha)
-
-    @property
-    def best(self) -> Effect:
-        """The effect most likely missing.
-
-        Raises
-        ------
-        InvalidInput
-            There is evidence for none.
-        """
-        if not self.significant:
-            raise InvalidInput(
-                "no effect of the catalogue is missing as far as this driving can show: "
-                f"{self.omnibus}"
-            )
-        return self.ranking[0].effect
-
-    _HEAD = ("effect", "statistic", "p", "error with it", "size", "cannot tell from")
-
-    def _rows(self, most: int = 12) -> list[list[str]]:
-        return [
-            [
-                c.id,
-                f"{c.statistic:.1f}",
-                f"{c.p_value:.2g}",
-                f"{c.predicted_error:.4f}",
-                c.size,
-                ", ".join(c.indistinguishable_from),
-            ]
-            for c in self.ranking[:most]
-        ]
-
-    def _headline(self) -> str:
-        if not self.significant:
-            return f"no effect of the catalogue is missing; {self.omnibus}"
-        what = f"most likely missing: {self.ranking[0].effect.title}"
-        if self.ranking[0].indistinguishable_from:
-            twins = ", ".join(self.ranking[0].indistinguishable_from)
-            what += f" (this driving cannot tell it from {twins})"
-        # The test against unknown forces is blunter than that of one effect: its silence is none.
-        return f"{what}; {self.omnibus}" if self.omnibus.rejects else what
-
-    def __str__(self) -> str:
-        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
-
-    def _repr_html_(self) -> str:
-        return f"<p>{self._headline()}</p>{html_table(self._HEAD, self._rows())}"
-
-    def plot(self, ax: Axes | None = None, most: int = 10) -> Axes:
-        """Bars of the evidence for each effect."""
-        import matplotlib.pyplot as plt
-
-        if ax is None:
-            ax = plt.subplots(figsize=(6.0, 3.5))[1]
-        shown = self.ranking[:most][::-1]
-        colours = ["tab:red" if c.p_value < self.alpha else "0.7" for c in shown]
-        ax.barh([c.id for c in shown], [max(c.statistic, 0.1) for c in shown], color=colours)
-        ax.set(
-            xscale="log", xlabel="evidence (score statistic; refitted: 2 x gain in log-likelihood)"
-        )
-        return ax
 
 
 def diagnose(
@@ -209,8 +67,6 @@ def diagnose(
     board = score_board_of(evidence, possible)
     left = omnibus_of(evidence)
     family = board.family_p_values(seed=seed)
-    present = max(int(np.isfinite(driving.measured).sum()), 1)
-    remaining = float(board.residual @ board.residual)
     ranked = [
         Candidate(
             s.effect,
@@ -218,12 +74,9 @@ def diagnose(
             family[s.effect.id],
             s.value,
             s.std,
-            float(
-                np.sqrt(max(remaining - s.statistic * max(s.variance_ratio, 1.0), 0.0) / present)
-            ),
             s.retained,
             s.variance_ratio,
-            _score_twins(board, s),
+            indistinguishable_from=_score_twins(board, s),
         )
         for s in board.scores
     ]
@@ -257,7 +110,14 @@ def diagnose(
         far = sorted((c for c in tried if c.id not in done), key=lambda c: -c.statistic)
         done |= {c.id for c in far}
         ranked = finished + far + [c for c in ranked if c.id not in done]
-    return Diagnosis(fit, tuple(ranked), left, alpha, board.scores, family)
+    return _with_errors(Diagnosis(fit, driving, tuple(ranked), left, alpha, board.scores, family))
+
+
+def _with_errors(dx: Diagnosis) -> Diagnosis:
+    """The same with errors, all at one noise floor."""
+    errors = dx.errors_on(dx.driving, dx.floor)
+    ranking = tuple(replace(c, error=errors.get(c.id, c.error)) for c in dx.ranking)
+    return replace(dx, ranking=ranking, error=compare(dx.fit, dx.driving, noise=dx.floor).error)
 
 
 def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple[Effect, ...]:

@@ -225,12 +225,18 @@ def _means(
     place, length = _places(driving)
     padded = np.zeros(length)
     padded[place] = left
-    lags = min(int(_LONGEST_S * driving.logs[0].rate_hz), len(x) // 4)
-    spectrum = np.abs(np.fft.rfft(padded)) ** 2
-    rho = np.fft.irfft(spectrum, length)[: lags + 1]
+    finest = float(driving.sample_rate_hz.max())
+    lags = min(int(_LONGEST_S * finest), len(x) // 4)
+    rho = _products(padded)[: lags + 1]
     if rho[0] <= 0.0:
         return mean, np.zeros_like(mean), 1
     rho = rho / rho[0]
+    if driving.sample_rate_hz.min() < finest:
+        # A coarser log has no pairs at most lags.
+        there = np.zeros(length)
+        there[place] = 1.0
+        pairs = _products(there)[: lags + 1]
+        rho = rho * pairs[0] / np.maximum(pairs, 1.0)
     negative = np.flatnonzero(rho <= 0.0)
     rho[negative[0] if len(negative) else len(rho) :] = 0.0
     both = np.concatenate([rho, np.zeros(length - 2 * lags - 1), rho[:0:-1]])
@@ -246,17 +252,28 @@ def _means(
     # Each cell's own mean takes some of the scatter away.
     kept = 1.0 - float(count @ np.minimum(variance, 1.0)) / len(x)
     scatter = float(np.mean(left**2)) / max(kept, 0.1)
-    return mean, np.sqrt(scatter * variance), max(round(2.0 * float(rho.sum()) - 1.0), 1)
+    window = (2.0 * float(rho.sum()) - 1.0) * driving.mean_rate_hz / finest
+    return mean, np.sqrt(scatter * variance), max(round(window), 1)
 
 
-def _places(driving: Driving) -> tuple[FloatArray, int]:
-    """Places of the samples in one array in which stretches lie too far apart to correlate."""
-    gap = int(_LONGEST_S * driving.logs[0].rate_hz) + 1
+def _products(x: FloatArray) -> FloatArray:
+    """Sums of products of samples so many places apart."""
+    return as_float64(np.fft.irfft(np.abs(np.fft.rfft(x)) ** 2, len(x)))
+
+
+def _places(driving: Driving) -> tuple[npt.NDArray[np.intp], int]:
+    """Places of the samples in one array in which stretches lie too far apart to correlate.
+
+    Neighbours are as far apart as at the finest rate of all logs.
+    """
+    finest = float(driving.sample_rate_hz.max())
+    gap = int(_LONGEST_S * finest) + 1
     places, at = [], 0
     for s in driving.stretches:
         n = s.where.stop - s.where.start
-        places.append(np.arange(at, at + n))
-        at += n + gap
+        own = np.round(np.arange(n) * (finest / driving.logs[s.log].rate_hz)).astype(np.intp)
+        places.append(at + own)
+        at += int(own[-1]) + 1 + gap
     return np.concatenate(places), 1 << int(np.ceil(np.log2(at + gap)))
 
 
@@ -267,7 +284,7 @@ def _predicted(
 
     Blocks of some seconds are left out in turns; a cell that was hardly visited says little.
     """
-    block = int(_BLOCK_S * driving.logs[0].rate_hz)
+    block = int(_BLOCK_S * driving.mean_rate_hz)
     fold = (np.arange(len(x)) // max(min(block, len(x) // (2 * _FOLDS)), 1)) % _FOLDS
     both = cell * _FOLDS + fold
     size = cells * _FOLDS

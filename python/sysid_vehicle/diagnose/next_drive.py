@@ -300,7 +300,7 @@ def _driven(
     sensor = dict(zip(MEASURED, fit.noise.sensor, strict=True))
     steer = max(white_noise_std(log["steer_rad"]) for log in fit.driving.logs)
     noise = SensorNoise(**{n: float(s) for n, s in sensor.items()}, steer_rad=steer)
-    rate = fit.driving.logs[0].rate_hz
+    rate = max(fit.driving.logs, key=lambda log: log.duration_s).rate_hz
     try:
         drive = drive_truth(truth, manoeuvre, seed=seed, noise=noise, rate_hz=rate)
     except (NumericalError, InvalidInput):

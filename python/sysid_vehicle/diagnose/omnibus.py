@@ -16,6 +16,7 @@ from scipy.stats import chi2
 from .._arrays import FloatArray
 from ..estimate import Driving
 from ..identify import Fit
+from .coordinates import begins, late
 from .evidence import Evidence
 from .projection import pseudo_inverse, variance_ratio
 
@@ -117,14 +118,13 @@ def _virtual(evidence: Evidence) -> tuple[list[str], FloatArray, list[int]]:
     w = v / 20.0
     one = np.ones_like(v)
     shapes = [one, w**2, a, a**3, a * w**2, a**2, push, push * a, push * np.abs(a), push**2, r]
-    turn = steer - np.concatenate([steer[:1], steer[:-1]])
+    turn = steer - late(driving, steer)
+    turn[begins(driving)] = 0.0  # what lay between two stretches is no turn of the wheel
     shapes.append(turn / max(float(np.std(turn)), 1e-9))
     force = np.column_stack(shapes)
     few = np.column_stack([one, w**2, a, push])
     # Known one sample earlier; the first sample of a stretch knows nothing.
-    force, few = (np.vstack([np.zeros((1, m.shape[1])), m[:-1]]) for m in (force, few))
-    for t in (force, few):
-        t[np.flatnonzero(np.diff(driving.log_number)) + 1] = 0.0
+    force, few = late(driving, force), late(driving, few)
     names: list[str] = []
     targets: list[int] = []
     blocks: list[FloatArray] = []

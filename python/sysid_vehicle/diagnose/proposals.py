@@ -23,6 +23,7 @@ from .._arrays import FloatArray, as_float64
 from .._text import number
 from ..effects import Effect
 from ..user_effects import define_effect, parameter
+from .coordinates import blocks
 from .evidence import FORCES, READINGS, Evidence, Solution, solve
 from .grammar import Form, forms, unit_of_gain
 from .shape import known
@@ -266,9 +267,8 @@ def _on_held_out(
         predicted = held_out.fitted @ shift + there[:, :count] @ gains
         residuals.append(held_out.residual - predicted)
     fall = 0.5 * (residuals[0] ** 2 - residuals[1] ** 2)
-    channels = len(fall) // held_out.driving.samples
-    block = channels * int(_BLOCK_S * held_out.driving.logs[0].rate_hz)
-    sums = [float(fall[i : i + block].sum()) for i in range(0, len(fall), block)]
+    by_sample = fall.reshape(held_out.driving.samples, -1).sum(axis=1)
+    sums = np.add.reduceat(by_sample, blocks(held_out.driving, _BLOCK_S))
     return float(fall.sum()), float(np.std(sums) * np.sqrt(len(sums)))
 
 

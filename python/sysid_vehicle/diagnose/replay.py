@@ -112,7 +112,7 @@ class Replay:
             problem = self._driven(acting, sign, True)
         try:
             return self._fitted(problem)
-        except (_core.NumericalFailure, np.linalg.LinAlgError) as failure:
+        except (NumericalError, np.linalg.LinAlgError) as failure:
             raise NumericalError(f"the fit without it fails: {failure}") from failure
 
     def _fitted(self, problem: _core.Problem) -> FloatArray:

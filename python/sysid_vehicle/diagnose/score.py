@@ -23,6 +23,7 @@ from .._arrays import FloatArray, as_float64
 from ..effects import Effect
 from ..estimate import Driving
 from ..identify import Fit
+from .coordinates import blocks
 from .evidence import Evidence
 from .projection import long_run_ratios, pseudo_inverse, score_terms
 from .sensitivity import duration, sensitivities
@@ -202,8 +203,8 @@ def score_board_of(evidence: Evidence, candidates: tuple[Effect, ...]) -> ScoreB
 
 def _by_block(terms: FloatArray, driving: Driving) -> FloatArray:
     """Sums over blocks of half a second, or shorter ones where there would be too few."""
-    length = max(min(int(_BLOCK_S * driving.logs[0].rate_hz), len(terms) // _FEWEST_BLOCKS), 1)
-    return np.add.reduceat(terms, np.arange(0, len(terms), length), axis=0)
+    starts = blocks(driving, min(_BLOCK_S, driving.usable_s / _FEWEST_BLOCKS))
+    return as_float64(np.add.reduceat(terms, starts, axis=0))
 
 
 def _score(

@@ -7,36 +7,37 @@ so that what merely acted like one of them is told from what is missing too.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from .._text import html_table, number, with_error
-from ..effects import Effect, Parameter
+from ..effects import Effect
 from ..identify import Fit
 from .constancy import constancy
-from .diagnose import Diagnosis
+from .diagnosis import Diagnosis
+from .possible import Size, possible, sizes
 from .score import Score, score_board
 
-__all__ = ["EffectVerdict", "Finding", "Verdicts", "judge", "possible", "verdicts"]
+__all__ = ["EffectVerdict", "Finding", "Verdicts", "judge", "verdicts"]
 
-Finding = Literal["missing", "one of a group", "proxy", "negligible", "not testable", "absent"]
+Finding = Literal[
+    "missing", "one of a group", "open", "proxy", "negligible", "not testable", "absent"
+]
 
 _NAMED: tuple[Finding, ...] = ("missing", "one of a group")
 _ORDER: tuple[Finding, ...] = (
     "missing",
     "one of a group",
+    "open",
     "proxy",
     "negligible",
     "not testable",
     "absent",
 )
-_IMPOSSIBLE = 5.0  # typical sizes, beyond which no car is known
-_AT_BOUND = 1e-5  # of the width between the bounds
 _UPPER = 1.645  # 95 %, one side
-_CERTAIN = 1.96
 
 
 @dataclass(frozen=True)
@@ -47,14 +48,15 @@ class EffectVerdict:
     ----------
     effect : Effect
     finding : str
-        `missing`; `one of a group` of rivals that explain this driving as well; `proxy`, which acts
-        like something else; `negligible`; `absent`; or `not testable` with this data.
+        `missing`; `one of a group` of rivals that explain this driving as well; `open`, for which
+        there is evidence beside a missing one, but no refit yet; `proxy`, which acts like something
+        else; `negligible`; `absent`; or `not testable` with this data.
     value, std : tuple of float
         Parameters, predicted or refitted; empty where nothing is known of them.
     bound : tuple of float
         How far from nothing each parameter may be, at 95 %.
     group : tuple of str
-        The rivals, or what the proxy acted like.
+        The rivals, what the proxy acted like, or beside what there is evidence.
     because : str
         Of a proxy: what tells that it is not the effect itself.
     """
@@ -78,10 +80,12 @@ class EffectVerdict:
             return f"missing; {size}"
         if self.finding == "one of a group":
             return f"missing, or else {rivals}, which this driving cannot tell from it; {size}"
+        if self.finding == "open":
+            return f"evidence for it beside {rivals}; {size}; add {rivals} and diagnose again"
         if self.finding == "proxy" and rivals:
             return f"only acted like what {rivals} explain{'s' if len(self.group) == 1 else ''}"
         if self.finding == "proxy":
-            return f"something acts like it, but {self.because}: look elsewhere"
+            return f"something acts like it, but {self.because}"
         if self.finding == "negligible":
             return f"present but negligible; {size}; it would matter from {matters}"
         if self.finding == "absent":
@@ -176,11 +180,14 @@ def verdicts(dx: Diagnosis, *, seed: int = 0) -> Verdicts:
     -------
     Verdicts
     """
-    best = dx.ranking[0] if dx.significant else None
+    best = dx.named
     final = dx.fit if best is None or best.fit is None else best.fit
     groups = {} if best is None else {best.id: best.indistinguishable_from}
-    known = (dx.scores, dx.family) if final is dx.fit else None
-    return judge(
+    if final is dx.fit:
+        known = dx.scores, dx.family
+    else:
+        known = dx.beside.board.scores, dx.beside.board.family_p_values(seed=seed)
+    told = judge(
         final,
         scored=known,
         lacked={e.id for e in dx.fit.model.candidates},
@@ -188,7 +195,12 @@ def verdicts(dx: Diagnosis, *, seed: int = 0) -> Verdicts:
         acted={c.id for c in dx.significant},
         alpha=dx.alpha,
         seed=seed,
+        refitted=dx.sizes,
     )
+    if not dx.doubt:
+        return told
+    named = {v.effect.id for v in told.all if v.finding in _NAMED}
+    return told.doubting(named, dx.doubt, added=named)
 
 
 def judge(
@@ -200,6 +212,7 @@ def judge(
     alpha: float,
     seed: int = 0,
     scored: tuple[tuple[Score, ...], Mapping[str, float]] | None = None,
+    refitted: Mapping[str, Size] | None = None,
     settled: bool = False,
 ) -> Verdicts:
     """Judge every effect beside those of the final model.
@@ -220,6 +233,8 @@ def judge(
         Of the draws that correct for testing many effects.
     scored : (scores, p-values), optional
         Of what the final model lacks, where a diagnosis of it has them already.
+    refitted : mapping, optional
+        Of rivals, their parameters and standard errors in place of what they cannot be told from.
     settled : bool
         Whether everything worth adding was added. What there is still evidence for is then no
         explanation: with it, driving that no fit saw is not predicted better.
@@ -247,12 +262,17 @@ def judge(
             # A rival of what is itself a proxy, or negligible, is no better than that.
             instead = tuple(e for e in missing if effect.id in groups.get(e, ()))
             kind: Finding = "one of a group" if instead else "proxy"
-            verdict = EffectVerdict(
-                effect, kind, verdict.value, verdict.std, verdict.bound, group=instead or names
-            )
+            value, std = verdict.value, verdict.std
+            if instead and refitted is not None:
+                # Beside its rival it explains nothing: its size is that of the model without it.
+                value, std = refitted.get(effect.id, (value, std))
+            verdict = EffectVerdict(effect, kind, value, std, verdict.bound, group=instead or names)
         elif settled and verdict.finding == "missing":
             because = "with it, driving that no fit saw is predicted no better"
             verdict = replace(verdict, finding="proxy", because=because)
+        elif names and verdict.finding == "missing":
+            # Several may act like the same one that is missing too: only a refit tells.
+            verdict = replace(verdict, finding="open", group=names)
         found.append(verdict)
     found.sort(key=lambda v: (_ORDER.index(v.finding), family.get(v.effect.id, 0.0)))
     return Verdicts(tuple(found))
@@ -286,47 +306,9 @@ def _of_present(
         finding, group = "proxy", ()
         size = _listed(effect, [with_error(v, s) for v, s in zip(value, std, strict=True)])
         because = f"no car has such a value ({size})"
-    elif all(abs(d) + s < p.matters for p, d, s in _sizes(effect, value, std)):
+    elif all(abs(d) + s < p.matters for p, d, s in sizes(effect, value, std)):
         finding, group = "negligible", ()
     return EffectVerdict(effect, finding, value, std, _bound(effect, value, std), group, because)
-
-
-def possible(effect: Effect, value: Sequence[float], std: Sequence[float]) -> bool:
-    """Whether the 95 % intervals of an effect's parameters hold values that a car can have.
-
-    A search that ends at a bound other than nothing wanted more than any car has.
-
-    Parameters
-    ----------
-    effect : Effect
-    value, std : sequence of float
-        Of its parameters, in their order.
-
-    Returns
-    -------
-    bool
-    """
-    return not any(_impossible(p, d, s) for p, d, s in _sizes(effect, value, std))
-
-
-def _sizes(
-    effect: Effect, value: Sequence[float], std: Sequence[float]
-) -> list[tuple[Parameter, float, float]]:
-    """Parameters that have a size, how far each is from nothing, and the reach of its interval."""
-    return [
-        (p, v - p.null_value, _CERTAIN * s)
-        for p, v, s in zip(effect.parameters, value, std, strict=True)
-        if not p.scan
-    ]
-
-
-def _impossible(p: Parameter, off: float, reach: float) -> bool:
-    most = _IMPOSSIBLE * abs(p.typical - p.null_value)
-    low, high = max(p.lower - p.null_value, -most), min(p.upper - p.null_value, most)
-    if np.isinf(reach):
-        at = _AT_BOUND * (p.upper - p.lower)
-        return bool((low < 0.0 and off < low + at) or (high > 0.0 and off > high - at))
-    return bool(off + reach < low or off - reach > high)
 
 
 def _bound(effect: Effect, value: tuple[float, ...], std: tuple[float, ...]) -> tuple[float, ...]:

@@ -33,19 +33,27 @@ class Where:
         Of the missing force, the most telling first.
     steady : dict of str to tuple of float
         Mean of each missing force over all the driving, and its standard error.
-    change_points : tuple of ChangePoint
-        Moments at which the car changed, in their order.
+    change_points : tuple of ChangePoint or None
+        Moments at which the car changed, in their order; None where they were not sought.
     alpha : float
         Rate of change points claimed where the car stays the same.
     coherence : tuple of Coherence
         With the steering angle and the wheel force.
+    model : str
+        What fails, in words.
     """
 
     maps: tuple[ForceMap, ...]
     steady: dict[str, tuple[float, float]]
-    change_points: tuple[ChangePoint, ...]
+    change_points: tuple[ChangePoint, ...] | None
     alpha: float
     coherence: tuple[Coherence, ...]
+    model: str = "the model"
+
+    @property
+    def title(self) -> str:
+        """What the findings are about."""
+        return f"Where {self.model} fails"
 
     @property
     def best_pair(self) -> ForceMap:
@@ -71,15 +79,16 @@ class Where:
             for target, (mean, std) in self.steady.items()
             if abs(mean) > 3.0 * std
         ]
-        told += [str(c) for c in self.change_points] or ["no moment at which the car changed"]
+        if self.change_points is not None:
+            told += [str(c) for c in self.change_points] or ["no moment at which the car changed"]
         return (*told, *(str(c) for c in self.coherence))
 
     def __str__(self) -> str:
-        return "\n".join(["Where the model fails", *(f"  {line}" for line in self.lines)])
+        return "\n".join([self.title, *(f"  {line}" for line in self.lines)])
 
     def _repr_html_(self) -> str:
         items = "".join(f"<li>{escape(line)}</li>" for line in self.lines)
-        return f"<p>Where the model fails</p><ul>{items}</ul>"
+        return f"<p>{escape(self.title)}</p><ul>{items}</ul>"
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """The missing force over the most telling pair of coordinates."""
@@ -88,7 +97,7 @@ class Where:
     def plot_time(self, ax: Axes | None = None) -> Axes:
         """The missing force over time, and the moments at which the car changed."""
         ax = self.over_time.plot(ax)
-        for c in self.change_points:
+        for c in self.change_points or ():
             ax.axvline(c.driven_s, color="tab:red", lw=1.2)
             ax.annotate(
                 c.what,
@@ -102,15 +111,24 @@ class Where:
         return ax
 
     def to_dict(self) -> dict[str, Any]:
-        """The findings, ready for JSON."""
+        """The findings, ready for JSON; what was not sought is left out."""
         best = self.best_pair
-        return {
+        described = {
             "best_pair": {
                 "coordinates": list(best.coordinates),
                 "share": best.share,
                 "shares": best.shares,
             },
             "steady": {t: {"value": v, "std": s} for t, (v, s) in self.steady.items()},
+            "coherence": {
+                c.input: dict(zip(("channel", "frequency_hz", "coherence"), c.peak, strict=True))
+                | {"threshold": c.threshold}
+                for c in self.coherence
+            },
+        }
+        if self.change_points is None:
+            return described
+        return described | {
             "change_points": [
                 {
                     "log": c.log,
@@ -122,20 +140,7 @@ class Where:
                 }
                 for c in self.change_points
             ],
-            "delays": {
-                c.input: {
-                    "delay_s": c.delay.delay_s,
-                    "std_s": c.delay.std_s,
-                    "linear": c.delay.linear,
-                }
-                for c in self.coherence
-                if c.delay is not None
-            },
-            "coherence": {
-                c.input: dict(zip(("channel", "frequency_hz", "coherence"), c.peak, strict=True))
-                | {"threshold": c.threshold}
-                for c in self.coherence
-            },
+            "delays": {c.input: c.delay.to_dict() for c in self.coherence if c.delay is not None},
         }
 
 
@@ -145,6 +150,8 @@ def where(
     *,
     alpha: float = 0.01,
     seed: int = 0,
+    causes: bool = True,
+    name: str = "the model",
 ) -> Where:
     """Find where, when and at which frequencies a fitted model fails.
 
@@ -158,6 +165,11 @@ def where(
         Rate of change points claimed where the car stays the same.
     seed : int
         Of the draws that calibrate change points and delays.
+    causes : bool
+        Whether to seek change points and delays too. They are claims about the car, and a model
+        that is known to lack something else may feign them.
+    name : str
+        What to call the model in words.
     """
     driving = fit.driving if logs is None else Driving.of(logs)
     evidence = Evidence(fit, driving)
@@ -165,7 +177,8 @@ def where(
     return Where(
         maps,
         steady,
-        change_points(evidence, alpha=alpha, seed=seed),
+        change_points(evidence, alpha=alpha, seed=seed) if causes else None,
         alpha,
-        coherence(evidence, seed=seed),
+        coherence(evidence, delays=causes, seed=seed),
+        name,
     )

@@ -100,6 +100,21 @@ class Driving:
             y[:, MEASURED.index("ax_mps2")] = np.nan
         return y
 
+    @cached_property
+    def sample_rate_hz(self) -> FloatArray:
+        """For each sample, the rate of the log it comes from: separate runs may differ."""
+        return np.concatenate(
+            [
+                np.full(s.where.stop - s.where.start, self.logs[s.log].rate_hz)
+                for s in self.stretches
+            ]
+        )
+
+    @property
+    def mean_rate_hz(self) -> float:
+        """Usable samples per usable second."""
+        return self.samples / self.usable_s
+
     @property
     def samples(self) -> int:
         """Number of usable samples."""

@@ -15,6 +15,7 @@ from scipy.optimize import lsq_linear
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
+from ..errors import NumericalError
 from ..identify.search import Box
 from .likelihood import Likelihood
 
@@ -86,7 +87,7 @@ class _Valley:
         """None where the car spins in the model."""
         try:
             found = self.objective.residuals(self.full(x), self.gains)
-        except _core.NumericalFailure:
+        except NumericalError:
             return None
         return found if np.isfinite(found).all() else None
 

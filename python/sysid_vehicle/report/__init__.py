@@ -2,10 +2,11 @@
 
 from .figures import errors_by_step, evidence, failure_maps, overlay, residuals, sizes, tyre_curve
 from .tyres import TyreCurve, identified_curves, model_curves
-from .words import summary
+from .words import RANKING_HEAD, ranking_rows, ranking_title, summary
 from .write import write_report
 
 __all__ = [
+    "RANKING_HEAD",
     "TyreCurve",
     "errors_by_step",
     "evidence",
@@ -13,6 +14,8 @@ __all__ = [
     "identified_curves",
     "model_curves",
     "overlay",
+    "ranking_rows",
+    "ranking_title",
     "residuals",
     "sizes",
     "summary",

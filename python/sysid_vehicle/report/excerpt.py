@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import FloatArray
-from ..estimate import MEASURED, Driving
-from ..identify import Fit
-from ..study import Study
+from ..estimate import MEASURED
+from ..study import Study, look_ahead
 from .words import stages
 
 __all__ = ["Excerpt", "worst_excerpt"]
@@ -51,7 +50,7 @@ def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5)
     channels = tuple(c for c in _SHOWN if c in driving.present)
     columns = [MEASURED.index(c) for c in channels]
     errors = {
-        title: _errors(study.fits[i], study.fit, driving, horizon_s)[:, columns]
+        title: look_ahead(study.fits[i], study.fit.noise.floor(), driving, horizon_s)[:, columns]
         for title, i in stages(study)
     }
     measured = driving.measured[:, columns]
@@ -65,13 +64,12 @@ def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5)
         first = begin + round(horizon_s * log.rate_hz)
         end, begin = begin + n, begin + n
         width = min(int(seconds * log.rate_hz), end - first)
-        # So many samples ahead are the horizon only at the first log's rate.
-        if width < 2 or log.rate_hz != driving.logs[0].rate_hz:
+        if width < 2:
             continue
         total = np.convolve(badness[first:end], np.ones(width), "valid")
         at = first + int(np.argmax(total))
-        if best is None or total.max() > best[0]:
-            best = (float(total.max()), slice(at, at + width), log.name)
+        if best is None or total.max() / width > best[0]:
+            best = (float(total.max()) / width, slice(at, at + width), log.name)
     if best is None or not channels:
         return None
     _, where, name = best
@@ -83,10 +81,3 @@ def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5)
         measured[where],
         {title: e[where] for title, e in errors.items()},
     )
-
-
-def _errors(fit: Fit, judge: Fit, driving: Driving, horizon_s: float) -> FloatArray:
-    """Prediction errors that far ahead, samples x 5, by filters with the same noise for all."""
-    ahead = round(horizon_s * driving.logs[0].rate_hz)
-    problem = driving.problem(fit.model)
-    return problem.look_ahead(fit.model.vector(), judge.noise.floor().vector(), max(ahead, 1))

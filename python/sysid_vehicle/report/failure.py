@@ -11,24 +11,28 @@ __all__ = ["unknown", "where_and_when"]
 
 
 def where_and_when(study: Study, truth: Model | None) -> list[str]:
-    """Where, when and at which frequencies the baseline fails."""
-    found = study.where
+    """Where the baseline fails, and where, when and at which frequencies the final model does."""
+    final, baseline = study.where, study.where_baseline
     figure = new_figure(9.0, 6.4)
     axes = figure.subplots(2, 2)
-    found.plot(axes[0, 0])
-    found.plot_time(axes[0, 1])
-    found.coherence[0].plot(axes[1, 0])
-    found.coherence[0].plot_phase(axes[1, 1])
+    baseline.plot(axes[0, 0])
+    final.plot_time(axes[0, 1])
+    baseline.coherence[0].plot(axes[1, 0])
+    final.coherence[0].plot_phase(axes[1, 1])
+    parts = [heading("Where, when and how fast the model fails")]
+    for title, lines in study.where_lines:
+        parts += [heading(title, 3), bullets(f"{line[0].upper()}{line[1:]}." for line in lines)]
+    whose = "the final model" if study.added else "the baseline"
     return [
-        heading("Where, when and how fast the baseline fails"),
-        bullets(f"{line[0].upper()}{line[1:]}." for line in found.lines),
+        *parts,
         picture(
             figure,
-            "Above: the force that the model lacks, over the pair of coordinates that predicts "
-            "most of it on driving it was not made from (grey: hardly any driving; dots: beyond "
-            "two standard errors), and over the time driven with 95 % intervals; red lines are "
-            "moments at which the car changed. Below: how far the residuals follow the steering, "
-            "by frequency, and by what phase the car lags the model; a delay is a straight line.",
+            "Left, of the baseline: the force that it lacks, over the pair of coordinates that "
+            "predicts most of it on driving it was not made from (grey: hardly any driving; dots: "
+            "beyond two standard errors), and how far its residuals follow the steering, by "
+            f"frequency. Right, of {whose}: the force that it lacks over the time driven with 95 % "
+            "intervals (red lines are moments at which the car changed), and by what phase the car "
+            "lags it; a delay is a straight line.",
         ),
     ]
 

@@ -34,7 +34,7 @@ _WIDE_RANGE = 8.0  # largest over smallest error that still reads well on a line
 def errors_by_step(study: Study, ax: Axes | None = None) -> Axes:
     """Draw held-out errors by step as bars, training errors as marks, and the noise floor."""
     ax = axes_or_new(ax, 7.0, 3.0)
-    labels = ["baseline", *(f"+ {a.id}" for a in study.added)]
+    labels = list(study.steps)
     held_out = [c.error for c in study.test]
     train = [c.error for c in study.train]
     at = np.arange(len(held_out))

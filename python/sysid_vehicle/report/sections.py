@@ -70,12 +70,13 @@ def _where(study: Study, truth: Model | None) -> list[str]:
         ),
     ]
     if first.regions:
-        parts.append(paragraph("The baseline fails most at"))
+        parts.append(paragraph("The error of the baseline is largest at"))
         parts.append(bullets(str(r) for r in first.regions))
     return parts
 
 
 def _which(study: Study, truth: Model | None) -> list[str]:
+    whose = "final" if study.added else "fitted"
     parts = [heading("Which effect is missing")]
     for i, dx in enumerate(study.diagnoses):
         if len(study.diagnoses) > 1:
@@ -94,14 +95,16 @@ def _which(study: Study, truth: Model | None) -> list[str]:
                 f"Evidence for each effect; {n} of {len(dx.ranking)} significant at {dx.alpha:g} "
                 "over all of them together.",
             ),
-            table(RANKING_HEAD, _with_minus_signs(ranking_rows(dx)), "ranking"),
+            table(RANKING_HEAD, _with_minus_signs(ranking_rows(study, i)), "ranking"),
         ]
     parts.append(
         paragraph(
             "Each candidate was refitted or scored as if it alone were missing, so sizes of rivals "
-            "are not to be added up. 'error with it' is the error that would remain, in units of "
-            "what the noise of the model without it expects; 'cannot tell from' names effects that "
-            "would explain this driving as well."
+            "are not to be added up. 'held-out error with it' is the one-step-ahead error on the "
+            "held-out driving of the model with that effect, refitted to the driving of the fit, "
+            f"in units of the noise floor of the {whose} model; where there is none nothing was "
+            "refitted. 'cannot tell from' names effects that would explain the driving of the fit "
+            "as well."
         )
     )
     return parts
@@ -113,9 +116,11 @@ def _verdicts(study: Study, truth: Model | None) -> list[str]:
         heading("A verdict for every effect"),
         table(("effect", "verdict", "in words"), rows, "verdicts"),
         paragraph(
-            "Each is judged beside the effects that were added. 'proxy': it acted like one of "
-            "them, or no car has such a value. 'absent': it can be no larger than stated. 'not "
-            "testable': this driving could hide one large enough to matter."
+            "Each is judged beside the effects that were added. 'one of a group': it or another of "
+            "the group is missing, and this driving cannot tell which. 'proxy': it acts like "
+            "something that is missing, but is not that itself, for the reason stated. 'absent': "
+            "it can be no larger than stated. 'not testable': this driving could hide one large "
+            "enough to matter."
         ),
     ]
     biases = bias_report(study.fit).biases[:5]

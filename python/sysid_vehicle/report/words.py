@@ -5,22 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from .._text import number
-from ..diagnose import Diagnosis
 from ..identify import Estimate
 from ..study import AddedEffect, Study
 
 __all__ = [
     "RANKING_HEAD",
     "effect_found",
+    "errors",
     "interval",
     "quantity",
     "ranking_rows",
+    "ranking_title",
     "stages",
     "summary",
     "unit",
 ]
 
-RANKING_HEAD = ("effect", "statistic", "p", "error with it", "size", "cannot tell from")
+RANKING_HEAD = ("effect", "statistic", "p", "held-out error with it", "size", "cannot tell from")
 
 
 def unit(name: str) -> str:
@@ -47,7 +48,7 @@ def effect_found(added: AddedEffect) -> str:
         f"{e.name.split('.')[1]} = {quantity(e.value)}{unit(e.unit)} (95 %: {interval(e)})"
         for e in added.parameters
     )
-    return f"{added.id}: {sizes}"
+    return f"{added.id}: {sizes}" + (f"; {added.reserve}" if added.reserve else "")
 
 
 def stages(study: Study) -> list[tuple[str, int]]:
@@ -66,24 +67,44 @@ def summary(study: Study) -> tuple[str, str, str]:
         what = f"There is evidence for {names}, but none of them holds on held-out driving."
     else:
         what = "No effect was added: there is evidence for none of the catalogue."
-    before, after = study.test[0].error, study.test[-1].error
-    if study.added:
-        error = (
-            f"On driving the fit never saw, the one-step-ahead error fell from {before:.2f} to "
-            f"{after:.2f} times the noise floor."
-        )
-    else:
-        error = (
-            f"On driving the fit never saw, the one-step-ahead error is {before:.2f} times the "
-            "noise floor."
-        )
+    error = f"On driving the fit never saw, the one-step-ahead error {errors(study)}."
     return verdict, what, error
 
 
-def ranking_rows(diagnosis: Diagnosis, most: int = 10) -> list[list[str]]:
-    """Print the first rows of a ranking, under `RANKING_HEAD`."""
+def errors(study: Study) -> str:
+    """Say how the held-out error changed, as a predicate."""
+    before, after = (f"{study.test[i].error:.2f}" for i in (0, -1))
+    if not study.added:
+        return f"is {before} times the noise floor"
+    if before == after:
+        return f"stayed at {before} times the noise floor"
+    fell = study.test[-1].error < study.test[0].error
+    return f"{'fell' if fell else 'rose'} from {before} to {after} times the noise floor"
+
+
+def ranking_title(study: Study) -> str:
+    """Say what leads the ranking of the baseline, no surer of it than the verdict is."""
+    dx = study.diagnoses[0]
+    if not dx.significant:
+        return f"There is evidence for no effect of the catalogue; {dx.omnibus}."
+    named = [
+        a for a in study.added if not a.stands_in and study.verdicts[a.id].finding != "negligible"
+    ]
+    leading = next((a for c in dx.significant for a in named if a.id == c.id), None)
+    if leading is None:
+        best = dx.significant[0].effect
+        return f"What fits best, but is not named as missing: {best.title} ({best.id})."
+    title = study.verdicts[leading.id].effect.title
+    others = ", ".join(leading.confounded_with)
+    beside = f", or else {others}, which this driving cannot tell from it" if others else ""
+    return f"most likely missing: {title} ({leading.id}){beside}"
+
+
+def ranking_rows(study: Study, which: int = 0, most: int = 10) -> list[list[str]]:
+    """Print the first rows of the ranking of one diagnosis, under `RANKING_HEAD`."""
     rows = []
-    for c in diagnosis.ranking[:most]:
+    known = study.errors_with[which]
+    for c in study.diagnoses[which].ranking[:most]:
         size = ", ".join(
             f"{p.name} {number(v, 3)} ± {number(s, 2)}{unit(p.unit)}"
             for p, v, s in zip(c.effect.parameters, c.value, c.std, strict=True)
@@ -94,7 +115,7 @@ def ranking_rows(diagnosis: Diagnosis, most: int = 10) -> list[list[str]]:
                 c.id,
                 f"{c.statistic:.1f}",
                 f"{c.p_value:.2g}",
-                f"{c.predicted_error:.3f}",
+                f"{known[c.id][1]:.3f}" if c.id in known else "-",
                 size,
                 twins,
             ]

@@ -1,7 +1,8 @@
 """Studies: the whole loop from a log to a better model."""
 
+from .added import AddedEffect
 from .improve import improve
-from .study import AddedEffect, Study, Verdict
-from .waterfall import Waterfall
+from .study import Study, Verdict
+from .waterfall import Waterfall, look_ahead
 
-__all__ = ["AddedEffect", "Study", "Verdict", "Waterfall", "improve"]
+__all__ = ["AddedEffect", "Study", "Verdict", "Waterfall", "improve", "look_ahead"]

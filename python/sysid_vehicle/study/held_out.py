@@ -9,12 +9,14 @@ from functools import lru_cache
 import numpy as np
 
 from .._arrays import FloatArray
+from ..diagnose import blocks
 from ..errors import InvalidInput, NumericalError, warn
 from ..estimate import Driving
 from ..identify import Fit, Prediction, predict
 from ..log import Log
 
 __all__ = [
+    "BEYOND",
     "as_sure",
     "error_falls",
     "fall_in_error",
@@ -24,6 +26,7 @@ __all__ = [
     "share_explained",
 ]
 
+BEYOND = 1e-4  # evidence of something left there: tyres known only in part go on otherwise
 _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6
 
@@ -123,9 +126,8 @@ def _with_error(difference: FloatArray, test: Driving) -> tuple[float, float]:
     They are of one length, or a steady gain would seem unsteady: 5 s, by when what disturbs a car
     is another thing, and less where the driving is short, as few pieces tell nothing of scatter.
     """
-    n = len(difference)
-    pieces = max(round(n / (_PIECE_S * test.logs[0].rate_hz)), _FEWEST_PIECES)
-    sums = [piece.sum() for piece in np.array_split(difference, min(pieces, n))]
+    pieces = max(round(test.usable_s / _PIECE_S), _FEWEST_PIECES)
+    sums = np.add.reduceat(difference, blocks(test, test.usable_s / pieces))
     return float(np.sum(difference)), float(np.std(sums, ddof=1) * np.sqrt(len(sums)))
 
 

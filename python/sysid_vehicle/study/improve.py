@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
 from ..compare import Comparison, compare
-from ..diagnose import (
-    considered,
-    judge,
-    omnibus,
-)
-from ..errors import InvalidInput, warn
+from ..diagnose import Verdicts, considered, judge, omnibus
+from ..errors import InvalidInput, SysidWarning, warn
 from ..estimate import Driving
 from ..identify import Fit, identify
-from ..log import Log
+from ..log import Log, check_excitation
 from ..model import Model
+from .added import AddedEffect
 from .held_out import hold_out, serving
-from .search import Search
+from .search import Search, Trail
 from .steps import way
-from .study import AddedEffect, Study
+from .study import Study
 from .verdict import SURE, Left, verdict_on
 
 __all__ = ["improve"]
@@ -97,6 +95,7 @@ def improve(
         any(c.p_value < SURE for c in last.significant)
         if len(fits) > 1
         else bool(last.significant),
+        _excited(train_driving),
     )
     told = judge(
         fit,
@@ -106,6 +105,7 @@ def improve(
         acted={c.id for dx in diagnoses for c in dx.significant},
         alpha=alpha,
         seed=seed,
+        refitted=found.sizes,
         settled=True,
     )
     verdict, told = verdict_on(fits, told, on_train, left)
@@ -116,7 +116,7 @@ def improve(
         train=tuple(on_train),
         test=tuple(on_test),
         held_out=test_driving,
-        added=_added(fits, on_test, found.p_values),
+        added=_added(fits, on_test, found, told),
         omnibus=left.fitted,
         omnibus_held_out=left.held_out,
         verdicts=told,
@@ -125,12 +125,18 @@ def improve(
     )
 
 
+def _excited(driving: Driving) -> bool:
+    with catch_warnings():
+        simplefilter("ignore", SysidWarning)  # reading the logs has warned of it
+        return check_excitation(driving.logs)
+
+
 def _silent(_: str) -> None:
     pass
 
 
 def _added(
-    fits: list[Fit], on_test: list[Comparison], p_values: dict[str, float]
+    fits: list[Fit], on_test: list[Comparison], found: Trail, told: Verdicts
 ) -> tuple[AddedEffect, ...]:
     added = []
     final = fits[-1]
@@ -140,8 +146,17 @@ def _added(
         new = [e for e in fit_after.model.effects if e not in fit_before.model.effects]
         for name in new:
             estimates = tuple(e for e in final.estimates if e.name.startswith(f"{name}."))
+            group = set(found.rivals.get(name, ())) - set(final.model.effects)
             added.append(
-                AddedEffect(name, estimates, before.error, after.error, p_values.get(name, np.nan))
+                AddedEffect(
+                    name,
+                    estimates,
+                    before.error,
+                    after.error,
+                    found.p_values.get(name, np.nan),
+                    tuple(e for e in found.rivals.get(name, ()) if e in group),
+                    told[name].because if told[name].finding == "proxy" else "",
+                )
             )
     return tuple(added)
 

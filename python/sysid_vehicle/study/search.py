@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from ..diagnose import Candidate, Diagnosis, diagnose, omnibus
+from ..diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
 from ..estimate import Driving
 from ..identify import Fit
 from .steps import alternatives, exchanged, first_that_holds, likeliest
@@ -29,6 +29,8 @@ class Trail:
         By effect that was chosen or nearly chosen, what the driving could not tell from it.
     nearly : dict
         By effect, what was nearly chosen in its place.
+    sizes : dict
+        Parameters of rivals and their standard errors, each refitted in place of what was chosen.
     """
 
     fits: list[Fit]
@@ -36,6 +38,7 @@ class Trail:
     p_values: dict[str, float] = field(default_factory=dict)
     rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     nearly: dict[str, tuple[Candidate, ...]] = field(default_factory=dict)
+    sizes: dict[str, Size] = field(default_factory=dict)
 
     @property
     def fit(self) -> Fit:
@@ -51,6 +54,7 @@ class Trail:
             self.nearly.setdefault(c.id, alternatives(dx, c))
             self.rivals.setdefault(c.id, c.indistinguishable_from)
         self.rivals[chosen.id] = chosen.indistinguishable_from
+        self.sizes |= dx.sizes
 
 
 @dataclass(frozen=True)

@@ -5,65 +5,48 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import Any, Literal
 
 from .._files import write_json
-from .._text import html_table, text_table, with_error
+from .._text import html_table, text_table
 from ..compare import Comparison
 from ..diagnose import (
-    Candidate,
+    INPUTS,
+    Delay,
     Diagnosis,
-    EffectVerdict,
+    Evidence,
     Omnibus,
     Unknown,
     Verdicts,
     Where,
+    coherence,
     unknown,
     where,
 )
 from ..estimate import Driving
-from ..identify import Estimate, Fit
+from ..identify import Fit, refine
 from ..model import Model
+from .added import AddedEffect
+from .held_out import BEYOND
+from .record import record
 from .waterfall import Waterfall, waterfall
 
 __all__ = ["AddedEffect", "Study", "Verdict"]
 
-Verdict = Literal["adequate", "explained", "partly_explained", "unknown"]
+Verdict = Literal["adequate", "explained", "partly_explained", "unknown", "not_testable"]
 
 _MEANING = {
     "adequate": "nothing is missing that this driving can show",
     "explained": "the effects found explain all that depends on the driving",
     "partly_explained": "the effects found explain part of it; something else is missing",
     "unknown": "something is missing and no effect of the catalogue explains it",
+    "not_testable": (
+        "this driving does not excite the lateral motion, and shows next to nothing of tyres, "
+        "steering and load transfer; drive corners, steps and sweeps of the steering"
+    ),
 }
-
-
-@dataclass(frozen=True)
-class AddedEffect:
-    """An effect that was added.
-
-    Attributes
-    ----------
-    parameters : tuple of Estimate
-        In the final model.
-    error_before, error_after : float
-        On the held-out driving, in units of the noise floor.
-    p_value : float
-        Of the model without it being complete.
-    """
-
-    id: str
-    parameters: tuple[Estimate, ...]
-    error_before: float
-    error_after: float
-    p_value: float
-
-    def __str__(self) -> str:
-        size = ", ".join(
-            f"{e.name.split('.')[1]} {with_error(e.value, e.std)} {e.unit}" for e in self.parameters
-        )
-        return f"{self.id}: {size}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +56,7 @@ class Study:
     Attributes
     ----------
     verdict : str
-        `adequate`, `explained`, `partly_explained` or `unknown`.
+        `adequate`, `explained`, `partly_explained`, `unknown` or `not_testable`.
     fits : tuple of Fit
         The baseline, then one for each effect added.
     diagnoses : tuple of Diagnosis
@@ -123,12 +106,76 @@ class Study:
     @property
     def steps(self) -> tuple[str, ...]:
         """The baseline and what was added, in order."""
-        return ("baseline", *(f"+ {a.id}" for a in self.added))
+        return ("baseline", *(f"+ {a.name}" for a in self.added))
 
     @cached_property
     def where(self) -> Where:
-        """Where, when and at which frequencies the baseline fails; some seconds at first."""
-        return where(self.fits[0])
+        """Where, when and at which frequencies the final model fails; some seconds at first."""
+        return where(self.fit, name=self._named(self.fit))
+
+    @cached_property
+    def where_baseline(self) -> Where:
+        """The same of the baseline; some seconds at first.
+
+        Where it was found to lack effects, these feign delays and changes of the car, which are
+        then not sought: the final model tells.
+        """
+        if len(self.fits) == 1:
+            return self.where
+        return where(self.fits[0], causes=False, name=self._named(self.fits[0]))
+
+    @cached_property
+    def errors_with(self) -> tuple[dict[str, tuple[float, float]], ...]:
+        """Errors with each effect that a diagnosis refitted, in training and held out.
+
+        One step ahead, against the noise floor of the final model, as `train` and `test` are. A
+        dictionary by effect for each diagnosis; some seconds at first.
+        """
+        floor = self.fit.noise
+        found = []
+        for dx in self.diagnoses:
+            train = dx.errors_on(self.fit.driving, floor)
+            test = dx.errors_on(self.held_out, floor)
+            found.append({e: (train[e], test[e]) for e in train})
+        return tuple(found)
+
+    @cached_property
+    def late(self) -> dict[str, Delay]:
+        """How late the car answers each input, where effects of the final model delay it.
+
+        Compared with the final model without them, all else fitted anew. By input, `steer` and
+        `force`; empty where no effect that was added delays anything.
+        """
+        lags = {e.id for e in self.model.parts if e.scored_at_typical}
+        lags &= {a.id for a in self.added}
+        if not lags:
+            return {}
+        model = self.model
+        for name in lags:
+            model = model.drop(name)
+        prompt = refine(model, self.fit.driving, self.fit.noise)
+        found = coherence(Evidence(prompt, prompt.driving))
+        return {c.input: c.delay for c in found if c.delay is not None and c.delay.significant}
+
+    @property
+    def where_lines(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """Where the baseline and the final model fail: a title and sentences of each."""
+        final = self.where.lines
+        lags = ", ".join(e.id for e in self.model.parts if e.scored_at_typical)
+        final += tuple(
+            d.answers(f"the model without {lags}", f"the {INPUTS[name]}")
+            for name, d in self.late.items()
+        )
+        told = ((self.where.title, final),)
+        if len(self.fits) == 1:
+            return told
+        return ((self.where_baseline.title, self.where_baseline.lines), *told)
+
+    def _named(self, fit: Fit) -> str:
+        if len(self.fits) == 1:
+            return "the baseline"
+        added = [e for e in fit.model.effects if e not in self.fits[0].model.effects]
+        return f"the final model (with {', '.join(added)})" if added else "the baseline"
 
     @cached_property
     def unknown(self) -> Unknown | None:
@@ -143,7 +190,7 @@ class Study:
     def with_warnings(self, warnings: Sequence[str]) -> Study:
         """The same study with these warnings; what it has worked out so far it keeps."""
         other = replace(self, warnings=tuple(warnings))
-        for slow in ("where", "unknown"):
+        for slow in ("where", "where_baseline", "late", "errors_with", "unknown"):
             if slow in self.__dict__:
                 other.__dict__[slow] = self.__dict__[slow]
         return other
@@ -184,49 +231,37 @@ class Study:
     def in_the_end(self) -> str:
         """What is left on the driving of the fit, and on the other, in words."""
         said = f"In the end: {self.omnibus}."
-        if self.omnibus_held_out is not None:
-            said += f" On the held-out driving: {self.omnibus_held_out}."
+        beyond = self.omnibus_held_out
+        more = beyond is not None and beyond.p_value < BEYOND
+        if beyond is not None and beyond.rejects and not more:
+            said += (
+                " On the held-out driving: no more than parameters may leave that the fit knows "
+                f"only in part (p = {beyond.p_value:.2g})."
+            )
+        elif beyond is not None:
+            said += f" On the held-out driving: {beyond}."
+        if self.train[-1].unrelated:
+            wrong = "; ".join(self.train[-1].unrelated.values())
+            return f"{said} Something else is wrong: {wrong}."
+        if self.verdict not in ("unknown", "partly_explained") or more or self.omnibus.rejects:
+            return said
+        # Nothing is left, yet something is missing: what took it up is not what is missing.
+        stand_ins = [a.id for a in self.added if a.stands_in]
+        if stand_ins:
+            said += f" What is missing was taken up by stand-ins: {', '.join(stand_ins)}."
+        elif not self.added and self.diagnoses[-1].significant:
+            some = ", ".join(c.id for c in self.diagnoses[-1].significant[:3])
+            said += f" There is evidence for {some}, which predict held-out driving no better."
         return said
 
     def _repr_html_(self) -> str:
-        effects = "".join(f"<li>{a}</li>" for a in self.added)
-        return f"<p><b>{self.verdict}</b>: {self.meaning}.</p><ul>{effects}</ul>" + html_table(
-            self._HEAD, self._rows()
-        )
+        effects = "".join(f"<li>{escape(str(a))}</li>" for a in self.added)
+        said = f"<p><b>{self.verdict}</b>: {self.meaning}.</p><ul>{effects}</ul>"
+        return f"{said}{html_table(self._HEAD, self._rows())}<p>{escape(self.in_the_end)}</p>"
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""
-        return {
-            "verdict": self.verdict,
-            "effects": [_effect(a) for a in self.added],
-            "ranking": [_candidate(c, self.verdicts[c.id]) for c in self.diagnoses[0].ranking],
-            "verdicts": self.verdicts.to_dict(),
-            "channels": {
-                "before": {"train": _channels(self.train[0]), "test": _channels(self.test[0])},
-                "after": {"train": _channels(self.train[-1]), "test": _channels(self.test[-1])},
-            },
-            "regions": [
-                {
-                    "speed_mps": list(r.speed_mps),
-                    "lateral_acceleration_mps2": list(r.lateral_mps2),
-                    "share": r.share,
-                }
-                for r in self.test[0].regions
-            ],
-            "where": self.where.to_dict(),
-            "unknown": {
-                "p_value": self.omnibus.p_value,
-                "strongest": self.omnibus.strongest,
-                **_held_out(self.omnibus_held_out),
-                **({} if self.unknown is None else self.unknown.to_dict()),
-            },
-            "errors": {
-                "train": [c.error for c in self.train],
-                "test": [c.error for c in self.test],
-            },
-            "parameters": {e.name: e.to_dict() for e in (*self.fit.estimates, *self.fit.derived)},
-            "warnings": list(self.warnings),
-        }
+        return record(self)
 
     def to_json(self, path: str | Path) -> None:
         """Write all figures to a JSON file, whole or not at all."""
@@ -238,44 +273,3 @@ class Study:
         from ..report import write_report
 
         write_report(self, Path(path))
-
-
-def _held_out(o: Omnibus | None) -> dict[str, Any]:
-    if o is None:
-        return {}
-    return {"held_out": {"p_value": o.p_value, "strongest": o.strongest}}
-
-
-def _effect(a: AddedEffect) -> dict[str, Any]:
-    return {
-        "id": a.id,
-        "parameters": {e.name.split(".")[1]: e.to_dict() for e in a.parameters},
-        "error_before": a.error_before,
-        "error_after": a.error_after,
-        "p_value": a.p_value,
-    }
-
-
-def _candidate(c: Candidate, verdict: EffectVerdict) -> dict[str, Any]:
-    return {
-        "id": c.id,
-        "status": verdict.finding,
-        "bound": list(verdict.bound),
-        "group": list(verdict.group),
-        "retained": c.retained,
-        "statistic": c.statistic,
-        "p_value": c.p_value,
-        "predicted_error": c.predicted_error,
-        "indistinguishable_from": list(c.indistinguishable_from),
-        "parameters": {
-            p.name: {"value": v, "std": s, "unit": p.unit}
-            for p, v, s in zip(c.effect.parameters, c.value, c.std, strict=True)
-        },
-    }
-
-
-def _channels(c: Comparison) -> dict[str, Any]:
-    return {
-        name: {"rmse": s.rmse, "noise_floor": s.noise_floor, "nrmse": s.nrmse, "r2": s.r2}
-        for name, s in c.channels.items()
-    }

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from ..compare import Comparison
 from ..diagnose import Omnibus, Verdicts
 from ..identify import Fit
-from .held_out import share_explained
+from .held_out import BEYOND, share_explained
 from .study import Verdict
 
 __all__ = ["SURE", "Left", "verdict_on"]
@@ -22,7 +22,6 @@ SURE = 0.01  # evidence of one effect more: at 5 % it would spoil one complete m
 _MOST = 0.9  # share of what is missing: stand-ins take up four fifths and more of it
 _REMAINS = 0.6  # of the evidence: right ones beside others leave less than half, stand-ins most
 _LEFT = 1e-3  # evidence of something left, beside which an effect alone is not what is missing
-_BEYOND = 1e-4  # the same on held-out driving: tyres known only in part go on otherwise there
 
 
 @dataclass(frozen=True)
@@ -36,12 +35,15 @@ class Left:
         the fit or on held-out driving; the latter is not asked where nothing was added.
     candidates : bool
         Whether there is evidence of an effect, or beyond doubt (`SURE`) of one effect more.
+    excited : bool
+        Whether the driving of the fit excites the lateral motion.
     """
 
     before: Omnibus
     fitted: Omnibus
     held_out: Omnibus | None = None
     candidates: bool = False
+    excited: bool = True
 
     @property
     def nothing(self) -> bool:
@@ -61,7 +63,7 @@ class Left:
 
     @property
     def _beyond(self) -> bool:
-        return self.held_out is not None and self.held_out.p_value < _BEYOND
+        return self.held_out is not None and self.held_out.p_value < BEYOND
 
 
 def _excess(o: Omnibus) -> float:
@@ -92,7 +94,14 @@ def verdict_on(
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
     # An uneven road or a coloured sensor keeps the error of the true car above its noise floor:
     # what does not depend on the driving is no effect's to explain.
+    wrong = on_train[-1].unrelated
+    if wrong:
+        # Readings that contradict each other leave no name safe.
+        return "unknown", told.doubting(added, "; ".join(wrong.values()), added=added)
     if not added:
+        # Tyres that never met a slip angle are free, and leave chance evidence of effects.
+        if not left.excited and not left.fitted.rejects:
+            return "not_testable", told
         return ("adequate" if left.nothing else "unknown"), told
     stand_ins = _proxies(told, added)
     share = share_explained(on_train[0].error, on_train[-1].error)

@@ -19,7 +19,7 @@ from ..identify import Fit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Waterfall", "waterfall"]
+__all__ = ["Waterfall", "look_ahead", "waterfall"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,15 +115,43 @@ def waterfall(
     return Waterfall(tuple(steps), horizons, errors(*train), errors(*test))
 
 
+def look_ahead(
+    fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float, *, apart: float = 0.0
+) -> FloatArray:
+    """Prediction errors so many seconds ahead, at the rate of each log, but one sample at least.
+
+    Parameters
+    ----------
+    fit : Fit
+    noise : NoiseModel
+        Of the filter that tells what was known when a prediction begins.
+    driving : Driving
+    horizon_s : float
+    apart : float
+        How far predictions begin apart, as a share of the horizon; 0 for one at each sample.
+
+    Returns
+    -------
+    array, shape (samples, 5)
+        NaN where no prediction ends.
+    """
+    problem = driving.problem(fit.model)
+    errors = np.full((driving.samples, len(MEASURED)), np.nan)
+    for rate in np.unique(driving.sample_rate_hz):
+        ahead = max(round(horizon_s * rate), 1)
+        own = driving.sample_rate_hz == rate
+        every = max(int(apart * ahead), 1)
+        found = problem.look_ahead(fit.model.vector(), noise.vector(), ahead, every)
+        errors[own] = found[own]
+    return errors
+
+
 def _error(
     fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float, spread: FloatArray
 ) -> float:
-    ahead = max(round(horizon_s * driving.logs[0].rate_hz), 1)
-    problem = driving.problem(fit.model)
     try:
         # Predictions that begin a twentieth of their length apart are wrong alike.
-        every = max(ahead // 20, 1)
-        e = problem.look_ahead(fit.model.vector(), noise.vector(), ahead, every) / spread
+        e = look_ahead(fit, noise, driving, horizon_s, apart=0.05) / spread
     except NumericalError:
         return float("inf")
     e = np.where(np.isfinite(driving.measured), e, np.nan)

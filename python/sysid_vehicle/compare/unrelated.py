@@ -1,0 +1,68 @@
+"""Channels that contradict the others: no effect of a car explains them.
+
+A noise model learns whatever spread the prediction errors have, so that normalised errors never
+look gross. What tells is the channel's own variance: readings that the other channels predict
+worse than their own mean does have nothing to do with them, and readings that follow the
+prediction at another scale are in another unit, or turned round.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import FloatArray
+from .._text import number
+from ..estimate import MEASURED, Driving
+from ..estimate.inputs import white_noise_std
+
+__all__ = ["unrelated"]
+
+_IGNORANT = 2.0  # times the usual spread
+_WORSE = 1.1  # of the channel's variance: a prediction that errs more is worse than the mean
+_FELT = 0.1  # of the channel's variance, which a prediction must have to be called one
+_SIGNAL = 0.5  # of the variance of a prediction: the rest is white noise
+_ALIKE = 0.5  # square of the correlation, beyond which readings follow their prediction
+_SCALES = (0.5, 2.0)
+
+
+def unrelated(driving: Driving, innovation: FloatArray, spread: FloatArray) -> dict[str, str]:
+    """Find the channels that contradict the others, and say how.
+
+    Parameters
+    ----------
+    driving : Driving
+    innovation : array, shape (samples, 5)
+        Of a model with noise of its own: measurement less prediction.
+    spread : array, shape (samples, 5)
+        Expected standard deviation of that. Where it is large the filter knows nothing yet.
+
+    Returns
+    -------
+    dict of str to str
+        A sentence for each such channel, the worst first.
+    """
+    found: list[tuple[float, str, str]] = []
+    for i, name in enumerate(MEASURED):
+        y, e = driving.measured[:, i], innovation[:, i]
+        there = np.isfinite(y) & np.isfinite(e)
+        if there.any():
+            there &= spread[:, i] < _IGNORANT * np.median(spread[there, i])
+        if np.count_nonzero(there) < 3:
+            continue
+        y, e = y[there], e[there]
+        predicted = y - e
+        own, missed = float(np.var(y)), float(np.mean(e**2))
+        # Where a channel hardly moves its prediction is noise of the other sensors.
+        felt = float(np.var(predicted)) - white_noise_std(predicted) ** 2
+        if own <= 0.0 or felt <= _SIGNAL * float(np.var(predicted)):
+            continue
+        slope = float(np.mean((y - y.mean()) * (predicted - predicted.mean()))) / felt
+        alike = slope**2 * felt / own
+        scaled = not _SCALES[0] < slope < _SCALES[1]
+        if alike > _ALIKE and scaled and missed > _FELT * min(own, felt):
+            told = f"{name}: reads {number(slope, 4)} times what the other channels predict"
+            found.append((missed / own, name, f"{told}; check its unit and sign"))
+        elif missed > _WORSE * own and felt > _FELT * own:
+            told = f"{name}: the other channels predict it worse than its own mean does"
+            found.append((missed / own, name, f"{told}; check what the column holds"))
+    return {name: text for _, name, text in sorted(found, reverse=True)}

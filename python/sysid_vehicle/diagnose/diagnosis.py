@@ -1,0 +1,265 @@
+"""What a diagnosis found: a ranking, and what may be named as the cause."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .._text import html_table, text_table, with_error
+from ..compare import compare
+from ..effects import Effect
+from ..errors import InvalidInput, NumericalError
+from ..estimate import Driving, NoiseModel
+from ..identify import Fit
+from .doubt import Beside, beside, confirmed, doubt
+from .omnibus import Omnibus
+from .possible import Size, possible
+from .score import Score
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["Candidate", "Diagnosis"]
+
+_NEAR = 0.6  # of the evidence for the first one: what has less is not named in its place
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One effect that may be missing.
+
+    Attributes
+    ----------
+    statistic : float
+        Score statistic; after a refit, twice the gain in log-likelihood.
+    p_value : float
+        Of the baseline being complete, corrected for testing all effects.
+    value, std : tuple of float
+        Parameters, predicted or refitted.
+    error : float
+        One-step-ahead error on the diagnosed driving with the effect, as `compare` gives it, in
+        units of `Diagnosis.floor`; NaN where the effect was not refitted.
+    retained : float
+        Share of the effect that the fitted parameters cannot copy.
+    indistinguishable_from : tuple of str
+        Effects that this driving cannot tell from it.
+    fit : Fit or None
+        The model with the effect, where it was refitted.
+    """
+
+    effect: Effect
+    statistic: float
+    p_value: float
+    value: tuple[float, ...]
+    std: tuple[float, ...]
+    retained: float
+    variance_ratio: float
+    error: float = float("nan")
+    indistinguishable_from: tuple[str, ...] = ()
+    fit: Fit | None = None
+
+    @property
+    def id(self) -> str:
+        """Id of the effect."""
+        return self.effect.id
+
+    @property
+    def size(self) -> str:
+        """Its parameters with standard errors, in words."""
+        return ", ".join(
+            f"{p.name} {with_error(v, s)} {p.unit}"
+            for p, v, s in zip(self.effect.parameters, self.value, self.std, strict=True)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Effects ranked by the evidence that they are missing.
+
+    Attributes
+    ----------
+    fit : Fit
+        The diagnosed model.
+    driving : Driving
+        What it was diagnosed on.
+    ranking : tuple of Candidate
+        All candidates, the most likely first.
+    omnibus : Omnibus
+        Whether anything at all is left.
+    alpha : float
+        Rate of false claims accepted, over all effects together.
+    scores : tuple of Score
+        The tests that the ranking began with, beside the fit as it is.
+    family : dict of str to float
+        Their p-values by effect, corrected for testing all of them.
+    error : float
+        One-step-ahead error on the driving without any of the effects, in units of `floor`.
+    """
+
+    fit: Fit
+    driving: Driving
+    ranking: tuple[Candidate, ...]
+    omnibus: Omnibus
+    alpha: float
+    scores: tuple[Score, ...]
+    family: dict[str, float]
+    error: float = float("nan")
+
+    @property
+    def floor(self) -> NoiseModel:
+        """Noise that errors are measured by: that of the best refit, or of the fit as it is."""
+        best = self.ranking[0].fit if self.significant else None
+        return (self.fit if best is None else best).noise
+
+    def errors_on(self, driving: Driving, floor: NoiseModel) -> dict[str, float]:
+        """Errors with each effect that was refitted, one step ahead.
+
+        Parameters
+        ----------
+        driving : Driving
+        floor : NoiseModel
+            Its sensors and white motion noise are the unit.
+
+        Returns
+        -------
+        dict of str to float
+            By effect. Infinite where the model fails.
+        """
+        found = {}
+        for c in self.ranking:
+            if c.fit is not None:
+                try:
+                    found[c.id] = compare(c.fit, driving, noise=floor).error
+                except NumericalError:
+                    found[c.id] = float("inf")
+        return found
+
+    @property
+    def sizes(self) -> dict[str, Size]:
+        """Parameters of each effect that was refitted, and their standard errors."""
+        return {c.id: (c.value, c.std) for c in self.ranking if c.fit is not None}
+
+    @property
+    def significant(self) -> tuple[Candidate, ...]:
+        """Candidates for which there is evidence."""
+        return tuple(c for c in self.ranking if c.p_value < self.alpha)
+
+    @property
+    def named(self) -> Candidate | None:
+        """The candidate that may be called missing, if there is one.
+
+        The likeliest that a refit confirms, with a value that a car can have, or one that is nearly
+        as likely.
+        """
+        return None if self.doubt else self._likeliest
+
+    @property
+    def best(self) -> Effect:
+        """The effect most likely missing.
+
+        Raises
+        ------
+        InvalidInput
+            There is evidence for none, or none may be named (`doubt`).
+        """
+        if not self.significant:
+            raise InvalidInput(
+                "no effect of the catalogue is missing as far as this driving can show: "
+                f"{self.omnibus}"
+            )
+        if self.named is None:
+            raise InvalidInput(
+                f"no effect can be named: {self.doubt}; check the channels and the vehicle file, "
+                "or add one of `ranking` to look further"
+            )
+        return self.named.effect
+
+    @cached_property
+    def doubt(self) -> str:
+        """Why no effect may be called missing, though there is evidence for some; else empty."""
+        if not self.significant:
+            return ""
+        first = self._likeliest
+        if first is None:
+            return self._refused(self.significant[0])
+        return doubt(self.beside, self.omnibus, self.error, first.error)
+
+    @cached_property
+    def beside(self) -> Beside:
+        """What is left with the likeliest effect in the model, or without any."""
+        first = self._likeliest
+        fit = self.fit if first is None or first.fit is None else first.fit
+        return beside(fit, self.driving, {e.id for e in self.fit.model.candidates})
+
+    @cached_property
+    def _likeliest(self) -> Candidate | None:
+        few = self.significant
+        return next(
+            (
+                c
+                for c in few
+                if c.statistic >= _NEAR * few[0].statistic
+                and possible(c.effect, c.value, c.std)
+                and (c.fit is None or confirmed(c.statistic, c.effect))
+            ),
+            None,
+        )
+
+    def _refused(self, c: Candidate) -> str:
+        if c.fit is not None and not confirmed(c.statistic, c.effect):
+            told = f"{c.id} is likeliest by its score, but refitted the model predicts no better"
+        else:
+            told = f"{c.id} fits best, but no car has such a value ({c.size})"
+        worst = "; ".join(self.beside.unrelated.values())
+        return f"{told}; {worst or self.beside.worst}"
+
+    _HEAD = ("effect", "statistic", "p", "training error with it", "size", "cannot tell from")
+
+    def _rows(self, most: int = 12) -> list[list[str]]:
+        return [
+            [
+                c.id,
+                f"{c.statistic:.1f}",
+                f"{c.p_value:.2g}",
+                "-" if np.isnan(c.error) else f"{c.error:.3f}",
+                c.size,
+                ", ".join(c.indistinguishable_from),
+            ]
+            for c in self.ranking[:most]
+        ]
+
+    def _headline(self) -> str:
+        if not self.significant:
+            return f"no effect of the catalogue is missing; {self.omnibus}"
+        if self.named is None:
+            return f"something is wrong that no effect can be named for: {self.doubt}"
+        what = f"most likely missing: {self.named.effect.title}"
+        if self.named.indistinguishable_from:
+            twins = ", ".join(self.named.indistinguishable_from)
+            what += f" (this driving cannot tell it from {twins})"
+        # The test against unknown forces is blunter than that of one effect: its silence is none.
+        return f"{what}; with it {self.beside.omnibus}" if self.omnibus.rejects else what
+
+    def __str__(self) -> str:
+        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(self._headline())}</p>{html_table(self._HEAD, self._rows())}"
+
+    def plot(self, ax: Axes | None = None, most: int = 10) -> Axes:
+        """Bars of the evidence for each effect."""
+        import matplotlib.pyplot as plt
+
+        if ax is None:
+            ax = plt.subplots(figsize=(6.0, 3.5))[1]
+        shown = self.ranking[:most][::-1]
+        colours = ["tab:red" if c.p_value < self.alpha else "0.7" for c in shown]
+        ax.barh([c.id for c in shown], [max(c.statistic, 0.1) for c in shown], color=colours)
+        ax.set(
+            xscale="log", xlabel="evidence (score statistic; refitted: 2 x gain in log-likelihood)"
+        )
+        return ax

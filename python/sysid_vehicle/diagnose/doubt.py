@@ -1,0 +1,124 @@
+"""May an effect be named, or is something else wrong? What is left beside the likeliest one tells.
+
+Readings that are late, shuffled or in another unit are no effect of a car. Some effect of the
+catalogue always fits them best, and its score may be large, as scores are taken at a fit that is
+nowhere near the truth. But the refit does not confirm it, or what was left before stays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from scipy.stats import chi2
+
+from ..compare import Comparison, compare
+from ..effects import Effect
+from ..estimate import Driving
+from ..identify import Fit
+from .evidence import Evidence
+from .omnibus import Omnibus, omnibus_of
+from .score import ScoreBoard, score_board_of
+
+__all__ = ["Beside", "beside", "confirmed", "doubt"]
+
+_CONFIRMED = 0.01  # chance of the gain of a refit without the effect
+_LEFT = 1e-3  # evidence of something left
+_STAYS = 0.6  # share of the evidence: what is missing too takes up less beside the right effect
+_TAKEN = 0.1  # share of the square of the error beyond the noise floor
+_FURTHER = 0.05  # family-wise, of one effect more
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """What a model leaves that has the likeliest effect.
+
+    Attributes
+    ----------
+    fit : Fit
+    driving : Driving
+    lacked : frozenset of str
+        Effects that may be missing too.
+    """
+
+    fit: Fit
+    driving: Driving
+    lacked: frozenset[str]
+
+    @cached_property
+    def _evidence(self) -> Evidence:
+        return Evidence(self.fit, self.driving)
+
+    @cached_property
+    def omnibus(self) -> Omnibus:
+        """Whether anything is left."""
+        return omnibus_of(self._evidence)
+
+    @cached_property
+    def board(self) -> ScoreBoard:
+        """Scores of the other effects."""
+        others = tuple(e for e in self.fit.model.candidates if e.id in self.lacked)
+        return score_board_of(self._evidence, others)
+
+    @cached_property
+    def _comparison(self) -> Comparison:
+        return compare(self.fit, self.driving)
+
+    @property
+    def unrelated(self) -> dict[str, str]:
+        """Channels that contradict the others, and how."""
+        return self._comparison.unrelated
+
+    @property
+    def worst(self) -> str:
+        """The channel with the largest innovations, in words."""
+        channels = self._comparison.channels
+        name = max(channels, key=lambda c: channels[c].nrmse)
+        return f"the largest innovations are those of {name} ({channels[name].nrmse:.2f} expected)"
+
+
+def beside(fit: Fit, driving: Driving, lacked: set[str]) -> Beside:
+    """Look at what a model leaves; nothing is computed before it is asked for."""
+    return Beside(fit, driving, frozenset(lacked))
+
+
+def confirmed(statistic: float, effect: Effect) -> bool:
+    """Whether a refit gained more than its parameters gain by chance."""
+    return float(chi2.sf(statistic, len(effect.parameters))) < _CONFIRMED
+
+
+def doubt(left: Beside, before: Omnibus, error_before: float, error_after: float) -> str:
+    """Why the likeliest effect may not be called missing; empty where it may.
+
+    Parameters
+    ----------
+    left : Beside
+        What the model with the effect leaves.
+    before : Omnibus
+        Without the effect.
+    error_before, error_after : float
+        One step ahead, without and with the effect, at one noise floor; NaN where not refitted.
+    """
+    if left.unrelated:
+        return "; ".join(left.unrelated.values())
+    if not left.omnibus.p_value < _LEFT or not left.fit.model.effects:
+        return ""
+    share = excess(left.omnibus) / max(excess(before), 1.0)
+    beyond = max(error_before**2 - 1.0, 0.0)
+    taken = 1.0 - max(error_after**2 - 1.0, 0.0) / beyond if beyond > 0.0 else 1.0
+    if share > _STAYS and taken < _TAKEN:
+        return (
+            f"with the effect that fits best {100 * min(share, 1.0):.0f} % of the evidence that "
+            f"something is missing stays, and the error does not fall; {left.worst}"
+        )
+    if not any(p < _FURTHER for p in left.board.family_p_values().values()):
+        return (
+            f"with the effect that fits best {left.omnibus}, and no other effect of the catalogue "
+            f"explains that; {left.worst}"
+        )
+    return ""
+
+
+def excess(o: Omnibus) -> float:
+    """Evidence beyond what a complete model shows."""
+    return max(o.statistic - o.degrees, 0.0)

@@ -1,0 +1,73 @@
+"""An effect that a study added."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from .._text import with_error
+from ..identify import Estimate
+
+__all__ = ["AddedEffect"]
+
+
+@dataclass(frozen=True)
+class AddedEffect:
+    """An effect that was added.
+
+    Attributes
+    ----------
+    parameters : tuple of Estimate
+        In the final model.
+    error_before, error_after : float
+        On the held-out driving, in units of the noise floor.
+    p_value : float
+        Of the model without it being complete.
+    confounded_with : tuple of str
+        Effects of which any may act in its place: this driving cannot tell them from it.
+    stands_in : str
+        What tells that it only stands in for what is missing; empty where it is named.
+    """
+
+    id: str
+    parameters: tuple[Estimate, ...]
+    error_before: float
+    error_after: float
+    p_value: float
+    confounded_with: tuple[str, ...] = ()
+    stands_in: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its id, and those of the effects that this driving cannot tell from it."""
+        return " or ".join((self.id, *self.confounded_with))
+
+    @property
+    def reserve(self) -> str:
+        """What is to be said against it, in words; empty where there is nothing."""
+        said = []
+        if self.confounded_with:
+            others = ", ".join(self.confounded_with)
+            said.append(f"or else {others}, which this driving cannot tell from it")
+        if self.stands_in:
+            said.append(f"it only stands in for something else: {self.stands_in}")
+        return "; ".join(said)
+
+    def __str__(self) -> str:
+        size = ", ".join(
+            f"{e.name.split('.')[1]} {with_error(e.value, e.std)} {e.unit}".removesuffix(" 1")
+            for e in self.parameters
+        )
+        return f"{self.id}: {size}" + (f"; {self.reserve}" if self.reserve else "")
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, ready for JSON."""
+        return {
+            "id": self.id,
+            "parameters": {e.name.split(".")[1]: e.to_dict() for e in self.parameters},
+            "error_before": self.error_before,
+            "error_after": self.error_after,
+            "p_value": self.p_value,
+            "confounded_with": list(self.confounded_with),
+            "stands_in": self.stands_in,
+        }

@@ -1,0 +1,164 @@
+"""On readings that no car gives, nothing is named; what is wrong with them is."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import (
+    Diagnosis,
+    Fit,
+    InvalidInput,
+    Log,
+    Model,
+    compare,
+    diagnose,
+    drive,
+    identify,
+    improve,
+    manoeuvres,
+    verdicts,
+)
+from sysid_vehicle.compare import unrelated
+from sysid_vehicle.diagnose import Omnibus
+from sysid_vehicle.diagnose.doubt import confirmed, doubt
+from sysid_vehicle.effects import effect
+from sysid_vehicle.estimate import MEASURED, Driving
+
+NAMED = ("missing", "one of a group", "open")
+
+
+@pytest.fixture(scope="module")
+def clean(truth: Model) -> Log:
+    return drive(truth, manoeuvres.lap(25.0), seed=61, rate_hz=50.0)
+
+
+@pytest.fixture(scope="module")
+def shuffled(clean: Log, altered: Callable[..., Log]) -> Log:
+    rng = np.random.default_rng(3)
+    return altered(clean, ay_mps2=rng.permutation(clean["ay_mps2"]))
+
+
+@pytest.fixture(scope="module")
+def of_shuffled(truth: Model, shuffled: Log) -> Diagnosis:
+    return diagnose(identify(truth, shuffled, starts=1))
+
+
+def test_a_shuffled_channel_is_named_and_no_effect_is(of_shuffled: Diagnosis) -> None:
+    dx = of_shuffled
+    assert dx.significant, "some effect of the catalogue fits best"
+    assert dx.named is None
+    with pytest.raises(InvalidInput, match=r"no effect can be named: .*ay_mps2"):
+        _ = dx.best
+    assert str(dx).startswith("something is wrong that no effect can be named for")
+    assert "ay_mps2" in str(dx).splitlines()[0]
+    told = verdicts(dx)
+    assert not [v for v in told.all if v.finding in NAMED]
+
+
+def test_a_comparison_tells_of_a_shuffled_channel(of_shuffled: Diagnosis, shuffled: Log) -> None:
+    found = compare(of_shuffled.fit, shuffled)
+    assert set(found.unrelated) == {"ay_mps2"}
+    assert "Something else is wrong: ay_mps2: the other channels predict it worse" in str(found)
+    assert "ay_mps2: the other channels" in found._repr_html_()
+
+
+def test_a_study_of_a_shuffled_channel_knows_nothing(truth: Model, shuffled: Log) -> None:
+    few = ["accelerometer_scale", "accelerometer_bias", "mass"]
+    found = improve(truth, shuffled, shuffled, starts=1, candidates=few)
+    assert found.verdict == "unknown"
+    assert all(a.stands_in for a in found.added)
+    assert "Something else is wrong: ay_mps2" in str(found)
+
+
+def test_what_its_refit_does_not_confirm_is_not_named(
+    truth: Model, clean: Log, altered: Callable[..., Log]
+) -> None:
+    """Lateral acceleration a tenth of a second late: relaxation scores best, and fits worse."""
+    late = round(0.1 * clean.rate_hz)
+    ay = clean["ay_mps2"]
+    log = altered(clean, ay_mps2=np.concatenate([np.full(late, ay[0]), ay[:-late]]))
+    dx = diagnose(identify(truth, log, starts=1))
+    assert dx.named is None or confirmed(dx.named.statistic, dx.named.effect)
+    assert not [v for v in verdicts(dx).all if v.finding in ("missing", "one of a group")]
+
+
+def test_a_missing_effect_is_named_and_others_stay_open(
+    truth: Model, hidden_fit: Callable[[str, float], Fit]
+) -> None:
+    dx = diagnose(hidden_fit("steer_offset.offset_rad", 0.002))
+    assert dx.doubt == ""
+    assert dx.named is not None
+    assert dx.named.id == dx.best.id == "steer_offset"
+    assert str(dx).startswith("most likely missing: ")
+    assert "with it nothing left" in str(dx)
+    two = truth.add("mass", "gyro_scale").with_values(
+        {"mass.relative_error": 0.1, "gyro_scale.scale_error": 0.05}
+    )
+    log = drive(two, manoeuvres.lap(25.0), seed=62, rate_hz=50.0)
+    dx = diagnose(identify(truth, log, starts=1))
+    told = verdicts(dx)
+    assert dx.best.id in ("mass", "gyro_scale")
+    assert [v.effect.id for v in told.of("missing")] in ([dx.best.id], [])
+    opened = told.of("open")
+    assert {"mass", "gyro_scale"} - {dx.best.id} <= {v.effect.id for v in opened}
+    assert all(f"add {dx.best.id} and diagnose again" in v.sentence for v in opened)
+
+
+def test_channels_that_contradict_the_others(clean: Log, rng: np.random.Generator) -> None:
+    driving = Driving.of(clean)
+    y = driving.measured
+    noise = 0.02 * np.std(y, axis=0) * rng.standard_normal(y.shape)
+    i = MEASURED.index("yaw_rate_radps")
+    spread = np.ones_like(y)
+    assert unrelated(driving, noise, spread) == {}
+
+    def predicted(values: np.ndarray) -> dict[str, str]:
+        e = noise.copy()
+        e[:, i] = y[:, i] - values
+        return unrelated(driving, e, spread)
+
+    assert "reads 1000" in predicted(1e-3 * y[:, i])["yaw_rate_radps"]
+    assert "reads -1" in predicted(-y[:, i])["yaw_rate_radps"]
+    assert "worse than its own mean" in predicted(np.roll(y[:, i], 300))["yaw_rate_radps"]
+    # A sensor as noisy as it likes is no contradiction, nor is a prediction that is noise itself.
+    assert predicted(y[:, i] + np.std(y[:, i]) * rng.standard_normal(len(y))) == {}
+    assert predicted(0.5 * np.std(y[:, i]) * rng.standard_normal(len(y))) == {}
+    # Nor is a gain that is some per cent off.
+    assert predicted(0.8 * y[:, i]) == {}
+
+
+@pytest.mark.filterwarnings("ignore:.*not excited:sysid_vehicle.SysidWarning")
+def test_a_straight_contradicts_nothing(truth: Model) -> None:
+    log = drive(truth, manoeuvres.straight_acceleration(), seed=1, rate_hz=50.0)
+    assert compare(identify(truth, log, starts=1), log).unrelated == {}
+
+
+def test_what_stays_as_it_was_is_doubted(fit: Fit) -> None:
+    class Left:
+        worst = "the largest innovations are those of ay_mps2 (3.00 expected)"
+
+        def __init__(self, statistic: float, p_value: float, *others: float) -> None:
+            self.unrelated: dict[str, str] = {}
+            self.fit = fit.__class__(**{**vars(fit), "model": fit.model.add("mass")})
+            self.omnibus = Omnibus(statistic, 50, p_value, "F_y")
+            self.board = type("Board", (), {"family_p_values": lambda _: dict(enumerate(others))})()
+
+    before = Omnibus(450.0, 50, 1e-60, "F_y")
+    assert doubt(Left(60.0, 0.2), before, 3.0, 1.0) == ""  # type: ignore[arg-type]
+    stays = doubt(Left(430.0, 1e-50, 0.001), before, 3.0, 2.95)  # type: ignore[arg-type]
+    assert "95 % of the evidence" in stays
+    assert "ay_mps2" in stays
+    # Beside another effect that is missing too much is left.
+    assert doubt(Left(430.0, 1e-50, 0.001), before, 3.0, 2.0) == ""  # type: ignore[arg-type]
+    alone = doubt(Left(150.0, 1e-9, 0.5), before, 3.0, 1.5)  # type: ignore[arg-type]
+    assert "no other effect of the catalogue explains that" in alone
+
+
+def test_a_refit_confirms_what_gains_more_than_chance() -> None:
+    drag, two = effect("aero_drag"), effect("tyre_temperature")
+    assert confirmed(12.0, drag)
+    assert not confirmed(3.0, drag)
+    assert not confirmed(-84.6, drag)
+    assert confirmed(8.0, drag)
+    assert not confirmed(8.0, two)
