@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 import sysid_vehicle as sv
 from sysid_vehicle.diagnose import Bias
+from sysid_vehicle.simulate import drive_truth
 
 DRIVES: dict[str, Callable[[float], sv.manoeuvres.Manoeuvre]] = {
     "lap": lambda most: sv.manoeuvres.lap(40.0, most),
@@ -37,6 +38,7 @@ NAMES = ("stiffness_front", "stiffness_rear", "yaw_inertia_kgm2")
 Array = npt.NDArray[np.float64]
 NEAR, SHARE = 0.01, 0.2
 RATE_HZ = 50.0
+SLIDES_RAD = 0.12
 OTHER = {
     "tyre_front": sv.Tyre(B=9.0, C=1.3, D=0.9, E=0.0),
     "tyre_rear": sv.Tyre(B=11.0, C=1.5, D=1.1, E=-0.2),
@@ -89,12 +91,13 @@ def identified(
 
 
 def hardest(truth: sv.Model, name: str) -> sv.manoeuvres.Manoeuvre:
-    """The drive, as hard as the car can be driven."""
+    """The drive, as hard as the car can be driven without sliding."""
     for most in (7.5, 6.5, 5.5, 4.5, 3.5):
         drive = DRIVES[name](most)
         with suppress(sv.SysidError):
-            sv.drive(truth, drive, seed=0, rate_hz=RATE_HZ)
-            return drive
+            v_x, v_y, _ = drive_truth(truth, drive, seed=0, rate_hz=RATE_HZ).states.T
+            if np.abs(np.arctan2(v_y, v_x)).max() < SLIDES_RAD:
+                return drive
     raise SystemExit(f"{truth.vehicle.name} spins in each {name}")
 
 

@@ -83,6 +83,36 @@ TEST(Simulator, HandsAndFeetAreLimited) {
     EXPECT_NEAR(most_brake, 1500.0, 1e-9);
 }
 
+TEST(Simulator, BeginsInTheMiddleOfACorner) {
+    // The second half of a drive, begun where the first one ended, is the second half.
+    const EffectMask effects = mask_of({"friction_change"});
+    Parameters p = plain_parameters();
+    p[parameter_of("friction_change", 0)] = 0.3;
+    p[parameter_of("friction_change", 1)] = 4.0;
+    Driver driver;
+    driver.tracks_path = false;
+    const auto drive = [&](std::size_t n, const Beginning& beginning) {
+        const std::vector<Reference> steered(n, {20.0, 0.0, 0.03});
+        const std::vector<double> calm(3 * n, 0.0);
+        return simulate({saloon(), effects}, p.data(), kStep, steered, driver, calm.data(),
+                        beginning);
+    };
+    const Drive whole = drive(600, {20.0});
+    ASSERT_EQ(whole.lost_at, 600U);
+    const double* middle = &whole.states[300 * kModelStates];
+    const Drive half = drive(300, {middle[0], middle[1], middle[2], 0.0, 300 * kStep});
+    double moved = 0.0;
+    for (std::size_t k = 0; k < 300; ++k) {
+        const double* there = &whole.states[(300 + k) * kModelStates];
+        // The wheel force begins anew, and is right again soon.
+        for (std::size_t i = 0; i < kMotionStates; ++i)
+            EXPECT_NEAR(half.states[k * kModelStates + i], there[i], 0.02) << k;
+        moved = std::max(moved, std::abs(there[1] - middle[1]));
+    }
+    EXPECT_GT(moved, 0.1);  // the loss of grip is felt
+    EXPECT_EQ(drive(2, {20.0, 0.0, 0.0, 0.01, 0.0}).inputs[0], 0.03 + 0.01);
+}
+
 TEST(Simulator, EndsWhenSpun) {
     Driver driver;
     driver.tracks_path = false;

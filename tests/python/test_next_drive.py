@@ -1,6 +1,4 @@
-"""What drives can tell: bias of what is hidden, separation of rivals, the next drive."""
-
-from collections.abc import Callable
+"""What drives can tell: separation of rivals, the next drive."""
 
 import numpy as np
 import pytest
@@ -12,7 +10,6 @@ from sysid_vehicle import (
     InvalidInput,
     Log,
     Model,
-    bias_report,
     drive,
     effect,
     identify,
@@ -25,35 +22,7 @@ from sysid_vehicle.diagnose.next_drive import extent_m
 from sysid_vehicle.diagnose.score import score_board
 from sysid_vehicle.simulate import drive_truth
 
-Hidden = Callable[[str, float], Fit]
 LAG, RELAXATION = effect("steer_lag"), effect("tyre_relaxation")
-
-
-def test_bias_is_what_the_refit_finds(hidden_fit: Hidden) -> None:
-    name, size = "steer_ratio.ratio_error", 0.02
-    blind = hidden_fit(name, size)
-    seeing = identify(blind.model.add("steer_ratio"), blind.driving, starts=1)
-    report = bias_report(blind, [effect("steer_ratio")])
-    per_typical = report["steer_ratio"].relative["stiffness_front"]
-    predicted = per_typical * size / effect("steer_ratio").parameters[0].typical
-    with_and_without = [f.derived[0].value for f in (blind, seeing)]
-    found = with_and_without[0] / with_and_without[1] - 1.0
-    assert abs(found) > 0.005
-    assert predicted == pytest.approx(found, rel=0.35)
-
-
-def test_bias_report_tells_the_most_harmful_first(fit: Fit) -> None:
-    report = bias_report(fit)
-    harm = [
-        max(abs(b.relative["stiffness_front"]), abs(b.relative["stiffness_rear"]))
-        for b in report.biases
-    ]
-    assert harm == sorted(harm, reverse=True)
-    assert "that is not modelled adds" in str(report.biases[0])
-    assert "steer_ratio" in str(report)
-    assert "<table" in report._repr_html_()
-    with pytest.raises(KeyError, match="there are"):
-        report["magic"]
 
 
 def test_information_of_two_logs_adds_up(fit: Fit, lap: Log, course: Log) -> None:

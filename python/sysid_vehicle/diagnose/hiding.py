@@ -263,7 +263,7 @@ def _bias(
     worst = max(doubt, key=lambda n: doubt[n])
     if doubt[worst] > 0.0:
         between = " or ".join(f"{100.0 * x[worst]:+.1f} %" for x in (first, second))
-        because = f"{between} to {worst}, with another driver, noise, and tyre as good"
+        because = f"{between} to {worst}, by the driver, the noise, and tyres that fit as well"
         return Bias(e, size, {}, because)
     return Bias(e, size, mean)
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from .._style import new_figure
 from .._text import number
-from ..diagnose import bias_report
+from ..diagnose import EffectVerdict, bias_report
 from ..estimate import UNITS
 from ..model import Model
 from ..study import Study
@@ -123,13 +125,36 @@ def _verdicts(study: Study, truth: Model | None) -> list[str]:
             "enough to matter."
         ),
     ]
-    biases = bias_report(study.fit).biases[:5]
-    if biases:
-        parts += [
-            heading("What the identified parameters would hide", 3),
-            bullets(f"{b}." for b in biases),
-        ]
-    return parts
+    return parts + _hidden(study)
+
+
+# Each effect takes two refits: the page is not to wait for all of them.
+_MOST_HIDDEN = 6
+_HIDDEN_SAMPLES = 1500
+
+
+def _hidden(study: Study) -> list[str]:
+    """What the effects that this driving tells least of would do to the parameters."""
+    known = {e.id for e in study.fit.model.candidates}
+    open_ = [v for v in study.verdicts.of("not testable") if v.effect.id in known]
+    if not open_:
+        return []
+
+    def looseness(v: EffectVerdict) -> float:
+        sizes = zip(v.bound, v.effect.parameters, strict=False)
+        return max((b / abs(p.typical) for b, p in sizes if p.typical != 0.0), default=np.inf)
+
+    least = sorted(open_, key=looseness, reverse=True)[:_MOST_HIDDEN]
+    report = bias_report(study.fit, [v.effect for v in least], most_samples=_HIDDEN_SAMPLES)
+    return [
+        heading("What the identified parameters would hide", 3),
+        paragraph(
+            f"Of the {len(open_)} effects that are not testable, those of which this driving tells "
+            "least. Each was simulated at a typical size on the same driving, and the model fitted "
+            "without it. bias_report tells the same of all effects."
+        ),
+        bullets(f"{b}." for b in report.biases),
+    ]
 
 
 def _ahead(study: Study, truth: Model | None) -> list[str]:
