@@ -1,5 +1,6 @@
 """Calibration behind ask and tell, the double track beside it, the experiments as one call."""
 
+from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -124,3 +125,58 @@ def test_inertia_is_found_though_mass_and_centre_of_mass_are_wrong() -> None:
     assert done.error_percent("jzz_kgm2") < 10.0
     done = estimate_pitch(mass="wrong", wrong_cg=True, road_noise=0.1, duration_s=30.0, seed=2)
     assert done.error_percent("jyy_kgm2") < 6.0
+
+
+def noisy(gains: dict[str, float], seed: int) -> float:
+    """A bowl of least 0.3 at 3 and 0.5 under noise that a trial can be lucky with."""
+    place = int(1e6 * (gains["a"] + 3.0 * gains["b"])) % 2**31
+    luck = np.random.default_rng([seed, place]).standard_normal()
+    deep = 0.3 + np.log10(gains["a"] / 3.0) ** 2 + (gains["b"] - 0.5) ** 2
+    return float(deep * np.exp(0.3 * luck))
+
+
+@pytest.mark.skipif(find_spec("bayes_opt") is None, reason="bayesian-optimization not installed")
+def test_the_best_trial_is_lucky_and_the_best_predicted_is_judged_beside_it() -> None:
+    fresh = [partial(noisy, seed=100 + k) for k in range(20)]
+    lucky = []
+    for seed in range(4):
+        found = calibrate(partial(noisy, seed=seed), BOX, trials=25, seed=seed, fresh=fresh)
+        observed, predicted = found.candidates
+        assert (observed.how, predicted.how) == ("observed", "predicted")
+        assert observed.cost == min(c for _, c in found.tried)
+        assert len(observed.fresh) == len(predicted.fresh) == 20
+        assert found.gains == min(found.candidates, key=lambda c: c.fresh_mean).gains
+        lucky.append(observed.fresh_mean / observed.cost)
+        assert "best observed: cost" in str(found)
+        assert "best predicted: cost" in str(found)
+        assert str(found).count(", taken") == 1
+    assert np.median(lucky) > 1.1
+
+
+@pytest.mark.skipif(find_spec("bayes_opt") is None, reason="bayesian-optimization not installed")
+def test_the_posterior_mean_sees_through_noise_that_the_best_trial_owes_its_place_to() -> None:
+    def deep(place: np.ndarray) -> float:
+        return float(0.3 + (4.0 * place[0] - 2.5) ** 2 + (2.0 * place[1] - 1.5) ** 2)
+
+    observed, predicted = [], []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        search = BayesianSearch(2, first=60, seed=seed)
+        best = (np.inf, np.zeros(2))
+        for place in rng.uniform(size=(60, 2)):
+            cost = deep(place) * np.exp(0.3 * rng.standard_normal())
+            search.tell(place, cost)
+            best = min(best, (cost, place), key=lambda b: b[0])
+        place, mean = search.best_predicted()
+        assert np.all((place >= 0.0) & (place <= 1.0))
+        assert mean == pytest.approx(deep(place), rel=0.6)
+        observed.append(deep(best[1]) - 0.3)
+        predicted.append(deep(place) - 0.3)
+    assert np.mean(predicted) < 0.8 * np.mean(observed)
+
+
+def test_without_a_model_or_fresh_seeds_the_best_trial_stands() -> None:
+    found = calibrate(bowl, BOX, trials=30, optimiser=Dice())
+    assert [c.how for c in found.candidates] == ["observed"]
+    assert found.gains == found.candidates[0].gains
+    assert np.isnan(found.candidates[0].fresh_mean)

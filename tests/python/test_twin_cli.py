@@ -7,9 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sysid_vehicle import InvalidInput
 from sysid_vehicle.cli import main
 from sysid_vehicle.cli import twin as command
-from sysid_vehicle.twin import JointExperiment, LoadExperiment, estimate_pitch, mass_and_sideslip
+from sysid_vehicle.twin import (
+    NOMINAL_SUV,
+    JointExperiment,
+    LoadExperiment,
+    estimate_pitch,
+    mass_and_sideslip,
+    run_schedule,
+)
 from sysid_vehicle.twin.figures import joint_figure, load_figure
 
 
@@ -86,7 +94,10 @@ def test_calibrated_gains_go_to_validate(
 
     monkeypatch.setattr(command, "mass_and_sideslip", kept)
     assert main(["twin", "validate", "--gains", str(gains)]) == 0
-    assert seen[0] == json.loads(gains.read_text(encoding="utf-8"))["gains"]
+    content = json.loads(gains.read_text(encoding="utf-8"))
+    assert seen[0] == content["gains"]
+    assert set(content["candidates"]) == {"observed", "predicted"}
+    assert len(content["candidates"]["predicted"]["fresh"]) == 5
 
 
 @pytest.mark.parametrize(
@@ -107,6 +118,43 @@ def test_wrong_input_is_one_line(
     (tmp_path / "bad.json").write_text('{"law": "side-by-side"}', encoding="utf-8")
     assert main(["twin", *given]) != 0
     assert told in capsys.readouterr().err
+
+
+def test_the_whole_schedule_from_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        command, "run_schedule", lambda **options: run_schedule(shorten=0.25, **options)
+    )
+    plot, numbers = tmp_path / "p.svg", tmp_path / "p.json"
+    given = ["twin", "schedule", "--road-noise", "0.05", "--seed", "2"]
+    assert main([*given, "--plot", str(plot), "--json", str(numbers)]) == 0
+    said = capsys.readouterr().out
+    assert "% of change" in said
+    assert plot.read_text(encoding="utf-8").startswith("<?xml")
+    content = json.loads(numbers.read_text(encoding="utf-8"))
+    assert [s["experiment"] for s in content["stages"]] == [
+        "mass", "roll and yaw inertia", "pitch inertia",
+    ]  # fmt: skip
+    for name in ("mass_kg", "jxx_kgm2", "jyy_kgm2", "jzz_kgm2"):
+        row = content["parameters"][name]
+        assert row["error_percent_of_change"] < 10.0, name
+        assert abs(row["found"] - row["true"]) < 5.0 * row["spread"], name
+
+
+def test_each_stage_begins_with_what_those_before_it_found() -> None:
+    done = run_schedule(snr=float("inf"), shorten=0.1, law="gradient")
+    mass, turning, pitch = done.stages
+    assert turning.found.parameters["mass_kg"][0] == mass.found.last("mass_kg")
+    assert pitch.found.parameters["jzz_kgm2"][0] == turning.found.last("jzz_kgm2")
+    assert done.load.jyy_kgm2 == pitch.found.last("jyy_kgm2")
+    assert mass.found.parameters["mass_kg"][0] == NOMINAL_SUV.mass_kg
+    assert done.plot("jxx_kgm2").get_ylabel() == "jxx_kgm2"
+    with pytest.raises(InvalidInput, match="no stage looked for 'cg_z_m'"):
+        done.plot("cg_z_m")
+    for wrong in ({"road_noise": 2.0}, {"shorten": 0.0}, {"snr": -1.0}):
+        with pytest.raises(InvalidInput, match=next(iter(wrong))):
+            run_schedule(**wrong)  # type: ignore[arg-type]
 
 
 def test_a_load_experiment_is_one(tmp_path: Path) -> None:

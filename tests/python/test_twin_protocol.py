@@ -1,8 +1,12 @@
 """Any simulator as a twin: the built-in car, two functions, an FMU built here."""
 
+import copy
+import gc
+import pickle
 import re
 import shutil
 import subprocess
+import tempfile
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
@@ -287,3 +291,37 @@ def test_what_an_fmu_lacks_is_said(unit: Path, tmp_path: Path) -> None:
         FMUTwin(tmp_path / "none.fmu", VARIABLES)
     started = made(start={"v": 3.0})
     assert started.outputs(np.array([0.0]))[0] == 3.0
+
+
+def test_an_fmu_leaves_no_folder_behind(unit: Path) -> None:
+    twin = FMUTwin(unit, VARIABLES, dt_s=DT)
+    folder = Path(twin._alive.folder)
+    assert folder.is_dir()
+    with pytest.raises(TypeError, match="cannot be pickled; make it anew from the file"):
+        pickle.dumps(twin)
+    twin.step(np.array([700.0]))
+    other = copy.deepcopy(twin)
+    another = Path(other._alive.folder)
+    assert another != folder
+    np.testing.assert_array_equal(other.outputs(np.array([1.0])), twin.outputs(np.array([1.0])))
+    with twin:
+        pass
+    twin.close()
+    assert not folder.exists()
+    with pytest.raises(InvalidInput, match="this twin is closed; make it anew"):
+        twin.outputs(np.array([1.0]))
+    del other
+    gc.collect()
+    assert not another.exists()
+
+
+def test_an_fmu_that_is_refused_leaves_no_folder_behind(
+    unit: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    for changes in ({"parameters": {"drag": "c"}}, {"states": ("a", "b")}):
+        given: dict[str, object] = {"inputs": {"force_n": "F"}, "outputs": {"v": "v"}, **changes}
+        with pytest.raises(InvalidInput):
+            FMUTwin(unit, FMUVariables(**given), dt_s=DT)  # type: ignore[arg-type]
+    gc.collect()
+    assert list(tmp_path.iterdir()) == []

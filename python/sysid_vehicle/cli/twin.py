@@ -7,6 +7,7 @@ import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,9 @@ from ..twin import (
     estimate_pitch,
     estimate_roll_yaw,
     mass_and_sideslip,
+    run_schedule,
 )
-from ..twin.figures import joint_figure, load_figure
+from ..twin.figures import joint_figure, load_figure, schedule_figure
 from ..twin.joint import (
     BENCHMARK_BOX,
     BENCHMARK_GAINS,
@@ -100,7 +102,12 @@ _EXPERIMENTS = {
 
 def add_parser(commands: Any) -> None:
     """Add `twin` and its subcommands to the `commands` of the parser."""
-    twin = commands.add_parser("twin", help="state, mass and inertia by a simulator beside the car")
+    twin = commands.add_parser(
+        "twin",
+        help="state, mass and inertia by a simulator beside the car",
+        epilog="These commands drive the built-in simulator. An FMU, from Python, runs native "
+        "code: load none that you do not trust.",
+    )
     inner = twin.add_subparsers(dest="twin_command", required=True, metavar="SUBCOMMAND")
     helps = {
         "mass": "the mass, in town",
@@ -129,9 +136,21 @@ def add_parser(commands: Any) -> None:
         _common(parser, tuple(_LAWS))
         parser.add_argument("--table", action="store_true", help="every row of the paper's table")
         parser.add_argument("--plot", type=Path, metavar="SVG", help="file for the figures")
+    stages = inner.add_parser("schedule", help="mass, then roll and yaw, then pitch inertia")
+    stages.add_argument(
+        "--snr", type=float, default=10.0, metavar="X", help="amplitude of signal to noise; inf"
+    )
+    stages.add_argument(
+        "--road-noise", type=float, default=0.0, metavar="X", help="relative noise of the road"
+    )
+    _common(stages, tuple(_LAWS))
+    stages.add_argument("--plot", type=Path, metavar="SVG", help="file for the figures")
     tune = inner.add_parser("calibrate", help="gains by Bayesian optimisation, on a lap")
     _common(tune, ("side-by-side", "published", _BENCHMARK))
     tune.add_argument("--trials", type=int, default=60, metavar="N", help="default: %(default)s")
+    tune.add_argument(
+        "--fresh", type=int, default=5, metavar="N", help="seeds to judge by (default: %(default)s)"
+    )
     tune.add_argument("--plot", type=Path, metavar="SVG", help="file for the cost over trials")
     check = inner.add_parser("validate", help="mass and sideslip on a lap and in lane changes")
     _common(check, ("side-by-side", "published"))
@@ -154,7 +173,7 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     refuse_other_suffix(args.plot, ".svg")
     if args.seed < 0:
         raise InvalidInput(f"--seed {args.seed}: give a whole number from zero up")
-    todo = {"calibrate": _calibrate, "validate": _validate}
+    todo = {"calibrate": _calibrate, "validate": _validate, "schedule": _schedule}
     figures = todo.get(args.twin_command, _load)(args)
     if args.json is not None:
         write_json(args.json, {**figures, "warnings": heard})
@@ -229,20 +248,40 @@ def _calibrate(args: argparse.Namespace) -> dict[str, Any]:
 
     law = _LAWS.get(args.law)
 
-    def cost(gains: dict[str, float]) -> float:
+    def cost(gains: dict[str, float], seed: int = args.seed) -> float:
         if law is None:
-            return benchmark_cost(gains, seed=args.seed)
-        return twin_cost(gains, law=law, seed=args.seed)
+            return benchmark_cost(gains, seed=seed)
+        return twin_cost(gains, law=law, seed=seed)
 
     box = BENCHMARK_BOX if law is None else TWIN_BOX[law]
-    found = calibrate(cost, box, trials=args.trials, seed=args.seed, tell=tell)
+    if args.fresh < 0:
+        raise InvalidInput(f"--fresh {args.fresh}: give a whole number from zero up")
+    fresh = [partial(cost, seed=args.seed + 1 + k) for k in range(args.fresh)]
+    found = calibrate(cost, box, trials=args.trials, seed=args.seed, tell=tell, fresh=fresh)
     print(found)
     if args.plot is not None:
         figure = new_figure(6.0, 3.0)
         found.plot(ax=figure.add_subplot())
         write_text(args.plot, svg(figure).decode())
         print(f"Picture: {args.plot}")
-    return {"law": args.law, "gains": found.gains, "cost": found.cost, "lost": found.lost}
+    return {
+        "law": args.law,
+        "gains": found.gains,
+        "cost": found.cost,
+        "lost": found.lost,
+        "candidates": {c.how: c.to_dict() for c in found.candidates},
+    }
+
+
+def _schedule(args: argparse.Namespace) -> dict[str, Any]:
+    done = run_schedule(
+        snr=args.snr, law=_LAWS[args.law], road_noise=args.road_noise, seed=args.seed
+    )
+    print(done)
+    if args.plot is not None:
+        write_text(args.plot, svg(schedule_figure(done)).decode())
+        print(f"Picture: {args.plot}")
+    return {"law": args.law, **done.to_dict()}
 
 
 def _validate(args: argparse.Namespace) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from .calibrate import (
     BayesianSearch,
     Box,
     Calibration,
+    Candidate,
     Optimiser,
     calibrate,
     sideslip_and_mass_cost,
@@ -57,6 +58,7 @@ from .observer import STATES, Observation, Observer, StateGain, observe
 from .protocol import Twin, observe_with
 from .readings import READINGS, Readings, measure, noisy_road
 from .residuals import ChannelResidual
+from .schedule import ScheduleRun, run_schedule
 
 __all__ = [
     "INPUTS",
@@ -72,6 +74,7 @@ __all__ = [
     "Box",
     "Calibration",
     "CallableTwin",
+    "Candidate",
     "ChannelResidual",
     "DoubleTrackObserver",
     "DoubleTrackRun",
@@ -89,6 +92,7 @@ __all__ = [
     "PointMass",
     "Readings",
     "Schedule",
+    "ScheduleRun",
     "SideBySide",
     "StateGain",
     "Twin",
@@ -108,6 +112,7 @@ __all__ = [
     "observe_with",
     "on_manoeuvre",
     "rough_road",
+    "run_schedule",
     "sideslip_and_mass_cost",
     "single_track",
     "swept_steer",

@@ -5,8 +5,10 @@ The search is behind ask and tell, so that any optimiser plugs in. Dettu et al. 
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -26,6 +28,7 @@ __all__ = [
     "BayesianSearch",
     "Box",
     "Calibration",
+    "Candidate",
     "Optimiser",
     "calibrate",
     "sideslip_and_mass_cost",
@@ -109,6 +112,9 @@ class BayesianSearch:
         self._first = first
         self._random = np.random.default_rng(seed)
         self._told = 0
+        self._seed = seed
+        self._places: list[FloatArray] = []
+        self._logs: list[float] = []
         self._inner: Any = BayesianOptimization(
             f=None,
             pbounds=dict.fromkeys(self._names, (0.0, 1.0)),
@@ -128,8 +134,90 @@ class BayesianSearch:
     def tell(self, place: FloatArray, cost: float) -> None:
         """Hear what it costs there."""
         self._told += 1
+        self._places.append(np.array(place, dtype=np.float64))
+        self._logs.append(math.log(max(cost, 1e-12)))
         named = dict(zip(self._names, map(float, place), strict=True))
         self._inner.register(params=named, target=-math.log(max(cost, 1e-12)))
+
+    def best_predicted(self) -> tuple[FloatArray, float]:
+        """Give the place of least posterior mean, and the cost that it predicts there.
+
+        The least of many noisy costs is low by luck as well; the mean of a Gaussian process with
+        noise of its own, fitted to all that was told, has no part in that luck.
+        """
+        from scipy.optimize import minimize
+        from sklearn.gaussian_process import GaussianProcessRegressor
+        from sklearn.gaussian_process.kernels import (
+            ConstantKernel,
+            Matern,
+            WhiteKernel,
+        )
+
+        x, y = np.array(self._places), np.array(self._logs)
+        kernel = ConstantKernel(1.0) * Matern(
+            np.full(x.shape[1], 0.5), (0.05, 20.0), nu=2.5
+        ) + WhiteKernel(0.01, (1e-6, 1.0))
+        process = GaussianProcessRegressor(
+            kernel, normalize_y=True, n_restarts_optimizer=2, random_state=self._seed
+        )
+        with warnings.catch_warnings():
+            # A length at its bound says that a gain hardly matters, which is no fault.
+            warnings.simplefilter("ignore")
+            process.fit(x, y)
+        rng = np.random.default_rng(self._seed)
+        best = x[np.argsort(y)[:5]]
+        near = best[rng.integers(len(best), size=500)]
+        near = near + 0.05 * rng.standard_normal(near.shape)
+        starts = np.vstack([x, np.clip(near, 0.0, 1.0), rng.uniform(size=(500, x.shape[1]))])
+        start = starts[np.argmin(process.predict(starts))]
+        found = minimize(
+            lambda place: float(process.predict(place[None])[0]),
+            start,
+            method="L-BFGS-B",
+            bounds=[(0.0, 1.0)] * x.shape[1],
+        )
+        place = found.x if found.fun <= float(process.predict(start[None])[0]) else start
+        return place, float(np.exp(process.predict(place[None])[0]))
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Gains that may be the best.
+
+    Attributes
+    ----------
+    how : {"observed", "predicted"}
+        The least cost of a trial, or the least that the optimiser's model predicts.
+    gains : dict
+        By name.
+    cost : float
+        What the trial cost, or what the model predicts.
+    fresh : tuple of float
+        Costs on seeds that no trial had; infinite where the twin was lost.
+    """
+
+    how: str
+    gains: dict[str, float]
+    cost: float
+    fresh: tuple[float, ...] = ()
+
+    @property
+    def fresh_mean(self) -> float:
+        """Mean cost on fresh seeds; not a number without any."""
+        return float(np.mean(self.fresh)) if self.fresh else math.nan
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, for a file."""
+        return {"gains": self.gains, "cost": self.cost, "fresh": list(self.fresh)}
+
+    def __str__(self) -> str:
+        fresh = ""
+        if self.fresh:
+            fresh = (
+                f", on {len(self.fresh)} fresh seeds {self.fresh_mean:.4g} "
+                f"({min(self.fresh):.4g} .. {max(self.fresh):.4g})"
+            )
+        return f"best {self.how}: cost {self.cost:.4g}{fresh}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,9 +227,12 @@ class Calibration:
     Attributes
     ----------
     gains : dict
-        The best that were tried.
+        Those of the candidate that costs least on fresh seeds; without fresh seeds, the best that
+        were tried.
     cost : float
-        Their cost.
+        Least cost of a trial.
+    candidates : tuple of Candidate
+        The best that was tried, and the best that the optimiser's model predicts, if it has one.
     tried : tuple of (dict, float)
         Every trial with its cost, in order; infinite where the twin was lost.
     lost : int
@@ -152,6 +243,7 @@ class Calibration:
     cost: float
     tried: tuple[tuple[dict[str, float], float], ...]
     lost: int
+    candidates: tuple[Candidate, ...] = ()
 
     def plot(self, *, ax: Axes | None = None) -> Axes:
         """Draw every trial's cost, and the best so far."""
@@ -179,6 +271,10 @@ class Calibration:
 
     def __str__(self) -> str:
         lines = [f"Cost {self.cost:.4g} after {len(self.tried)} trials, {self.lost} lost the twin"]
+        lines += [
+            f"  {candidate}{', taken' if candidate.gains is self.gains else ''}"
+            for candidate in self.candidates
+        ]
         lines += [f"  {name:12s} {value:.5g}" for name, value in self.gains.items()]
         return "\n".join(lines)
 
@@ -225,6 +321,7 @@ def calibrate(
     optimiser: Optimiser | None = None,
     seed: int = 0,
     tell: Callable[[int, float], None] | None = None,
+    fresh: Sequence[Callable[[dict[str, float]], float]] = (),
 ) -> Calibration:
     """Look for the gains of least cost.
 
@@ -242,6 +339,9 @@ def calibrate(
         Of the default optimiser.
     tell : callable, optional
         Told the number of each trial and the best cost so far.
+    fresh : sequence of callable
+        The cost with other seeds than the trials'. The best trial and, if the optimiser has
+        ``best_predicted``, the best that its model predicts are judged by them.
 
     Returns
     -------
@@ -263,17 +363,33 @@ def calibrate(
     for i in range(trials):
         place = np.clip(np.asarray(who.ask(), dtype=np.float64), 0.0, 1.0)
         gains = box.gains(place)
-        try:
-            value = cost(gains)
-        except NumericalError:
-            value = math.nan
+        value = _cost(cost, gains)
         if math.isfinite(value):
             paid.append(value)
         who.tell(place, value if math.isfinite(value) else _LOST * max(paid, default=_UNKNOWN))
-        tried.append((gains, value if math.isfinite(value) else math.inf))
+        tried.append((gains, value))
         if tell is not None:
             tell(i, min(paid, default=math.inf))
     if not paid:
         raise NumericalError(f"all {trials} trials lost the twin; look at smaller gains")
     best = min(tried, key=lambda t: t[1])
-    return Calibration(best[0], best[1], tuple(tried), trials - len(paid))
+    candidates = [Candidate("observed", *best)]
+    predict = getattr(who, "best_predicted", None)
+    if predict is not None and len(paid) > size:
+        place, predicted = predict()
+        candidates.append(Candidate("predicted", box.gains(place), predicted))
+    judged = tuple(
+        dataclasses.replace(c, fresh=tuple(_cost(again, c.gains) for again in fresh))
+        for c in candidates
+    )
+    taken = min(judged, key=lambda c: c.fresh_mean) if fresh else judged[0]
+    return Calibration(taken.gains, best[1], tuple(tried), trials - len(paid), judged)
+
+
+def _cost(cost: Callable[[dict[str, float]], float], gains: dict[str, float]) -> float:
+    """A cost, infinite where the twin is lost."""
+    try:
+        value = cost(gains)
+    except NumericalError:
+        return math.inf
+    return value if math.isfinite(value) else math.inf

@@ -32,7 +32,7 @@ Mass = Literal["known", "stage_1", "wrong"]
 
 _TORQUES = [i for i, name in enumerate(INPUTS) if name.startswith(("drive_", "brake_"))]
 # A sensor is never believed to be better than this.
-_FLOOR = {
+NOISE_FLOOR = {
     "ax_mps2": 2e-3,
     "ay_mps2": 2e-3,
     "az_mps2": 2e-3,
@@ -128,6 +128,27 @@ def _road(seed: int, duration_s: float) -> Drive14:
     return rough_road(TwinCar(), LOADED_SUV, seed=seed, duration_s=duration_s)
 
 
+def drive_of(name: str, seed: int, part: float = 1.0) -> Drive14:
+    """The town, the sweep or the road with the loaded car, for a part of the customary time."""
+    if name == "town":
+        return _town(180.0 * part)
+    if name == "sweep":
+        return _sweep(max(1, round(4 * part)))
+    return _road(seed, 120.0 * part)
+
+
+_GAINS = {
+    "jxx_kgm2": (60.0, 15.0, 8.0),
+    "jzz_kgm2": (900.0, 200.0, 80.0),
+    "jyy_kgm2": (300.0, 60.0, 40.0),
+}
+
+
+def laws_of(law: Law, snr: float, names: Sequence[str]) -> list[ParameterLaw]:
+    """Laws of moments of inertia, with the gains of the paper's order."""
+    return _laws(law, snr, {name: _GAINS[name] for name in names})
+
+
 def _first(names: Sequence[str], errors: Sequence[float] | None) -> dict[str, float]:
     """Values to begin with: off by `errors` in parts of the true change, -1 for the nominal."""
     off = [-1.0] * len(names) if errors is None else list(errors)
@@ -144,7 +165,7 @@ def _batch(
     readings: Readings, channels: Sequence[str], names: Sequence[str], doubt: float = 0.0
 ) -> Observer:
     """Twins side by side; unless doubted, the torques are exact, as the paper's twin has them."""
-    noise = {c: max(readings.noise[c], _FLOOR[c]) for c in channels}
+    noise = {c: max(readings.noise[c], NOISE_FLOOR[c]) for c in channels}
     return Observer(batch=SideBySide(unknowns(*names), noise, input_doubt=doubt))
 
 
@@ -244,9 +265,7 @@ def estimate_roll_yaw(
     if law == "side_by_side":
         observer = _batch(readings, channels, looked_for)
     else:
-        observer = Observer(
-            laws=_laws(law, snr, {"jxx_kgm2": (60.0, 15.0, 8.0), "jzz_kgm2": (900.0, 200.0, 80.0)})
-        )
+        observer = Observer(laws=laws_of(law, snr, names))
     found = observe(TwinCar(), first, drive.inputs, readings, observer, speed_mps=_speed(drive))
     return LoadExperiment(
         "roll and yaw inertia", drive, readings, found, names, LOADED_SUV, NOMINAL_SUV
@@ -296,7 +315,7 @@ def estimate_pitch(
     if law == "side_by_side":
         observer = _batch(readings, channels, looked_for)
     else:
-        observer = Observer(laws=_laws(law, snr, {"jyy_kgm2": (300.0, 60.0, 40.0)}))
+        observer = Observer(laws=laws_of(law, snr, names))
     found = observe(TwinCar(), first, told, readings, observer, speed_mps=_speed(drive))
     return LoadExperiment("pitch inertia", drive, readings, found, names, LOADED_SUV, NOMINAL_SUV)
 

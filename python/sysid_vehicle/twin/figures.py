@@ -11,12 +11,13 @@ from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, new_figure, tidy
 from .car import SPORTS_CAR
 from .experiments import LoadExperiment
 from .joint import JointExperiment
+from .schedule import ScheduleRun
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["joint_figure", "load_figure"]
+__all__ = ["joint_figure", "load_figure", "schedule_figure"]
 
 _ACCEPTABLE = 10.0  # per cent of the change: the paper's limit
 _LINES = (AFTER, BEFORE, MEASURED, FLOOR)
@@ -63,6 +64,16 @@ def load_figure(
         _legend(ax)
         tidy(ax, xlabel=condition, ylabel="error [% of the change]")
         ax.set_ylim(bottom=0.0)
+    return figure
+
+
+def schedule_figure(run: ScheduleRun) -> Figure:
+    """Draw what each stage is for over its time, one stage under the other."""
+    shown = [(stage, name) for stage in run.stages for name in stage.names]
+    figure = new_figure(7.0, 2.2 * len(shown))
+    for ax, (stage, name) in zip(figure.subplots(len(shown), 1), shown, strict=True):
+        stage.plot(name, ax=ax)
+        ax.set_title(stage.name, loc="left", fontsize=9)
     return figure
 
 
