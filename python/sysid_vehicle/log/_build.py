@@ -46,7 +46,7 @@ def _build(data: Columns, despike: tuple[str, ...], check: bool, notes: list[str
     columns = collect(data, notes)
     time_s = columns.pop("time_s")
     if time_s.size < 2:
-        raise InvalidInput(f"time_s: only {time_s.size} sample(s); a log needs at least two")
+        raise InvalidInput(f"time_s: only {time_s.size} sample(s); give a log of at least two")
     check_time(time_s)
     if check:
         columns = blank_held(columns, 1.0 / float(np.median(np.diff(time_s))), notes)

@@ -17,14 +17,16 @@ _LINEAR_MPS2 = 5.0  # lateral acceleration up to which the tyres are taken as ne
 _USUAL_S = 0.055
 # A lever arm of this length acts like a lag of length over speed [m].
 _LEVER_M = 1.2
-_STEER_LATE_S = 0.075
+_STEADY_MPS2 = 2.0  # braking harder moves load between the axles
+_STEER_LATE_S = 0.06
 _STEER_EARLY_S = 0.12  # hydraulics, rubber and relaxing tyres delay the answer of a car
 _FORCE_EARLY_S = 0.4  # brakes and engines take their time
 # Of acceleration, squared speed, lateral acceleration times steering, and one; per mass.
 _FORCE_PRIOR = np.array([1.0, 3e-4, 0.5, 0.0])
 _FORCE_SPREAD = np.array([0.1, 7e-4, 1.0, np.inf])
-# Below, a lag explains too little of the misfit. Gravity through roll bends ay_mps2 most.
-_MIN_GAIN = {"vy_mps": 1.35, "yaw_rate_radps": 1.35, "ay_mps2": 1.6}
+# Below, a lag explains too little of the misfit. Gravity through roll bends ay_mps2 most, and
+# what corners take of the force is only roughly known.
+_MIN_GAIN = {"vy_mps": 1.35, "yaw_rate_radps": 1.35, "ay_mps2": 1.6, "fx_n": 2.0}
 _MIN_GAIN_ELSE = 1.2
 _MIN_EVIDENCE = 30.0
 _EXCITED_MPS2 = 0.4
@@ -49,7 +51,8 @@ def lag_notes(motion: Motion) -> list[str]:
         notes += _lateral(motion, usable)
     if "ax_mps2" in c and _spread(motion.mean(c["ax_mps2"]), usable) > _EXCITED_MPS2:
         notes += _speed(motion, usable)
-        if "fx_n" in c and _spread(c["fx_n"], np.ones(c["fx_n"].size, dtype=bool)) > 0.0:
+        driven = _spread(motion.change(c["vx_mps"]), usable) > _EXCITED_MPS2
+        if "fx_n" in c and driven and np.ptp(c["fx_n"]) > 0.0:
             notes += _force(motion, usable)
     if "vy_mps" in c and not notes:
         notes += _steer(motion, usable)
@@ -133,7 +136,11 @@ def _force(m: Motion, usable: np.ndarray) -> list[str]:
     # Without priors for drag and for what corners take, a slow change of speed has any lag.
     mean, spread = mass * _FORCE_PRIOR, mass * _FORCE_SPREAD
     lag = find_lag(sides, mean, spread, usable)
-    return [_note("fx_n", "ax_mps2", lag)] if _told(lag, _USUAL_S, _FORCE_EARLY_S) else []
+    return (
+        [_note("fx_n", "ax_mps2", lag)]
+        if _told(lag, _USUAL_S, _FORCE_EARLY_S, _MIN_GAIN["fx_n"])
+        else []
+    )
 
 
 def _steer(m: Motion, usable: np.ndarray) -> list[str]:
@@ -144,6 +151,7 @@ def _steer(m: Motion, usable: np.ndarray) -> list[str]:
     """
     c, one = m.channels, np.ones(m.count)
     usable = usable & (np.abs(m.mean(c["ay_mps2"])) < _LINEAR_MPS2)
+    usable &= np.abs(m.change(c["vx_mps"])) < _STEADY_MPS2
     if np.count_nonzero(usable) < _MIN_WINDOWS:
         return []
     speed = np.maximum(c["vx_mps"], 3.0)

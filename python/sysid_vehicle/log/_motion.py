@@ -12,7 +12,7 @@ import numpy as np
 
 from ._channels import FloatArray
 from ._grid import own_period
-from ._signals import filled, median_of_five
+from ._signals import disorder, filled, median_of_five, white_noise
 
 _RATE_HZ = 50.0  # enough for what a car does; quicker logs are averaged down
 _MEDIAN_ABOVE_HZ = 40.0  # below, a median of five samples would take movement for spikes
@@ -28,6 +28,17 @@ class Motion:
         Canonical channels on a uniform grid, `time_s` among them; NaN is missing.
     rate_hz : float
         Rate of the grid.
+
+    Attributes
+    ----------
+    channels : dict of ndarray, shape (m,)
+        Without spikes and holes, at `rate_hz`, with `time_s` beside.
+    disorder : dict of float
+        Share of a channel's variance that is white.
+    noise : dict of float
+        White noise of a channel's mean over one second.
+    usable : ndarray of bool, shape (count,)
+        Windows in which every channel is known.
     """
 
     def __init__(self, columns: Mapping[str, FloatArray], rate_hz: float) -> None:
@@ -37,10 +48,17 @@ class Motion:
         self.rate_hz = rate_hz / every
         self.time_s = _averaged(time_s, every, count)
         self.channels: dict[str, FloatArray] = {}
+        self.disorder: dict[str, float] = {}
+        self.noise: dict[str, float] = {}
         known = np.ones(count, dtype=bool)
         for name, values in columns.items():
             if name == "time_s":
                 continue
+            own = values[np.isfinite(values)]
+            self.disorder[name] = disorder(own)
+            # A mean over one second has the noise of one sample over the root of their number.
+            per_second = rate_hz * own.size / values.size
+            self.noise[name] = white_noise(own) / max(per_second, 1.0) ** 0.5
             dense = filled(values)
             if rate_hz > _MEDIAN_ABOVE_HZ:
                 dense = median_of_five(dense)

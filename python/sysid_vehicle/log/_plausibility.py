@@ -18,7 +18,7 @@ from ..errors import InvalidInput
 from ._channels import DEG, FloatArray
 from ._lags import lag_notes, sideways
 from ._motion import Motion
-from ._ranges import check_ranges
+from ._ranges import WHITE, check_ranges
 from ._regression import Regression, regress
 
 _MOVING = 3.0  # in whatever unit vx has; only windows above are compared
@@ -26,8 +26,11 @@ _WINDOW_S = 1.0
 _MIN_WINDOWS = 8
 _EXCITED = 0.5  # m/s2 that one side must reach before anything is compared
 _SLIDING = 0.2  # m/s2, the same for the change of vy, which is a small part of ay
+_ABOVE_NOISE = 6.0  # noise of the regressor itself makes every coefficient too small
 _CLEARLY = 1.5  # m/s2 that it must reach before channels are called unrelated
 _LINEAR_MPS2 = 5.0
+_DRIVEN_MPS, _LEAST_FORCE_N = 12.0, 30.0  # at that speed drag takes more
+_HELD_MPS2 = 0.05  # a speed that falls no faster on average is held
 
 # Scale errors of good sensors, gravity through roll, tyres and geometry that are not known.
 _SCALE_DOUBT = 0.12
@@ -36,8 +39,11 @@ _NOT_ONE = 5.0  # deviations from the right unit before another is looked for
 _FITS = 3.0  # deviations within which another unit fits
 _UNNAMED = math.log(2.5)  # a scale that is farther off is refused although no unit explains it
 
-# The wheelbase that answers: of cars, from karts to coaches, and what understeer adds.
-_WHEELBASE, _WHEELBASE_DOUBT, _UNDERSTEER_S2PM = math.log(2.9), 0.45, 0.004
+# The wheelbase that answers, from karts to coaches [m], what understeer adds [m/(m/s)^2], how far
+# they vary, and the deviations from them at which the steering angle is none of road wheels.
+_WHEELBASE_M, _WHEELBASE_DOUBT = 2.9, 0.45
+_UNDERSTEER, _UNDERSTEER_DOUBT = 0.002, 0.003
+_NOT_A_WHEELBASE = 3.5
 
 _YAW_DEG = ("yaw_rate_radps", "degrees per second", f"factor = {DEG}")
 _AY_G = ("ay_mps2", "g", "factor = 9.80665")
@@ -132,6 +138,8 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[s
         raise problem or error from None
     if problem is not None:
         raise problem
+    if "fx_n" in columns:
+        notes += _held_speed_note(drive)
     return notes + lag_notes(motion)
 
 
@@ -152,6 +160,28 @@ def _check_laws(drive: _Drive) -> None:
         _check_longitudinal(drive)
     if "fx_n" in channels:
         _check_force(drive)
+
+
+def _held_speed_note(drive: _Drive) -> list[str]:
+    """Return a note if the speed is held by a force that brakes."""
+    c = drive.motion.channels
+    force = drive.mean(c["fx_n"])
+    if "ax_mps2" in c:
+        felt = drive.mean(c["ax_mps2"])
+    elif "vy_mps" in c:
+        felt = drive.change(c["vx_mps"]) - drive.mean(c["vy_mps"] * c["yaw_rate_radps"])
+    else:
+        felt = drive.change(c["vx_mps"])
+    speed = float(np.mean(drive.mean(c["vx_mps"])))
+    mean = float(np.mean(force))
+    if speed < _DRIVEN_MPS or mean > -_LEAST_FORCE_N or float(np.mean(felt)) < -_HELD_MPS2:
+        return []
+    text = (
+        f"fx_n: brakes with {-mean:.3g} N on average while the speed is held at {speed:.3g} m/s, "
+        f"{drive.place(force)}: unless the road leads downhill the sign is wrong; put factor = -1 "
+        f"for fx_n in the channel map"
+    )
+    return [text]
 
 
 def _ones(drive: _Drive) -> FloatArray:
@@ -255,11 +285,11 @@ def _check_steer(drive: _Drive) -> None:
         raise InvalidInput(_wrong_sign("steer_rad", text, steer, drive))
     if base <= 0.0 or answer.coherence < 0.5:
         return
-    understeer = _UNDERSTEER_S2PM * float(np.median(drive.mean(c["vx_mps"]))) ** 2
-    expected = math.exp(_WHEELBASE) + understeer
-    spread = math.hypot(_WHEELBASE_DOUBT, understeer / expected)
-    off = math.log(base / expected) / math.hypot(spread, doubt / base)
-    if abs(off) < _NOT_ONE or (base / expected < 6.0 and base > 0.1 * expected):
+    speed_2 = float(np.median(drive.mean(c["vx_mps"]))) ** 2
+    expected = _WHEELBASE_M + _UNDERSTEER * speed_2
+    spread = math.hypot(_WHEELBASE_DOUBT * _WHEELBASE_M, _UNDERSTEER_DOUBT * speed_2) / expected
+    off = abs(math.log(base / expected)) / math.hypot(spread, doubt / base)
+    if off < _NOT_A_WHEELBASE or 0.2 < base / expected < 5.0:
         return
     ratio = base / expected
     i = int(np.argmax(np.abs(steer)))
@@ -286,7 +316,10 @@ def _check_sliding(drive: _Drive) -> None:
     slide = drive.change(c["vy_mps"])
     ay, turn = drive.mean(c["ay_mps2"]), drive.mean(c["vx_mps"] * c["yaw_rate_radps"])
     expected = ay - turn
-    if max(_size(slide), _size(expected)) < _SLIDING:
+    noise = drive.motion.noise
+    speed = float(np.median(drive.mean(c["vx_mps"])))
+    own = math.hypot(noise["ay_mps2"], speed * noise["yaw_rate_radps"]) / _WINDOW_S**0.5
+    if _size(expected) < max(_SLIDING, _ABOVE_NOISE * own):
         return
     # The expected change is the small difference of two large readings, each with an own scale;
     # and where the speed is not measured at the centre of gravity the yaw rate adds to it.
@@ -296,11 +329,14 @@ def _check_sliding(drive: _Drive) -> None:
     if ratio < -4.0 * doubt and found.coherence > 0.3:
         text = "changes against what ay_mps2 - vx_mps * yaw_rate_radps demands"
         raise InvalidInput(_wrong_sign("vy_mps", text, drive.mean(c["vy_mps"]), drive))
-    if found.coherence < 0.1 and _spread(expected - found.coefficients[1] * turn) > 1.0:
+    # Of a channel in disorder nothing of the change is left, and it is white.
+    lost = found.coherence < 0.1 and ratio + 5.0 * doubt < 0.8 and ratio < 0.3
+    clear = _spread(expected - found.coefficients[1] * turn) > _CLEARLY
+    if lost and (clear or drive.motion.disorder["vy_mps"] > WHITE):
         raise InvalidInput(
             f"vy_mps: does not change as ay_mps2 - vx_mps * yaw_rate_radps demands, "
-            f"{drive.place(expected)}; check that the column holds the lateral speed, in the order "
-            f"of time, or leave it out"
+            f"{drive.place(expected)}; check that the column holds the lateral speed, in the "
+            f"order of time, or leave it out"
         )
     if found.coherence > 0.5 and ratio > 0.0:
         formula = "(d vy_mps / dt) / (ay_mps2 - vx_mps * yaw_rate_radps)"

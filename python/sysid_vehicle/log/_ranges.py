@@ -10,7 +10,9 @@ import numpy as np
 from ..errors import InvalidInput
 from ._channels import CHANNELS, DEG, FloatArray
 from ._grid import at
-from ._signals import filled, median_of_five
+from ._signals import disorder, filled, median_of_five, white_noise
+
+WHITE = 0.7  # share of white variance from which a channel has no order
 
 _MIN_RATE_HZ = 18.0
 _DRIVEN_MPS = 15.0
@@ -21,26 +23,33 @@ _HOLDING_N, _HOLDING_NS2PM2 = 5e4, 6.2
 
 @dataclass(frozen=True)
 class _Range:
-    """Largest magnitude of a channel, largest white noise, and what the channel may be instead."""
+    """Largest magnitude of a channel, white noise that is impossible and that is doubtful.
+
+    `likely` is what the channel may be instead, and the remedy.
+    """
 
     largest: float
+    jump: float
     noise: float
     likely: str
 
 
 _RANGES = {
-    "vx_mps": _Range(150.0, 2.0, "if it is in km/h, put factor = 0.2777778"),
-    "vy_mps": _Range(60.0, 1.5, "if it is in km/h, put factor = 0.2777778"),
-    "yaw_rate_radps": _Range(10.0, 0.5, f"if it is in degrees per second, put factor = {DEG}"),
-    "ax_mps2": _Range(60.0, 15.0, "if it is in mg, put factor = 0.00980665"),
-    "ay_mps2": _Range(60.0, 15.0, "if it is in mg, put factor = 0.00980665"),
+    "vx_mps": _Range(150.0, 2.0, 0.5, "if it is in km/h, put factor = 0.2777778"),
+    "vy_mps": _Range(60.0, 1.5, 0.2, "if it is in km/h, put factor = 0.2777778"),
+    "yaw_rate_radps": _Range(
+        10.0, 0.5, 0.05, f"if it is in degrees per second, put factor = {DEG}"
+    ),
+    "ax_mps2": _Range(60.0, 15.0, 5.0, "if it is in mg, put factor = 0.00980665"),
+    "ay_mps2": _Range(60.0, 15.0, 5.0, "if it is in mg, put factor = 0.00980665"),
     "steer_rad": _Range(
         1.2,
         0.1,
+        0.02,
         f"if it is in degrees, put factor = {DEG}; if it is the angle of the steering wheel, "
         f"divide the factor by the steering ratio",
     ),
-    "fx_n": _Range(1e6, 1e6, "if it is in mN, put factor = 0.001"),
+    "fx_n": _Range(1e6, np.inf, np.inf, "if it is in mN, put factor = 0.001"),
 }
 
 
@@ -74,26 +83,37 @@ def check_ranges(columns: Mapping[str, FloatArray], rate_hz: float) -> list[str]
                 f"{name} in the channel map"
             )
         if rate_hz > _MIN_RATE_HZ:
-            _check_jumps(name, values, limits.noise, time_s)
+            notes += _check_jumps(name, values, limits, time_s)
     if "fx_n" in columns:
         _check_force(columns)
     return notes
 
 
-def _check_jumps(name: str, values: FloatArray, largest: float, time_s: FloatArray) -> None:
-    """Refuse a channel whose usual second difference is that of large white noise."""
+def _check_jumps(name: str, values: FloatArray, limits: _Range, time_s: FloatArray) -> list[str]:
+    """Refuse a channel whose usual second difference is that of large white noise.
+
+    Warn of one that holds nothing else than noise, if it is more than a sensor has.
+    """
     known = values[np.isfinite(values)]
     if known.size < 50 or known.size < 0.5 * values.size:  # slow channels move between samples
-        return
-    second = np.abs(np.diff(known, 2))
-    noise = 1.4826 * float(np.median(second)) / 6.0**0.5
-    if noise > largest:
+        return []
+    noise = white_noise(known)
+    if noise > limits.jump:
         i = int(np.argmax(np.abs(np.diff(filled(values)))))
         raise InvalidInput(
             f"{name}: jumps from sample to sample by {2.0**0.5 * noise:.3g} {CHANNELS[name].unit}, "
             f"most at {at(i, time_s)}; no car moves so: check the column, and that its rows are in "
             f"the order of time"
         )
+    if noise > limits.noise and disorder(known) > WHITE:
+        i = int(np.argmax(np.abs(np.diff(filled(values)))))
+        text = (
+            f"{name}: holds only noise, {noise:.3g} {CHANNELS[name].unit} from sample to sample "
+            f"(most at {at(i, time_s)}); check the column, and that its rows are in the order of "
+            f"time"
+        )
+        return [text]
+    return []
 
 
 def _check_force(columns: Mapping[str, FloatArray]) -> None:

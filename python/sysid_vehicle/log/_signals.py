@@ -94,3 +94,16 @@ def spikes(values: FloatArray) -> np.ndarray:
     second = np.pad(np.abs(np.diff(x, 2)), 1, mode="edge")
     noise = _local_median(second, candidates)
     return candidates[deviation[candidates] > _SPIKE_NOISE * noise]
+
+
+def disorder(values: FloatArray) -> float:
+    """Return how much of a channel's variance changes from sample to sample: 1 if it is white."""
+    variance = float(np.var(values)) if values.size > 1 else 0.0
+    return float(np.mean(np.diff(values) ** 2)) / (2.0 * variance) if variance > 0.0 else 0.0
+
+
+def white_noise(values: FloatArray) -> float:
+    """Return the standard deviation of a channel's white noise, from its second differences."""
+    if values.size < 3:
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / float(np.sqrt(6.0))

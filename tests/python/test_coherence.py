@@ -1,0 +1,162 @@
+"""Channels against the laws of motion: good logs pass in silence, corrupted ones are named."""
+
+import dataclasses
+import re
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Log, Model, drive, lab, manoeuvres, read_log
+from sysid_vehicle.errors import InvalidInput, SysidWarning
+from sysid_vehicle.log._regression import find_lag, regress
+
+Columns = dict[str, np.ndarray]
+
+# True of the drive, and said of it rightly.
+TRUE_NOTES = ("not excited", "the rate is only", "constant (")
+
+
+def columns_of(log: Log) -> Columns:
+    return {name: np.array(log[name]) for name in log.channels}
+
+
+def heard(columns: Columns) -> str:
+    """Return what reading says, but for what is true of the drive."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            Log.from_arrays(columns)
+        except InvalidInput as error:
+            return str(error)
+    told = [str(w.message) for w in caught]
+    return "; ".join(t for t in told if not any(note in t for note in TRUE_NOTES))
+
+
+@pytest.mark.parametrize("rate_hz", [5.0, 10.0, 20.0, 100.0, 1000.0])
+@pytest.mark.parametrize("name", manoeuvres.all())
+def test_own_drives_are_read_in_silence(truth: Model, name: str, rate_hz: float) -> None:
+    data = columns_of(drive(truth, manoeuvres.all()[name], seed=7, rate_hz=rate_hz))
+    assert heard(data) == ""
+    n = data["time_s"].size
+    for start in (0.0, 0.3, 0.6):
+        part = slice(int(start * n), int(start * n) + int(12.0 * rate_hz))
+        assert heard({c: v[part] for c, v in data.items()}) == ""
+
+
+def test_a_double_lane_change_keeps_its_speed(truth: Model, tmp_path: Path) -> None:
+    """Most of its a_x is v_y r: without that term its speed looked like km/h."""
+    for seed in range(4):
+        log = drive(truth, manoeuvres.double_lane_change(), seed=seed)
+        log.to_csv(tmp_path / "lane.csv")
+        assert read_log(tmp_path / "lane.csv")["vx_mps"].max() == log["vx_mps"].max()
+
+
+@pytest.mark.parametrize("without", [("vy_mps",), ("vy_mps", "fx_n"), ("ax_mps2",)])
+def test_with_fewer_channels_too(truth: Model, without: tuple[str, ...]) -> None:
+    for manoeuvre in manoeuvres.all().values():
+        data = columns_of(drive(truth, manoeuvre, seed=8))
+        assert heard({c: v for c, v in data.items() if c not in without}) == ""
+
+
+@pytest.mark.parametrize("duration_s", [120.0, 200.0])
+def test_the_laboratory_drives_an_oval(duration_s: float) -> None:
+    oval = dataclasses.replace(lab.excitation.Oval(), duration_s=duration_s)
+    log = lab.run_closed_loop(oval, lab.Setup.default(), seed=1).to_log()
+    assert heard(columns_of(log)) == ""
+
+
+@pytest.fixture(scope="module")
+def corruptions() -> dict[str, dict[str, object]]:
+    folder = str(Path(__file__).resolve().parents[2] / "benchmarks" / "reading")
+    sys.path.insert(0, folder)
+    try:
+        import corruptions
+    finally:
+        sys.path.remove(folder)
+    return {"all": corruptions.CORRUPTIONS, "matters": {"": corruptions.matters}}
+
+
+# What a lap holds too little of: its v_y is too slow to have a time, and so is its steering.
+LAP_MISSES = {("0.1 s late", "vy_mps"), ("0.1 s late", "steer_rad")}
+
+
+@pytest.mark.parametrize("seed", [21, 22])
+def test_corruptions_of_a_lap_are_noticed(truth: Model, corruptions: dict, seed: int) -> None:
+    data = columns_of(drive(truth, manoeuvres.lap(), seed=seed))
+    rng = np.random.default_rng(seed)
+    for kind, channels in corruptions["all"].items():
+        for channel, corrupt in channels.items():
+            spoilt = corrupt(data, rng)
+            if (kind, channel) in LAP_MISSES or not corruptions["matters"][""](data, spoilt):
+                continue
+            said = heard(spoilt)
+            assert said, (kind, channel)
+            assert re.search(r"t = |whole log|samples|sample ", said), said
+            assert re.search(r"put |check |swap ", said), said
+
+
+class TestLags:
+    @pytest.mark.parametrize(
+        ("channel", "late_s", "words"),
+        [
+            ("yaw_rate_radps", 0.1, "yaw_rate_radps: lags behind ay_mps2 by"),
+            ("yaw_rate_radps", -0.1, "yaw_rate_radps: runs ahead of ay_mps2 by"),
+            ("ay_mps2", 0.1, "ay_mps2: lags behind yaw_rate_radps by"),
+            ("vy_mps", 0.1, "vy_mps: lags behind ay_mps2 and yaw_rate_radps by"),
+            ("vx_mps", 0.1, "vx_mps: lags behind ax_mps2 by"),
+            ("ax_mps2", 0.1, "vx_mps: runs ahead of ax_mps2 by"),
+            ("fx_n", 0.1, "fx_n: lags behind ax_mps2 by"),
+            ("steer_rad", 0.1, "steer_rad: lags behind yaw_rate_radps and ay_mps2 by"),
+        ],
+    )
+    def test_who_is_late_and_by_how_much(
+        self, truth: Model, channel: str, late_s: float, words: str
+    ) -> None:
+        data = columns_of(drive(truth, manoeuvres.double_lane_change(), seed=9))
+        time_s = data["time_s"]
+        said = heard({**data, channel: np.interp(time_s - late_s, time_s, data[channel])})
+        found = re.search(words + r" ([\d.]+) s", said)
+        assert found is not None, said
+        # The steering depends on tyres that are not known, and so does its time.
+        assert float(found[1]) == pytest.approx(0.1, abs=0.03 if channel == "steer_rad" else 0.01)
+
+    def test_the_remedy_mends_it(self, truth: Model) -> None:
+        data = columns_of(drive(truth, manoeuvres.step_steer(), seed=9))
+        time_s, yaw = data["time_s"], data["yaw_rate_radps"]
+        late = {**data, "yaw_rate_radps": np.interp(time_s - 0.1, time_s, yaw)}
+        found = re.search(r"put delay_s = (\S+) for yaw_rate_radps", heard(late))
+        assert found is not None
+        entry = {"yaw_rate_radps": {"delay_s": float(found[1])}}
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", SysidWarning)
+            log = read_log(late, entry)
+        inner = slice(100, -100)
+        np.testing.assert_allclose(log["yaw_rate_radps"][inner], yaw[inner], atol=0.02)
+        assert np.isnan(log["yaw_rate_radps"][-5:]).all()
+
+    def test_a_shift_between_samples(self, rng: np.random.Generator) -> None:
+        time_s = np.arange(3000) * 0.02
+        signal = np.sin(time_s) + np.sin(2.7 * time_s)
+        noisy = signal + rng.normal(0.0, 0.05, time_s.size)
+
+        def sides(lag: float) -> tuple[np.ndarray, np.ndarray]:
+            moved = np.interp(time_s + 0.0537 - lag, time_s, signal)
+            return noisy, np.column_stack([moved, np.ones(time_s.size)])
+
+        free = np.full(2, np.inf)
+        lag = find_lag(sides, np.zeros(2), free, np.ones(time_s.size, dtype=bool))
+        assert lag.seconds == pytest.approx(0.0537, abs=4.0 * lag.deviation)
+        assert 0.0 < lag.deviation < 0.002
+
+
+def test_a_regression_is_not_bent_by_outliers(rng: np.random.Generator) -> None:
+    x = np.column_stack([rng.normal(size=400), np.ones(400)])
+    y = x @ np.array([2.0, 1.0]) + rng.normal(0.0, 0.1, 400)
+    y[:20] += 50.0
+    found = regress(y, x, np.zeros(2), np.full(2, np.inf))
+    np.testing.assert_allclose(found.coefficients, [2.0, 1.0], atol=0.05)
+    assert 0.003 < found.deviations[0] < 0.01
+    assert found.coherence > 0.7
