@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._arrays import FloatArray
-from .._text import html_table, number, text_table
+from .._text import html_list, html_paragraph, html_table, number, text_table
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..identify import Fit, explaining
 from ..log import Log
@@ -93,8 +93,11 @@ class Comparison:
         return "\n".join(parts)
 
     def _repr_html_(self) -> str:
-        where = "".join(f"<li>{r}</li>" for r in self.regions)
-        return f"<p>{self._headline()}</p>{html_table(self._HEAD, self._rows())}<ul>{where}</ul>"
+        return (
+            html_paragraph(self._headline())
+            + html_table(self._HEAD, self._rows())
+            + html_list(self.regions)
+        )
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """The map of where the model fails."""

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from tqdm import tqdm
 
-from .._text import html_table, text_table, with_error
+from .._text import html_paragraph, html_table, text_table, with_error
 from .._threads import Workers
 from ..effects import Effect, effect
 from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving
-from ..identify import Fit, refine, refit
+from ..identify import Fit, explaining, refine, refit
 from ..log import Log
 from ..model import Model
 from .evidence import Evidence
@@ -158,7 +158,7 @@ class Diagnosis:
         return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
 
     def _repr_html_(self) -> str:
-        return f"<p>{self._headline()}</p>{html_table(self._HEAD, self._rows())}"
+        return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
 
     def plot(self, ax: Axes | None = None, most: int = 10) -> Axes:
         """Bars of the evidence for each effect."""
@@ -175,6 +175,7 @@ class Diagnosis:
         return ax
 
 
+@explaining
 def diagnose(
     fit: Fit,
     logs: Log | Sequence[Log] | Driving | None = None,

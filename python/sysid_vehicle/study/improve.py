@@ -15,7 +15,7 @@ from ..diagnose import (
 )
 from ..errors import InvalidInput, warn
 from ..estimate import Driving
-from ..identify import Fit, identify
+from ..identify import Fit, explaining, identify
 from ..log import Log
 from ..model import Model
 from .held_out import hold_out, serving
@@ -29,6 +29,7 @@ __all__ = ["improve"]
 _SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
 
 
+@explaining
 def improve(
     model: Model,
     train: Log | Sequence[Log],

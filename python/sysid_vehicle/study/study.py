@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import Any, Literal
 
 from .._files import write_json
-from .._text import html_table, text_table, with_error
+from .._text import html_list, html_table, text_table, with_error
 from ..compare import Comparison
 from ..diagnose import (
     Candidate,
@@ -189,9 +190,10 @@ class Study:
         return said
 
     def _repr_html_(self) -> str:
-        effects = "".join(f"<li>{a}</li>" for a in self.added)
-        return f"<p><b>{self.verdict}</b>: {self.meaning}.</p><ul>{effects}</ul>" + html_table(
-            self._HEAD, self._rows()
+        return (
+            f"<p><b>{escape(self.verdict)}</b>: {escape(self.meaning)}.</p>"
+            + html_list(self.added)
+            + html_table(self._HEAD, self._rows())
         )
 
     def to_dict(self) -> dict[str, Any]:
