@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._arrays import FloatArray
-from .._text import html_table, number, text_table
+from .._text import html_list, html_paragraph, html_table, number, text_table
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..identify import Fit, explaining
 from ..log import Log
@@ -99,10 +98,11 @@ class Comparison:
         return "\n".join(parts)
 
     def _repr_html_(self) -> str:
-        lines = [*self.unrelated.values(), *map(str, self.regions)]
-        where = "".join(f"<li>{escape(line)}</li>" for line in lines)
-        table = html_table(self._HEAD, self._rows())
-        return f"<p>{escape(self._headline())}</p>{table}<ul>{where}</ul>"
+        return (
+            html_paragraph(self._headline())
+            + html_table(self._HEAD, self._rows())
+            + html_list([*self.unrelated.values(), *self.regions])
+        )
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """The map of where the model fails."""

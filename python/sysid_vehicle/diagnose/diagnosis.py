@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._text import html_table, text_table, with_error
+from .._text import html_paragraph, html_table, text_table, with_error
 from ..compare import compare
 from ..effects import Effect
 from ..errors import InvalidInput, NumericalError
@@ -248,7 +247,7 @@ class Diagnosis:
         return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
 
     def _repr_html_(self) -> str:
-        return f"<p>{escape(self._headline())}</p>{html_table(self._HEAD, self._rows())}"
+        return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
 
     def plot(self, ax: Axes | None = None, most: int = 10) -> Axes:
         """Bars of the evidence for each effect."""
