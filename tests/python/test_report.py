@@ -13,7 +13,8 @@ import pytest
 import sysid_vehicle as sv
 from sysid_vehicle import _style
 from sysid_vehicle.demo.story import findings
-from sysid_vehicle.report import figures, write_report
+from sysid_vehicle.diagnose import EffectVerdict, Verdicts
+from sysid_vehicle.report import figures, sections, write_report
 from sysid_vehicle.report.excerpt import worst_excerpt
 from sysid_vehicle.report.tyres import driven_slip, identified_curves, model_curves
 from sysid_vehicle.report.words import interval, quantity, ranking_title, summary
@@ -23,6 +24,8 @@ TRUTH = (
     .add("tyre_load_sensitivity")
     .with_values({"tyre_load_sensitivity.sensitivity": 0.25})
 )
+
+UNTESTED = ("aero_drag", "steer_ratio")
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +62,16 @@ def written(study: sv.Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
     study.report(path)
     return path
+
+
+def test_what_the_driving_cannot_test_is_told_by_refits(study: sv.Study) -> None:
+    seen = "".join(sections._hidden(study))
+    assert "would have been seen" in seen
+    open_ = Verdicts(tuple(EffectVerdict(sv.effect(e), "not testable") for e in UNTESTED))
+    told = "".join(sections._hidden(replace(study, verdicts=open_)))
+    assert "Of the 2 effects that are not testable" in told
+    assert "0.45 m2 that is not modelled adds less than one percent to any parameter" in told
+    assert re.search(r"ratio_error 0\.08 that is not modelled adds \+\d", told)
 
 
 class Checker(HTMLParser):

@@ -137,8 +137,12 @@ def _hidden(study: Study) -> list[str]:
     """What the effects that this driving tells least of would do to the parameters."""
     known = {e.id for e in study.fit.model.candidates}
     open_ = [v for v in study.verdicts.of("not testable") if v.effect.id in known]
+    title = heading("What the identified parameters would hide", 3)
     if not open_:
-        return []
+        text = (
+            "Each effect that was tested would have been seen. bias_report tells what it would do"
+        )
+        return [title, paragraph(f"{text} unseen.")]
 
     def looseness(v: EffectVerdict) -> float:
         sizes = zip(v.bound, v.effect.parameters, strict=False)
@@ -147,7 +151,7 @@ def _hidden(study: Study) -> list[str]:
     least = sorted(open_, key=looseness, reverse=True)[:_MOST_HIDDEN]
     report = bias_report(study.fit, [v.effect for v in least], most_samples=_HIDDEN_SAMPLES)
     return [
-        heading("What the identified parameters would hide", 3),
+        title,
         paragraph(
             f"Of the {len(open_)} effects that are not testable, those of which this driving tells "
             "least. Each was simulated at a typical size on the same driving, and the model fitted "
