@@ -1,0 +1,54 @@
+"""What a study says of driving that tells little, and of effects that act alike."""
+
+import pytest
+
+from sysid_vehicle import Model, drive, improve, manoeuvres
+
+
+@pytest.mark.filterwarnings("ignore:.*not excited:sysid_vehicle.SysidWarning")
+@pytest.mark.filterwarnings("ignore:.*too short:sysid_vehicle.SysidWarning")
+@pytest.mark.filterwarnings("ignore:.*did not converge:sysid_vehicle.SysidWarning")
+def test_driving_without_corners_tests_nothing_lateral(start: Model, truth: Model) -> None:
+    car = truth.add("tyre_load_sensitivity").with_values({"tyre_load_sensitivity.sensitivity": 0.2})
+    straight = [
+        drive(car, manoeuvres.straight_acceleration(), seed=s, rate_hz=50.0) for s in (1, 2)
+    ]
+    found = improve(start, *straight, starts=1)
+    assert found.verdict == "not_testable"
+    assert found.added == ()
+    assert "drive corners" in str(found)
+    assert found.verdicts["tyre_load_sensitivity"].finding == "not testable"
+    dragging = truth.add("aero_drag").with_values({"aero_drag.drag_area_m2": 0.45})
+    straight = [
+        drive(dragging, manoeuvres.straight_acceleration(), seed=s, rate_hz=50.0) for s in (1, 2)
+    ]
+    found = improve(start, *straight, starts=1, candidates=["aero_drag", "steer_lag"])
+    assert [a.id for a in found.added] == ["aero_drag"]
+    assert found.verdict == "explained"
+
+
+def test_at_ten_hertz_what_cannot_be_told_apart_is_named_together(truth: Model) -> None:
+    car = truth.add("tyre_load_sensitivity").with_values(
+        {"tyre_load_sensitivity.sensitivity": 0.25}
+    )
+    alike = {"tyre_load_sensitivity", "longitudinal_load_transfer"}
+    found = improve(
+        truth,
+        drive(car, manoeuvres.lap(), seed=1, rate_hz=10.0),
+        drive(car, manoeuvres.handling_course(), seed=1001, rate_hz=10.0),
+        candidates=[*sorted(alike), "steer_delay"],
+        starts=1,
+    )
+    (added,) = found.added
+    assert {added.id, *added.confounded_with} == alike
+    assert all(e in str(found).splitlines()[1] for e in alike)
+    (told,) = found.to_dict()["effects"]
+    assert {told["id"], *told["confounded_with"]} == alike
+    (rival,) = alike - {added.id}
+    # The size of the rival is that of the model with it in the other's place.
+    size = next(c for c in found.diagnoses[0].ranking if c.id == rival)
+    assert found.verdicts[rival].value == size.value
+    # On the baseline the car seems to answer late; the final model shows that it does not.
+    delays = [c.delay for c in found.where.coherence]
+    assert not any(d.significant for d in delays if d is not None)
+    assert not any("answers" in line for _, lines in found.where_lines for line in lines)
