@@ -24,6 +24,7 @@ from sysid_vehicle import (
 from sysid_vehicle.identify import METHODS, refine, refit
 
 G = 9.80665
+WHATS = ("cornering stiffness", "peak friction", "slip at the peak")
 SPREAD = 4.0  # standard errors
 
 
@@ -36,9 +37,29 @@ def true_stiffness(car: Vehicle) -> tuple[float, float]:
 
 
 def assert_stiffness_found(found: Fit, car: Vehicle) -> None:
-    for estimate, true in zip(found.derived, true_stiffness(car), strict=True):
+    stiffness = [e for e in found.derived if e.name.startswith("cornering stiffness")]
+    for estimate, true in zip(stiffness, true_stiffness(car), strict=True):
         assert abs(estimate.value - true) < SPREAD * estimate.std
         assert 0.0 < estimate.std < 0.1 * true
+
+
+def test_derived_quantities_are_found_by_name(fit: Fit) -> None:
+    for axle in ("front", "rear"):
+        b, c, d, e = (fit.model.value(f"{letter}_{axle}") for letter in "BCDE")
+        assert fit[f"cornering stiffness {axle}"] == fit[f"cornering_stiffness_{axle}"]
+        assert fit[f"peak friction {axle}"].value == pytest.approx(d * min(1.0, c))
+        slip = fit[f"slip_at_the_peak_{axle}"]
+        low, high = slip.interval
+        assert low < slip.value < high
+        # No slip angle gives more force than that of the peak.
+        x = b * np.linspace(0.0, 3.0, 200001)
+        curve = np.sin(c * np.arctan(x - e * (x - np.arctan(x))))
+        assert slip.value == pytest.approx(x[int(np.argmax(curve))] / b, abs=3e-5)
+    assert {f"{what} {axle}" for what in WHATS for axle in ("front", "rear")} <= {
+        line.split("  ")[1].strip() for line in str(fit).splitlines() if line.startswith("  ")
+    }
+    with pytest.raises(KeyError, match="there are"):
+        fit["cornering stiffness middle"]
 
 
 def test_the_cornering_stiffness_is_found(fit: Fit, car: Vehicle, start: Model) -> None:

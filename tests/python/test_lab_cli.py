@@ -1,12 +1,15 @@
 """`sysid-vehicle lab run`."""
 
+import argparse
 import json
+import warnings
 from pathlib import Path
 
 import pytest
 
 from sysid_vehicle import example_vehicle, read_log
 from sysid_vehicle.cli import main
+from sysid_vehicle.cli.lab_inputs import vehicle_of
 
 
 def test_it_drives_previews_and_writes_all_that_was_asked_for(
@@ -64,3 +67,13 @@ def test_what_makes_no_sense_is_one_line_and_status_2(
     said = capsys.readouterr().err
     assert words in said
     assert said.count("\n") == 1
+
+
+def test_the_published_car_is_not_taken_in_silence(tmp_path: Path) -> None:
+    args = argparse.Namespace(vehicle=None)
+    with pytest.warns(UserWarning, match=r"no --vehicle was given: .* the published car"):
+        taken = vehicle_of(args)
+    taken.to_toml(tmp_path / "car.toml")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert vehicle_of(argparse.Namespace(vehicle=tmp_path / "car.toml")) == taken

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..errors import warn
 from ..lab import Setup
 from ..log import Log
 from ..read import read_log
@@ -45,5 +46,6 @@ def logs_of(args: argparse.Namespace) -> list[Log]:
 def vehicle_of(args: argparse.Namespace) -> Vehicle:
     """Read the car, or take the one that the laboratory drives."""
     if args.vehicle is None:
+        warn("no --vehicle was given: mass, inertia and geometry are those of the published car")
         return Setup.default().plant.vehicle
     return Vehicle.from_toml(args.vehicle)

@@ -2,16 +2,61 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, as_float64
 from .._text import html_paragraph, html_table, number, text_table
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 
 __all__ = ["Estimate", "Fit", "Start"]
+
+GRAVITY = 9.80665
+
+
+def _stiffness(bcde: FloatArray) -> float:
+    return float(bcde[0] * bcde[1] * bcde[2])
+
+
+def _peak(bcde: FloatArray) -> float:
+    return float(bcde[2] * np.sin(0.5 * np.pi * min(bcde[1], 1.0)))
+
+
+def _peak_slip(bcde: FloatArray) -> float:
+    """Where C atan(x - E (x - atan x)) is a right angle, over B."""
+    b, c, _, e = map(float, bcde)
+    if c <= 1.0 or b <= 0.0:
+        return np.inf
+    wanted = np.tan(0.5 * np.pi / c)
+
+    def left(x: float) -> float:
+        return float(x - e * (x - np.arctan(x)) - wanted)
+
+    high = 1.0
+    while left(high) < 0.0:
+        high *= 2.0
+        if high > 1e9:
+            return np.inf
+    return float(brentq(left, 0.0, high, xtol=1e-14)) / b
+
+
+_MEANINGS: tuple[tuple[str, str, Callable[[FloatArray], float]], ...] = (
+    ("cornering stiffness", "N/rad", _stiffness),
+    ("peak friction", "1", _peak),
+    ("slip at the peak", "rad", _peak_slip),
+)
+
+
+def _slope(function: Callable[[FloatArray], float], bcde: FloatArray, i: int) -> float:
+    """Central difference by one coefficient."""
+    step = np.zeros(4)
+    step[i] = 1e-5 * max(abs(float(bcde[i])), 0.1)
+    with np.errstate(invalid="ignore"):
+        return float((function(bcde + step) - function(bcde - step)) / (2.0 * step[i]))
 
 
 @dataclass(frozen=True)
@@ -87,10 +132,11 @@ class Fit:
     converged: bool
 
     def __getitem__(self, name: str) -> Estimate:
-        for e in self.estimates:
-            if e.name == name:
+        every = (*self.estimates, *self.derived)
+        for e in every:
+            if name in (e.name, e.name.replace(" ", "_")):
                 return e
-        raise KeyError(name)
+        raise KeyError(f"'{name}'; there are {', '.join(e.name for e in every)}")
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -99,27 +145,37 @@ class Fit:
 
     @property
     def derived(self) -> tuple[Estimate, ...]:
-        """What the tyre coefficients mean together: cornering stiffness and slip at the peak.
+        """What the tyre coefficients of an axle mean together.
 
-        Driving that never reaches the peak determines these, or only the stiffness, long before it
-        determines B, C, D and E one by one.
+        Cornering stiffness [N/rad], highest friction [1] and slip angle of that peak [rad], which
+        is infinite where the curve has none. Driving that never reaches the peak determines the
+        stiffness long before it determines B, C, D and E one by one. Each is found by the name it
+        is printed with, and by that name with underscores.
         """
-        return tuple(self._stiffness(axle) for axle in ("front", "rear"))
+        return tuple(
+            self._combined(axle, name, unit, function)
+            for axle in ("front", "rear")
+            for name, unit, function in _MEANINGS
+        )
 
-    def _stiffness(self, axle: str) -> Estimate:
+    def _combined(
+        self, axle: str, name: str, unit: str, function: Callable[[FloatArray], float]
+    ) -> Estimate:
         v = self.model.vehicle
         arm = v.lr_m if axle == "front" else v.lf_m
-        load = v.mass_kg * 9.80665 * arm / v.wheelbase_m
-        names = [f"{letter}_{axle}" for letter in "BCD"]
-        values = np.array([self.model.value(n) for n in names])
-        stiffness = float(np.prod(values) * load)
+        scale = v.mass_kg * GRAVITY * arm / v.wheelbase_m if unit == "N/rad" else 1.0
+        names = [f"{letter}_{axle}" for letter in "BCDE"]
+        bcde = as_float64([self.model.value(n) for n in names])
         where = [e.name for e in self.estimates]
         gradient = np.zeros(len(where))
-        for n, x in zip(names, values, strict=True):
+        for i, n in enumerate(names):
             if n in where:
-                gradient[where.index(n)] = stiffness / x
-        std = float(np.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0)))
-        return Estimate(f"cornering stiffness {axle}", stiffness, std, "N/rad")
+                gradient[where.index(n)] = scale * _slope(function, bcde, i)
+        value = scale * function(bcde)
+        variance = float(gradient @ self.covariance @ gradient)
+        known = bool(np.isfinite(value) and np.isfinite(variance))
+        std = float(np.sqrt(max(variance, 0.0))) if known else np.inf
+        return Estimate(f"{name} {axle}", value, std, unit, "" if known else "no peak")
 
     def _rows(self) -> list[list[str]]:
         rows = []
