@@ -56,9 +56,11 @@ Vehicle14::OfWheels::OfWheels(const CarData& car) : tyre(car.front.tyre, car.rea
     unsprung = take(&AxleData::unsprung_kg);
     per_unsprung = Wheels(1.0) / unsprung;
     weight = unsprung * kTwinGravity;
+    unsprung_all = sum(unsprung);
     tyre_spring = take(&AxleData::tyre_npm);
     tyre_damping = take(&AxleData::tyre_damping_nspm);
     radius = take(&AxleData::radius_m);
+    unsprung_moment = sum(unsprung * radius);
     inertia = take(&AxleData::wheel_inertia_kgm2);
     per_inertia = Wheels(1.0) / inertia;
     rolling = take(&AxleData::rolling_resistance) * radius;
@@ -88,7 +90,7 @@ Vehicle14::Vehicle14(const CarData& car, const Load& load) : car_(car), w_(car),
 }
 
 void Vehicle14::set_load(const Load& load) {
-    const double unsprung = sum(w_.unsprung);
+    const double unsprung = w_.unsprung_all;
     if (!(load.mass_kg > unsprung))
         throw std::invalid_argument("a mass of " + std::to_string(load.mass_kg) +
                                     " kg is not more than its unsprung part of " +
@@ -96,7 +98,7 @@ void Vehicle14::set_load(const Load& load) {
     inverse_ = inverse_inertia(load);
     load_ = load;
     sprung_ = load.mass_kg - unsprung;
-    sprung_height_ = (load.mass_kg * load.cg_z_m - sum(w_.unsprung * w_.radius)) / sprung_;
+    sprung_height_ = (load.mass_kg * load.cg_z_m - w_.unsprung_moment) / sprung_;
     x_ = {-load.cg_x_m, -car_.wheelbase_m - load.cg_x_m};
     y_ = w_.half_track - load.cg_y_m;
     tilt_ = Wheels(sprung_height_) - w_.roll_centre;

@@ -159,6 +159,7 @@ class Vehicle14 {
             anti_slope, unsprung, per_unsprung, weight, tyre_spring, tyre_damping, radius, inertia,
             per_inertia, rolling, relaxation;
         TyreCurve<Wheels> tyre;
+        double unsprung_all, unsprung_moment;  // mass, and mass times height
     };
 
     CarData car_;
