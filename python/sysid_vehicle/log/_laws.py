@@ -1,0 +1,118 @@
+"""What the laws of motion say of a drive: the windows, the fits, and how a misfit is told."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InvalidInput
+from ._channels import FloatArray
+from ._motion import Motion
+from ._regression import Regression, regress
+
+WINDOW_S = 1.0
+EXCITED = 0.5  # m/s2 that one side must reach before anything is compared
+# Scale errors of good sensors, gravity through roll, and geometry that is not known.
+SCALE_DOUBT = 0.12
+
+_NOT_ONE = 5.0  # deviations from the right unit before another is looked for
+_FITS = 3.0  # deviations within which another unit fits
+_UNNAMED = math.log(2.5)  # a scale that is farther off is refused although no unit explains it
+
+Slip = tuple[str, str, str]
+Slips = tuple[tuple[float, tuple[Slip, ...]], ...]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Windows of a drive in which the car moves, and what the laws of motion say there."""
+
+    motion: Motion
+    rows: np.ndarray
+
+    def mean(self, values: FloatArray) -> FloatArray:
+        result: FloatArray = self.motion.mean(values)[self.rows]
+        return result
+
+    def change(self, values: FloatArray) -> FloatArray:
+        result: FloatArray = self.motion.change(values)[self.rows]
+        return result
+
+    def place(self, driver: FloatArray) -> str:
+        """Return where the driver is largest, for messages."""
+        where = self.motion.times_s[self.rows][int(np.argmax(np.abs(driver)))]
+        return f"most clearly around t = {where:.6g} s"
+
+
+class KnownUnit(InvalidInput):
+    """A unit that explains what does not fit."""
+
+
+def ones(drive: Drive) -> FloatArray:
+    return np.ones(np.count_nonzero(drive.rows))
+
+
+def fit(
+    y: FloatArray, columns: list[FloatArray], spread: list[float], mean: list[float] | None = None
+) -> Regression:
+    prior = np.zeros(len(columns)) if mean is None else np.array(mean)
+    return regress(y, np.column_stack(columns), prior, np.array(spread))
+
+
+def size_of(values: FloatArray) -> float:
+    return float(np.percentile(np.abs(values), 95))
+
+
+def spread_of(values: FloatArray) -> float:
+    return size_of(values - np.median(values))
+
+
+def cosine(x: FloatArray, y: FloatArray) -> float:
+    size = float(np.linalg.norm(x) * np.linalg.norm(y))
+    return float(x @ y) / size if size > 0.0 else 0.0
+
+
+def wrong_sign(channel: str, what: str, values: FloatArray, drive: Drive) -> str:
+    return (
+        f"{channel}: wrong sign: it {what}, {drive.place(values)} "
+        f"(ISO 8855: x forward, y and yaw to the left); put factor = -1 in the channel map"
+    )
+
+
+def check_scale(
+    ratio: float,
+    doubt: float,
+    usual: float,
+    slips: Slips,
+    formula: str,
+    driver: FloatArray,
+    drive: Drive,
+    inverse: bool = False,
+) -> None:
+    """Refuse a coefficient that is far from one, by the unit that explains it best.
+
+    The logarithm of the ratio is taken as normal about that of each unit, with the deviation of
+    the fit and the `usual` one of sensors; compared are the likelihoods.
+    """
+    deviation = math.hypot(usual, doubt / ratio)
+    off = abs(math.log(ratio)) / deviation
+    best, channels = min(slips, key=lambda slip: abs(math.log(ratio / slip[0])))
+    miss = abs(math.log(ratio / best)) / deviation
+    shown = 1.0 / ratio if inverse else ratio
+    if inverse:
+        numerator, denominator = "ax_mps2", "(d vx_mps / dt)"
+        formula = f"{numerator} / {denominator}"
+    if off > _NOT_ONE and miss < _FITS and off**2 - miss**2 > _NOT_ONE**2:
+        units = " and ".join(f"{channel}: seems to be in {unit}" for channel, unit, _ in channels)
+        remedy = " and ".join(f"{factor} for {channel}" for channel, _, factor in channels)
+        raise KnownUnit(
+            f"{units}: {formula} is {shown:.3g} instead of about 1, {drive.place(driver)}; put "
+            f"{remedy} in the channel map"
+        )
+    if off > _NOT_ONE and abs(math.log(ratio)) > _UNNAMED:
+        raise InvalidInput(
+            f"{formula} is {shown:.3g} instead of about 1, {drive.place(driver)}; check the units "
+            f"of these channels and put their factors in the channel map"
+        )
