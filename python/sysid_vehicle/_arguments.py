@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+from collections.abc import Mapping
 from decimal import Decimal
 from numbers import Integral, Real
 
@@ -10,7 +12,7 @@ import numpy as np
 
 from .errors import InvalidInput
 
-__all__ = ["generator", "real", "whole"]
+__all__ = ["expect", "generator", "real", "whole"]
 
 
 def real(value: object) -> float | None:
@@ -25,7 +27,7 @@ def real(value: object) -> float | None:
     try:
         return float(value)
     except OverflowError:
-        return math.copysign(math.inf, value)
+        return math.inf if value > 0 else -math.inf  # type: ignore[operator]
 
 
 def whole(value: object, name: str, least: int = 0) -> int:
@@ -43,14 +45,60 @@ def whole(value: object, name: str, least: int = 0) -> int:
     return int(value)
 
 
-def generator(seed: int | np.random.Generator) -> np.random.Generator:
+def generator(seed: object) -> np.random.Generator:
     """The generator, or a new one of this seed.
 
     Raises
     ------
     InvalidInput
-        The seed is neither a generator nor a whole number from zero up.
+        The seed is neither a generator nor a whole number from zero up. Nothing, which numpy takes
+        for "never the same twice", is none.
     """
     if isinstance(seed, np.random.Generator):
         return seed
-    return np.random.default_rng(whole(seed, "seed"))
+    try:
+        return np.random.default_rng(whole(seed, "seed"))
+    except InvalidInput:
+        raise InvalidInput(
+            f"seed = {seed!r}; give a whole number from zero up, or a numpy generator"
+        ) from None
+
+
+# What to do with something that is given where something else is wanted.
+_REMEDIES = {
+    ("Log", "path"): "read it with read_log first",
+    ("Log", "table"): "make a log of it with Log.from_arrays",
+    ("Log", "Drive"): "pass its .log",
+    ("Log", "Fit"): "the fit comes first, then the logs",
+    ("Log", "Model"): "the model comes first, then the logs",
+    ("Fit", "Model"): "fit it first: identify(model, logs)",
+    ("Fit", "Vehicle"): "fit its model first: identify(Model(vehicle), logs)",
+    ("Fit", "Study"): "pass its .fit",
+    ("Fit", "Log"): "the fit comes first, then the logs: identify(model, logs) makes one",
+    ("Model", "Vehicle"): "make a model of it: Model(vehicle)",
+    ("Model", "path"): "read the car first: Model(Vehicle.from_toml(path))",
+    ("Model", "Fit"): "pass its .model",
+    ("Model", "Study"): "pass its .model",
+    ("Model", "Log"): "the model comes first, then the logs",
+}
+
+
+def expect(value: object, wanted: type, function: str) -> None:
+    """Refuse what is no `wanted`, with a word on what to do with it.
+
+    Raises
+    ------
+    InvalidInput
+        The value is of another type.
+    """
+    if isinstance(value, wanted):
+        return
+    given = type(value).__name__
+    kind = given
+    if isinstance(value, str | os.PathLike):
+        kind = "path"
+    elif isinstance(value, Mapping | np.ndarray) or hasattr(value, "columns"):
+        kind = "table"
+    name = wanted.__name__
+    remedy = _REMEDIES.get((name, kind), f"pass a {name}")
+    raise InvalidInput(f"{function}: a {given} was given in place of a {name}; {remedy}")

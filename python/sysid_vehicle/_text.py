@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 from math import isfinite
 
-__all__ = ["html_table", "number", "text_table", "with_error"]
+__all__ = [
+    "html_list",
+    "html_paragraph",
+    "html_table",
+    "html_text",
+    "number",
+    "text_table",
+    "with_error",
+]
 
 
 def number(x: float, digits: int = 4) -> str:
@@ -34,6 +42,21 @@ def text_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
         lines.append("  " + "  ".join(cells).rstrip())
     lines.insert(1, "  " + "  ".join("-" * w for w in widths))
     return "\n".join(lines)
+
+
+def html_paragraph(text: object) -> str:
+    """What it prints as a paragraph."""
+    return f"<p>{escape(str(text))}</p>"
+
+
+def html_list(items: Iterable[object]) -> str:
+    """What they print as the items of a list."""
+    return "<ul>" + "".join(f"<li>{escape(str(item))}</li>" for item in items) + "</ul>"
+
+
+def html_text(text: object) -> str:
+    """What it prints, line by line as it stands."""
+    return f"<pre>{escape(str(text))}</pre>"
 
 
 def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
+from .._arguments import generator
 from ..model import Model
 from ..report import write_report
 from ..study import Study, improve
@@ -78,7 +77,7 @@ def run_demo(
     InvalidInput
         If no effect has this id, or the report cannot be written.
     """
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     truth = hide(hidden, rng)
     train, test = drive_both(truth, rng)
     model = Model(vehicle_file(truth.vehicle))

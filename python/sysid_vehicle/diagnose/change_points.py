@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from ..effects import effect
 from ..estimate import Driving
@@ -105,7 +106,7 @@ def change_points(
     driving = evidence.driving
     kinds = kinds_of_change(evidence)
     constant = np.hstack([evidence.fitted, *(k.columns for k in kinds), of_driving(evidence)])
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     found: list[ChangePoint] = []
     to_search = [(0, driving.samples)]
     while to_search and len(found) < _MOST:

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import csd, welch
 
+from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._style import axes_or_new, tidy
+from .._text import html_text
 from ..estimate import MEASURED
 from .delay import HIGHEST_HZ, Delay, delay, pieces_of
 from .evidence import Evidence
@@ -75,7 +77,7 @@ class Coherence:
         return text
 
     def _repr_html_(self) -> str:
-        return f"<pre>{self}</pre>"
+        return html_text(self)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw coherence over frequency, and what exceeds chance."""
@@ -121,7 +123,7 @@ def coherence(evidence: Evidence, *, delays: bool = True, seed: int = 0) -> tupl
     seed : int
         Of the draws of noise of the inputs, which widens the intervals of delays.
     """
-    rng = np.random.default_rng(seed) if delays else None
+    rng = generator(seed) if delays else None
     names = ("steer", "force") if evidence.driving.force_known else ("steer",)
     inputs = evidence.driving.inputs()
     return tuple(_with(evidence, inputs, i, name, rng) for i, name in enumerate(names))

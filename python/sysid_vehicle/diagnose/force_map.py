@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from .._arrays import FloatArray, as_float64
 from .._style import axes_or_new, tidy
+from .._text import html_text
 from ..estimate import Driving
 from ..identify import Fit
 from .coordinates import COORDINATES, coordinates
@@ -107,7 +108,7 @@ class ForceMap:
         return "\n".join([head, *(f"  {self.peak(t)}" for t in self.targets)])
 
     def _repr_html_(self) -> str:
-        return f"<pre>{self}</pre>"
+        return html_text(self)
 
     def plot(self, ax: Axes | None = None, target: str | None = None) -> Axes:
         """Draw one target: grey where nobody drove, dots where it is beyond two standard errors.

@@ -19,7 +19,7 @@ from .._arrays import FloatArray, as_float64
 from .._text import html_table, number, text_table
 from ..effects import Effect, base_parameters, effect
 from ..errors import InvalidInput, NumericalError
-from ..identify import Fit
+from ..identify import Fit, explaining
 from .replay import Replay
 from .sensitivity import duration
 
@@ -119,6 +119,7 @@ class BiasReport:
         return html_table(self._HEAD, self._rows())
 
 
+@explaining
 def bias_report(
     fit: Fit,
     effects: Sequence[Effect | str] | None = None,

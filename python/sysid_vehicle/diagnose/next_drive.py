@@ -15,12 +15,12 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from .. import manoeuvres
-from .._text import html_table, text_table
+from .._text import html_paragraph, html_table, text_table
 from ..effects import Effect, effect
 from ..errors import InvalidInput, NumericalError
 from ..estimate import MEASURED, Driving
 from ..estimate.inputs import white_noise_std
-from ..identify import Fit
+from ..identify import Fit, explaining
 from ..log import Log
 from ..manoeuvres import Manoeuvre
 from ..model import Model
@@ -144,7 +144,7 @@ class NextDrive:
         return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
 
     def _repr_html_(self) -> str:
-        return f"<p>{self._headline()}</p>{html_table(self._HEAD, self._rows())}"
+        return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
 
 
 def separations(
@@ -165,6 +165,7 @@ def separations(
     }
 
 
+@explaining
 def suggest_manoeuvre(
     fit: Fit,
     first: Effect | str,

@@ -19,6 +19,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import chdtrc, erfc
 
+from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from ..effects import Effect
 from ..estimate import Driving
@@ -117,7 +118,7 @@ class ScoreBoard:
         # In units of their own: rounding at the largest would drown the smallest.
         scale = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
         covariance = self.information / np.outer(scale, scale)
-        turned = np.random.default_rng(seed).standard_normal((draws, len(self.blocks)))
+        turned = generator(seed).standard_normal((draws, len(self.blocks)))
         normal = turned @ (self.blocks / scale)
         smallest = _smallest_p_values(
             [(s.effect, self._places[s.effect.id]) for s in self.scores], normal, covariance

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, axes_or_new, tidy
 from .coordinates import COORDINATES, Coordinate, coordinates, late
@@ -157,7 +158,7 @@ def curves(evidence: Evidence, seed: int = 0) -> tuple[Curve, ...]:
                 continue
             own = slice(i * _KNOTS, (i + 1) * _KNOTS)
             V = weights @ found.covariance[own, own] @ weights.T
-            half = _band(V, np.random.default_rng(seed))
+            half = _band(V, generator(seed))
             force = as_float64(weights @ found.mean[own])
             best[target] = Curve(
                 target, COORDINATES[name], fine, force, half, float(found.evidence[i])
@@ -180,7 +181,7 @@ def surface(evidence: Evidence, pair: tuple[str, str], seed: int = 0) -> Surface
     visited = hats.sum(axis=0) >= _FEWEST
     half = np.full(len(visited), np.nan)
     V = found.covariance[own, own][np.ix_(visited, visited)]
-    half[visited] = _band(V, np.random.default_rng(seed))
+    half[visited] = _band(V, generator(seed))
     force = np.where(visited, found.mean[own], np.nan)
     shape = (_KNOTS_OF_PAIR, _KNOTS_OF_PAIR)
     return Surface(

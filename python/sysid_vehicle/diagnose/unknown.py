@@ -11,7 +11,7 @@ import numpy as np
 
 from .._arrays import FloatArray
 from ..estimate import Driving
-from ..identify import Fit
+from ..identify import Fit, explaining
 from ..log import Log
 from .evidence import Evidence
 from .force_map import force_maps
@@ -93,6 +93,7 @@ def _numbers(values: FloatArray) -> list[float | None]:
     return [float(f"{v:.6g}") if np.isfinite(v) else None for v in values]
 
 
+@explaining
 def unknown(
     fit: Fit,
     test: Log | Sequence[Log] | Driving,

@@ -8,7 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from ..estimate import Driving
-from ..identify import Fit
+from ..identify import Fit, explaining
 from ..log import Log
 from .change_points import ChangePoint, change_points
 from .coherence import Coherence, coherence
@@ -144,6 +144,7 @@ class Where:
         }
 
 
+@explaining
 def where(
     fit: Fit,
     logs: Log | Sequence[Log] | Driving | None = None,

@@ -1,7 +1,7 @@
 """State estimation: prepared driving, the noise model, filters for models of one's own."""
 
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
-from .driving import MEASURED, UNITS, Driving
+from .driving import MEASURED, UNITS, Driving, several_logs
 from .filters import FilterRun, FilterState, LateMeasurements, StateFilter, StateModel
 from .noise import NoiseModel, first_guess, generous, learn_noise
 
@@ -21,5 +21,6 @@ __all__ = [
     "learn_noise",
     "nees_check",
     "nis_check",
+    "several_logs",
     "whiteness_check",
 ]

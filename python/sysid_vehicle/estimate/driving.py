@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from .. import _core
+from .._arguments import expect
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..log import Log
@@ -21,6 +23,23 @@ MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 """Measured channels, in the core's order."""
 
 UNITS = dict(zip(MEASURED, ("m/s", "m/s", "rad/s", "m/s2", "m/s2"), strict=True))
+
+
+def several_logs(logs: Log | Sequence[Log]) -> tuple[Log, ...]:
+    """One log or many as many.
+
+    Raises
+    ------
+    InvalidInput
+        There is none, or something else; the message says what to make of that.
+    """
+    single = isinstance(logs, Log | str | Mapping) or hasattr(logs, "columns")
+    found: tuple[Any, ...] = tuple(logs) if isinstance(logs, Iterable) and not single else (logs,)
+    if not found:
+        raise InvalidInput("no log was given; pass one Log or a list of them")
+    for log in found:
+        expect(log, Log, "driving")
+    return found
 
 
 @dataclass(frozen=True)
@@ -58,9 +77,7 @@ class Driving:
         """
         if isinstance(logs, Driving):
             return logs
-        several = (logs,) if isinstance(logs, Log) else tuple(logs)
-        if not several:
-            raise InvalidInput("no log was given; pass one Log or a list of them")
+        several = several_logs(logs)
         found = cls(several, all(log.has("fx_n") for log in several))
         if not found.stretches:
             names = ", ".join(log.name for log in several)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import FloatArray
-from .._text import html_table, number, text_table
+from .._text import html_paragraph, html_table, number, text_table
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 
@@ -147,7 +147,7 @@ class Fit:
 
     def _repr_html_(self) -> str:
         return (
-            f"<p>{self._headline()}</p>"
+            html_paragraph(self._headline())
             + html_table(self._HEAD, self._rows())
             + self.noise._repr_html_()
         )

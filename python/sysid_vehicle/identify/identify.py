@@ -9,7 +9,6 @@ from scipy.stats import qmc
 from tqdm import tqdm
 
 from .. import _core
-from .._arguments import whole
 from .._arrays import FloatArray
 from .._threads import Workers
 from ..errors import InvalidInput, NumericalError, warn
@@ -73,8 +72,6 @@ def identify(
     """
     if method not in METHODS:
         raise InvalidInput(f"no optimiser is called '{method}'; there are {', '.join(METHODS)}")
-    starts, workers = whole(starts, "starts", 1), whole(workers, "workers", 1)
-    seed = whole(seed, "seed")
     driving = Driving.of(logs)
     check_excitation(list(driving.logs))
     _say_what_is_not_seen(model, driving)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import wraps
+from inspect import signature
 from typing import ParamSpec, TypeVar
 
 import numpy as np
 
+from .._arguments import expect, whole
 from ..errors import explained
 from ..estimate import Driving
 from ..log import Log
@@ -53,10 +55,23 @@ def suspects(model: Model | None, logs: Sequence[Log]) -> str:
 
 
 def explaining(function: Callable[_P, _T]) -> Callable[_P, _T]:
-    """The function, whose numerical failures name the suspects among its arguments."""
+    """A public function whose arguments are checked, and whose failures name what is to blame.
+
+    Checked are a leading `Fit` or `Model`, and whatever is called `seed`, `starts` or `workers`.
+    Numerical failures name the suspects among all arguments.
+    """
+    told = signature(function)
+    first = next(iter(told.parameters.values()))
+    wanted = {"Fit": Fit, "Model": Model}.get(str(first.annotation))
 
     @wraps(function)
     def call(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        by_name = told.bind(*args, **kwargs).arguments
+        if wanted is not None:
+            expect(by_name[first.name], wanted, function.__name__)
+        for name, least in (("seed", 0), ("starts", 1), ("workers", 1)):
+            if name in by_name:
+                whole(by_name[name], name, least)
         given = (*args, *kwargs.values())
         with explained(
             lambda: ", ".join(log.name for log in _logs(given)),

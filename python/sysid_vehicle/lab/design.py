@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import qmc
 from tqdm import tqdm
 
+from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, BEFORE, axes_or_new, tidy
 from .._threads import Workers
@@ -254,7 +255,7 @@ def design_excitation(
     tried: list[Trial] = []
     spread = trials - trials // 2
     points = qmc.Sobol(len(box), seed=seed).random(1 << (spread - 1).bit_length())[:spread]
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     with (
         Workers(workers) as pool,
         tqdm(total=trials, desc="excitations", disable=not progress) as bar,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
 from .._text import html_table, number, text_table
@@ -250,7 +251,7 @@ def run_closed_loop(
     see readings only.
     """
     setup = setup if setup is not None else Setup.default()
-    rng = seed if isinstance(seed, np.random.Generator) else np.random.default_rng(seed)
+    rng = generator(seed)
     model = setup.plant
     wanted = excitation.wanted(model.vehicle, setup.rate_hz)
     n = len(wanted)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
-from .._text import html_table, number, text_table
+from .._text import html_paragraph, html_table, number, text_table
 from ..errors import InvalidInput
 from ..identify import METHODS
 from .box import BOX, GIVEN, box_of, first_point
@@ -78,12 +78,13 @@ class TyreRegression:
         ]
 
     def __str__(self) -> str:
-        head = f"Regression, {self.loss} loss {number(self.value, 7)}; {self.starts}"
-        return f"{head}\n{text_table(self._HEAD, self._rows())}"
+        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
+
+    def _headline(self) -> str:
+        return f"Regression, {self.loss} loss {number(self.value, 7)}; {self.starts}"
 
     def _repr_html_(self) -> str:
-        head = f"Regression, {self.loss} loss {number(self.value, 7)}; {self.starts}"
-        return f"<p>{head}</p>{html_table(self._HEAD, self._rows())}"
+        return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
 
 
 def regress_tyres(

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from .. import _core
+from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from .box import first_point
@@ -70,5 +71,5 @@ def drive_tyres(
             f"{name}: the car spins or stops at sample {k} ({k * step_s:.2f} s; "
             f"{READINGS[0]} {y[k, 0]:.3g}, {READINGS[1]} {y[k, 1]:.3g}); steer or brake less"
         )
-    noise = np.random.default_rng(seed).normal(size=y.shape) * np.asarray(sensors)
+    noise = generator(seed).normal(size=y.shape) * np.asarray(sensors)
     return TyreLog(step_s, as_float64(y + noise), u, name)

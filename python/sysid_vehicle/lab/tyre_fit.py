@@ -10,7 +10,7 @@ import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, BEFORE, axes_or_new, tidy
-from .._text import html_table, number, text_table
+from .._text import html_paragraph, html_table, number, text_table
 from ..identify import Estimate
 from .likelihood import NOISES
 from .multistart import Ends
@@ -342,8 +342,9 @@ class TyreFit:
 
     def _repr_html_(self) -> str:
         return (
-            f"<p>{self._headline()}</p>{html_table(self._head, self._rows())}"
-            f"<p>{self._closing()}</p>"
+            html_paragraph(self._headline())
+            + html_table(self._head, self._rows())
+            + html_paragraph(self._closing())
         )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, near_names
 from ..read._csv import read_table
@@ -149,5 +150,5 @@ def simulate_mu_slip(
     at = (np.arange(41) / 40.0) ** 2 if slip is None else as_float64(slip)
     mu = curve.mu(at, values)
     if seed is not None:
-        mu = mu + noise_std * np.random.default_rng(seed).standard_normal(len(at))
+        mu = mu + noise_std * generator(seed).standard_normal(len(at))
     return MuSlipData(at, mu, noise_std)

@@ -10,6 +10,7 @@ from html import escape
 
 import numpy as np
 
+from .._arguments import generator
 from .._arrays import FloatArray
 from ..errors import InvalidInput
 from ..identify import Fit
@@ -114,7 +115,7 @@ def calibrate_sideslip(
         raise InvalidInput("learnt, runs: give one setting and one run at least")
     start = settings if settings is not None else SideslipSettings.of(log)
     names = list(learnt)
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
 
     def tried(x: FloatArray) -> tuple[float, SideslipRun]:
         changed = dict(zip(names, (float(v) for v in np.exp(x)), strict=True))

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
+from .._arguments import generator
 from .._arrays import FloatArray
-from ..errors import InvalidInput, NumericalError
+from ..errors import NumericalError
 from ..log import Log
 from ..manoeuvres import Manoeuvre
 from ..model import Model
@@ -107,7 +108,7 @@ def drive_truth(
     -------
     Drive
     """
-    rng = _generator(seed)
+    rng = generator(seed)
     references = manoeuvre.references(model.vehicle, rate_hz)
     n = len(references)
     push = (disturbance or RoadDisturbance()).sample(n, rate_hz, rng)
@@ -193,15 +194,6 @@ def drive(
         rate_hz=rate_hz,
         name=name,
     ).log
-
-
-def _generator(seed: object) -> np.random.Generator:
-    if isinstance(seed, np.random.Generator):
-        return seed
-    # Nothing, which numpy takes for "never the same twice", must not get through.
-    if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool) and seed >= 0:
-        return np.random.default_rng(int(seed))
-    raise InvalidInput(f"seed = {seed!r}; give a whole number from zero up, or a numpy generator")
 
 
 def _how_it_was_lost(manoeuvre: Manoeuvre, state: FloatArray, time_s: float) -> str:

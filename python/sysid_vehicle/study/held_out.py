@@ -10,8 +10,8 @@ import numpy as np
 
 from .._arrays import FloatArray
 from ..diagnose import blocks
-from ..errors import InvalidInput, NumericalError, warn
-from ..estimate import Driving
+from ..errors import NumericalError, warn
+from ..estimate import Driving, several_logs
 from ..identify import Fit, Prediction, predict
 from ..log import Log
 
@@ -35,14 +35,12 @@ def hold_out(
     train: Log | Sequence[Log], test: Log | Sequence[Log] | None
 ) -> tuple[Driving, Driving]:
     """Training and held-out driving; without `test`: the last log, or 30 % of the only one."""
-    logs = [train] if isinstance(train, Log) else list(train)
+    logs = several_logs(train)
     if test is not None:
         return Driving.of(logs), Driving.of(test)
     if len(logs) > 1:
         warn(f"no test log was given: '{logs[-1].name}' is held out from the fit")
         return Driving.of(logs[:-1]), Driving.of(logs[-1:])
-    if not logs:
-        raise InvalidInput("no log was given; pass one Log or a list of them")
     log = logs[0]
     cut = float(log["time_s"][int((1.0 - _SHARE) * log.n)])
     warn(

@@ -12,7 +12,7 @@ from ..compare import Comparison, compare
 from ..diagnose import Verdicts, considered, judge, omnibus
 from ..errors import InvalidInput, SysidWarning, warn
 from ..estimate import Driving
-from ..identify import Fit, identify
+from ..identify import Fit, explaining, identify
 from ..log import Log, check_excitation
 from ..model import Model
 from .added import AddedEffect
@@ -27,6 +27,7 @@ __all__ = ["improve"]
 _SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
 
 
+@explaining
 def improve(
     model: Model,
     train: Log | Sequence[Log],

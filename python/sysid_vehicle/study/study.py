@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from .._files import write_json
-from .._text import html_table, text_table
+from .._text import html_list, html_paragraph, html_table, text_table
 from ..compare import Comparison
 from ..diagnose import (
     INPUTS,
@@ -255,9 +255,12 @@ class Study:
         return said
 
     def _repr_html_(self) -> str:
-        effects = "".join(f"<li>{escape(str(a))}</li>" for a in self.added)
-        said = f"<p><b>{self.verdict}</b>: {self.meaning}.</p><ul>{effects}</ul>"
-        return f"{said}{html_table(self._HEAD, self._rows())}<p>{escape(self.in_the_end)}</p>"
+        return (
+            f"<p><b>{escape(self.verdict)}</b>: {escape(self.meaning)}.</p>"
+            + html_list(self.added)
+            + html_table(self._HEAD, self._rows())
+            + html_paragraph(self.in_the_end)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""

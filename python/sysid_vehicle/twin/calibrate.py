@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from .._arguments import generator
 from .._arrays import FloatArray
 from .._style import AFTER, MEASURED, axes_or_new, tidy
 from ..errors import InvalidInput, NumericalError
@@ -110,7 +111,7 @@ class BayesianSearch:
             ) from error
         self._names = [f"g{i:02d}" for i in range(size)]
         self._first = first
-        self._random = np.random.default_rng(seed)
+        self._random = generator(seed)
         self._told = 0
         self._seed = seed
         self._places: list[FloatArray] = []

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import signal
 
 from .. import _core
+from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
 from ..manoeuvres import Manoeuvre
@@ -221,7 +222,7 @@ def rough_road(
     cycles/m and a low-pass at 15 Hz, which the paper needs but does not give; the rear axle meets
     it wheelbase/speed later (the paper prints the inverse).
     """
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     t = np.arange(round(duration_s / dt_s)) * dt_s
     leak = np.exp(-2.0 * np.pi * 0.02 * speed_mps * dt_s)
     profile = signal.lfilter([1.0], [1.0, -leak], rng.standard_normal(len(t)))

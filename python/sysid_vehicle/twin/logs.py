@@ -10,6 +10,7 @@ from dataclasses import fields
 
 import numpy as np
 
+from .._arguments import generator
 from .._arrays import as_float64
 from ..errors import InvalidInput
 from ..log import Log
@@ -100,7 +101,7 @@ def to_log(
         raise InvalidInput(
             f"rate_hz = {rate_hz!r}: the drive has {1.0 / drive.dt_s:g} Hz; give a divisor of it"
         )
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     numbers = car.numbers()
     steer = drive["steer_rad"]
     if steer_lag_s > 0.0:

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from .._arguments import generator
 from .._arrays import FloatArray
 from ..errors import InvalidInput, near_names
 from .drives import INPUTS, OUTPUTS, Drive14
@@ -81,7 +82,7 @@ def measure(
     if not snr > 0.0 and unit == "amplitude":
         raise InvalidInput(f"snr = {snr!r}; give a positive number, inf for no noise")
     ratio = snr if unit == "amplitude" else 10.0 ** (snr / 20.0)
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     values = np.full((len(drive.outputs), len(READINGS)), np.nan)
     known, scale = noise or {}, {}
     for name in dict.fromkeys((*channels, "yaw_rate_radps")):
@@ -101,7 +102,7 @@ def noisy_road(
     The vertical speed of the road gets the factor of its height: to differentiate the noise
     itself would give rates no road has.
     """
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     out = inputs.copy()
     for axle in (("fl", "fr"), ("rl", "rr")):
         factor = rng.uniform(1.0 - relative, 1.0 + relative, len(inputs))
