@@ -13,7 +13,7 @@ from ..compare import compare
 from ..effects import Effect, effect
 from ..errors import NumericalError
 from ..estimate import Driving
-from ..identify import Fit, refine, refit
+from ..identify import Fit, explaining, refine, refit
 from ..log import Log
 from ..model import Model
 from .diagnosis import Candidate, Diagnosis
@@ -33,6 +33,7 @@ _TELLS_APART = 9.0  # twice the log-likelihood, or a statistic: three standard e
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
 
 
+@explaining
 def diagnose(
     fit: Fit,
     logs: Log | Sequence[Log] | Driving | None = None,
