@@ -263,7 +263,7 @@ TEST(Covariances, OfTwinsSideBySide) {
         BatchEstimator batch({{kMass, 10.0, 100.0, 0.0, 0.0, 1e4}, {1, 0.01, 0.1, 0.0, -1.0, 1.0}},
                              {{0, std::min(1.0, 1.0 / ratio)}, {1, std::min(1.0, 1.0 / ratio)}},
                              0.01);
-        LoadVector estimate{};
+        Estimates estimate{};
         estimate[kMass] = 1000.0;
         std::mt19937 generator(3);
         std::normal_distribution<double> normal;
