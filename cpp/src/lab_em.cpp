@@ -74,7 +74,7 @@ class PublishedExpectation {
             form.input_before = form.speed_predicted = true;
             const ObserverModel model = log.model.with_form(form);
             add_smoothed_moments<NX, NY>(ObserverSystem(model, log.inputs, log.readings, noise_),
-                                         smooth(steps_[i], kRidge), out);
+                                         smooth<SmoothedSum::kDifference>(steps_[i], kRidge), out);
         }
         return out;
     }

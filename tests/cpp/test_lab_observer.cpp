@@ -201,6 +201,57 @@ TEST(Observer, FeelsAnUnknownSideForce) {
     EXPECT_FALSE(std::isnan(found.reading[4 * 9 + 3]));
 }
 
+TEST(Observer, CoastsThroughAMinuteWithoutReadings) {
+    // The car brakes to walking pace and speeds up again while nothing is read.
+    constexpr double dt = 0.01;
+    constexpr std::size_t kLost = 1000, kBack = 7000, kSamples = 7300;
+    const ObserverNoise noise = noise_of_a_good_car();
+    for (const auto& form : {ObserverForm::mended(), ObserverForm::published()}) {
+        const ObserverModel truth(kCar, ObserverForm::mended(), dt);
+        ObserverLog log{ObserverModel(kCar, form, dt), {}, {}, {}};
+        ObserverVec x = ObserverVec::Zero();
+        x[0] = 12.0;
+        ObserverMat A = ObserverMat::Identity();
+        ObserverRow H;
+        std::mt19937 generator(9);
+        std::normal_distribution<double> normal;
+        std::vector<ObserverVec> states;
+        for (std::size_t k = 0; k < kSamples; ++k) {
+            const double t = dt * static_cast<double>(k);
+            if (k > 0) x = truth.predict(x, log.inputs.back(), log.inputs.back(), A);
+            states.push_back(x);
+            const double wanted = t < 12.0 || t > 50.0 ? 12.0 : 1.2;
+            const double force = std::clamp(800.0 * (wanted - x[0]), -1200.0, 1200.0);
+            log.inputs.push_back({force, 0.02 * std::sin(2.0 * t), 120000.0, 115000.0});
+            ObserverReading y = truth.observe(x[0], x, log.inputs.back(), H);
+            for (int i = 0; i < 4; ++i) y[i] += std::sqrt(noise.sensors(i, i)) * normal(generator);
+            log.readings.push_back(y);
+        }
+        log.start = form.coupling ? ObserverStart::from_reading(log.readings[0], noise, kCar)
+                                  : ObserverStart::published();
+        const ObserverTrace whole = trace(log, noise, false);
+        for (std::size_t k = kLost; k < kBack; ++k) log.readings[k].setConstant(std::nan(""));
+        const ObserverTrace found = trace(log, noise, false);
+        for (const double v : found.state) ASSERT_TRUE(std::isfinite(v));
+        for (const double v : found.covariance) ASSERT_TRUE(std::isfinite(v));
+        const auto std_of = [&](std::size_t k, std::size_t i) {
+            return std::sqrt(found.covariance[36 * k + 7 * i]);
+        };
+        for (const std::size_t i : {0, 3, 4, 5})
+            for (std::size_t k = kLost; k < kBack; k += 500)
+                EXPECT_GT(std_of(k + 499, i), std_of(k, i)) << i << ' ' << k;
+        for (const std::size_t i : {0, 1, 2}) {
+            EXPECT_GT(std_of(kBack - 1, i), std_of(kLost - 1, i)) << i;
+            // The published form has errors of its own: it is back where it would have been.
+            const std::size_t at = 6 * (kBack + 200) + i;
+            const double right =
+                form.coupling ? states[kBack + 200][static_cast<Eigen::Index>(i)] : whole.state[at];
+            const double error = found.state[at] - right;
+            EXPECT_LT(std::abs(error), 3.0 * std_of(kBack + 200, i)) << i;
+        }
+    }
+}
+
 TEST(ObserverEm, LearnsTheSensorsWithoutFalling) {
     const ObserverLog log = pushed_car(ObserverForm::mended(), 3000, 500.0);
     ObserverNoise start;

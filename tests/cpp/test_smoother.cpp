@@ -63,6 +63,54 @@ TEST(Smoother, NeverLessCertainThanTheFilter) {
     EXPECT_EQ(smoothed.back().mean, steps.back().mean);
 }
 
+/// A covariance in units of the standard deviations of `unit`.
+Mat<3, 3> in_units_of(const Mat<3, 3>& unit, const Mat<3, 3>& P) {
+    const Vec<3> per_size = unit.diagonal().cwiseSqrt().cwiseInverse();
+    return per_size.asDiagonal() * P * per_size.asDiagonal();
+}
+
+TEST(Smoother, CovarianceStaysOneWhateverTheNoise) {
+    std::mt19937 generator(11);
+    std::normal_distribution<double> normal;
+    for (const double noise : {0.0, 1e-300, 1e-12, 1.0}) {
+        for (int trial = 0; trial < 40; ++trial) {
+            Small s = small_system(200);
+            s.A = Mat<3, 3>::NullaryExpr([&] { return normal(generator); });
+            const double size = s.A.eigenvalues().cwiseAbs().maxCoeff();
+            s.A *= 0.98 / size;
+            s.Q = noise * Vec<3>(1.0, trial % 2 == 0 ? 0.0 : 1.0, 1e-3).asDiagonal();
+            const auto steps = filtered(s, kSmallMean, small_covariance());
+            const auto smoothed = smooth(steps);
+            for (std::size_t k = 0; k < smoothed.size(); ++k) {
+                const Mat<3, 3>& P = smoothed[k].covariance;
+                ASSERT_TRUE(P.allFinite()) << noise << ' ' << trial << ' ' << k;
+                ASSERT_TRUE(smoothed[k].mean.allFinite()) << noise << ' ' << trial << ' ' << k;
+                ASSERT_GE(P.diagonal().minCoeff(), 0.0) << noise << ' ' << trial << ' ' << k;
+                // Rounding is relative to what is rounded, the prediction of the filter.
+                const Mat<3, 3>& prior = steps[k].predicted_covariance;
+                if (!(prior.diagonal().minCoeff() > 1e-290)) continue;
+                const Mat<3, 3> scaled = in_units_of(prior, P);
+                ASSERT_GE(scaled.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-14)
+                    << noise << ' ' << trial << ' ' << k;
+                if (noise > 1e-300) {
+                    ASSERT_LT(scaled.diagonal().maxCoeff(), 1.0 + 1e-8)
+                        << noise << ' ' << trial << ' ' << k;
+                }
+            }
+        }
+    }
+}
+
+TEST(Smoother, SquaresAreTheDifferenceForOrdinaryNoise) {
+    const auto steps = filtered(small_system(100), kSmallMean, small_covariance());
+    const auto squares = smooth(steps);
+    const auto difference = smooth<SmoothedSum::kDifference>(steps);
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+        EXPECT_LT((squares[k].covariance - difference[k].covariance).norm(), 1e-12) << k;
+        EXPECT_EQ(squares[k].mean, difference[k].mean) << k;
+    }
+}
+
 TEST(Smoother, NothingComesOfNothing) {
     EXPECT_TRUE(smooth(std::vector<FilterStep<3, 2>>{}).empty());
 }

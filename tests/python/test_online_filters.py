@@ -185,3 +185,42 @@ def test_an_impossible_matrix_on_the_way_is_named_with_its_sample():
         g.step(None, [np.inf, 0.0])
     with pytest.raises(NumericalError, match="2 values for a measurement of 3 at sample 0"):
         g.step(None, [0.0, 0.0, 0.0])
+
+
+class Decaying:
+    """Three states that decay, of which one is measured, with process noise of a given size."""
+
+    def __init__(self, rng: np.random.Generator, size: float, sensor: float) -> None:
+        A = rng.normal(size=(3, 3))
+        self.A = 0.98 * A / np.abs(np.linalg.eigvals(A)).max()
+        self.size, self.sensor = size, sensor
+
+    def predict(self, u, x):
+        return self.A @ x
+
+    def observe(self, u, x):
+        return x[:1]
+
+    def process_noise(self, u):
+        return self.size * np.eye(3)
+
+    def measurement_noise(self, u):
+        return np.array([[self.sensor]])
+
+
+@pytest.mark.parametrize("sensor", [1e-16, 1e-2])
+@pytest.mark.parametrize("size", [0.0, 1e-300, 1e-12, 1.0])
+def test_smoothed_covariances_are_covariances_whatever_the_noise(size, sensor):
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        f = StateFilter(Decaying(rng, size, sensor), np.zeros(3), np.eye(3), method="ekf")
+        run = f.run([None] * 60, np.sqrt(sensor) * rng.normal(size=(60, 1)))
+        mean, covariance = run.smooth()
+        assert np.isfinite(mean).all()
+        variance = np.diagonal(covariance, axis1=1, axis2=2)
+        assert (variance >= 0.0).all()
+        # Rounding is relative to what is rounded, the prediction of the filter.
+        prior = np.sqrt(np.diagonal(run.predicted_covariance, axis1=1, axis2=2))
+        correlation = covariance / prior[:, :, None] / prior[:, None, :]
+        assert np.linalg.eigvalsh(correlation).min() > -1e-14
+        assert (variance <= prior**2 * (1.0 + 1e-6)).all()

@@ -26,6 +26,7 @@ METHODS = ("ekf", "ukf")
 _STEP = (
     1e-4  # of central differences, of the size or doubt of the state: rounding stays below 1e-11
 )
+_SUREST = 1e-12  # variance, of the largest, below which a correlation's eigenvalue is rounding
 
 
 class StateModel(Protocol):
@@ -77,16 +78,29 @@ class FilterRun:
 
         With an unscented filter the regression of the new on the old state stands for the
         transition, which is the unscented smoother (Särkkä, IEEE Trans. Automatic Control 2008).
+        No variance is negative: the covariance is a sum of squares, where the textbook's difference
+        of covariances loses its sign to rounding if hardly any noise enters. Where the predicted
+        covariance is singular, the pseudo-inverse of its correlations gives the gain.
         """
         mean, covariance = self.mean.copy(), self.covariance.copy()
         for k in range(len(self.steps) - 2, -1, -1):
             now, after = self.steps[k], self.steps[k + 1]
-            gain = np.linalg.lstsq(
-                after.predicted_covariance, after.transition @ now.covariance, rcond=None
-            )[0].T
+            size = np.sqrt(np.diag(after.predicted_covariance))
+            per_size = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+            correlation = per_size[:, None] * after.predicted_covariance * per_size
+            carried = after.transition @ now.covariance
+            scaled = np.linalg.lstsq(correlation, per_size[:, None] * carried, rcond=_SUREST)[0]
+            gain = scaled.T * per_size
             mean[k] += gain @ (mean[k + 1] - after.predicted_mean)
-            covariance[k] += gain @ (covariance[k + 1] - after.predicted_covariance) @ gain.T
-            covariance[k] = 0.5 * (covariance[k] + covariance[k].T)
+            entered = after.predicted_covariance - carried @ after.transition.T
+            kept = np.eye(len(gain)) - gain @ after.transition
+            before = np.sqrt(np.diag(now.predicted_covariance))
+            roots = [
+                kept @ _root_of(now.covariance, before),
+                gain @ _root_of(0.5 * (entered + entered.T), size),
+                gain @ _root_of(covariance[k + 1], size),
+            ]
+            covariance[k] = sum(root @ root.T for root in roots)
         return mean, covariance
 
 
@@ -347,10 +361,17 @@ def _triangular(array: FloatArray) -> FloatArray:
     return np.asarray(lower * signs, dtype=float)
 
 
-def _root_of(C: FloatArray) -> FloatArray:
-    """Any root of a covariance, which may be singular."""
+def _root_of(C: FloatArray, size: FloatArray | None = None) -> FloatArray:
+    """Any root of a covariance, which may be singular.
+
+    What rounding left below zero is cut: of the covariance, or of it scaled by standard deviations
+    `size` where states of different units would round each other away.
+    """
     try:
         return np.asarray(np.linalg.cholesky(C), dtype=np.float64)
     except np.linalg.LinAlgError:
-        values, vectors = np.linalg.eigh(C)
-        return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+        if size is None:
+            size = np.ones(len(C))
+        per_size = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+        values, vectors = np.linalg.eigh(per_size[:, None] * C * per_size)
+        return np.asarray(size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -78,9 +79,11 @@ class ObserverModel {
     ObserverModel with_form(const ObserverForm& form) const { return {car_, form, dt_}; }
 
     /// State one sample after `x`, and the first three rows of the Jacobian `A` that leads there;
-    /// the others are the unit matrix's, as the forces only wander.
+    /// the others are the unit matrix's, as the forces only wander. Without any reading at the new
+    /// sample (`unread`) nothing holds Euler's rule where it grows, at low speed: estimate and
+    /// covariance would overflow within seconds. The rates are sampled exactly there in any form.
     ObserverVec predict(const ObserverVec& x, const ObserverInput& before, const ObserverInput& now,
-                        ObserverMat& A) const {
+                        ObserverMat& A, bool unread = false) const {
         const ObserverInput& u = form_.input_before ? before : now;
         const Lateral c = lateral(x[0], u);
         Mat<3, 3> J;
@@ -99,7 +102,7 @@ class ObserverModel {
         // Local linearisation (Ozaki, Statistica Sinica 1992): the rate's own Jacobian is what is
         // sampled exactly. It stays stable at walking pace, where Euler's rule does not.
         ObserverVec next = x;
-        if (!form_.exact_sampling) {
+        if (!form_.exact_sampling && !(unread && euler_grows(J))) {
             A.topRows<3>().setZero();
             A.topLeftCorner<3, 3>() = dt_ * J;
             A.topLeftCorner<3, 3>().diagonal().array() += 1.0;
@@ -153,6 +156,13 @@ class ObserverModel {
             -(f * car_.lf_m * car_.lf_m + r * car_.lr_m * car_.lr_m) * per_inertia_,
             v_x > 1.0 ? -per_speed : 0.0,
         };
+    }
+
+    /// Whether a step of Euler's rule enlarges the lateral motion (Jury's criterion).
+    bool euler_grows(const Mat<3, 3>& J) const {
+        const double a = 1.0 + dt_ * J(1, 1), d = 1.0 + dt_ * J(2, 2);
+        const double determinant = a * d - dt_ * dt_ * J(1, 2) * J(2, 1);
+        return !(std::abs(a + d) < 1.0 + determinant && determinant < 1.0);
     }
 
     ObserverCar car_;
@@ -211,7 +221,8 @@ class ObserverSystem {
     ObserverVec predict(std::size_t k, const ObserverVec& x, ObserverMat& A,
                         ObserverMat& /*steady*/) const {
         speed_ = x[0];
-        return model_->predict(x, (*inputs_)[k > 0 ? k - 1 : 0], (*inputs_)[k], A);
+        return model_->predict(x, (*inputs_)[k > 0 ? k - 1 : 0], (*inputs_)[k], A,
+                               (*readings_)[k].array().isNaN().all());
     }
     ObserverReading observe(std::size_t k, const ObserverVec& x, ObserverRow& H) const {
         const bool early = !model_->form().speed_predicted && !std::isnan(speed_);
@@ -245,7 +256,7 @@ class Observer {
         double speed = x_[0];
         if (samples_ > 0 || start_.one_before) {
             ObserverMat A = ObserverMat::Identity();
-            x_ = model_.predict(x_, samples_ > 0 ? before_ : now, now, A);
+            x_ = model_.predict(x_, samples_ > 0 ? before_ : now, now, A, y.array().isNaN().all());
             propagate<ObserverSystem::kMovingStates>(A, P_);
             P_ += noise_.process;
         }
