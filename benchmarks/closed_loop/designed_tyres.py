@@ -5,7 +5,7 @@
 What `sysid-vehicle lab run --excitation designed` and `lab identify --unchecked` do, with other
 sensor noise and another design each time. The closed loop sees readings only, and so does the
 identification, which begins at the middle of its box. The design uses the true tyres: it
-believes the car that is then driven. A drive designed for other tyres than the car's may teach less.
+believes the car that is then driven. A drive designed for other tyres may teach less.
 """
 
 import argparse

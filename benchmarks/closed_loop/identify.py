@@ -8,8 +8,9 @@ at the best optimum. The time of one published identification beside that of pla
 simulated drives: how often the 95 % intervals hold the truth, and what happens with a wrong start,
 a wrong mass and no measured v_y. No truth enters any estimate.
 
-These drives are open loop, and the very model that is fitted makes them, with white noise. Their coverage says that the intervals are computed
-rightly. It says nothing of a car that the model does not describe, nor of closed-loop driving.
+These drives are open loop, and the very model that is fitted makes them, with white noise. Their
+coverage says that the intervals are computed rightly. It says nothing of a car that the model does
+not describe, nor of closed-loop driving.
 """
 
 from __future__ import annotations
@@ -180,7 +181,9 @@ def coverage(repeats: int, workers: int, what: str, **how: object) -> None:
     with ProcessPoolExecutor(workers) as pool:
         found = list(pool.map(partial(judged, **how), range(repeats)))
     took = time.perf_counter() - begin
-    print(f"\nCoverage, {repeats} open-loop drives of the fitted model itself, {what} ({took:.0f} s):")
+    print(
+        f"\nCoverage, {repeats} open-loop drives of the fitted model itself, {what} ({took:.0f} s):"
+    )
     print(f"  {'quantity':<18} {'in interval':>12} {'information matrix alone':>26}")
     shares = {}
     for name in found[0]:
