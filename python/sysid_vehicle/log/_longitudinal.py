@@ -75,11 +75,14 @@ def _ramp_on(drive: Drive, name: str) -> tuple[FloatArray, FloatArray, Regressio
     driver = drive.mean(c[name])
     columns = [driver, *across, drive.change(yaw), ones(drive)]
     spread = [np.inf, *[np.inf] * len(across), 0.6, np.inf]
+    found = fit(ramp, columns, spread)
     if name == "fx_n":
-        # The force of the wheels is told before drag, which an accelerometer feels.
-        columns.append(drive.mean(c["vx_mps"] ** 2))
-        spread.append(_DRAG_PER_M)
-    return ramp, driver, fit(ramp, columns, spread)
+        # The force of the wheels is told before drag, which an accelerometer feels. In few windows
+        # drag and acceleration cannot be told apart: the law that explains more counts.
+        drag = drive.mean(c["vx_mps"] ** 2)
+        dragged = fit(ramp, [*columns, drag], [*spread, _DRAG_PER_M])
+        found = max(found, dragged, key=lambda law: law.coherence)
+    return ramp, driver, found
 
 
 def check_force(drive: Drive) -> None:
