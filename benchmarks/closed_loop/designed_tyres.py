@@ -4,7 +4,8 @@
 
 What `sysid-vehicle lab run --excitation designed` and `lab identify --unchecked` do, with other
 sensor noise and another design each time. The closed loop sees readings only, and so does the
-identification, which begins at the middle of its box.
+identification, which begins at the middle of its box. The design uses the true tyres: it
+believes the car that is then driven. A drive designed for other tyres may teach less.
 """
 
 import argparse
@@ -47,7 +48,8 @@ def main() -> None:
             f"seed {seed}: at worst {worst:.3f} % off; outside: {', '.join(missed) or 'none'}",
             flush=True,
         )
-    print(f"\n{'':14s} {'rms error':>10s} {'worst':>9s}  in its 95 % interval")
+    print("\nDrives designed with the true tyres; identification does not see them.")
+    print(f"{'':14s} {'rms error':>10s} {'worst':>9s}  in its 95 % interval")
     for name in truth:
         hits = inside[name]
         low, high = binomtest(sum(hits), len(hits)).proportion_ci(method="wilson")

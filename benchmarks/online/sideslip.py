@@ -33,6 +33,7 @@ PUBLISHED_MASS_KG, PUBLISHED_INERTIA_KGM2, PUBLISHED_STIFFNESS_NPR = 1549.8, 231
 EXCITED_MPS2 = 1.0  # lateral acceleration of driving that tells something of the tyres
 WITHIN_S = 20.0
 REAL_PARTS_S = ((150.0, 425.0), (425.0, 700.0))  # calibration with v_y; v_y hidden
+WASH_OUT_S = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # tried for the leaky integrator
 
 
 def car(name: str) -> sv.Vehicle:
@@ -100,15 +101,22 @@ def band(run: SideslipRun, low: float) -> float:
     return next(rms for a, _, rms, _ in run.error().bands if a == low)
 
 
-def kinematic(log: sv.Log) -> np.ndarray:
-    """Sideslip by integrating what was measured; begins with no sideslip."""
+def kinematic(log: sv.Log, wash_out_s: float) -> np.ndarray:
+    """Sideslip by leaky integration of what was measured; begins with no sideslip."""
     beta = np.zeros(log.n)
+    leak = np.exp(-1.0 / (wash_out_s * log.rate_hz))
     rate, vx, ax, ay = (log[n] for n in ("yaw_rate_radps", "vx_mps", "ax_mps2", "ay_mps2"))
     for k in range(1, log.n):
         b = beta[k - 1]
         across = (ay[k] * np.cos(b) - ax[k] * np.sin(b)) * np.cos(b) / vx[k]
-        beta[k] = b + (across - rate[k]) / log.rate_hz
+        beta[k] = leak * b + (across - rate[k]) / log.rate_hz
     return beta
+
+
+def kinematic_rms(log: sv.Log, wash_out_s: float) -> float:
+    """Error of the leaky integrator, rms [deg]."""
+    true = np.arctan2(log["vy_mps"], log["vx_mps"])
+    return float(np.degrees(np.sqrt(np.nanmean((kinematic(log, wash_out_s) - true) ** 2))))
 
 
 def settled_after(log: sv.Log, run: SideslipRun, target: tuple[float, float]) -> float:
@@ -231,9 +239,14 @@ def real_rows(table: Table, data: Path, runs: int) -> None:
         first, later = (log.between(*part) for part in REAL_PARTS_S)
         as_given = car("revs_250lm")
         vehicle = fitted_vehicle(sv.identify(sv.Model(as_given), first))
-    shown_kinematic = np.degrees(kinematic(later) - np.arctan2(later["vy_mps"], later["vx_mps"]))
-    by_hand = float(np.sqrt(np.mean(shown_kinematic**2)))
-    table.row("Ferrari 250 LM, later laps, kinematic integration", f"{by_hand:.2f} deg")
+    # Without a leak the sensors' offsets add up to tens of degrees, which is no rival.
+    wash_out_s = min(WASH_OUT_S, key=lambda s: kinematic_rms(first, s))
+    by_hand = kinematic_rms(later, wash_out_s)
+    nothing = np.degrees(np.arctan2(later["vy_mps"], later["vx_mps"]))
+    table.row(
+        f"Ferrari 250 LM, later laps, leaky integrator, {wash_out_s:g} s chosen on the first",
+        f"{by_hand:.2f} deg (sideslip taken as zero {np.sqrt(np.nanmean(nothing**2)):.2f})",
+    )
     linear = {}
     for which, most in (("linear range", 0.03), ("all slips", 0.3)):
         found = cornering_stiffness(as_given, first, forgetting=1.0, most_slip_rad=most)
@@ -249,7 +262,7 @@ def real_rows(table: Table, data: Path, runs: int) -> None:
     e = run.error()
     table.row("  dual, tyres and settings of the first laps", shown(run))
     table.row(
-        "    against kinematic integration", f"{by_hand / e.rms_deg:.1f} x", ">= 2 x",
+        "    against the leaky integrator", f"{by_hand / e.rms_deg:.1f} x", ">= 2 x",
         by_hand >= 2 * e.rms_deg,
     )  # fmt: skip
     for which, rms in linear.items():

@@ -128,7 +128,7 @@ def test_failed_writing_leaves_the_old_file(
         raise OSError("disk full")
 
     monkeypatch.setattr("os.replace", fail)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(InvalidInput, match="disk full"):
         make(data).to_csv(target)
     assert target.read_text() == "precious"
     assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]

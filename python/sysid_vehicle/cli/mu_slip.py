@@ -6,8 +6,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .._files import write_json, write_text
-from .._style import svg
+from .._style import new_figure, svg
 from ..online import (
     MAGIC_FORMULA,
     TWO_PARAMETER,
@@ -15,7 +17,9 @@ from ..online import (
     MuSlipData,
     animate_mu_slip,
     compare_mu_slip,
+    draw_mu_slip_lissajous,
     mu_slip_ekf,
+    mu_slip_over_noise,
     mu_slip_overview,
     save_animation,
 )
@@ -51,14 +55,29 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("--plot", type=Path, metavar="SVG", help="file for the figures")
     parser.add_argument("--animation", type=Path, metavar="GIF", help="file for the convergence")
+    parser.add_argument(
+        "--lissajous",
+        type=Path,
+        metavar="SVG",
+        help="file for friction against slip over time, measured and filtered",
+    )
+    parser.add_argument(
+        "--over-noise",
+        type=Path,
+        metavar="SVG",
+        help="simulate the recommended curve at the slips of DATA with several levels of noise; "
+        "print the errors of every estimator, and draw them into this file",
+    )
     parser.add_argument("--json", type=Path, metavar="JSON", help="file for all numbers")
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Estimate with every method, print them, and write what was asked for."""
-    refuse_other_suffix(args.plot, ".svg")
+    pictures = [args.plot, args.lissajous, args.over_noise]
+    for path in pictures:
+        refuse_other_suffix(path, ".svg")
     refuse_other_suffix(args.animation, ".gif")
-    refuse_unwritable([args.plot, args.animation, args.json], inputs=[args.data])
+    refuse_unwritable([*pictures, args.animation, args.json], inputs=[args.data])
     curve = _CURVES[args.curve]
     comparison = compare_mu_slip(MuSlipData.from_csv(args.data, args.noise_std), curve=curve)
     print(comparison)
@@ -67,10 +86,31 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     filtered = mu_slip_ekf(comparison.data, curve=curve)
     if args.plot is not None:
         write_text(args.plot, svg(mu_slip_overview(filtered)).decode())
+    if args.lissajous is not None:
+        figure = new_figure(6.5, 4.5)
+        draw_mu_slip_lissajous(filtered, figure.subplots())
+        write_text(args.lissajous, svg(figure).decode())
+    if args.over_noise is not None:
+        _over_noise(comparison, args.over_noise)
     if args.animation is not None:
         save_animation(animate_mu_slip(filtered), args.animation)
     if args.json is not None:
         write_json(args.json, _plain(comparison, heard))
+
+
+def _over_noise(comparison: MuSlipComparison, path: Path) -> None:
+    """Judge the estimators on data like these, from a quarter of their noise to four times it."""
+    data, best = comparison.data, comparison.best
+    assert data.noise_std is not None  # a comparison has learnt it
+    levels = data.noise_std * np.array([0.25, 0.5, 1.0, 2.0, 4.0])
+    slip = data.slip[np.isfinite(data.mu)]
+    study = mu_slip_over_noise(best.values, curve=best.curve, noise_std=levels, slip=slip)
+    print()
+    print(study)
+    figure = new_figure(12.0, 5.0)
+    for ax, name in zip(figure.subplots(1, 2), best.curve.parameters[:2], strict=True):
+        study.plot(ax, name)
+    write_text(path, svg(figure).decode())
 
 
 def _plain(comparison: MuSlipComparison, heard: list[str]) -> dict[str, Any]:

@@ -280,7 +280,7 @@ def learn_observer_noise(
         `accelerate`, when no more is to come by the geometric decay of the last gains.
     never_fall : bool
         Shortens a step that would lower the log-likelihood. The model is linearised anew in each
-        iteration, so that without it a step near the optimum may.
+        iteration, so that without it a step may.
     accelerate : bool
         Leaps ahead after every second step, where that gains (Varadhan & Roland, Scand. J.
         Statistics 2008). Variances that tend to zero take very long without it.

@@ -30,6 +30,7 @@ _CLEARLY_RAMP, _CLEARLY_DRIVEN, _CLEARLY_FELT = (
 )  # m/s2 beyond which channels must follow each other
 _DRIVEN_MPS, _LEAST_FORCE_N = 12.0, 30.0  # at that speed drag takes more
 _HELD_MPS2 = 0.05  # a speed that falls no faster on average is held
+_DRAG_PER_M = 0.003  # half the air's density times a large drag area, over the mass of a light car
 
 _AX_G = ("ax_mps2", "g", "factor = 9.80665")
 _VX_KMH = ("vx_mps", "km/h", "factor = 0.2777778")
@@ -73,7 +74,14 @@ def _ramp_on(drive: Drive, name: str) -> tuple[FloatArray, FloatArray, Regressio
         across = [values[drive.rows] for values in sideways(drive.motion)]
     driver = drive.mean(c[name])
     columns = [driver, *across, drive.change(yaw), ones(drive)]
-    found = fit(ramp, columns, [np.inf, *[np.inf] * len(across), 0.6, np.inf])
+    spread = [np.inf, *[np.inf] * len(across), 0.6, np.inf]
+    found = fit(ramp, columns, spread)
+    if name == "fx_n":
+        # The force of the wheels is told before drag, which an accelerometer feels. In few windows
+        # drag and acceleration cannot be told apart: the law that explains more counts.
+        drag = drive.mean(c["vx_mps"] ** 2)
+        dragged = fit(ramp, [*columns, drag], [*spread, _DRAG_PER_M])
+        found = max(found, dragged, key=lambda law: law.coherence)
     return ramp, driver, found
 
 

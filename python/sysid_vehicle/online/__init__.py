@@ -9,11 +9,12 @@ from .mu_slip_curve import (
     MuSlipPrior,
     magic_formula_coefficients,
 )
-from .mu_slip_data import MuSlipData, simulate_mu_slip
+from .mu_slip_data import MuSlipData, simulate_mu_slip, sinusoidal_slip
 from .mu_slip_figures import (
     MuSlipFrame,
     animate_mu_slip,
     draw_mu_slip_convergence,
+    draw_mu_slip_lissajous,
     draw_mu_slip_observability,
     draw_mu_slip_signal,
     mu_slip_overview,
@@ -21,6 +22,7 @@ from .mu_slip_figures import (
 )
 from .mu_slip_filter import MuSlipFilter, mu_slip_ekf, mu_slip_smooth
 from .mu_slip_least_squares import mu_slip_cramer_rao, mu_slip_fit
+from .mu_slip_noise import MuSlipNoiseStudy, mu_slip_over_noise
 from .mu_slip_results import MuSlipEstimate, MuSlipRun, MuSlipSmoothed
 from .sideslip import KINDS, SideslipEstimate, SideslipObserver, estimate_sideslip
 from .sideslip_calibration import SideslipCalibration, calibrate_sideslip, fitted_vehicle
@@ -39,6 +41,7 @@ __all__ = [
     "MuSlipEstimate",
     "MuSlipFilter",
     "MuSlipFrame",
+    "MuSlipNoiseStudy",
     "MuSlipPrior",
     "MuSlipRun",
     "MuSlipSmoothed",
@@ -53,6 +56,7 @@ __all__ = [
     "compare_mu_slip",
     "cornering_stiffness",
     "draw_mu_slip_convergence",
+    "draw_mu_slip_lissajous",
     "draw_mu_slip_observability",
     "draw_mu_slip_signal",
     "estimate_sideslip",
@@ -61,9 +65,11 @@ __all__ = [
     "mu_slip_cramer_rao",
     "mu_slip_ekf",
     "mu_slip_fit",
+    "mu_slip_over_noise",
     "mu_slip_overview",
     "mu_slip_smooth",
     "save_animation",
     "sideslip_overview",
     "simulate_mu_slip",
+    "sinusoidal_slip",
 ]

@@ -15,7 +15,7 @@ from ..errors import InvalidInput, near_names
 from ..read._csv import read_table
 from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
 
-__all__ = ["MuSlipData", "simulate_mu_slip"]
+__all__ = ["MuSlipData", "simulate_mu_slip", "sinusoidal_slip"]
 
 _COLUMNS = ("slip", "mu")
 _LARGEST = {"slip": 1.5, "mu": 5.0}  # beyond them the unit is wrong
@@ -123,6 +123,40 @@ def at_least_one(name: str, count: int) -> int:
     if count < 1:
         raise InvalidInput(f"{name}: {count} is below 1; give 1 or more")
     return count
+
+
+def sinusoidal_slip(
+    mean: float = 0.2, amplitude: float = 0.2, periods: float = 3.0, readings: int = 300
+) -> FloatArray:
+    """Slip that swings to and fro at equal steps of time, for :func:`simulate_mu_slip`.
+
+    Parameters
+    ----------
+    mean, amplitude : float
+        Of the slip ratio; it begins at its smallest.
+    periods : float
+        How often it swings.
+    readings : int
+        Number of samples.
+
+    Returns
+    -------
+    ndarray, shape (readings,)
+
+    Raises
+    ------
+    InvalidInput
+        If a number is not finite, nothing swings, or there are fewer than 3 readings.
+    """
+    if not np.isfinite([mean, amplitude, periods]).all():
+        raise InvalidInput("slip: mean, amplitude or periods is not finite; give numbers")
+    if readings < 3 or periods <= 0.0 or amplitude == 0.0:
+        raise InvalidInput(
+            f"slip: {readings} readings, {periods:g} periods, amplitude {amplitude:g}; give 3 "
+            "readings or more, and periods and an amplitude above 0"
+        )
+    phase = 2.0 * np.pi * periods * np.arange(readings) / readings
+    return as_float64(mean - amplitude * np.cos(phase))
 
 
 def simulate_mu_slip(

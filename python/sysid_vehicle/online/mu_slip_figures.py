@@ -27,6 +27,7 @@ __all__ = [
     "MuSlipFrame",
     "animate_mu_slip",
     "draw_mu_slip_convergence",
+    "draw_mu_slip_lissajous",
     "draw_mu_slip_observability",
     "draw_mu_slip_signal",
     "mu_slip_overview",
@@ -173,6 +174,39 @@ def draw_mu_slip_convergence(run: MuSlipRun, ax: Axes | None = None) -> Axes:
     ax.legend(frameon=False, ncols=2, fontsize="small", loc="lower center")
     ylabel = "share of the first variance"
     return tidy(ax, xlabel="slip ratio", ylabel=ylabel, title="Convergence of the covariance")
+
+
+def draw_mu_slip_lissajous(
+    run: MuSlipRun, ax: Axes | None = None, truth: Sequence[float] | None = None
+) -> Axes:
+    """Draw friction against slip as time goes on: measured, filtered and true.
+
+    Filtered is the friction that the filter expects at the slip of each reading, from the readings
+    before it. Where slip swings to and fro, its path runs from the prior to the curve that the
+    readings follow. Nothing is drawn where there is no reading.
+
+    Parameters
+    ----------
+    run : MuSlipRun
+        What to show.
+    ax : Axes, optional
+        Where to draw; a new figure is made without it.
+    truth : sequence of float, optional
+        True parameters, if there are any.
+    """
+    ax = axes_or_new(ax, 6.5, 4.5)
+    data = run.data
+    ax.plot(data.slip, data.mu, color=FLOOR, linewidth=0.5, alpha=0.6)
+    ax.plot(data.slip, data.mu, ".", color=MEASURED, markersize=3, label="measured")
+    if truth is not None:
+        true = run.curve.mu(data.slip, truth)
+        ax.plot(data.slip, true, color=TRUTH, linewidth=3.0, label="true")
+    filtered = run.expected_mu
+    ax.plot(data.slip, filtered, color=AFTER, linewidth=1.2, label="filtered")
+    ax.plot(data.slip[:1], filtered[:1], "o", color=BEFORE, markersize=6, label="first reading")
+    ax.legend(frameon=False)
+    title = f"Friction against slip over time, {run.method}"
+    return tidy(ax, xlabel="slip ratio", ylabel="friction", title=title)
 
 
 def draw_mu_slip_signal(run: MuSlipRun, ax: Axes | None = None) -> Axes:

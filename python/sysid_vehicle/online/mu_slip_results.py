@@ -131,6 +131,11 @@ class MuSlipRun:
     signal_after: FloatArray
 
     @property
+    def expected_mu(self) -> FloatArray:
+        """Friction expected of each reading from those before it, shape (n,); NaN where missing."""
+        return self.data.mu - self.innovation
+
+    @property
     def estimate(self) -> MuSlipEstimate:
         """After the last reading."""
         kernels, values = self.curve.kernels, self.mean[-1]
