@@ -94,7 +94,7 @@ struct ObserverSettings {
     // logarithm of the tyre's numbers: stiffness is doubtful at first and wanders in hard driving,
     // friction changes with the road and comes back
     double stiffness_prior = 0.4, stiffness_wander = 0.0003;
-    double friction_prior = 0.17, friction_time_s = 50.0;
+    double friction_prior = 0.05, friction_time_s = 50.0;
     double relaxation_m = 0.5, relaxation_doubt = 0.3;  // of both axles, and of its logarithm
     // gate, frozen sensors, low speed
     double gate_probability = 1e-6, gate_patience_s = 3.0, frozen_after_s = 0.2;
