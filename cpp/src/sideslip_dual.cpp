@@ -6,8 +6,11 @@ namespace {
 
 constexpr double kSlowestMps = 1.0;  // keeps what divides by speed finite
 constexpr double kFullUse = 0.3;     // lateral force over load at which tyres tell all they can
-constexpr double kMostStiffness = 1.6, kMostFriction = 0.8;  // of the logarithms
-constexpr double kSteerUnknown = 0.15;                       // wander of its angle [rad/sqrt(s)]
+constexpr double kMostStiffness = 1.6, kMostFriction = 0.8, kMostRelaxation = 3.0;  // logarithms
+constexpr double kRelaxationWander = 0.01;                                          // [1/sqrt(s)]
+constexpr double kContradictionTimeS = 1.0, kTolerated = 1.5;  // of the innovations
+constexpr double kContradicted = 0.3;   // wander of the stiffness for each sigma above [1/sqrt(s)]
+constexpr double kSteerUnknown = 0.15;  // wander of its angle [rad/sqrt(s)]
 constexpr double kBlindSideslip = 0.1, kBlindYawRate = 0.5;  // doubt of a start without sensors
 
 double share_of(double dt, double time_s) { return std::exp(-dt / time_s); }
@@ -78,22 +81,25 @@ template <class S>
 void TyreModel::predict(const Input& u, const S* x, S* next) const {
     using std::atan;
     using std::cos;
+    using std::exp;
     using std::sin;
     const VehicleData& c = car.data;
     const double vx = 0.5 * (u.vx + u.vx_before), ax = 0.5 * (u.ax + u.ax_before);
     const double steer = 0.5 * (u.steer + u.steer_before);
     const double cosine = std::cos(steer), side = u.loads.fx_f * std::sin(steer);
+    S felt;
     const auto rates = [&](const S* at, S& beta_rate, S& yaw_acceleration) {
         S front, rear;
         forces(u, at, front, rear);
         const S front_across = cosine * front + side;
-        const S ay = (front_across + rear) / c.mass_kg + at[kRoad];
+        felt = (front_across + rear) / c.mass_kg;
+        const S ay = felt + at[kRoad];
         const S along = cos(at[kBeta]);
         beta_rate = (ay * along - ax * sin(at[kBeta])) * along / vx - at[kYawRate];
         yaw_acceleration = (c.lf_m * front_across - c.lr_m * rear + u.drive_nm * at[kDrive]) /
                            car.yaw_inertia_kgm2;
     };
-    const double keep = std::exp(-vx * u.dt / settings.relaxation_m);
+    const S keep = exp((-vx * u.dt / settings.relaxation_m) * exp(-1.0 * x[kRelax]));
     const auto relax = [&](const S& beta, const S& r, S* to) {
         const S tangent = sin(beta) / cos(beta);
         const S slip_f = steer - atan(tangent + (c.lf_m / vx) * r);
@@ -118,6 +124,7 @@ void TyreModel::predict(const Input& u, const S* x, S* next) const {
     next[kBeta] = x[kBeta] + 0.5 * u.dt * (first_beta + second_beta);
     next[kYawRate] = x[kYawRate] + 0.5 * u.dt * (first_yaw + second_yaw);
     relax(0.5 * (x[kBeta] + next[kBeta]), 0.5 * (x[kYawRate] + next[kYawRate]), next);
+    next[kLean] = felt + share_of(u.dt, settings.roll_time_s) * (x[kLean] - felt);
 }
 
 template <class S>
@@ -125,24 +132,27 @@ void TyreModel::observe(const Input& u, const S* x, S* y) const {
     S front, rear;
     forces(u, x, front, rear);
     y[0] = x[kYawRate];
-    y[1] = (std::cos(u.steer) * front + std::sin(u.steer) * u.loads.fx_f + rear) *
-           ((1.0 + x[kRoll]) / car.data.mass_kg);
+    y[1] =
+        (std::cos(u.steer) * front + std::sin(u.steer) * u.loads.fx_f + rear) / car.data.mass_kg +
+        x[kRoll] * x[kLean];
 }
 
-Mat<13, 13> TyreModel::process_noise(const Input& u) const {
+Mat<15, 15> TyreModel::process_noise(const Input& u) const {
     const ObserverSettings& s = settings;
     const auto fresh = [&](double time_s) { return 1.0 - squared(share_of(u.dt, time_s)); };
-    Vec<13> q;
+    Vec<15> q;
     q[kBeta] = u.dt * squared(s.sideslip_wander_rad);
     q[kYawRate] = u.dt * squared(s.yaw_wander_radps);
     q[kSlipF] = u.dt * squared(u.slip_f_wander) + 1e-12;
     q[kSlipR] = 1e-12;
-    q[kStiffF] = u.dt * squared(s.stiffness_wander * u.use_f);
-    q[kStiffR] = u.dt * squared(s.stiffness_wander * u.use_r);
+    q[kStiffF] = u.dt * squared(u.stiffness_wander_f);
+    q[kStiffR] = u.dt * squared(u.stiffness_wander_r);
+    q[kRelax] = u.dt * squared(kRelaxationWander);
     q[kGripF] = q[kGripR] = squared(s.friction_prior) * fresh(s.friction_time_s);
     q[kRoad] = squared(s.road_mps2) * fresh(s.road_time_s);
     q[kRoll] = 1e-16;  // a property of the car
     q[kErrorF] = q[kErrorR] = q[kDrive] = fresh(s.error_time_s);
+    q[kLean] = 1e-10;  // it follows from the forces
     return q.asDiagonal();
 }
 
@@ -155,7 +165,7 @@ SideslipDual::SideslipDual(const ObservedCar& car, const ObserverSettings& setti
       settings_(settings),
       watch_(settings),
       forces_(ForceModel{car, settings}, Vec<5>::Zero(), Mat<5, 5>::Identity()),
-      tyres_(TyreModel{car, settings}, Vec<13>::Zero(), Mat<13, 13>::Identity(), Gate<2>(),
+      tyres_(TyreModel{car, settings}, Vec<15>::Zero(), Mat<15, 15>::Identity(), Gate<2>(),
              NoiseAdaptation(), SigmaWeights::near(TyreModel::kStates)) {}
 
 const SideslipEstimate& SideslipDual::step(double dt, const SensorSample& sample) {
@@ -221,10 +231,10 @@ void SideslipDual::start(double dt, const SensorSample& s) {
     const double slip_f = a[ForceModel::kFyf] / (slope(car_.front) * input_.loads.fz_f);
     const double slip_r = a[ForceModel::kFyr] / (slope(car_.rear) * input_.loads.fz_r);
     const bool first = tyres_.samples() == 0;
-    Vec<13> b = tyres_.state().mean, doubt;
-    const Mat<4, 4> learnt =
-        tyres_.state().covariance.block<4, 4>(TyreModel::kStiffF, TyreModel::kStiffF);
-    const double roll_variance = tyres_.state().covariance(TyreModel::kRoll, TyreModel::kRoll);
+    Vec<15> b = tyres_.state().mean, doubt;
+    constexpr int at = TyreModel::kLearnt, learnt = TyreModel::kLearntStates;
+    const Mat<learnt, learnt> known = tyres_.state().covariance.block<learnt, learnt>(at, at);
+    if (first) b[TyreModel::kRoll] = settings_.roll_expected;
     b[TyreModel::kBeta] = c.lr_m * r / speed - slip_r;
     b[TyreModel::kYawRate] = r;
     b[TyreModel::kSlipF] = slip_f;
@@ -232,15 +242,15 @@ void SideslipDual::start(double dt, const SensorSample& s) {
     for (const int i :
          {TyreModel::kRoad, TyreModel::kErrorF, TyreModel::kErrorR, TyreModel::kDrive})
         b[i] = 0.0;
+    b[TyreModel::kLean] = ay / (1.0 + b[TyreModel::kRoll]);
     const double stiff = settings_.stiffness_prior, grip = settings_.friction_prior;
     const bool blind = std::isnan(s.yaw_rate_radps) || std::isnan(s.ay_mps2);
     const double unseen = blind ? kBlindSideslip : 0.0;
     doubt << 0.01 + std::abs(slip_r) + unseen, blind ? kBlindYawRate : 0.1,
         0.005 + std::abs(slip_f), 0.005 + std::abs(slip_r), stiff, stiff, grip, grip,
-        settings_.road_mps2, first ? settings_.roll_share : std::sqrt(roll_variance), 1.0, 1.0, 1.0;
-    Mat<13, 13> P = doubt.cwiseAbs2().asDiagonal();
-    // What was learnt of the car outlives a stop.
-    if (!first) P.block<4, 4>(TyreModel::kStiffF, TyreModel::kStiffF) = learnt;
+        settings_.relaxation_doubt, settings_.roll_share, settings_.road_mps2, 1.0, 1.0, 1.0, 0.5;
+    Mat<15, 15> P = doubt.cwiseAbs2().asDiagonal();
+    if (!first) P.block<learnt, learnt>(at, at) = known;
     // An error of beta is one of both slip angles, which are doubtful by themselves as well.
     const double shared = squared(doubt[TyreModel::kBeta]);
     for (const int i : {TyreModel::kSlipF, TyreModel::kSlipR}) {
@@ -256,7 +266,7 @@ void SideslipDual::start(double dt, const SensorSample& s) {
 
 void SideslipDual::run_tyres(double dt, const SensorSample& s) {
     const Vec<5>& a = forces_.state().mean;
-    const Vec<13>& b = tyres_.state().mean;
+    const Vec<15>& b = tyres_.state().mean;
     TyreModel::Input& u = input_;
     u.dt = dt;
     u.steer_before = u.steer;
@@ -277,23 +287,34 @@ void SideslipDual::run_tyres(double dt, const SensorSample& s) {
     u.error_r_n = error(u.loads.fz_r, u.loads.fx_r, rear, car_.rear.D);
     u.drive_nm =
         settings_.error_drive * std::abs(u.loads.fx_f + u.loads.fx_r) * 0.5 * car_.wheelbase_m();
-    u.use_f = std::min(std::abs(front) / (kFullUse * u.loads.fz_f), 1.0);
-    u.use_r = std::min(std::abs(rear) / (kFullUse * u.loads.fz_r), 1.0);
+    // Stiffness is doubted anew where readings are farther off than the model allows.
+    const double wander = settings_.stiffness_wander +
+                          kContradicted * std::max(std::sqrt(contradiction_) - kTolerated, 0.0);
+    u.stiffness_wander_f = wander * std::min(std::abs(front) / (kFullUse * u.loads.fz_f), 1.0);
+    u.stiffness_wander_r = wander * std::min(std::abs(rear) / (kFullUse * u.loads.fz_r), 1.0);
     u.slip_f_wander = watch_.steer_gap_s() > 0.0 ? kSteerUnknown : 0.0;
     tyres_.step(u, Vec<2>(s.yaw_rate_radps, s.ay_mps2));
+    const int observed = tyres_.state().update.observed;
+    if (observed > 0) {
+        const double keep = share_of(dt, kContradictionTimeS);
+        contradiction_ = keep * contradiction_ + (1.0 - keep) * tyres_.nis() / observed;
+    }
 
     // Logarithms that ran away would not come back by themselves.
-    Vec<13> mean = b;
-    const auto limit = [&](int first, double most) {
-        for (int i = first; i < first + 2; ++i) mean[i] = std::min(std::max(mean[i], -most), most);
+    Vec<15> mean = b;
+    const auto limit = [&](int i, double most) {
+        mean[i] = std::min(std::max(mean[i], -most), most);
     };
     limit(TyreModel::kStiffF, kMostStiffness);
+    limit(TyreModel::kStiffR, kMostStiffness);
     limit(TyreModel::kGripF, kMostFriction);
-    if (mean != b) tyres_.restart(mean, Mat<13, 13>(tyres_.state().covariance));
+    limit(TyreModel::kGripR, kMostFriction);
+    limit(TyreModel::kRelax, kMostRelaxation);
+    if (mean != b) tyres_.restart(mean, Mat<15, 15>(tyres_.state().covariance));
 }
 
 void SideslipDual::run_forces(double dt, const SensorSample& s) {
-    const Vec<13>& b = tyres_.state().mean;
+    const Vec<15>& b = tyres_.state().mean;
     const Vec<2>& used = tyres_.used();
     if (used.hasNaN()) {
         // Nobody feels the forces: they are what the tyre model makes of the driving.

@@ -3,11 +3,11 @@
 // Observer A turns the sensors into forces: state (v_x, r, F_yf, F_yr, F_x), measured
 // (v_x, r, a_x, a_y); the forces wander freely, no tyre is assumed. Observer B knows tyres: state
 // beta, r, both slip angles behind their relaxation length, and what is doubtful of the tyres:
-// stiffness, grip and an error of the force for each axle; of the road, of body roll, and of the
-// yaw moment by drive and brakes (a locking differential makes one as large as a tenth of the
-// tyres'). It reads r and a_y. Both run beside each other: A gives B the speed and the longitudinal
-// force that share the grip and shift the load, B gives A the sideslip, and the forces where a
-// sensor fails.
+// stiffness, grip, an error of the force for each axle, and the relaxation length; of the road, of
+// body roll, and of the yaw moment by drive and brakes (a locking differential makes one as large
+// as a tenth of the tyres'). It reads r and a_y. Both run beside each other: A gives B the speed
+// and the longitudinal force that share the grip and shift the load, B gives A the sideslip, and
+// the forces where a sensor fails.
 //
 // B reads the sensors and not, as was published, the forces that A made of them: A's errors last
 // for several samples, and B would believe the same noise several times. The error states let the
@@ -53,13 +53,17 @@ struct TyreModel {  // observer B
         kStiffR,
         kGripF,
         kGripR,
-        kRoad,  // lateral acceleration that moves the car and that no accelerometer feels
-        kRoll,  // share of it that the accelerometer feels too much, by gravity in body roll
+        kRelax,  // logarithm of what the relaxation length is multiplied by
+        kRoll,   // share of `kLean` that the accelerometer feels too much, by gravity in body roll
+        kRoad,   // lateral acceleration that moves the car and that no accelerometer feels
         kErrorF,
         kErrorR,
         kDrive,  // yaw moment of wheels that drive or brake unlike left and right
+        kLean,   // lateral acceleration that the body has rolled with by now
     };
-    static constexpr int kStates = 13;
+    static constexpr int kStates = 15;
+    // What is learnt of the car and outlives a stop.
+    static constexpr int kLearnt = kStiffF, kLearntStates = kRoll - kStiffF + 1;
     static constexpr int kMeasured = 2;  // r, a_y
     struct Input {
         double dt = 0.0;
@@ -69,8 +73,8 @@ struct TyreModel {  // observer B
         AxleLoads loads{};
         double error_f_n = 0.0, error_r_n = 0.0;  // standard deviation of the tyre model's error
         double drive_nm = 0.0;                    // standard deviation of that yaw moment
-        double use_f = 0.0, use_r = 0.0;          // 1 where the tyres tell all they can
-        double slip_f_wander = 0.0;               // of an unknown steering angle [rad/sqrt(s)]
+        double stiffness_wander_f = 0.0, stiffness_wander_r = 0.0;  // [1/sqrt(s)]
+        double slip_f_wander = 0.0;  // of an unknown steering angle [rad/sqrt(s)]
     };
 
     ObservedCar car;
@@ -82,7 +86,7 @@ struct TyreModel {  // observer B
     void predict(const Input& u, const S* x, S* next) const;
     template <class S>
     void observe(const Input& u, const S* x, S* y) const;
-    Mat<13, 13> process_noise(const Input& u) const;
+    Mat<15, 15> process_noise(const Input& u) const;
     Mat<2, 2> measurement_noise(const Input& u) const;
 };
 
@@ -98,7 +102,7 @@ class SideslipDual {
     void remember(Row& row) {
         row(car_, settings_);
         if constexpr (Row::kReads) *this = SideslipDual(car_, settings_);
-        row(watch_, forces_, tyres_, input_, out_, index_, started_);
+        row(watch_, forces_, tyres_, input_, out_, index_, contradiction_, started_);
     }
 
   private:
@@ -117,6 +121,7 @@ class SideslipDual {
     TyreModel::Input input_;
     SideslipEstimate out_;
     std::size_t index_ = 0;
+    double contradiction_ = 1.0;  // squared innovations over their variance, of the last while
     bool started_ = false;
 };
 
