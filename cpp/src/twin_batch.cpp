@@ -75,8 +75,11 @@ Eigen::VectorXd BatchEstimator::spread() const {
 
 Estimates BatchEstimator::of_twin(std::size_t which, const Estimates& estimate) const {
     Estimates v = estimate;
+    if (which > parameters_.size())
+        throw std::out_of_range("twin " + std::to_string(which) + ": there are " +
+                                std::to_string(twins()) + ", counted from 0");
     if (which > 0) {
-        const BatchParameter& p = parameters_.at(which - 1);
+        const BatchParameter& p = parameters_[which - 1];
         v[static_cast<std::size_t>(p.parameter)] += p.step;
     }
     return v;

@@ -20,6 +20,10 @@ from sysid_vehicle.read import ChannelMap
 NAMED = {"channels", "parameters", "effects", "verdicts", "estimates", "noise", "groups"}
 
 
+# It was measured with the noise of the incomplete model, and so was next to 1 for every effect.
+WITHDRAWN = {(".ranking[].predicted_error", "number")}
+
+
 @pytest.fixture(scope="module")
 def artefacts(repo: Path) -> Path:
     return repo / "tests" / "data" / "artefacts_0_1"
@@ -115,7 +119,7 @@ def test_todays_reports_have_all_that_stood_there(
         out = tmp_path / f"{command}.json"
         assert main([command, *files, *common, str(out)]) == 0
         old = json.loads((artefacts / f"{command}.json").read_text())
-        assert lost(old, json.loads(out.read_text())) == set(), command
+        assert lost(old, json.loads(out.read_text())) <= WITHDRAWN, command
 
 
 def test_what_goes_is_noticed() -> None:

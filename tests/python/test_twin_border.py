@@ -116,7 +116,7 @@ def test_laws_and_batches_check_their_places_and_rows() -> None:
         _core.BatchEstimator(good, [[-1, 0.1, 0]], 1e-3, [2, 1, 5, 4, 20])
     batch = _core.BatchEstimator(good, [[3, 0.1, 0]], 1e-3, [2, 1, 5, 4, 20])
     estimate = [1.0] * _core.TWIN_ESTIMATES
-    with pytest.raises(IndexError):
+    with pytest.raises(ValueError, match="twin 7: there are 2, counted from 0"):
         batch.of_twin(7, estimate)
     with pytest.raises(ValueError, match="car: expected 4 values"):
         batch.update(np.zeros(3), np.zeros((2, 3)), estimate)
