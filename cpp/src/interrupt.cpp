@@ -11,7 +11,8 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kBetween{50};
 
 thread_local InterruptGuard* innermost = nullptr;
-thread_local Clock::time_point asked;  // outlives guards: a row of short kernels is asked as often
+// Outlives guards: a row of short kernels is asked as often.
+thread_local Clock::rep asked = 0;
 
 }  // namespace
 
@@ -24,9 +25,9 @@ InterruptGuard::~InterruptGuard() { innermost = outer_; }
 
 void poll_interrupt() {
     if (innermost == nullptr) return;
-    const Clock::time_point now = Clock::now();
-    if (now - asked < kBetween) return;
-    asked = now;
+    const Clock::duration now = Clock::now().time_since_epoch();
+    if (now - Clock::duration(asked) < kBetween) return;
+    asked = now.count();
     innermost->ask_();
 }
 

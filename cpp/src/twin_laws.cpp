@@ -22,7 +22,8 @@ double Derivative::operator()(double value) {
 ParameterLaws::ParameterLaws(std::vector<ParameterLaw> laws, double dt,
                              std::size_t yaw_rate_channel, double derivative_hz, Schedule schedule)
     : laws_(std::move(laws)), schedule_(schedule), dt_(dt), yaw_rate_channel_(yaw_rate_channel) {
-    if (!(dt > 0.0 && derivative_hz > 0.0))
+    const bool positive = dt > 0.0 && derivative_hz > 0.0;
+    if (!positive)
         throw std::invalid_argument("laws: the step and the derivative's corner must be positive");
     stage_ = std::numeric_limits<int>::max();
     for (const ParameterLaw& law : laws_) {

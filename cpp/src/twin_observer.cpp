@@ -30,8 +30,8 @@ void check(const TwinObserverSettings& settings, double dt) {
                                         " is not one of " + std::to_string(size));
     };
     if (settings.stride == 0) throw std::invalid_argument("stride = 0: give one or more");
-    if (!(dt > 0.0 && std::isfinite(dt)))
-        throw std::invalid_argument("the step must be positive and finite");
+    const bool usable = dt > 0.0 && std::isfinite(dt);
+    if (!usable) throw std::invalid_argument("the step must be positive and finite");
     for (const StateGain& g : settings.gains) {
         within(g.channel, kReadings, "gains: reading");
         within(g.state, kTwinStatesWithTyres, "gains: state");

@@ -24,7 +24,8 @@ std::array<double, 6> inverse_inertia(const Load& l) {
     const double yz = l.jxx_kgm2 * l.jyz_kgm2 + l.jxy_kgm2 * l.jxz_kgm2;
     const double zz = l.jxx_kgm2 * l.jyy_kgm2 - l.jxy_kgm2 * l.jxy_kgm2;
     const double all = l.jxx_kgm2 * xx - l.jxy_kgm2 * xy - l.jxz_kgm2 * xz;
-    if (!(l.jxx_kgm2 > 0.0 && zz > 0.0 && all > 0.0))
+    const bool positive = l.jxx_kgm2 > 0.0 && zz > 0.0 && all > 0.0;
+    if (!positive)
         throw std::invalid_argument(
             "the moments of inertia must be positive and the products small beside them");
     const double per = 1.0 / all;

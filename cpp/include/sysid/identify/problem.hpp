@@ -17,7 +17,7 @@ struct Run {
     double dt = 0.01;
     std::vector<Input> inputs;
     std::vector<Vec<kChannels>> measurements;  // NaN where missing
-    std::string name{};                        // of the log, for messages
+    std::string name;                          // of the log, for messages
     std::size_t size() const { return inputs.size(); }
 };
 

@@ -162,7 +162,8 @@ class ObserverModel {
     bool euler_grows(const Mat<3, 3>& J) const {
         const double a = 1.0 + dt_ * J(1, 1), d = 1.0 + dt_ * J(2, 2);
         const double determinant = a * d - dt_ * dt_ * J(1, 2) * J(2, 1);
-        return !(std::abs(a + d) < 1.0 + determinant && determinant < 1.0);
+        const bool shrinks = std::abs(a + d) < 1.0 + determinant && determinant < 1.0;
+        return !shrinks;
     }
 
     ObserverCar car_;

@@ -20,13 +20,11 @@ struct SensorRange {
     double most;       // of the absolute value
     double most_rate;  // per second
 };
-constexpr std::array<SensorRange, 5> kSensorRanges = {{
-    {"steer_rad", 1.2, 15.0},
-    {"vx_mps", 150.0, 30.0},
-    {"yaw_rate_radps", 10.0, 20.0},
-    {"ax_mps2", 80.0, 200.0},
-    {"ay_mps2", 80.0, 200.0},
-}};
+constexpr std::array<SensorRange, 5> kSensorRanges = {
+    SensorRange{"steer_rad", 1.2, 15.0},       SensorRange{"vx_mps", 150.0, 30.0},
+    SensorRange{"yaw_rate_radps", 10.0, 20.0}, SensorRange{"ax_mps2", 80.0, 200.0},
+    SensorRange{"ay_mps2", 80.0, 200.0},
+};
 constexpr double kMostSideslipRad = 1.2;  // beyond it a car spins, and no tyre model holds
 constexpr double kLongestStepS = 0.05;    // longer ones are divided
 constexpr double kForgottenAfterS = 1.0;  // after a longer one the motion is unknown

@@ -35,18 +35,22 @@ enum LoadParameter : int {
     kJxy,
     kJxz,
     kJyz,
-    kLoadParameters
+    kLoadParameters,
 };
 
 using LoadVector = std::array<double, kLoadParameters>;
 
 inline LoadVector to_vector(const Load& l) {
-    return {l.mass_kg, l.jxx_kgm2, l.jyy_kgm2, l.jzz_kgm2, l.cg_x_m,
-            l.cg_y_m,  l.cg_z_m,   l.jxy_kgm2, l.jxz_kgm2, l.jyz_kgm2};
+    return {
+        l.mass_kg, l.jxx_kgm2, l.jyy_kgm2, l.jzz_kgm2, l.cg_x_m,
+        l.cg_y_m,  l.cg_z_m,   l.jxy_kgm2, l.jxz_kgm2, l.jyz_kgm2,
+    };
 }
 
 inline Load to_load(const LoadVector& v) {
-    return {v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9]};
+    return {
+        v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9],
+    };
 }
 
 /// What an observer estimates: a load, and a factor of those inputs whose size is doubted.
