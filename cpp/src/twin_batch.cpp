@@ -29,12 +29,14 @@ BatchEstimator::BatchEstimator(std::vector<BatchParameter> parameters,
             throw std::invalid_argument(
                 "batch: steps must not be zero, spreads must be positive, limits in their order");
     }
-    for (const BatchChannel& c : channels_)
-        if (!(c.noise > 0.0 && c.high_pass_hz >= 0.0))
+    for (const BatchChannel& c : channels_) {
+        const bool noisy = c.noise > 0.0 && c.high_pass_hz >= 0.0;
+        if (!noisy)
             throw std::invalid_argument("batch: the noise of every channel must be positive");
-    if (!(dt > 0.0 && settings.residual_s > 0.0 && settings.clip > 0.0 &&
-          settings.forgetting >= 0.0 && settings.block_s > 0.0))
-        throw std::invalid_argument("batch: step, times and clip must be positive");
+    }
+    const bool usable = dt > 0.0 && settings.residual_s > 0.0 && settings.clip > 0.0 &&
+                        settings.forgetting >= 0.0 && settings.block_s > 0.0;
+    if (!usable) throw std::invalid_argument("batch: step, times and clip must be positive");
     const auto n = at(parameters_.size());
     const auto m = at(channels_.size());
     // In units of each parameter's spread, so that kilograms and metres mix.
