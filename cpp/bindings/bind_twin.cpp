@@ -26,15 +26,17 @@ const Input14& input_of(const Array& a) {
 /// A place that crossed as a number.
 std::size_t place(double value, std::size_t size, const std::string& what) {
     // Asked so that what is no number is refused before it is cast.
-    if (!(value >= 0.0 && value < static_cast<double>(size) && value == std::floor(value)))
+    const bool there =
+        value >= 0.0 && value < static_cast<double>(size) && value == std::floor(value);
+    if (!there)
         throw std::invalid_argument(what + " " + std::to_string(value) +
                                     " is not a whole number from 0 to " + std::to_string(size - 1));
     return static_cast<std::size_t>(value);
 }
 
 double step_of(double dt) {
-    if (!(dt > 0.0 && std::isfinite(dt)))
-        throw std::invalid_argument("dt: the step must be positive and finite");
+    const bool usable = dt > 0.0 && std::isfinite(dt);
+    if (!usable) throw std::invalid_argument("dt: the step must be positive and finite");
     return dt;
 }
 
@@ -166,7 +168,9 @@ void register_vehicle(py::module_& m) {
                 const double* r = matrix(references, n, 3, "references");
                 const Input14* u = inputs_of(base);
                 if (base.shape(0) != n) throw std::invalid_argument("base: as long as references");
-                if (!(driver.reaction_s >= 0.0 && driver.reaction_s < step_of(dt) * 1e9))
+                const bool possible =
+                    driver.reaction_s >= 0.0 && driver.reaction_s < step_of(dt) * 1e9;
+                if (!possible)
                     throw std::invalid_argument("driver: reaction_s must not be negative");
                 std::vector<Reference> wanted;
                 wanted.reserve(static_cast<std::size_t>(n));
