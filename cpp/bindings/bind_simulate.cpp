@@ -34,8 +34,9 @@ void register_simulate(py::module_& m) {
                 w = {r[0], r[1], r[2]};
                 r += 3;
             }
-            const Beginning beginning{initial_speed, initial_vy, initial_yaw_rate, initial_steer,
-                                      start};
+            const Beginning beginning{
+                initial_speed, initial_vy, initial_yaw_rate, initial_steer, start,
+            };
             const Drive drive =
                 unlocked([&] { return simulate(model, values, dt, wanted, driver, d, beginning); });
             return py::make_tuple(copy_of(drive.inputs, 2), copy_of(drive.states, kModelStates),

@@ -236,8 +236,15 @@ void register_laws(py::module_& m) {
                  std::vector<BatchParameter> ps;
                  ps.reserve(parameters.size());
                  for (const auto& p : parameters)
-                     ps.push_back({static_cast<int>(place(p[0], kEstimates, "batch: parameter")),
-                                   p[1], p[2], p[3], p[4], p[5], p[6] != 0.0});
+                     ps.push_back({
+                         static_cast<int>(place(p[0], kEstimates, "batch: parameter")),
+                         p[1],
+                         p[2],
+                         p[3],
+                         p[4],
+                         p[5],
+                         p[6] != 0.0,
+                     });
                  std::vector<BatchChannel> cs;
                  cs.reserve(channels.size());
                  for (const auto& c : channels)

@@ -19,7 +19,7 @@ void raise(const py::object& error) {
 
 /// The one border: what the kernels throw leaves as what the package documents. Called with the
 /// interpreter lock held; errors that are Python's own pass.
-void raise_public(std::exception_ptr thrown) {
+void raise_public(std::exception_ptr thrown) {  // NOLINT(performance-unnecessary-value-param)
     try {
         if (thrown) std::rethrow_exception(thrown);
     } catch (const sysid::NumericalFailure& failure) {

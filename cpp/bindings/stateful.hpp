@@ -23,7 +23,7 @@ class Guarded {
     template <class Use>
     auto with(Use&& use) {
         return unlocked([&] {
-            const std::lock_guard<std::mutex> alone(lock_);
+            const std::scoped_lock alone(lock_);
             return use(object_);
         });
     }
