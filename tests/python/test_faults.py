@@ -179,6 +179,8 @@ def test_killed_commands_leave_whole_files(data: Path) -> None:
 
 
 _ONCE = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs ignore it
 import sys
 from sysid_vehicle.cli import main
 print("ready", flush=True)

@@ -10,6 +10,8 @@ import sysid_vehicle as sv
 from sysid_vehicle.diagnose import BiasReport
 from sysid_vehicle.diagnose.replay import Replay
 
+pytestmark = pytest.mark.slow  # refits of many simulated drives
+
 # What disturbances take up, and what moves the tyres much.
 HARMLESS = ("aero_drag", "rolling_resistance", "road_grade", "head_wind")
 HARMFUL = ("speed_sensor_lever_arm", "steer_ratio", "locked_differential", "steer_compliance")

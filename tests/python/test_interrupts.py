@@ -17,6 +17,7 @@ from sysid_vehicle._threads import Workers
 # that came too late would end the tests.
 _CHILD = """
 import json, os, signal, threading, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 import numpy as np
 import sysid_vehicle as sv
 from sysid_vehicle import lab, online, twin
