@@ -207,8 +207,9 @@ void SideslipDual::run(double dt, const SensorSample& s) {
 
 bool SideslipDual::lost() const {
     const auto& b = tyres_.state();
-    return !(std::abs(b.mean[TyreModel::kBeta]) < kMostSideslipRad &&
-             b.covariance(TyreModel::kBeta, TyreModel::kBeta) < squared(kMostSideslipRad));
+    const bool known = std::abs(b.mean[TyreModel::kBeta]) < kMostSideslipRad &&
+                       b.covariance(TyreModel::kBeta, TyreModel::kBeta) < squared(kMostSideslipRad);
+    return !known;
 }
 
 void SideslipDual::start(double dt, const SensorSample& s) {
