@@ -9,7 +9,6 @@ with drag, grade, or anything else that acts along the car.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,7 @@ from tqdm import tqdm
 
 from .._arrays import FloatArray, as_float64
 from .._text import html_table, number, text_table
+from .._threads import Workers
 from ..effects import Effect, base_parameters, effect
 from ..errors import InvalidInput, NumericalError
 from ..identify import Fit, explaining
@@ -195,7 +195,7 @@ def bias_report(
         return told.read(p)
 
     jobs = [(which, first) for which in range(len(wanted) + 1) for first in (True, False)]
-    with ThreadPoolExecutor(workers) as pool:
+    with Workers(workers) as pool:
         done = tqdm(pool.map(refitted, jobs), desc="refits", total=len(jobs), disable=not progress)
         found = list(done)
     biases = []
