@@ -32,7 +32,8 @@ void answer_interrupts() {
 }
 
 void register_interrupts(py::module_& m) {
-    py::register_local_exception_translator([](const std::exception_ptr& thrown) {
+    // NOLINTNEXTLINE(performance-unnecessary-value-param): pybind11 fixes the signature
+    py::register_local_exception_translator([](std::exception_ptr thrown) {
         try {
             if (thrown) std::rethrow_exception(thrown);
         } catch (const Stopped& stopped) {
