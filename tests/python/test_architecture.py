@@ -51,9 +51,9 @@ EXCEPTIONS = {("study/study.py", "report")}
 
 RANK = {module: rank for rank, layer in enumerate(PYTHON_LAYERS) for module in layer}
 PYTHON_FILES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
-CPP_FILES = sorted(
-    path for root in ("cpp/include/sysid", "cpp/src") for path in (REPO / root).rglob("*.[ch]pp")
-)
+CPP_HEADERS = REPO / "cpp/include/sysid"
+CPP_SOURCES = REPO / "cpp/src"
+CPP_FILES = sorted(path for root in (CPP_HEADERS, CPP_SOURCES) for path in root.rglob("*.[ch]pp"))
 
 
 def name(path: Path) -> str:
@@ -113,13 +113,9 @@ def cpp_violations(path: Path, text: str) -> list[str]:
 
 
 def own_cpp_layer(path: Path) -> str:
-    """Give the layer of a header, and of a source that of the header of its name."""
-    headers = REPO / "cpp/include/sysid"
-    if path.is_relative_to(headers):
-        return path.relative_to(headers).parts[0]
-    found = [header.parent.name for header in headers.glob(f"*/{path.stem}.hpp")]
-    # Sources without a header of their own share one of the last layer.
-    return found[0] if found else CPP_LAYERS[-1]
+    """Give the station of a C++ file: the folder under the headers or under the sources."""
+    root = CPP_SOURCES if path.is_relative_to(CPP_SOURCES) else CPP_HEADERS
+    return path.relative_to(root).parts[0]
 
 
 def test_there_are_files_to_check() -> None:
@@ -189,16 +185,29 @@ def test_cpp_includes_point_forward(path: Path) -> None:
     assert cpp_violations(path, path.read_text(encoding="utf-8")) == []
 
 
+def test_every_source_stands_in_the_folder_of_its_header() -> None:
+    """`src/` mirrors `include/sysid/`: what a source implements is found without a search."""
+    headers = {path.relative_to(CPP_HEADERS).with_suffix("") for path in CPP_HEADERS.rglob("*.hpp")}
+    lost = []
+    for path in sorted(CPP_SOURCES.rglob("*.cpp")):
+        place = path.relative_to(CPP_SOURCES).with_suffix("")
+        own = re.findall(rf'#include "sysid/({place.parent}/\w+)\.hpp"', path.read_text("utf-8"))
+        if place not in headers and not own:
+            lost.append(name(path))
+    assert lost == []
+
+
 def test_the_check_sees_an_include_that_points_back() -> None:
-    header = REPO / "cpp/include/sysid/model/tyre.hpp"
+    header = CPP_HEADERS / "model/tyre.hpp"
     back = cpp_violations(header, '#include <cmath>\n#include "sysid/estimate/filter.hpp"\n')
     assert back == [
         "cpp/include/sysid/model/tyre.hpp:2 model includes estimate, which comes after it"
     ]
     assert cpp_violations(header, '#include "sysid/math/dual.hpp"\n') == []
-    source = REPO / "cpp/src/simulator.cpp"
+    source = CPP_SOURCES / "simulate/simulator.cpp"
     back = cpp_violations(source, '#include "sysid/identify/problem.hpp"\n')
-    assert back == ["cpp/src/simulator.cpp:1 simulate includes identify, which comes after it"]
+    place = "cpp/src/simulate/simulator.cpp:1"
+    assert back == [f"{place} simulate includes identify, which comes after it"]
 
 
 _OPENED = re.compile(

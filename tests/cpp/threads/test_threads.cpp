@@ -1,6 +1,6 @@
 // Kernels on objects that several threads share and none of them changes: the same numbers as in
-// one thread, and under the thread sanitizer no race. A program of its own, because it is built
-// with that sanitizer, for which the whole of the tests would take too long.
+// one thread, and under the thread sanitizer no race. Part of the ordinary tests, and a program of
+// its own for that sanitizer, under which all of the tests would take too long.
 #include <thread>
 
 #include "helpers.hpp"
@@ -68,7 +68,7 @@ TEST_F(SharedProblem, Simulation) {
     const std::vector<double> calm(3 * references.size());
     const Driver driver{};
     expect_the_same([&] {
-        return simulate(problem_.model, p_.data(), 0.01, references, driver, calm.data(), 20.0)
+        return simulate(problem_.model, p_.data(), 0.01, references, driver, calm.data(), {})
             .states;
     });
 }
