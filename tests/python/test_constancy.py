@@ -41,7 +41,7 @@ def test_a_proxy_changes_from_drive_to_drive(fits: dict[str, Fit]) -> None:
     slow, fast = kept.values
     assert slow > 1.6 * fast > 0.0
     assert "head_wind does not keep its value: speed_mps from" in str(kept)
-    judged = judge(fit, lacked={"head_wind"}, groups={}, acted=set(), alpha=0.05)["head_wind"]
+    judged = judge(fit, lacked={"head_wind"}, groups={}, acted=set())["head_wind"]
     assert judged.finding == "proxy"
     assert "not with one value (speed_mps from " in judged.sentence
     assert judged.sentence.endswith("m/s)")

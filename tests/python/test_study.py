@@ -20,11 +20,11 @@ from sysid_vehicle import (
     improve,
     manoeuvres,
 )
+from sysid_vehicle.rules import share_explained
 from sysid_vehicle.study.held_out import (
     error_falls,
     gain_in_log_likelihood,
     hold_out,
-    share_explained,
 )
 
 LAG = "steer_lag.time_constant_s", 0.06

@@ -10,18 +10,15 @@ from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
-from sysid_vehicle.study import steps
+from sysid_vehicle.rules import USUAL, share_explained
 from sysid_vehicle.study.held_out import (
-    as_sure,
     error_falls,
     fall_in_error,
     gain_in_log_likelihood,
-    share_explained,
 )
 from sysid_vehicle.study.search import Search, Trail, _more
 from sysid_vehicle.study.steps import (
     _distance,
-    _held_out_gain,
     _mattering,
     alternatives,
     better,
@@ -121,82 +118,6 @@ def test_held_out_driving_has_a_say_between_what_the_fit_cannot_tell_apart(
         assert chosen[0].id == (other.id if told_apart else preferred.id)
 
 
-@pytest.mark.parametrize(
-    ("same", "own", "fall", "holds"),
-    [
-        ((90.0, 30.0), (90.0, 30.0), (9.0, 30.0), True),
-        # The error by the noise floor may not be shown to fall where the likelihood is sure,
-        ((90.0, 30.0), (90.0, 30.0), (-9.0, 30.0), True),
-        # but it must not be shown to grow,
-        ((90.0, 30.0), (90.0, 30.0), (-90.0, 30.0), False),
-        # and both noises have to be sure.
-        ((40.0, 30.0), (90.0, 30.0), (-9.0, 30.0), False),
-        ((90.0, 30.0), (40.0, 30.0), (-9.0, 30.0), False),
-        # Noise of its own may be too sure, which the others know better,
-        ((90.0, 30.0), (-9.0, 30.0), (90.0, 30.0), True),
-        ((40.0, 30.0), (-9.0, 30.0), (40.0, 30.0), True),
-        # but not where it speaks against it.
-        ((90.0, 30.0), (-90.0, 30.0), (90.0, 30.0), False),
-        # Large noise of the poorer model hides the gain: where the error falls the others do,
-        ((9.0, 30.0), (40.0, 30.0), (40.0, 30.0), True),
-        ((-9.0, 30.0), (40.0, 30.0), (40.0, 30.0), True),
-        # unless the gain is lost.
-        ((-90.0, 30.0), (40.0, 30.0), (40.0, 30.0), False),
-        # One alone does not.
-        ((9.0, 30.0), (90.0, 30.0), (9.0, 30.0), False),
-        ((90.0, 30.0), (9.0, 30.0), (9.0, 30.0), False),
-        ((9.0, 30.0), (9.0, 30.0), (90.0, 30.0), False),
-    ],
-)
-def test_what_holds_on_held_out_driving(
-    monkeypatch: pytest.MonkeyPatch,
-    dx: Diagnosis,
-    baseline: Fit,
-    driving: tuple[Driving, Driving],
-    same: tuple[float, float],
-    own: tuple[float, float],
-    fall: tuple[float, float],
-    *,
-    holds: bool,
-) -> None:
-    def gain(*_: object, same_noise: bool = False) -> tuple[float, float]:
-        return same if same_noise else own
-
-    monkeypatch.setattr(steps, "gain_in_log_likelihood", gain)
-    monkeypatch.setattr(steps, "fall_in_error", lambda *_: fall)
-    monkeypatch.setattr(steps, "as_sure", lambda *_: False)
-    (drag,) = (c for c in dx.ranking if c.id == "aero_drag")
-    assert _held_out_gain(baseline, drag, driving[1]) == (same[0], holds)
-    # What only acts like something is worth having where the error falls.
-    monkeypatch.setattr(steps, "_can_be", lambda _: False)
-    assert _held_out_gain(baseline, drag, driving[1]) == (same[0], holds and fall[0] > 0.0)
-
-
-def test_the_likelihood_has_the_last_word_where_noise_did_not_grow(
-    monkeypatch: pytest.MonkeyPatch,
-    dx: Diagnosis,
-    baseline: Fit,
-    driving: tuple[Driving, Driving],
-) -> None:
-    (drag,) = (c for c in dx.ranking if c.id == "aero_drag")
-    own = {"gain": 150.0}
-    monkeypatch.setattr(steps, "fall_in_error", lambda *_: (-90.0, 30.0))
-    monkeypatch.setattr(
-        steps,
-        "gain_in_log_likelihood",
-        lambda *_, same_noise=False: (-90.0 if same_noise else own["gain"], 30.0),
-    )
-    assert drag.fit is not None
-    assert as_sure(baseline, drag.fit, driving[1])
-    assert not as_sure(drag.fit, baseline, driving[1])
-    assert _held_out_gain(baseline, drag, driving[1]) == (-90.0, True)
-    own["gain"] = 90.0
-    assert _held_out_gain(baseline, drag, driving[1]) == (-90.0, False)
-    own["gain"] = 150.0
-    monkeypatch.setattr(steps, "_can_be", lambda _: False)
-    assert _held_out_gain(baseline, drag, driving[1]) == (-90.0, False)
-
-
 def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(
     start: Model, truth: Model
 ) -> None:
@@ -240,7 +161,7 @@ def search(test: Driving, most_effects: int, told: list[str]) -> Search:
         test,
         candidates=AGAINST,
         most_effects=most_effects,
-        alpha=0.05,
+        rules=USUAL,
         seed=0,
         progress=False,
         say=told.append,

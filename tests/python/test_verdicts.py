@@ -17,6 +17,7 @@ from sysid_vehicle import (
 )
 from sysid_vehicle.diagnose import EffectVerdict, Verdicts
 from sysid_vehicle.diagnose.verdicts import _of_present, judge
+from sysid_vehicle.rules import USUAL
 
 Hidden = Callable[[str, float], Fit]
 OFFSET = "steer_offset.offset_rad", 0.002
@@ -67,7 +68,7 @@ def test_a_rival_of_what_is_not_missing_itself_is_not_missing_either(
     def of(groups: dict[str, tuple[str, ...]]) -> EffectVerdict:
         lacked = {e.id for e in found.fit.model.candidates}
         acted = {c.id for c in found.significant}
-        told = judge(both, lacked=lacked, groups=groups, acted=acted, alpha=0.05)
+        told = judge(both, lacked=lacked, groups=groups, acted=acted)
         assert told["aero_drag"].finding not in ("missing", "one of a group")
         return told[rival]
 
@@ -110,7 +111,7 @@ def test_what_this_driving_cannot_show_is_not_testable(truth: Model, start: Mode
 
 
 def kind(name: str, value: float, std: float) -> EffectVerdict:
-    return _of_present(effect(name), (value,), (std,), ())
+    return _of_present(effect(name), (value,), (std,), (), USUAL)
 
 
 def test_impossible_and_negligible_values() -> None:

@@ -19,13 +19,12 @@ from .._text import number
 from ..effects import Effect
 from ..estimate import Driving
 from ..identify import Fit
+from ..rules import USUAL, Rules
 from .evidence import Evidence
 from .projection import pseudo_inverse, variance_ratio
 
 __all__ = ["Constancy", "constancy"]
 
-_LEVEL = 0.01
-_SPREAD = 0.25  # share of a value: less is what any equation of any textbook leaves open
 _PIECE_S = 10.0
 _MOST_PIECES = 6
 
@@ -44,6 +43,8 @@ class Constancy:
         share of the whole value; the largest of the effect's parameters.
     values : tuple of float
         Of the first parameter, piece by piece.
+    rules : Rules
+        By which it holds.
     """
 
     effect: Effect
@@ -52,11 +53,15 @@ class Constancy:
     p_value: float
     spread: float
     values: tuple[float, ...]
+    rules: Rules = USUAL
 
     @property
     def holds(self) -> bool:
-        """Whether one value will do: no evidence at 1 % of differences, or small ones only."""
-        return self.p_value > _LEVEL or self.spread < _SPREAD
+        """Whether one value will do: no evidence of differences, or only of small ones.
+
+        Those up to `Rules.spread` are what any equation of a textbook leaves open.
+        """
+        return self.p_value > self.rules.level or self.spread < self.rules.spread
 
     def __str__(self) -> str:
         if self.holds:
@@ -71,7 +76,7 @@ class Constancy:
         return f"{first.name} from {low} to {high} {first.unit}".removesuffix(" 1")
 
 
-def constancy(fit: Fit) -> dict[str, Constancy]:
+def constancy(fit: Fit, rules: Rules = USUAL) -> dict[str, Constancy]:
     """Test every effect of a fitted model, on what it was fitted to.
 
     Returns
@@ -92,6 +97,7 @@ def constancy(fit: Fit) -> dict[str, Constancy]:
             evidence,
             evidence.fitted[:, [names.index(f"{part.id}.{q.name}") for q in part.parameters]],
             pieces,
+            rules,
         )
         for part in parts
     }
@@ -111,6 +117,7 @@ def _of_effect(
     evidence: Evidence,
     own: FloatArray,
     pieces: list[FloatArray],
+    rules: Rules,
 ) -> Constancy:
     fit, e = evidence.fit, evidence.left
     whole = np.array([fit[f"{effect.id}.{q.name}"].value - q.null_value for q in effect.parameters])
@@ -132,7 +139,7 @@ def _of_effect(
     excess = max(1.0 - rank / statistic, 0.0) if statistic > 0.0 else 0.0
     scatter = np.sqrt(excess * (weights * centred**2).sum(axis=0))
     share = scatter / np.maximum(np.abs(whole), 1e-300)
-    felt = [i for i, q in enumerate(effect.parameters) if abs(whole[i]) > 0.5 * q.matters]
+    felt = [i for i, q in enumerate(effect.parameters) if abs(whole[i]) > rules.felt * q.matters]
     return Constancy(
         effect,
         statistic,
@@ -140,4 +147,5 @@ def _of_effect(
         float(chi2.sf(statistic, rank)),
         float(np.max(share[felt])) if felt else 0.0,
         tuple(float(v) for v in effect.parameters[0].null_value + whole[0] + centred[:, 0]),
+        rules,
     )

@@ -16,6 +16,7 @@ from ..estimate import Driving
 from ..identify import Fit, explaining, refine, refit
 from ..log import Log
 from ..model import Model
+from ..rules import USUAL, Rules, bic
 from .diagnosis import Candidate, Diagnosis
 from .evidence import Evidence
 from .omnibus import omnibus_of
@@ -29,7 +30,6 @@ _REFITS = 5
 _HOPELESS = 0.15
 _HOPELESS_WITH_STATES = 0.6
 _RIVALS = 0.3  # of the score of the best, with which one that acts like it may overtake it
-_TELLS_APART = 9.0  # twice the log-likelihood, or a statistic: three standard errors
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
 
 
@@ -39,7 +39,8 @@ def diagnose(
     logs: Log | Sequence[Log] | Driving | None = None,
     *,
     candidates: Sequence[str | Effect] | None = None,
-    alpha: float = 0.05,
+    alpha: float | None = None,
+    rules: Rules = USUAL,
     refits: int = _REFITS,
     workers: int = 2,
     seed: int = 0,
@@ -58,15 +59,18 @@ def diagnose(
     candidates : sequence of str, optional
         Effects to consider; by default all that the model lacks.
     alpha : float
-        Rate of false claims accepted, over all effects together.
+        Rate of false claims accepted, over all effects together; by default that of the rules.
+    rules : Rules
+        By which effects are claimed.
     refits : int
         How many of the best to refit; 0 ranks by score alone.
     """
+    rules = rules.at(alpha)
     driving = fit.driving if logs is None else Driving.of(logs)
     possible = considered(fit.model, candidates)
     evidence = Evidence(fit, driving)
-    board = score_board_of(evidence, possible)
-    left = omnibus_of(evidence)
+    board = score_board_of(evidence, possible, rules)
+    left = omnibus_of(evidence, rules)
     family = board.family_p_values(seed=seed)
     ranked = [
         Candidate(
@@ -77,11 +81,11 @@ def diagnose(
             s.std,
             s.retained,
             s.variance_ratio,
-            indistinguishable_from=_score_twins(board, s),
+            indistinguishable_from=_score_rivals(board, s, 2.0 * rules.apart),
         )
         for s in board.scores
     ]
-    few = _worth_refitting([c for c in ranked if c.p_value < alpha], refits)
+    few = _worth_refitting([c for c in ranked if c.p_value < rules.alpha], refits)
     if few:
         # What the best one gains tells which of the others cannot come near it.
         first = _refitted(fit, driving, few[0])
@@ -106,12 +110,12 @@ def diagnose(
             near = [c for c in tried if c.statistic > 0.4 * top]
             finished = list(pool.map(lambda c: _finished(fit, c), near))
         finished.sort(key=lambda c: -_merit(c, driving.samples))
-        finished = [_with_refit_twins(c, finished) for c in finished]
+        finished = [_with_refit_rivals(c, finished, 2.0 * rules.apart) for c in finished]
         done = {c.id for c in finished}
         far = sorted((c for c in tried if c.id not in done), key=lambda c: -c.statistic)
         done |= {c.id for c in far}
         ranked = finished + far + [c for c in ranked if c.id not in done]
-    return _with_errors(Diagnosis(fit, driving, tuple(ranked), left, alpha, board.scores, family))
+    return _with_errors(Diagnosis(fit, driving, tuple(ranked), left, rules, board.scores, family))
 
 
 def _with_errors(dx: Diagnosis) -> Diagnosis:
@@ -159,23 +163,23 @@ def _too_fast(c: Candidate) -> bool:
 
 def _merit(c: Candidate, samples: int) -> float:
     """Gain in log-likelihood less the Bayesian price of its parameters."""
-    return 0.5 * c.statistic - 0.5 * len(c.effect.parameters) * float(np.log(samples))
+    return bic(0.5 * c.statistic, len(c.effect.parameters), samples)
 
 
-def _score_twins(board: ScoreBoard, score: Score) -> tuple[str, ...]:
+def _score_rivals(board: ScoreBoard, score: Score, apart: float) -> tuple[str, ...]:
     """Rivals which leave nothing for the effect, and for which the effect leaves nothing."""
     own = board.joint_statistic(score.effect.id)
     twins = []
-    if own < _TELLS_APART:
+    if own < apart:
         return ()
     for rival in board.scores:
         if rival.effect.id == score.effect.id:
             continue
         theirs = board.joint_statistic(rival.effect.id)
-        if abs(theirs - own) >= _TELLS_APART:
+        if abs(theirs - own) >= apart:
             continue  # together they tell at least as much as either
         both = board.joint_statistic(score.effect.id, rival.effect.id)
-        if both - theirs < _TELLS_APART and both - own < _TELLS_APART:
+        if both - theirs < apart and both - own < apart:
             twins.append(rival.effect.id)
     return tuple(twins)
 
@@ -227,9 +231,9 @@ def _starts(c: Candidate) -> list[dict[str, float]]:
     return starts
 
 
-def _with_refit_twins(c: Candidate, all_: list[Candidate]) -> Candidate:
+def _with_refit_rivals(c: Candidate, all_: list[Candidate], apart: float) -> Candidate:
     """Among refitted effects the likelihood itself says which cannot be told apart."""
-    near = tuple(o.id for o in all_ if o is not c and abs(o.statistic - c.statistic) < _TELLS_APART)
+    near = tuple(o.id for o in all_ if o is not c and abs(o.statistic - c.statistic) < apart)
     refitted = {o.id for o in all_}
     twins = (*near, *(t for t in c.indistinguishable_from if t not in refitted))
     return replace(c, indistinguishable_from=twins)

@@ -14,6 +14,7 @@ from ..effects import Effect
 from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving, NoiseModel
 from ..identify import Fit
+from ..rules import Rules
 from .doubt import Beside, beside, confirmed, doubt
 from .omnibus import Omnibus
 from .possible import Size, possible
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["Candidate", "Diagnosis"]
-
-_NEAR = 0.6  # of the evidence for the first one: what has less is not named in its place
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +88,8 @@ class Diagnosis:
         All candidates, the most likely first.
     omnibus : Omnibus
         Whether anything at all is left.
-    alpha : float
-        Rate of false claims accepted, over all effects together.
+    rules : Rules
+        By which it claims.
     scores : tuple of Score
         The tests that the ranking began with, beside the fit as it is.
     family : dict of str to float
@@ -103,10 +102,15 @@ class Diagnosis:
     driving: Driving
     ranking: tuple[Candidate, ...]
     omnibus: Omnibus
-    alpha: float
+    rules: Rules
     scores: tuple[Score, ...]
     family: dict[str, float]
     error: float = float("nan")
+
+    @property
+    def alpha(self) -> float:
+        """Rate of false claims accepted, over all effects together."""
+        return self.rules.alpha
 
     @property
     def floor(self) -> NoiseModel:
@@ -185,14 +189,15 @@ class Diagnosis:
         first = self._likeliest
         if first is None:
             return self._refused(self.significant[0])
-        return doubt(self.beside, self.omnibus, self.error, first.error)
+        return doubt(self.beside, self.omnibus, self.error, first.error, self.rules)
 
     @cached_property
     def beside(self) -> Beside:
         """What is left with the likeliest effect in the model, or without any."""
         first = self._likeliest
         fit = self.fit if first is None or first.fit is None else first.fit
-        return beside(fit, self.driving, {e.id for e in self.fit.model.candidates})
+        lacked = {e.id for e in self.fit.model.candidates}
+        return beside(fit, self.driving, lacked, self.rules)
 
     @cached_property
     def _likeliest(self) -> Candidate | None:
@@ -201,15 +206,15 @@ class Diagnosis:
             (
                 c
                 for c in few
-                if c.statistic >= _NEAR * few[0].statistic
-                and possible(c.effect, c.value, c.std)
-                and (c.fit is None or confirmed(c.statistic, c.effect))
+                if c.statistic >= self.rules.near * few[0].statistic
+                and possible(c.effect, c.value, c.std, self.rules)
+                and (c.fit is None or confirmed(c.statistic, c.effect, self.rules))
             ),
             None,
         )
 
     def _refused(self, c: Candidate) -> str:
-        if c.fit is not None and not confirmed(c.statistic, c.effect):
+        if c.fit is not None and not confirmed(c.statistic, c.effect, self.rules):
             told = f"{c.id} is likeliest by its score, but refitted the model predicts no better"
         else:
             told = f"{c.id} fits best, but no car has such a value ({c.size})"

@@ -16,17 +16,12 @@ from ..compare import Comparison, compare
 from ..effects import Effect
 from ..estimate import Driving
 from ..identify import Fit
+from ..rules import USUAL, Rules, excess, share_explained
 from .evidence import Evidence
 from .omnibus import Omnibus, omnibus_of
 from .score import ScoreBoard, score_board_of
 
 __all__ = ["Beside", "beside", "confirmed", "doubt"]
-
-_CONFIRMED = 0.01  # chance of the gain of a refit without the effect
-_LEFT = 1e-3  # evidence of something left
-_STAYS = 0.6  # share of the evidence: what is missing too takes up less beside the right effect
-_TAKEN = 0.1  # share of the square of the error beyond the noise floor
-_FURTHER = 0.05  # family-wise, of one effect more
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +34,13 @@ class Beside:
     driving : Driving
     lacked : frozenset of str
         Effects that may be missing too.
+    rules : Rules
     """
 
     fit: Fit
     driving: Driving
     lacked: frozenset[str]
+    rules: Rules = USUAL
 
     @cached_property
     def _evidence(self) -> Evidence:
@@ -52,13 +49,13 @@ class Beside:
     @cached_property
     def omnibus(self) -> Omnibus:
         """Whether anything is left."""
-        return omnibus_of(self._evidence)
+        return omnibus_of(self._evidence, self.rules)
 
     @cached_property
     def board(self) -> ScoreBoard:
         """Scores of the other effects."""
         others = tuple(e for e in self.fit.model.candidates if e.id in self.lacked)
-        return score_board_of(self._evidence, others)
+        return score_board_of(self._evidence, others, self.rules)
 
     @cached_property
     def _comparison(self) -> Comparison:
@@ -77,17 +74,23 @@ class Beside:
         return f"the largest innovations are those of {name} ({channels[name].nrmse:.2f} expected)"
 
 
-def beside(fit: Fit, driving: Driving, lacked: set[str]) -> Beside:
+def beside(fit: Fit, driving: Driving, lacked: set[str], rules: Rules = USUAL) -> Beside:
     """Look at what a model leaves; nothing is computed before it is asked for."""
-    return Beside(fit, driving, frozenset(lacked))
+    return Beside(fit, driving, frozenset(lacked), rules)
 
 
-def confirmed(statistic: float, effect: Effect) -> bool:
+def confirmed(statistic: float, effect: Effect, rules: Rules = USUAL) -> bool:
     """Whether a refit gained more than its parameters gain by chance."""
-    return float(chi2.sf(statistic, len(effect.parameters))) < _CONFIRMED
+    return float(chi2.sf(statistic, len(effect.parameters))) < rules.level
 
 
-def doubt(left: Beside, before: Omnibus, error_before: float, error_after: float) -> str:
+def doubt(
+    left: Beside,
+    before: Omnibus,
+    error_before: float,
+    error_after: float,
+    rules: Rules = USUAL,
+) -> str:
     """Why the likeliest effect may not be called missing; empty where it may.
 
     Parameters
@@ -98,27 +101,21 @@ def doubt(left: Beside, before: Omnibus, error_before: float, error_after: float
         Without the effect.
     error_before, error_after : float
         One step ahead, without and with the effect, at one noise floor; NaN where not refitted.
+    rules : Rules
     """
     if left.unrelated:
         return "; ".join(left.unrelated.values())
-    if not left.omnibus.p_value < _LEFT or not left.fit.model.effects:
+    if not left.omnibus.p_value < rules.strict or not left.fit.model.effects:
         return ""
     share = excess(left.omnibus) / max(excess(before), 1.0)
-    beyond = max(error_before**2 - 1.0, 0.0)
-    taken = 1.0 - max(error_after**2 - 1.0, 0.0) / beyond if beyond > 0.0 else 1.0
-    if share > _STAYS and taken < _TAKEN:
+    if share > rules.stays and share_explained(error_before, error_after) < rules.taken:
         return (
             f"with the effect that fits best {100 * min(share, 1.0):.0f} % of the evidence that "
             f"something is missing stays, and the error does not fall; {left.worst}"
         )
-    if not any(p < _FURTHER for p in left.board.family_p_values().values()):
+    if not any(p < rules.alpha for p in left.board.family_p_values().values()):
         return (
             f"with the effect that fits best {left.omnibus}, and no other effect of the catalogue "
             f"explains that; {left.worst}"
         )
     return ""
-
-
-def excess(o: Omnibus) -> float:
-    """Evidence beyond what a complete model shows."""
-    return max(o.statistic - o.degrees, 0.0)

@@ -16,13 +16,12 @@ from scipy.stats import chi2
 from .._arrays import FloatArray
 from ..estimate import Driving
 from ..identify import Fit
+from ..rules import USUAL, Rules
 from .coordinates import begins, late
 from .evidence import Evidence
 from .projection import pseudo_inverse, variance_ratio
 
 __all__ = ["Omnibus", "omnibus", "omnibus_of"]
-
-_LEVEL = 0.01
 
 # Targets in the core's order: pushes F_x, F_y, M_z, then accelerations, then sensor readings.
 _TARGETS = {"F_x": 0, "F_y": 1, "M_z": 2, "dv_x/dt": 3, "dv_y/dt": 4}
@@ -46,17 +45,20 @@ class Omnibus:
         Of a complete model.
     strongest : str
         Target that carries most of the evidence.
+    rules : Rules
+        By which it rejects.
     """
 
     statistic: float
     degrees: int
     p_value: float
     strongest: str
+    rules: Rules = USUAL
 
     @property
     def rejects(self) -> bool:
-        """Whether the model is shown to be incomplete, at 1 %."""
-        return not self.p_value > _LEVEL
+        """Whether the model is shown to be incomplete, at 1 % usually."""
+        return not self.p_value > self.rules.level
 
     @property
     def moves(self) -> tuple[str, ...]:
@@ -72,12 +74,12 @@ class Omnibus:
         )
 
 
-def omnibus(fit: Fit, driving: Driving) -> Omnibus:
+def omnibus(fit: Fit, driving: Driving, rules: Rules = USUAL) -> Omnibus:
     """Test a fitted model, with the effects it has, for anything left."""
-    return omnibus_of(Evidence(fit, driving))
+    return omnibus_of(Evidence(fit, driving), rules)
 
 
-def omnibus_of(evidence: Evidence) -> Omnibus:
+def omnibus_of(evidence: Evidence, rules: Rules = USUAL) -> Omnibus:
     """The same of residuals that may be known already."""
     names, signals, targets = _virtual(evidence)
     p = evidence.fit.model.vector()
@@ -102,6 +104,7 @@ def omnibus_of(evidence: Evidence) -> Omnibus:
         degrees,
         float(chi2.sf(statistic, degrees)),
         max(by_target, key=lambda t: by_target[t]),
+        rules,
     )
 
 

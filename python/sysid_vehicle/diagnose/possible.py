@@ -7,18 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..effects import Effect, Parameter
+from ..rules import USUAL, Rules
 
 __all__ = ["Size", "possible", "sizes"]
 
 Size = tuple[tuple[float, ...], tuple[float, ...]]
 """Parameters of an effect, and their standard errors."""
 
-_IMPOSSIBLE = 5.0  # typical sizes, beyond which no car is known
 _AT_BOUND = 1e-5  # of the width between the bounds
-_CERTAIN = 1.96
 
 
-def possible(effect: Effect, value: Sequence[float], std: Sequence[float]) -> bool:
+def possible(
+    effect: Effect, value: Sequence[float], std: Sequence[float], rules: Rules = USUAL
+) -> bool:
     """Whether the 95 % intervals of an effect's parameters hold values that a car can have.
 
     A search that ends at a bound other than nothing wanted more than any car has.
@@ -28,27 +29,28 @@ def possible(effect: Effect, value: Sequence[float], std: Sequence[float]) -> bo
     effect : Effect
     value, std : sequence of float
         Of its parameters, in their order.
+    rules : Rules
 
     Returns
     -------
     bool
     """
-    return not any(_impossible(p, d, s) for p, d, s in sizes(effect, value, std))
+    return not any(_impossible(p, d, s, rules) for p, d, s in sizes(effect, value, std, rules))
 
 
 def sizes(
-    effect: Effect, value: Sequence[float], std: Sequence[float]
+    effect: Effect, value: Sequence[float], std: Sequence[float], rules: Rules = USUAL
 ) -> list[tuple[Parameter, float, float]]:
     """Parameters that have a size, how far each is from nothing, and the reach of its interval."""
     return [
-        (p, v - p.null_value, _CERTAIN * s)
+        (p, v - p.null_value, rules.interval * s)
         for p, v, s in zip(effect.parameters, value, std, strict=True)
         if not p.scan
     ]
 
 
-def _impossible(p: Parameter, off: float, reach: float) -> bool:
-    most = _IMPOSSIBLE * abs(p.typical - p.null_value)
+def _impossible(p: Parameter, off: float, reach: float, rules: Rules) -> bool:
+    most = rules.implausible * abs(p.typical - p.null_value)
     low, high = max(p.lower - p.null_value, -most), min(p.upper - p.null_value, most)
     if np.isinf(reach):
         at = _AT_BOUND * (p.upper - p.lower)

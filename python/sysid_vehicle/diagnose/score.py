@@ -24,6 +24,7 @@ from .._arrays import FloatArray, as_float64
 from ..effects import Effect
 from ..estimate import Driving
 from ..identify import Fit
+from ..rules import USUAL, Rules
 from .coordinates import blocks
 from .evidence import Evidence
 from .projection import long_run_ratios, pseudo_inverse, score_terms
@@ -32,7 +33,6 @@ from .sensitivity import duration, sensitivities
 __all__ = ["Score", "ScoreBoard", "score_board", "score_board_of"]
 
 _BLOCK_S, _FEWEST_BLOCKS = 0.5, 24
-_INVISIBLE = 1e-3  # share of an effect's sensitivity that the fitted parameters cannot copy
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +132,9 @@ class ScoreBoard:
         return dict(zip((s.effect.id for s in self.scores), map(float, family), strict=True))
 
 
-def score_board(fit: Fit, driving: Driving, candidates: tuple[Effect, ...]) -> ScoreBoard:
+def score_board(
+    fit: Fit, driving: Driving, candidates: tuple[Effect, ...], rules: Rules = USUAL
+) -> ScoreBoard:
     """Score every candidate at once.
 
     Parameters
@@ -141,11 +143,14 @@ def score_board(fit: Fit, driving: Driving, candidates: tuple[Effect, ...]) -> S
         A converged fit.
     driving : Driving
         What it was fitted to.
+    rules : Rules
     """
-    return score_board_of(Evidence(fit, driving), candidates)
+    return score_board_of(Evidence(fit, driving), candidates, rules)
 
 
-def score_board_of(evidence: Evidence, candidates: tuple[Effect, ...]) -> ScoreBoard:
+def score_board_of(
+    evidence: Evidence, candidates: tuple[Effect, ...], rules: Rules = USUAL
+) -> ScoreBoard:
     """The same of residuals that may be known already."""
     found = sensitivities(evidence, candidates)
     e = evidence.left
@@ -163,7 +168,7 @@ def score_board_of(evidence: Evidence, candidates: tuple[Effect, ...]) -> ScoreB
     for effect in found.candidates:
         own = found.places[effect.id]
         retained = float(np.sqrt(after[own].sum() / max(before[own].sum(), 1e-300)))
-        if retained >= _INVISIBLE:
+        if retained >= rules.retained:
             visible.append((effect, retained, slice(len(kept), len(kept) + own.stop - own.start)))
             kept += list(range(own.start, own.stop))
     if len(kept) < R.shape[1]:

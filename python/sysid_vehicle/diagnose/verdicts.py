@@ -16,6 +16,7 @@ import numpy as np
 from .._text import html_table, number, with_error
 from ..effects import Effect
 from ..identify import Fit
+from ..rules import USUAL, Rules
 from .constancy import constancy
 from .diagnosis import Diagnosis
 from .possible import Size, possible, sizes
@@ -37,7 +38,6 @@ _ORDER: tuple[Finding, ...] = (
     "not testable",
     "absent",
 )
-_UPPER = 1.645  # 95 %, one side
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ def verdicts(dx: Diagnosis, *, seed: int = 0) -> Verdicts:
         lacked={e.id for e in dx.fit.model.candidates},
         groups=groups,
         acted={c.id for c in dx.significant},
-        alpha=dx.alpha,
+        rules=dx.rules,
         seed=seed,
         refitted=dx.sizes,
     )
@@ -209,7 +209,7 @@ def judge(
     lacked: set[str],
     groups: Mapping[str, tuple[str, ...]],
     acted: set[str],
-    alpha: float,
+    rules: Rules = USUAL,
     seed: int = 0,
     scored: tuple[tuple[Score, ...], Mapping[str, float]] | None = None,
     refitted: Mapping[str, Size] | None = None,
@@ -227,8 +227,8 @@ def judge(
         By effect of the final model, the rivals that driving cannot tell from it.
     acted : set of str
         Effects for which there was evidence before.
-    alpha : float
-        Rate of false claims accepted, over all effects together.
+    rules : Rules
+        By which effects are claimed.
     seed : int
         Of the draws that correct for testing many effects.
     scored : (scores, p-values), optional
@@ -241,13 +241,17 @@ def judge(
     """
     if scored is None:
         lacking = tuple(e for e in final.model.candidates if e.id in lacked)
-        board = score_board(final, final.driving, lacking)
+        board = score_board(final, final.driving, lacking, rules)
         scored = board.scores, board.family_p_values(seed=seed)
     family = scored[1]
     scores = {s.effect.id: s for s in scored[0]}
     names = tuple(e for e in final.model.effects if e in lacked)
-    found = [_of_added(e, final, groups.get(e.id, ())) for e in final.model.parts if e.id in lacked]
-    kept = constancy(final)
+    found = [
+        _of_added(e, final, groups.get(e.id, ()), rules)
+        for e in final.model.parts
+        if e.id in lacked
+    ]
+    kept = constancy(final, rules)
     for i, v in enumerate(found):
         if v.effect.id in kept and not kept[v.effect.id].holds:
             because = f"not with one value ({kept[v.effect.id].span})"
@@ -257,7 +261,7 @@ def judge(
         if effect.id not in lacked:
             continue
         score = scores.get(effect.id)
-        verdict = _of_scored(effect, score, family.get(effect.id, 1.0) < alpha)
+        verdict = _of_scored(effect, score, family.get(effect.id, 1.0) < rules.alpha, rules)
         if effect.id in acted and names and verdict.finding in ("absent", "not testable"):
             # A rival of what is itself a proxy, or negligible, is no better than that.
             instead = tuple(e for e in missing if effect.id in groups.get(e, ()))
@@ -278,18 +282,18 @@ def judge(
     return Verdicts(tuple(found))
 
 
-def _of_added(effect: Effect, final: Fit, group: tuple[str, ...]) -> EffectVerdict:
+def _of_added(effect: Effect, final: Fit, group: tuple[str, ...], rules: Rules) -> EffectVerdict:
     estimates = [final[f"{effect.id}.{p.name}"] for p in effect.parameters]
     value, std = tuple(e.value for e in estimates), tuple(e.std for e in estimates)
-    return _of_present(effect, value, std, group)
+    return _of_present(effect, value, std, group, rules)
 
 
-def _of_scored(effect: Effect, score: Score | None, evidence: bool) -> EffectVerdict:
+def _of_scored(effect: Effect, score: Score | None, evidence: bool, rules: Rules) -> EffectVerdict:
     if score is None:
         return EffectVerdict(effect, "not testable")
     if evidence:
-        return _of_present(effect, score.value, score.std, ())
-    bound = _bound(effect, score.value, score.std)
+        return _of_present(effect, score.value, score.std, (), rules)
+    bound = _bound(effect, score.value, score.std, rules)
     # The bound says it all: below what matters, the test had the power to find what does.
     small = all(b < p.matters for b, p in zip(bound, effect.parameters, strict=True) if not p.scan)
     return EffectVerdict(
@@ -298,22 +302,29 @@ def _of_scored(effect: Effect, score: Score | None, evidence: bool) -> EffectVer
 
 
 def _of_present(
-    effect: Effect, value: tuple[float, ...], std: tuple[float, ...], group: tuple[str, ...]
+    effect: Effect,
+    value: tuple[float, ...],
+    std: tuple[float, ...],
+    group: tuple[str, ...],
+    rules: Rules,
 ) -> EffectVerdict:
     finding: Finding = "one of a group" if group else "missing"
     because = ""
-    if not possible(effect, value, std):
+    if not possible(effect, value, std, rules):
         finding, group = "proxy", ()
         size = _listed(effect, [with_error(v, s) for v, s in zip(value, std, strict=True)])
         because = f"no car has such a value ({size})"
-    elif all(abs(d) + s < p.matters for p, d, s in sizes(effect, value, std)):
+    elif all(abs(d) + s < p.matters for p, d, s in sizes(effect, value, std, rules)):
         finding, group = "negligible", ()
-    return EffectVerdict(effect, finding, value, std, _bound(effect, value, std), group, because)
+    bound = _bound(effect, value, std, rules)
+    return EffectVerdict(effect, finding, value, std, bound, group, because)
 
 
-def _bound(effect: Effect, value: tuple[float, ...], std: tuple[float, ...]) -> tuple[float, ...]:
+def _bound(
+    effect: Effect, value: tuple[float, ...], std: tuple[float, ...], rules: Rules
+) -> tuple[float, ...]:
     return tuple(
-        float(np.abs(v - p.null_value) + _UPPER * s)
+        float(np.abs(v - p.null_value) + rules.bound * s)
         for p, v, s in zip(effect.parameters, value, std, strict=True)
     )
 

@@ -16,17 +16,14 @@ from ..identify import Fit, Prediction, predict
 from ..log import Log
 
 __all__ = [
-    "BEYOND",
     "as_sure",
     "error_falls",
     "fall_in_error",
     "gain_in_log_likelihood",
     "hold_out",
     "serving",
-    "share_explained",
 ]
 
-BEYOND = 1e-4  # evidence of something left there: tyres known only in part go on otherwise
 _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6
 
@@ -132,12 +129,3 @@ def _with_error(difference: FloatArray, test: Driving) -> tuple[float, float]:
 def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:
     """Whether the richer model errs less on held-out driving (`fall_in_error`)."""
     return fall_in_error(poorer, richer, test)[0] > 0.0
-
-
-def share_explained(before: float, after: float) -> float:
-    """Of the square of an error beyond the noise floor, what a richer model took away.
-
-    All of it, where nothing was beyond the noise floor.
-    """
-    most, left = (max(error**2 - 1.0, 0.0) for error in (before, after))
-    return 1.0 - left / most if most > 0.0 else 1.0

@@ -15,12 +15,13 @@ from ..estimate import Driving
 from ..identify import Fit, explaining, identify
 from ..log import Log, check_excitation
 from ..model import Model
+from ..rules import USUAL, Rules, verdict
 from .added import AddedEffect
 from .held_out import hold_out, serving
 from .search import Search, Trail
 from .steps import way
 from .study import Study
-from .verdict import SURE, Left, verdict_on
+from .verdict import facts_of, in_the_light_of
 
 __all__ = ["improve"]
 
@@ -34,7 +35,8 @@ def improve(
     test: Log | Sequence[Log] | None = None,
     *,
     most_effects: int = 6,
-    alpha: float = 0.05,
+    alpha: float | None = None,
+    rules: Rules = USUAL,
     candidates: Sequence[str] | None = None,
     starts: int = 8,
     seed: int = 0,
@@ -56,7 +58,10 @@ def improve(
     most_effects : int
         Stop after so many.
     alpha : float
-        Rate of false claims accepted, over all effects together, per step.
+        Rate of false claims accepted, over all effects together, per step; by default that of the
+        rules.
+    rules : Rules
+        Limits that decide what is claimed.
     candidates : sequence of str, optional
         Effects to consider.
     tell : callable, optional
@@ -68,6 +73,7 @@ def improve(
     """
     if most_effects < 0:
         raise InvalidInput("most_effects must not be negative")
+    rules = rules.at(alpha)
     began = time.perf_counter()
     say = tell if tell is not None else _silent
     train_driving, test_driving = hold_out(train, test)
@@ -77,7 +83,7 @@ def improve(
         test_driving,
         candidates=candidates,
         most_effects=most_effects,
-        alpha=alpha,
+        rules=rules,
         seed=seed,
         progress=progress,
         say=say,
@@ -89,40 +95,47 @@ def improve(
     on_train = [compare(f, train_driving, noise=floor) for f in fits]
     on_test = [compare(f, test_driving, noise=floor) for f in fits]
     last = diagnoses[-1]
-    left = Left(
-        diagnoses[0].omnibus,
-        last.omnibus if last.fit is fit else omnibus(fit, train_driving),
-        omnibus(serving(fit, test_driving), test_driving) if len(fits) > 1 else None,
-        any(c.p_value < SURE for c in last.significant)
-        if len(fits) > 1
-        else bool(last.significant),
-        _excited(train_driving),
-    )
+    fitted = last.omnibus if last.fit is fit else omnibus(fit, train_driving, rules)
+    validation = None
+    if len(fits) > 1:
+        validation = omnibus(serving(fit, test_driving), test_driving, rules)
     told = judge(
         fit,
         scored=(last.scores, last.family) if last.fit is fit else None,
         lacked={e.id for e in considered(model, candidates)},
         groups={e: g for e, g in found.rivals.items() if e in fit.model.effects},
         acted={c.id for dx in diagnoses for c in dx.significant},
-        alpha=alpha,
+        rules=rules,
         seed=seed,
         refitted=found.sizes,
         settled=True,
     )
-    verdict, told = verdict_on(fits, told, on_train, left)
+    facts = facts_of(
+        fits,
+        told,
+        on_train,
+        before=diagnoses[0].omnibus,
+        fitted=fitted,
+        validation=validation,
+        candidate=min((c.p_value for c in last.ranking), default=1.0),
+        excited=_excited(train_driving),
+    )
+    decision = verdict(facts, rules)
+    told = in_the_light_of(decision, told)
     return Study(
-        verdict=verdict,
+        verdict=decision.verdict,
         fits=tuple(fits),
         diagnoses=tuple(diagnoses),
         train=tuple(on_train),
         test=tuple(on_test),
         held_out=test_driving,
         added=_added(fits, on_test, found, told),
-        omnibus=left.fitted,
-        omnibus_held_out=left.held_out,
+        omnibus=fitted,
+        omnibus_held_out=validation,
         verdicts=told,
         warnings=_warnings(fit, train_driving),
         seconds=time.perf_counter() - began,
+        rules=rules,
     )
 
 

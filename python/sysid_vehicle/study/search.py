@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from ..diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
 from ..estimate import Driving
 from ..identify import Fit
+from ..rules import Rules
 from .steps import alternatives, exchanged, first_that_holds, likeliest
 
 __all__ = ["Search", "Trail"]
@@ -64,13 +65,14 @@ class Search:
     Attributes
     ----------
     test : Driving
-        What no fit sees, and every step must predict better.
+        Validation data, which every step must predict better.
+    rules : Rules
     """
 
     test: Driving
     candidates: Sequence[str] | None
     most_effects: int
-    alpha: float
+    rules: Rules
     seed: int
     progress: bool
     say: Callable[[str], None]
@@ -88,7 +90,9 @@ class Search:
                 return trail
             chosen, lean = step
             trail.note(dx, chosen)
-            found = exchanged(lean, trail.nearly, self.test, most_effects=self.most_effects)
+            found = exchanged(
+                lean, trail.nearly, self.test, most_effects=self.most_effects, rules=self.rules
+            )
             effects = set(found.model.effects)
             # One more than allowed may make another needless.
             if len(effects) > self.most_effects:
@@ -115,7 +119,7 @@ class Search:
         step = first_that_holds(beside, trail.fit, self.test)
         if step is None or first.id not in step[1].model.effects:
             return None
-        if omnibus(step[1], step[1].driving).rejects:
+        if omnibus(step[1], step[1].driving, self.rules).rejects:
             return None
         trail.note(beside, step[0])
         return first, step[1]
@@ -124,7 +128,7 @@ class Search:
         return diagnose(
             fit,
             candidates=self.candidates,
-            alpha=self.alpha,
+            rules=self.rules,
             seed=self.seed,
             progress=self.progress,
         )

@@ -11,6 +11,7 @@ from ..effects import Parameter
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Estimate, Fit, refine
+from ..rules import USUAL, Measures, Rules, accept, bic
 from .held_out import as_sure, error_falls, fall_in_error, gain_in_log_likelihood
 
 __all__ = [
@@ -24,12 +25,7 @@ __all__ = [
     "without_idle",
 ]
 
-_IDLE = 2.6  # an effect within so many standard errors of nothing is none
-_NEAR = 0.6  # of the evidence for the chosen effect
-_ALTERNATIVES = 2
-_LEANING, _CLEAR, _SURE = 1.0, 2.0, 4.5  # standard errors
-_SAME = 0.05  # twice the nats between two fits that say the same
-_BETTER = 4.5  # nats, beyond the Bayesian price of the parameters: three standard errors
+_ALTERNATIVES = 2  # tried in place of one effect
 
 
 def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate, Fit] | None:
@@ -39,65 +35,54 @@ def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate,
     those that the fitted driving cannot tell apart the held-out driving has a say too. With it
     comes its fit, without what is idle then.
     """
-    likely = sorted(dx.significant, key=lambda c: not _can_be(c))
+    rules = dx.rules
+    likely = sorted(dx.significant, key=lambda c: not _can_be(c, rules))
     first: Candidate | None = None
     held: dict[str, tuple[float, Candidate, Fit]] = {}
     for c in likely:
-        if first and (c.id not in first.indistinguishable_from or _can_be(c) != _can_be(first)):
+        if first and (
+            c.id not in first.indistinguishable_from or _can_be(c, rules) != _can_be(first, rules)
+        ):
             continue
-        if c.fit is None or not _sound(c):
+        if c.fit is None or not _sound(c, rules):
             continue
-        lean = without_idle(c.fit)
+        lean = without_idle(c.fit, rules)
         if c.id not in lean.model.effects:
             continue
-        gain, holds = _held_out_gain(fit, c, test)
-        if holds:
+        found = _measures(fit, c, test, rules)
+        if accept(found, rules):
             first = first or c
-            held[c.id] = (_merit(c.fit) + gain, c, lean)
+            held[c.id] = (_merit(c.fit) + found.gain[0], c, lean)
     if not held:
         return None
-    _, chosen, lean = max(held.values(), key=lambda found: found[0])
+    _, chosen, lean = max(held.values(), key=lambda h: h[0])
     return chosen, lean
 
 
 def likeliest(dx: Diagnosis) -> Candidate | None:
     """The candidate that fits best, of those with evidence for them and a value a car can have."""
-    return next((c for c in dx.significant if _sound(c) and _can_be(c)), None)
+    return next((c for c in dx.significant if _sound(c, dx.rules) and _can_be(c, dx.rules)), None)
 
 
-def _sound(c: Candidate) -> bool:
+def _sound(c: Candidate, rules: Rules) -> bool:
     """Whether it was refitted, and gained more than its price could be by chance."""
-    return c.fit is not None and c.statistic >= 2.0 * np.log(c.fit.driving.samples)
+    return c.fit is not None and c.statistic >= rules.price * np.log(c.fit.driving.samples)
 
 
-def _held_out_gain(fit: Fit, c: Candidate, test: Driving) -> tuple[float, bool]:
-    """What a candidate gains on held-out driving, and whether it holds there.
-
-    Three measures are asked, and none is always right: the noise of the poorer model may be so
-    large that it hides what another does better, that of the richer one surer than it may be there,
-    and the noise floor weighs the channels as no rough road would. Two have to speak for it.
-    """
+def _measures(fit: Fit, c: Candidate, test: Driving, rules: Rules) -> Measures:
+    """What a candidate changes on validation data."""
     assert c.fit is not None
-    gain, error = gain_in_log_likelihood(fit, c.fit, test, same_noise=True)
-    own, own_error = gain_in_log_likelihood(fit, c.fit, test)
-    fall, fall_error = fall_in_error(fit, c.fit, test)
-    measures = ((gain, error), (own, own_error), (fall, fall_error))
-
-    def two_beyond(doubt: float) -> bool:
-        return sum(v > doubt * e for v, e in measures) >= 2
-
-    if all(v > -_CLEAR * e for v, e in measures) and (
-        two_beyond(_LEANING) if fall > 0.0 else _can_be(c) and two_beyond(_CLEAR)
-    ):
-        return gain, True
-    # Coloured noise of sensors is predicted best by a model that takes it for motion: its errors
-    # one step ahead are smaller than those of the true car. The likelihood is not deceived, unless
-    # by noise that grew.
-    return gain, own > _SURE * own_error and _can_be(c) and as_sure(fit, c.fit, test)
+    return Measures(
+        gain_in_log_likelihood(fit, c.fit, test, same_noise=True),
+        gain_in_log_likelihood(fit, c.fit, test),
+        fall_in_error(fit, c.fit, test),
+        _can_be(c, rules),
+        as_sure(fit, c.fit, test),
+    )
 
 
-def _can_be(c: Candidate) -> bool:
-    return possible(c.effect, c.value, c.std)
+def _can_be(c: Candidate, rules: Rules) -> bool:
+    return possible(c.effect, c.value, c.std, rules)
 
 
 def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
@@ -108,13 +93,13 @@ def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
     chosen one does is the same thing by another name: an alternative only if there is an effect
     already that it may make needless, as rolling resistance does a slope with a sensor's bias.
     """
-    same = 0.0 if dx.fit.model.effects else _SAME
+    same = 0.0 if dx.fit.model.effects else dx.rules.same
     alike = [
         c
         for c in dx.significant
         if c.fit is not None
         and c.id != chosen.id
-        and c.statistic > _NEAR * chosen.statistic
+        and c.statistic > dx.rules.near * chosen.statistic
         and abs(c.statistic - chosen.statistic) >= same
         and (
             c.id in chosen.effect.twins
@@ -126,7 +111,12 @@ def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
 
 
 def exchanged(
-    fit: Fit, nearly: Mapping[str, Sequence[Candidate]], test: Driving, *, most_effects: int
+    fit: Fit,
+    nearly: Mapping[str, Sequence[Candidate]],
+    test: Driving,
+    *,
+    most_effects: int,
+    rules: Rules = USUAL,
 ) -> Fit:
     """The fit with others in place of effects that they explain away, one or two for each.
 
@@ -142,6 +132,7 @@ def exchanged(
         What the fit never saw, and has a say (`better`).
     most_effects : int
         That the model may have.
+    rules : Rules
 
     Returns
     -------
@@ -155,10 +146,10 @@ def exchanged(
             for others in dict.fromkeys([*((c,) for c in near), tuple(near)]):
                 if not others or len(fit.model.effects) - 1 + len(others) > most_effects:
                     continue
-                trial = _with_others(fit, name, others)
+                trial = _with_others(fit, name, others, rules)
                 if trial is None or frozenset(trial.model.effects) in seen:
                     continue
-                if better(trial, best, test):
+                if better(trial, best, test, rules):
                     best = trial
         if best is fit:
             return fit
@@ -166,7 +157,7 @@ def exchanged(
         seen.add(frozenset(fit.model.effects))
 
 
-def _with_others(fit: Fit, name: str, others: Sequence[Candidate]) -> Fit | None:
+def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules) -> Fit | None:
     """The fit with others in place of an effect, and without what is idle then.
 
     None where the search fails.
@@ -176,12 +167,12 @@ def _with_others(fit: Fit, name: str, others: Sequence[Candidate]) -> Fit | None
         values = zip(c.effect.parameters, c.value, strict=True)
         model = model.add(c.effect).with_values({f"{c.id}.{p.name}": v for p, v in values})
     try:
-        return without_idle(refine(model, fit.driving, fit.noise))
+        return without_idle(refine(model, fit.driving, fit.noise), rules)
     except (NumericalError, np.linalg.LinAlgError):
         return None
 
 
-def better(one: Fit, other: Fit, test: Driving) -> bool:
+def better(one: Fit, other: Fit, test: Driving, rules: Rules = USUAL) -> bool:
     """Whether one fit is to be preferred, and what is new in it has values that a car can have.
 
     Both drivings speak: that of the fit, less the Bayesian price of the parameters, and the held-
@@ -189,12 +180,12 @@ def better(one: Fit, other: Fit, test: Driving) -> bool:
     size that matters is preferred, and then the one with fewer effects.
     """
     ones, others = set(one.model.effects), set(other.model.effects)
-    if not all(_real(one, name) for name in ones - others):
+    if not all(_real(one, name, rules) for name in ones - others):
         return False
     ahead = lead(one, other, test)
     if (_mattering(one), len(ones)) < (_mattering(other), len(others)):
         return ahead > 0.0
-    return ahead > _BETTER and error_falls(other, one, test)
+    return ahead > rules.apart and error_falls(other, one, test)
 
 
 def lead(one: Fit, other: Fit, test: Driving) -> float:
@@ -217,14 +208,14 @@ def _mattering(fit: Fit) -> int:
     )
 
 
-def _real(fit: Fit, name: str) -> bool:
+def _real(fit: Fit, name: str, rules: Rules) -> bool:
     """Whether an effect of the model has a value that a car can have."""
     found = next(e for e in fit.model.parts if e.id == name)
     estimates = [fit[f"{name}.{p.name}"] for p in found.parameters]
-    return possible(found, [e.value for e in estimates], [e.std for e in estimates])
+    return possible(found, [e.value for e in estimates], [e.std for e in estimates], rules)
 
 
-def without_idle(fit: Fit) -> Fit:
+def without_idle(fit: Fit, rules: Rules = USUAL) -> Fit:
     """The fit without effects that have become indistinguishable from nothing, and unnecessary.
 
     Of two effects that act alike neither may be told from nothing while the model needs one of
@@ -232,12 +223,14 @@ def without_idle(fit: Fit) -> Fit:
     """
     kept: set[str] = set()
     while True:
-        idle = [e.id for e in fit.model.parts if e.id not in kept and _strength(fit, e.id) < _IDLE]
+        idle = [
+            e.id for e in fit.model.parts if e.id not in kept and _strength(fit, e.id) < rules.idle
+        ]
         if not idle:
             return fit
         weakest = min(idle, key=lambda name: _strength(fit, name))
         without = refine(fit.model.drop(weakest), fit.driving, fit.noise)
-        if _merit(without) + _BETTER < _merit(fit):
+        if _merit(without) + rules.apart < _merit(fit):
             kept.add(weakest)
         else:
             fit = without
@@ -262,8 +255,7 @@ def way(fits: Sequence[Fit]) -> list[Fit]:
 
 
 def _merit(fit: Fit) -> float:
-    price = 0.5 * len(fit.estimates) * float(np.log(fit.driving.samples))
-    return fit.log_likelihood - price
+    return bic(fit.log_likelihood, len(fit.estimates), fit.driving.samples)
 
 
 def _strength(fit: Fit, name: str) -> float:

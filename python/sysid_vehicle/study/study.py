@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from .._files import write_json
 from .._text import html_list, html_paragraph, html_table, text_table
@@ -28,14 +28,12 @@ from ..diagnose import (
 from ..estimate import Driving
 from ..identify import Fit, refine
 from ..model import Model
+from ..rules import USUAL, Rules, Verdict
 from .added import AddedEffect
-from .held_out import BEYOND
 from .record import record
 from .waterfall import Waterfall, waterfall
 
 __all__ = ["AddedEffect", "Study", "Verdict"]
-
-Verdict = Literal["adequate", "explained", "partly_explained", "unknown", "not_testable"]
 
 _MEANING = {
     "adequate": "nothing is missing that this driving can show",
@@ -73,6 +71,8 @@ class Study:
         What is to be said of every effect that the baseline lacks.
     seconds : float
         Wall time.
+    rules : Rules
+        By which effects were claimed.
     """
 
     verdict: Verdict
@@ -87,6 +87,7 @@ class Study:
     verdicts: Verdicts
     warnings: tuple[str, ...]
     seconds: float
+    rules: Rules = USUAL
 
     @property
     def fit(self) -> Fit:
@@ -232,7 +233,7 @@ class Study:
         """What is left on the driving of the fit, and on the other, in words."""
         said = f"In the end: {self.omnibus}."
         beyond = self.omnibus_held_out
-        more = beyond is not None and beyond.p_value < BEYOND
+        more = beyond is not None and beyond.p_value < self.rules.elsewhere
         if beyond is not None and beyond.rejects and not more:
             said += (
                 " On the held-out driving: no more than parameters may leave that the fit knows "

@@ -1,0 +1,56 @@
+"""The rules by which effects are claimed: all limits, and what follows from measured numbers.
+
+1. All effects are scored at once. There is evidence for an effect whose p-value, corrected for
+   testing all of them, is below `alpha`. One that the fit copies (`retained`) is not testable.
+2. The best are refitted. A refit counts if it gains `price` BIC penalties, or ln n in nats.
+3. It is accepted if the validation data confirm it (`accept`): two of three measures speak for it
+   (`lean`, `clear`) and none against it, or its likelihood alone is beyond doubt (`sure`).
+4. Effects whose likelihoods differ by less than `apart` are confounded; validation data choose. An
+   accepted effect gives way to others of its kind (`near`) that lead by `apart`, or are simpler.
+5. An effect within `idle` standard errors of nothing is dropped unless BIC needs it.
+6. When nothing is added any more, the final model is tested for anything left: at `level` on the
+   training data, at `elsewhere` on validation data, and for one effect more.
+7. Nothing left: what was added explains it. An added effect is not named if its value is physically
+   implausible, or differs between pieces of the driving (`spread`).
+8. Something left: names are withdrawn that take up less than `most` of the error, leave more than
+   `stays` of the evidence, take up less than is left, or should have explained what is left.
+9. The verdict follows from what is left and which names stand (`verdict`).
+10. `Rules` holds every limit with unit, meaning, and the benchmark that chose or judges it.
+
+Nothing here sees a fit or a log: others measure, this decides.
+"""
+
+from .accept import Measures, accept, bic
+from .limits import USUAL, Rules
+from .verdict import (
+    Added,
+    Decision,
+    Facts,
+    Tested,
+    Verdict,
+    Withdrawn,
+    excess,
+    share_explained,
+    smaller_than,
+    something_left,
+    verdict,
+)
+
+__all__ = [
+    "USUAL",
+    "Added",
+    "Decision",
+    "Facts",
+    "Measures",
+    "Rules",
+    "Tested",
+    "Verdict",
+    "Withdrawn",
+    "accept",
+    "bic",
+    "excess",
+    "share_explained",
+    "smaller_than",
+    "something_left",
+    "verdict",
+]

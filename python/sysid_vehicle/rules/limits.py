@@ -1,0 +1,128 @@
+"""All limits that decide what is claimed, each with its unit, meaning and benchmark."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+
+from .._arguments import real
+from .._text import text_table
+from ..errors import InvalidInput
+
+__all__ = ["USUAL", "Rules"]
+
+_NULLS = "benchmarks/exam --draw null=2000"
+_EFFECTS = "benchmarks/exam --draw effect=120 pair=50 --severity 1 2"
+_OUTSIDE = 'benchmarks/exam --draw "group removed=70" outside=40 --severity 0.5 2'
+_CONVENTION = "convention"
+
+
+def _limit(value: float, unit: str, meaning: str, chosen_by: str) -> float:
+    told = {"unit": unit, "meaning": meaning, "chosen_by": chosen_by}
+    found: float = field(default=value, metadata=told)
+    return found
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Every limit that decides what is claimed; printed, a table with units and meanings.
+
+    Raises
+    ------
+    InvalidInput
+        A limit is no positive finite number, or a probability or share above 1.
+    """
+
+    alpha: float = _limit(
+        0.05, "probability", "of a false claim, over all effects together, per step", _NULLS
+    )
+    level: float = _limit(
+        0.01, "probability", "below which a single test of a complete model rejects it", _NULLS
+    )
+    strict: float = _limit(
+        1e-3, "probability", "below which what is left puts names in doubt", _OUTSIDE
+    )
+    elsewhere: float = _limit(
+        1e-4,
+        "probability",
+        "the same on validation data, where tyres known only in part go on otherwise",
+        _NULLS,
+    )
+    retained: float = _limit(
+        1e-3,
+        "share",
+        "of an effect that fitted parameters cannot copy; less is not testable",
+        _NULLS,
+    )
+    interval: float = _limit(1.96, "standard errors", "of a 95 % interval", _CONVENTION)
+    bound: float = _limit(1.645, "standard errors", "of a 95 % bound, one side", _CONVENTION)
+    implausible: float = _limit(
+        5.0, "typical sizes", "beyond which a value is physically implausible", _OUTSIDE
+    )
+    spread: float = _limit(
+        0.25, "share", "of its value by which an effect may differ between pieces", _OUTSIDE
+    )
+    felt: float = _limit(
+        0.5, "sizes that matter", "from which the constancy of a parameter is asked", _OUTSIDE
+    )
+    price: float = _limit(
+        2.0, "BIC penalties", "of one parameter that the likelihood ratio of a refit covers", _NULLS
+    )
+    lean: float = _limit(
+        1.0, "standard errors", "by which measures speak for an effect whose error falls", _EFFECTS
+    )
+    clear: float = _limit(
+        2.0, "standard errors", "the same where it does not fall, and against an effect", _EFFECTS
+    )
+    sure: float = _limit(
+        4.5, "standard errors", "of likelihood on validation data, which decide alone", _EFFECTS
+    )
+    idle: float = _limit(
+        2.6, "standard errors", "from nothing, within which an effect may be needless", _EFFECTS
+    )
+    apart: float = _limit(
+        4.5, "nats", "that tell two models apart, beyond the BIC penalty: 3 sigma", _EFFECTS
+    )
+    same: float = _limit(
+        0.05, "twice nats", "between fits that are the same by other names", _EFFECTS
+    )
+    near: float = _limit(
+        0.6, "share", "of the evidence for the best, with which another may replace it", _EFFECTS
+    )
+    taken: float = _limit(
+        0.1, "share", "of the error, which the only name beside much evidence takes up", _OUTSIDE
+    )
+    most: float = _limit(
+        0.9, "share", "of the error that names take up beside which something is left", _OUTSIDE
+    )
+    stays: float = _limit(
+        0.6, "share", "of the evidence against the baseline that right names may leave", _OUTSIDE
+    )
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = real(getattr(self, f.name))
+            most = 1.0 if f.metadata["unit"] in ("probability", "share") else np.inf
+            if value is None or not 0.0 < value <= most or np.isinf(value):
+                wanted = "between 0 and 1" if most == 1.0 else "above 0, finite"
+                raise InvalidInput(f"{f.name} = {getattr(self, f.name)!r}: give a number {wanted}")
+            object.__setattr__(self, f.name, value)
+
+    def at(self, alpha: float | None) -> Rules:
+        """The same with another rate of false claims; None leaves it as it is."""
+        return self if alpha is None else replace(self, alpha=alpha)
+
+    def to_dict(self) -> dict[str, dict[str, Any]]:
+        """Value, unit, meaning and benchmark of each limit, ready for JSON."""
+        return {f.name: {"value": getattr(self, f.name), **f.metadata} for f in fields(self)}
+
+    def __str__(self) -> str:
+        told = self.to_dict().items()
+        rows = [[n, f"{t['value']:g}", t["unit"], t["meaning"], t["chosen_by"]] for n, t in told]
+        return text_table(("limit", "value", "unit", "meaning", "chosen or judged by"), rows)
+
+
+USUAL = Rules()
+"""The rules that hold where none are given."""

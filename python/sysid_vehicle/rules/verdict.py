@@ -1,0 +1,253 @@
+"""The verdict on the whole, and the names that what is left puts in doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from .limits import USUAL, Rules
+
+__all__ = [
+    "Added",
+    "Decision",
+    "Facts",
+    "Tested",
+    "Verdict",
+    "Withdrawn",
+    "excess",
+    "share_explained",
+    "smaller_than",
+    "something_left",
+    "verdict",
+]
+
+Verdict = Literal["adequate", "explained", "partly_explained", "unknown", "not_testable"]
+
+
+class Tested(Protocol):
+    """A test for anything left."""
+
+    @property
+    def statistic(self) -> float:
+        """Chi-squared of a complete model."""
+
+    @property
+    def degrees(self) -> int:
+        """Degrees of freedom."""
+
+    @property
+    def p_value(self) -> float:
+        """Of a complete model."""
+
+    @property
+    def moves(self) -> tuple[str, ...]:
+        """Channels that what is left moves most."""
+
+
+def excess(test: Tested) -> float:
+    """Evidence beyond what a complete model shows."""
+    return max(test.statistic - test.degrees, 0.0)
+
+
+def share_explained(before: float, after: float) -> float:
+    """Of the square of an error beyond the noise floor, what a richer model took away.
+
+    All of it, where nothing was beyond the noise floor.
+    """
+    most, left = (max(error**2 - 1.0, 0.0) for error in (before, after))
+    return 1.0 - left / most if most > 0.0 else 1.0
+
+
+@dataclass(frozen=True)
+class Added:
+    """An effect of the final model that the baseline lacked.
+
+    Attributes
+    ----------
+    finding : str
+        What is said of it by itself: `missing`, `one of a group`, `negligible` or `proxy`.
+    group : tuple of str
+        Its rivals, where it is one of a group.
+    moves : frozenset of str
+        Channels that it moves.
+    taken : float
+        Of the square of the training error, what it took up in its turn.
+    """
+
+    id: str
+    finding: str
+    group: tuple[str, ...] = ()
+    moves: frozenset[str] = frozenset()
+    taken: float = 0.0
+
+    @property
+    def named(self) -> bool:
+        """Whether it is said to be missing, not only to act like it or to be negligible."""
+        return self.finding in ("missing", "one of a group")
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a study measured, from which its verdict follows.
+
+    Attributes
+    ----------
+    before, fitted : Tested
+        For anything left by the baseline and by the final model, on the training data.
+    validation : Tested or None
+        The latter on validation data; None where nothing was added.
+    candidate : float
+        Smallest p-value of an effect that the final model lacks.
+    errors : (float, float)
+        Training error without and with what was added, in units of the noise floor.
+    contradictions : tuple of str
+        Channels that contradict the others, in words.
+    excited : bool
+        Whether the training data excite the lateral motion.
+    """
+
+    before: Tested
+    fitted: Tested
+    validation: Tested | None = None
+    candidate: float = 1.0
+    errors: tuple[float, float] = (1.0, 1.0)
+    added: tuple[Added, ...] = ()
+    contradictions: tuple[str, ...] = ()
+    excited: bool = True
+
+
+@dataclass(frozen=True)
+class Withdrawn:
+    """Names that are taken back, and why.
+
+    Attributes
+    ----------
+    effects : frozenset of str
+    because : str
+    beside : frozenset of str
+        Effects of the model, which are no mere rivals of these: each stands or falls by itself.
+    """
+
+    effects: frozenset[str]
+    because: str
+    beside: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A verdict, and the names that are withdrawn, in this order."""
+
+    verdict: Verdict
+    withdrawn: tuple[Withdrawn, ...] = ()
+
+
+def something_left(facts: Facts, rules: Rules = USUAL) -> bool:
+    """Whether the final model is shown to be incomplete."""
+    one_more = rules.alpha if facts.validation is None else min(rules.alpha, rules.level)
+    return (
+        not facts.fitted.p_value > rules.level
+        or facts.candidate < one_more
+        or _on_validation(facts, rules)
+    )
+
+
+def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
+    """The verdict on the whole, and the names that cannot be told beside what is left.
+
+    What was added may explain all, a part, or only stand in for what is missing. Its residuals
+    tell: on the training data, and on validation data, where a stand-in leaves what the right
+    effect does not. An uneven road or a coloured sensor keeps the error of the true car above its
+    noise floor: what does not depend on the driving is no effect's to explain.
+    """
+    names = frozenset(a.id for a in facts.added)
+    if facts.contradictions:
+        # Readings that contradict each other leave no name safe.
+        because = "; ".join(facts.contradictions)
+        return Decision("unknown", (Withdrawn(names, because, names),))
+    left = something_left(facts, rules)
+    if not names:
+        # Tyres that never met a slip angle are free, and leave chance evidence of effects.
+        if not facts.excited and facts.fitted.p_value > rules.level:
+            return Decision("not_testable")
+        return Decision("unknown" if left else "adequate")
+    stand_ins = frozenset(a.id for a in facts.added if a.finding == "proxy")
+    withdrawn = _withdrawn(facts, rules, names, stand_ins) if left else []
+    # What only stands in for something else explains nothing, however well it fits, and what cannot
+    # be told from that is no better.
+    because = f"it acts like {', '.join(sorted(stand_ins))}, which is none either"
+    withdrawn.append(Withdrawn(stand_ins, because))
+    proxies = {a.id for a in facts.added if a.finding == "proxy" or _falls(a, withdrawn)}
+    negligible = {a.id for a in facts.added if a.finding == "negligible"}
+    if proxies == names or (left and proxies | negligible == names):
+        return Decision("unknown", tuple(withdrawn))
+    whole = not left and not proxies
+    return Decision("explained" if whole else "partly_explained", tuple(withdrawn))
+
+
+def _withdrawn(
+    facts: Facts, rules: Rules, names: frozenset[str], stand_ins: frozenset[str]
+) -> list[Withdrawn]:
+    """Names that are not safe beside something that is left."""
+    share = share_explained(*facts.errors)
+    if share < rules.most:
+        because = f"takes up only {max(100 * share, 0.0):.0f} % of what is missing"
+        return [Withdrawn(names, because, names)]
+    stays = excess(facts.fitted) / max(excess(facts.before), 1.0)
+    if stays > rules.stays:
+        because = f"with it, {100 * stays:.0f} % of the evidence that something is missing stays"
+        return [Withdrawn(names, because, names)]
+    taken = {a.id: a.taken for a in facts.added}
+    small = smaller_than(facts.errors[1] ** 2 - 1.0, taken, stand_ins)
+    first = Withdrawn(small, "what is left unexplained is larger", names)
+    alone = _alone(facts, rules, small)
+    because = "were it what is missing, nothing would be left"
+    return [first, Withdrawn(alone, because, names)]
+
+
+def _alone(facts: Facts, rules: Rules, small: frozenset[str]) -> frozenset[str]:
+    """The effect that is named, where it is one only, if it should have explained what is left.
+
+    A proxy beside it tells that something else is missing too. That may be all that is left, unless
+    it moves what the effect moves.
+    """
+    tests = [facts.fitted] if facts.fitted.p_value < rules.strict else []
+    if facts.validation is not None and _on_validation(facts, rules):
+        tests.append(facts.validation)
+    named = [a for a in facts.added if a.named and a.id not in small]
+    if len(named) != 1:
+        return frozenset()
+    own = frozenset({named[0].id})
+    if not any(a.finding == "proxy" or (a.named and a.id in small) for a in facts.added):
+        return own if tests else frozenset()
+    return own if any(named[0].moves & set(t.moves) for t in tests) else frozenset()
+
+
+def smaller_than(
+    left: float, taken: Mapping[str, float], proxies: frozenset[str]
+) -> frozenset[str]:
+    """Effects that took up less than is left unexplained in the end.
+
+    What a proxy took up is unexplained too.
+    """
+    doubted = set(proxies)
+    while True:
+        unexplained = left + sum(max(taken.get(e, 0.0), 0.0) for e in doubted)
+        more = {e for e, t in taken.items() if e not in doubted and t < unexplained}
+        if not more:
+            return frozenset(doubted - proxies)
+        doubted |= more
+
+
+def _on_validation(facts: Facts, rules: Rules) -> bool:
+    return facts.validation is not None and facts.validation.p_value < rules.elsewhere
+
+
+def _falls(effect: Added, withdrawn: Sequence[Withdrawn]) -> bool:
+    """Whether the name of an added effect is taken back."""
+    return any(
+        effect.id in w.effects and effect.named
+        if effect.id in w.beside
+        else effect.finding == "one of a group" and set(effect.group) <= w.effects
+        for w in withdrawn
+    )

@@ -1,0 +1,298 @@
+"""The rules by which effects are claimed see numbers only, and are all in one place."""
+
+import ast
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import InvalidInput, Rules
+from sysid_vehicle.diagnose import Omnibus
+from sysid_vehicle.rules import (
+    USUAL,
+    Added,
+    Facts,
+    Measures,
+    accept,
+    bic,
+    share_explained,
+    smaller_than,
+    something_left,
+    verdict,
+)
+
+PACKAGE = Path(__file__).resolve().parents[2] / "python" / "sysid_vehicle"
+
+# Constants of numerical methods and of effort: how finely, how long, how often. They decide no
+# claim. Those of the last group shape how what no name fits is described; no effect is claimed.
+NUMERICAL = {
+    "diagnose/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
+    "diagnose/diagnose.py": {"_REFITS", "_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS", "_BEYOND"},
+    "diagnose/evidence.py": {"_AT_ONCE"},
+    "diagnose/information.py": {"_COPIED"},
+    "diagnose/possible.py": {"_AT_BOUND"},
+    "diagnose/projection.py": {"_COPIED", "_SINGULAR", "_LAGS", "_ROWS"},
+    "diagnose/replay.py": {
+        "_RATE_HZ", "_WINDOW_S", "_GRAVITY_MPS2", "_LOOKS", "_ROUNDS", "_BENDS", "_AS_GOOD",
+    },
+    "diagnose/score.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
+    "diagnose/sensitivity.py": {"_AT_ONCE"},
+    "study/held_out.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES"},
+    "study/improve.py": {"_SHORT_S"},
+    "study/steps.py": {"_ALTERNATIVES"},
+    # Descriptions of the unknown, of biases, and of the next drive.
+    "diagnose/change_directions.py": {"_BLEND_S", "_SMALL"},
+    "diagnose/change_points.py": {
+        "_STEP_S", "_MOST_STEPS", "_LEAST_S", "_INTERVAL", "_NEAR_S", "_FINE", "_MOST",
+        "_TOGETHER_S",
+    },
+    "diagnose/coherence.py": {"_WINDOW_S", "_LEVEL"},
+    "diagnose/delay.py": {"_BANDS", "_LOWEST_HZ", "_SMALL", "_ROUNDS", "_DRAWS"},
+    "diagnose/force_map.py": {
+        "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_BLOCK_S", "_LONGEST_S",
+    },
+    "diagnose/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE", "_CERTAIN"},
+    "diagnose/next_drive.py": {"_ENOUGH"},
+    "diagnose/proposals.py": {"_MOST", "_TRIED", "_ALIKE", "_BLOCK_S", "_RETAINED", "_VISIBLE"},
+    "diagnose/shape.py": {
+        "_KNOTS", "_KNOTS_OF_PAIR", "_SIZES", "_SIZES_OF_PAIR", "_SMOOTH", "_FINE", "_DRAWS",
+        "_LEVEL", "_FEWEST",
+    },
+    "diagnose/where.py": {"_TELLS"},
+}  # fmt: skip
+_NO_LIMIT = (0, 1, -1, 2, 0.5)  # of which halves, squares and signs are made
+
+
+def private_constants(text: str) -> Iterator[str]:
+    """Private names that a module binds to plain numbers."""
+    for node in ast.parse(text).body:
+        if not isinstance(node, ast.Assign):
+            continue
+        for target in node.targets:
+            names = target.elts if isinstance(target, ast.Tuple) else [target]
+            values = [n for n in ast.walk(node.value) if isinstance(n, ast.Constant)]
+            numbers = values and all(type(v.value) in (int, float) for v in values)
+            called = any(isinstance(n, ast.Call | ast.Subscript) for n in ast.walk(node.value))
+            if numbers and not called:
+                yield from (n.id for n in names if isinstance(n, ast.Name) and n.id.startswith("_"))
+
+
+def compared_numbers(text: str) -> Iterator[tuple[int, float]]:
+    """Line and number wherever something is compared with a number that is no trivial one."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Compare):
+            for part in (node.left, *node.comparators):
+                for n in ast.walk(part):
+                    if (
+                        isinstance(n, ast.Constant)
+                        and type(n.value) in (int, float)
+                        and n.value not in _NO_LIMIT
+                    ):
+                        yield node.lineno, float(n.value)
+
+
+def test_no_limit_that_decides_a_claim_stands_elsewhere() -> None:
+    found = {
+        str(path.relative_to(PACKAGE)): set(private_constants(path.read_text("utf-8")))
+        for folder in ("study", "diagnose")
+        for path in (PACKAGE / folder).glob("*.py")
+    }
+    new = {path: names - NUMERICAL.get(path, set()) for path, names in found.items()}
+    assert {p: n for p, n in new.items() if n} == {}, "a limit belongs into rules/limits.py"
+    gone = {path: names - found.get(path, set()) for path, names in NUMERICAL.items()}
+    assert {p: n for p, n in gone.items() if n} == {}, "no longer there"
+
+
+def test_deciding_files_compare_with_no_number_of_their_own() -> None:
+    deciding = ["study/steps.py", "study/search.py", "study/verdict.py", "study/improve.py"]
+    deciding += [f"diagnose/{n}.py" for n in ("doubt", "verdicts", "constancy", "possible")]
+    deciding += ["rules/accept.py", "rules/verdict.py"]
+    found = {p: list(compared_numbers((PACKAGE / p).read_text("utf-8"))) for p in deciding}
+    assert {p: n for p, n in found.items() if n} == {}
+
+
+def test_the_checks_see_constants_and_comparisons() -> None:
+    text = "_A = 0.3\n_B, _C = 1.0, 2\n_D = 'x'\n_E = {1: 'y'}\nF = 3.0\n_G = f(3.0)\nx = y > 0.7"
+    assert set(private_constants(text)) == {"_A", "_B", "_C"}
+    assert list(compared_numbers(text)) == [(7, 0.7)]
+
+
+def test_every_limit_says_what_it_is_and_what_chose_it() -> None:
+    told = USUAL.to_dict()
+    assert set(told) == {f.name for f in fields(Rules)}
+    for t in told.values():
+        assert t["unit"]
+        assert t["meaning"]
+        assert t["chosen_by"].startswith(("benchmarks/", "convention"))
+    assert all(name in str(USUAL) for name in told)
+    assert USUAL.at(None) is USUAL
+    assert USUAL.at(0.01).alpha == 0.01
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "words"),
+    [
+        ("alpha", 0.0, "alpha = 0.0: give a number between 0 and 1"),
+        ("most", 1.5, "most = 1.5: give a number between 0 and 1"),
+        ("sure", float("nan"), "sure = nan: give a number above 0, finite"),
+        ("clear", float("inf"), "clear = inf: give a number above 0, finite"),
+        ("idle", "2", "idle = '2': give a number above 0, finite"),
+    ],
+)
+def test_limits_that_mean_nothing_are_refused(limit: str, value: float, words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        replace(USUAL, **{limit: value})  # type: ignore[arg-type]
+
+
+def test_bic() -> None:
+    assert bic(-100.0, 3, 1000) == pytest.approx(-100.0 - 1.5 * np.log(1000.0))
+
+
+@pytest.mark.parametrize(
+    ("same", "own", "fall", "holds"),
+    [
+        ((90.0, 30.0), (90.0, 30.0), (9.0, 30.0), True),
+        # The error by the noise floor may not be shown to fall where the likelihood is sure,
+        ((90.0, 30.0), (90.0, 30.0), (-9.0, 30.0), True),
+        # but it must not be shown to grow,
+        ((90.0, 30.0), (90.0, 30.0), (-90.0, 30.0), False),
+        # and both noises have to be sure.
+        ((40.0, 30.0), (90.0, 30.0), (-9.0, 30.0), False),
+        ((90.0, 30.0), (40.0, 30.0), (-9.0, 30.0), False),
+        # Noise of its own may be too sure, which the others know better,
+        ((90.0, 30.0), (-9.0, 30.0), (90.0, 30.0), True),
+        ((40.0, 30.0), (-9.0, 30.0), (40.0, 30.0), True),
+        # but not where it speaks against it.
+        ((90.0, 30.0), (-90.0, 30.0), (90.0, 30.0), False),
+        # Large noise of the poorer model hides the gain: where the error falls the others do,
+        ((9.0, 30.0), (40.0, 30.0), (40.0, 30.0), True),
+        ((-9.0, 30.0), (40.0, 30.0), (40.0, 30.0), True),
+        # unless the gain is lost.
+        ((-90.0, 30.0), (40.0, 30.0), (40.0, 30.0), False),
+        # One alone does not.
+        ((9.0, 30.0), (90.0, 30.0), (9.0, 30.0), False),
+        ((90.0, 30.0), (9.0, 30.0), (9.0, 30.0), False),
+        ((9.0, 30.0), (9.0, 30.0), (90.0, 30.0), False),
+    ],
+)
+def test_what_validation_data_confirm(
+    same: tuple[float, float], own: tuple[float, float], fall: tuple[float, float], *, holds: bool
+) -> None:
+    found = Measures(same, own, fall, plausible=True, as_sure=False)
+    assert accept(found) is holds
+    # What only acts like something is worth having where the error falls.
+    assert accept(replace(found, plausible=False)) is (holds and fall[0] > 0.0)
+
+
+def test_the_likelihood_has_the_last_word_where_noise_did_not_grow() -> None:
+    found = Measures((-90.0, 30.0), (150.0, 30.0), (-90.0, 30.0), plausible=True, as_sure=True)
+    assert accept(found)
+    assert not accept(replace(found, own_gain=(90.0, 30.0)))
+    assert accept(replace(found, own_gain=(90.0, 30.0)), replace(USUAL, sure=2.0))
+    assert not accept(replace(found, plausible=False))
+    assert not accept(replace(found, as_sure=False))
+
+
+def of(p_value: float, statistic: float = 99.0, target: str = "M_z") -> Omnibus:
+    return Omnibus(statistic, 9, p_value, target)
+
+
+NONE = of(0.5, 5.0)
+BEFORE = of(1e-60, 909.0)
+MASS = Added("mass", "missing", moves=frozenset({"yaw_rate_radps"}), taken=8.0)
+DRAG = Added("aero_drag", "missing", moves=frozenset({"vx_mps"}), taken=1.0)
+WHOLE = Facts(BEFORE, NONE, NONE, errors=(3.0, 1.0), added=(MASS,))
+
+
+def test_what_is_left_on_validation_data_takes_more_evidence() -> None:
+    assert not something_left(WHOLE)
+    assert not something_left(replace(WHOLE, validation=of(0.001)))
+    assert something_left(replace(WHOLE, validation=of(1e-5)))
+    assert something_left(replace(WHOLE, fitted=of(0.005)))
+    assert something_left(replace(WHOLE, candidate=0.005))
+    # One effect more takes more evidence than the first one.
+    assert not something_left(replace(WHOLE, candidate=0.03))
+    assert something_left(replace(WHOLE, candidate=0.03, validation=None, added=()))
+
+
+def test_verdicts_where_nothing_was_added() -> None:
+    facts = Facts(NONE, NONE)
+    assert verdict(facts).verdict == "adequate"
+    assert verdict(replace(facts, candidate=0.01)).verdict == "unknown"
+    assert verdict(replace(facts, excited=False)).verdict == "not_testable"
+    assert verdict(replace(facts, fitted=BEFORE, excited=False)).verdict == "unknown"
+    said = verdict(replace(WHOLE, contradictions=("ay_mps2: turned round",)))
+    assert said.verdict == "unknown"
+    assert said.withdrawn[0].effects == {"mass"}
+    assert said.withdrawn[0].because == "ay_mps2: turned round"
+
+
+def withdrawn(facts: Facts) -> dict[str, str]:
+    return {e: w.because for w in verdict(facts).withdrawn for e in w.effects}
+
+
+def test_verdicts_where_nothing_is_left() -> None:
+    assert verdict(WHOLE).verdict == "explained"
+    assert withdrawn(WHOLE) == {}
+    proxy = replace(DRAG, finding="proxy")
+    assert verdict(replace(WHOLE, added=(MASS, proxy))).verdict == "partly_explained"
+    assert verdict(replace(WHOLE, added=(proxy,))).verdict == "unknown"
+    # What cannot be told from a proxy is no better.
+    rival = replace(MASS, finding="one of a group", group=("aero_drag",))
+    assert verdict(replace(WHOLE, added=(rival, proxy))).verdict == "unknown"
+    negligible = replace(MASS, finding="negligible")
+    assert verdict(replace(WHOLE, added=(negligible,))).verdict == "explained"
+
+
+def test_names_beside_something_that_is_left() -> None:
+    left = replace(WHOLE, fitted=of(1e-9, 209.0), errors=(3.0, 1.2), added=(MASS, DRAG))
+    assert verdict(left).verdict == "partly_explained"
+    assert withdrawn(left) == {}
+    error = replace(left, errors=(3.0, 2.0))
+    assert verdict(error).verdict == "unknown"
+    assert set(withdrawn(error)) == {"mass", "aero_drag"}
+    assert withdrawn(error)["mass"] == "takes up only 62 % of what is missing"
+    stays = replace(left, fitted=of(1e-9, 709.0))
+    assert "78 % of the evidence" in withdrawn(stays)["aero_drag"]
+    little = replace(left, added=(MASS, replace(DRAG, taken=0.1)), fitted=of(0.005, 209.0))
+    assert withdrawn(little) == {"aero_drag": "what is left unexplained is larger"}
+    assert verdict(little).verdict == "partly_explained"
+    only = replace(left, added=(replace(MASS, finding="negligible"),))
+    assert verdict(only).verdict == "unknown"
+
+
+def test_an_effect_named_alone_should_have_explained_what_is_left() -> None:
+    alone = "were it what is missing, nothing would be left"
+    left = replace(WHOLE, fitted=of(1e-9, 209.0, "F_x"), errors=(3.0, 1.2))
+    assert withdrawn(left) == {"mass": alone}
+    assert verdict(left).verdict == "unknown"
+    assert withdrawn(replace(left, fitted=of(0.005, 209.0))) == {}
+    # Beside a proxy something else may be missing, which may be all that is left.
+    proxy = replace(DRAG, finding="proxy")
+    beside = replace(left, added=(MASS, proxy))
+    assert withdrawn(beside).get("mass") is None
+    turning = replace(beside, fitted=of(1e-9, 209.0, "M_z"))
+    assert withdrawn(turning)["mass"] == alone
+    elsewhere = replace(beside, fitted=of(0.005, 209.0, "F_x"), validation=of(1e-5))
+    assert withdrawn(elsewhere)["mass"] == alone
+
+
+def test_what_took_up_less_than_is_left_is_doubted() -> None:
+    taken = {"large": 10.0, "middle": 2.0, "tiny": 0.1}
+    assert smaller_than(0.01, taken, frozenset()) == set()
+    assert smaller_than(0.5, taken, frozenset()) == {"tiny"}
+    # What proxies took up is unexplained too, and so is what was doubted for it.
+    assert smaller_than(1.95, taken, frozenset()) == {"tiny", "middle"}
+    assert smaller_than(0.5, taken, frozenset({"large"})) == {"tiny", "middle"}
+    assert smaller_than(1.0, {}, frozenset()) == set()
+
+
+def test_the_share_explained_is_of_what_is_beyond_the_noise_floor() -> None:
+    assert share_explained(2.0, 1.0) == 1.0
+    assert share_explained(2.0, 0.99) == 1.0
+    assert share_explained(3.0, np.sqrt(5.0)) == pytest.approx(0.5)
+    assert share_explained(2.0, 2.0) == 0.0
+    assert share_explained(2.0, 3.0) < 0.0
+    assert share_explained(1.0, 1.0) == 1.0
