@@ -38,10 +38,7 @@ def test_other_encodings_of_text(tmp_path: Path, encoding: str) -> None:
 @pytest.mark.parametrize(
     ("start", "words"),
     [
-        (b"PAR1\x15\x04", ["Parquet", "pandas.read_parquet"]),
-        (b"MATLAB 5.0 MAT-file, Platform", ["MATLAB", "scipy.io.loadmat"]),
-        (b"\x89HDF\r\n\x1a\n", ["HDF5", "h5py"]),
-        (b"MDF     4.10    ", ["ASAM MDF", "asammdf"]),
+        (b"MATLAB 5.0 MAT-file, Platform", ["a MATLAB file, but it is broken", "record"]),
         (b"PK\x03\x04", ["ZIP", "Excel"]),
         (b"\x1f\x8b\x08", ["gzip", "gunzip"]),
         (b"\x01\x02\x00\xfe\x03", ["no text (first at byte 2)", "as CSV"]),
@@ -87,7 +84,7 @@ class TestUnits:
             log = read(path)
         told = [str(warning.message) for warning in caught]
         assert len(told) == 4
-        assert any("vx_mps: the row of units states 'km/h'" in text for text in told)
+        assert any("vx_mps: the file states 'km/h'" in text for text in told)
         np.testing.assert_allclose(log["time_s"], [0.0, 0.01, 0.02])
         np.testing.assert_allclose(log["vx_mps"], 10.0)
         np.testing.assert_allclose(log["yaw_rate_radps"], np.pi / 2)
@@ -98,6 +95,40 @@ class TestUnits:
         path = write(tmp_path, HEADER, "s,km/h,rad/s,m/s2,m/s2,rad", *ROWS)
         log = read(path, {"vx_mps": {"column": "vx_mps", "factor": 0.25}})
         np.testing.assert_allclose(log["vx_mps"], [5.0, 5.25, 5.5])
+
+    @pytest.mark.parametrize(
+        ("unit", "what"),
+        [("deg/s", "an angular velocity"), ("bar", "a pressure"), ("slug", "a mass")],
+    )
+    def test_one_of_another_quantity_is_refused(self, tmp_path: Path, unit: str, what: str) -> None:
+        path = write(tmp_path, HEADER, f"s,{unit},rad/s,m/s2,m/s2,rad", *ROWS)
+        with pytest.raises(InvalidInput, match=rf"vx_mps: the file states '{unit}'.*") as caught:
+            read(path)
+        assert f"{what}, but the channel is a speed [m/s]" in str(caught.value)
+        log = read(path, {"vx_mps": {"column": "vx_mps", "factor": 0.5}})
+        np.testing.assert_allclose(log["vx_mps"], [10.0, 10.5, 11.0])
+
+    @pytest.mark.parametrize(
+        ("channel", "unit", "factor"),
+        [
+            ("vx_mps", "mph", 0.44704),
+            ("vx_mps", "knots", 0.5144444),
+            ("yaw_rate_radps", "°/s", 0.0174532925),
+            ("ay_mps2", "[g]", 9.80665),
+            ("steer_rad", "deg", 0.0174532925),
+            ("fx_n", "kN", 1000.0),
+            ("fx_n", "lbf", 4.4482216153),
+            ("fx_n", "kgf", 9.80665),
+        ],
+    )
+    def test_table(self, tmp_path: Path, channel: str, unit: str, factor: float) -> None:
+        header = f"{HEADER},fx_n"
+        units = ",".join(unit if name == channel else "[]" for name in header.split(","))
+        path = write(tmp_path, header, units, *(row + ",5" for row in ROWS))
+        with pytest.warns(SysidWarning, match=f"{channel}: the file states"):
+            log = read(path)
+        raw = read(write(tmp_path, header, *(row + ",5" for row in ROWS)))
+        np.testing.assert_allclose(log[channel], factor * raw[channel], rtol=1e-6)
 
     def test_one_that_is_not_known_is_told(self, tmp_path: Path) -> None:
         with pytest.warns(SysidWarning, match=r"vx_mps: .*furlong.*taken as m/s.*channel map"):

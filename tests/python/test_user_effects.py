@@ -363,3 +363,14 @@ def test_effects_are_copied_by_what_they_are() -> None:
         assert copied.columns == mine.columns
     assert copy.deepcopy(known) is pickle.loads(pickle.dumps(known)) is known
     assert b"equation" not in pickle.dumps(known)
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose", "improve"])
+def test_a_file_of_definitions_runs_once_before_anything_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    (tmp_path / "mine.py").write_text("print('defined')\n")
+    rest = [str(tmp_path / "none.csv"), "--vehicle", str(tmp_path / "none.toml")]
+    more = ["--report", str(tmp_path / "out.html")] if command == "improve" else []
+    assert main([command, *rest, *more, "--define", str(tmp_path / "mine.py")]) == 2
+    assert capsys.readouterr().out == "defined\n"

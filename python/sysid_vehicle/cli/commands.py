@@ -55,9 +55,8 @@ def _demo(args: argparse.Namespace, heard: Warnings) -> None:
 def _compare(args: argparse.Namespace, heard: Warnings) -> None:
     refuse_unwritable([args.json], inputs=_inputs(args))
     _define(args)
-    _define(args)
     model = Model(Vehicle.from_toml(args.vehicle), args.effects)
-    logs = _read(args.logs, args.channels)
+    logs = _read(args.logs, args)
     fit = identify(model, logs, progress=_on_terminal())
     comparison = compare(fit, logs)
     failing = where(fit)
@@ -71,6 +70,7 @@ def _compare(args: argparse.Namespace, heard: Warnings) -> None:
 
 def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
     refuse_unwritable([args.json], inputs=_inputs(args))
+    _define(args)
     study = _study(args, heard)
     print(study.test[0])
     print()
@@ -142,8 +142,8 @@ def _define(args: argparse.Namespace) -> None:
 
 def _study(args: argparse.Namespace, heard: Warnings) -> Study:
     model = Model(Vehicle.from_toml(args.vehicle))
-    train = _read(args.logs, args.channels)
-    test = _read(args.test, args.channels) if args.test else None
+    train = _read(args.logs, args)
+    test = _read(args.test, args) if args.test else None
     for path in {p.resolve() for p in args.logs} & {p.resolve() for p in args.test}:
         warn(f"{path.name} is both fitted and held out; the held-out error then proves nothing")
     study = improve(
@@ -164,13 +164,20 @@ def _with_warnings(study: Study, heard: Warnings) -> Study:
     return study.with_warnings(heard)
 
 
-def _read(paths: list[Path], channels: Path | None) -> list[Log]:
-    mapping = None if channels is None else ChannelMap.from_toml(channels)
-    return [read_log(path, mapping) for path in paths]
+def _read(paths: list[Path], args: argparse.Namespace) -> list[Log]:
+    mapping = None if args.channels is None else ChannelMap.from_toml(args.channels)
+    return [read_log(path, mapping, dbc=args.dbc) for path in paths]
 
 
 def _inputs(args: argparse.Namespace) -> list[Path]:
-    given = [*args.logs, args.vehicle, args.channels, *getattr(args, "test", []), *args.define]
+    given = [
+        *args.logs,
+        args.vehicle,
+        args.channels,
+        args.dbc,
+        *getattr(args, "test", []),
+        *args.define,
+    ]
     return [path for path in given if path is not None]
 
 

@@ -10,14 +10,15 @@ from ..lab import Setup
 from ..log import Log
 from ..read import read_log
 from ..vehicle import Vehicle
+from .log_arguments import LOG_HELP, add_reading
 
 __all__ = ["add_log_arguments", "add_vehicle_argument", "files_of", "logs_of", "vehicle_of"]
 
 
 def add_log_arguments(parser: argparse.ArgumentParser) -> None:
     """Ask for logs and how to read them."""
-    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="CSV file of one run")
-    parser.add_argument("--channels", type=Path, metavar="TOML", help="channel map")
+    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help=LOG_HELP)
+    add_reading(parser)
     parser.add_argument(
         "--unchecked",
         action="store_true",
@@ -34,13 +35,15 @@ def add_vehicle_argument(parser: argparse.ArgumentParser) -> None:
 
 def files_of(args: argparse.Namespace) -> list[Path]:
     """Every file that is read, none of which may be written to."""
-    others = [args.channels, getattr(args, "vehicle", None)]
+    others = [args.channels, args.dbc, getattr(args, "vehicle", None)]
     return [*args.logs, *(path for path in others if path is not None)]
 
 
 def logs_of(args: argparse.Namespace) -> list[Log]:
     """Read the logs."""
-    return [read_log(path, args.channels, check=not args.unchecked) for path in args.logs]
+    return [
+        read_log(path, args.channels, dbc=args.dbc, check=not args.unchecked) for path in args.logs
+    ]
 
 
 def vehicle_of(args: argparse.Namespace) -> Vehicle:

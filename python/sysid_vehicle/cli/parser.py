@@ -8,6 +8,7 @@ from pathlib import Path
 from .. import _core
 from ..demo import DEFAULT, RANDOM
 from . import lab, mu_slip, sideslip, twin
+from .log_arguments import LOG_HELP, add_reading
 
 __all__ = ["parse"]
 
@@ -76,13 +77,11 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
 
 
 def _driving(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="CSV file of one run")
+    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help=LOG_HELP)
     parser.add_argument(
         "--vehicle", type=Path, required=True, metavar="TOML", help="the car's own numbers"
     )
-    parser.add_argument(
-        "--channels", type=Path, metavar="TOML", help="channel map, for other column names or units"
-    )
+    add_reading(parser)
     _define(parser)
 
 

@@ -11,6 +11,7 @@ from .._style import svg
 from ..online import KINDS, estimate_sideslip, sideslip_overview
 from ..read import read_log
 from ..vehicle import Vehicle
+from .log_arguments import LOG_HELP, add_reading
 from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_parser", "run"]
@@ -28,13 +29,11 @@ def add_parser(commands: Any) -> None:
         description=_CONTRACT,
         epilog="kinds: " + "; ".join(f"{kind}: {what}" for kind, what in KINDS.items()),
     )
-    parser.add_argument("log", type=Path, metavar="LOG", help="CSV file of one run")
+    parser.add_argument("log", type=Path, metavar="LOG", help=LOG_HELP)
     parser.add_argument(
         "--vehicle", type=Path, required=True, metavar="TOML", help="the car's own numbers"
     )
-    parser.add_argument(
-        "--channels", type=Path, metavar="TOML", help="channel map, for other column names or units"
-    )
+    add_reading(parser)
     parser.add_argument(
         "--kind", choices=sorted(KINDS), default="dual", help="observer (default: %(default)s)"
     )
@@ -45,9 +44,11 @@ def add_parser(commands: Any) -> None:
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Estimate, print, and write what was asked for."""
     refuse_other_suffix(args.plot, ".svg")
-    inputs = [args.log, args.vehicle, *([args.channels] if args.channels is not None else [])]
+    others = [path for path in (args.channels, args.dbc) if path is not None]
+    inputs = [args.log, args.vehicle, *others]
     refuse_unwritable([args.plot, args.json], inputs=inputs)
-    vehicle, log = Vehicle.from_toml(args.vehicle), read_log(args.log, args.channels)
+    vehicle = Vehicle.from_toml(args.vehicle)
+    log = read_log(args.log, args.channels, dbc=args.dbc)
     found = estimate_sideslip(vehicle, log, kind=args.kind)
     print(found)
     if args.plot is not None:

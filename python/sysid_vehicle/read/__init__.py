@@ -1,4 +1,4 @@
-"""Reading log files of any column names into canonical logs."""
+"""Reading logs of any format and any column names into canonical logs."""
 
 from __future__ import annotations
 
@@ -6,33 +6,47 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from .._files import as_path
 from ..errors import InvalidInput, warn
 from ..log import Columns, Log
 from ._channel_map import ChannelMap, Source
 from ._csv import read_table
-from ._table import table_of
+from ._objects import contents_of_object
+from ._recording import Recording
+from ._registry import FORMATS, Format, blamed, read_with, recognised
+from ._table import Table
 
-__all__ = ["ChannelMap", "Source", "read_log"]
+__all__ = ["FORMATS", "ChannelMap", "Format", "Source", "read_log"]
 
 
 def read_log(
-    path: str | Path | Columns,
+    source: str | Path | Columns,
     channels: str | Path | Mapping[str, Any] | ChannelMap | None = None,
     *,
+    dbc: str | Path | None = None,
     name: str | None = None,
     check: bool = True,
 ) -> Log:
-    """Read a driving log from a CSV file, or from columns in memory under other names.
+    """Read a driving log from a file of any known format, or from what is in memory.
+
+    Formats are recognised by what a file begins with: CSV in its dialects (MoTeC's and AiM's among
+    them), VBOX, MATLAB, HDF5, Parquet, Arrow, ASAM MDF, MCAP, ROS bags, and logs of CAN frames.
+    Where a format has a time for each channel, each keeps its own samples: the log has a row for
+    every time, and what is not sampled then is missing there.
 
     Parameters
     ----------
-    path : str, Path or table
-        File whose first line names the columns. An empty cell or ``nan`` is a missing measurement.
-        Lines that begin with ``#`` are comments, a second line may state units, times may be ISO
-        8601 stamps. A dict of arrays or a table (pandas, polars, Arrow) is taken as it is.
+    source : str, Path or table
+        The file, or the folder of a ROS 2 bag. In text the first line names the columns; an empty
+        cell or ``nan`` is a missing measurement, lines that begin with ``#`` are comments, a second
+        line may state units, times may be ISO 8601 stamps. In memory: a dict of arrays, or of pairs
+        of times [s] and values; a table of pandas, polars or Arrow; a data set of xarray.
     channels : str, Path, mapping or ChannelMap, optional
-        Channel map for a file with other column names or units: a TOML file, the content of its
-        ``[channels]`` table, or the map itself.
+        Channel map for a log with other names or units: a TOML file, the content of its
+        ``[channels]`` table, or the map itself. Units that the file states are converted where the
+        map gives no factor.
+    dbc : str or Path, optional
+        Database of the CAN frames that the file holds.
     name : str, optional
         Name of the run; the file name without its suffix otherwise, ``log`` for a table.
     check : bool
@@ -46,7 +60,7 @@ def read_log(
     ------
     InvalidInput
         If the file, the channel map or the data cannot be used; the message names the channel, the
-        sample or line, and the remedy.
+        sample or line, and the remedy. If a library is absent it names the extra that brings it.
 
     Warns
     -----
@@ -61,13 +75,29 @@ def read_log(
         mapping = ChannelMap.from_dict(channels)
     else:
         mapping = ChannelMap.from_toml(channels)
-    run = name if name is not None else Path(path).stem if isinstance(path, (str, Path)) else "log"
+    is_path = isinstance(source, (str, Path))
+    run = name if name is not None else as_path(source).stem if is_path else "log"
+    entry = recognised(as_path(source)) if is_path else None
     notes: list[str] = []
     try:
-        table = read_table(path) if isinstance(path, (str, Path)) else table_of(path)
+        with blamed(entry, source if is_path else run):
+            table = contents(source, dbc, entry)
+            if isinstance(table, Recording):
+                table = mapping.rows_of(table, notes)
         columns = mapping.apply(table, notes)
     except InvalidInput as error:
         raise InvalidInput(f"{run}: {error}") from error
     for note in notes:
         warn(f"{run}: {note}")
     return Log.from_arrays(columns, name=run, despike=mapping.despiked, check=check)
+
+
+def contents(
+    source: str | Path | Columns, dbc: str | Path | None, entry: Format | None
+) -> Table | Recording:
+    """Return what a file or an object holds, under its own names."""
+    if not isinstance(source, (str, Path)):
+        return contents_of_object(source)
+    if entry is None:
+        return read_table(source)
+    return read_with(entry, Path(source), None if dbc is None else as_path(dbc))

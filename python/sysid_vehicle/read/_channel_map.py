@@ -14,8 +14,9 @@ import numpy.typing as npt
 from .._files import read_toml, refuse_unknown
 from ..errors import InvalidInput, near_names
 from ..log import CHANNELS, listed
+from ._recording import Recording
 from ._table import Table
-from ._units import factor_to
+from ._units import WHAT, factor_to, measures, states_nothing
 
 _COMPARED_NAMES = 1000  # near names are sought among so many
 _SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s")
@@ -117,6 +118,22 @@ class ChannelMap:
         """Canonical channels whose one-sample spikes are to be removed."""
         return tuple(channel for channel, source in self.sources.items() if source.despike)
 
+    def rows_of(self, recording: Recording, notes: list[str]) -> Table:
+        """Return the channels of a recording as a table whose rows are their times.
+
+        Raises
+        ------
+        InvalidInput
+            If a source is not there, or if the map gives the time, which each channel has itself.
+        """
+        if "time_s" in self.sources or self.rate_hz is not None:
+            raise InvalidInput(
+                "time_s: every channel of this log has its own time; take time_s out of the "
+                "channel map"
+            )
+        wanted = {channel: source.column for channel, source in self.sources.items()}
+        return recording.table(wanted, self.absent, notes)
+
     def apply(self, table: Table, notes: list[str]) -> dict[str, npt.NDArray[np.float64]]:
         """Return the canonical channels of `table`, then its other numeric columns.
 
@@ -181,20 +198,34 @@ def _earlier(
 
 
 def _stated_factor(table: Table, column: str, channel: str, notes: list[str]) -> float:
-    """Return the factor for the unit that the file states for a column; 1 if it states none."""
+    """Return the factor for the unit that the file states for a column; 1 if it states none.
+
+    Raises
+    ------
+    InvalidInput
+        If the unit is one of another quantity.
+    """
     if column not in table.units or column in table.seconds:
         return 1.0
     unit, si_unit = table.units[column], CHANNELS[channel].unit
     factor = factor_to(si_unit, unit)
+    if factor is None and states_nothing(unit):
+        return 1.0
+    if factor is None and (what := measures(unit)):
+        raise InvalidInput(
+            f"{channel}: the file states '{unit}' for column '{column}', {what}, but the channel "
+            f"is {WHAT[si_unit]} [{si_unit}]; name another column in the channel map, or a factor "
+            f"that makes {si_unit} of it"
+        )
     if factor is None:
         notes.append(
-            f"{channel}: the row of units states '{unit}', which is no known unit for it; it was "
-            f"taken as {si_unit}: put its factor in the channel map"
+            f"{channel}: the file states '{unit}', which is no known unit for it; it was taken as "
+            f"{si_unit}: put its factor in the channel map"
         )
         return 1.0
     if factor != 1.0:
         notes.append(
-            f"{channel}: the row of units states '{unit}' and it was converted; put factor = "
+            f"{channel}: the file states '{unit}' and it was converted; put factor = "
             f"{factor:.7g} for {channel} in the channel map to confirm it"
         )
     return factor

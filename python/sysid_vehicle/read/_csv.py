@@ -27,8 +27,18 @@ def read_table(path: str | Path) -> Table:
     InvalidInput
         If the file cannot be read, has no header or no rows, or a row has the wrong length.
     """
-    text = read_text_table(path).replace("\r\n", "\n").replace("\r", "\n")
-    header, body, first_line = _split(text)
+    return table_of_text(read_text_table(path))
+
+
+def table_of_text(text: str, *, units_row: bool | None = None) -> Table:
+    """Read the text of a CSV file; `units_row` tells whether the second line states units.
+
+    Raises
+    ------
+    InvalidInput
+        As :func:`read_table`.
+    """
+    header, body, first_line = _split(text.replace("\r\n", "\n").replace("\r", "\n"))
     delimiter = max(",;\t", key=header.count)
     _, cells = next(_rows(header, delimiter, 1), (1, []))
     names = tuple(name.strip() for name in cells)
@@ -39,7 +49,7 @@ def read_table(path: str | Path) -> Table:
             f"the first line holds numbers ({', '.join(names[:3])}, ...); put a line with the "
             f"column names before it"
         )
-    units, body, first_line = _units_row(body, delimiter, names, first_line)
+    units, body, first_line = _units_row(body, delimiter, names, first_line, units_row)
     if not body.strip():
         raise InvalidInput("there are no rows below the column names; record the log again")
     # With semicolons or tabs between cells a comma inside a cell is a decimal comma.
@@ -70,7 +80,7 @@ def _split(text: str) -> tuple[str, str, int]:
 
 
 def _units_row(
-    body: str, delimiter: str, names: tuple[str, ...], first_line: int
+    body: str, delimiter: str, names: tuple[str, ...], first_line: int, told_so: bool | None
 ) -> tuple[dict[str, str], str, int]:
     """Take a row of units off the body: no numbers in it, and mostly units that are known."""
     row, _, rest = body.partition("\n")
@@ -79,8 +89,8 @@ def _units_row(
     except InvalidInput:  # is told of where the rows are read
         return {}, body, first_line
     told = [cell.strip() for cell in cells if cell.strip()]
-    known = sum(is_unit(cell) for cell in told)
-    if len(cells) != len(names) or any(map(_is_number, told)) or 2 * known <= len(told):
+    known = 2 * sum(is_unit(cell) for cell in told) > len(told) if told_so is None else told_so
+    if len(cells) != len(names) or any(map(_is_number, told)) or not known:
         return {}, body, first_line
     units = {name: cell.strip() for name, cell in zip(names, cells, strict=True) if cell.strip()}
     return units, rest, first_line + 1

@@ -1,4 +1,4 @@
-"""Files that are no text: what they are by their first bytes, and how to get at their columns."""
+"""Files of text in any encoding, and what files without a reader are by their first bytes."""
 
 from __future__ import annotations
 
@@ -7,19 +7,11 @@ from pathlib import Path
 
 from ..errors import InvalidInput
 
-_GIVE = "and give the table to read_log in place of the path"
 _ARRAYS = "and give a dict of its one-dimensional arrays to read_log in place of the path"
 _EXPORT = "export it as CSV"
 
 # First bytes, what has them, what to do.
 _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
-    (b"PAR1", "a Parquet file", f"read it with pandas.read_parquet {_GIVE}"),
-    (b"ARROW1", "an Arrow file", f"read it with pandas.read_feather {_GIVE}"),
-    (b"MATLAB 5.0 MAT-file", "a MATLAB file", f"load it with scipy.io.loadmat {_ARRAYS}"),
-    (b"\x89HDF\r\n\x1a\n", "an HDF5 file (or MATLAB 7.3)", f"open it with h5py {_ARRAYS}"),
-    (b"MDF     ", "an ASAM MDF file", f"read it with asammdf, MDF(path).to_dataframe(), {_GIVE}"),
-    (b"UnFinMF ", "an unfinished ASAM MDF file", "finish it with the logger's tool, then export"),
-    (b"LOGG", "a Vector BLF file", "decode it with the car's DBC, then export it as CSV"),
     (b"\x93NUMPY", "a NumPy file", f"load it with numpy.load {_ARRAYS}"),
     (b"PK\x03\x04", "a ZIP archive (Excel, .npz, zipped CSV)", f"unpack or load it {_ARRAYS}"),
     (b"\xd0\xcf\x11\xe0", "an old Excel or Office file", _EXPORT),
@@ -28,8 +20,6 @@ _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
     (b"\xfd7zXZ", "an xz archive", "unpack it with unxz"),
     (b"\x28\xb5\x2f\xfd", "a Zstandard archive", "unpack it with unzstd"),
     (b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it"),
-    (b"#ROSBAG V", "a ROS bag", "export its topics as CSV"),
-    (b"SQLite format 3", "an SQLite database (or ROS 2 bag)", "export its table as CSV"),
     (b"TDSm", "a TDMS file", f"read it with nptdms {_ARRAYS}"),
     (b"\x80\x04\x95", "a pickle", f"load it in Python {_ARRAYS}"),
     (b"%PDF", "a PDF document", _EXPORT),

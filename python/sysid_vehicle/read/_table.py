@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -86,6 +87,9 @@ class Table:
 def table_of(data: object) -> Table:
     """Return the columns of a mapping of arrays or of a table in memory (pandas, polars, Arrow).
 
+    An index of times becomes the column ``time_s`` where there is none. Units are taken from the
+    metadata of Arrow's fields, and from ``attrs`` of pandas' columns.
+
     Raises
     ------
     InvalidInput
@@ -95,18 +99,44 @@ def table_of(data: object) -> Table:
     not_numbers: dict[str, BadCell] = {}
     seconds: dict[str, FloatArray] = {}
     pairs = named_columns(data)
+    index = getattr(data, "index", None)
+    if index is not None and "time_s" not in dict(pairs) and _is_time(index):
+        pairs = [("time_s", index), *pairs]
     for name, raw in pairs:
         stamps = as_seconds(raw)
         values = as_floats(raw, name, required=False) if stamps is None else None
         if stamps is not None:
             seconds[name] = stamps
+            if name == "time_s":
+                columns[name] = stamps
         if values is not None:
             columns[name] = values
-        else:
+        elif name not in columns:
             cells = np.asarray(raw, dtype=object).ravel()
             not_numbers[name] = _first_bad(cells)
     n = max((values.size for values in (*columns.values(), *seconds.values())), default=0)
-    return Table(tuple(name for name, _ in pairs), columns, not_numbers, n, {}, seconds)
+    names = tuple(name for name, _ in pairs)
+    return Table(names, columns, not_numbers, n, _stated_units(data, pairs), seconds)
+
+
+def _is_time(index: Any) -> bool:
+    """Tell whether the index of a frame is one of stamps or durations, or says that it is time."""
+    kind = getattr(getattr(index, "dtype", None), "kind", "O")
+    named = str(getattr(index, "name", "")).lower() in ("time", "time_s", "timestamps", "t")
+    return kind in tuple("mM") or (named and kind in tuple("iuf"))
+
+
+def _stated_units(data: object, pairs: list[tuple[str, Any]]) -> dict[str, str]:
+    units: dict[str, str] = {}
+    for entry in getattr(data, "schema", None) or () if hasattr(data, "column_names") else ():
+        told = entry.metadata or {}
+        unit = next((told[key] for key in (b"unit", b"units") if key in told), b"")
+        units[entry.name] = unit.decode("utf-8", errors="replace")
+    for name, raw in pairs:
+        attrs = getattr(raw, "attrs", None)
+        if isinstance(attrs, Mapping):
+            units.setdefault(name, str(attrs.get("units", attrs.get("unit", ""))))
+    return {name: unit for name, unit in units.items() if unit}
 
 
 def _first_bad(cells: npt.NDArray[np.object_]) -> BadCell:

@@ -1,81 +1,129 @@
-"""Units that stand in a row of their own below the column names."""
+"""Units that a file states: what they measure, and their factors to the units of the channels.
+
+One table is all that converts; a unit that it does not have is never guessed.
+"""
 
 from __future__ import annotations
 
 import math
 
 _G = 9.80665
+_DEG = math.pi / 180.0
+_POUND = 0.45359237
 
-# Factor to the SI unit of a canonical channel, by that unit and the text in the file.
-_FACTORS: dict[str, dict[str, float]] = {
+# Factor to the SI unit, by that unit and the text in the file as `plain` gives it.
+FACTORS: dict[str, dict[str, float]] = {
     "s": {
-        "s": 1.0,
-        "sec": 1.0,
-        "second": 1.0,
-        "seconds": 1.0,
-        "ms": 1e-3,
-        "msec": 1e-3,
-        "us": 1e-6,
-        "µs": 1e-6,
-        "μs": 1e-6,
-        "ns": 1e-9,
-        "min": 60.0,
+        **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0),
+        **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
+        **dict.fromkeys(("us", "µs", "μs", "microsecond", "microseconds"), 1e-6),
+        **dict.fromkeys(("ns", "nanosecond", "nanoseconds"), 1e-9),
+        **dict.fromkeys(("min", "minutes"), 60.0),
+        **dict.fromkeys(("h", "hr", "hours"), 3600.0),
     },
     "m/s": {
-        "m/s": 1.0,
-        "mps": 1.0,
-        "km/h": 1.0 / 3.6,
-        "kmh": 1.0 / 3.6,
-        "kph": 1.0 / 3.6,
-        "mph": 0.44704,
+        **dict.fromkeys(("m/s", "mps", "ms-1", "m/sec"), 1.0),
+        **dict.fromkeys(("km/h", "kmh", "kph", "kmph", "km/hr"), 1.0 / 3.6),
+        **dict.fromkeys(("mph", "mi/h", "miles/h"), 0.44704),
         "mm/s": 1e-3,
         "cm/s": 1e-2,
-        "kn": 1852.0 / 3600.0,
-        "knots": 1852.0 / 3600.0,
-        "ft/s": 0.3048,
+        **dict.fromkeys(("kn", "kt", "kts", "knot", "knots"), 1852.0 / 3600.0),
+        **dict.fromkeys(("ft/s", "fps"), 0.3048),
     },
     "rad/s": {
-        "rad/s": 1.0,
-        "radps": 1.0,
-        "deg/s": math.pi / 180.0,
-        "degps": math.pi / 180.0,
-        "dps": math.pi / 180.0,
-        "°/s": math.pi / 180.0,
+        **dict.fromkeys(("rad/s", "radps", "rad/sec", "rads-1"), 1.0),
+        **dict.fromkeys(
+            ("deg/s", "degps", "dps", "°/s", "deg/sec", "degree/s", "degrees/s", "degs-1"), _DEG
+        ),
         "mrad/s": 1e-3,
+        **dict.fromkeys(("rpm", "1/min", "r/min", "rev/min", "min-1"), math.pi / 30.0),
     },
     "m/s2": {
-        "m/s2": 1.0,
-        "mps2": 1.0,
-        "g": _G,
+        **dict.fromkeys(("m/s2", "mps2", "m/s/s", "m/ss", "ms2", "m/sec2"), 1.0),
+        **dict.fromkeys(("g", "gn", "gee"), _G),
         "mg": 1e-3 * _G,
-        "km/h/s": 1.0 / 3.6,
+        **dict.fromkeys(("km/h/s", "kmh/s"), 1.0 / 3.6),
         "ft/s2": 0.3048,
         "cm/s2": 1e-2,
+        "mm/s2": 1e-3,
     },
     "rad": {
-        "rad": 1.0,
+        **dict.fromkeys(("rad", "radian", "radians"), 1.0),
         "mrad": 1e-3,
-        "deg": math.pi / 180.0,
-        "°": math.pi / 180.0,
-        "degree": math.pi / 180.0,
-        "degrees": math.pi / 180.0,
+        **dict.fromkeys(("deg", "°", "degree", "degrees", "grad°"), _DEG),
+        **dict.fromkeys(("gon", "grad"), math.pi / 200.0),
+        **dict.fromkeys(("arcmin", "'"), _DEG / 60.0),
+        **dict.fromkeys(("rev", "revs", "turn", "turns"), 2.0 * math.pi),
     },
-    "N": {"n": 1.0, "kn": 1e3, "dan": 10.0, "lbf": 4.4482216152605},
+    "N": {
+        **dict.fromkeys(("n", "newton", "newtons"), 1.0),
+        "kn": 1e3,
+        "mn": 1e6,
+        "dan": 10.0,
+        **dict.fromkeys(("lbf", "lb", "lbs"), _POUND * _G),
+        **dict.fromkeys(("klbf", "kip"), 1e3 * _POUND * _G),
+        **dict.fromkeys(("kgf", "kp", "kg"), _G),
+    },
+    "kg": {
+        **dict.fromkeys(("kg", "kilogram"), 1.0),
+        **dict.fromkeys(("t", "ton", "tonne"), 1e3),
+        **dict.fromkeys(("lb", "lbs", "lbm", "pound", "pounds"), _POUND),
+        "slug": 14.593902937,
+    },
+    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": 0.3048, "in": 0.0254, "mi": 1609.344},
+    "N m": {"nm": 1.0, "knm": 1e3, "lbft": 1.3558179483, "ftlb": 1.3558179483, "lb-ft": 1.3558},
+    "Pa": {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "bar": 1e5, "mbar": 1e2, "psi": 6894.757},
+    "degC": {"degc": 1.0, "°c": 1.0, "c": 1.0, "degf": 1.0, "°f": 1.0, "f": 1.0, "k": 1.0},
+    "V": {"v": 1.0, "mv": 1e-3, "volt": 1.0, "volts": 1.0},
+    "A": {"a": 1.0, "ma": 1e-3, "amp": 1.0},
+    "Hz": {"hz": 1.0, "khz": 1e3},
+    "%": {"%": 1.0, "percent": 1.0},
 }
-_SEEN = {unit for factors in _FACTORS.values() for unit in factors} | {"-", "1", "%", "bar", "nm"}
+WHAT = {
+    "s": "a time",
+    "m/s": "a speed",
+    "rad/s": "an angular velocity",
+    "m/s2": "an acceleration",
+    "rad": "an angle",
+    "N": "a force",
+    "kg": "a mass",
+    "m": "a length",
+    "N m": "a torque",
+    "Pa": "a pressure",
+    "degC": "a temperature",
+    "V": "a voltage",
+    "A": "a current",
+    "Hz": "a frequency",
+    "%": "a share",
+}
+_NONE = {"", "-", "1", "none", "n/a", "na", "[]", "unitless", "no_unit", "nounit"}
 
 
 def plain(text: str) -> str:
     """Return a unit as it is looked up: without brackets, spaces, powers written in other ways."""
     text = text.strip().strip("[](){}").replace(" ", "").replace("²", "2").replace("^", "")
-    return text.replace("**", "").replace("*", "").replace("s-2", "s2").lower()
+    text = text.replace("**", "").replace("*", "").replace("·", "").replace("s-2", "s2").lower()
+    return {"m/s-2": "m/s2", "ms2": "m/s2"}.get(text, text)
 
 
 def is_unit(text: str) -> bool:
     """Tell whether a cell is a unit that logs of cars have, in brackets or not."""
-    return plain(text) in _SEEN or (text.strip()[:1] in ("[", "(") and len(text.strip()) < 20)
+    there = plain(text)
+    if any(there in factors for factors in FACTORS.values()) or there in _NONE - {""}:
+        return True
+    return text.strip()[:1] in ("[", "(") and len(text.strip()) < 20
+
+
+def states_nothing(text: str) -> bool:
+    """Tell whether a unit is a way to say that there is none."""
+    return plain(text) in _NONE
 
 
 def factor_to(si_unit: str, text: str) -> float | None:
     """Return the factor from the unit in a file to that of a channel; None if it is not known."""
-    return _FACTORS.get(si_unit, {}).get(plain(text))
+    return FACTORS.get(si_unit, {}).get(plain(text))
+
+
+def measures(text: str) -> str:
+    """Return what a unit measures, in words; empty if it is not known."""
+    return next((WHAT[si] for si, factors in FACTORS.items() if plain(text) in factors), "")

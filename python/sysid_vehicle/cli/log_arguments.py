@@ -1,0 +1,18 @@
+"""What every command that reads driving logs may be told."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+__all__ = ["LOG_HELP", "add_reading"]
+
+LOG_HELP = "log of one run: CSV, MDF, MCAP, ROS bag, .mat, .vbo, CAN log, Parquet, ..."
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Ask how the logs are to be read."""
+    parser.add_argument(
+        "--channels", type=Path, metavar="TOML", help="channel map, for other column names or units"
+    )
+    parser.add_argument("--dbc", type=Path, metavar="DBC", help="database of a log of CAN frames")

@@ -1,0 +1,96 @@
+"""Logs of CAN frames, written by python-can, with the database of the car."""
+
+from pathlib import Path
+
+import pytest
+from log_formats import FAST, MAP, SLOW, check_values, measured, read_told
+
+from sysid_vehicle import example_vehicle
+from sysid_vehicle.cli import main
+from sysid_vehicle.errors import InvalidInput
+from sysid_vehicle.read import read_log
+
+pytestmark = pytest.mark.filterwarnings(
+    # What the libraries say of themselves and of each other.
+    "ignore::DeprecationWarning",
+    "ignore::FutureWarning",
+    "ignore::PendingDeprecationWarning",
+    "ignore::ResourceWarning",
+)
+
+DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: ECU
+BO_ 256 Motion: 8 ECU
+ SG_ YawRate : 0|16@1- (0.001,0) [-32|32] "deg/s" ECU
+ SG_ LongAcc : 16|16@1- (0.0001,0) [-3|3] "g" ECU
+ SG_ LatAcc : 32|16@1- (0.0001,0) [-3|3] "g" ECU
+ SG_ Steer : 48|16@1- (0.00001,0) [-0.3|0.3] "rad" ECU
+BO_ 2566914048 Wheels: 2 ECU
+ SG_ Speed : 0|16@1+ (0.01,0) [0|300] "km/h" ECU
+BO_ 768 Never: 1 ECU
+ SG_ Nothing : 0|8@1+ (1,0) [0|1] "" ECU
+"""
+
+
+class TestCan:
+    def write(self, folder: Path, suffix: str) -> tuple[Path, Path]:
+        can, cantools = pytest.importorskip("can"), pytest.importorskip("cantools")
+        dbc, path = folder / "car.dbc", folder / f"run.{suffix}"
+        dbc.write_text(DBC)
+        database = cantools.database.load_file(dbc)
+        frames = []
+        for name, times in (("Motion", FAST), ("Wheels", SLOW)):
+            message = database.get_message_by_name(name)
+            for t in times:
+                values = {s.name: float(measured(t)[s.name]) for s in message.signals}
+                frames.append(
+                    can.Message(
+                        timestamp=1.7e9 + float(t),
+                        arbitration_id=message.frame_id,
+                        is_extended_id=message.is_extended_frame,
+                        data=message.encode(values),
+                    )
+                )
+        with can.Logger(str(path)) as logger:
+            for frame in sorted(frames, key=lambda f: f.timestamp):
+                logger.on_message_received(frame)
+        return path, dbc
+
+    @pytest.mark.parametrize("suffix", ["blf", "asc", "log", "csv", "trc"])
+    def test_logs(self, tmp_path: Path, suffix: str) -> None:
+        path, dbc = self.write(tmp_path, suffix)
+        log = read_told(path, dbc=dbc)
+        check_values(log, atol=0.01)
+        full = {**MAP, "vx_mps": "Wheels.Speed"}
+        check_values(read_told(path, full, dbc=str(dbc)), atol=0.01)
+
+    def test_mdf_of_frames(self, tmp_path: Path) -> None:
+        pytest.importorskip("asammdf")
+        path, dbc = self.write(tmp_path, "mf4")
+        check_values(read_told(path, dbc=dbc), atol=0.01)
+
+    def test_no_database_and_one_of_another_car(self, tmp_path: Path) -> None:
+        path, _ = self.write(tmp_path, "blf")
+        with pytest.raises(InvalidInput, match=r"run\.blf: is a CAN log.*--dbc car\.dbc"):
+            read_log(path, MAP)
+        other = tmp_path / "other.dbc"
+        other.write_text(
+            DBC.replace("256 Motion", "257 Motion").replace("2566914048", "2566914049")
+        )
+        with pytest.raises(InvalidInput, match=r"none of its 2 kinds of frames \(0x100, "):
+            read_log(path, MAP, dbc=other)
+
+
+def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, dbc = TestCan().write(tmp_path, "blf")
+    (tmp_path / "map.toml").write_text(
+        "[channels]\n" + "".join(f'{c} = "{s}"\n' for c, s in MAP.items())
+    )
+    example_vehicle().to_toml(tmp_path / "car.toml")
+    known = ["--vehicle", str(tmp_path / "car.toml"), "--channels", str(tmp_path / "map.toml")]
+    for command in (["compare"], ["lab", "identify"]):
+        assert main([*command, str(path), *known, "--dbc", str(dbc)]) == 2
+        # It was decoded: the four seconds of it are too short a drive.
+        assert "only 4 s of the log can be used" in capsys.readouterr().err
