@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
+from sysid_vehicle.identify.tyre_shape import friction, peak_slip, stiffness, top
 from sysid_vehicle.lab import (
     PUBLISHED_BOX,
     PUBLISHED_START,
@@ -38,7 +39,6 @@ from sysid_vehicle.lab import (
     regress_tyres,
 )
 from sysid_vehicle.lab.tyre_fit import PARAMETERS
-from sysid_vehicle.lab.tyre_shape import friction, peak_slip, stiffness, top
 
 CAR = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6, air_density_kgpm3=1.2929)
 TYRE = np.array([22.0, 1.8, 1.6, 0.8])

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +18,28 @@ from .effects import Effect, Parameter, base_parameters, catalogue, effect
 from .errors import InvalidInput
 from .vehicle import Tyre, Vehicle
 
-__all__ = ["Model", "vehicle_data"]
+__all__ = ["Model", "Setting", "vehicle_data"]
 
 _YAW_INERTIA = "yaw_inertia_kgm2"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a user says of one parameter; None leaves it as the model has it.
+
+    Attributes
+    ----------
+    free : bool, optional
+        Whether driving has to tell it.
+    bounds : tuple of 2 floats, optional
+        Lower and upper bound, within those that the parameter has of itself.
+    prior : tuple of 2 floats, optional
+        Mean and standard deviation of what is known beforehand.
+    """
+
+    free: bool | None = None
+    bounds: tuple[float, float] | None = None
+    prior: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -36,6 +56,9 @@ class Model:
         The effects themselves, as they were defined when the model was made: a model keeps its
         own, whatever is defined or forgotten later. Those of `effects` that are not given here are
         looked up.
+    settings : mapping of str to Setting
+        Which parameters are fixed or free, bounded, or have a prior, by full name; most easily
+        said by `with_fixed`, `with_free`, `with_bounds` and `with_priors`.
     values : mapping of str to float
         Values of parameters by full name (`B_front`, `steer_lag.time_constant_s`), where they
         differ from the vehicle's, or from the null values of effects.
@@ -45,6 +68,7 @@ class Model:
     effects: tuple[str, ...] = ()
     values: Mapping[str, float] = field(default_factory=dict)
     parts: tuple[Effect, ...] = field(default=(), repr=False)
+    settings: Mapping[str, Setting] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         vehicle: object = self.vehicle
@@ -66,11 +90,14 @@ class Model:
         object.__setattr__(self, "parts", tuple(e.seated(taken) for e in found))
         object.__setattr__(self, "values", dict(self.values))
         known = self.names
-        for name in self.values:
+        object.__setattr__(self, "settings", dict(self.settings))
+        for name in (*self.values, *self.settings):
             if name not in known:
                 raise InvalidInput(
                     f"the model has no parameter '{name}'; it has {', '.join(known)}"
                 )
+        for name, told in self.settings.items():
+            self._check_setting(name, told)
 
     def add(self, *names: str | Effect) -> Model:
         """The same model with more effects, at their null values."""
@@ -84,11 +111,65 @@ class Model:
         gone = {n if n in self.effects else effect(n).id for n in names}
         kept = tuple(e for e in self.effects if e not in gone)
         values = {k: v for k, v in self.values.items() if k.split(".")[0] not in gone}
-        return replace(self, effects=kept, values=values)
+        settings = {k: v for k, v in self.settings.items() if k.split(".")[0] not in gone}
+        return replace(self, effects=kept, values=values, settings=settings)
 
     def with_values(self, values: Mapping[str, float]) -> Model:
         """The same model with some parameters at other values."""
         return replace(self, values={**self.values, **values})
+
+    def with_fixed(self, what: Mapping[str, float] | Iterable[str]) -> Model:
+        """The same model with some parameters known: at given values, or where they stand."""
+        values = dict(what) if isinstance(what, Mapping) else {}
+        names = [what] if isinstance(what, str) else list(what)
+        fixed = {n: Setting(free=False) for n in names}
+        return replace(self, values={**self.values, **values}, settings={**self.settings, **fixed})
+
+    def with_free(self, names: Iterable[str]) -> Model:
+        """The same model with some parameters for driving to tell, a known yaw inertia too."""
+        several = [names] if isinstance(names, str) else list(names)
+        return self._with_settings({n: {"free": True} for n in several})
+
+    def with_bounds(self, bounds: Mapping[str, tuple[float, float]]) -> Model:
+        """The same model with narrower bounds of some parameters, (lower, upper)."""
+        return self._with_settings({n: {"bounds": pair} for n, pair in bounds.items()})
+
+    def with_priors(self, priors: Mapping[str, tuple[float, float]]) -> Model:
+        """The same model with some parameters roughly known: (mean, standard deviation)."""
+        return self._with_settings({n: {"prior": pair} for n, pair in priors.items()})
+
+    def _with_settings(self, changes: Mapping[str, Mapping[str, Any]]) -> Model:
+        told = dict(self.settings)
+        for name, change in changes.items():
+            told[name] = replace(told.get(name, Setting()), **change)
+        return replace(self, settings=told)
+
+    def _check_setting(self, name: str, told: Setting) -> None:
+        if (told.bounds or told.prior) and name not in self.free_names:
+            raise InvalidInput(
+                f"{name} has bounds or a prior but is not free; with_free(['{name}']) frees it"
+            )
+        own = self._own_bounds(name)
+        if told.bounds is not None:
+            low, high = told.bounds
+            if not own[0] <= low < high <= own[1]:
+                raise InvalidInput(
+                    f"bounds of {name} are {low:g} .. {high:g}; give (lower, upper) within "
+                    f"{own[0]:g} .. {own[1]:g}"
+                )
+        if told.prior is not None:
+            low, high = self.bounds(name)
+            mean, std = told.prior
+            if not (low <= mean <= high and 0.0 < std < np.inf):
+                raise InvalidInput(
+                    f"the prior of {name} is {mean:g} +- {std:g}; give (mean, standard deviation), "
+                    f"the mean within {low:g} .. {high:g} and the deviation above zero"
+                )
+
+    @property
+    def priors(self) -> dict[str, tuple[float, float]]:
+        """Means and standard deviations of the free parameters that have a prior."""
+        return {n: told.prior for n, told in self.settings.items() if told.prior is not None}
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -105,14 +186,18 @@ class Model:
 
     @property
     def free_names(self) -> tuple[str, ...]:
-        """Parameters that driving has to tell: tyres, effects, and a yaw inertia nobody knows."""
+        """Parameters that driving has to tell.
+
+        Tyres, effects, and a yaw inertia nobody knows, unless `settings` say otherwise.
+        """
         known = self.vehicle.yaw_inertia_kgm2 is not None
-        return tuple(n for n in self.names if not (known and n == _YAW_INERTIA))
+        told = {n: s.free for n, s in self.settings.items() if s.free is not None}
+        return tuple(n for n in self.names if told.get(n, not (known and n == _YAW_INERTIA)))
 
     @property
     def candidates(self) -> tuple[Effect, ...]:
         """Effects of the catalogue that could be added."""
-        unknown_inertia = self.vehicle.yaw_inertia_kgm2 is None
+        unknown_inertia = _YAW_INERTIA in self.free_names
         return self.seated(
             e
             for e in catalogue()
@@ -132,6 +217,10 @@ class Model:
 
     def bounds(self, name: str) -> tuple[float, float]:
         """Lower and upper bound of a parameter."""
+        told = self.settings.get(name, Setting()).bounds
+        return self._own_bounds(name) if told is None else told
+
+    def _own_bounds(self, name: str) -> tuple[float, float]:
         p = self.parameters[name]
         if name == _YAW_INERTIA:
             guess = self._inertia_guess()

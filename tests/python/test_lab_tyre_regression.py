@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from sysid_vehicle.errors import InvalidInput
+from sysid_vehicle.identify.tyre_shape import friction
 from sysid_vehicle.lab import (
     PUBLISHED_BOX,
     PUBLISHED_START,
@@ -13,10 +14,9 @@ from sysid_vehicle.lab import (
     regress_tyres,
 )
 from sysid_vehicle.lab.box import box_of
-from sysid_vehicle.lab.projection import Regression, SoftRows
+from sysid_vehicle.lab.projection import Regression
 from sysid_vehicle.lab.regression_search import RegressionTask
 from sysid_vehicle.lab.tyre_fit import PARAMETERS
-from sysid_vehicle.lab.tyre_shape import friction
 
 CAR = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6)
 FRONT = np.array([22.0, 1.8, 1.6, 0.8])
@@ -127,7 +127,7 @@ def test_joint_loss_prefers_the_likelier_end() -> None:
     told = motion(3000, noise=0.05, seed=3, published=False)
     fit = regress_tyres(CAR, told, loss="joint", starts=8)
     one = np.ones(told.n)
-    loss = told.loss(CAR, one, one, projects_steer=True)
+    loss = told.errors(CAR, one, one, projects_steer=True)
     likelihood = []
     for end in fit.starts.end:
         p = fit.parameters.copy()
@@ -195,10 +195,10 @@ def test_variance_has_a_floor() -> None:
 
 def test_eliminated_parameters_are_the_best_ones() -> None:
     told = motion(noise=0.02, published=True)
-    loss = told.loss(CAR, np.ones(told.n), np.zeros(told.n), projects_steer=False)
+    loss = told.errors(CAR, np.ones(told.n), np.zeros(told.n), projects_steer=False)
     linear = [PARAMETERS.index(n) for n in ("D_front", "D_rear", "P1", "P2", "P3")]
     box = box_of(["D_front", "D_rear", "P1", "P2", "P3"], {})
-    problem = Regression(loss, SoftRows.none(len(PARAMETERS)), linear, box.lower, box.upper)
+    problem = Regression(loss, linear, box.lower, box.upper)
     p = np.array([20.0, 1.7, 1.0, 0.5, 20.0, 1.5, 1.0, 0.0, 0, 0, 0, 1, 1, 0.5])
     full = problem.complete(p)
     least = loss.half_sum_of_squares(full)

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from sysid_vehicle import Log
 from sysid_vehicle.cli import main
 from sysid_vehicle.errors import InvalidInput
+from sysid_vehicle.identify.tyre_shape import look_alike, peak_slip, stiffness, top
 from sysid_vehicle.lab import (
     GreyBoxVehicle,
     TyreFit,
@@ -23,7 +24,6 @@ from sysid_vehicle.lab import (
 from sysid_vehicle.lab.box import BOX, box_of
 from sysid_vehicle.lab.tyre_fit import strongest_correlations
 from sysid_vehicle.lab.tyre_objective import objective_of
-from sysid_vehicle.lab.tyre_shape import look_alike, peak_slip, stiffness, top
 
 CAR = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6)
 TRUTH = {

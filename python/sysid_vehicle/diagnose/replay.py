@@ -17,7 +17,7 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import NumericalError
 from ..estimate import MEASURED, generous
-from ..identify import Fit, free_box, settle
+from ..identify import Fit, free_box, objective_of, settle
 from ..identify.search import Box, minimise
 from ..log import Log
 from ..model import Model
@@ -124,14 +124,13 @@ class Replay:
         p = model.vector()
         frozen = problem.freeze(p, noise.vector())
         _, p = min(self._ends(problem, (p, *self._bent(p)), frozen, box), key=_cost)
+        objective, told = objective_of(model, problem), noise.vector()
         best = -np.inf
         for _ in range(_LOOKS):
-            end, noise, converged = settle(
-                problem, problem, model.vehicle, p, noise, box, rounds=_ROUNDS
-            )
+            end, told, converged = settle(objective, p, told, box, rounds=_ROUNDS)
             if not converged:
                 raise NumericalError("the fit without it does not converge")
-            frozen = problem.freeze(end, noise.vector())
+            frozen = problem.freeze(end, told)
             if frozen.log_likelihood <= best:
                 break
             found, best = end, frozen.log_likelihood

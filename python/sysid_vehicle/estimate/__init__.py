@@ -3,7 +3,14 @@
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
 from .driving import MEASURED, UNITS, Driving, several_logs
 from .filters import FilterRun, FilterState, LateMeasurements, StateFilter, StateModel
-from .noise import NoiseModel, first_guess, generous, learn_noise
+from .noise import (
+    NoiseModel,
+    first_guess,
+    generous,
+    learn_noise,
+    maximise_noise,
+    noise_range,
+)
 
 __all__ = [
     "MEASURED",
@@ -19,8 +26,10 @@ __all__ = [
     "first_guess",
     "generous",
     "learn_noise",
+    "maximise_noise",
     "nees_check",
     "nis_check",
+    "noise_range",
     "several_logs",
     "whiteness_check",
 ]

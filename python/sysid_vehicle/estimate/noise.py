@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from html import escape
+from typing import Protocol
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..vehicle import Vehicle
 from .driving import MEASURED, UNITS, Driving
 from .inputs import white_noise_std
 
-__all__ = ["NoiseModel", "first_guess", "generous", "learn_noise"]
+__all__ = ["NoiseModel", "first_guess", "generous", "learn_noise", "maximise_noise", "noise_range"]
 
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
@@ -106,7 +107,8 @@ def _weight_and_moment(vehicle: Vehicle) -> tuple[float, float]:
     return weight, weight * vehicle.wheelbase_m / 4.0
 
 
-def _limits(vehicle: Vehicle) -> tuple[FloatArray, FloatArray]:
+def noise_range(vehicle: Vehicle) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest noise that is learned, in the core's order."""
     weight, arm = _weight_and_moment(vehicle)
     low = np.concatenate(
         [_SMALLEST, [1e-4, 1e-4, 1e-5], 1e-4 * np.array([weight, weight, arm]), [0.05]]
@@ -114,7 +116,7 @@ def _limits(vehicle: Vehicle) -> tuple[FloatArray, FloatArray]:
     high = np.concatenate(
         [[5.0, 5.0, 1.0, 20.0, 20.0], [2.0, 2.0, 1.0], 0.6 * np.array([weight, weight, arm]), [1.0]]
     )
-    return np.log(low), np.log(high)
+    return as_float64(low), as_float64(high)
 
 
 def first_guess(driving: Driving, vehicle: Vehicle) -> NoiseModel:
@@ -135,14 +137,49 @@ def generous(sensor: Sequence[float], vehicle: Vehicle) -> NoiseModel:
 def learn_noise(
     problem: _core.Problem, p: FloatArray, start: NoiseModel, vehicle: Vehicle, *, rounds: int = 8
 ) -> tuple[NoiseModel, float]:
-    """Noise of maximum likelihood at fixed model parameters, and the log-likelihood.
+    """Noise of maximum likelihood at fixed model parameters, and the log-likelihood."""
+    found, value = maximise_noise(problem, p, start.vector(), *noise_range(vehicle), rounds=rounds)
+    return NoiseModel.from_vector(found), value
+
+
+class _Scored(Protocol):
+    def noise_score(
+        self, p: FloatArray, noise: FloatArray, /
+    ) -> tuple[float, FloatArray, FloatArray]: ...
+
+
+def maximise_noise(
+    problem: _Scored,
+    p: FloatArray,
+    start: FloatArray,
+    lowest: FloatArray,
+    highest: FloatArray,
+    *,
+    rounds: int,
+) -> tuple[FloatArray, float]:
+    """Noise of maximum likelihood at fixed parameters of any model.
 
     Fisher scoring with Levenberg's damping on the logarithms of the noise parameters; the
     likelihood never falls.
+
+    Parameters
+    ----------
+    problem : object with `noise_score`
+        Such as `_core.Problem` and `_core.TyreProblem`.
+    p : array, shape (parameters,)
+    start, lowest, highest : array, shape (noises,)
+        Where to begin, and the range that is searched.
+    rounds : int
+        Most steps.
+
+    Returns
+    -------
+    noise : array, shape (noises,)
+    log_likelihood : float
     """
-    low, high = _limits(vehicle)
-    eta = np.clip(np.log(np.maximum(start.vector(), 1e-12)), low, high)
-    value, gradient, information = problem.noise_score(p, np.exp(eta))
+    low, high = np.log(lowest), np.log(highest)
+    eta = np.clip(np.log(np.maximum(start, 1e-12)), low, high)
+    value, gradient, information = problem.noise_score(p, as_float64(np.exp(eta)))
     damping = 1e-2
     for _ in range(rounds):
         # At a bound, only steps back inside count.
@@ -158,15 +195,15 @@ def learn_noise(
             step[free] = np.clip(np.linalg.solve(system, gradient[free]), -1.5, 1.5)
             trial = np.clip(eta + step, low, high)
             try:
-                trial_value, g, info = problem.noise_score(p, np.exp(trial))
+                there = problem.noise_score(p, as_float64(np.exp(trial)))
             except NumericalError:
-                trial_value = -np.inf
-            if trial_value > value:
-                gained = trial_value - value
-                eta, value, gradient, information = trial, trial_value, g, info
+                there = (-np.inf, gradient, information)
+            if there[0] > value:
+                gained = there[0] - value
+                eta, (value, gradient, information) = trial, there
                 damping = max(damping / 5.0, 1e-6)
                 break
             damping *= 8.0
         if gained < 0.05:
             break
-    return NoiseModel.from_vector(np.exp(eta)), float(value)
+    return as_float64(np.exp(eta)), float(value)

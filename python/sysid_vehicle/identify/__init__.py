@@ -1,9 +1,13 @@
 """Identification of parameters and noise from driving."""
 
-from .fit import Estimate, Fit, Start
-from .identify import free_box, identify, refine, refit, settle
+from .estimates import Estimate
+from .fit import Fit
+from .identify import free_box, identify, objective_of, profile_fit, refine, refit
 from .predictive import Prediction, predict
+from .profile import Profile
 from .search import METHODS
+from .settle import settle
+from .starts import Start, Starts
 from .suspects import explaining
 
 __all__ = [
@@ -11,11 +15,15 @@ __all__ = [
     "Estimate",
     "Fit",
     "Prediction",
+    "Profile",
     "Start",
+    "Starts",
     "explaining",
     "free_box",
     "identify",
+    "objective_of",
     "predict",
+    "profile_fit",
     "refine",
     "refit",
     "settle",

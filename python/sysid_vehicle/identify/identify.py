@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
-from scipy.stats import qmc
-from tqdm import tqdm
 
 from .. import _core
-from .._arrays import FloatArray
-from .._threads import Workers
+from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError, warn
-from ..estimate import Driving, NoiseModel, first_guess, learn_noise
+from ..estimate import Driving, NoiseModel, first_guess, noise_range
 from ..log import Log, check_excitation
 from ..model import Model
-from ..vehicle import Vehicle
-from .fit import Estimate, Fit, Start
+from .estimates import INTERVALS, box_covariance, wald, with_profiles
+from .fit import Fit
+from .objective import Objective, gaussian_prior
+from .profile import profile_all
 from .search import METHODS, Box, minimise
+from .settle import settle, settle_finely
+from .starts import Runner, Starts, space_filling
 from .suspects import explaining
 
-__all__ = ["identify", "refine", "refit"]
+__all__ = ["free_box", "identify", "objective_of", "profile_fit", "refine", "refit"]
 
 _THINNED = 3000  # samples that decide between starts
-_SAME_OPTIMUM = 1.0  # nats
+_BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 
 
 @explaining
@@ -33,6 +36,10 @@ def identify(
     *,
     starts: int = 12,
     method: str = "gauss-newton",
+    fixed: Mapping[str, float] | Iterable[str] = (),
+    bounds: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    priors: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    intervals: str = "information",
     seed: int = 0,
     workers: int = 2,
     progress: bool = False,
@@ -52,6 +59,15 @@ def identify(
         Number of starts; the others fill the box of the parameters evenly (Sobol sequence).
     method : str
         Local optimiser: `gauss-newton`, `nlopt` or `scipy`.
+    fixed : mapping of str to float, or names
+        Parameters that are known, with their values; at the model's values where only named.
+    bounds : mapping of str to (lower, upper)
+        Narrower bounds of free parameters.
+    priors : mapping of str to (mean, standard deviation)
+        What is known of free parameters beforehand, as normal distributions.
+    intervals : str
+        `information`: 95 % intervals from the information matrix. `profile`: from the profile
+        likelihood, which follows bent valleys and takes some tens of searches.
     seed : int
         Of the start points.
     workers : int
@@ -66,53 +82,68 @@ def identify(
     Raises
     ------
     InvalidInput
-        Unknown method, no starts or workers, a negative seed, or nothing usable in the logs.
+        Unknown method, intervals or parameter, bounds or priors that contradict each other, no
+        free parameter, no starts or workers, a negative seed, or nothing usable in the logs.
     NumericalError
         No start led anywhere.
     """
     if method not in METHODS:
         raise InvalidInput(f"no optimiser is called '{method}'; there are {', '.join(METHODS)}")
+    if intervals not in INTERVALS:
+        raise InvalidInput(f"intervals = '{intervals}'; there are {', '.join(INTERVALS)}")
+    model = _told(model, fixed, bounds, priors)
     driving = Driving.of(logs)
     check_excitation(list(driving.logs))
     _say_what_is_not_seen(model, driving)
-    names = list(model.free_names)
+    names = model.free_names
     box = free_box(model)
     p = model.vector()
     noise = first_guess(driving, model.vehicle)
-    thin = driving.problem(model, most_samples=_THINNED)
+    thin = objective_of(model, driving.problem(model, most_samples=_THINNED))
     frozen = thin.freeze(p, noise.vector())
-    begins = _start_points(model, names, box, starts, seed)
+    # Up to this the log-likelihood is minus half the sum of squares.
+    level = frozen.log_likelihood + thin.problem.half_sum_of_squares(p, frozen)
 
     def search(begin: FloatArray) -> tuple[FloatArray, float]:
-        full = p.copy()
-        full[box.columns] = begin
-        try:
-            found = minimise(thin, full, frozen, box, method=method, tolerance=0.1)
-        except (NumericalError, np.linalg.LinAlgError):
-            return begin, np.inf
-        return found.x, found.cost
+        end = begin.copy()
+        found = minimise(thin, begin, frozen, box, method=method, tolerance=0.1)
+        end[box.columns] = found.x
+        return end, level - found.cost
 
-    with Workers(workers) as pool:
-        ends = list(
-            tqdm(pool.map(search, begins), total=len(begins), desc="starts", disable=not progress)
-        )
-    costs = np.array([cost for _, cost in ends])
-    if not np.isfinite(costs).any():
+    begins = np.tile(p, (starts, 1))
+    begins[:, box.columns] = _start_points(model, names, box, starts, seed)
+    ends, values = Runner(box, workers, progress).all_of(search, as_float64(begins))
+    if not np.isfinite(values).any():
         raise NumericalError(
             f"{', '.join(log.name for log in driving.logs)}: no start led to a finite likelihood"
         )
-    best = int(np.nanargmin(costs))
-    table = tuple(
-        Start(
-            dict(zip(names, map(float, begin), strict=True)),
-            dict(zip(names, map(float, end), strict=True)),
-            float(cost),
-            bool(cost < costs[best] + _SAME_OPTIMUM),
-        )
-        for begin, (end, cost) in zip(begins, ends, strict=True)
+    table = Starts(
+        names, as_float64(begins[:, box.columns]), as_float64(ends[:, box.columns]), values
     )
-    p[box.columns] = ends[best][0]
-    return _polish(model, driving, p, noise, box, names, table)
+    fit = _polish(model, driving, ends[int(np.argmax(values))], noise, table)
+    if intervals == "profile":
+        return profile_fit(fit, workers=workers, progress=progress)
+    return fit
+
+
+def _told(
+    model: Model,
+    fixed: Mapping[str, float] | Iterable[str],
+    bounds: Mapping[str, tuple[float, float]],
+    priors: Mapping[str, tuple[float, float]],
+) -> Model:
+    model = model.with_fixed(fixed).with_bounds(bounds).with_priors(priors)
+    if not model.free_names:
+        raise InvalidInput("every parameter is fixed: nothing is left to identify; use compare")
+    return model
+
+
+def objective_of(model: Model, problem: _core.Problem) -> Objective:
+    """The likelihood of a problem with the priors of a model's free parameters."""
+    known = model.parameters
+    stated = {known[n].column: prior for n, prior in model.priors.items()}
+    prior = gaussian_prior(_core.PARAMETERS, stated)
+    return Objective(problem, prior, *noise_range(model.vehicle))
 
 
 def refine(
@@ -125,26 +156,52 @@ def refine(
     inputs : array, shape (samples, 2), optional
         In place of the driving's own steering angle and wheel force.
     """
-    names = list(model.free_names)
-    p = model.vector()
-    return _polish(model, driving, p, noise, free_box(model), names, (), inputs)
+    return _polish(model, driving, model.vector(), noise, Starts.none(model.free_names), inputs)
 
 
 def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3) -> Fit:
     """Parameters alone, from a model's values, under a noise model that stays as it is."""
-    names = list(model.free_names)
     box = free_box(model)
-    problem = driving.problem(model)
+    objective = objective_of(model, driving.problem(model))
     p = model.vector()
     p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
     for _ in range(rounds):
-        frozen = problem.freeze(p, noise.vector())
-        found = minimise(problem, p, frozen, box, rounds=8, tolerance=0.2)
+        frozen = objective.freeze(p, noise.vector())
+        found = minimise(objective, p, frozen, box, rounds=8, tolerance=0.2)
         moved = np.abs(found.x - p[box.columns])
         p[box.columns] = found.x
         if np.all(moved < 1e-4 * (box.upper - box.lower)):
             break
-    return _summary(model, driving, problem, p, noise, box, names, (), True)
+    return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True)
+
+
+def profile_fit(fit: Fit, *, workers: int = 2, progress: bool = False) -> Fit:
+    """The same fit at the very bottom of its valley, with intervals of the profile likelihood.
+
+    Where a profile comes upon a better optimum the fit goes on from there.
+    """
+    objective = objective_of(fit.model, fit.driving.problem(fit.model))
+    box = free_box(fit.model)
+    p, noise = fit.model.vector(), fit.noise.vector()
+    for _ in range(_BETTER_FOUND):
+        p, noise, _ = settle_finely(objective, p, noise, box)
+        told = NoiseModel.from_vector(noise)
+        fit = _summary(fit.model, fit.driving, objective, p, told, fit.starts, fit.converged)
+        profiles, better = profile_all(
+            objective,
+            p,
+            objective.freeze(p, noise),
+            box,
+            fit.covariance,
+            list(fit.quantities.values()),
+            workers=workers,
+            progress=progress,
+        )
+        if better is None:
+            break
+        p = better
+    estimates = with_profiles(fit.estimates, profiles[: len(fit.estimates)], box)
+    return replace(fit, estimates=estimates, profiles=profiles)
 
 
 def free_box(model: Model) -> Box:
@@ -166,30 +223,22 @@ _USUAL = {"B": (4.0, 25.0), "C": (1.0, 2.0), "D": (0.5, 1.8), "E": (-2.0, 0.9)}
 
 
 def _start_points(
-    model: Model, names: list[str], box: Box, starts: int, seed: int
-) -> list[FloatArray]:
+    model: Model, names: Sequence[str], box: Box, starts: int, seed: int
+) -> FloatArray:
     given = np.clip([model.value(n) for n in names], box.lower, box.upper)
+    low, high = given.copy(), given.copy()
     for i, n in enumerate(names):
-        if "." in n and model.value(n) == model.parameters[n].null_value:
+        if n[0] in _USUAL and n[1] == "_":
+            low[i], high[i] = _USUAL[n[0]]
+        elif "." in n:
             p = model.parameters[n]
-            given[i] = np.clip(p.null_value + 0.3 * p.typical, box.lower[i], box.upper[i])
-    points = [given]
-    if starts > 1:
-        size = 1 << (starts - 2).bit_length() if starts > 2 else 1
-        unit = qmc.Sobol(len(names), seed=seed).random(size)[: starts - 1]
-        for u in unit:
-            x = given.copy()
-            for i, n in enumerate(names):
-                if n[0] in _USUAL and n[1] == "_":
-                    low, high = _USUAL[n[0]]
-                    x[i] = low + u[i] * (high - low)
-                elif "." in n:
-                    p = model.parameters[n]
-                    x[i] = p.null_value + (2.0 * u[i] - (0.0 if p.one_sided else 1.0)) * p.typical
-                else:
-                    x[i] = given[i] * 2.0 ** (2.0 * u[i] - 1.0)
-            points.append(np.clip(x, box.lower, box.upper))
-    return points
+            if model.value(n) == p.null_value:
+                given[i] = p.null_value + 0.3 * p.typical
+            low[i] = p.null_value - (0.0 if p.one_sided else p.typical)
+            high[i] = p.null_value + (2.0 if p.one_sided else 1.0) * p.typical
+        else:
+            low[i], high[i] = 0.5 * given[i], 2.0 * given[i]
+    return np.clip(space_filling(given, low, high, starts, seed), box.lower, box.upper)
 
 
 def _polish(
@@ -197,99 +246,46 @@ def _polish(
     driving: Driving,
     p: FloatArray,
     noise: NoiseModel,
-    box: Box,
-    names: list[str],
-    starts: tuple[Start, ...],
+    starts: Starts,
     inputs: FloatArray | None = None,
 ) -> Fit:
     """Noise and parameters of maximum likelihood, from values that are already near."""
-    problem = driving.problem(model, other_inputs=inputs)
+    objective = objective_of(model, driving.problem(model, other_inputs=inputs))
     # Noise needs fewer samples than parameters do; the last word has all of them.
     thin = driving.problem(model, most_samples=_THINNED, other_inputs=inputs)
-    p, noise, converged = settle(problem, thin, model.vehicle, p, noise, box)
-    noise, _ = learn_noise(problem, p, noise, model.vehicle, rounds=1)
-    return _summary(model, driving, problem, p, noise, box, names, starts, converged)
-
-
-def settle(
-    problem: _core.Problem,
-    thin: _core.Problem,
-    vehicle: Vehicle,
-    p: FloatArray,
-    noise: NoiseModel,
-    box: Box,
-    *,
-    rounds: int = 10,
-) -> tuple[FloatArray, NoiseModel, bool]:
-    """Alternate between noise, learned on `thin`, and parameters until the likelihood stands still.
-
-    Returns
-    -------
-    tuple of array, NoiseModel and bool
-        The core's parameter vector, the noise, and whether it came to a stand.
-    """
-    p = p.copy()
-    p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
-    best = -np.inf
-    for round_ in range(rounds):
-        noise, _ = learn_noise(thin, p, noise, vehicle, rounds=6 if round_ == 0 else 3)
-        frozen = problem.freeze(p, noise.vector())
-        if frozen.log_likelihood < best + 0.5:
-            return p, noise, True
-        best = frozen.log_likelihood
-        p[box.columns] = minimise(problem, p, frozen, box, rounds=8, tolerance=0.05).x
-    return p, noise, False
+    p, found, converged = settle(
+        objective, p, noise.vector(), free_box(model), thin=replace(objective, problem=thin)
+    )
+    found, _ = objective.learn_noise(p, found, rounds=1)
+    told = NoiseModel.from_vector(found)
+    return _summary(model, driving, objective, p, told, starts, converged)
 
 
 def _summary(
     model: Model,
     driving: Driving,
-    problem: _core.Problem,
+    objective: Objective,
     p: FloatArray,
     noise: NoiseModel,
-    box: Box,
-    names: list[str],
-    starts: tuple[Start, ...],
+    starts: Starts,
     converged: bool,
 ) -> Fit:
-    frozen = problem.freeze(p, noise.vector())
-    _, _, information = problem.normal_equations(p, frozen, box.columns)
-    estimates, covariance = _estimates(model, p, box, names, information)
+    box, names = free_box(model), model.free_names
+    frozen = objective.freeze(p, noise.vector())
+    _, _, information = objective.normal_equations(p, frozen, box.columns)
+    x = p[box.columns]
+    covariance = box_covariance(information, box, x)
+    units = {n: parameter.unit for n, parameter in model.parameters.items()}
     return Fit(
-        model.with_values(dict(zip(names, map(float, p[box.columns]), strict=True))),
+        model.with_values(dict(zip(names, map(float, x), strict=True))),
         noise,
-        estimates,
+        wald(names, units, x, covariance, box),
         covariance,
         float(frozen.log_likelihood),
         driving,
         starts,
         converged,
     )
-
-
-def _estimates(
-    model: Model, p: FloatArray, box: Box, names: list[str], information: FloatArray
-) -> tuple[tuple[Estimate, ...], FloatArray]:
-    x = p[box.columns]
-    margin = 1e-6 * (box.upper - box.lower)
-    at_bound = (x <= box.lower + margin) | (x >= box.upper - margin)
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    free = ~at_bound & (np.diag(information) > 0.0)  # of what is never felt nothing is known
-    covariance = np.zeros_like(information)
-    if free.any():
-        scaled = information[np.ix_(free, free)] / np.outer(scale[free], scale[free])
-        values, vectors = np.linalg.eigh(scaled)
-        values = np.maximum(values, 1e-12)
-        inverse = (vectors / values) @ vectors.T
-        covariance[np.ix_(free, free)] = inverse / np.outer(scale[free], scale[free])
-    estimates = []
-    for i, n in enumerate(names):
-        std = float(np.sqrt(covariance[i, i])) if free[i] else float("inf")
-        # Uniform over the whole box has a standard deviation of 29 % of it: nothing was learned.
-        unknown = std > 0.25 * (box.upper[i] - box.lower[i])
-        note = "at bound" if at_bound[i] else "not determined" if unknown else ""
-        estimates.append(Estimate(n, float(x[i]), std, model.parameters[n].unit, note))
-    return tuple(estimates), covariance
 
 
 def _say_what_is_not_seen(model: Model, driving: Driving) -> None:

@@ -12,8 +12,7 @@ Association 1986). Where the fitted driving determines every parameter, p is p^.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import cast
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,7 +21,8 @@ from .._arrays import FloatArray, as_float64
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from .fit import Fit
-from .identify import free_box
+from .identify import free_box, objective_of
+from .objective import Penalised
 from .search import Box, minimise
 
 __all__ = ["Prediction", "predict"]
@@ -34,7 +34,7 @@ _SETTLED = 1e-4  # the same: along the valley of one B C D many small steps lead
 
 @dataclass(frozen=True)
 class _Remembered:
-    """The misfit on other driving, and what it costs to leave the parameters of the fit.
+    """What it costs to leave the parameters of the fit.
 
     The fit is remembered as a parabola. To ask its driving anew for every step takes a study 1.4
     times as long, and the exam named more wrong effects where the right one was no candidate.
@@ -42,45 +42,38 @@ class _Remembered:
     B C D, lie on a straight line.
     """
 
-    problem: _core.Problem
     box: Box
     fitted: FloatArray
-    information: FloatArray
+    root: FloatArray  # upper triangular; its square is the information
+
+    @property
+    def information(self) -> FloatArray:
+        """Of the fit, in these coordinates."""
+        return as_float64(self.root.T @ self.root)
 
     def units(self, x: FloatArray) -> FloatArray:
         """How much of a parameter is one of its coordinate."""
         return np.where(self.box.lower > 0.0, x, 1.0)
 
-    def off(self, x: FloatArray) -> FloatArray:
-        """How far parameters are from the fit."""
+    def __call__(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """How far parameters are from the fit, in its standard errors, as residuals."""
+        x = p[self.box.columns]
         positive = self.box.lower > 0.0
         ratio = np.where(positive, x, 1.0) / np.where(positive, self.fitted, 1.0)
-        return np.where(positive, np.log(ratio), x - self.fitted)
+        off = np.where(positive, np.log(ratio), x - self.fitted)
+        slopes = np.zeros((len(x), len(p)))
+        slopes[:, self.box.columns] = self.root / self.units(x)
+        return as_float64(-self.root @ off), slopes
 
-    def price(self, p: FloatArray) -> float:
-        off = self.off(p[self.box.columns])
-        return float(0.5 * off @ self.information @ off)
-
-    def half_sum_of_squares(self, p: FloatArray, frozen: _core.FrozenFilter) -> float:
-        return self.problem.half_sum_of_squares(p, frozen) + self.price(p)
-
-    def normal_equations(
-        self, p: FloatArray, frozen: _core.FrozenFilter, columns: list[int]
-    ) -> tuple[float, FloatArray, FloatArray]:
-        cost, descent, information = self.problem.normal_equations(p, frozen, columns)
-        units = self.units(p[columns])
-        pull = self.information @ self.off(p[columns]) / units
-        known = self.information / np.outer(units, units)
-        return cost + self.price(p), descent - pull, information + known
-
-    def occam(self, p: FloatArray, frozen: _core.FrozenFilter) -> float:
+    def occam(self, problem: _core.Problem, p: FloatArray, frozen: _core.FrozenFilter) -> float:
         """Half the log of by how much the other driving narrows the parameters down."""
-        _, _, learnt = self.problem.normal_equations(p, frozen, self.box.columns)
+        _, _, learnt = problem.normal_equations(p, frozen, self.box.columns)
         units = self.units(p[self.box.columns])
-        scale = np.sqrt(np.diag(self.information))
+        known = self.information
+        scale = np.sqrt(np.diag(known))
         before, after = (
             np.linalg.slogdet(m / np.outer(scale, scale))[1]
-            for m in (self.information, self.information + learnt * np.outer(units, units))
+            for m in (known, known + learnt * np.outer(units, units))
         )
         return float(0.5 * (after - before))
 
@@ -125,39 +118,42 @@ def predict(fit: Fit, driving: Driving, noise: NoiseModel) -> Prediction:
     NumericalError
         The model fails on the other driving.
     """
-    other = _remembered(fit, driving)
-    box, p = other.box, fit.model.vector()
-    frozen = other.problem.freeze(p, noise.vector())
+    remembered = _remembered(fit)
+    box, p = remembered.box, fit.model.vector()
+    problem = driving.problem(fit.model)
+    other = Penalised(problem, (remembered,))
+    frozen = problem.freeze(p, noise.vector())
     best = frozen.log_likelihood
     for _ in range(_PASSES):
         trial = p.copy()
-        trial[box.columns] = minimise(
-            cast(_core.Problem, other), p, frozen, box, rounds=_ROUNDS, tolerance=_SETTLED
-        ).x
-        moved = other.problem.freeze(trial, noise.vector())
-        reached = moved.log_likelihood - other.price(trial)
+        trial[box.columns] = minimise(other, p, frozen, box, rounds=_ROUNDS, tolerance=_SETTLED).x
+        moved = problem.freeze(trial, noise.vector())
+        reached = moved.log_likelihood - other.prior_cost(trial)
         gained = reached - best
         if gained > 0.0:
             p, frozen, best = trial, moved, reached
         if gained < _ENOUGH:
             break
-    trace = other.problem.trace(p, noise.vector(), False)
+    trace = problem.trace(p, noise.vector(), False)
     density = -0.5 * np.sum(trace["whitened"] ** 2, axis=1) + trace["log_density"]
-    density -= (other.price(p) + other.occam(p, frozen)) / len(density)
+    density -= (other.prior_cost(p) + remembered.occam(problem, p, frozen)) / len(density)
     return Prediction(
         fit.model.from_vector(p), as_float64(density), float(np.mean(trace["log_density"]))
     )
 
 
-def _remembered(fit: Fit, driving: Driving) -> _Remembered:
+def _remembered(fit: Fit) -> _Remembered:
     """What the fitted driving told; of what it did not show, what the parameters' bounds tell."""
     box = free_box(fit.model)
     p = fit.model.vector()
-    problem = fit.driving.problem(fit.model)
-    _, _, information = problem.normal_equations(
-        p, problem.freeze(p, fit.noise.vector()), box.columns
+    objective = objective_of(fit.model, fit.driving.problem(fit.model))
+    _, _, information = objective.normal_equations(
+        p, objective.freeze(p, fit.noise.vector()), box.columns
     )
     information = information + np.diag(12.0 / (box.upper - box.lower) ** 2)
-    other = _Remembered(driving.problem(fit.model), box, p[box.columns], information)
-    units = other.units(other.fitted)
-    return replace(other, information=as_float64(information * np.outer(units, units)))
+    units = np.where(box.lower > 0.0, p[box.columns], 1.0)
+    scaled = information * np.outer(units, units)
+    size = np.sqrt(np.diag(scaled))
+    # A root of what is scaled to ones loses no digits to units.
+    root = np.linalg.cholesky(scaled / np.outer(size, size)).T * size
+    return _Remembered(box, p[box.columns], as_float64(root))

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
 from .. import _core
 from .._arrays import FloatArray
+from .objective import Problem
 
 __all__ = ["METHODS", "Box", "Outcome", "minimise"]
 
@@ -36,9 +38,9 @@ class Outcome:
 
 
 def minimise(
-    problem: _core.Problem,
+    problem: Problem,
     p: FloatArray,
-    frozen: _core.FrozenFilter,
+    frozen: Any,
     box: Box,
     *,
     method: str = "gauss-newton",
@@ -60,9 +62,9 @@ def _filled(p: FloatArray, box: Box, x: FloatArray) -> FloatArray:
 
 
 def _gauss_newton(
-    problem: _core.Problem,
+    problem: Problem,
     p: FloatArray,
-    frozen: _core.FrozenFilter,
+    frozen: Any,
     box: Box,
     rounds: int,
     tolerance: float,
@@ -124,9 +126,9 @@ def _step(
 
 
 def _nlopt(
-    problem: _core.Problem,
+    problem: Problem,
     p: FloatArray,
-    frozen: _core.FrozenFilter,
+    frozen: Any,
     box: Box,
     rounds: int,
     tolerance: float,
@@ -165,9 +167,9 @@ def _nlopt(
 
 
 def _scipy(
-    problem: _core.Problem,
+    problem: Problem,
     p: FloatArray,
-    frozen: _core.FrozenFilter,
+    frozen: Any,
     box: Box,
     rounds: int,
     tolerance: float,
@@ -186,6 +188,6 @@ def _scipy(
     return Outcome(found.x, float(found.cost), bool(found.status > 0))
 
 
-_Method = Callable[[_core.Problem, FloatArray, _core.FrozenFilter, Box, int, float], Outcome]
+_Method = Callable[[Problem, FloatArray, Any, Box, int, float], Outcome]
 METHODS: dict[str, _Method] = {"gauss-newton": _gauss_newton, "nlopt": _nlopt, "scipy": _scipy}
 """The local optimisers there are to choose from."""

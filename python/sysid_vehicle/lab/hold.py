@@ -9,9 +9,8 @@ import numpy as np
 from .._arrays import FloatArray
 from .._text import number
 from ..errors import InvalidInput, near_names
+from ..identify.profile import LEVEL, lost_at
 from .box import box_of
-from .profile import LEVEL, Quantity, lost_at
-from .summary import quantities
 from .tyre_fit import TyreFit
 from .tyre_objective import objective_of
 
@@ -71,7 +70,7 @@ def hold_value(fit: TyreFit, name: str, value: float) -> HeldValue:
         No estimate is called `name`, or the value is not finite or outside the search box.
     """
     names = [e.name for e in fit.estimates]
-    known = {q.name: q for q in quantities(names)}
+    known = fit.quantities
     if name not in known:
         raise InvalidInput(f"there is no estimate '{name}'{near_names(name, tuple(known))}")
     what = known[name]
@@ -86,15 +85,15 @@ def hold_value(fit: TyreFit, name: str, value: float) -> HeldValue:
     elif not np.isfinite(value):
         raise InvalidInput(f"{name} = {value} is not a number")
     objective = objective_of(fit.vehicle, fit.logs)
-    gains = objective.problem.freeze(fit.parameters, fit.noise)
+    gains = objective.freeze(fit.parameters, fit.noise)
     best = objective.half_sum_of_squares(fit.parameters, gains)
     valleys = [
         (fit.parameters, fit.covariance),
         *((r.parameters, r.covariance) for r in fit.rivals),
     ]
 
-    def lost(p: FloatArray, covariance: FloatArray, what: Quantity) -> float:
+    def lost(p: FloatArray, covariance: FloatArray) -> float:
         return lost_at(objective, p, gains, box, covariance, what, value, best)
 
     with np.errstate(over="ignore", invalid="ignore"):
-        return HeldValue(name, value, max(min(lost(p, c, what) for p, c in valleys), 0.0))
+        return HeldValue(name, value, max(min(lost(p, c) for p, c in valleys), 0.0))

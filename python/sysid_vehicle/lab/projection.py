@@ -11,23 +11,10 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import lsq_linear
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
+from ..identify.objective import Problem
 
-__all__ = ["Regression", "SoftRows"]
-
-
-@dataclass(frozen=True)
-class SoftRows:
-    """Wishes that are linear in the parameters: residuals `target - rows @ p`."""
-
-    rows: FloatArray
-    target: FloatArray
-
-    @classmethod
-    def none(cls, parameters: int) -> SoftRows:
-        """Make no wish at all."""
-        return cls(np.zeros((0, parameters)), np.zeros(0))
+__all__ = ["Regression"]
 
 
 @dataclass
@@ -36,16 +23,14 @@ class Regression:
 
     Parameters
     ----------
-    loss : TyreLoss
-    soft : SoftRows
+    loss : Problem
     linear : list of int
         Parameters that are eliminated; empty to search for all.
     lower, upper : array, shape (linear,)
         Their bounds.
     """
 
-    loss: _core.TyreLoss
-    soft: SoftRows
+    loss: Problem
     linear: list[int]
     lower: FloatArray
     upper: FloatArray
@@ -63,11 +48,11 @@ class Regression:
 
     def _completed(self, p: FloatArray) -> tuple[FloatArray, float]:
         if not self.linear:
-            return p, self._cost(p)
+            return p, self.loss.half_sum_of_squares(p, None)
         key = p.tobytes()
         if self._last is not None and self._last[0] == key:
             return self._last[1], self._last[2]
-        cost, gradient, information = self._normal(p, self.linear)
+        cost, gradient, information = self.loss.normal_equations(p, None, self.linear)
         step = _bounded(
             information, gradient, self.lower - p[self.linear], self.upper - p[self.linear]
         )
@@ -76,20 +61,6 @@ class Regression:
         cost += float(0.5 * step @ information @ step - gradient @ step)
         self._last = (key, full, cost)
         return full, cost
-
-    def _cost(self, p: FloatArray) -> float:
-        wished = self.soft.target - self.soft.rows @ p
-        return self.loss.half_sum_of_squares(p) + 0.5 * float(wished @ wished)
-
-    def _normal(self, p: FloatArray, columns: list[int]) -> tuple[float, FloatArray, FloatArray]:
-        cost, gradient, information = self.loss.normal_equations(p, columns)
-        if len(self.soft.target):
-            wished = self.soft.target - self.soft.rows @ p
-            some = self.soft.rows[:, columns]
-            cost += 0.5 * float(wished @ wished)
-            gradient = gradient + some.T @ wished
-            information = information + some.T @ some
-        return cost, gradient, information
 
     def half_sum_of_squares(self, p: FloatArray, _: object = None) -> float:
         """Half the sum of squares alone."""
@@ -110,7 +81,7 @@ class Regression:
         """Half the sum of squares, direction of descent, Gauss-Newton matrix, after elimination."""
         full, _cost = self._completed(p)
         linear = self._free(full)
-        cost, gradient, information = self._normal(full, [*columns, *linear])
+        cost, gradient, information = self.loss.normal_equations(full, None, [*columns, *linear])
         n = len(columns)
         if not linear:
             return cost, gradient, information
@@ -124,16 +95,14 @@ class Regression:
 
     def residuals(self, p: FloatArray, _: object = None) -> FloatArray:
         """All residuals, those of the wishes last."""
-        full, _cost = self._completed(p)
-        wished = self.soft.target - self.soft.rows @ full
-        return np.concatenate([self.loss.residuals(full).ravel(), wished])
+        return self.loss.residuals(self._completed(p)[0], None).ravel()
 
     def sensitivities(self, p: FloatArray, _: object, columns: list[int]) -> FloatArray:
         """Minus the derivatives of the residuals, after elimination."""
         full, _cost = self._completed(p)
         linear = self._free(full)
         every = [*columns, *linear]
-        by = np.vstack([self.loss.sensitivities(full, every), self.soft.rows[:, every]])
+        by = self.loss.sensitivities(full, None, every)
         n = len(columns)
         if not linear:
             return as_float64(by)

@@ -10,10 +10,10 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from .._text import html_paragraph, html_table, number, text_table
 from ..errors import InvalidInput
-from ..identify import METHODS
+from ..identify.search import METHODS
+from ..identify.starts import Starts, space_filling
 from .box import BOX, GIVEN, box_of, first_point
 from .motion import TyreMotion
-from .multistart import Ends, start_points
 from .regression_search import RegressionTask, search
 from .tyre_data import GreyBoxVehicle
 from .tyre_fit import PARAMETERS
@@ -50,7 +50,7 @@ class TyreRegression:
         All of `lab.tyre_fit.PARAMETERS`.
     value : float
         The loss there, summed over all samples.
-    starts : Ends
+    starts : Starts
         With minus half the loss in place of the log-likelihood; for the joint loss, whose weights
         are worked out at every end, the log-likelihood itself up to a constant.
     """
@@ -58,7 +58,7 @@ class TyreRegression:
     loss: str
     parameters: FloatArray
     value: float
-    starts: Ends
+    starts: Starts
 
     def tyre(self, axle: str) -> FloatArray:
         """B, C, D, E of an axle, `front` or `rear`."""
@@ -154,9 +154,11 @@ def regress_tyres(
     bounds = box_of(free, box or BOX)
     p = first_point(GIVEN if start is None else start)
     p[bounds.columns] = np.clip(p[bounds.columns], bounds.lower, bounds.upper)
-    begins = start_points(p[bounds.columns], bounds, list(range(8)), starts, seed)
+    begins = space_filling(
+        p[bounds.columns], bounds.lower, bounds.upper, starts, seed, list(range(8))
+    )
     task = RegressionTask(vehicle, motion, loss, bounds, projection, method, p)
     ends, values, merits = search(task, begins)
-    table = Ends(tuple(free), begins, as_float64(ends[:, bounds.columns]), merits)
+    table = Starts(tuple(free), begins, as_float64(ends[:, bounds.columns]), merits)
     best = int(np.argmax(merits))
     return TyreRegression(loss, ends[best], float(values[best]), table)

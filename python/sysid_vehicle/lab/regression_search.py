@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
+from ..identify.objective import LinearRows, Penalised
 from ..identify.search import Box, minimise
+from ..identify.tyre_shape import look_alike
 from .motion import TyreMotion
-from .projection import Regression, SoftRows
+from .projection import Regression
 from .tyre_data import GreyBoxVehicle
 from .tyre_fit import PARAMETERS
-from .tyre_shape import look_alike
 
 __all__ = ["RegressionTask", "descend_regression", "search"]
 
@@ -109,11 +108,10 @@ class RegressionTask:
         for _ in range(_AGAIN[still] if still else 1):
             here = problem.half_sum_of_squares(p)
             tolerance = _STEP * max(still * here, exact) if still else self._tolerance()
-            # `minimise` asks no more of a problem than `Regression` gives it.
             found = minimise(
-                cast(_core.Problem, problem),
+                problem,
                 p,
-                cast(_core.FrozenFilter, None),
+                None,
                 inner,
                 method=self.method,
                 rounds=_ROUNDS,
@@ -157,9 +155,9 @@ class RegressionTask:
 
     def _problem(self, ay: FloatArray, yaw: FloatArray) -> Regression:
         out = [self.projection and PARAMETERS[c][0] not in "BCE" for c in self.box.columns]
+        errors = self.motion.errors(self.vehicle, ay, yaw, projects_steer=self.loss == "joint")
         return Regression(
-            self.motion.loss(self.vehicle, ay, yaw, projects_steer=self.loss == "joint"),
-            _wishes(self.given) if self.loss == "regularised" else SoftRows.none(len(self.given)),
+            Penalised(errors, (_wishes(self.given),) if self.loss == "regularised" else ()),
             [c for c, k in zip(self.box.columns, out, strict=True) if k],
             self.box.lower[out],
             self.box.upper[out],
@@ -168,7 +166,7 @@ class RegressionTask:
     def _sizes(self, p: FloatArray) -> FloatArray:
         """Root mean square errors of a_y and of the yaw acceleration."""
         one = np.ones(self.motion.n)
-        errors = self.motion.loss(self.vehicle, one, one, projects_steer=True).residuals(p)
+        errors = self.motion.errors(self.vehicle, one, one, projects_steer=True).residuals(p)
         return as_float64(np.sqrt(np.mean(errors**2, axis=0)) + 1e-9)
 
     def _first_weights(self) -> tuple[FloatArray, FloatArray]:
@@ -297,7 +295,7 @@ def descend_regression(
     return task.descend(p)
 
 
-def _wishes(start: FloatArray) -> SoftRows:
+def _wishes(start: FloatArray) -> LinearRows:
     scale = np.where(start == 0.0, 1.0, np.abs(start))
     rows, target = [], []
     for i in range(11):
@@ -312,4 +310,4 @@ def _wishes(start: FloatArray) -> SoftRows:
         row[i + 4] = -row[i]
         rows.append(row)
         target.append(0.0)
-    return SoftRows(as_float64(rows), as_float64(target))
+    return LinearRows(as_float64(rows), as_float64(target))

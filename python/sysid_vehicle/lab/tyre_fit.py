@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,17 +11,17 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, BEFORE, axes_or_new, tidy
 from .._text import html_paragraph, html_table, number, text_table
-from ..identify import Estimate
-from .likelihood import NOISES
-from .multistart import Ends
-from .profile import Profile
+from ..identify.estimates import Estimate
+from ..identify.profile import Profile
+from ..identify.quantities import Quantity, parameter, std_of, tyre_quantity
+from ..identify.starts import Starts
+from ..identify.tyre_shape import COMBINATIONS, friction, peak_slip
 from .tyre_data import GreyBoxVehicle, TyreLog
-from .tyre_shape import COMBINATIONS, friction, peak_slip, slope_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["AXLES", "PARAMETERS", "UNITS", "TyreBand", "TyreFit"]
+__all__ = ["AXLES", "NOISES", "PARAMETERS", "UNITS", "TyreBand", "TyreFit", "quantities"]
 
 AXLES = ("front", "rear")
 PARAMETERS = (
@@ -43,6 +43,17 @@ UNITS = dict.fromkeys(PARAMETERS, "1") | {
     "P3": "m/s",
     "drag_area_m2": "m2",
 }
+NOISES = (
+    "v_x [m/s]",
+    "v_y [m/s]",
+    "yaw rate [rad/s]",
+    "a_y [m/s2]",
+    "disturbed v_x [m/s per root second]",
+    "disturbed v_y [m/s per root second]",
+    "disturbed yaw rate [rad/s per root second]",
+)
+"""Standard deviations that are learned, in the core's order."""
+
 _CHI_SQUARE = 3.84  # 95 % quantile, one degree of freedom
 _KNOWN_WELL = 0.05  # relative standard error
 
@@ -84,12 +95,22 @@ class Rival:
     lost: float
     covariance: FloatArray
 
-    def interval(self, function: Callable[[FloatArray], float], slope: FloatArray) -> FloatArray:
-        """What of the 95 % interval of a function of the parameters lies around this optimum."""
-        variance = max(float(slope @ self.covariance @ slope), 0.0)
-        reach = np.sqrt(max(_CHI_SQUARE - 2.0 * self.lost, 0.0) * variance)
-        centre = function(self.parameters)
-        return as_float64([centre - reach, centre + reach])
+    def interval(self, what: Quantity, columns: list[int]) -> tuple[float, float]:
+        """What of the 95 % interval of a quantity lies around this optimum."""
+        std = std_of(what, self.parameters, columns, self.covariance)
+        reach = float(np.sqrt(max(_CHI_SQUARE - 2.0 * self.lost, 0.0))) * std
+        centre = what.of(self.parameters)
+        return centre - reach, centre + reach
+
+
+def quantities(names: Sequence[str]) -> dict[str, Quantity]:
+    """Parameters of these names, and the combinations of both axles."""
+    found = [parameter(n, PARAMETERS.index(n)) for n in names]
+    for axle in AXLES:
+        columns = [PARAMETERS.index(f"{letter}_{axle}") for letter in "BCDE"]
+        for name, (function, _) in COMBINATIONS.items():
+            found.append(tyre_quantity(f"{name}_{axle}", columns, function))
+    return {what.name: what for what in found}
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +127,9 @@ class TyreFit:
         The free ones.
     covariance : array, shape (free, free)
     noise : array, shape (7,)
-        In the order of `lab.likelihood.NOISES`.
+        In the order of `NOISES`.
     log_likelihood : float
-    starts : Ends
+    starts : Starts
         On the thinned data that decide between starts.
     driven_rad : tuple of 2 floats
         Slip angles, front and rear, that one sample in 200 exceeds.
@@ -125,7 +146,7 @@ class TyreFit:
     covariance: FloatArray
     noise: FloatArray
     log_likelihood: float
-    starts: Ends
+    starts: Starts
     driven_rad: tuple[float, float]
     profiles: tuple[Profile, ...] = ()
     rivals: tuple[Rival, ...] = ()
@@ -151,28 +172,21 @@ class TyreFit:
         It reaches over all `rivals`.
         """
         low, high = next((f.interval for f in self.profiles if f.name == name), self[name].interval)
+        what = self.quantities[name]
         for rival in self.rivals:
-            there = rival.interval(*self._function(name, rival.parameters))
-            low, high = min(low, float(there[0])), max(high, float(there[1]))
+            there = rival.interval(what, self.columns)
+            low, high = min(low, there[0]), max(high, there[1])
         return (low if np.isfinite(low) else -np.inf), (high if np.isfinite(high) else np.inf)
 
-    def _function(
-        self, name: str, p: FloatArray
-    ) -> tuple[Callable[[FloatArray], float], FloatArray]:
-        """Value of an estimate or combination as a function of all parameters, and its gradient.
+    @property
+    def columns(self) -> list[int]:
+        """Places of the estimates among all parameters."""
+        return [PARAMETERS.index(e.name) for e in self.estimates]
 
-        The gradient is by the free parameters, at `p`.
-        """
-        names = [e.name for e in self.estimates]
-        slope = np.zeros(len(names))
-        if name in names:
-            slope[names.index(name)] = 1.0
-            return lambda q: float(q[PARAMETERS.index(name)]), slope
-        kind, axle = name.rsplit("_", 1)
-        function, first = COMBINATIONS[kind][0], 4 * AXLES.index(axle)
-        where = [names.index(f"{letter}_{axle}") for letter in "BCDE"]
-        slope[where] = np.nan_to_num(slope_of(function, p[first : first + 4]))
-        return lambda q: function(q[first : first + 4]), slope
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """Estimates and combinations as functions of all parameters."""
+        return quantities([e.name for e in self.estimates])
 
     def tyre(self, axle: str) -> FloatArray:
         """B, C, D, E of an axle, `front` or `rear`."""
@@ -188,21 +202,17 @@ class TyreFit:
     @property
     def combinations(self) -> tuple[Estimate, ...]:
         """Cornering stiffness B C D over load, highest friction, and slip angle of the peak."""
-        names = [e.name for e in self.estimates]
+        known = self.quantities
         found = []
         for i, axle in enumerate(AXLES):
-            bcde = self.tyre(axle)
-            where = [names.index(f"{letter}_{axle}") for letter in "BCDE"]
-            block = self.covariance[np.ix_(where, where)]
-            peak = peak_slip(bcde)
-            for name, (function, unit) in COMBINATIONS.items():
-                slope = slope_of(function, bcde)
-                variance = float(slope @ block @ slope) if np.isfinite(slope).all() else np.inf
+            peak = peak_slip(self.tyre(axle))
+            for name, (_, unit) in COMBINATIONS.items():
+                what = known[f"{name}_{axle}"]
+                std = std_of(what, self.parameters, self.columns, self.covariance)
                 # Nobody has seen a peak that was not driven to.
                 beyond = name != "BCD" and self.driven_rad[i] < peak
                 note = "beyond the driven slip" if beyond else ""
-                std = float(np.sqrt(max(variance, 0.0)))
-                found.append(Estimate(f"{name}_{axle}", function(bcde), std, unit, note))
+                found.append(Estimate(what.name, what.of(self.parameters), std, unit, note))
         return tuple(found)
 
     @property

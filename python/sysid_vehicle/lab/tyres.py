@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
-from ..identify import METHODS
+from ..identify.estimates import with_profiles
+from ..identify.profile import profile_all
+from ..identify.search import METHODS
+from ..identify.settle import descend, settle, settle_finely
+from ..identify.starts import space_filling
 from .box import box_of, first_point
-from .descent import descend, settle, settle_finely
 from .motion import TyreMotion
-from .multistart import multistart, start_points
+from .multistart import multistart
 from .regression_search import descend_regression
-from .summary import summary, with_profiles, with_rivals
+from .summary import summary, with_rivals
 from .tyre_data import GreyBoxVehicle, TyreLog
 from .tyre_fit import PARAMETERS, TyreFit
 from .tyre_objective import free_parameters, objective_of
@@ -83,7 +89,8 @@ def identify_tyres(
     free = free_parameters(vehicle, residual_terms=residual_terms)
     p = first_point(start or {})
     box = box_of(free, {})
-    begins = start_points(p[box.columns], box, list(range(8)), starts, seed)
+    given = np.clip(p[box.columns], box.lower, box.upper)
+    begins = space_filling(given, box.lower, box.upper, starts, seed, list(range(8)))
     told = [g if g.sideslip_measured else g.with_kinematic_sideslip() for g in several]
     p, noise, ends, others = multistart(
         objective_of(vehicle, several, _THINNED),
@@ -99,7 +106,8 @@ def identify_tyres(
         progress=progress,
     )
     whole = objective_of(vehicle, several)
-    p, noise, value = settle(whole, p, noise, box, method=method)
+    p, noise, _ = settle(whole, p, noise, box, method=method, parameters_first=True)
+    value = whole.log_likelihood(p, noise)
     rivals: list[FloatArray] = []
     for other in others:
         end, there = descend(whole, other, noise, box)
@@ -109,8 +117,8 @@ def identify_tyres(
         else:
             rivals.append(end)
     for left in reversed(range(_BETTER_FOUND)):
-        passed, noise, value = settle(whole, p, noise, box, method=method)
-        p, noise, value = settle_finely(whole, passed, noise, box, value)
+        passed, noise, _ = settle(whole, p, noise, box, method=method, parameters_first=True)
+        p, noise, _ = settle_finely(whole, passed, noise, box)
         fit = summary(vehicle, several, whole, p, noise, box, free, ends)
         fit = with_rivals(fit, whole, rivals, box, None if profiles else passed)
         ahead = min(fit.rivals, key=lambda rival: rival.lost, default=None)
@@ -120,7 +128,19 @@ def identify_tyres(
             continue
         if not profiles:
             return fit
-        fit, better = with_profiles(fit, whole, box, workers=workers, progress=progress)
+        gains = whole.freeze(p, noise)
+        found, better = profile_all(
+            whole,
+            p,
+            gains,
+            box,
+            fit.covariance,
+            list(fit.quantities.values()),
+            workers=workers,
+            progress=progress,
+        )
+        estimates = with_profiles(fit.estimates, found[: len(free)], box)
+        fit = replace(fit, estimates=estimates, profiles=found)
         if better is None:
             break
         p = better  # a profile came upon it

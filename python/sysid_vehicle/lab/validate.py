@@ -16,9 +16,8 @@ from .._files import read_text
 from .._style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
 from .._text import html_table, number, text_table
 from ..errors import InvalidInput
-from .likelihood import NOISES
 from .tyre_data import READINGS, GreyBoxVehicle, TyreLog, tyre_problem
-from .tyre_fit import PARAMETERS, TyreFit
+from .tyre_fit import NOISES, PARAMETERS, TyreFit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +35,7 @@ class IdentifiedCar:
     parameters : array, shape (14,)
         In the order of `lab.tyre_fit.PARAMETERS`.
     noise : array, shape (7,)
-        In the order of `lab.likelihood.NOISES`.
+        In the order of `lab.tyre_fit.NOISES`.
     """
 
     vehicle: GreyBoxVehicle

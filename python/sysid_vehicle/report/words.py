@@ -31,7 +31,7 @@ def unit(name: str) -> str:
 
 def interval(e: Estimate) -> str:
     """Print the 95 % interval; a dash where there is none."""
-    if not np.isfinite(e.std):
+    if e.ends is None and not np.isfinite(e.std):
         return "-"
     low, high = e.interval
     return f"{quantity(low)} .. {quantity(high)}"

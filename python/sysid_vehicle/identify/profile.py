@@ -7,24 +7,26 @@ direction at the optimum, promises far too much; the profile follows the valley.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from tqdm.auto import tqdm
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, FLOOR, axes_or_new, tidy
 from .._text import number
-from ..identify.search import Box
-from .likelihood import Likelihood
+from .._threads import Workers
+from .objective import Penalised
+from .quantities import Quantity
+from .search import Box
 from .valley import down_the_valley
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["LEVEL", "Profile", "Quantity", "lost_at", "profile"]
+__all__ = ["LEVEL", "Profile", "lost_at", "profile", "profile_all"]
 
 LEVEL = 1.96
 """Root of the 95 % quantile of chi-square with one degree of freedom."""
@@ -36,27 +38,6 @@ _ENOUGH = 0.01  # nats
 _STIFF = 30.0  # how much harder the wish pulls than the data
 _BETTER = 0.1  # nats
 _STEP = 3.0  # most by which the distance grows from one point to the next
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """What is profiled: a parameter or a function of parameters.
-
-    Parameters
-    ----------
-    name : str
-    of : callable
-        From all parameters to the value.
-    slope : callable
-        From all parameters to its gradient.
-    column : int, optional
-        The parameter that it is.
-    """
-
-    name: str
-    of: Callable[[FloatArray], float]
-    slope: Callable[[FloatArray], FloatArray]
-    column: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +94,41 @@ class Profile:
         return tidy(ax, xlabel=self.name, ylabel="log-likelihood lost")
 
 
+def profile_all(
+    objective: Penalised,
+    p: FloatArray,
+    gains: Any,
+    box: Box,
+    covariance: FloatArray,
+    wanted: Sequence[Quantity],
+    *,
+    workers: int,
+    progress: bool,
+) -> tuple[tuple[Profile, ...], FloatArray | None]:
+    """Profile many quantities side by side.
+
+    Returns
+    -------
+    profiles : tuple of Profile
+    better : array, shape (parameters,), or None
+        The point of highest likelihood, where one above the optimum was come upon.
+    """
+
+    def one(what: Quantity) -> tuple[Profile, FloatArray | None]:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return profile(objective, p, gains, box, covariance, what)
+
+    with Workers(workers) as pool:
+        found = list(
+            tqdm(pool.map(one, wanted), total=len(wanted), desc="profiles", disable=not progress)
+        )
+    better = [b for _, b in found if b is not None]
+    return (
+        tuple(f for f, _ in found),
+        min(better, key=lambda b: objective.half_sum_of_squares(b, gains)) if better else None,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class _Side:
     values: list[float]
@@ -123,9 +139,9 @@ class _Side:
 
 
 def profile(
-    objective: Likelihood,
+    objective: Penalised,
     p: FloatArray,
-    gains: _core.FrozenGains,
+    gains: Any,
     box: Box,
     covariance: FloatArray,
     what: Quantity,
@@ -157,9 +173,9 @@ def profile(
 
 
 def _side(
-    objective: Likelihood,
+    objective: Penalised,
     p: FloatArray,
-    gains: _core.FrozenGains,
+    gains: Any,
     box: Box,
     covariance: FloatArray,
     what: Quantity,
@@ -167,7 +183,7 @@ def _side(
     sign: float,
 ) -> _Side:
     centre = what.of(p)
-    gradient = what.slope(p)[box.columns]
+    gradient = np.nan_to_num(what.slope(p)[box.columns])
     across = covariance @ gradient
     variance = float(gradient @ across)
     side = _Side([], [], centre, True, None)
@@ -216,9 +232,9 @@ def _side(
 
 
 def lost_at(
-    objective: Likelihood,
+    objective: Penalised,
     p: FloatArray,
-    gains: _core.FrozenGains,
+    gains: Any,
     box: Box,
     covariance: FloatArray,
     what: Quantity,
@@ -229,7 +245,7 @@ def lost_at(
 
     `best` is half the sum of squares at the optimum.
     """
-    gradient = what.slope(p)[box.columns]
+    gradient = np.nan_to_num(what.slope(p)[box.columns])
     across = covariance @ gradient
     variance = float(gradient @ across)
     if not (np.isfinite(variance) and variance > 0.0):
@@ -254,9 +270,9 @@ def _next(inside: tuple[float, float, FloatArray], outside: tuple[float, float])
 
 
 def _pinned(
-    objective: Likelihood,
+    objective: Penalised,
     start: FloatArray,
-    gains: _core.FrozenGains,
+    gains: Any,
     box: Box,
     what: Quantity,
     target: float,
@@ -275,9 +291,11 @@ def _pinned(
         return there, objective.half_sum_of_squares(there, gains) - best
     weight = _STIFF / std
 
-    def wish(p: FloatArray) -> tuple[float, FloatArray]:
-        return weight * (what.of(p) - target), weight * what.slope(p)
+    def wish(p: FloatArray) -> tuple[FloatArray, FloatArray]:
+        error = np.array([weight * (target - what.of(p))])
+        return error, weight * np.nan_to_num(what.slope(p))[None, :]
 
-    wished = replace(objective, soft=(*objective.soft, wish))
-    there = down_the_valley(wished, there, gains, box, tolerance=_ENOUGH, rounds=_ROUNDS)
+    there = down_the_valley(
+        objective.also(wish), there, gains, box, tolerance=_ENOUGH, rounds=_ROUNDS
+    )
     return there, objective.half_sum_of_squares(there, gains) - best

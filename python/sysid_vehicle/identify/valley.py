@@ -8,16 +8,16 @@ residuals follows it (Transtrum & Sethna, arXiv:1201.5885, 2012).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import lsq_linear
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import NumericalError
-from ..identify.search import Box
-from .likelihood import Likelihood
+from .objective import Problem
+from .search import Box
 
 __all__ = ["down_the_valley"]
 
@@ -68,9 +68,9 @@ class _Slope:
 class _Valley:
     """Residuals as a function of the free parameters, with gains that stay as they are."""
 
-    objective: Likelihood
+    objective: Problem
     p: FloatArray
-    gains: _core.FrozenGains
+    gains: Any
     box: Box
 
     @property
@@ -86,7 +86,7 @@ class _Valley:
     def residuals(self, x: FloatArray) -> FloatArray | None:
         """None where the car spins in the model."""
         try:
-            found = self.objective.residuals(self.full(x), self.gains)
+            found = self.objective.residuals(self.full(x), self.gains).ravel()
         except NumericalError:
             return None
         return found if np.isfinite(found).all() else None
@@ -125,9 +125,9 @@ class _Valley:
 
 
 def down_the_valley(
-    objective: Likelihood,
+    objective: Problem,
     p: FloatArray,
-    gains: _core.FrozenGains,
+    gains: Any,
     box: Box,
     *,
     tolerance: float = 1e-4,
@@ -140,9 +140,9 @@ def down_the_valley(
 
     Parameters
     ----------
-    objective : Likelihood
+    objective : Problem
     p : array, shape (parameters,)
-    gains : FrozenGains
+    gains : frozen gains of the problem
     box : Box
     tolerance : float
         In nats.

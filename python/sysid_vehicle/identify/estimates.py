@@ -1,0 +1,132 @@
+"""Estimates with their uncertainty: one rule for standard errors, intervals and notes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .._arrays import FloatArray, as_float64
+from .._text import number
+from .profile import Profile
+from .search import Box
+
+__all__ = ["INTERVALS", "Estimate", "box_covariance", "profiled", "wald", "with_profiles"]
+
+INTERVALS = ("information", "profile")
+"""Where intervals come from: the information matrix, or the profile likelihood."""
+
+_SPREAD_OF_BOX = np.sqrt(1.0 / 12.0)  # standard deviation of a uniform over a box of width 1
+_UNKNOWN = 0.2  # of the width
+_WIDE = 0.5  # of the width, for an interval
+_AT_BOUND = 1e-6  # of the width
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter with its uncertainty.
+
+    Attributes
+    ----------
+    std : float
+        Standard error; infinite where a bound holds the value.
+    note : str
+        Empty, or why the value says little: `not determined`, `at bound`, `no lower end`, `no upper
+        end` (of the interval).
+    ends : tuple of 2 floats, optional
+        95 % interval of the profile likelihood, where that was asked for.
+    """
+
+    name: str
+    value: float
+    std: float
+    unit: str
+    note: str = ""
+    ends: tuple[float, float] | None = None
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval: of the profile likelihood where there is one, else of the std."""
+        if self.ends is not None:
+            return self.ends
+        return self.value - 1.96 * self.std, self.value + 1.96 * self.std
+
+    def to_dict(self) -> dict[str, Any]:
+        """Value, standard error, unit, and an interval of the profile likelihood, for JSON."""
+        told = {"value": self.value, "std": self.std, "unit": self.unit}
+        return told if self.ends is None else {**told, "interval": list(self.ends)}
+
+    def __str__(self) -> str:
+        return f"{self.name} = {number(self.value)} +- {number(self.std, 2)} {self.unit}"
+
+
+def box_covariance(information: FloatArray, box: Box, x: FloatArray) -> FloatArray:
+    """Covariance from the information of the data and that of having looked in the box only.
+
+    Without the second, coefficients that copy each other would have no covariance at all, and the
+    combinations that are known none either. It is that of a uniform over the box, about the
+    estimate `x`: an estimate at a bound is further from the rest of the box than one amid it.
+    """
+    width = box.upper - box.lower
+    spread = np.hypot(_SPREAD_OF_BOX * width, x - 0.5 * (box.lower + box.upper))
+    per_std = 1.0 / spread
+    total = information + np.diag(per_std**2)
+    scale = np.sqrt(np.diag(total))
+    inverse = np.linalg.inv(total / np.outer(scale, scale))
+    return as_float64(0.5 * (inverse + inverse.T) / np.outer(scale, scale))
+
+
+def wald(
+    names: Sequence[str], units: Mapping[str, str], x: FloatArray, covariance: FloatArray, box: Box
+) -> tuple[Estimate, ...]:
+    """Estimates with the standard errors of the information matrix.
+
+    What the data do not determine is called that, even where it ended at a bound: the bound did not
+    stop it. What they do determine and a bound stops has no standard error.
+    """
+    width = box.upper - box.lower
+    std = np.sqrt(np.diag(covariance))
+    unknown = std > _UNKNOWN * width
+    held = (x <= box.lower + _AT_BOUND * width) | (x >= box.upper - _AT_BOUND * width)
+    return tuple(
+        Estimate(
+            name,
+            float(x[i]),
+            float("inf") if held[i] and not unknown[i] else float(std[i]),
+            units[name],
+            "not determined" if unknown[i] else "at bound" if held[i] else "",
+        )
+        for i, name in enumerate(names)
+    )
+
+
+def with_profiles(
+    estimates: Sequence[Estimate], profiles: Sequence[Profile], box: Box
+) -> tuple[Estimate, ...]:
+    """Replace intervals, and the notes that they decide, by those of the profile likelihood."""
+    found = {f.name: f for f in profiles}
+    return tuple(
+        replace(e, note=_note(e, found[e.name], width), ends=found[e.name].interval)
+        for e, width in zip(estimates, box.upper - box.lower, strict=True)
+    )
+
+
+def profiled(estimate: Estimate, profiles: Sequence[Profile]) -> Estimate:
+    """Replace the interval of what follows from parameters, which has no bounds of its own."""
+    found = next((f for f in profiles if f.name == estimate.name), None)
+    if found is None or not np.isfinite(estimate.value):
+        return estimate
+    low = -np.inf if found.open_below else found.low
+    high = np.inf if found.open_above else found.high
+    note = "no lower end" if found.open_below else "no upper end" if found.open_above else ""
+    return replace(estimate, note=estimate.note or note, ends=(low, high))
+
+
+def _note(estimate: Estimate, found: Profile, width: float) -> str:
+    if found.high - found.low > _WIDE * width or (found.open_below and found.open_above):
+        return "not determined"
+    if found.open_below or found.open_above:
+        return "no lower end" if found.open_below else "no upper end"
+    return "" if estimate.note == "not determined" else estimate.note

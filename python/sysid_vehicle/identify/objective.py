@@ -1,0 +1,189 @@
+"""What every search minimises: whitened residuals of data, and of what is known beforehand.
+
+The grey-box model of the main job (`_core.Problem`), the laboratory's car with logged axle loads
+(`_core.TyreProblem`) and its regressions on a known motion are problems of one form. Priors, and
+the wish that a quantity have a certain value, are further residuals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from .._arrays import FloatArray, as_float64
+from ..estimate import maximise_noise
+
+__all__ = [
+    "LinearRows",
+    "Objective",
+    "Penalised",
+    "Predicting",
+    "Problem",
+    "Rows",
+    "gaussian_prior",
+]
+
+Rows = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+"""Further residuals: from all parameters to errors (m,) and minus their derivatives (m, n)."""
+
+
+class Problem(Protocol):
+    """Nonlinear least squares over some of all parameters.
+
+    `gains` is what stays as it is during a search: the gains of a filter, or None.
+    """
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+
+    def residuals(self, p: FloatArray, gains: Any, /) -> FloatArray:
+        """Whitened residuals."""
+
+    def half_sum_of_squares(self, p: FloatArray, gains: Any, /) -> float:
+        """Half the sum of their squares."""
+
+    def sensitivities(self, p: FloatArray, gains: Any, columns: list[int], /) -> FloatArray:
+        """Minus the derivatives of the residuals by the parameters `columns`, one row each."""
+
+    def normal_equations(
+        self, p: FloatArray, gains: Any, columns: list[int], /
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """Half the sum of squares, G' e and G' G of the sensitivities G."""
+
+
+class Predicting(Problem, Protocol):
+    """A problem whose residuals are prediction errors of a filter with noise to be learned."""
+
+    def freeze(self, p: FloatArray, noise: FloatArray, /) -> Any:
+        """Gains of the filter, with the log-likelihood as `log_likelihood`."""
+
+    def noise_score(
+        self, p: FloatArray, noise: FloatArray, /
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """Log-likelihood, its derivatives by the noise's logarithms, and their information."""
+
+
+@dataclass(frozen=True)
+class LinearRows:
+    """Further residuals that are linear in the parameters: `target - rows @ p`."""
+
+    rows: FloatArray
+    target: FloatArray
+
+    def __call__(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Errors, and minus their derivatives."""
+        return as_float64(self.target - self.rows @ p), self.rows
+
+
+def gaussian_prior(size: int, priors: dict[int, tuple[float, float]]) -> tuple[LinearRows, ...]:
+    """Independent normal priors.
+
+    Parameters
+    ----------
+    size : int
+        Number of all parameters.
+    priors : dict
+        Mean and standard deviation by place of the parameter.
+
+    Returns
+    -------
+    tuple of LinearRows
+        Empty where there is no prior.
+    """
+    if not priors:
+        return ()
+    rows = np.zeros((len(priors), size))
+    target = np.empty(len(priors))
+    for i, (column, (mean, std)) in enumerate(priors.items()):
+        rows[i, column] = 1.0 / std
+        target[i] = mean / std
+    return (LinearRows(rows, target),)
+
+
+@dataclass(frozen=True)
+class Penalised:
+    """A problem with further residuals, which is a problem again.
+
+    Parameters
+    ----------
+    problem : Problem
+    prior : tuple of Rows
+    """
+
+    problem: Problem
+    prior: tuple[Rows, ...] = ()
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return self.problem.samples
+
+    def also(self, rows: Rows) -> Penalised:
+        """The same with more residuals."""
+        return replace(self, prior=(*self.prior, rows))
+
+    def prior_cost(self, p: FloatArray) -> float:
+        """Half the sum of squares of what is no data."""
+        return sum((0.5 * float(e @ e) for e, _ in (rows(p) for rows in self.prior)), 0.0)
+
+    def residuals(self, p: FloatArray, gains: Any = None) -> FloatArray:
+        """All residuals, those of the data first."""
+        errors = [rows(p)[0] for rows in self.prior]
+        return np.concatenate([self.problem.residuals(p, gains).ravel(), *errors])
+
+    def half_sum_of_squares(self, p: FloatArray, gains: Any = None) -> float:
+        """Half the sum of squares alone."""
+        return self.problem.half_sum_of_squares(p, gains) + self.prior_cost(p)
+
+    def sensitivities(self, p: FloatArray, gains: Any, columns: list[int]) -> FloatArray:
+        """Minus the derivatives of the residuals."""
+        slopes = [rows(p)[1][:, columns] for rows in self.prior]
+        return np.vstack([self.problem.sensitivities(p, gains, columns), *slopes])
+
+    def normal_equations(
+        self, p: FloatArray, gains: Any, columns: list[int]
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """Half the sum of squares, direction of descent, Gauss-Newton matrix."""
+        cost, descent, information = self.problem.normal_equations(p, gains, columns)
+        for rows in self.prior:
+            errors, slopes = rows(p)
+            some = slopes[:, columns]
+            cost += 0.5 * float(errors @ errors)
+            descent = descent + some.T @ errors
+            information = information + some.T @ some
+        return cost, descent, information
+
+
+@dataclass(frozen=True)
+class Objective(Penalised):
+    """The likelihood of a model with its priors, and of its noise.
+
+    Parameters
+    ----------
+    problem : Predicting
+    prior : tuple of Rows
+    lowest, highest : array, shape (noises,)
+        Within which the noise is learned.
+    """
+
+    problem: Predicting
+    lowest: FloatArray = field(default_factory=lambda: np.empty(0))
+    highest: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    def freeze(self, p: FloatArray, noise: FloatArray) -> Any:
+        """Gains of the filter; their log-likelihood is that of the data alone."""
+        return self.problem.freeze(p, noise)
+
+    def log_likelihood(self, p: FloatArray, noise: FloatArray) -> float:
+        """Of the data, less what the priors cost."""
+        return float(self.problem.freeze(p, noise).log_likelihood) - self.prior_cost(p)
+
+    def learn_noise(
+        self, p: FloatArray, noise: FloatArray, *, rounds: int = 12
+    ) -> tuple[FloatArray, float]:
+        """Noise of maximum likelihood at fixed parameters, and the log-likelihood of the data."""
+        return maximise_noise(self.problem, p, noise, self.lowest, self.highest, rounds=rounds)

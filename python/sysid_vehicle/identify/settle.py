@@ -1,0 +1,149 @@
+"""Local searches that work the filter's gains, and the noise, out anew on their way."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import FloatArray
+from .objective import Objective
+from .search import Box, minimise
+from .valley import down_the_valley
+
+__all__ = ["bottom", "descend", "settle", "settle_finely"]
+
+_STANDS = 0.5  # nats
+_STILL = 3e-4  # nats
+_REFREEZES = 8
+_ROUNDS = 12
+
+
+def descend(
+    objective: Objective,
+    p: FloatArray,
+    noise: FloatArray,
+    box: Box,
+    *,
+    method: str = "gauss-newton",
+    refreezes: int = 2,
+) -> tuple[FloatArray, float]:
+    """One local search: gains are worked out anew wherever it has settled.
+
+    Returns
+    -------
+    p : array, shape (parameters,)
+    log_likelihood : float
+        Priors included.
+    """
+    p = p.copy()
+    for _ in range(refreezes):
+        gains = objective.freeze(p, noise)
+        found = minimise(objective, p, gains, box, method=method, rounds=40)
+        moved = np.abs(found.x - p[box.columns])
+        p[box.columns] = found.x
+        if np.all(moved < 1e-3 * (box.upper - box.lower)):
+            break
+    return p, objective.log_likelihood(p, noise)
+
+
+def settle(
+    objective: Objective,
+    p: FloatArray,
+    noise: FloatArray,
+    box: Box,
+    *,
+    thin: Objective | None = None,
+    method: str = "gauss-newton",
+    parameters_first: bool = False,
+    rounds: int = 10,
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Alternate between noise and parameters until the likelihood stands still.
+
+    Parameters
+    ----------
+    objective : Objective
+    p : array, shape (parameters,)
+    noise : array, shape (noises,)
+    box : Box
+    thin : Objective, optional
+        The same on fewer samples, from which the noise is learned.
+    method : str
+        Local optimiser.
+    parameters_first : bool
+        Noise learned at poor parameters is large, and large noise makes poor parameters look good
+        enough: where they may be poor and the noise is not, they move first.
+    rounds : int
+
+    Returns
+    -------
+    p : array, shape (parameters,)
+    noise : array, shape (noises,)
+    converged : bool
+        Whether it came to a stand.
+    """
+    p = p.copy()
+    p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
+    if parameters_first:
+        p, _ = descend(objective, p, noise, box, method=method)
+    best = -np.inf
+    for round_ in range(rounds):
+        noise, _ = (thin or objective).learn_noise(p, noise, rounds=6 if round_ == 0 else 3)
+        gains = objective.freeze(p, noise)
+        value = gains.log_likelihood - objective.prior_cost(p)
+        if value < best + _STANDS:
+            return p, noise, True
+        best = value
+        p[box.columns] = minimise(
+            objective, p, gains, box, method=method, rounds=8, tolerance=0.05
+        ).x
+    return p, noise, False
+
+
+def bottom(
+    objective: Objective, p: FloatArray, noise: FloatArray, box: Box
+) -> tuple[FloatArray, float]:
+    """From near an optimum to the optimum itself, to a thousandth of a nat.
+
+    `descend` ends where steps gain little, which in a valley of tyres that look alike may be a nat
+    above its bottom: near enough to tell starts apart, too far to call it the maximum.
+
+    Returns
+    -------
+    p : array, shape (parameters,)
+    log_likelihood : float
+        Priors included.
+    """
+    gains = objective.freeze(p, noise)
+    value = gains.log_likelihood - objective.prior_cost(p)
+    for _ in range(_REFREEZES):
+        trial = down_the_valley(objective, p, gains, box)
+        gains = objective.freeze(trial, noise)
+        reached = gains.log_likelihood - objective.prior_cost(trial)
+        if reached > value:
+            p = trial
+        if reached < value + _STILL:
+            return p, max(value, reached)
+        value = reached
+    return p, value
+
+
+def settle_finely(
+    objective: Objective, p: FloatArray, noise: FloatArray, box: Box
+) -> tuple[FloatArray, FloatArray, float]:
+    """Parameters and noise to the bottom of the valley that `settle` has found.
+
+    Returns
+    -------
+    p : array, shape (parameters,)
+    noise : array, shape (noises,)
+    log_likelihood : float
+        Priors included.
+    """
+    value = objective.log_likelihood(p, noise)
+    for _ in range(_ROUNDS):
+        p, _ = bottom(objective, p, noise, box)
+        noise, _ = objective.learn_noise(p, noise)
+        before = value
+        value = objective.log_likelihood(p, noise)
+        if value < before + _STILL:
+            break
+    return p, noise, value

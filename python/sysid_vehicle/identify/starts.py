@@ -1,0 +1,181 @@
+"""Searches from a space-filling set of starts, and where each of them ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import qmc
+from tqdm.auto import tqdm
+
+from .._arrays import FloatArray, as_float64
+from .._style import AFTER, BEFORE, axes_or_new, tidy
+from .._threads import Workers
+from ..errors import NumericalError
+from .search import Box
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["SAME_OPTIMUM", "Runner", "Search", "Start", "Starts", "space_filling"]
+
+SAME_OPTIMUM = 1.0
+"""Ends whose log-likelihood differs by less than this [nats] are the same optimum."""
+
+_SAME_POINT = 1e-4  # of the box's width
+
+Search = Callable[[FloatArray], tuple[FloatArray, float]]
+"""From all parameters at a start to those at its end, and the log-likelihood there."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """One start of the search and where it ended."""
+
+    begin: dict[str, float]
+    end: dict[str, float]
+    log_likelihood: float
+    agrees: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Every start of a search and where it ended; a sequence of `Start`.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The free parameters.
+    begin, end : array, shape (starts, parameters)
+    log_likelihood : array, shape (starts,)
+        At the ends, all under the same noise, on the thinned data that decide between starts; minus
+        infinity where the search broke down.
+    """
+
+    names: tuple[str, ...]
+    begin: FloatArray
+    end: FloatArray
+    log_likelihood: FloatArray
+
+    @classmethod
+    def none(cls, names: tuple[str, ...]) -> Starts:
+        """No start at all: of a search that went on from an earlier one."""
+        empty = np.empty((0, len(names)))
+        return cls(names, empty, empty, np.empty(0))
+
+    def __len__(self) -> int:
+        return len(self.log_likelihood)
+
+    def __getitem__(self, i: int) -> Start:
+        begin, end = (
+            dict(zip(self.names, map(float, points[i]), strict=True))
+            for points in (self.begin, self.end)
+        )
+        return Start(begin, end, float(self.log_likelihood[i]), bool(self.agrees[i]))
+
+    def __iter__(self) -> Iterator[Start]:
+        return (self[i] for i in range(len(self)))
+
+    @property
+    def agrees(self) -> npt.NDArray[np.bool_]:
+        """Which starts ended within one unit of log-likelihood of the best."""
+        best = np.max(self.log_likelihood, initial=-np.inf)
+        return np.asarray(self.log_likelihood > best - SAME_OPTIMUM)
+
+    @property
+    def share(self) -> float:
+        """Share of the starts that ended at the best optimum."""
+        return float(self.agrees.mean())
+
+    def __str__(self) -> str:
+        several = len(self) > 1
+        return (
+            f"{int(self.agrees.sum())} of {len(self)} start{'s' * several} "
+            f"{'end' if several else 'ends'} at the best optimum "
+            f"(log-likelihood {np.max(self.log_likelihood):.1f})"
+        )
+
+    def plot(self, name: str, ax: Axes | None = None) -> Axes:
+        """Draw where one parameter began and ended.
+
+        Parameters
+        ----------
+        name : str
+            One of `names`.
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        ax = axes_or_new(ax, 5.0, 3.2)
+        i = self.names.index(name)
+        for begin, end, there in zip(self.begin[:, i], self.end[:, i], self.agrees, strict=True):
+            colour = AFTER if there else BEFORE
+            ax.plot([0.0, 1.0], [begin, end], "-o", color=colour, markersize=3, linewidth=0.7)
+        ax.set_xticks([0.0, 1.0], ["start", "end"])
+        return tidy(ax, ylabel=name)
+
+
+def space_filling(
+    given: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    starts: int,
+    seed: int,
+    moved: list[int] | None = None,
+) -> FloatArray:
+    """The given point, then points that fill a box evenly (Sobol sequence).
+
+    Parameters
+    ----------
+    given, low, high : array, shape (free,)
+    starts, seed : int
+    moved : list of int, optional
+        Which of the parameters the points spread over; the others stay as given. All of them if
+        left out.
+
+    Returns
+    -------
+    array, shape (starts, free)
+    """
+    points = np.tile(given, (starts, 1))
+    where = list(range(len(given))) if moved is None else moved
+    if starts > 1 and where:
+        unit = qmc.Sobol(len(where), seed=seed).random(1 << (starts - 1).bit_length())
+        points[1:, where] = low[where] + unit[: starts - 1] * (high - low)[where]
+    return as_float64(points)
+
+
+@dataclass(frozen=True)
+class Runner:
+    """Runs searches side by side; starts that have met share the rest of their way."""
+
+    box: Box
+    workers: int
+    progress: bool
+
+    def all_of(self, search: Search, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Ends and their log-likelihoods, from points of shape (starts, parameters)."""
+        width = self.box.upper - self.box.lower
+        place = np.round((points[:, self.box.columns] - self.box.lower) / width / _SAME_POINT)
+        _, first, which = np.unique(place, axis=0, return_index=True, return_inverse=True)
+        with Workers(self.workers) as pool:
+            found = pool.map(lambda i: _guarded(search, points[i]), first)
+            bar = tqdm(found, total=len(first), desc="starts", disable=not self.progress)
+            ends, values = zip(*bar, strict=True)
+        back = which.ravel()  # NumPy 2.0 gives it another shape
+        return as_float64(np.array(ends)[back]), as_float64(np.array(values)[back])
+
+
+def _guarded(search: Search, p: FloatArray) -> tuple[FloatArray, float]:
+    try:
+        # A car that spins in the model on its way costs numbers beyond all range.
+        with np.errstate(over="ignore", invalid="ignore"):
+            end, value = search(p)
+    except (NumericalError, np.linalg.LinAlgError):
+        return p, -np.inf
+    return end, value if np.isfinite(value) else -np.inf

@@ -1,0 +1,86 @@
+"""From tyres to the tyres that look alike: the valleys beside the one a search ended in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import FloatArray
+from ..identify.objective import Objective
+from ..identify.search import Box, minimise
+from ..identify.settle import descend
+from ..identify.tyre_shape import look_alike
+
+__all__ = ["valleys", "walk"]
+
+_CURVATURES = (-1.0, 0.0, 0.4, 0.8)
+_SIDES = ((0,), (4,), (0, 4))  # where the coefficients of the axles that are moved begin
+_TASTE = 5  # steps that tell whether a valley is worth going down
+_WORTH = 0.1  # nats
+_WALKS = 4
+_HOPELESS = 15.0  # nats above, after the taste
+_TRIED = 4
+_APART = 0.02  # of the box's width
+
+
+def walk(
+    objective: Objective, p: FloatArray, value: float, noise: FloatArray, box: Box
+) -> tuple[FloatArray, float, list[FloatArray]]:
+    """Leave a side valley for the best of those that `valleys` finds, again and again.
+
+    Returns
+    -------
+    p : array, shape (parameters,)
+    log_likelihood : float
+    others : list of array
+        The valleys that were found and are not better.
+    """
+    others: list[FloatArray] = []
+    for _ in range(_WALKS):
+        found = valleys(objective, p, noise, box)
+        if not found or found[0][1] < value + _WORTH:
+            return p, value, [end for end, _ in found]
+        others = [p, *(end for end, _ in found[1:])]
+        p, value = found[0]
+    return p, value, others
+
+
+def valleys(
+    objective: Objective, p: FloatArray, noise: FloatArray, box: Box
+) -> list[tuple[FloatArray, float]]:
+    """Other optima among the tyres of the same stiffness and peak but of other curvature.
+
+    Along these the likelihood has several minima that only a small bend of the tyre curve tells
+    apart, too far from each other for a local search.
+
+    Returns
+    -------
+    list of (parameters, log-likelihood)
+        Best first; none that is `p` itself.
+    """
+    gains = objective.freeze(p, noise)
+    here = objective.half_sum_of_squares(p, gains)
+    tasted = []
+    for sides in _SIDES:
+        for e in _CURVATURES:
+            trial = p.copy()
+            for first in sides:
+                trial[first : first + 4] = look_alike(p[first : first + 4], e)
+            found = minimise(objective, trial, gains, box, rounds=_TASTE)
+            trial[box.columns] = found.x
+            if found.cost < here + _HOPELESS and not _same(trial, p, box):
+                tasted.append((found.cost, trial))
+    ends: list[tuple[FloatArray, float]] = []
+    tried: list[FloatArray] = [p]
+    for _, trial in sorted(tasted, key=lambda one: one[0])[:_TRIED]:
+        if any(_same(trial, other, box) for other in tried):
+            continue
+        there, value = descend(objective, trial, noise, box)
+        if not any(_same(there, other, box) for other in tried):
+            ends.append((there, value))
+        tried += [trial, there]
+    return sorted(ends, key=lambda one: -one[1])
+
+
+def _same(a: FloatArray, b: FloatArray, box: Box) -> bool:
+    apart = np.abs(a - b)[box.columns] / (box.upper - box.lower)
+    return bool(np.all(apart < _APART))

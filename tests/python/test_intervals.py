@@ -1,0 +1,132 @@
+"""Parameters that a user fixes, bounds or knows roughly; intervals; which note takes precedence."""
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Fit, InvalidInput, Log, Model, identify
+from sysid_vehicle.identify import profile_fit, refit
+from sysid_vehicle.identify.estimates import box_covariance, wald
+from sysid_vehicle.identify.objective import Penalised, gaussian_prior
+from sysid_vehicle.identify.search import Box
+
+SHAPES = ("C_front", "C_rear", "E_front", "E_rear")
+HALF = 0.5 * 1.96**2  # nats that the end of a 95 % interval costs
+
+
+@pytest.fixture(scope="module")
+def short(lap: Log) -> Log:
+    return lap.between(0.0, 12.0)
+
+
+@pytest.fixture(scope="module")
+def profiled(truth: Model, short: Log) -> Fit:
+    return identify(
+        truth,
+        short,
+        starts=1,
+        fixed=SHAPES,
+        bounds={"D_rear": (0.5, 1.5)},
+        intervals="profile",
+    )
+
+
+def test_what_is_fixed_stays_and_is_not_estimated(profiled: Fit, truth: Model) -> None:
+    assert [e.name for e in profiled.estimates] == ["B_front", "D_front", "B_rear", "D_rear"]
+    for name in SHAPES:
+        assert profiled.model.value(name) == truth.value(name)
+    for e in profiled.estimates:
+        assert abs(e.value - truth.value(e.name)) < 4.0 * e.std
+    assert profiled.model.bounds("D_rear") == (0.5, 1.5)
+    # Effects that are added keep what was said of the tyres.
+    assert "C_front" not in profiled.model.add("mass").free_names
+
+
+def test_profile_intervals_end_where_a_refit_says(profiled: Fit, truth: Model) -> None:
+    assert "95 % interval (profile)" in str(profiled)
+    problem = profiled.driving.problem(profiled.model)
+    p, noise = profiled.model.vector(), profiled.noise.vector()
+    gains = problem.freeze(p, noise)
+    best = problem.half_sum_of_squares(p, gains)
+    for name in ("B_front", "D_rear"):
+        for end in profiled[name].interval:
+            held = refit(
+                profiled.model.with_fixed({name: end}), profiled.driving, profiled.noise, rounds=1
+            )
+            lost = problem.half_sum_of_squares(held.model.vector(), gains) - best
+            assert lost == pytest.approx(HALF, abs=0.15), name
+    # So does that of what follows from the parameters, and both agree where all is well known.
+    stiffness = profiled["cornering stiffness front"]
+    low, high = stiffness.interval
+    assert (low, high) == profiled.profile("cornering_stiffness_front").interval
+    assert high - low == pytest.approx(2.0 * 1.96 * stiffness.std, rel=0.1)
+    with pytest.raises(KeyError, match="there are B_front"):
+        profiled.profile("C_front")
+
+
+def test_a_prior_counts_as_one_more_reading(profiled: Fit) -> None:
+    plain = profiled
+    free, std = plain["D_front"], plain["D_front"].std
+    mean = free.value + 0.6 * std
+    model = plain.model.with_priors({"D_front": (mean, std)})
+    known = profile_fit(refit(model, plain.driving, plain.noise))
+    # Two readings as sure as each other: halfway, and surer by the root of two.
+    assert known["D_front"].value == pytest.approx(free.value + 0.3 * std, abs=0.1 * std)
+    assert known["D_front"].std == pytest.approx(std / np.sqrt(2.0), rel=0.03)
+    assert known.log_likelihood < plain.log_likelihood
+
+
+@pytest.mark.parametrize(
+    ("told", "message"),
+    [
+        ({"fixed": ["C_frnt"]}, "no parameter 'C_frnt'"),
+        ({"bounds": {"D_front": (2.0, 1.0)}}, r"bounds of D_front are 2 .. 1; give \(lower"),
+        ({"priors": {"D_front": (1.0, 0.0)}}, "prior of D_front is 1 .- 0"),
+        (
+            {"fixed": ["D_front"], "priors": {"D_front": (1.0, 0.1)}},
+            r"D_front has bounds or a prior but is not free; with_free\(\['D_front'\]\)",
+        ),
+        ({"fixed": [f"{x}_{a}" for x in "BCDE" for a in ("front", "rear")]}, "nothing is left"),
+        ({"intervals": "bootstrap"}, "there are information, profile"),
+    ],
+)
+def test_what_contradicts_itself_is_refused(
+    start: Model, short: Log, told: dict[str, object], message: str
+) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        identify(start, short, **told)
+
+
+def test_a_known_inertia_can_be_freed(truth: Model) -> None:
+    name = "yaw_inertia_kgm2"
+    assert name not in truth.free_names
+    freed = truth.with_free([name]).with_priors({name: (1700.0, 100.0)})
+    assert name in freed.free_names
+    assert freed.priors == {name: (1700.0, 100.0)}
+    assert "yaw_inertia" not in {e.id for e in freed.candidates}
+    assert truth.add("mass").with_fixed({"mass.relative_error": 0.05}).drop("mass") == truth
+
+
+def test_what_is_not_determined_is_not_called_at_bound() -> None:
+    box = Box([0, 1, 2], np.zeros(3), np.ones(3))
+    x = np.array([1.0, 1.0, 0.5])
+    covariance = box_covariance(np.diag([1e-3, 1e6, 1e6]), box, x)
+    loose, held, free = wald("abc", dict.fromkeys("abc", "1"), x, covariance, box)
+    assert (loose.note, held.note, free.note) == ("not determined", "at bound", "")
+    # The data say nothing: no more is known than the box. A bound leaves no standard error.
+    assert loose.std == pytest.approx(np.hypot(0.5, 1.0 / np.sqrt(12.0)), rel=1e-3)
+    assert held.std == np.inf
+    assert free.std == pytest.approx(1e-3, rel=1e-4)
+
+
+def test_priors_are_residuals_like_those_of_the_data(profiled: Fit) -> None:
+    problem = profiled.driving.problem(profiled.model, most_samples=300)
+    p, columns = profiled.model.vector(), profiled.columns
+    gains = problem.freeze(p, profiled.noise.vector())
+    whole = Penalised(problem, gaussian_prior(len(p), {columns[1]: (1.5, 0.1)}))
+    e, G = whole.residuals(p, gains), whole.sensitivities(p, gains, columns)
+    cost, descent, information = whole.normal_equations(p, gains, columns)
+    assert whole.half_sum_of_squares(p, gains) == pytest.approx(0.5 * e @ e)
+    assert cost == pytest.approx(0.5 * e @ e)
+    assert descent == pytest.approx(G.T @ e)
+    assert information == pytest.approx(G.T @ G)
+    assert e[-1] == pytest.approx((1.5 - p[columns[1]]) / 0.1)
