@@ -4,6 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 
 from . import _core
+from ._arguments import whole
 
 
 class Workers(ThreadPoolExecutor):
@@ -16,11 +17,16 @@ class Workers(ThreadPoolExecutor):
     ----------
     count : int
         How many threads.
+
+    Raises
+    ------
+    InvalidInput
+        `count` is no whole number above zero; the message calls it ``workers``.
     """
 
     def __init__(self, count: int) -> None:
         self._stop = _core.Stop()
-        super().__init__(count, initializer=self._stop.follow)
+        super().__init__(whole(count, "workers", 1), initializer=self._stop.follow)
 
     def __exit__(
         self,

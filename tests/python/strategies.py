@@ -45,7 +45,7 @@ def car_columns(
     lateral_mps2: float = 4.0,
     noise: float = 1.0,
 ) -> Columns:
-    """Columns of a linear car (1500 kg, 2.7 m) in curves at varying speed, with noisy sensors.
+    """Columns of a linear car (1500 kg, 1.2 + 1.5 m) in curves at varying speed, noisy sensors.
 
     Negative speeds reverse the car. All channels agree with each other but for the noise.
     """
@@ -64,7 +64,9 @@ def car_columns(
     vy_dot = np.gradient(vy, 1.0 / rate_hz) if n > 1 else np.zeros(n)
     ay = vx * yaw_rate + vy_dot
     ax = vx_dot - vy * yaw_rate
+    yaw_acceleration = np.gradient(yaw_rate, 1.0 / rate_hz) if n > 1 else np.zeros(n)
     steer = 2.7 * yaw_rate / speed + 0.002 * wanted
+    front_n = (1.5 * 1500.0 * ay + 2700.0 * yaw_acceleration) / 2.7
     white = noise * rng.standard_normal((6, n))
     return {
         "time_s": time_s,
@@ -74,7 +76,7 @@ def car_columns(
         "ax_mps2": ax + 0.06 * white[3],
         "ay_mps2": ay + 0.06 * white[4],
         "steer_rad": steer + 2e-4 * white[5],
-        "fx_n": 1500.0 * (ax + 0.5 * wanted * steer) + 0.4 * vx * np.abs(vx),
+        "fx_n": 1500.0 * ax + front_n * np.sin(steer) + 0.4 * vx * np.abs(vx),
     }
 
 

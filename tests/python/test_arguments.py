@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle import Fit, InvalidInput, Log, Model, Vehicle
+from sysid_vehicle import Fit, InvalidInput, Log, Model, Vehicle, lab
 from sysid_vehicle._arguments import generator, real, whole
+from sysid_vehicle._threads import Workers
 
 
 class Table:
@@ -55,6 +56,14 @@ def test_a_vehicle_is_made_of_tyres_and_a_name(car: Vehicle) -> None:
         car.replace(tyre_rear={"B": 10})
     with pytest.raises(InvalidInput, match="name = 3 is not a text"):
         car.replace(name=3)
+
+
+@pytest.mark.parametrize("workers", [0, -2, 1.5, True, "2", None])
+def test_no_pool_is_made_of_less_than_one_worker(workers: object) -> None:
+    with pytest.raises(InvalidInput, match=r"workers = .*: give a whole number, 1 or more"):
+        Workers(workers)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match="workers = "):
+        lab.design_excitation(trials=2, duration_s=10.0, workers=workers)  # type: ignore[arg-type]
 
 
 def test_whole_numbers_and_seeds() -> None:

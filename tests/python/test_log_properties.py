@@ -73,6 +73,13 @@ def test_a_clean_log_is_never_refused(columns: strategies.Columns) -> None:
     assert log is not None or seconds < 5.0
 
 
+@pytest.mark.parametrize("seed", [1812152180, 1533802531, 2357659483, 1570158557, 3976774156])
+@pytest.mark.parametrize("noise", [0.0, 1.0, 5.0])
+def test_force_against_the_drag_of_tight_corners_is_right(seed: int, noise: float) -> None:
+    """On a radius of 7 m most of the wheel force holds the speed against the steered wheels."""
+    assert read(strategies.car_columns(634, 50.0, seed, 8.0, 9.0, noise)) is not None
+
+
 @given(strategies.clean_logs(lengths=st.integers(50, 500)), st.integers(0, 10**6), st.data())
 def test_uneven_time_loses_no_channel(
     columns: strategies.Columns, seed: int, data: st.DataObject

@@ -182,6 +182,31 @@ def test_noise_of_the_yaw_rate_does_not_make_the_stiffness_too_small(vehicle, lo
     assert off(chosen) < 0.5 * off(short)
 
 
+def test_least_squares_leave_out_what_is_missing(vehicle, log):
+    whole = cornering_stiffness(vehicle, log, window_s=0.15)
+    columns = {name: np.array(log[name]) for name in log.channels}
+    columns["steer_rad"][1000:1200] = np.nan
+    columns["steer_rad"][-3:] = np.nan
+    columns["ay_mps2"][np.arange(log.n) % 4 != 0] = np.nan  # a slower sensor
+    columns["vx_mps"][2000:2100] = 0.0
+    with pytest.warns(SysidWarning, match="no values"):
+        spoilt = sv.Log.from_arrays(columns, name="spoilt", check=False)
+    run = cornering_stiffness(vehicle, spoilt, window_s=0.15)
+    assert not run.used[1000:1200].any()
+    assert not run.used[2000:2100].any()
+    assert run.used.sum() > 0.8 * whole.used.sum()
+    assert run.cf_npr[-1] == pytest.approx(whole.cf_npr[-1], rel=0.02)
+    assert run.cr_npr[-1] == pytest.approx(whole.cr_npr[-1], rel=0.02)
+    columns["steer_rad"][:] = np.nan
+    columns["steer_rad"][::50] = 0.01
+    rare = sv.Log.from_arrays(columns, name="rare", check=False)
+    with pytest.warns(SysidWarning, match="only 0 samples"):
+        cornering_stiffness(vehicle, rare, window_s=0.15)
+    for window_s in (0.0, np.nan, np.inf):
+        with pytest.raises(InvalidInput, match="window_s"):
+            cornering_stiffness(vehicle, log, window_s=window_s)
+
+
 def test_the_command_line_prints_and_writes(vehicle, log, tmp_path, capsys):
     log.between(0.0, 20.0).to_csv(tmp_path / "run.csv")
     vehicle.to_toml(tmp_path / "car.toml")

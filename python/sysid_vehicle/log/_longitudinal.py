@@ -30,6 +30,7 @@ _CLEARLY_RAMP, _CLEARLY_DRIVEN, _CLEARLY_FELT = (
 )  # m/s2 beyond which channels must follow each other
 _DRIVEN_MPS, _LEAST_FORCE_N = 12.0, 30.0  # at that speed drag takes more
 _HELD_MPS2 = 0.05  # a speed that falls no faster on average is held
+_FRONT_SHARE, _FRONT_SPREAD = 0.5, 0.2  # of the lateral force: what the front axle bears
 _DRAG_PER_M = 0.003  # half the air's density times a large drag area, over the mass of a light car
 
 _AX_G = ("ax_mps2", "g", "factor = 9.80665")
@@ -64,7 +65,10 @@ def check_longitudinal(drive: Drive) -> None:
 
 
 def _ramp_on(drive: Drive, name: str) -> tuple[FloatArray, FloatArray, Regression]:
-    """Regress the change of speed on a channel, what turning adds to it taken out."""
+    """Regress the change of speed on a channel, what turning adds to it taken out.
+
+    Returns that change of speed, the means of the channel, and the regression.
+    """
     c = drive.motion.channels
     yaw, ramp = c["yaw_rate_radps"], drive.change(c["vx_mps"])
     if "vy_mps" in c:
@@ -75,13 +79,22 @@ def _ramp_on(drive: Drive, name: str) -> tuple[FloatArray, FloatArray, Regressio
     driver = drive.mean(c[name])
     columns = [driver, *across, drive.change(yaw), ones(drive)]
     spread = [np.inf, *[np.inf] * len(across), 0.6, np.inf]
-    found = fit(ramp, columns, spread)
+    mean = [0.0] * len(spread)
+    if name == "fx_n":
+        # Steered wheels pull back with their side force, which an accelerometer feels: in tight
+        # corners most of the force goes into that, and the two look alike.
+        corner = drive.mean(c["ay_mps2"] * np.sin(c["steer_rad"]))
+        columns.append(corner)
+        mean.append(-_FRONT_SHARE)
+        spread.append(_FRONT_SPREAD)
+    found = fit(ramp, columns, spread, mean)
     if name == "fx_n":
         # The force of the wheels is told before drag, which an accelerometer feels. In few windows
         # drag and acceleration cannot be told apart: the law that explains more counts.
         drag = drive.mean(c["vx_mps"] ** 2)
-        dragged = fit(ramp, [*columns, drag], [*spread, _DRAG_PER_M])
+        dragged = fit(ramp, [*columns, drag], [*spread, _DRAG_PER_M], [*mean, 0.0])
         found = max(found, dragged, key=lambda law: law.coherence)
+        ramp = ramp - found.coefficients[len(columns) - 1] * corner
     return ramp, driver, found
 
 

@@ -30,6 +30,7 @@ __all__ = ["CorneringRls", "CorneringRun", "cornering_stiffness"]
 _ENOUGH = 200  # samples with slip
 _BLOCK = 100  # samples over which the noise is one
 _SHORTEST_S, _LONGEST_S = 0.15, 1.0  # of the window; corners are smoothed away by a longer one
+_SLOWEST_MPS = 1.0  # below it slip angles mean nothing
 _NOISE_SHARE = 0.01  # of the variance of a slip angle
 
 
@@ -209,7 +210,8 @@ def cornering_stiffness(
     Raises
     ------
     InvalidInput
-        If neither `beta_rad` nor ``vy_mps`` is there, or a value cannot be.
+        If neither `beta_rad` nor ``vy_mps`` is there, a value cannot be, or the log is shorter
+        than the window.
 
     Warns
     -----
@@ -219,7 +221,10 @@ def cornering_stiffness(
     beta = np.arctan2(log["vy_mps"], log["vx_mps"]) if beta_rad is None else as_float64(beta_rad)
     if beta.shape != (log.n,):
         raise InvalidInput(f"beta_rad: shape {beta.shape}; give one value for each of {log.n}")
+    if window_s is not None and not (np.isfinite(window_s) and window_s > 0.0):
+        raise InvalidInput(f"window_s: {window_s:g} is not above 0; leave it out to have it chosen")
     rate, vx = log["yaw_rate_radps"], log["vx_mps"]
+    vx = np.where(vx > _SLOWEST_MPS, vx, np.nan)
     slips = (
         log["steer_rad"] - np.arctan(np.tan(beta) + vehicle.lf_m * rate / vx),
         -np.arctan(np.tan(beta) - vehicle.lr_m * rate / vx),
@@ -232,14 +237,16 @@ def cornering_stiffness(
         )
     width = max(5, 2 * round(0.5 * window_s * log.rate_hz) + 1)
     if width > log.n:
-        raise InvalidInput(f"{log.name}: {log.n} samples are fewer than the window of {width}")
-
-    def smooth(y: FloatArray, derivative: int = 0) -> FloatArray:
-        step = 1.0 / log.rate_hz
-        return np.asarray(savgol_filter(y, width, 2, deriv=derivative, delta=step))
-
+        raise InvalidInput(
+            f"{log.name}: {log.n} samples are fewer than the window of {width}; give a longer log, "
+            f"or a shorter window_s"
+        )
+    step = 1.0 / log.rate_hz
     readings = np.column_stack(
-        [smooth(slips[0]), smooth(slips[1]), smooth(log["ay_mps2"]), smooth(rate, 1)]
+        [
+            _parabolas(y, width, derivative, step)
+            for y, derivative in ((slips[0], 0), (slips[1], 0), (log["ay_mps2"], 0), (rate, 1))
+        ]
     )
     found = CorneringRls(vehicle, forgetting=forgetting, **settings).run(readings).T
     cf, cr, cf_std, cr_std, used = found
@@ -247,9 +254,29 @@ def cornering_stiffness(
     if not run.excited:
         warn(
             f"{log.name}: only {int(run.used.sum())} samples hold slip angles in the linear range; "
-            f"the cornering stiffness stays near where it started. Give a log with gentle corners"
+            f"the cornering stiffness stays near where it started. Give a log with gentle corners "
+            f"in which no channel is missing for long"
         )
     return run
+
+
+def _parabolas(y: FloatArray, width: int, derivative: int, step_s: float) -> FloatArray:
+    """Local parabolas over `width` samples, or their slope; NaN where too much is missing.
+
+    Holes of up to half a window are interpolated first: the parabolas hardly feel them. Longer ones
+    stay, and so do stretches between them that are shorter than a window.
+    """
+    out = np.full(y.size, np.nan)
+    known = np.flatnonzero(np.isfinite(y))
+    if known.size == 0:
+        return out
+    cuts = np.flatnonzero(np.diff(known) > width // 2 + 1) + 1
+    for part in np.split(known, cuts):
+        rows = np.arange(part[0], part[-1] + 1)
+        if rows.size >= width:
+            dense = np.interp(rows, part, y[part])
+            out[rows] = savgol_filter(dense, width, 2, deriv=derivative, delta=step_s)
+    return out
 
 
 def _window_s(slip: FloatArray, noise: FloatArray, rate_hz: float) -> float:
