@@ -79,8 +79,8 @@ def corruptions() -> dict[str, dict[str, object]]:
     return {"all": corruptions.CORRUPTIONS, "matters": {"": corruptions.matters}}
 
 
-# What a lap holds too little of: its v_y is too slow to have a time, and so is its steering.
-LAP_MISSES = {("0.1 s late", "vy_mps"), ("0.1 s late", "steer_rad")}
+# What a lap holds too little of: its v_y is too slow to have a time.
+LAP_MISSES = {("0.1 s late", "vy_mps")}
 
 
 @pytest.mark.parametrize("seed", [21, 22])
@@ -137,6 +137,47 @@ class TestLags:
         np.testing.assert_allclose(log["yaw_rate_radps"][inner], yaw[inner], atol=0.02)
         assert np.isnan(log["yaw_rate_radps"][-5:]).all()
 
+    @pytest.mark.parametrize("name", ["lap", "handling_course"])
+    @pytest.mark.parametrize(
+        "hidden", [{}, {"tyre_load_sensitivity.sensitivity": 0.25}, {"mass.relative_error": 0.12}]
+    )
+    def test_steering_that_is_late_near_the_limit(
+        self, truth: Model, name: str, hidden: dict[str, float]
+    ) -> None:
+        """Tyres are far from linear there, and none of them is known."""
+        effects = {value.split(".")[0] for value in hidden}
+        car = truth.add(*effects).with_values(hidden) if effects else truth
+        data = columns_of(drive(car, manoeuvres.all()[name], seed=10, rate_hz=50.0))
+        assert heard(data) == ""
+        time_s = data["time_s"]
+        said = heard({**data, "steer_rad": np.interp(time_s - 0.1, time_s, data["steer_rad"])})
+        found = re.search(r"steer_rad: lags behind yaw_rate_radps and ay_mps2 by ([\d.]+) s", said)
+        assert found is not None, said
+        assert float(found[1]) == pytest.approx(0.1, abs=0.03)
+
+    @pytest.mark.parametrize(
+        "hidden",
+        [
+            {"steer_delay.delay_s": 0.1},
+            {"steer_lag.time_constant_s": 0.1},
+            {"tyre_relaxation.relaxation_length_m": 0.9},
+            {"speed_sensor_lever_arm.forward_m": 0.8, "speed_sensor_lever_arm.left_m": 0.4},
+        ],
+    )
+    def test_what_a_car_delays_is_no_late_channel(
+        self, truth: Model, hidden: dict[str, float]
+    ) -> None:
+        car = truth.add(next(iter(hidden)).split(".")[0]).with_values(hidden)
+        for name in ("double_lane_change", "sine_sweep", "slalom", "step_steer"):
+            log = drive(car, manoeuvres.all()[name], seed=11, rate_hz=50.0)
+            assert heard(columns_of(log)) == "", name
+
+    def test_at_one_frequency_a_lag_is_only_a_phase(self, truth: Model) -> None:
+        data = columns_of(drive(truth, manoeuvres.slalom(), seed=12, rate_hz=50.0))
+        for late_s in (0.0, 0.05):
+            time_s, steer = data["time_s"], data["steer_rad"]
+            assert heard({**data, "steer_rad": np.interp(time_s - late_s, time_s, steer)}) == ""
+
     def test_a_shift_between_samples(self, rng: np.random.Generator) -> None:
         time_s = np.arange(3000) * 0.02
         signal = np.sin(time_s) + np.sin(2.7 * time_s)
@@ -150,6 +191,44 @@ class TestLags:
         lag = find_lag(sides, np.zeros(2), free, np.ones(time_s.size, dtype=bool))
         assert lag.seconds == pytest.approx(0.0537, abs=4.0 * lag.deviation)
         assert 0.0 < lag.deviation < 0.002
+
+
+@pytest.fixture(scope="module")
+def long_course(truth: Model) -> Columns:
+    return columns_of(drive(truth, manoeuvres.handling_course(120.0), seed=13, rate_hz=25.0))
+
+
+class TestClock:
+    @staticmethod
+    def late(data: Columns, begin_s: float, end_s: float) -> str:
+        time_s = data["time_s"]
+        by = np.linspace(begin_s, end_s, time_s.size)
+        return heard({**data, "steer_rad": np.interp(time_s - by, time_s, data["steer_rad"])})
+
+    def test_a_clock_that_drifts_is_refused(self, long_course: Columns) -> None:
+        assert heard(long_course) == ""
+        said = self.late(long_course, 0.0, 3.0)
+        found = re.search(r"its clock drifts .*: (\S+) s (early|late) at .*, (\S+) s late at", said)
+        assert found is not None, said
+        assert float(found[1]) == pytest.approx(0.0, abs=0.3)
+        assert float(found[3]) == pytest.approx(3.0, abs=0.3)
+        assert re.search(r" 2\.\d s early at", self.late(long_course, 0.1, -2.2))
+
+    @pytest.mark.parametrize("late_s", [1.5, -0.6])
+    def test_a_clock_that_is_off_throughout(self, long_course: Columns, late_s: float) -> None:
+        found = re.search(
+            r"steer_rad: .* against yaw_rate_radps .*delay_s = (\S+) ",
+            self.late(long_course, *2 * [late_s]),
+        )
+        assert found is not None
+        # The car answers late itself.
+        assert float(found[1]) == pytest.approx(late_s - 0.1, abs=0.15)
+
+    def test_steering_that_explains_nothing_is_refused(self, long_course: Columns) -> None:
+        steer = np.roll(long_course["steer_rad"], long_course["time_s"].size // 3)
+        assert "steer_rad: does not turn with yaw_rate_radps" in heard(
+            {**long_course, "steer_rad": steer}
+        )
 
 
 def test_a_regression_is_not_bent_by_outliers(rng: np.random.Generator) -> None:

@@ -7,18 +7,17 @@ import numpy as np
 from ._channels import FloatArray
 from ._motion import Motion
 from ._regression import Lag, Sides, find_lag, regress
+from ._steering import several_frequencies, steering_lag
 
 _MIN_RATE_HZ = 18.0
 _MIN_WINDOWS = 60
 _MOVING_MPS = 5.0
-_LINEAR_MPS2 = 5.0  # lateral acceleration up to which the tyres are taken as nearly linear
 
 # Lags that sensors and lever arms of good logs have [s].
 _USUAL_S = 0.055
 # A lever arm of this length acts like a lag of length over speed [m].
 _LEVER_M = 1.2
-_STEADY_MPS2 = 2.0  # braking harder moves load between the axles
-_STEER_LATE_S = 0.06
+_STEER_LATE_S = 0.03
 _STEER_EARLY_S = 0.12  # hydraulics, rubber and relaxing tyres delay the answer of a car
 _FORCE_EARLY_S = 0.4  # brakes and engines take their time
 # Of acceleration, squared speed, lateral acceleration times steering, and one; per mass.
@@ -26,7 +25,13 @@ _FORCE_PRIOR = np.array([1.0, 3e-4, 0.5, 0.0])
 _FORCE_SPREAD = np.array([0.1, 7e-4, 1.0, np.inf])
 # Below, a lag explains too little of the misfit. Gravity through roll bends ay_mps2 most, and
 # what corners take of the force is only roughly known.
-_MIN_GAIN = {"vy_mps": 1.35, "yaw_rate_radps": 1.35, "ay_mps2": 1.6, "fx_n": 2.0}
+_MIN_GAIN = {
+    "vy_mps": 1.35,
+    "yaw_rate_radps": 1.35,
+    "ay_mps2": 1.6,
+    "fx_n": 2.0,
+    "steer_rad": 1.1,
+}
 _MIN_GAIN_ELSE = 1.2
 _MIN_EVIDENCE = 30.0
 _EXCITED_MPS2 = 0.4
@@ -37,7 +42,7 @@ def lag_notes(motion: Motion) -> list[str]:
 
     The lateral channels must obey ``d(vy)/dt = ay - vx yaw_rate``, the longitudinal ones
     ``d(vx)/dt = ax + vy yaw_rate``; the force on the wheels follows the acceleration, and the
-    steering angle what the slip of the front wheels demands.
+    force of the front axle the slip that the steering angle makes.
     """
     c = motion.channels
     motion.windows(0.4)
@@ -143,38 +148,12 @@ def _force(m: Motion, usable: np.ndarray) -> list[str]:
     )
 
 
-def _steer(m: Motion, usable: np.ndarray) -> list[str]:
-    """Compare the steering angle with the front slip angle that the front force asks for.
-
-    ``steer = (vy + lf r) / vx + (lr m ay + Iz dr/dt) / (L C_front)``, with priors for what a car
-    has, and a cubic term as the tyres begin to saturate.
-    """
-    c, one = m.channels, np.ones(m.count)
-    usable = usable & (np.abs(m.mean(c["ay_mps2"])) < _LINEAR_MPS2)
-    usable &= np.abs(m.change(c["vx_mps"])) < _STEADY_MPS2
-    if np.count_nonzero(usable) < _MIN_WINDOWS:
+def _steer(motion: Motion, usable: np.ndarray) -> list[str]:
+    if not several_frequencies(motion):
         return []
-    speed = np.maximum(c["vx_mps"], 3.0)
-    slip, turn = c["vy_mps"] / speed, c["yaw_rate_radps"] / speed
-
-    def sides(lag: float) -> tuple[FloatArray, FloatArray]:
-        columns = [
-            m.mean(m.shifted(slip, -lag)),
-            m.mean(m.shifted(turn, -lag)),
-            m.mean(m.at("ay_mps2", -lag)),
-            m.change(m.at("yaw_rate_radps", -lag)),
-            m.mean(m.at("ay_mps2", -lag) ** 3),
-            one,
-        ]
-        return m.mean(c["steer_rad"]), np.column_stack(columns)
-
-    lag = find_lag(
-        sides,
-        np.array([1.0, 1.3, 0.007, 0.009, 2e-5, 0.0]),
-        np.array([0.1, 0.4, 0.003, 0.003, 5e-5, np.inf]),
-        usable,
-    )
-    told = _told(lag, _STEER_LATE_S, _STEER_EARLY_S)
+    lag = steering_lag(motion, usable)
+    # A car may answer late, and then its steering angle seems early; no car answers ahead of it.
+    told = _told(lag, _STEER_LATE_S, _STEER_EARLY_S, _MIN_GAIN["steer_rad"])
     return [_note("steer_rad", "yaw_rate_radps and ay_mps2", lag)] if told else []
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import InvalidInput
 from ._channels import DEG, FloatArray
+from ._clock import clock_notes
 from ._lags import lag_notes
 from ._laws import (
     EXCITED,
@@ -94,6 +95,7 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[s
         For the first channel that cannot be right; the message names channel, time and remedy.
     """
     notes: list[str] = []
+    clock: list[str] = []
     motion = Motion(columns, rate_hz)
     motion.windows(WINDOW_S)
     speed = motion.mean(motion.channels["vx_mps"])
@@ -107,7 +109,7 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[s
     except InvalidInput as error:
         problem = error  # the unit, if it can be told, says more
     try:
-        _check_laws(drive)
+        clock = _check_laws(drive)
     except KnownUnit:
         raise
     except InvalidInput as error:
@@ -116,22 +118,25 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[s
         raise problem
     if "fx_n" in columns:
         notes += held_speed_note(drive)
-    return notes + lag_notes(motion)
+    return notes + (clock or lag_notes(motion))
 
 
-def _check_laws(drive: Drive) -> None:
+def _check_laws(drive: Drive) -> list[str]:
     channels = drive.motion.channels
     speed = drive.mean(channels["vx_mps"])
     if np.median(speed) < 0.0:
         raise InvalidInput(wrong_sign("vx_mps", "is negative for most of the drive", speed, drive))
     _check_lateral(drive)
-    _check_steer(drive)
+    clock = clock_notes(drive.motion)
+    if not clock:
+        _check_steer(drive)
     if "vy_mps" in channels:
         _check_sliding(drive)
     if "ax_mps2" in channels:
         check_longitudinal(drive)
     if "fx_n" in channels:
         check_force(drive)
+    return clock
 
 
 def _check_lateral(drive: Drive) -> None:
@@ -209,7 +214,7 @@ def _check_steer(drive: Drive) -> None:
     # On a circle of one radius only a small offset keeps the slope from being anything.
     answer = fit(steer[rows], columns, [np.inf, np.inf, _OFFSET * size_of(steer[rows])])
     alone = cosine(curvature[rows], steer[rows])
-    if answer.coherence < 0.15 and abs(alone) < 0.4 and spread_of(ay[rows]) > _CLEARLY:
+    if answer.coherence < 0.25 and abs(alone) < 0.45 and spread_of(ay[rows]) > _CLEARLY:
         raise InvalidInput(
             f"steer_rad: does not turn with yaw_rate_radps and ay_mps2, {drive.place(ay)}; check "
             f"that the column holds the steering angle, in the order of time"

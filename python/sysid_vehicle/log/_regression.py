@@ -109,7 +109,7 @@ def find_lag(sides: Sides, mean: FloatArray, spread: FloatArray, usable: np.ndar
         return y[usable], x[usable]
 
     start = regress(*rows(0.0), mean, spread)
-    lags = np.arange(-_REACH_S, _REACH_S + 0.5 * _COARSE_S, _COARSE_S)
+    lags = coarse_lags()
     profile = [_misfit(*rows(lag), mean, spread, start) for lag in lags]
     lag = float(lags[int(np.argmin(profile))])
     deviation = 0.0
@@ -134,6 +134,11 @@ def find_lag(sides: Sides, mean: FloatArray, spread: FloatArray, usable: np.ndar
     # The weights' sum stands for the number of rows that count.
     variance = best / max(float(start.weights.sum()), 1.0)
     return Lag(lag, deviation, worse / best, (worse - best) / variance)
+
+
+def coarse_lags() -> FloatArray:
+    """Return the lags at which the misfit is profiled [s]."""
+    return np.arange(-_REACH_S, _REACH_S + 0.5 * _COARSE_S, _COARSE_S)
 
 
 def _precision(spread: FloatArray) -> FloatArray:
