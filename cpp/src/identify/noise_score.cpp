@@ -16,21 +16,27 @@ using Lanes = Eigen::Array<double, kNoiseParameters, 1>;
 using Table = Mat<kNoiseParameters, kNoiseParameters>;
 constexpr int kTimeLane = kNoiseParameters - 1;
 
+/// Of the states that take part: square, one column for each channel, one row for each.
+using Square = Eigen::MatrixXd;
+using Block = Eigen::Ref<const Square>;
+using Gain = Eigen::Matrix<double, Eigen::Dynamic, kChannels>;
+using Row = Eigen::Matrix<double, kChannels, Eigen::Dynamic>;
+
 constexpr int motion_lane(int i) { return kChannels + i; }
 constexpr int wander_lane(int i) { return kChannels + kMotionStates + i; }
 
 /// Derivatives of the filter's mean and covariance by the logarithms of the noise parameters, along
 /// a run. Only the first `n` states take part; the others stand still and are certain.
-template <int NX>
 class Answer {
   public:
-    Answer(const RunSystem<NX>& system, const Run& run, const Noise& noise)
-        : n_(kStatesPlain + static_cast<int>(system.own().count)),
-          mean_(static_cast<std::size_t>(n_), Lanes::Zero()),
-          covariance_(static_cast<std::size_t>(n_ * n_), Lanes::Zero()),
+    Answer(int n, double forget, const Run& run, const Noise& noise)
+        : n_(n),
+          mean_(place(n), Lanes::Zero()),
+          moved_(mean_.size()),
+          covariance_(place(n * n), Lanes::Zero()),
           half_(covariance_.size()),
+          cross_(place(n * kChannels)),
           process_(Mat<kStatesPlain, kNoiseParameters>::Zero()) {
-        const double forget = system.forget();
         // d exp(-dt/tau) / d log(tau)
         slope_ = forget * run.dt / noise.correlation_time_s;
         for (int i = 0; i < kMotionStates; ++i) {
@@ -49,9 +55,9 @@ class Answer {
     }
 
     /// From the update at one sample to the prediction for the next one.
-    void predict(const Mat<NX, NX>& transition) {
-        const Mat<NX, NX> through = transition * keep_;
-        const Mat<NX, kChannels> gain = transition * gain_;
+    void predict(const Block& transition) {
+        const Square through = transition.lazyProduct(keep_);
+        const Gain gain = transition.lazyProduct(gain_);
         turn(through);
         for (int i = 0; i < n_; ++i)
             for (int j = 0; j <= i; ++j) {
@@ -59,9 +65,9 @@ class Answer {
                 for (int c = 0; c < kChannels; ++c) d[c] += seen_[c] * gain(i, c) * gain(j, c);
             }
         // The transition's own diagonal for the wandering states depends on the correlation time.
-        const Mat<kMotionStates, NX> cross =
-            slope_ * covariance_after_.template middleRows<kMotionStates>(kMotionStates) *
-            transition.transpose();
+        const Eigen::Matrix<double, kMotionStates, Eigen::Dynamic> cross =
+            slope_ * covariance_after_.middleRows<kMotionStates>(kMotionStates)
+                         .lazyProduct(transition.transpose());
         for (int i = 0; i < kMotionStates; ++i) {
             const int w = kMotionStates + i;
             for (int j = 0; j < n_; ++j)
@@ -70,28 +76,47 @@ class Answer {
         for (int i = 0; i < kStatesPlain; ++i) at(i, i) += process_.row(i).transpose().array();
         for (int i = 0; i < n_; ++i)
             for (int j = 0; j < i; ++j) at(j, i) = at(i, j);
-        std::array<Lanes, NX> moved;
         for (int i = 0; i < n_; ++i) {
             Lanes sum = Lanes::Zero();
             for (int j = 0; j < n_; ++j) sum += transition(i, j) * mean_[place(j)];
-            moved[place(i)] = sum;
+            moved_[place(i)] = sum;
         }
         for (int i = 0; i < kMotionStates; ++i) {
             const int w = kMotionStates + i;
-            moved[place(w)][kTimeLane] += slope_ * mean_after_[w];
+            moved_[place(w)][kTimeLane] += slope_ * mean_after_[w];
         }
-        std::copy_n(moved.begin(), n_, mean_.begin());
+        mean_.swap(moved_);
     }
 
     /// What one sample adds to the score and to the information, and the update there.
+    template <int NX>
     void update(const FilterStep<NX, kChannels>& s, const Vec<kChannels>& measured) {
-        const Mat<kChannels, NX>& H = s.update.observation;
-        const Vec<kChannels> weighed = s.update.information * s.update.innovation;
+        const auto& u = s.update;
+        update({u.innovation, u.information, u.lower}, u.observation.leftCols(n_),
+               u.gain.topRows(n_), measured);
+        mean_after_ = s.mean.head(n_);
+        covariance_after_ = s.covariance.topLeftCorner(n_, n_);
+    }
+
+    const Lanes& score() const { return score_; }
+    const Table& information() const { return information_; }
+
+  private:
+    static constexpr int kPairs = kChannels * (kChannels + 1) / 2;
+
+    /// Of the innovation: its value, the inverse of its covariance, and the factor of that.
+    struct Seen {
+        const Vec<kChannels>& innovation;
+        const Mat<kChannels, kChannels>& information;
+        const Mat<kChannels, kChannels>& lower;
+    };
+
+    void update(const Seen& s, const Row& H, const Gain& gain, const Vec<kChannels>& measured) {
+        const Vec<kChannels> weighed = s.information * s.innovation;
         for (int i = 0; i < kChannels; ++i) seen_[i] = std::isnan(measured[i]) ? 0.0 : sensor_[i];
 
-        std::array<Lanes, std::size_t{NX} * kChannels> cross;  // dP H^T
-        const auto crossed = [&](int i, int c) -> Lanes& {
-            return cross[place(i * kChannels + c)];
+        const auto crossed = [&](int i, int c) -> Lanes& {  // dP H^T
+            return cross_[place(i * kChannels + c)];
         };
         for (int i = 0; i < n_; ++i)
             for (int c = 0; c < kChannels; ++c) {
@@ -99,14 +124,13 @@ class Answer {
                 for (int j = 0; j < n_; ++j) sum += H(c, j) * at(i, j);
                 crossed(i, c) = sum;
             }
-        innovate(s.update, crossed);
+        innovate(s, H, crossed);
 
-        keep_ = Mat<NX, NX>::Identity() - s.update.gain * H;
-        gain_ = s.update.gain;
-        mean_after_ = s.mean;
-        covariance_after_ = s.covariance;
+        gain_ = gain;
+        keep_ = -gain.lazyProduct(H);
+        keep_.diagonal().array() += 1.0;
         // x+ = x- + K e:  dx+ = (I - K H) (dx- + dP- H^T S^-1 e) - K dR S^-1 e
-        std::array<Lanes, NX> pushed;
+        std::vector<Lanes>& pushed = moved_;
         for (int i = 0; i < n_; ++i) {
             pushed[place(i)] = mean_[place(i)];
             for (int c = 0; c < kChannels; ++c) pushed[place(i)] += weighed[c] * crossed(i, c);
@@ -119,17 +143,11 @@ class Answer {
         }
     }
 
-    const Lanes& score() const { return score_; }
-    const Table& information() const { return information_; }
-
-  private:
-    static constexpr int kPairs = kChannels * (kChannels + 1) / 2;
-
     static std::size_t place(int i) { return static_cast<std::size_t>(i); }
     Lanes& at(int i, int j) { return covariance_[place(i * n_ + j)]; }
 
     /// A dP A^T, its lower triangle.
-    void turn(const Mat<NX, NX>& A) {
+    void turn(const Square& A) {
         for (int i = 0; i < n_; ++i)
             for (int j = 0; j < n_; ++j) {
                 Lanes sum = Lanes::Zero();
@@ -146,11 +164,9 @@ class Answer {
 
     /// The derivatives of the innovation and of its covariance S, whitened by L L^T = S.
     template <class Crossed>
-    void innovate(const Update<NX, kChannels>& u, Crossed&& crossed) {
-        using Square = Mat<kChannels, kChannels>;
-        const Mat<kChannels, NX>& H = u.observation;
-        const auto lower = u.lower.template triangularView<Eigen::Lower>();
-        const Square inverse = lower.solve(Square::Identity());
+    void innovate(const Seen& u, const Row& H, const Crossed& crossed) {
+        const Mat<kChannels, kChannels> inverse =
+            u.lower.triangularView<Eigen::Lower>().solve(Mat<kChannels, kChannels>::Identity());
         const Vec<kChannels> white = inverse * u.innovation;
         std::array<std::array<Lanes, kChannels>, kChannels> change;  // H dP H^T + dR
         std::array<Lanes, kChannels> shift;                          // -H dx
@@ -197,23 +213,24 @@ class Answer {
     Lanes score_ = Lanes::Zero();
     Table information_ = Table::Zero();
     int n_;
-    std::vector<Lanes> mean_, covariance_, half_;
+    std::vector<Lanes> mean_, moved_, covariance_, half_, cross_;
     Mat<kStatesPlain, kNoiseParameters> process_;
     Vec<kChannels> sensor_, seen_;
     double slope_ = 0.0;
-    Mat<NX, NX> keep_, covariance_after_;
-    Mat<NX, kChannels> gain_;
-    Vec<NX> mean_after_;
+    Square keep_, covariance_after_;
+    Gain gain_;
+    Eigen::VectorXd mean_after_;
 };
 
 template <int NX>
 double score_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
                  Lanes& score, Table& information) {
     const RunSystem<NX> system(problem.model, run, p, noise);
-    Answer<NX> answer(system, run, noise);
+    const int n = kStatesPlain + static_cast<int>(system.own().count);
+    Answer answer(n, system.forget(), run, noise);
     const double log_likelihood =
         filter_run<NX>(system, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
-            if (k > 0) answer.predict(s.transition);
+            if (k > 0) answer.predict(s.transition.topLeftCorner(n, n));
             answer.update(s, run.measurements[k]);
         });
     score += answer.score();

@@ -9,10 +9,8 @@ namespace sysid {
 
 namespace {
 
-constexpr int kWidth = 8;      // directions differentiated in one pass
-constexpr int kNarrow = 4;     // in a pass for the few that are left over
 constexpr double kTurn = 1.6;  // of the fastest rate in a part of an interval, see `substeps_for`
-using Wide = Dual<kWidth>;
+using Wide = Dual<kParameterPass>;
 
 template <int NX>
 void freeze_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
@@ -126,8 +124,8 @@ void differentiate(const Problem& problem, const double* p, const FrozenFilter& 
 void passes(const Problem& problem, const double* p, const FrozenFilter& filter,
             const std::vector<int>& columns, double* out, double* values) {
     const std::size_t width = columns.size();
-    for (std::size_t first = 0; first < width; first += kWidth) {
-        const std::size_t count = std::min<std::size_t>(kWidth, width - first);
+    for (std::size_t first = 0; first < width; first += kParameterPass) {
+        const std::size_t count = std::min<std::size_t>(kParameterPass, width - first);
         double* row = out + first;
         const auto keep = [&](std::size_t, const auto& white) {
             for (const auto& e : white) {
@@ -136,10 +134,10 @@ void passes(const Problem& problem, const double* p, const FrozenFilter& filter,
                 if (first == 0 && values != nullptr) *values++ = e.v;
             }
         };
-        if (count <= kNarrow)
-            differentiate<kNarrow>(problem, p, filter, columns, first, count, keep);
+        if (count <= kShortParameterPass)
+            differentiate<kShortParameterPass>(problem, p, filter, columns, first, count, keep);
         else
-            differentiate<kWidth>(problem, p, filter, columns, first, count, keep);
+            differentiate<kParameterPass>(problem, p, filter, columns, first, count, keep);
     }
 }
 
@@ -201,8 +199,8 @@ double normal_equations(const Problem& problem, const double* p, const FrozenFil
 void signal_sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,
                           const double* signals, const std::vector<int>& targets, double* out) {
     const std::size_t width = targets.size();
-    for (std::size_t first = 0; first < width; first += kWidth) {
-        const std::size_t count = std::min<std::size_t>(kWidth, width - first);
+    for (std::size_t first = 0; first < width; first += kParameterPass) {
+        const std::size_t count = std::min<std::size_t>(kParameterPass, width - first);
         double* row = out + first;
         std::size_t offset = 0;
         for (std::size_t i = 0; i < problem.runs.size(); ++i) {

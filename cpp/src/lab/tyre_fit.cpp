@@ -1,6 +1,6 @@
-#include <cmath>
-
 #include "sysid/lab/tyre_fit.hpp"
+
+#include <cmath>
 
 namespace sysid::lab {
 

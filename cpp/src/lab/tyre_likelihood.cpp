@@ -1,8 +1,9 @@
+#include "sysid/lab/tyre_likelihood.hpp"
+
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
-#include "sysid/lab/tyre_likelihood.hpp"
 #include "sysid/math/errors.hpp"
 #include "sysid/math/interrupt.hpp"
 #include "sysid/math/linear.hpp"

@@ -1,8 +1,9 @@
+#include "sysid/online/mu_slip.hpp"
+
 #include <algorithm>
 
 #include "sysid/estimate/smoother.hpp"
 #include "sysid/math/interrupt.hpp"
-#include "sysid/online/mu_slip.hpp"
 
 namespace sysid {
 
@@ -39,7 +40,7 @@ template <class Curve>
 double cost_of(const std::vector<CurveVec<Curve>>& path, const CurveReadings& readings,
                const CurvePrior<Curve>& prior, const CurveFilterSettings<Curve>& settings) {
     const CurveVec<Curve> away = path.front() - prior.mean;
-    double cost = away.dot(prior.covariance.ldlt().solve(away));
+    double cost = away.dot(solved_by<Curve::kParameters, 1>(prior.covariance, away));
     for (std::size_t k = 0; k < path.size(); ++k) {
         if (!std::isnan(readings.mu[k])) {
             const double error = readings.mu[k] - Curve::mu(readings.slip[k], path[k].data());
@@ -79,6 +80,12 @@ double sum_of_squares(const CurveReadings& readings, const CurveVec<Curve>& x) {
 }
 
 template <class Curve>
+CurveMat<Curve> inverse_of(const CurveMat<Curve>& information) {
+    constexpr int n = Curve::kParameters;
+    return solved_by<n, n>(information, CurveMat<Curve>::Identity());
+}
+
+template <class Curve>
 struct NormalEquations {
     CurveMat<Curve> information = CurveMat<Curve>::Zero();
     CurveVec<Curve> gradient = CurveVec<Curve>::Zero();  // J' times the residuals
@@ -95,7 +102,7 @@ struct NormalEquations {
             gradient += at.gradient * (readings.mu[k] - at.mu);
             ++used;
         }
-        const CurveMat<Curve> inverse = information.ldlt().solve(CurveMat<Curve>::Identity());
+        const CurveMat<Curve> inverse = inverse_of<Curve>(information);
         for (const auto& at : points) curvature += at.gradient * (inverse * at.hessian).trace();
     }
 };
@@ -172,8 +179,9 @@ CurveFit<Curve> fit_curve(const CurveReadings& readings, const CurveVec<Curve>& 
             CurveMat<Curve> system = free.asDiagonal() * at.information * free.asDiagonal();
             system +=
                 CurveMat<Curve>((damping * scale + CurveVec<Curve>::Ones() - free).asDiagonal());
-            const CurveVec<Curve> next =
-                (x + system.ldlt().solve(gradient)).cwiseMax(lower).cwiseMin(upper);
+            const CurveVec<Curve> next = (x + solved_by<Curve::kParameters, 1>(system, gradient))
+                                             .cwiseMax(lower)
+                                             .cwiseMin(upper);
             const double trial_cost = next.allFinite() ? sum_of_squares<Curve>(readings, next)
                                                        : std::numeric_limits<double>::infinity();
             if (trial_cost <= cost) {
@@ -189,13 +197,14 @@ CurveFit<Curve> fit_curve(const CurveReadings& readings, const CurveVec<Curve>& 
         if (!lowered) fit.converged = true;  // no step, however short, leads lower
     }
     const NormalEquations<Curve> at(readings, x);
-    const Eigen::LLT<CurveMat<Curve>> factor(at.information);
+    CurveMat<Curve> factor, inverse;
     fit.mean = x;
     fit.sum_of_squares = cost;
     fit.used = at.used;
-    fit.determined = factor.info() == Eigen::Success && std::isfinite(cost);
+    fit.determined =
+        cholesky<Curve::kParameters>(at.information, factor, inverse) && std::isfinite(cost);
     if (!fit.determined) return fit;
-    fit.covariance = factor.solve(CurveMat<Curve>::Identity());
+    fit.covariance = inverse.transpose() * inverse;
     symmetrise(fit.covariance);
     fit.bias = -0.5 * fit.covariance * at.curvature;
     return fit;

@@ -1,10 +1,10 @@
+#include "sysid/twin/batch.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
-
-#include "sysid/twin/batch.hpp"
 
 namespace sysid {
 

@@ -1,10 +1,11 @@
+#include "sysid/twin/double_track.hpp"
+
 #include <algorithm>
 #include <cmath>
 
 #include "sysid/math/errors.hpp"
 #include "sysid/math/interrupt.hpp"
 #include "sysid/model/tyre.hpp"
-#include "sysid/twin/double_track.hpp"
 
 namespace sysid {
 

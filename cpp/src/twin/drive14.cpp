@@ -1,8 +1,9 @@
+#include "sysid/twin/drive14.hpp"
+
 #include <algorithm>
 #include <cmath>
 
 #include "sysid/math/interrupt.hpp"
-#include "sysid/twin/drive14.hpp"
 
 namespace sysid {
 

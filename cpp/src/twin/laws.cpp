@@ -1,8 +1,8 @@
+#include "sysid/twin/laws.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-
-#include "sysid/twin/laws.hpp"
 
 namespace sysid {
 

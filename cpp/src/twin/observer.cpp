@@ -1,10 +1,11 @@
+#include "sysid/twin/observer.hpp"
+
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
 #include "sysid/math/errors.hpp"
 #include "sysid/math/interrupt.hpp"
-#include "sysid/twin/observer.hpp"
 
 namespace sysid {
 

@@ -1,8 +1,8 @@
+#include "sysid/twin/vehicle14.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-
-#include "sysid/twin/vehicle14.hpp"
 
 namespace sysid {
 

@@ -48,19 +48,7 @@ struct SingleTrack {
     /// how the auxiliary states move; `rate` receives the derivatives of the motion.
     template <class S, class T>
     Workings<S> evaluate(const S* motion, const S* push, const Lags<S>& lags, const Input& u,
-                         const T* p, S* rate) const {
-        // An accelerometer beside the centre of gravity makes the measured a_x, which stands for
-        // the force, depend on the yaw acceleration it brings about. Each pass shrinks the error
-        // by l_y dr/dt per a_x, a few hundredths.
-        const int passes = !force_known && (effects & kReadYawAcceleration) != 0 ? 4 : 1;
-        Workings<S> w;
-        w.r_dot = S(0.0);
-        for (int i = 0; i < passes; ++i) once(w, motion, push, lags, u, p);
-        rate[0] = w.a_x + w.v_y * w.r + w.gravity_x;
-        rate[1] = w.a_y - w.v_x * w.r + w.gravity_y;
-        rate[2] = w.r_dot;
-        return w;
-    }
+                         const T* p, S* rate) const;
 
     /// The same with the derivatives of the auxiliary states `aux`.
     template <class S, class T>
@@ -72,17 +60,7 @@ struct SingleTrack {
 
     /// What the sensors read: v_x, v_y, r, a_x, a_y.
     template <class S, class T>
-    void sense(const Workings<S>& w, const T* p, const S* aux, S* y) const {
-        y[kVx] = w.v_x;
-        y[kVy] = w.v_y;
-        y[kYawRate] = w.r;
-        y[kAx] = w.a_x;
-        y[kAy] = w.a_y;
-        for_each_active(
-            effects, p + kBaseParameterCount,
-            [&](auto e, const T* own, std::size_t at) { return e.sensors(own, w, aux + at, y); });
-        user_sensors(user, p + kBaseParameterCount, w, y);
-    }
+    void sense(const Workings<S>& w, const T* p, const S* aux, S* y) const;
 
     /// Fastest rate [1/s] of the motion, for choosing integration steps.
     double fastest_rate(const double* p, double v_x) const {
@@ -238,5 +216,36 @@ struct SingleTrack {
         w.r_dot = (w.l_f * front_lateral - w.l_r * w.fy_r + w.moment_z) / w.I_z;
     }
 };
+
+// Not inside the class: there they would be inline, and compiled by every user of the model.
+
+template <class S, class T>
+Workings<S> SingleTrack::evaluate(const S* motion, const S* push, const Lags<S>& lags,
+                                  const Input& u, const T* p, S* rate) const {
+    // An accelerometer beside the centre of gravity makes the measured a_x, which stands for
+    // the force, depend on the yaw acceleration it brings about. Each pass shrinks the error
+    // by l_y dr/dt per a_x, a few hundredths.
+    const int passes = !force_known && (effects & kReadYawAcceleration) != 0 ? 4 : 1;
+    Workings<S> w;
+    w.r_dot = S(0.0);
+    for (int i = 0; i < passes; ++i) once(w, motion, push, lags, u, p);
+    rate[0] = w.a_x + w.v_y * w.r + w.gravity_x;
+    rate[1] = w.a_y - w.v_x * w.r + w.gravity_y;
+    rate[2] = w.r_dot;
+    return w;
+}
+
+template <class S, class T>
+void SingleTrack::sense(const Workings<S>& w, const T* p, const S* aux, S* y) const {
+    y[kVx] = w.v_x;
+    y[kVy] = w.v_y;
+    y[kYawRate] = w.r;
+    y[kAx] = w.a_x;
+    y[kAy] = w.a_y;
+    for_each_active(effects, p + kBaseParameterCount, [&](auto e, const T* own, std::size_t at) {
+        return e.sensors(own, w, aux + at, y);
+    });
+    user_sensors(user, p + kBaseParameterCount, w, y);
+}
 
 }  // namespace sysid

@@ -158,4 +158,29 @@ void settle_auxiliary(const SingleTrack& model, ModelState<S>& x, const S* push,
         model.evaluate(x.data(), push, lags, u, p, rate.data());
 }
 
+/// Directions that one pass through the model differentiates by: states in a filter, in one with
+/// states of many effects, and parameters or signals, many of them and few.
+constexpr int kStatePass = 6, kWideStatePass = 9;
+constexpr int kParameterPass = 8, kShortParameterPass = 4;
+
+// The model takes seconds to compile for each scalar. These are what kernels use; each is compiled
+// once, by the files of this name in `src/dynamics/`.
+#define SYSID_COMPILED_MODEL(PREFIX, S, T)                                                     \
+    PREFIX template Workings<S> SingleTrack::evaluate(const S*, const S*, const Lags<S>&,      \
+                                                      const Input&, const T*, S*) const;       \
+    PREFIX template void SingleTrack::sense(const Workings<S>&, const T*, const S*, S*) const; \
+    PREFIX template void advance(const SingleTrack&, ModelState<S>&, const S*, const Input&,   \
+                                 const Input&, const T*, double, int);                         \
+    PREFIX template std::array<S, kChannels> sense(const SingleTrack&, const ModelState<S>&,   \
+                                                   const S*, const Input&, const T*);          \
+    PREFIX template void settle_auxiliary(const SingleTrack&, ModelState<S>&, const S*,        \
+                                          const Input&, const T*);
+
+SYSID_COMPILED_MODEL(extern, double, double)
+SYSID_COMPILED_MODEL(extern, Dual<kStatePass>, double)
+SYSID_COMPILED_MODEL(extern, Dual<kWideStatePass>, double)
+SYSID_COMPILED_MODEL(extern, Dual<kParameterPass>, double)
+SYSID_COMPILED_MODEL(extern, Dual<kParameterPass>, Dual<kParameterPass>)
+SYSID_COMPILED_MODEL(extern, Dual<kShortParameterPass>, Dual<kShortParameterPass>)
+
 }  // namespace sysid

@@ -21,12 +21,16 @@ namespace sysid {
 template <int M, int NX>
 Mat<NX, NX> pulled_back(const Mat<NX, NX>& A, const Mat<NX, NX>& N) {
     if constexpr (M == NX) {
-        return A.transpose() * N * A;
+        return transposed_times<NX, NX, NX>(A, times<NX, NX, NX>(N, A));
     } else {
         Mat<M, NX> change = A.template topRows<M>();
-        change.diagonal().array() -= 1.0;
-        const Mat<NX, NX> halfway = N + N.template leftCols<M>() * change;
-        return halfway + change.transpose() * halfway.template topRows<M>();
+        for (int i = 0; i < M; ++i) change(i, i) -= 1.0;
+        Mat<NX, NX> halfway = N;  // its first M columns are those that `change` meets
+        add_product<NX, M, NX>(N.data(), change.data(), 1.0, halfway.data());
+        const Mat<NX, M> turned = transposed<M, NX>(change);
+        const Mat<M, NX> top = halfway.template topRows<M>();
+        add_product<NX, M, NX>(turned.data(), top.data(), 1.0, halfway.data());
+        return halfway;
     }
 }
 
@@ -86,18 +90,26 @@ void step_back(const Update<NX, NY>& now, const Vec<NY>& y, Vec<NX>& r, Mat<NX, 
     Mat<NY, NY> information = now.information;
     for (int j = 0; j < NY; ++j)
         if (std::isnan(y[j])) information(j, j) = 0.0;
-    const Mat<NX, NY> NK = N * now.gain;
-    const Vec<NY> u = now.information * now.innovation - now.gain.transpose() * r;
-    const Mat<NY, NY> bracket = information + now.gain.transpose() * NK;
-    sensors.sum += u * u.transpose() - bracket;
-    r += now.observation.transpose() * u;
+    const Mat<NX, NY> NK = times<NX, NX, NY>(N, now.gain);
+    const Mat<NY, NX> turned = transposed<NX, NY>(now.gain);
+    Vec<NY> u = times<NY, NY, 1>(now.information, now.innovation);
+    add_product<NY, NX, 1>(turned.data(), r.data(), -1.0, u.data());
+    Mat<NY, NY> bracket = information;
+    add_product<NY, NX, NY>(turned.data(), NK.data(), 1.0, bracket.data());
+    for (int j = 0; j < NY; ++j)
+        for (int i = 0; i < NY; ++i) sensors.sum(i, j) += u[i] * u[j] - bracket(i, j);
+    for (int j = 0; j < NX; ++j)
+        for (int i = 0; i < NY; ++i) r[j] += now.observation(i, j) * u[i];
     const auto back = [&](const auto& X) {
         return now.observed == NY ? carried_back<D>(X, now.observation)
                                   : carried_back<0>(X, now.observation);
     };
     const Mat<NX, NX> mixed = back(NK);
-    const Mat<NX, NY> halfway = back(bracket).transpose();
-    N += back(halfway) - mixed - mixed.transpose();
+    const Mat<NY, NX> carried = back(bracket);
+    const Mat<NX, NY> halfway = transposed<NY, NX>(carried);
+    N += back(halfway);
+    for (int j = 0; j < NX; ++j)
+        for (int i = 0; i < NX; ++i) N(i, j) -= mixed(i, j) + mixed(j, i);
 }
 
 /// The same, one reading after the other, the last one first; only the diagonal of the sum.
@@ -106,21 +118,30 @@ void step_back(const SequentialUpdate<NX, NY>& now, const Vec<NY>& y, Vec<NX>& r
                SquareSum<NY>& sensors) {
     for (int j = NY; j-- > 0;) {
         if (std::isnan(y[j])) continue;
-        const Vec<NX> gain = now.gain.col(j);
-        Vec<NX> mixed = N * gain;
-        const double u = now.information[j] * now.innovation[j] - gain.dot(r);
-        const double bracket = now.information[j] + gain.dot(mixed);
+        const double* gain = now.gain.data() + static_cast<std::ptrdiff_t>(NX) * j;
+        Vec<NX> mixed = Vec<NX>::Zero();
+        add_product<NX, NX, 1>(N.data(), gain, 1.0, mixed.data());
+        double u = now.information[j] * now.innovation[j];
+        double bracket = now.information[j];
+        for (int i = 0; i < NX; ++i) {
+            u -= gain[i] * r[i];
+            bracket += gain[i] * mixed[i];
+        }
         sensors.sum(j, j) += u * u - bracket;
         if (j < D) {
             r[j] += u;
             mixed[j] -= 0.5 * bracket;
-            N.col(j) -= mixed;
-            N.row(j) -= mixed.transpose();
+            for (int i = 0; i < NX; ++i) N(i, j) -= mixed[i];
+            for (int i = 0; i < NX; ++i) N(j, i) -= mixed[i];
         } else {
-            const Vec<NX> h = now.observation.row(j).transpose();
-            r += u * h;
-            mixed -= 0.5 * bracket * h;
-            N -= mixed * h.transpose() + h * mixed.transpose();
+            Vec<NX> h;
+            for (int i = 0; i < NX; ++i) {
+                h[i] = now.observation(j, i);
+                r[i] += u * h[i];
+                mixed[i] -= 0.5 * bracket * h[i];
+            }
+            for (int k = 0; k < NX; ++k)
+                for (int i = 0; i < NX; ++i) N(i, k) -= mixed[i] * h[k] + h[i] * mixed[k];
         }
     }
 }
@@ -157,8 +178,10 @@ class FilteredExpectation {
         for (std::size_t i = 0; i < records_.size(); ++i) add_record(i, out);
         const auto& Q = noise_.process;
         const auto& R = noise_.sensors;
-        out.process.sum = (out.process.samples * Q + Q * out.process.sum * Q).eval();
-        out.sensors.sum = (out.sensors.samples * R + R * out.sensors.sum * R).eval();
+        out.process.sum = times<NX, NX, NX>(Q, times<NX, NX, NX>(out.process.sum, Q));
+        out.process.sum += out.process.samples * Q;
+        out.sensors.sum = times<NY, NY, NY>(R, times<NY, NY, NY>(out.sensors.sum, R));
+        out.sensors.sum += out.sensors.samples * R;
         return out;
     }
 
@@ -182,13 +205,14 @@ class FilteredExpectation {
             out.sensors.samples += 1.0;
             if (k + 1 < steps.size()) {
                 const auto& A = steps[k + 1].transition;
-                r = (A.transpose() * r).eval();
+                r = transposed_times<NX, NX, 1>(A, r);
                 N = pulled_back<MovingStates<System, NX>::value>(A, N);
             }
             step_back<DirectReadings<System>::value>(steps[k].update, y, r, N, out.sensors);
             symmetrise(N);
             if (k > 0 || record.predict_first) {
-                out.process.sum.noalias() += r * r.transpose() - N;
+                for (int n = 0; n < NX; ++n)
+                    for (int m = 0; m < NX; ++m) out.process.sum(m, n) += r[m] * r[n] - N(m, n);
                 out.process.add_count();
             }
         }
@@ -211,9 +235,13 @@ void add_smoothed_moments(const System& system, const std::vector<SmoothedStep<N
         if (k > 0) {
             const auto& before = states[k - 1];
             const Vec<NX> e = now.mean - system.predict(k, before.mean, A, ignored);
-            const Mat<NX, NX> mixed = now.lag_one * A.transpose();
-            out.process.sum += e * e.transpose() + now.covariance +
-                               A * before.covariance * A.transpose() - mixed - mixed.transpose();
+            const Mat<NX, NX> mixed = times_transposed<NX, NX, NX>(now.lag_one, A);
+            Mat<NX, NX> spread = before.covariance;
+            propagate<NX>(A, spread);
+            for (int j = 0; j < NX; ++j)
+                for (int i = 0; i < NX; ++i)
+                    out.process.sum(i, j) += e[i] * e[j] + now.covariance(i, j) + spread(i, j) -
+                                             mixed(i, j) - mixed(j, i);
             out.process.add_count();
         }
         const Vec<NY>& y = system.measurement(k);
@@ -228,7 +256,10 @@ void add_smoothed_moments(const System& system, const std::vector<SmoothedStep<N
             }
         }
         out.sensors.samples += 1.0;
-        out.sensors.sum += e * e.transpose() + H * now.covariance * H.transpose();
+        const Mat<NY, NY> known =
+            times_transposed<NY, NX, NY>(times<NY, NX, NX>(H, now.covariance), H);
+        for (int j = 0; j < NY; ++j)
+            for (int i = 0; i < NY; ++i) out.sensors.sum(i, j) += e[i] * e[j] + known(i, j);
     }
 }
 
@@ -241,154 +272,66 @@ struct EmOptions {
     bool accelerate = false;
 };
 
-template <int NX, int NY>
-struct EmOutcome {
-    NoisePair<NX, NY> noise;
+/// How an iteration went, whatever the size of the model.
+struct EmProgress {
     std::vector<double> log_likelihood;  // of the start, then after each iteration
     bool converged = false;
     int shortened = 0;  // steps that had to be
     int fell = 0;       // iterations that ended lower than they began
-    int leaps = 0;      // iterations that were leaps, see `NoiseLeap`
+    int leaps = 0;      // iterations that were leaps, see `NoiseLeap` in `em.cpp`
 };
 
-/// Leap along the path of two steps of expectation-maximisation: squared extrapolation (Varadhan &
-/// Roland, Scand. J. Statistics 2008) of the logarithms of the covariances, which keeps them
-/// positive and lets those that tend to zero get there.
 template <int NX, int NY>
-class NoiseLeap {
-  public:
-    using Pair = NoisePair<NX, NY>;
-    NoiseLeap(const Pair& a, const Pair& b, const Pair& c)
-        : process_(a.process, b.process, c.process), sensors_(a.sensors, b.sensors, c.sensors) {}
-
-    /// Length of the leap in steps; not above one where a leap makes no sense.
-    double length() const {
-        const double bend = process_.bend.squaredNorm() + sensors_.bend.squaredNorm();
-        const double step = process_.step.squaredNorm() + sensors_.step.squaredNorm();
-        return bend > 0.0 ? std::min(std::sqrt(step / bend), 100.0) : 1.0;
-    }
-    Pair landing(const NoiseStructure<NX>& process, const NoiseStructure<NY>& sensors,
-                 const Pair& now) const {
-        const double n = length();
-        return {
-            process.admitted(process_.at(n), now.process),
-            sensors.admitted(sensors_.at(n), now.sensors),
-        };
-    }
-
-  private:
-    template <int N>
-    struct Path {
-        Vec<N> unit;
-        Mat<N, N> start, step, bend;  // logarithms, and their first and second differences
-
-        Path(const Mat<N, N>& a, const Mat<N, N>& b, const Mat<N, N>& c)
-            : unit(a.diagonal().cwiseMax(kNothing).cwiseSqrt()), start(logarithm(a)) {
-            const Mat<N, N> middle = logarithm(b);
-            step = middle - start;
-            bend = logarithm(c) - middle - step;
-        }
-        Mat<N, N> at(double n) const {
-            const Eigen::SelfAdjointEigenSolver<Mat<N, N>> e(start + 2.0 * n * step + n * n * bend);
-            const Mat<N, N> root =
-                e.eigenvectors() * (0.5 * e.eigenvalues()).array().exp().matrix().asDiagonal();
-            const Mat<N, N> half = unit.asDiagonal() * root;
-            return half * half.transpose();
-        }
-
-      private:
-        static constexpr double kNothing = 1e-200;  // stands for a variance of zero
-        Mat<N, N> logarithm(const Mat<N, N>& C) const {
-            const Vec<N> per_unit = unit.cwiseInverse();
-            const Eigen::SelfAdjointEigenSolver<Mat<N, N>> e(per_unit.asDiagonal() * C *
-                                                             per_unit.asDiagonal());
-            const Vec<N> logs = e.eigenvalues().cwiseMax(kNothing).array().log();
-            return e.eigenvectors() * logs.asDiagonal() * e.eigenvectors().transpose();
-        }
-    };
-
-    Path<NX> process_;
-    Path<NY> sensors_;
+struct EmOutcome : EmProgress {
+    NoisePair<NX, NY> noise;
 };
 
-/// Alternates expectation and maximisation. `Expectation` provides log_likelihood(noise), then
-/// moments() for that noise.
+/// Covariances of a model of any size.
+struct AnyNoise {
+    Eigen::MatrixXd process, sensors;
+};
+
+/// What the iteration asks of a model of any size.
+class AnyExpectation {
+  public:
+    AnyExpectation() = default;
+    virtual ~AnyExpectation() = default;
+    AnyExpectation(const AnyExpectation&) = delete;
+    AnyExpectation& operator=(const AnyExpectation&) = delete;
+    virtual double log_likelihood(const AnyNoise& noise) = 0;
+    /// For the noise of the last call; of the process, then of the sensors.
+    virtual std::pair<AnySquareSum, AnySquareSum> moments() = 0;
+};
+
+/// Alternates expectation and maximisation from `noise` on, which receives the outcome.
+EmProgress learn_noise(AnyExpectation& expectation, AnyNoise& noise, const NoiseForm& process,
+                       const NoiseForm& sensors, const EmOptions& options);
+
+/// The same for `Expectation`, which provides log_likelihood(noise), then moments() for that noise.
 template <int NX, int NY, class Expectation>
 EmOutcome<NX, NY> learn_noise(Expectation& expectation, const NoisePair<NX, NY>& start,
                               const NoiseStructure<NX>& process, const NoiseStructure<NY>& sensors,
                               const EmOptions& options) {
-    using Pair = NoisePair<NX, NY>;
+    class Sized final : public AnyExpectation {
+      public:
+        explicit Sized(Expectation& its) : its_(its) {}
+        double log_likelihood(const AnyNoise& noise) override {
+            return its_.log_likelihood({noise.process, noise.sensors});
+        }
+        std::pair<AnySquareSum, AnySquareSum> moments() override {
+            const NoiseMoments<NX, NY> found = its_.moments();
+            return {found.process.any(), found.sensors.any()};
+        }
+
+      private:
+        Expectation& its_;
+    };
+    Sized sized(expectation);
+    AnyNoise noise{start.process, start.sensors};
     EmOutcome<NX, NY> out;
-    out.noise = {
-        process.admitted(start.process, start.process),
-        sensors.admitted(start.sensors, start.sensors),
-    };
-    double value = expectation.log_likelihood(out.noise);
-    double gain_before = 0.0, value_at_leap = value;
-    std::vector<Pair> path{out.noise};  // since the last leap
-    out.log_likelihood.push_back(value);
-    const auto iterations = [&] { return static_cast<int>(out.log_likelihood.size()) - 1; };
-    const auto value_or_nan = [&](const Pair& noise) {
-        try {
-            return expectation.log_likelihood(noise);
-        } catch (const NumericalFailure&) {  // a leap into the blue
-            return std::nan("");
-        }
-    };
-    while (iterations() < options.most_iterations) {
-        const NoiseMoments<NX, NY> moments = expectation.moments();
-        Pair next;
-        next.process = process.best(moments.process, out.noise.process);
-        next.sensors = sensors.best(moments.sensors, out.noise.sensors);
-        double reached = expectation.log_likelihood(next);
-        // The filter linearises anew, so that near the optimum a step may be too long.
-        for (int halving = 0; options.never_fall && reached < value && halving < 6; ++halving) {
-            if (halving == 0) ++out.shortened;
-            next.process = 0.5 * (next.process + out.noise.process);
-            next.sensors = 0.5 * (next.sensors + out.noise.sensors);
-            reached = expectation.log_likelihood(next);
-        }
-        const double gain = reached - value;
-        if (gain < 0.0 && options.never_fall) {
-            out.converged = true;  // no step of either length gains anything
-            break;
-        }
-        if (gain < 0.0) ++out.fell;
-        out.noise = next;
-        value = reached;
-        out.log_likelihood.push_back(value);
-        // Gains shrink geometrically: what is to come is the rest of the series (Aitken).
-        const double ratio = gain_before > 0.0 ? gain / gain_before : 1.0;
-        if (!options.accelerate && gain >= 0.0 && ratio < 1.0 &&
-            gain * ratio / (1.0 - ratio) < options.tolerance) {
-            out.converged = true;
-            break;
-        }
-        gain_before = gain;
-        path.push_back(next);
-        if (!options.accelerate || path.size() < 3 || iterations() >= options.most_iterations)
-            continue;
-        const NoiseLeap<NX, NY> leap(path[0], path[1], path[2]);
-        path.assign(1, out.noise);
-        if (leap.length() > 1.0) {
-            const Pair landing = leap.landing(process, sensors, out.noise);
-            const double there = value_or_nan(landing);
-            if (there > value) {
-                ++out.leaps;
-                out.noise = path[0] = landing;
-                value = there;
-                out.log_likelihood.push_back(value);
-            } else {
-                expectation.log_likelihood(out.noise);  // its moments come next
-            }
-        }
-        // Steps after a leap first undo its side effects: their gains are no geometric series.
-        if (value - value_at_leap < options.tolerance) {
-            out.converged = true;
-            break;
-        }
-        value_at_leap = value;
-    }
+    static_cast<EmProgress&>(out) =
+        learn_noise(sized, noise, process.form(), sensors.form(), options);
+    out.noise = {noise.process, noise.sensors};
     return out;
 }
 

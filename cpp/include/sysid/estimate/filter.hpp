@@ -121,7 +121,7 @@ class Filter {
                 symmetrise(state_.covariance);
             } else {
                 square_root_predict<NX>(t, state_.mean, root_, root_of<NX>(Q, index_), weights_);
-                state_.covariance = root_ * root_.transpose();
+                state_.covariance = times_transposed<NX, NX, NX>(root_, root_);
             }
         }
     }
@@ -132,9 +132,9 @@ class Filter {
             model_.observe(input, x.data(), expected.data());
             return expected;
         };
-        const Vec<NY> root_scale = scale_.cwiseSqrt();
-        const Mat<NY, NY> R =
-            root_scale.asDiagonal() * model_.measurement_noise(input) * root_scale.asDiagonal();
+        Mat<NY, NY> R = model_.measurement_noise(input);
+        for (int j = 0; j < NY; ++j)
+            for (int i = 0; i < NY; ++i) R(i, j) *= std::sqrt(scale_[i]) * std::sqrt(scale_[j]);
         Regression<NX, NY> line;
         if constexpr (method == Method::kExtended) {
             std::array<Dual<NX>, NX> x;
@@ -153,7 +153,7 @@ class Filter {
             if constexpr (method == Method::kSquareRoot) {
                 square_root_update<NX, NY>(t, state_.mean, root_, y, root_of<NY>(R, index_),
                                            weights_, index_, state_.update);
-                state_.covariance = root_ * root_.transpose();
+                state_.covariance = times_transposed<NX, NX, NX>(root_, root_);
             }
         }
         if constexpr (method != Method::kSquareRoot)
@@ -167,7 +167,7 @@ class Filter {
 
     void adapt(const Vec<NY>& y, const Vec<NY>& fitted, const Mat<NY, NX>& H,
                const Mat<NY, NY>& R) {
-        const Vec<NY> known = (H * state_.covariance).cwiseProduct(H).rowwise().sum();
+        const Vec<NY> known = seen_variance<NX, NY>(H, state_.covariance);
         for (int i = 0; i < NY; ++i) {
             if (std::isnan(y[i])) continue;
             const double e = y[i] - fitted[i];

@@ -23,6 +23,7 @@
 #include "sysid/math/errors.hpp"
 #include "sysid/math/interrupt.hpp"
 #include "sysid/math/linear.hpp"
+#include "sysid/math/products.hpp"
 
 namespace sysid {
 
@@ -50,13 +51,17 @@ struct SteadyNoise<System, std::void_t<decltype(System::kSteadyNoise)>>
 template <int M, int NX>
 void propagate(const Mat<NX, NX>& A, Mat<NX, NX>& P) {
     if constexpr (M == NX) {
-        P = (A * P * A.transpose()).eval();
+        P = times_transposed<NX, NX, NX>(times<NX, NX, NX>(A, P), A);
         symmetrise(P);
     } else {
-        Mat<NX, M> halfway;
-        halfway.noalias() = P * A.template topRows<M>().transpose();
+        const Mat<M, NX> moving = A.template topRows<M>();
+        const Mat<NX, M> halfway = times_transposed<NX, NX, M>(P, moving);
         for (int j = 0; j < M; ++j)
-            for (int i = 0; i <= j; ++i) P(i, j) = P(j, i) = A.row(i).dot(halfway.col(j));
+            for (int i = 0; i <= j; ++i) {
+                double sum = 0.0;
+                for (int k = 0; k < NX; ++k) sum += moving(i, k) * halfway(k, j);
+                P(i, j) = P(j, i) = sum;
+            }
         for (int j = 0; j < M; ++j)
             for (int i = M; i < NX; ++i) P(i, j) = P(j, i) = halfway(i, j);
     }
@@ -65,28 +70,29 @@ void propagate(const Mat<NX, NX>& A, Mat<NX, NX>& P) {
 /// X H', where the first D rows of H are those of the unit matrix.
 template <int D, int R, int NX, int NY>
 Mat<R, NY> seen_by(const Mat<R, NX>& X, const Mat<NY, NX>& H) {
-    if constexpr (D == 0) {
-        return X * H.transpose();
-    } else {
-        Mat<R, NY> out;
-        out.template leftCols<D>() = X.template leftCols<D>();
-        out.template rightCols<NY - D>().noalias() =
-            X * H.template bottomRows<NY - D>().transpose();
-        return out;
-    }
+    Mat<R, NY> out = Mat<R, NY>::Zero();
+    for (int j = 0; j < D; ++j)
+        for (int i = 0; i < R; ++i) out(i, j) = X(i, j);
+    for (int j = D; j < NY; ++j)
+        for (int k = 0; k < NX; ++k) {
+            const double h = H(j, k);
+            for (int i = 0; i < R; ++i) out(i, j) += X(i, k) * h;
+        }
+    return out;
 }
 
 /// X H of the same H.
 template <int D, int R, int NX, int NY>
 Mat<R, NX> carried_back(const Mat<R, NY>& X, const Mat<NY, NX>& H) {
-    if constexpr (D == 0) {
-        return X * H;
-    } else {
-        Mat<R, NX> out;
-        out.noalias() = X.template rightCols<NY - D>() * H.template bottomRows<NY - D>();
-        out.template leftCols<D>() += X.template leftCols<D>();
-        return out;
-    }
+    Mat<R, NX> out = Mat<R, NX>::Zero();
+    for (int j = 0; j < D; ++j)
+        for (int i = 0; i < R; ++i) out(i, j) = X(i, j);
+    for (int j = 0; j < NX; ++j)
+        for (int k = D; k < NY; ++k) {
+            const double h = H(k, j);
+            for (int i = 0; i < R; ++i) out(i, j) += X(i, k) * h;
+        }
+    return out;
 }
 
 template <int NX, int NY>
@@ -142,8 +148,10 @@ class LogDensity {
 /// a share of what they were, larger than the rounding of the update.
 template <int NX>
 void keep_positive(const Mat<NX, NX>& before, Mat<NX, NX>& P) {
-    if ((P.diagonal().array() < kSurest * before.diagonal().array()).any())
-        P.diagonal() += 0.1 * kSurest * before.diagonal();
+    bool fell = false;
+    for (int i = 0; i < NX; ++i) fell |= P(i, i) < kSurest * before(i, i);
+    if (!fell) return;
+    for (int i = 0; i < NX; ++i) P(i, i) += 0.1 * kSurest * before(i, i);
 }
 
 /// For a covariance that lost its positive definiteness where a reading needs it.
@@ -162,25 +170,34 @@ bool joseph_update(Vec<NX>& x, Mat<NX, NX>& P, const Mat<NY, NY>& noise, Update<
         return whole ? seen_by<D>(X, u.observation) : seen_by<0>(X, u.observation);
     };
     const Mat<NX, NY> cross = seen(P);
-    const Mat<NY, NX> crossed = cross.transpose();
-    const Mat<NY, NY> S = seen(crossed) + noise;
+    const Mat<NY, NX> crossed = transposed<NX, NY>(cross);
+    Mat<NY, NY> S = seen(crossed);
+    S += noise;
     Mat<NY, NY> whitening;
     if (!cholesky<NY>(S, u.lower, whitening)) return false;
-    u.information.noalias() = whitening.transpose() * whitening;
-    u.gain.noalias() = cross * u.information;
-    const Vec<NY> whitened = whitening * u.innovation;
-    u.squares = whitened.squaredNorm();
-    u.determinant = u.lower.diagonal().prod();
+    u.information = transposed_times<NY, NY, NY>(whitening, whitening);
+    u.gain = times<NX, NY, NY>(cross, u.information);
+    u.squares = 0.0;
+    u.determinant = 1.0;
+    for (int i = 0; i < NY; ++i) {
+        double whitened = 0.0;
+        for (int j = 0; j <= i; ++j) whitened += whitening(i, j) * u.innovation[j];
+        u.squares += whitened * whitened;
+        u.determinant *= u.lower(i, i);
+    }
     u.determinant *= u.determinant;
-    x += u.gain * u.innovation;
+    add_product<NX, NY, 1>(u.gain.data(), u.innovation.data(), 1.0, x.data());
     // (I - K H) P (I - K H)' + K R K', multiplied from the left, then from the right.
-    const Mat<NX, NX> left = P - u.gain * crossed;
-    const Mat<NX, NY> rest = seen(left) - u.gain * noise;
+    const Mat<NX, NX> left = less_times_transposed<NX, NY, NX>(P, u.gain, cross);
+    Mat<NX, NY> rest = seen(left);
+    add_product<NX, NY, NY>(u.gain.data(), noise.data(), -1.0, rest.data());
     const auto finish = [&] {
-        P.noalias() = left - rest * u.gain.transpose();
+        P = less_times_transposed<NX, NY, NX>(left, rest, u.gain);
         symmetrise(P);
     };
-    if ((noise.diagonal().array() < kSurest * S.diagonal().array()).any()) {
+    bool sure = false;
+    for (int i = 0; i < NY; ++i) sure |= noise(i, i) < kSurest * S(i, i);
+    if (sure) {
         const Mat<NX, NX> before = P;
         finish();
         keep_positive<NX>(before, P);
@@ -197,22 +214,21 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
                         const Mat<NY, NX>& H, const Mat<NY, NY>& R, std::size_t sample,
                         Update<NX, NY>& u) {
     u.observed = 0;
-    u.innovation = y - expected;
     if (&u.observation != &H) u.observation = H;
     Mat<NY, NY> noise = R;
     for (int i = 0; i < NY; ++i) {
         if (std::isnan(y[i])) {
             u.innovation[i] = 0.0;
-            u.observation.row(i).setZero();
-            noise.row(i).setZero();
-            noise.col(i).setZero();
+            for (int j = 0; j < NX; ++j) u.observation(i, j) = 0.0;
+            for (int j = 0; j < NY; ++j) noise(i, j) = noise(j, i) = 0.0;
             noise(i, i) = 1.0;
         } else {
+            u.innovation[i] = y[i] - expected[i];
+            if (!std::isfinite(u.innovation[i]))
+                throw NumericalFailure("the expected reading is not finite", sample);
             ++u.observed;
         }
     }
-    if (!u.innovation.allFinite())
-        throw NumericalFailure("the expected reading is not finite", sample);
     if (joseph_update<NX, NY, D>(x, P, noise, u)) return;
     restore_positive(P, sample);
     if (!joseph_update<NX, NY, D>(x, P, noise, u))
@@ -259,15 +275,19 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
                 cross = P.col(j);
                 variance += cross[j];
             } else {
-                cross.noalias() = P * H.row(j).transpose();
-                variance += H.row(j) * cross;
+                cross.setZero();
+                for (int k = 0; k < NX; ++k) {
+                    const double h = H(j, k);
+                    for (int i = 0; i < NX; ++i) cross[i] += P(i, k) * h;
+                }
+                for (int i = 0; i < NX; ++i) variance += H(j, i) * cross[i];
             }
         };
         look();
         if (j < D)
             innovation -= x[j] - before[j];
         else
-            innovation -= H.row(j) * (x - before);
+            for (int i = 0; i < NX; ++i) innovation -= H(j, i) * (x[i] - before[i]);
         if (!std::isfinite(innovation))
             throw NumericalFailure("the expected reading is not finite", sample);
         if (!(variance > 0.0)) {
@@ -278,18 +298,25 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
                                        sample);
         }
         const double information = 1.0 / variance;
-        const Vec<NX> gain = cross * information;
+        Vec<NX> gain, half;
         // The Joseph form (I - k h') P (I - k h')' + R k k' is P - k c' - c k' + s k k', with
         // c = P h and the variance s of the innovation; written so it stays symmetric.
-        const Vec<NX> half = cross - (0.5 * variance) * gain;
+        for (int i = 0; i < NX; ++i) {
+            gain[i] = cross[i] * information;
+            half[i] = cross[i] - (0.5 * variance) * gain[i];
+            x[i] += gain[i] * innovation;
+        }
+        const auto lower = [&] {
+            for (int k = 0; k < NX; ++k)
+                for (int i = 0; i < NX; ++i) P(i, k) -= gain[i] * half[k] + half[i] * gain[k];
+        };
         if (R(j, j) < kSurest * variance) {
             const Mat<NX, NX> before_it = P;
-            P -= gain.lazyProduct(half.transpose()) + half.lazyProduct(gain.transpose());
+            lower();
             keep_positive<NX>(before_it, P);
         } else {
-            P -= gain.lazyProduct(half.transpose()) + half.lazyProduct(gain.transpose());
+            lower();
         }
-        x += gain * innovation;
         u.squares += innovation * innovation * information;
         u.determinant *= variance;
         u.innovation[j] = innovation;

@@ -19,7 +19,18 @@ struct SmoothedStep {
 /// One over the standard deviations of a covariance; zero for what is certain.
 template <int NX>
 Vec<NX> inverse_sizes(const Mat<NX, NX>& C) {
-    return C.diagonal().unaryExpr([](double v) { return v > 0.0 ? 1.0 / std::sqrt(v) : 0.0; });
+    Vec<NX> out;
+    for (int i = 0; i < NX; ++i) out[i] = C(i, i) > 0.0 ? 1.0 / std::sqrt(C(i, i)) : 0.0;
+    return out;
+}
+
+/// C with row and column i multiplied by element i of `by`.
+template <int NX>
+Mat<NX, NX> rescaled(const Mat<NX, NX>& C, const Vec<NX>& by) {
+    Mat<NX, NX> out;
+    for (int j = 0; j < NX; ++j)
+        for (int i = 0; i < NX; ++i) out(i, j) = by[i] * C(i, j) * by[j];
+    return out;
 }
 
 /// S^-1 X, by the inverse of a Cholesky factor, which is quick. States without noise make a
@@ -29,17 +40,21 @@ Vec<NX> inverse_sizes(const Mat<NX, NX>& C) {
 template <int NX>
 Mat<NX, NX> solved_by_covariance(const Mat<NX, NX>& S, const Mat<NX, NX>& X) {
     Mat<NX, NX> lower, whitening;
-    const bool regular = cholesky<NX>(S, lower, whitening) &&
-                         (lower.diagonal().array().square() > 1e-9 * S.diagonal().array()).all();
-    if (regular) return whitening.transpose() * (whitening * X);
+    bool regular = cholesky<NX>(S, lower, whitening);
+    for (int i = 0; i < NX; ++i) regular = regular && lower(i, i) * lower(i, i) > 1e-9 * S(i, i);
+    if (regular) return transposed_times<NX, NX, NX>(whitening, times<NX, NX, NX>(whitening, X));
     const Vec<NX> per_size = inverse_sizes<NX>(S);
-    const Mat<NX, NX> correlation = per_size.asDiagonal() * S * per_size.asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<Mat<NX, NX>> e(correlation);
-    const double least = kSurest * std::max(e.eigenvalues()[NX - 1], 0.0);
-    const Vec<NX> inverse =
-        e.eigenvalues().unaryExpr([least](double v) { return v > least ? 1.0 / v : 0.0; });
-    const Mat<NX, NX> scaled = per_size.asDiagonal() * e.eigenvectors();
-    return scaled * (inverse.asDiagonal() * (scaled.transpose() * X));
+    const auto e = spectrum<NX>(rescaled<NX>(S, per_size));
+    const double least = kSurest * std::max(e.values[NX - 1], 0.0);
+    Mat<NX, NX> scaled, weighed;
+    for (int j = 0; j < NX; ++j) {
+        const double inverse = e.values[j] > least ? 1.0 / e.values[j] : 0.0;
+        for (int i = 0; i < NX; ++i) {
+            scaled(i, j) = per_size[i] * e.vectors(i, j);
+            weighed(i, j) = scaled(i, j) * inverse;
+        }
+    }
+    return times<NX, NX, NX>(weighed, transposed_times<NX, NX, NX>(scaled, X));
 }
 
 /// L with L L' the covariance `C`, which rounding may have pushed off the edge of covariances:
@@ -48,11 +63,13 @@ template <int NX>
 Mat<NX, NX> covariance_root(const Mat<NX, NX>& C, const Mat<NX, NX>& predicted) {
     Mat<NX, NX> lower, inverse;
     if (cholesky<NX>(C, lower, inverse)) return lower;
-    const Vec<NX> per_size = inverse_sizes<NX>(predicted);
-    const Mat<NX, NX> scaled = per_size.asDiagonal() * C * per_size.asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<Mat<NX, NX>> e(scaled);
-    return predicted.diagonal().cwiseMax(0.0).cwiseSqrt().asDiagonal() * e.eigenvectors() *
-           e.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+    const auto e = spectrum<NX>(rescaled<NX>(C, inverse_sizes<NX>(predicted)));
+    Mat<NX, NX> root;
+    for (int j = 0; j < NX; ++j)
+        for (int i = 0; i < NX; ++i)
+            root(i, j) = std::sqrt(std::max(predicted(i, i), 0.0)) * e.vectors(i, j) *
+                         std::sqrt(std::max(e.values[j], 0.0));
+    return root;
 }
 
 /// The covariance itself where it is one, else without its negative part.
@@ -61,7 +78,7 @@ Mat<NX, NX> as_covariance(const Mat<NX, NX>& C, const Mat<NX, NX>& predicted) {
     Mat<NX, NX> lower, inverse;
     if (cholesky<NX>(C, lower, inverse)) return C;
     const Mat<NX, NX> root = covariance_root<NX>(C, predicted);
-    return root * root.transpose();
+    return times_transposed<NX, NX, NX>(root, root);
 }
 
 /// Which sum the smoothed covariance is.
@@ -92,32 +109,38 @@ std::vector<SmoothedStep<NX>> smooth(const std::vector<Step>& steps, double ridg
         const auto& now = steps[k];
         const auto& next = steps[k + 1];
         const Mat<NX, NX>& A = next.transition;
-        const Mat<NX, NX> carried = A * now.covariance;
-        const Mat<NX, NX> inverted = next.predicted_covariance + ridge * Mat<NX, NX>::Identity();
-        const Mat<NX, NX> J = solved_by_covariance<NX>(inverted, carried).transpose();
-        out[k].mean = now.mean + J * (out[k + 1].mean - next.predicted_mean);
+        const Mat<NX, NX> carried = times<NX, NX, NX>(A, now.covariance);
+        Mat<NX, NX> inverted = next.predicted_covariance;
+        for (int i = 0; i < NX; ++i) inverted(i, i) += ridge;
+        const Mat<NX, NX> turned = solved_by_covariance<NX>(inverted, carried);
+        const Mat<NX, NX> J = transposed<NX, NX>(turned);
+        const Vec<NX> ahead = out[k + 1].mean - next.predicted_mean;
+        out[k].mean = now.mean;
+        add_product<NX, NX, 1>(J.data(), ahead.data(), 1.0, out[k].mean.data());
+        Mat<NX, NX>& covariance = out[k].covariance;
         if constexpr (kSum == SmoothedSum::kDifference) {
-            out[k].covariance =
-                now.covariance +
-                J * (out[k + 1].covariance - next.predicted_covariance) * J.transpose();
-            symmetrise(out[k].covariance);
+            const Mat<NX, NX> change = out[k + 1].covariance - next.predicted_covariance;
+            const Mat<NX, NX> half = times<NX, NX, NX>(J, change);
+            covariance = now.covariance;
+            add_product<NX, NX, NX>(half.data(), turned.data(), 1.0, covariance.data());
         } else {
-            Mat<NX, NX> entered = next.predicted_covariance - carried * A.transpose();
+            Mat<NX, NX> entered =
+                less_times_transposed<NX, NX, NX>(next.predicted_covariance, carried, A);
             symmetrise(entered);
-            Mat<NX, 3 * NX> roots;
-            roots.template leftCols<NX>().noalias() =
-                (Mat<NX, NX>::Identity() - J * A) *
-                covariance_root<NX>(now.covariance, now.predicted_covariance);
-            roots.template middleCols<NX>(NX).noalias() =
-                J * covariance_root<NX>(entered, next.predicted_covariance);
-            roots.template rightCols<NX>().noalias() =
-                J * covariance_root<NX>(out[k + 1].covariance, next.predicted_covariance);
-            for (int j = 0; j < NX; ++j)
-                for (int i = 0; i <= j; ++i)
-                    out[k].covariance(i, j) = out[k].covariance(j, i) =
-                        roots.row(i).dot(roots.row(j));
+            Mat<NX, NX> kept = Mat<NX, NX>::Identity();
+            add_product<NX, NX, NX>(J.data(), A.data(), -1.0, kept.data());
+            covariance.setZero();
+            const auto add_square = [&](const Mat<NX, NX>& from, const Mat<NX, NX>& root) {
+                const Mat<NX, NX> half = times<NX, NX, NX>(from, root);
+                const Mat<NX, NX> back = transposed<NX, NX>(half);
+                add_product<NX, NX, NX>(half.data(), back.data(), 1.0, covariance.data());
+            };
+            add_square(kept, covariance_root<NX>(now.covariance, now.predicted_covariance));
+            add_square(J, covariance_root<NX>(entered, next.predicted_covariance));
+            add_square(J, covariance_root<NX>(out[k + 1].covariance, next.predicted_covariance));
         }
-        out[k + 1].lag_one = out[k + 1].covariance * J.transpose();
+        symmetrise(covariance);
+        out[k + 1].lag_one = times<NX, NX, NX>(out[k + 1].covariance, turned);
     }
     return out;
 }

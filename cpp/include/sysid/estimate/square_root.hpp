@@ -13,12 +13,29 @@ namespace sysid {
 template <int N, int M>
 Mat<N, N> lower_of(const Mat<N, M>& A) {
     static_assert(M >= N, "the array has too few columns");
-    const Mat<M, N> tall = A.transpose();
-    const Eigen::HouseholderQR<Mat<M, N>> qr(tall);
-    Mat<N, N> L =
-        qr.matrixQR().template topRows<N>().template triangularView<Eigen::Upper>().transpose();
-    for (int i = 0; i < N; ++i)
-        if (L(i, i) < 0.0) L.col(i) *= -1.0;
+    // Rows of A as columns: a reflection leaves of each what stands in its triangle (Golub & Van
+    // Loan, Matrix Computations (4th ed.), algorithm 5.2.1). Plain loops over sizes the compiler
+    // knows.
+    Mat<M, N> tall = A.transpose();
+    Mat<N, N> L = Mat<N, N>::Zero();
+    for (int k = 0; k < N; ++k) {
+        double rest = 0.0;
+        for (int i = k + 1; i < M; ++i) rest += tall(i, k) * tall(i, k);
+        const double first = tall(k, k);
+        const double length = std::sqrt(first * first + rest);
+        L(k, k) = length;
+        // Away from zero, where nothing cancels. A column of zeros needs no reflection.
+        const double pivot = first + std::copysign(length, first);
+        const double share = length > 0.0 ? 1.0 / (length * std::abs(pivot)) : 0.0;  // 2 / v'v
+        tall(k, k) = pivot;
+        for (int j = k + 1; j < N; ++j) {
+            double along = 0.0;
+            for (int i = k; i < M; ++i) along += tall(i, k) * tall(i, j);
+            for (int i = k; i < M; ++i) tall(i, j) -= share * along * tall(i, k);
+            // The reflection sets the pivot to minus its sign times the length: turned to plus.
+            L(j, k) = -std::copysign(1.0, first) * tall(k, j);
+        }
+    }
     return L;
 }
 
@@ -67,17 +84,20 @@ void square_root_update(const Transformed<NX, NY>& t, Vec<NX>& x, Mat<NX, NX>& L
     solve_from_the_right<NY, NX>(L, u.observation);
     const Mat<NX + NY, NX + NY> lower = lower_of<NX + NY, 3 * NX + NY + 1>(array);
     u.lower = lower.template topLeftCorner<NY, NY>();
-    if (!(u.lower.diagonal().minCoeff() > 0.0))
-        throw NumericalFailure("the innovation covariance is not positive definite", sample);
-    const auto solver = u.lower.template triangularView<Eigen::Lower>();
-    const Mat<NY, NY> whitening = solver.solve(Mat<NY, NY>::Identity());
-    u.information = whitening.transpose() * whitening;
-    u.gain = lower.template block<NX, NY>(NY, 0) * whitening;
-    const Vec<NY> white = whitening * u.innovation;
+    u.determinant = 1.0;
+    for (int i = 0; i < NY; ++i) {
+        if (!(u.lower(i, i) > 0.0))
+            throw NumericalFailure("the innovation covariance is not positive definite", sample);
+        u.determinant *= u.lower(i, i) * u.lower(i, i);
+    }
+    Mat<NY, NY> whitening = Mat<NY, NY>::Identity();
+    solve_from_the_right<NY, NY>(u.lower, whitening);
+    u.information = transposed_times<NY, NY, NY>(whitening, whitening);
+    const Mat<NX, NY> below = lower.template block<NX, NY>(NY, 0);
+    u.gain = times<NX, NY, NY>(below, whitening);
+    const Vec<NY> white = times<NY, NY, 1>(whitening, u.innovation);
     u.squares = white.squaredNorm();
-    u.determinant = u.lower.diagonal().prod();
-    u.determinant *= u.determinant;
-    x += u.gain * u.innovation;
+    add_product<NX, NY, 1>(u.gain.data(), u.innovation.data(), 1.0, x.data());
     L = lower.template bottomRightCorner<NX, NX>();
 }
 

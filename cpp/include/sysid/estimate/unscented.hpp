@@ -56,11 +56,10 @@ Mat<N, N> root_of(const Mat<N, N>& Q, std::size_t sample) {
     Mat<N, N> lower, inverse;
     if (cholesky<N>(Q, lower, inverse)) return lower;
     if (!Q.allFinite()) throw NumericalFailure("a noise covariance is not finite", sample);
-    const Eigen::SelfAdjointEigenSolver<Mat<N, N>> eigen(Q);
-    const Vec<N>& values = eigen.eigenvalues();
+    const auto [values, vectors] = spectrum<N>(Q);
     if (values[0] < -1e-12 * std::abs(values[N - 1]))
         throw NumericalFailure("a noise covariance has a negative variance", sample);
-    return eigen.eigenvectors() * values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+    return vectors * values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 /// Mean of f over the sigma points of (x, L L'), and the deviations of its values from it.
@@ -72,9 +71,12 @@ struct Transformed {
     Mat<NZ, NX> slope_times_L;  // regression matrix H times L
 
     Mat<NZ, NZ> covariance(const SigmaWeights& w) const {
-        Mat<NZ, NZ> P = w.covariance_centre * centre * centre.transpose();
-        P.noalias() += w.other * plus * plus.transpose();
-        P.noalias() += w.other * minus * minus.transpose();
+        Mat<NZ, NZ> P = times_transposed<NZ, NX, NZ>(plus, plus);
+        const Mat<NX, NZ> turned = transposed<NZ, NX>(minus);
+        add_product<NZ, NX, NZ>(minus.data(), turned.data(), 1.0, P.data());
+        for (int j = 0; j < NZ; ++j)
+            for (int i = 0; i < NZ; ++i)
+                P(i, j) = w.covariance_centre * centre[i] * centre[j] + w.other * P(i, j);
         return P;
     }
 };
@@ -84,25 +86,49 @@ Transformed<NX, NZ> transform(F&& f, const Vec<NX>& x, const Mat<NX, NX>& L,
                               const SigmaWeights& w) {
     Transformed<NX, NZ> t;
     t.centre = f(x);
-    t.mean = w.mean_centre * t.centre;
+    for (int n = 0; n < NZ; ++n) t.mean[n] = w.mean_centre * t.centre[n];
     for (int i = 0; i < NX; ++i) {
-        t.plus.col(i) = f(Vec<NX>(x + w.spread * L.col(i)));
-        t.minus.col(i) = f(Vec<NX>(x - w.spread * L.col(i)));
-        t.mean += w.other * (t.plus.col(i) + t.minus.col(i));
+        Vec<NX> beyond, before;
+        for (int n = 0; n < NX; ++n) {
+            beyond[n] = x[n] + w.spread * L(n, i);
+            before[n] = x[n] - w.spread * L(n, i);
+        }
+        const Vec<NZ> plus = f(beyond), minus = f(before);
+        for (int n = 0; n < NZ; ++n) {
+            t.plus(n, i) = plus[n];
+            t.minus(n, i) = minus[n];
+            t.mean[n] += w.other * (plus[n] + minus[n]);
+            t.slope_times_L(n, i) = w.other * w.spread * (plus[n] - minus[n]);
+        }
     }
-    t.slope_times_L = (w.other * w.spread) * (t.plus - t.minus);
-    t.centre -= t.mean;
-    t.plus.colwise() -= t.mean;
-    t.minus.colwise() -= t.mean;
+    for (int n = 0; n < NZ; ++n) t.centre[n] -= t.mean[n];
+    for (int i = 0; i < NX; ++i)
+        for (int n = 0; n < NZ; ++n) {
+            t.plus(n, i) -= t.mean[n];
+            t.minus(n, i) -= t.mean[n];
+        }
     return t;
 }
 
 /// Replaces X by X L^-1 of a lower factor L.
 template <int R, int N>
 void solve_from_the_right(const Mat<N, N>& L, Mat<R, N>& X) {
-    const Mat<N, R> solved =
-        L.transpose().template triangularView<Eigen::Upper>().solve(Mat<N, R>(X.transpose()));
-    X = solved.transpose();
+    for (int j = N; j-- > 0;) {
+        const double per_pivot = 1.0 / L(j, j);
+        for (int k = j + 1; k < N; ++k)
+            for (int i = 0; i < R; ++i) X(i, j) -= X(i, k) * L(k, j);
+        for (int i = 0; i < R; ++i) X(i, j) *= per_pivot;
+    }
+}
+
+/// Diagonal of H P H'.
+template <int NX, int NY>
+Vec<NY> seen_variance(const Mat<NY, NX>& H, const Mat<NX, NX>& P) {
+    const Mat<NY, NX> HP = times<NY, NX, NX>(H, P);
+    Vec<NY> out = Vec<NY>::Zero();
+    for (int j = 0; j < NX; ++j)
+        for (int i = 0; i < NY; ++i) out[i] += HP(i, j) * H(i, j);
+    return out;
 }
 
 /// Best line through the values at the sigma points: y = expected + H (x - mean) + w + v, with the
@@ -117,12 +143,15 @@ struct Regression {
                          const SigmaWeights& w) {
         Regression out{t.mean, t.slope_times_L, R};
         solve_from_the_right<NY, NX>(L, out.H);
-        out.noise += t.covariance(w) - t.slope_times_L * t.slope_times_L.transpose();
+        out.noise +=
+            less_times_transposed<NY, NX, NY>(t.covariance(w), t.slope_times_L, t.slope_times_L);
         symmetrise(out.noise);
         return out;
     }
     Vec<NY> innovation_variance(const Mat<NX, NX>& P) const {
-        return (H * P).cwiseProduct(H).rowwise().sum() + noise.diagonal();
+        Vec<NY> out = seen_variance<NX, NY>(H, P);
+        for (int i = 0; i < NY; ++i) out[i] += noise(i, i);
+        return out;
     }
 };
 

@@ -100,7 +100,7 @@ class RunSystem {
 
   private:
     // So many directions at once: the model is compiled for few widths.
-    static constexpr int kPass = NX % 9 == 0 ? 9 : 6;
+    static constexpr int kPass = NX % kWideStatePass == 0 ? kWideStatePass : kStatePass;
     static_assert(NX % kPass == 0);
     using D = Dual<kPass>;
 
@@ -147,7 +147,7 @@ class RunSystem {
 /// State sizes for models without states of the effects' own, with a few, with some, and with all.
 constexpr int kStatesFew = kStatesPlain + 3;
 constexpr int kStatesSome = kStatesPlain + 6;
-constexpr int kStatesMost = (kStatesFull + 8) / 9 * 9;
+constexpr int kStatesMost = (kStatesFull + kWideStatePass - 1) / kWideStatePass * kWideStatePass;
 
 /// Calls `use(std::integral_constant<int, NX>)` with a state size that holds the effects' states.
 template <class Use>

@@ -28,24 +28,32 @@ struct Dual2 {
     // f(a) with derivatives f'(a) and f''(a).
     static Dual2 chain(const Dual2& a, double value, double slope, double curvature) {
         Dual2 r(value);
-        r.d = slope * a.d;
-        r.dd = slope * a.dd + curvature * a.d * a.d.transpose();
+        for (int j = 0; j < N; ++j) {
+            r.d[j] = slope * a.d[j];
+            for (int i = 0; i < N; ++i)
+                r.dd(i, j) = slope * a.dd(i, j) + curvature * a.d[i] * a.d[j];
+        }
         return r;
     }
 
     friend Dual2 operator-(const Dual2& a) { return chain(a, -a.v, -1.0, 0.0); }
     friend Dual2 operator+(const Dual2& a, const Dual2& b) {
         Dual2 r(a.v + b.v);
-        r.d = a.d + b.d;
-        r.dd = a.dd + b.dd;
+        for (int j = 0; j < N; ++j) {
+            r.d[j] = a.d[j] + b.d[j];
+            for (int i = 0; i < N; ++i) r.dd(i, j) = a.dd(i, j) + b.dd(i, j);
+        }
         return r;
     }
     friend Dual2 operator-(const Dual2& a, const Dual2& b) { return a + (-b); }
     friend Dual2 operator*(const Dual2& a, const Dual2& b) {
         Dual2 r(a.v * b.v);
-        r.d = a.v * b.d + b.v * a.d;
-        const Mat<N, N> cross = a.d * b.d.transpose();
-        r.dd = a.v * b.dd + b.v * a.dd + cross + cross.transpose();
+        for (int j = 0; j < N; ++j) {
+            r.d[j] = a.v * b.d[j] + b.v * a.d[j];
+            for (int i = 0; i < N; ++i)
+                r.dd(i, j) =
+                    a.v * b.dd(i, j) + b.v * a.dd(i, j) + a.d[i] * b.d[j] + b.d[i] * a.d[j];
+        }
         return r;
     }
     friend Dual2 operator/(const Dual2& a, const Dual2& b) {

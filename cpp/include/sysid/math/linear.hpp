@@ -60,4 +60,31 @@ double lift_correlations(Mat<N, N>& P, double least) {
     return lift_correlations(P.data(), N, least);
 }
 
+/// S^-1 B of a symmetric S of at most 16 rows, without negative eigenvalues but for rounding.
+/// Directions in which S is zero get none of it. `B` becomes the result, column after column.
+void solve_symmetric(const double* S, int n, double* B, int columns);
+
+template <int N, int M>
+Mat<N, M> solved_by(const Mat<N, N>& S, Mat<N, M> B) {
+    static_assert(N <= 16, "too large for what solves it");
+    solve_symmetric(S.data(), N, B.data(), M);
+    return B;
+}
+
+/// Eigenvalues in rising order, and the eigenvectors that belong to them.
+template <class Values, class Vectors>
+struct Spectrum {
+    Values values;
+    Vectors vectors;
+};
+
+/// Of a symmetric matrix. Its algorithm is long: it is compiled once, for all sizes.
+Spectrum<Eigen::VectorXd, Eigen::MatrixXd> spectrum(const Eigen::MatrixXd& S);
+
+template <int N>
+Spectrum<Vec<N>, Mat<N, N>> spectrum(const Mat<N, N>& S) {
+    const auto any = spectrum(Eigen::MatrixXd(S));
+    return {any.values, any.vectors};
+}
+
 }  // namespace sysid

@@ -76,7 +76,7 @@ class CorneringRls {
         }
         if (!any) return false;
         const Mat<2, 2> S = s.forgetting * Mat<2, 2>::Identity() + A * P_ * A.transpose();
-        const Mat<2, 2> K = S.ldlt().solve(A * P_).transpose();
+        const Mat<2, 2> K = solved_by<2, 2>(S, A * P_).transpose();
         theta_ += K * (y - A * theta_);
         // Joseph's form of (P - K A P) / lambda keeps it positive definite.
         const Mat<2, 2> I_KA = Mat<2, 2>::Identity() - K * A;

@@ -183,7 +183,7 @@ class CurveFilter {
         const auto cost = [&](const CurveVec<Curve>& at) {
             const double error = mu - Curve::mu(slip, at.data());
             const CurveVec<Curve> away = at - mean_;
-            return error * error / R + away.dot(P.ldlt().solve(away));
+            return error * error / R + away.dot(solved_by<Curve::kParameters, 1>(P, away));
         };
         const double now = cost(x);
         CurveVec<Curve> trial = next;

@@ -46,10 +46,13 @@ struct PublishedUkf {
         const Vec<M> expected = seen * means;
         moved.colwise() -= predicted;
         seen.colwise() -= expected;
-        const Mat<N, N> spread_x = moved * squares.asDiagonal() * moved.transpose();
-        const Mat<M, M> S = Mat<M, M>(seen * squares.asDiagonal() * seen.transpose()) + R;
-        const Mat<N, M> cross = moved * squares.asDiagonal() * seen.transpose();
-        const Mat<N, M> K = S.llt().solve(cross.transpose()).transpose();
+        const Mat<N, n> weighed = moved * squares.asDiagonal();
+        const Mat<N, N> spread_x = times_transposed<N, n, N>(weighed, moved);
+        const Mat<M, n> weighed_seen = seen * squares.asDiagonal();
+        Mat<M, M> S = times_transposed<M, n, M>(weighed_seen, seen);
+        S += R;
+        const Mat<N, M> cross = times_transposed<N, n, M>(weighed, seen);
+        const Mat<N, M> K = solved_by<M, N>(S, cross.transpose()).transpose();
         x = predicted + K * (y - expected);
         P = spread_x + Q - K * S * K.transpose();
         if (!x.allFinite()) throw NumericalFailure("the state is not finite", sample);
