@@ -66,6 +66,19 @@ def test_subnormal_numbers_survive_the_import() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def test_the_import_leaves_what_is_slow_to_load_until_it_is_used() -> None:
+    code = (
+        "import sys, sysid_vehicle\n"
+        "slow = ('scipy.stats', 'scipy.optimize', 'scipy.interpolate', 'scipy.signal',\n"
+        "        'scipy.linalg', 'scipy.special', 'matplotlib', 'nlopt', 'pandas', 'tqdm')\n"
+        "print(*(name for name in slow if name in sys.modules))\n"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True
+    ).stdout
+    assert loaded.split() == []
+
+
 def test_the_extension_brings_no_thread_runtime() -> None:
     content = CORE.read_bytes()
     assert b"libgomp" not in content

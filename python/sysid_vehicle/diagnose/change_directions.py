@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit
+import scipy
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
@@ -77,7 +77,7 @@ def beginning(evidence: Evidence, kind: Kind, samples: list[int]) -> list[FloatA
         changing = evidence.problem.with_model(wide)
         return [_of_grip(evidence, kind, changing, change.columns, k) for k in samples]
     width = len(kind.names)
-    signals = [expit((now - now[k]) / _BLEND_S) for k in samples]
+    signals = [scipy.special.expit((now - now[k]) / _BLEND_S) for k in samples]
     columns = evidence.of_signals(
         np.repeat(np.column_stack(signals), width, axis=1), list(kind.names) * len(samples)
     )

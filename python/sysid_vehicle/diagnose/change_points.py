@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
@@ -164,7 +164,7 @@ def _search(
         direction = after @ (inverse[at] @ S[at])
         direction -= Q @ (Q.T @ direction)
         ratios.append(variance_ratio(direction, e - direction))
-        strength = -float(chi2.logsf(T[at] / ratios[-1], S.shape[1]))
+        strength = -float(scipy.stats.chi2.logsf(T[at] / ratios[-1], S.shape[1]))
         if best is None or strength > best[0]:
             best, left = (strength, i, at), e - direction
     assert best is not None
@@ -198,7 +198,7 @@ def _read(
     statistic = np.array([f.statistic for f in found])
     place = int(np.argmax(statistic))
     best, at = found[place], tried[place]
-    if best.statistic < chi2.isf(alpha, len(kind.names)):
+    if best.statistic < scipy.stats.chi2.isf(alpha, len(kind.names)):
         return None
     if (
         kind.what == "grip"
@@ -277,7 +277,7 @@ def _largest(
         S = S - np.einsum("bri,dr->bdi", across, total, optimize=True)
         first += width
         T = np.einsum("bdi,bij,bdj->bd", S, inverse, S, optimize=True).max(axis=0)
-        largest = np.maximum(largest, -chi2.logsf(T / ratio, width))
+        largest = np.maximum(largest, -scipy.stats.chi2.logsf(T / ratio, width))
     return as_float64(largest)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import csd, welch
+import scipy
 
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
@@ -150,9 +150,9 @@ def _with(
         u = inputs[begin:end, which : which + 1]
         count = 2 * (end - begin) // length - 1
         inside = slice(1, band + 1)
-        cross = cross + count * csd(u, e[begin:end], **how)[1][inside]
-        own = own + count * welch(u, **how)[1][inside]
-        of_e = of_e + count * welch(e[begin:end], **how)[1][inside]
+        cross = cross + count * scipy.signal.csd(u, e[begin:end], **how)[1][inside]
+        own = own + count * scipy.signal.welch(u, **how)[1][inside]
+        of_e = of_e + count * scipy.signal.welch(e[begin:end], **how)[1][inside]
         windows += count
     with np.errstate(invalid="ignore", divide="ignore"):
         gamma = np.nan_to_num(np.abs(cross) ** 2 / (own * of_e))

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from .. import _core
 from .._arrays import FloatArray
@@ -144,7 +144,7 @@ def _of_effect(
         effect,
         statistic,
         rank,
-        float(chi2.sf(statistic, rank)),
+        float(scipy.stats.chi2.sf(statistic, rank)),
         float(np.max(share[felt])) if felt else 0.0,
         tuple(float(v) for v in effect.parameters[0].null_value + whole[0] + centred[:, 0]),
         rules,

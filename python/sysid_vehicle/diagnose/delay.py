@@ -22,8 +22,7 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import hilbert
-from scipy.stats import chi2
+import scipy
 
 from .._arrays import FloatArray, as_float64
 from ..estimate import Driving
@@ -233,7 +232,7 @@ def _phases(
     information = float(line @ weight @ line)
     slope = float(line @ weight @ phase[known]) / information
     off = phase[known] - slope * line
-    chance = float(chi2.sf(off @ weight @ off, max(int(known.sum()) - 1, 1)))
+    chance = float(scipy.stats.chi2.sf(off @ weight @ off, max(int(known.sum()) - 1, 1)))
     return f, as_float64(phase), as_float64(std), chance > 0.01
 
 
@@ -261,7 +260,7 @@ def _in_band(
     inside = (f >= low) & (f < high)
     part = np.fft.irfft(np.where(inside, spectrum, 0.0), 2 * len(u))
     power = np.where(inside & (f > 0.0), np.abs(spectrum) ** 2, 0.0)
-    turned = np.imag(hilbert(part))
+    turned = np.imag(scipy.signal.hilbert(part))
     return part[: len(u)], turned[: len(u)], float(power.sum()), float(power @ f**2)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from tqdm import tqdm
 
+from .._progress import with_progress
 from .._threads import Workers
 from ..compare import compare
 from ..effects import Effect, effect
@@ -98,11 +98,11 @@ def diagnose(
         with Workers(workers) as pool:
             tried = [
                 first,
-                *tqdm(
+                *with_progress(
                     pool.map(lambda c: _refitted(fit, driving, c), others),
+                    "refits",
                     total=len(others),
-                    desc="refits",
-                    disable=not progress,
+                    shown=progress,
                 ),
             ]
             # Under the noise of the poorer model they differ less than they really do.

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from scipy.stats import chi2
+import scipy
 
 from ..compare import Comparison, compare
 from ..effects import Effect
@@ -81,7 +81,7 @@ def beside(fit: Fit, driving: Driving, lacked: set[str], rules: Rules = USUAL) -
 
 def confirmed(statistic: float, effect: Effect, rules: Rules = USUAL) -> bool:
     """Whether a refit gained more than its parameters gain by chance."""
-    return float(chi2.sf(statistic, len(effect.parameters))) < rules.level
+    return float(scipy.stats.chi2.sf(statistic, len(effect.parameters))) < rules.level
 
 
 def doubt(

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from tqdm import tqdm
 
 from .._arrays import FloatArray, as_float64
+from .._progress import with_progress
 from .._text import html_table, number, text_table
 from .._threads import Workers
 from ..effects import Effect, base_parameters, effect
@@ -196,7 +196,7 @@ def bias_report(
 
     jobs = [(which, first) for which in range(len(wanted) + 1) for first in (True, False)]
     with Workers(workers) as pool:
-        done = tqdm(pool.map(refitted, jobs), desc="refits", total=len(jobs), disable=not progress)
+        done = with_progress(pool.map(refitted, jobs), "refits", total=len(jobs), shown=progress)
         found = list(done)
     biases = []
     for i, (e, size) in enumerate(zip(wanted, sizes, strict=True), start=1):

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from tqdm.auto import tqdm
 
 from .. import manoeuvres
+from .._progress import with_progress
 from .._text import html_paragraph, html_table, text_table
 from ..effects import Effect, effect
 from ..errors import InvalidInput, NumericalError
@@ -216,7 +216,7 @@ def suggest_manoeuvre(
     menu = _menu(bounds)
     truth = fit.model.add(a).with_values(_values(a, psi))
     found, refused = [], 0
-    for manoeuvre in tqdm(menu, desc="manoeuvres", disable=not progress):
+    for manoeuvre in with_progress(menu, "manoeuvres", shown=progress):
         log = _driven(truth, manoeuvre, fit, bounds, seed)
         if log is None:
             refused += 1

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from .._arrays import FloatArray
 from ..estimate import Driving
@@ -102,7 +102,7 @@ def omnibus_of(evidence: Evidence, rules: Rules = USUAL) -> Omnibus:
     return Omnibus(
         statistic,
         degrees,
-        float(chi2.sf(statistic, degrees)),
+        float(scipy.stats.chi2.sf(statistic, degrees)),
         max(by_target, key=lambda t: by_target[t]),
         rules,
     )

@@ -17,7 +17,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import chdtrc, erfc
+import scipy
 
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
@@ -291,8 +291,8 @@ def _on_one_side(effect: Effect, directions: int) -> bool:
 def _chi2_tail(degrees: int, T: FloatArray) -> FloatArray:
     # Far quicker than the general form, and thousands of draws have one or two degrees.
     if degrees == 1:
-        return as_float64(erfc(np.sqrt(0.5 * np.maximum(T, 0.0))))
-    return as_float64(np.exp(-0.5 * T) if degrees == 2 else chdtrc(degrees, T))
+        return as_float64(scipy.special.erfc(np.sqrt(0.5 * np.maximum(T, 0.0))))
+    return as_float64(np.exp(-0.5 * T) if degrees == 2 else scipy.special.chdtrc(degrees, T))
 
 
 def _chi_squared(S: FloatArray, information: FloatArray) -> tuple[FloatArray, int]:

@@ -21,7 +21,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import solve_triangular
+import scipy
 
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
@@ -241,7 +241,7 @@ def _posterior(
         # w = L x with x ~ N(0, I): no matrix that could be singular is inverted.
         L = np.repeat(units * np.take(sizes, choice), width)[:, None] * root
         lower = np.linalg.cholesky(np.eye(len(L)) + L.T @ A @ L)
-        half = solve_triangular(lower, L.T, lower=True, check_finite=False)
+        half = scipy.linalg.solve_triangular(lower, L.T, lower=True, check_finite=False)
         x = half @ b
         log_evidence.append(0.5 * float(x @ x) - float(np.log(np.diag(lower)).sum()))
         means.append(half.T @ x)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from html import escape
 
 import numpy as np
-from scipy.stats import chi2, norm
+import scipy
 
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
@@ -118,7 +118,7 @@ def whiteness_check(
     """
     whitened = as_float64(whitened)
     columns = whitened.T if whitened.ndim == 2 else whitened[None]
-    bound = float(norm.isf(0.5 * (1.0 - probability)))
+    bound = float(scipy.stats.norm.isf(0.5 * (1.0 - probability)))
     out = []
     for i, e in enumerate(columns):
         product = e[lag:] * e[:-lag]
@@ -134,5 +134,5 @@ def whiteness_check(
 def _chi2(what: str, total: float, freedom: int, probability: float) -> Consistency:
     if freedom < 1:
         raise InvalidInput(f"{what}: there is no reading to judge by")
-    low, high = chi2.interval(probability, freedom)
+    low, high = scipy.stats.chi2.interval(probability, freedom)
     return Consistency(what, total / freedom, float(low) / freedom, float(high) / freedom, freedom)

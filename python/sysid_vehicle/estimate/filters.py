@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.stats import norm
+import scipy
 
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
@@ -147,7 +147,9 @@ class StateFilter:
         if gate_patience < 1 or not 0.0 <= adapt_rate < 1.0:
             raise InvalidInput("gate_patience must be 1 or more, adapt_rate lie in 0 to 1")
         self.model, self.method, self._adapt = model, method, adapt_rate
-        self._bound = None if gate_probability is None else norm.isf(0.5 * gate_probability)
+        self._bound = (
+            None if gate_probability is None else scipy.stats.norm.isf(0.5 * gate_probability)
+        )
         self._patience = gate_patience
         self.mean = as_float64(mean).copy()
         if self.mean.ndim != 1 or not np.isfinite(self.mean).all():

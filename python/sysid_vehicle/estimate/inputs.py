@@ -15,7 +15,7 @@ than it can notice in one place, but everywhere alike, and a test over the whole
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import savgol_coeffs
+import scipy
 
 from .._arrays import FloatArray
 
@@ -56,7 +56,7 @@ def quiet(y: FloatArray) -> FloatArray:
     for half in _HALF_WIDTHS:
         if len(y) <= 2 * half:
             break
-        weights = savgol_coeffs(2 * half + 1, _DEGREE)
+        weights = scipy.signal.savgol_coeffs(2 * half + 1, _DEGREE)
         local = np.convolve(y, weights, "valid")
         spread = _AGREES * noise * float(np.linalg.norm(weights))
         inner = slice(half, len(y) - half)

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from tqdm.auto import tqdm
 
 from .._arrays import FloatArray, as_float64
+from .._progress import with_progress
 from .._style import AFTER, FLOOR, axes_or_new, tidy
 from .._text import number
 from .._threads import Workers
@@ -120,7 +120,7 @@ def profile_all(
 
     with Workers(workers) as pool:
         found = list(
-            tqdm(pool.map(one, wanted), total=len(wanted), desc="profiles", disable=not progress)
+            with_progress(pool.map(one, wanted), "profiles", total=len(wanted), shown=progress)
         )
     better = [b for _, b in found if b is not None]
     return (

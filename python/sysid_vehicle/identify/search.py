@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares, lsq_linear
+import scipy
 
 from .. import _core
 from .._arrays import FloatArray
@@ -114,7 +114,7 @@ def _step(
     normal = information * np.outer(unit, unit) / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(normal + damping * np.eye(len(x)))
     root = np.sqrt(np.maximum(values, 1e-12))
-    found = lsq_linear(
+    found = scipy.optimize.lsq_linear(
         root[:, None] * vectors.T,
         (vectors.T @ (gradient * unit / scale)) / root,
         bounds=(lower * scale, upper * scale),
@@ -176,7 +176,7 @@ def _scipy(
 ) -> Outcome:
     """Trust-region reflective least squares of SciPy."""
     inside = np.clip(p[box.columns], box.lower + 1e-9, box.upper - 1e-9)
-    found = least_squares(
+    found = scipy.optimize.least_squares(
         lambda x: problem.residuals(_filled(p, box, x), frozen).ravel(),
         inside,
         jac=lambda x: -problem.sensitivities(_filled(p, box, x), frozen, box.columns),

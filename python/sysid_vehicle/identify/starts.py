@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import qmc
-from tqdm.auto import tqdm
+import scipy
 
 from .._arrays import FloatArray, as_float64
+from .._progress import with_progress
 from .._style import AFTER, BEFORE, axes_or_new, tidy
 from .._threads import Workers
 from ..errors import NumericalError
@@ -145,7 +145,7 @@ def space_filling(
     points = np.tile(given, (starts, 1))
     where = list(range(len(given))) if moved is None else moved
     if starts > 1 and where:
-        unit = qmc.Sobol(len(where), seed=seed).random(1 << (starts - 1).bit_length())
+        unit = scipy.stats.qmc.Sobol(len(where), seed=seed).random(1 << (starts - 1).bit_length())
         points[1:, where] = low[where] + unit[: starts - 1] * (high - low)[where]
     return as_float64(points)
 
@@ -165,7 +165,7 @@ class Runner:
         _, first, which = np.unique(place, axis=0, return_index=True, return_inverse=True)
         with Workers(self.workers) as pool:
             found = pool.map(lambda i: _guarded(search, points[i]), first)
-            bar = tqdm(found, total=len(first), desc="starts", disable=not self.progress)
+            bar = with_progress(found, "starts", total=len(first), shown=self.progress)
             ends, values = zip(*bar, strict=True)
         back = which.ravel()  # NumPy 2.0 gives it another shape
         return as_float64(np.array(ends)[back]), as_float64(np.array(values)[back])

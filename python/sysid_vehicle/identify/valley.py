@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import lsq_linear
+import scipy
 
 from .._arrays import FloatArray, as_float64
 from ..errors import NumericalError
@@ -43,7 +43,7 @@ class _Slope:
         """Minimum of the damped quadratic model over the box."""
         values, vectors = np.linalg.eigh(self.curvature + damping * np.eye(len(self.scale)))
         root = np.sqrt(np.maximum(values, _TINY))
-        found = lsq_linear(
+        found = scipy.optimize.lsq_linear(
             root[:, None] * vectors.T,
             (vectors.T @ self.gradient) / root,
             bounds=(np.minimum(self.to_lower, -_TINY), np.maximum(self.to_upper, _TINY)),

@@ -8,7 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import qmc
+import scipy
 from tqdm import tqdm
 
 from .._arguments import generator
@@ -254,7 +254,8 @@ def design_excitation(
     box = _box(believed, setup, limits)
     tried: list[Trial] = []
     spread = trials - trials // 2
-    points = qmc.Sobol(len(box), seed=seed).random(1 << (spread - 1).bit_length())[:spread]
+    sobol = scipy.stats.qmc.Sobol(len(box), seed=seed)
+    points = sobol.random(1 << (spread - 1).bit_length())[:spread]
     rng = generator(seed)
     with (
         Workers(workers) as pool,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
+import scipy
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
@@ -101,8 +101,8 @@ class TyreMotion:
         told = log if log.sideslip_measured else log.with_kinematic_sideslip()
         window = 2 * max(int(0.5 * window_s / log.step_s), 2) + 1
         y = np.column_stack([_filled(told.measurements[:, i]) for i in range(4)])
-        smooth = savgol_filter(y[:, :3], window, 3, axis=0)
-        rate = savgol_filter(y[:, 2], window, 3, deriv=1, delta=log.step_s)
+        smooth = scipy.signal.savgol_filter(y[:, :3], window, 3, axis=0)
+        rate = scipy.signal.savgol_filter(y[:, 2], window, 3, deriv=1, delta=log.step_s)
         motion = np.column_stack([smooth, told.inputs[:, 1:]])
         return cls(as_float64(motion), as_float64(y[:, 3]), None, as_float64(rate))
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import lsq_linear
+import scipy
 
 from .._arrays import FloatArray, as_float64
 from ..identify.objective import Problem
@@ -89,8 +88,8 @@ class Regression:
         factor = _factor(information[n:, n:])
         return (
             cost,
-            as_float64(gradient[:n] - across @ cho_solve(factor, gradient[n:])),
-            as_float64(information[:n, :n] - across @ cho_solve(factor, across.T)),
+            as_float64(gradient[:n] - across @ scipy.linalg.cho_solve(factor, gradient[n:])),
+            as_float64(information[:n, :n] - across @ scipy.linalg.cho_solve(factor, across.T)),
         )
 
     def residuals(self, p: FloatArray, _: object = None) -> FloatArray:
@@ -108,13 +107,14 @@ class Regression:
             return as_float64(by)
         other = by[:, n:]
         return as_float64(
-            by[:, :n] - other @ cho_solve(_factor(other.T @ other), other.T @ by[:, :n])
+            by[:, :n]
+            - other @ scipy.linalg.cho_solve(_factor(other.T @ other), other.T @ by[:, :n])
         )
 
 
 def _factor(matrix: FloatArray) -> tuple[FloatArray, bool]:
     ridge = 1e-13 * float(np.trace(matrix)) + 1e-300
-    factor, low = cho_factor(matrix + ridge * np.eye(len(matrix)))
+    factor, low = scipy.linalg.cho_factor(matrix + ridge * np.eye(len(matrix)))
     return as_float64(factor), bool(low)
 
 
@@ -122,12 +122,12 @@ def _bounded(
     matrix: FloatArray, gradient: FloatArray, lower: FloatArray, upper: FloatArray
 ) -> FloatArray:
     """Minimum of the quadratic within the bounds."""
-    step = cho_solve(_factor(matrix), gradient)
+    step = scipy.linalg.cho_solve(_factor(matrix), gradient)
     if np.all(step >= lower) and np.all(step <= upper):
         return as_float64(step)
     values, vectors = np.linalg.eigh(matrix)
     root = np.sqrt(np.maximum(values, 1e-14 * values[-1]))
-    found = lsq_linear(
+    found = scipy.optimize.lsq_linear(
         root[:, None] * vectors.T,
         (vectors.T @ gradient) / root,
         bounds=(np.minimum(lower, 0.0) - 1e-15, np.maximum(upper, 0.0) + 1e-15),

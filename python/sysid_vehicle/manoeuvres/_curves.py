@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from .._arrays import FloatArray
 from ..errors import InvalidInput
@@ -69,7 +69,9 @@ class Knots:
         """Values at these times."""
         inside = np.clip(time_s, self.time_s[0], self.time_s[-1])
         if self.smooth:
-            return np.asarray(PchipInterpolator(self.time_s, self.value)(inside), dtype=float)
+            return np.asarray(
+                scipy.interpolate.PchipInterpolator(self.time_s, self.value)(inside), dtype=float
+            )
         return np.interp(inside, self.time_s, self.value)
 
 

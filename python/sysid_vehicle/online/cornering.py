@@ -11,7 +11,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import savgol_filter
+import scipy
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
@@ -275,7 +275,7 @@ def _parabolas(y: FloatArray, width: int, derivative: int, step_s: float) -> Flo
         rows = np.arange(part[0], part[-1] + 1)
         if rows.size >= width:
             dense = np.interp(rows, part, y[part])
-            out[rows] = savgol_filter(dense, width, 2, deriv=derivative, delta=step_s)
+            out[rows] = scipy.signal.savgol_filter(dense, width, 2, deriv=derivative, delta=step_s)
     return out
 
 

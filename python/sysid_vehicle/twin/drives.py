@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from .. import _core
 from .._arguments import generator
@@ -225,9 +225,9 @@ def rough_road(
     rng = generator(seed)
     t = np.arange(round(duration_s / dt_s)) * dt_s
     leak = np.exp(-2.0 * np.pi * 0.02 * speed_mps * dt_s)
-    profile = signal.lfilter([1.0], [1.0, -leak], rng.standard_normal(len(t)))
-    low = signal.butter(2, 15.0, fs=1.0 / dt_s, output="sos")
-    profile = signal.sosfilt(low, profile)
+    profile = scipy.signal.lfilter([1.0], [1.0, -leak], rng.standard_normal(len(t)))
+    low = scipy.signal.butter(2, 15.0, fs=1.0 / dt_s, output="sos")
+    profile = scipy.signal.sosfilt(low, profile)
     profile *= rms_m / np.std(profile) * np.clip(t / 2.0, 0.0, 1.0)
     base = np.zeros((len(t), len(INPUTS)))
     lag = car.numbers()["wheelbase_m"] / speed_mps

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from .._arrays import FloatArray
 
@@ -158,7 +158,7 @@ def _colour(left: FloatArray, there: np.ndarray, step_s: float) -> tuple[float, 
     lags = np.arange(1, most + 1)
     q = count * (count + 2.0) * float(np.sum(rho**2 / np.maximum(count - lags, 1.0)))
     largest = float(rho[np.argmax(np.abs(rho))])
-    chance = float(stats.chi2.sf(q, most))
+    chance = float(scipy.stats.chi2.sf(q, most))
     return largest, chance > _CHANCE or abs(largest) < _COLOURED
 
 
