@@ -13,7 +13,7 @@ from .._arrays import FloatArray
 from .._threads import Workers
 from ..errors import InvalidInput, NumericalError, warn
 from ..estimate import Driving, NoiseModel, first_guess, learn_noise
-from ..log import Log, check_excitation
+from ..log import Log, check_car, check_excitation
 from ..model import Model
 from ..vehicle import Vehicle
 from .fit import Estimate, Fit, Start
@@ -66,13 +66,16 @@ def identify(
     Raises
     ------
     InvalidInput
-        Unknown method, no starts or workers, a negative seed, or nothing usable in the logs.
+        Unknown method, no starts or workers, a negative seed, nothing usable in the logs, or logs
+        that cannot be of this car: another mass, another steering ratio.
     NumericalError
         No start led anywhere.
     """
     if method not in METHODS:
         raise InvalidInput(f"no optimiser is called '{method}'; there are {', '.join(METHODS)}")
     driving = Driving.of(logs)
+    for log in driving.logs:
+        check_car(log, mass_kg=model.vehicle.mass_kg, wheelbase_m=model.vehicle.wheelbase_m)
     check_excitation(list(driving.logs))
     _say_what_is_not_seen(model, driving)
     names = list(model.free_names)
