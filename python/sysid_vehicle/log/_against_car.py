@@ -28,7 +28,7 @@ _COHERENT = 0.6
 _FORCE_DOUBT, _FORCE_FACTOR = 0.15, 1.7
 _STEER_DOUBT, _STEER_FACTOR = 0.2, 2.0
 _UNDERSTEER, _UNDERSTEER_DOUBT = 0.002, 0.003  # rad of road wheels per m/s2
-_NEAR = 0.12  # a unit is named where the factor is so near, as a logarithm
+_NEAR = 0.2  # a unit is named where the factor is so near, as a logarithm
 
 _MASS_SLIPS = (
     (1.0 / 0.45359237, "mass_kg seems to be in pounds: multiply it by 0.4536"),
@@ -111,8 +111,7 @@ def _steer(drive: Drive, wheelbase_m: float) -> _Told | None:
     """
     c = drive.motion.channels
     ay = drive.mean(c["ay_mps2"])
-    speed: FloatArray = np.maximum(c["vx_mps"], 1.0)
-    curvature = drive.mean(c["yaw_rate_radps"] / speed)
+    curvature = drive.mean(c["yaw_rate_radps"] / np.clip(c["vx_mps"], 1.0, None))
     gentle = np.abs(ay) < _LINEAR_MPS2
     if np.count_nonzero(gentle) < _MIN_WINDOWS or size_of(ay[gentle]) < EXCITED:
         return None
@@ -130,7 +129,7 @@ def _steer(drive: Drive, wheelbase_m: float) -> _Told | None:
         found = fit(steer[gentle], columns, spread, [0.0, s * _UNDERSTEER, 0.0, 0.0])
         # What the prior leaves open of the first coefficient where the speed hardly varies.
         x = columns[0]
-        shared = float(x @ ay[gentle] / max(x @ x, 1e-12))
+        shared = float(x @ ay[gentle] / max(float(x @ x), 1e-12))
         rest = ay[gentle] - shared * x
         open_ = float(np.sum(rest**2) / max(np.sum(ay[gentle] ** 2), 1e-12))
         doubt = abs(shared) * s * _UNDERSTEER_DOUBT * (1.0 if open_ < 0.05 else 0.3)
