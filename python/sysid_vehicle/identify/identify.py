@@ -12,7 +12,7 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError, warn
 from ..estimate import Driving, NoiseModel, first_guess, noise_range
-from ..log import Log, check_excitation
+from ..log import Log, check_car, check_excitation
 from ..model import Model
 from .estimates import INTERVALS, box_covariance, wald, with_profiles
 from .fit import Fit
@@ -83,7 +83,8 @@ def identify(
     ------
     InvalidInput
         Unknown method, intervals or parameter, bounds or priors that contradict each other, no
-        free parameter, no starts or workers, a negative seed, or nothing usable in the logs.
+        free parameter, no starts or workers, a negative seed, nothing usable in the logs, or logs
+        that cannot be of this car: another mass, another steering ratio.
     NumericalError
         No start led anywhere.
     """
@@ -93,6 +94,8 @@ def identify(
         raise InvalidInput(f"intervals = '{intervals}'; there are {', '.join(INTERVALS)}")
     model = _told(model, fixed, bounds, priors)
     driving = Driving.of(logs)
+    for log in driving.logs:
+        check_car(log, mass_kg=model.vehicle.mass_kg, wheelbase_m=model.vehicle.wheelbase_m)
     check_excitation(list(driving.logs))
     _say_what_is_not_seen(model, driving)
     names = model.free_names

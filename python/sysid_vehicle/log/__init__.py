@@ -1,5 +1,6 @@
 """Driving logs: canonical channels on a uniform grid, checked before they are used."""
 
+from ._against_car import check_car
 from ._channels import CHANNELS, Channel
 from ._columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
 from ._log import Log, check_excitation
@@ -11,6 +12,7 @@ __all__ = [
     "Log",
     "as_floats",
     "as_seconds",
+    "check_car",
     "check_excitation",
     "listed",
     "named_columns",

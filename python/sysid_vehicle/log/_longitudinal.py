@@ -45,7 +45,7 @@ _LONGITUDINAL_SLIPS: Slips = (
 
 
 def check_longitudinal(drive: Drive) -> None:
-    ramp, ax, found = _ramp_on(drive, "ax_mps2")
+    ramp, ax, found = ramp_on(drive, "ax_mps2")
     if max(size_of(ramp), size_of(ax)) < EXCITED:
         return
     ratio, doubt = float(found.coefficients[0]), float(found.deviations[0])
@@ -64,7 +64,7 @@ def check_longitudinal(drive: Drive) -> None:
         check_scale(ratio, doubt, SCALE_DOUBT, _LONGITUDINAL_SLIPS, formula, ramp, drive, True)
 
 
-def _ramp_on(drive: Drive, name: str) -> tuple[FloatArray, FloatArray, Regression]:
+def ramp_on(drive: Drive, name: str) -> tuple[FloatArray, FloatArray, Regression]:
     """Regress the change of speed on a channel, what turning adds to it taken out.
 
     Returns that change of speed, the means of the channel, and the regression.
@@ -99,7 +99,7 @@ def _ramp_on(drive: Drive, name: str) -> tuple[FloatArray, FloatArray, Regressio
 
 
 def check_force(drive: Drive) -> None:
-    ramp, force, found = _ramp_on(drive, "fx_n")
+    ramp, force, found = ramp_on(drive, "fx_n")
     if spread_of(ramp) < EXCITED or np.ptp(force) == 0.0:
         return
     inverse, doubt = float(found.coefficients[0]), float(found.deviations[0])
