@@ -14,12 +14,30 @@ def test_the_standard_error_is_that_of_a_sum_however_short_the_driving(
 ) -> None:
     test = Driving.of(course.between(0.0, length_s))
     n = test.samples
-    sums, errors = zip(
-        *(_with_error(rng.normal(0.2, 1.0, n), test) for _ in range(300)), strict=True
-    )
+    gains = [_with_error(rng.normal(0.2, 1.0, n), test) for _ in range(300)]
+    sums, errors = [g.value for g in gains], [g.error for g in gains]
     assert np.mean(sums) == pytest.approx(0.2 * n, abs=4.0 * np.sqrt(n / 300.0))
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.sqrt(n), rel=0.1)
     assert min(errors) > 0.0
+    trimmed = [g.typical for g in gains]
+    assert np.mean(trimmed) == pytest.approx(0.2 * n, abs=4.0 * np.sqrt(n / 300.0))
+    expected = np.sqrt(np.mean([g.typical_error**2 for g in gains]))
+    assert expected == pytest.approx(np.std(trimmed), rel=0.15)
+
+
+def test_one_spin_does_not_hide_what_all_other_pieces_show(
+    course: Log, rng: np.random.Generator
+) -> None:
+    test = Driving.of(course)
+    steady = rng.normal(0.2, 1.0, test.samples)
+    expected = _with_error(steady, test)
+    for spin in (-1e6, 1e6):
+        difference = steady.copy()
+        difference[:50] += spin
+        found = _with_error(difference, test)
+        assert abs(found.value) < 1.1 * found.error  # one piece is its own standard error
+        assert found.typical == pytest.approx(expected.typical, rel=0.2)
+        assert found.typical > 4.0 * found.typical_error
 
 
 def test_what_lasts_for_seconds_is_not_taken_for_many_pieces_of_evidence(
@@ -30,5 +48,6 @@ def test_what_lasts_for_seconds_is_not_taken_for_many_pieces_of_evidence(
     drawn = [
         np.repeat(rng.standard_normal(test.samples // lasting + 1), lasting) for _ in range(300)
     ]
-    sums, errors = zip(*(_with_error(d[: test.samples], test) for d in drawn), strict=True)
+    gains = [_with_error(d[: test.samples], test) for d in drawn]
+    sums, errors = [g.value for g in gains], [g.error for g in gains]
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(sums), rel=0.25)

@@ -13,14 +13,18 @@ from sysid_vehicle.diagnose import Omnibus
 from sysid_vehicle.rules import (
     USUAL,
     Added,
+    Change,
     Facts,
+    Gain,
     Measures,
     accept,
     bic,
+    grade,
     share_explained,
     smaller_than,
     something_left,
     verdict,
+    worse,
 )
 
 PACKAGE = Path(__file__).resolve().parents[2] / "python" / "sysid_vehicle"
@@ -39,10 +43,14 @@ NUMERICAL = {
     },
     "diagnose/score.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
     "diagnose/sensitivity.py": {"_AT_ONCE"},
-    "study/held_out.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES"},
+    "study/held_out.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED", "_AHEAD"},
+    "study/horizons.py": {"_BLOCK_S", "_FEWEST", "_APART", "_NORMAL", "_LOST"},
     "study/improve.py": {"_SHORT_S"},
     "study/steps.py": {"_ALTERNATIVES"},
     # Descriptions of the unknown, of biases, and of the next drive.
+    "diagnose/ceiling.py": {
+        "_RATE_HZ", "_LAGS_S", "_BLOCK_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",
+    },
     "diagnose/change_directions.py": {"_BLEND_S", "_SMALL"},
     "diagnose/change_points.py": {
         "_STEP_S", "_MOST_STEPS", "_LEAST_S", "_INTERVAL", "_NEAR_S", "_FINE", "_MOST",
@@ -150,27 +158,30 @@ def test_bic() -> None:
     assert bic(-100.0, 3, 1000) == pytest.approx(-100.0 - 1.5 * np.log(1000.0))
 
 
+def gain(value: float, error: float = 30.0) -> Gain:
+    return Gain(value, error, value, error)
+
+
 @pytest.mark.parametrize(
     ("same", "own", "fall", "holds"),
     [
         ((90.0, 30.0), (90.0, 30.0), (9.0, 30.0), True),
         # The error by the noise floor may not be shown to fall where the likelihood is sure,
         ((90.0, 30.0), (90.0, 30.0), (-9.0, 30.0), True),
-        # but it must not be shown to grow,
-        ((90.0, 30.0), (90.0, 30.0), (-90.0, 30.0), False),
+        # and weighs the channels as no rough road would: alone it refuses nothing,
+        ((90.0, 30.0), (90.0, 30.0), (-90.0, 30.0), True),
         # and both noises have to be sure.
         ((40.0, 30.0), (90.0, 30.0), (-9.0, 30.0), False),
         ((90.0, 30.0), (40.0, 30.0), (-9.0, 30.0), False),
         # Noise of its own may be too sure, which the others know better,
         ((90.0, 30.0), (-9.0, 30.0), (90.0, 30.0), True),
         ((40.0, 30.0), (-9.0, 30.0), (40.0, 30.0), True),
-        # but not where it speaks against it.
-        ((90.0, 30.0), (-90.0, 30.0), (90.0, 30.0), False),
+        # even where it speaks against it.
+        ((90.0, 30.0), (-90.0, 30.0), (90.0, 30.0), True),
         # Large noise of the poorer model hides the gain: where the error falls the others do,
         ((9.0, 30.0), (40.0, 30.0), (40.0, 30.0), True),
         ((-9.0, 30.0), (40.0, 30.0), (40.0, 30.0), True),
-        # unless the gain is lost.
-        ((-90.0, 30.0), (40.0, 30.0), (40.0, 30.0), False),
+        ((-90.0, 30.0), (40.0, 30.0), (40.0, 30.0), True),
         # One alone does not.
         ((9.0, 30.0), (90.0, 30.0), (9.0, 30.0), False),
         ((90.0, 30.0), (9.0, 30.0), (9.0, 30.0), False),
@@ -180,19 +191,41 @@ def test_bic() -> None:
 def test_what_validation_data_confirm(
     same: tuple[float, float], own: tuple[float, float], fall: tuple[float, float], *, holds: bool
 ) -> None:
-    found = Measures(same, own, fall, plausible=True, as_sure=False)
+    found = Measures(gain(*same), gain(*own), gain(*fall), plausible=True, as_sure=False)
     assert accept(found) is holds
+    # Predictions some seconds ahead have a veto.
+    assert not accept(replace(found, changes=(Change("vy_mps", 2.0, 0.2, 0.05),)))
     # What only acts like something is worth having where the error falls.
     assert accept(replace(found, plausible=False)) is (holds and fall[0] > 0.0)
 
 
 def test_the_likelihood_has_the_last_word_where_noise_did_not_grow() -> None:
-    found = Measures((-90.0, 30.0), (150.0, 30.0), (-90.0, 30.0), plausible=True, as_sure=True)
+    found = Measures(gain(-90.0), gain(150.0), gain(-90.0), plausible=True, as_sure=True)
     assert accept(found)
-    assert not accept(replace(found, own_gain=(90.0, 30.0)))
-    assert accept(replace(found, own_gain=(90.0, 30.0)), replace(USUAL, sure=2.0))
+    assert not accept(replace(found, changes=(Change("ay_mps2", 5.0, 0.2, 0.05),)))
+    assert not accept(replace(found, own_gain=gain(90.0)))
+    assert accept(replace(found, own_gain=gain(90.0)), replace(USUAL, sure=2.0))
     assert not accept(replace(found, plausible=False))
     assert not accept(replace(found, as_sure=False))
+
+
+def test_one_spin_neither_confirms_nor_refuses() -> None:
+    """In one piece of the driving the sums are a million times those of the others."""
+    spin = Gain(-77e6, 77e6, 150.0, 30.0)
+    found = Measures(spin, spin, spin, plausible=True, as_sure=False)
+    assert accept(found)
+    assert not accept(replace(found, plausible=False))  # the error itself is not shown to fall
+    nothing = replace(spin, typical=-20.0)
+    assert not accept(replace(found, gain=nothing, own_gain=nothing))
+
+
+def test_what_grows_clearly_and_by_more_than_matters() -> None:
+    grown = Change("vy_mps", 2.0, 0.10, 0.02)
+    assert worse((grown,)) == (grown,)
+    assert worse((replace(grown, error=0.08),)) == ()
+    assert worse((replace(grown, log_ratio=0.03, error=0.001),)) == ()
+    assert worse((replace(grown, log_ratio=-0.5),)) == ()
+    assert worse((grown,), replace(USUAL, worse=0.2)) == ()
 
 
 def of(p_value: float, statistic: float = 99.0, target: str = "M_z") -> Omnibus:
@@ -277,6 +310,14 @@ def test_an_effect_named_alone_should_have_explained_what_is_left() -> None:
     assert withdrawn(turning)["mass"] == alone
     elsewhere = replace(beside, fitted=of(0.005, 209.0, "F_x"), validation=of(1e-5))
     assert withdrawn(elsewhere)["mass"] == alone
+
+
+def test_grades_of_names() -> None:
+    assert grade("missing", "missing") == "confirmed"
+    assert grade("missing", "proxy") == "plausible"  # beside much that is left
+    assert grade("one of a group", "one of a group") == "plausible"
+    assert grade("negligible", "negligible") == "plausible"
+    assert grade("proxy", "proxy") == "alias"
 
 
 def test_what_took_up_less_than_is_left_is_doubted() -> None:

@@ -20,7 +20,7 @@ from sysid_vehicle import (
     improve,
     manoeuvres,
 )
-from sysid_vehicle.rules import share_explained
+from sysid_vehicle.rules import Gain, share_explained
 from sysid_vehicle.study.held_out import (
     error_falls,
     gain_in_log_likelihood,
@@ -117,6 +117,7 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
         "channels",
         "effects",
         "errors",
+        "horizons",
         "parameters",
         "ranking",
         "regions",
@@ -133,6 +134,8 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
         "confounded_with",
         "error_after",
         "error_before",
+        "gains",
+        "grade",
         "id",
         "p_value",
         "parameters",
@@ -140,6 +143,11 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     ]
     assert added["confounded_with"] == list(study.added[0].confounded_with)
     assert added["stands_in"] == ""
+    assert added["grade"] == ("plausible" if added["confounded_with"] else "confirmed")
+    # One sample ahead and at every horizon the yaw rate is predicted better.
+    assert all(g > 0.0 for g in added["gains"]["yaw_rate_radps"])
+    assert told["horizons"]["horizons_s"] == [0.5, 1.0, 2.0, 5.0]
+    assert len(told["horizons"]["channels"]["vy_mps"]["median"]) == 2
     assert added["parameters"]["time_constant_s"]["unit"] == "s"
     assert added["parameters"]["time_constant_s"]["value"] == study.model.value(LAG[0])
     first = told["ranking"][0]
@@ -283,11 +291,18 @@ def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: D
 
 def test_it_stops_at_the_most_effects_allowed(start: Model, lagging: tuple[Log, Log]) -> None:
     short = [log.between(0.0, 21.0) for log in lagging]
-    none = improve(start, *short, starts=1, most_effects=0)
+    none = improve(start, *short, starts=1, most_effects=0, exclude=["steer_lag"])
     assert none.added == ()
     assert none.verdict == "unknown"
-    with pytest.raises(InvalidInput, match="most_effects must not be negative"):
-        improve(start, *short, most_effects=-1)
+    assert "steer_lag" not in {c.id for c in none.diagnoses[0].ranking}
+    assert "steer_lag" not in {v.effect.id for v in none.verdicts.all}
+    for how, words in (
+        ({"most_effects": -1}, "most_effects = -1: give a whole number, 0 or more"),
+        ({"time_limit_s": 0.0}, "time_limit_s = 0.0: give seconds, above 0"),
+        ({"exclude": ["steer_lagg"]}, "steer_lagg"),
+    ):
+        with pytest.raises(InvalidInput, match=words):
+            improve(start, *short, **how)  # type: ignore[arg-type]
 
 
 def test_several_logs_are_fitted_together(start: Model, lap: Log, course: Log) -> None:
@@ -333,20 +348,19 @@ def test_logs_given_are_taken_as_they_are(lap: Log, course: Log) -> None:
 def test_held_out_driving_tells_the_richer_model(study: Study, lagging: tuple[Log, Log]) -> None:
     test = hold_out(*lagging)[1]
     poorer, richer = study.fits
-    gain, error = gain_in_log_likelihood(poorer, richer, test)
-    assert gain > 2.0 * error > 0.0
-    back, _ = gain_in_log_likelihood(richer, poorer, test)
-    assert back == pytest.approx(-gain)
-    assert gain_in_log_likelihood(richer, richer, test) == (0.0, 0.0)
-    same, error = gain_in_log_likelihood(poorer, richer, test, same_noise=True)
-    assert same > 2.0 * error > 0.0
+    gain = gain_in_log_likelihood(poorer, richer, test)
+    assert gain.value > 2.0 * gain.error > 0.0
+    assert gain_in_log_likelihood(richer, poorer, test).value == pytest.approx(-gain.value)
+    assert gain_in_log_likelihood(richer, richer, test) == Gain(0.0, 0.0, 0.0, 0.0)
+    same = gain_in_log_likelihood(poorer, richer, test, same_noise=True)
+    assert same.value > 2.0 * same.error > 0.0
     exact = []
     for fit in study.fits:
         noise = fit.noise.elsewhere(fit.model.vehicle)
         exact.append(test.problem(fit.model).freeze(fit.model.vector(), noise.vector()))
     difference = exact[1].log_likelihood - exact[0].log_likelihood
     # The lag is one parameter more that has to be known, and the tyres are hardly in doubt.
-    assert difference - 20.0 < gain < difference + 5.0
+    assert difference - 20.0 < gain.value < difference + 5.0
 
 
 def test_a_model_that_fails_on_held_out_driving_gains_nothing(fit: Fit, course: Log) -> None:
@@ -355,7 +369,7 @@ def test_a_model_that_fails_on_held_out_driving_gains_nothing(fit: Fit, course: 
         fit.model.with_values({"B_front": float("nan")}),
         *(getattr(fit, f) for f in list(Fit.__dataclass_fields__)[1:]),
     )
-    assert gain_in_log_likelihood(fit, broken, test) == (-np.inf, 0.0)
+    assert gain_in_log_likelihood(fit, broken, test).value == -np.inf
 
 
 def test_what_is_added_lowers_the_error_by_the_richer_models_own_measure(study: Study) -> None:

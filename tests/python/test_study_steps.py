@@ -138,8 +138,8 @@ def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(
     ]
     assert shares[0] == pytest.approx(1.0, abs=0.05)
     assert 0.2 < shares[1] < 0.6
-    ahead, error = gain_in_log_likelihood(fit, gain, test)
-    assert ahead > 2.0 * error > 0.0
+    ahead = gain_in_log_likelihood(fit, gain, test)
+    assert ahead.value > 2.0 * ahead.error > 0.0
     chosen = first_that_holds(dx, fit, test)
     assert chosen is not None
 
@@ -161,6 +161,7 @@ def search(test: Driving, most_effects: int, told: list[str]) -> Search:
         test,
         candidates=AGAINST,
         most_effects=most_effects,
+        ends=np.inf,
         rules=USUAL,
         seed=0,
         progress=False,
@@ -175,6 +176,12 @@ def test_no_more_effects_are_added_than_allowed(
     none = search(driving[1], 0, told).from_baseline(baseline)
     assert none.fit is baseline
     assert len(none.diagnoses) == 1
+    late = replace(search(driving[1], 6, told), ends=0.0).from_baseline(baseline)
+    assert late.fit is baseline
+    assert len(late.diagnoses) == 1
+    assert set(late.stopped) == {c.id for c in late.diagnoses[0].significant}
+    assert late.stopped
+    assert none.stopped == ()
     one = search(driving[1], 1, told).from_baseline(baseline)
     assert len(one.fit.model.effects) == 1
     assert one.diagnoses[-1].fit is one.fit
@@ -292,10 +299,10 @@ def test_the_fall_in_error_is_by_the_richer_models_floor(
     dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving]
 ) -> None:
     richer = by_id(dx, "aero_drag")
-    fall, error = fall_in_error(baseline, richer, driving[1])
-    assert fall > 2.0 * error > 0.0
+    fall = fall_in_error(baseline, richer, driving[1])
+    assert fall.value > 2.0 * fall.error > 0.0
     before, after = (compare(f, driving[1], noise=richer.noise).error for f in (baseline, richer))
     measured = int(np.isfinite(driving[1].measured).sum())
-    assert fall == pytest.approx(measured * (before**2 - after**2), rel=1e-6)
+    assert fall.value == pytest.approx(measured * (before**2 - after**2), rel=1e-6)
     broken = replace(baseline, model=baseline.model.with_values({"B_front": float("nan")}))
-    assert fall_in_error(baseline, broken, driving[1]) == (-np.inf, 0.0)
+    assert fall_in_error(baseline, broken, driving[1]).value == -np.inf

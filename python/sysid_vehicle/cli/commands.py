@@ -96,6 +96,8 @@ def _improve(args: argparse.Namespace, heard: Warnings) -> None:
     study = _study(args, heard)
     # The warnings have gone to the error stream.
     print(study.with_warnings(()))
+    print(study.horizons)
+    print(f"Of what the final model lacks, {study.ceiling}.")
     _print_where(study)
     if study.unknown is not None:
         print(study.unknown)
@@ -150,6 +152,9 @@ def _study(args: argparse.Namespace, heard: Warnings) -> Study:
         model,
         train,
         test,
+        most_effects=args.max_effects,
+        exclude=args.exclude,
+        time_limit_s=args.time_limit,
         tell=lambda text: print(text, file=sys.stderr, flush=True),
         progress=_on_terminal(),
     )

@@ -58,11 +58,13 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     diagnose = commands.add_parser("diagnose", help="learn which physical effect is missing")
     _driving(diagnose)
     _held_out(diagnose)
+    _search(diagnose)
     _json(diagnose)
 
     improve = commands.add_parser("improve", help="add what is missing, write a report")
     _driving(improve)
     _held_out(improve)
+    _search(improve)
     improve.add_argument(
         "--report", type=Path, required=True, metavar="HTML", help="report to write"
     )
@@ -108,6 +110,29 @@ def _held_out(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _search(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--exclude",
+        type=_names,
+        default=(),
+        metavar="EFFECT,...",
+        help="effects not to consider, such as those that the car is known not to have",
+    )
+    parser.add_argument(
+        "--max-effects",
+        type=_count,
+        default=6,
+        metavar="N",
+        help="add at most N effects (default 6)",
+    )
+    parser.add_argument(
+        "--time-limit",
+        type=_seconds,
+        metavar="S",
+        help="begin no further step after S seconds and judge what was found until then",
+    )
+
+
 def _json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
 
@@ -119,9 +144,25 @@ def _seed(text: str) -> int:
     return value
 
 
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise ValueError
+    return value
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise ValueError
+    return value
+
+
 def _names(text: str) -> tuple[str, ...]:
     return tuple(name for name in (part.strip() for part in text.split(",")) if name)
 
 
 # argparse says "invalid NAME value".
 _seed.__name__ = "seed (0 or more)"
+_count.__name__ = "number (0 or more)"
+_seconds.__name__ = "seconds (above 0)"

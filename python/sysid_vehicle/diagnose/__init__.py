@@ -1,5 +1,6 @@
 """Diagnosis: which physical effect a model is missing, or that none explains what is left."""
 
+from .ceiling import Ceiling, Explainable, ceiling
 from .change_points import ChangePoint
 from .coherence import INPUTS, Coherence, coherence
 from .constancy import Constancy, constancy
@@ -24,6 +25,7 @@ __all__ = [
     "Bias",
     "BiasReport",
     "Candidate",
+    "Ceiling",
     "ChangePoint",
     "Coherence",
     "Constancy",
@@ -33,6 +35,7 @@ __all__ = [
     "DriveLimits",
     "EffectVerdict",
     "Evidence",
+    "Explainable",
     "ForceMap",
     "NextDrive",
     "Omnibus",
@@ -45,6 +48,7 @@ __all__ = [
     "Where",
     "bias_report",
     "blocks",
+    "ceiling",
     "coherence",
     "considered",
     "constancy",

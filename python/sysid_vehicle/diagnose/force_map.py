@@ -142,6 +142,47 @@ class ForceMap:
         return ax
 
 
+@dataclass(frozen=True, eq=False)
+class MissingForces:
+    """Forces that the smoother needs beside the model.
+
+    Attributes
+    ----------
+    targets : tuple of str
+        `F_x`, `F_y`, `M_z`; without `F_x` where the wheel force is not known.
+    force, std : array, shape (samples, targets)
+        [N, N m], and what the smoother could miss.
+    state : array, shape (samples, n)
+        The smoothed states.
+    """
+
+    targets: tuple[str, ...]
+    force: FloatArray
+    std: FloatArray
+    state: FloatArray
+
+
+def missing_forces(fit: Fit, driving: Driving) -> MissingForces:
+    """Smooth the forces that a model lacks.
+
+    Parameters
+    ----------
+    fit : Fit
+    driving : Driving
+    """
+    car = fit.model.vehicle
+    weight = 9.81 * car.mass_kg
+    # A disturbance that was learned small would shrink the forces that are looked for.
+    least = 0.02 * weight * np.array([1.0, 1.0, 0.5 * car.wheelbase_m])
+    wander = np.maximum(fit.noise.wander, least)
+    noise = replace(fit.noise, wander=tuple(map(float, wander)))
+    trace = driving.problem(fit.model).trace(fit.model.vector(), noise.vector(), True)
+    targets = tuple(t for t in FORCES if t != "F_x" or driving.force_known)
+    columns = [3 + FORCES[t] for t in targets]
+    state, std = trace["state"], trace["state_std"]
+    return MissingForces(targets, state[:, columns], std[:, columns], state)
+
+
 def force_maps(
     fit: Fit, driving: Driving
 ) -> tuple[tuple[ForceMap, ...], dict[str, tuple[float, float]]]:
@@ -149,17 +190,9 @@ def force_maps(
 
     With them the mean of each force over all the driving, and its standard error.
     """
-    car = fit.model.vehicle
-    weight = 9.81 * car.mass_kg
-    # A wandering that was learned small would shrink the forces that are looked for.
-    least = 0.02 * weight * np.array([1.0, 1.0, 0.5 * car.wheelbase_m])
-    wander = np.maximum(fit.noise.wander, least)
-    noise = replace(fit.noise, wander=tuple(map(float, wander)))
-    trace = driving.problem(fit.model).trace(fit.model.vector(), noise.vector(), True)
-    targets = tuple(t for t in FORCES if t != "F_x" or driving.force_known)
-    columns = [3 + FORCES[t] for t in targets]
-    force, doubt = trace["state"][:, columns], trace["state_std"][:, columns]
-    where = coordinates(fit, driving, trace["state"])
+    found = missing_forces(fit, driving)
+    targets, force, doubt = found.targets, found.force, found.std
+    where = coordinates(fit, driving, found.state)
     maps = [_map(driving, names, where, targets, force, doubt) for names in PAIRS]
     everywhere = np.zeros(driving.samples, dtype=np.intp), np.array([float(driving.samples)])
     steady = {}

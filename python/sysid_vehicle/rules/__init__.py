@@ -4,7 +4,7 @@
    testing all of them, is below `alpha`. One that the fit copies (`retained`) is not testable.
 2. The best are refitted. A refit counts if it gains `price` BIC penalties, or ln n in nats.
 3. It is accepted if the validation data confirm it (`accept`): two of three measures speak for it
-   (`lean`, `clear`) and none against it, or its likelihood alone is beyond doubt (`sure`).
+   (`lean`, `clear`), or its likelihood alone (`sure`), and no error 1 to 5 s ahead grows (`worse`).
 4. Effects whose likelihoods differ by less than `apart` are confounded; validation data choose. An
    accepted effect gives way to others of its kind (`near`) that lead by `apart`, or are simpler.
 5. An effect within `idle` standard errors of nothing is dropped unless BIC needs it.
@@ -20,16 +20,18 @@
 Nothing here sees a fit or a log: others measure, this decides.
 """
 
-from .accept import Measures, accept, bic
+from .accept import Change, Gain, Measures, accept, bic, worse
 from .limits import USUAL, Rules
 from .verdict import (
     Added,
     Decision,
     Facts,
+    Grade,
     Tested,
     Verdict,
     Withdrawn,
     excess,
+    grade,
     share_explained,
     smaller_than,
     something_left,
@@ -39,8 +41,11 @@ from .verdict import (
 __all__ = [
     "USUAL",
     "Added",
+    "Change",
     "Decision",
     "Facts",
+    "Gain",
+    "Grade",
     "Measures",
     "Rules",
     "Tested",
@@ -49,8 +54,10 @@ __all__ = [
     "accept",
     "bic",
     "excess",
+    "grade",
     "share_explained",
     "smaller_than",
     "something_left",
     "verdict",
+    "worse",
 ]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from .limits import USUAL, Rules
 
-__all__ = ["Measures", "accept", "bic"]
+__all__ = ["Change", "Gain", "Measures", "accept", "bic", "worse"]
 
 
 def bic(log_likelihood: float, parameters: int, samples: int) -> float:
@@ -17,28 +19,71 @@ def bic(log_likelihood: float, parameters: int, samples: int) -> float:
 
 
 @dataclass(frozen=True)
-class Measures:
-    """What an effect changes on validation data: gains with their standard errors.
+class Gain:
+    """A sum over validation data, and what it would be were all blocks like most of them.
 
     Attributes
     ----------
-    gain : (float, float)
+    value, error : float
+        The sum and its standard error.
+    typical, typical_error : float
+        The same of the trimmed mean: one spin decides nothing.
+    """
+
+    value: float
+    error: float
+    typical: float
+    typical_error: float
+
+    def beyond(self, limit: float) -> bool:
+        """Whether it is above nothing by so many standard errors, as it is or trimmed."""
+        return self.value > limit * self.error or self.typical > limit * self.typical_error
+
+
+@dataclass(frozen=True)
+class Change:
+    """How an error some seconds ahead changes, median over blocks of the validation data.
+
+    Attributes
+    ----------
+    channel : str
+    horizon_s : float
+    log_ratio, error : float
+        Logarithm of the error after over that before, and its standard error.
+    """
+
+    channel: str
+    horizon_s: float
+    log_ratio: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Measures:
+    """What an effect changes on validation data.
+
+    Attributes
+    ----------
+    gain : Gain
         In log-likelihood [nats], both models with the noise of the poorer one.
-    own_gain : (float, float)
+    own_gain : Gain
         The same, each with noise of its own.
-    fall : (float, float)
+    fall : Gain
         Of the sum of squared errors, in squares of the noise floor.
     plausible : bool
         Whether a car can have such a value.
     as_sure : bool
         Whether the richer model, with noise of its own, is no less sure than the poorer one.
+    changes : tuple of Change
+        Of the errors some seconds ahead.
     """
 
-    gain: tuple[float, float]
-    own_gain: tuple[float, float]
-    fall: tuple[float, float]
+    gain: Gain
+    own_gain: Gain
+    fall: Gain
     plausible: bool
     as_sure: bool
+    changes: tuple[Change, ...] = ()
 
 
 def accept(measures: Measures, rules: Rules = USUAL) -> bool:
@@ -46,18 +91,21 @@ def accept(measures: Measures, rules: Rules = USUAL) -> bool:
 
     No measure is always right: the noise of the poorer model may be so large that it hides what
     another does better, that of the richer one surer than it may be there, and the noise floor
-    weighs the channels as no rough road would. So two of them must speak for it, and none against.
+    weighs the channels as no rough road would. So two of them must speak for it.
     Coloured noise of sensors is predicted best by a model that takes it for motion: its one-step
     errors are smaller than those of the true car. Its likelihood is not, unless its noise grew.
+    Whatever speaks for an effect, predictions some seconds ahead must not become worse.
     """
     three = (measures.gain, measures.own_gain, measures.fall)
+    falls = measures.fall.value > 0.0
+    speak = sum(g.beyond(rules.lean if falls else rules.clear) for g in three) >= 2
+    own = measures.own_gain
+    sure = own.value > rules.sure * own.error and measures.plausible and measures.as_sure
+    confirmed = (speak and (falls or measures.plausible)) or sure
+    return confirmed and not worse(measures.changes, rules)
 
-    def two_beyond(limit: float) -> bool:
-        return sum(v > limit * e for v, e in three) >= 2
 
-    falls = measures.fall[0] > 0.0
-    speak = two_beyond(rules.lean) if falls else measures.plausible and two_beyond(rules.clear)
-    if speak and all(v > -rules.clear * e for v, e in three):
-        return True
-    own, error = measures.own_gain
-    return own > rules.sure * error and measures.plausible and measures.as_sure
+def worse(changes: Sequence[Change], rules: Rules = USUAL) -> tuple[Change, ...]:
+    """The errors some seconds ahead that are shown to have grown, by more than it matters."""
+    least = math.log1p(rules.worse)
+    return tuple(c for c in changes if c.log_ratio > max(least, rules.clear * c.error))

@@ -79,6 +79,9 @@ class Rules:
     sure: float = _limit(
         4.5, "standard errors", "of likelihood on validation data, which decide alone", _EFFECTS
     )
+    worse: float = _limit(
+        0.05, "share", "by which no error 1 to 5 s ahead may grow on validation data", _EFFECTS
+    )
     idle: float = _limit(
         2.6, "standard errors", "from nothing, within which an effect may be needless", _EFFECTS
     )
@@ -90,6 +93,12 @@ class Rules:
     )
     near: float = _limit(
         0.6, "share", "of the evidence for the best, with which another may replace it", _EFFECTS
+    )
+    explainable: float = _limit(
+        0.1,
+        "share",
+        "of a missing force that the driving predicts, from which it has structure",
+        _OUTSIDE,
     )
     taken: float = _limit(
         0.1, "share", "of the error, which the only name beside much evidence takes up", _OUTSIDE

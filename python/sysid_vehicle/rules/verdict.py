@@ -12,10 +12,12 @@ __all__ = [
     "Added",
     "Decision",
     "Facts",
+    "Grade",
     "Tested",
     "Verdict",
     "Withdrawn",
     "excess",
+    "grade",
     "share_explained",
     "smaller_than",
     "something_left",
@@ -23,6 +25,7 @@ __all__ = [
 ]
 
 Verdict = Literal["adequate", "explained", "partly_explained", "unknown", "not_testable"]
+Grade = Literal["confirmed", "plausible", "alias"]
 
 
 class Tested(Protocol):
@@ -140,6 +143,25 @@ class Decision:
 
     verdict: Verdict
     withdrawn: tuple[Withdrawn, ...] = ()
+
+
+def grade(alone: str, beside: str) -> Grade:
+    """How sure the name of an added effect is.
+
+    Parameters
+    ----------
+    alone, beside : str
+        What is said of it by itself, and beside what is left.
+
+    Returns
+    -------
+    str
+        `confirmed`; `plausible`, where rivals cannot be told from it, its size hardly matters, or
+        too much is left to be sure; `alias` of what only acts like something else.
+    """
+    if alone == "proxy":
+        return "alias"
+    return "confirmed" if beside == "missing" else "plausible"
 
 
 def something_left(facts: Facts, rules: Rules = USUAL) -> bool:

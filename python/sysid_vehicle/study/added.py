@@ -7,6 +7,7 @@ from typing import Any
 
 from .._text import with_error
 from ..identify import Estimate
+from ..rules import Grade
 
 __all__ = ["AddedEffect"]
 
@@ -27,6 +28,8 @@ class AddedEffect:
         Effects of which any may act in its place: this driving cannot tell them from it.
     stands_in : str
         What tells that it only stands in for what is missing; empty where it is named.
+    grade : str
+        `confirmed`, `plausible` or `alias` (`rules.grade`).
     """
 
     id: str
@@ -36,6 +39,7 @@ class AddedEffect:
     p_value: float
     confounded_with: tuple[str, ...] = ()
     stands_in: str = ""
+    grade: Grade = "plausible"
 
     @property
     def name(self) -> str:
@@ -58,7 +62,7 @@ class AddedEffect:
             f"{e.name.split('.')[1]} {with_error(e.value, e.std)} {e.unit}".removesuffix(" 1")
             for e in self.parameters
         )
-        return f"{self.id}: {size}" + (f"; {self.reserve}" if self.reserve else "")
+        return f"{self.id}: {size}; {self.grade}" + (f"; {self.reserve}" if self.reserve else "")
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""
@@ -70,4 +74,5 @@ class AddedEffect:
             "p_value": self.p_value,
             "confounded_with": list(self.confounded_with),
             "stands_in": self.stands_in,
+            "grade": self.grade,
         }

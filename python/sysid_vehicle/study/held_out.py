@@ -14,9 +14,12 @@ from ..errors import NumericalError, warn
 from ..estimate import Driving, several_logs
 from ..identify import Fit, Prediction, predict
 from ..log import Log
+from ..rules import Change, Gain
+from .horizons import changes
 
 __all__ = [
     "as_sure",
+    "changes_ahead",
     "error_falls",
     "fall_in_error",
     "gain_in_log_likelihood",
@@ -26,6 +29,9 @@ __all__ = [
 
 _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6
+_TRIMMED = 0.1  # of the pieces, at either end
+_AHEAD = (1.0, 2.0, 5.0)
+_NONE = Gain(-np.inf, 0.0, -np.inf, 0.0)
 
 
 def hold_out(
@@ -49,8 +55,8 @@ def hold_out(
 
 def gain_in_log_likelihood(
     poorer: Fit, richer: Fit, test: Driving, *, same_noise: bool = False
-) -> tuple[float, float]:
-    """What the richer model gains on held-out driving, and the standard error of that, in nats.
+) -> Gain:
+    """What the richer model gains on validation data [nats].
 
     Either model's parameters are as unsure as the fit left them (`predict`), so that
     what it never saw of the tyres does not drown what an effect explains. Each model predicts with
@@ -63,7 +69,7 @@ def gain_in_log_likelihood(
         before = _prediction(poorer, test, poorer)
         after = _prediction(richer, test, poorer if same_noise else richer)
     except (NumericalError, np.linalg.LinAlgError):
-        return -np.inf, 0.0
+        return _NONE
     return _with_error(after.log_density - before.log_density, test)
 
 
@@ -97,8 +103,8 @@ def serving(fit: Fit, test: Driving) -> Fit:
         return fit
 
 
-def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> tuple[float, float]:
-    """By how much the sum of squared errors falls on held-out driving, and its standard error.
+def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> Gain:
+    """By how much the sum of squared errors falls on validation data.
 
     Both models are measured by the noise floor of the richer one: noise of its own can make a model
     likelier whose forces explain less than before. The error comes from pieces (`_with_error`).
@@ -110,22 +116,51 @@ def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> tuple[float, float
         try:
             trace = test.problem(fit.model).trace(fit.model.vector(), floor, False)
         except NumericalError:
-            return -np.inf, 0.0
+            return _NONE
         squares.append(np.sum(trace["whitened"] ** 2, axis=1))
     return _with_error(squares[0] - squares[1], test)
 
 
-def _with_error(difference: FloatArray, test: Driving) -> tuple[float, float]:
+def _with_error(difference: FloatArray, test: Driving) -> Gain:
     """The sum over all samples, and its standard error from what pieces of the driving scatter.
 
     They are of one length, or a steady gain would seem unsteady: 5 s, by when what disturbs a car
     is another thing, and less where the driving is short, as few pieces tell nothing of scatter.
+    The trimmed mean has the standard error of its winsorised sample (Tukey & McLaughlin, Sankhya
+    1963).
     """
     pieces = max(round(test.usable_s / _PIECE_S), _FEWEST_PIECES)
     sums = np.add.reduceat(difference, blocks(test, test.usable_s / pieces))
-    return float(np.sum(difference)), float(np.std(sums, ddof=1) * np.sqrt(len(sums)))
+    n = len(sums)
+    error = float(np.std(sums, ddof=1) * np.sqrt(n))
+    cut = max(round(_TRIMMED * n), 1)
+    if n <= 2 * cut:
+        return Gain(float(np.sum(difference)), error, float(np.sum(difference)), error)
+    kept = np.sort(sums)[cut : n - cut]
+    winsorised = np.clip(sums, kept[0], kept[-1])
+    return Gain(
+        float(np.sum(difference)),
+        error,
+        float(n * np.mean(kept)),
+        float(np.std(winsorised, ddof=1) * np.sqrt(n) / (1.0 - 2.0 * cut / n)),
+    )
+
+
+def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[Change, ...]:
+    """How errors 1 to 5 s ahead change, both models with parameters that serve validation data."""
+    one, other = (_serving_itself(fit, test) for fit in (poorer, richer))
+    return changes(one, other, test, _AHEAD)
+
+
+# One object for each fit: errors ahead are remembered by it.
+@lru_cache(maxsize=16)
+def _serving_itself(fit: Fit, test: Driving) -> Fit:
+    try:
+        return replace(fit, model=_prediction(fit, test, fit).model)
+    except (NumericalError, np.linalg.LinAlgError):
+        return fit
 
 
 def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:
     """Whether the richer model errs less on held-out driving (`fall_in_error`)."""
-    return fall_in_error(poorer, richer, test)[0] > 0.0
+    return fall_in_error(poorer, richer, test).value > 0.0

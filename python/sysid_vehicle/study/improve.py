@@ -8,14 +8,16 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
+from .._arguments import real, whole
 from ..compare import Comparison, compare
 from ..diagnose import Verdicts, considered, judge, omnibus
+from ..effects import effect
 from ..errors import InvalidInput, SysidWarning, warn
 from ..estimate import Driving
 from ..identify import Fit, explaining, identify
 from ..log import Log, check_excitation
 from ..model import Model
-from ..rules import USUAL, Rules, verdict
+from ..rules import USUAL, Rules, grade, verdict
 from .added import AddedEffect
 from .held_out import hold_out, serving
 from .search import Search, Trail
@@ -38,6 +40,8 @@ def improve(
     alpha: float | None = None,
     rules: Rules = USUAL,
     candidates: Sequence[str] | None = None,
+    exclude: Sequence[str] = (),
+    time_limit_s: float | None = None,
     starts: int = 8,
     seed: int = 0,
     progress: bool = False,
@@ -63,7 +67,12 @@ def improve(
     rules : Rules
         Limits that decide what is claimed.
     candidates : sequence of str, optional
-        Effects to consider.
+        Effects to consider; by default all that the model lacks.
+    exclude : sequence of str, optional
+        Effects not to consider.
+    time_limit_s : float, optional
+        After so many seconds no further step begins; what was found until then is judged, and a
+        warning tells.
     tell : callable, optional
         Called with a sentence about each step.
 
@@ -71,10 +80,13 @@ def improve(
     -------
     Study
     """
-    if most_effects < 0:
-        raise InvalidInput("most_effects must not be negative")
+    most_effects = whole(most_effects, "most_effects")
     rules = rules.at(alpha)
     began = time.perf_counter()
+    ends = began + _limit(time_limit_s)
+    if exclude:
+        left_out = {effect(e).id for e in exclude}
+        candidates = [e.id for e in considered(model, candidates) if e.id not in left_out]
     say = tell if tell is not None else _silent
     train_driving, test_driving = hold_out(train, test)
     baseline = identify(model, train_driving, starts=starts, seed=seed, progress=progress)
@@ -83,6 +95,7 @@ def improve(
         test_driving,
         candidates=candidates,
         most_effects=most_effects,
+        ends=ends,
         rules=rules,
         seed=seed,
         progress=progress,
@@ -121,7 +134,7 @@ def improve(
         excited=_excited(train_driving),
     )
     decision = verdict(facts, rules)
-    told = in_the_light_of(decision, told)
+    alone, told = told, in_the_light_of(decision, told)
     return Study(
         verdict=decision.verdict,
         fits=tuple(fits),
@@ -129,11 +142,11 @@ def improve(
         train=tuple(on_train),
         test=tuple(on_test),
         held_out=test_driving,
-        added=_added(fits, on_test, found, told),
+        added=_added(fits, on_test, found, told, alone),
         omnibus=fitted,
         omnibus_held_out=validation,
         verdicts=told,
-        warnings=_warnings(fit, train_driving),
+        warnings=_warnings(fit, train_driving, found),
         seconds=time.perf_counter() - began,
         rules=rules,
     )
@@ -145,12 +158,21 @@ def _excited(driving: Driving) -> bool:
         return check_excitation(driving.logs)
 
 
+def _limit(seconds: float | None) -> float:
+    if seconds is None:
+        return np.inf
+    value = real(seconds)
+    if value is None or not value > 0.0:
+        raise InvalidInput(f"time_limit_s = {seconds!r}: give seconds, above 0")
+    return value
+
+
 def _silent(_: str) -> None:
     pass
 
 
 def _added(
-    fits: list[Fit], on_test: list[Comparison], found: Trail, told: Verdicts
+    fits: list[Fit], on_test: list[Comparison], found: Trail, told: Verdicts, alone: Verdicts
 ) -> tuple[AddedEffect, ...]:
     added = []
     final = fits[-1]
@@ -170,13 +192,19 @@ def _added(
                     found.p_values.get(name, np.nan),
                     tuple(e for e in found.rivals.get(name, ()) if e in group),
                     told[name].because if told[name].finding == "proxy" else "",
+                    grade(alone[name].finding, told[name].finding),
                 )
             )
     return tuple(added)
 
 
-def _warnings(fit: Fit, driving: Driving) -> tuple[str, ...]:
+def _warnings(fit: Fit, driving: Driving, trail: Trail) -> tuple[str, ...]:
     found = []
+    if trail.stopped:
+        found.append(
+            f"the time limit ended the search with {', '.join(trail.stopped)} still to be tried"
+        )
+        warn(found[-1])
     if driving.usable_s < _SHORT_S:
         found.append(
             f"{driving}: too short to tell many effects apart; record {_SHORT_S:.0f} s or more, "

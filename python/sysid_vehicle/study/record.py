@@ -23,7 +23,10 @@ def record(study: Study) -> dict[str, Any]:
     errors = study.errors_with[0]
     return {
         "verdict": study.verdict,
-        "effects": [a.to_dict() for a in study.added],
+        "effects": [
+            {**a.to_dict(), "gains": study.horizons.gains(i + 1)} for i, a in enumerate(study.added)
+        ],
+        "horizons": study.horizons.to_dict(),
         "ranking": [
             _candidate(c, study.verdicts[c.id], *errors.get(c.id, (None, None)))
             for c in study.diagnoses[0].ranking
@@ -47,6 +50,7 @@ def record(study: Study) -> dict[str, Any]:
             "p_value": study.omnibus.p_value,
             "strongest": study.omnibus.strongest,
             **_held_out(study.omnibus_held_out),
+            "explainable": study.ceiling.to_dict(),
             **({} if study.unknown is None else study.unknown.to_dict()),
         },
         "errors": {

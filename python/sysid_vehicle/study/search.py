@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -32,6 +33,8 @@ class Trail:
         By effect, what was nearly chosen in its place.
     sizes : dict
         Parameters of rivals and their standard errors, each refitted in place of what was chosen.
+    stopped : tuple of str
+        Effects with evidence that the time limit left untried.
     """
 
     fits: list[Fit]
@@ -40,6 +43,7 @@ class Trail:
     rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     nearly: dict[str, tuple[Candidate, ...]] = field(default_factory=dict)
     sizes: dict[str, Size] = field(default_factory=dict)
+    stopped: tuple[str, ...] = ()
 
     @property
     def fit(self) -> Fit:
@@ -66,12 +70,15 @@ class Search:
     ----------
     test : Driving
         Validation data, which every step must predict better.
+    ends : float
+        When no further step begins, by `time.perf_counter`.
     rules : Rules
     """
 
     test: Driving
     candidates: Sequence[str] | None
     most_effects: int
+    ends: float
     rules: Rules
     seed: int
     progress: bool
@@ -83,6 +90,9 @@ class Search:
         while True:
             dx = self._diagnosis(trail.fit)
             trail.diagnoses.append(dx)
+            if time.perf_counter() > self.ends:
+                trail.stopped = tuple(c.id for c in dx.significant)
+                return trail
             step = first_that_holds(dx, trail.fit, self.test) if self.most_effects else None
             if step is None:
                 step = self._beside_another(dx, trail)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,8 +12,8 @@ from ..effects import Parameter
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Estimate, Fit, refine
-from ..rules import USUAL, Measures, Rules, accept, bic
-from .held_out import as_sure, error_falls, fall_in_error, gain_in_log_likelihood
+from ..rules import USUAL, Measures, Rules, accept, bic, worse
+from .held_out import as_sure, changes_ahead, error_falls, fall_in_error, gain_in_log_likelihood
 
 __all__ = [
     "alternatives",
@@ -50,9 +51,11 @@ def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate,
         if c.id not in lean.model.effects:
             continue
         found = _measures(fit, c, test, rules)
-        if accept(found, rules):
+        if accept(found, rules) and accept(
+            replace(found, changes=changes_ahead(fit, c.fit, test)), rules
+        ):
             first = first or c
-            held[c.id] = (_merit(c.fit) + found.gain[0], c, lean)
+            held[c.id] = (_merit(c.fit) + found.gain.value, c, lean)
     if not held:
         return None
     _, chosen, lean = max(held.values(), key=lambda h: h[0])
@@ -183,16 +186,16 @@ def better(one: Fit, other: Fit, test: Driving, rules: Rules = USUAL) -> bool:
     if not all(_real(one, name, rules) for name in ones - others):
         return False
     ahead = lead(one, other, test)
-    if (_mattering(one), len(ones)) < (_mattering(other), len(others)):
-        return ahead > 0.0
-    return ahead > rules.apart and error_falls(other, one, test)
+    simpler = (_mattering(one), len(ones)) < (_mattering(other), len(others))
+    if not (ahead > 0.0 if simpler else ahead > rules.apart and error_falls(other, one, test)):
+        return False
+    return not worse(changes_ahead(other, one, test), rules)
 
 
 def lead(one: Fit, other: Fit, test: Driving) -> float:
     """Log-likelihood, less the price of the parameters, that one fit is ahead on all driving."""
-    return (
-        _merit(one) - _merit(other) + gain_in_log_likelihood(other, one, test, same_noise=True)[0]
-    )
+    gain = gain_in_log_likelihood(other, one, test, same_noise=True)
+    return _merit(one) - _merit(other) + gain.value
 
 
 def _mattering(fit: Fit) -> int:

@@ -14,6 +14,7 @@ from .._text import html_list, html_paragraph, html_table, text_table
 from ..compare import Comparison
 from ..diagnose import (
     INPUTS,
+    Ceiling,
     Delay,
     Diagnosis,
     Evidence,
@@ -21,6 +22,7 @@ from ..diagnose import (
     Unknown,
     Verdicts,
     Where,
+    ceiling,
     coherence,
     unknown,
     where,
@@ -30,6 +32,7 @@ from ..identify import Fit, refine
 from ..model import Model
 from ..rules import USUAL, Rules, Verdict
 from .added import AddedEffect
+from .horizons import Horizons, horizons
 from .record import record
 from .waterfall import Waterfall, waterfall
 
@@ -188,13 +191,31 @@ class Study:
             return None
         return unknown(self.fit, self.held_out)
 
+    @cached_property
+    def ceiling(self) -> Ceiling:
+        """How much of what the final model lacks any function of the driving could explain."""
+        return ceiling(self.fit, self.held_out, rules=self.rules)
+
     def with_warnings(self, warnings: Sequence[str]) -> Study:
         """The same study with these warnings; what it has worked out so far it keeps."""
         other = replace(self, warnings=tuple(warnings))
-        for slow in ("where", "where_baseline", "late", "errors_with", "unknown"):
+        for slow in (
+            "where",
+            "where_baseline",
+            "late",
+            "errors_with",
+            "unknown",
+            "horizons",
+            "ceiling",
+        ):
             if slow in self.__dict__:
                 other.__dict__[slow] = self.__dict__[slow]
         return other
+
+    @cached_property
+    def horizons(self) -> Horizons:
+        """Errors of every step 0.5 to 5 s ahead on the validation data, in physical units."""
+        return horizons(self.fits, self.steps, self.held_out)
 
     def waterfall(self, horizons_s: Sequence[float] = (0.5, 1.0, 2.0, 5.0)) -> Waterfall:
         """Errors of every step, one sample and further ahead, in training and held out.

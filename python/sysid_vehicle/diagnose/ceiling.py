@@ -1,0 +1,232 @@
+"""How much of the missing force any function of the driving could explain.
+
+A flexible regression of the missing side force and yaw moment on what the driver does: steering,
+speed and longitudinal acceleration, and their history. Measured lateral motion is no regressor: it
+holds the missing force itself. The regression is fitted to the training data and judged on
+validation data, so that what it explains there is a lower bound of what is explainable; the rest is
+disturbance, noise, or hidden from the inputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .._arguments import generator
+from .._arrays import FloatArray, as_float64
+from .._text import html_text
+from ..estimate import Driving
+from ..identify import Fit, explaining
+from ..log import Log
+from ..rules import USUAL, Rules
+from .coordinates import begins, blocks
+from .force_map import UNITS, missing_forces
+
+__all__ = ["Ceiling", "Explainable", "ceiling"]
+
+Whole = npt.NDArray[np.intp]
+
+_RATE_HZ = 20.0  # missing forces are smooth
+_LAGS_S = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.8)
+_BLOCK_S, _FOLDS = 5.0, 5
+_PENALTIES = 10.0 ** np.arange(-4.0, 2.5, 0.5)  # over the number of samples
+_DRAWS = 400
+_UNDERSTEER_MPS = 25.0  # characteristic speed, by which steering becomes lateral acceleration
+_REACH = 4.0  # standard deviations of a regressor, beyond which nothing is extrapolated
+
+
+@dataclass(frozen=True)
+class Explainable:
+    """What the driving predicts of one missing force.
+
+    Attributes
+    ----------
+    share, low, high : float
+        Of its variance on validation data, with a 95 % interval from blocks of the driving; below
+        zero where the regression predicts nothing.
+    rms : float
+        Of the missing force on validation data, about its mean in training [N, N m].
+    """
+
+    target: str
+    share: float
+    low: float
+    high: float
+    rms: float
+
+    def __str__(self) -> str:
+        return (
+            f"{100 * max(self.share, 0.0):.0f} % ({100 * max(self.low, 0.0):.0f} to "
+            f"{100 * max(self.high, 0.0):.0f}) of the missing {self.target}, "
+            f"{self.rms:.3g} {UNITS[self.target]} rms"
+        )
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """How much of the missing forces a function of the driving could explain.
+
+    Attributes
+    ----------
+    forces : tuple of Explainable
+        Side force and yaw moment.
+    rules : Rules
+    """
+
+    forces: tuple[Explainable, ...]
+    rules: Rules = USUAL
+
+    @property
+    def structure(self) -> tuple[Explainable, ...]:
+        """Those of which more than `Rules.explainable` is shown to depend on the driving."""
+        return tuple(f for f in self.forces if f.low > self.rules.explainable)
+
+    def __str__(self) -> str:
+        told = "; ".join(map(str, self.structure))
+        if told:
+            return f"a function of steering, speed and acceleration history explains {told}"
+        most = max(self.forces, key=lambda f: f.share)
+        return (
+            "no function of steering, speed and acceleration history is found that explains what "
+            f"is missing (at best {most}): as far as they tell it is disturbance"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_text(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, ready for JSON."""
+        return {
+            f.target: {
+                "share": f.share,
+                "interval": [f.low, f.high],
+                "rms": f.rms,
+                "unit": UNITS[f.target],
+            }
+            for f in self.forces
+        }
+
+
+@explaining
+def ceiling(
+    fit: Fit,
+    test: Log | Sequence[Log] | Driving,
+    logs: Log | Sequence[Log] | Driving | None = None,
+    *,
+    seed: int = 0,
+    rules: Rules = USUAL,
+) -> Ceiling:
+    """Find how much of what a model lacks any function of the driving could explain.
+
+    Cubic ridge regression of the smoothed missing forces on the histories of steering, speed and
+    longitudinal acceleration; the penalty is chosen by cross-validation within the training data.
+
+    Parameters
+    ----------
+    fit : Fit
+    test : Log, sequence of Log, or Driving
+        Validation data.
+    logs : Log, sequence of Log, or Driving, optional
+        Training data; by default what the model was fitted to.
+    seed : int
+        Of the draws that make the intervals.
+    rules : Rules
+
+    Returns
+    -------
+    Ceiling
+    """
+    train, other = fit.driving if logs is None else Driving.of(logs), Driving.of(test)
+    rng = generator(seed)
+    features = [_features(fit, d) for d in (train, other)]
+    centre, spread = features[0].mean(axis=0), features[0].std(axis=0)
+    used = spread > 1e-9 * np.maximum(np.abs(centre), 1e-9)
+    X, Z = (np.clip((f[:, used] - centre[used]) / spread[used], -_REACH, _REACH) for f in features)
+    known, hidden = (missing_forces(fit, d) for d in (train, other))
+    few, there = _thinned(train), _thinned(other)
+    fold = _block_numbers(train)[few] % _FOLDS
+    piece = np.unique(_block_numbers(other)[there], return_inverse=True)[1]
+    found = []
+    for i, target in enumerate(known.targets):
+        if target == "F_x":
+            continue
+        y = known.force[few, i]
+        mean = float(y.mean())
+        size = _ridge(X[few], y - mean, _penalty(X[few], y, fold))
+        missing = hidden.force[there, i] - mean
+        error = missing - Z[there] @ size
+        found.append(_share(target, missing, error, piece, rng))
+    return Ceiling(tuple(found), rules)
+
+
+def _thinned(driving: Driving) -> Whole:
+    every = max(round(driving.mean_rate_hz / _RATE_HZ), 1)
+    return np.arange(0, driving.samples, every)
+
+
+def _block_numbers(driving: Driving) -> Whole:
+    starts = blocks(driving, min(_BLOCK_S, driving.usable_s / (2.0 * _FOLDS)))
+    return np.searchsorted(starts, np.arange(driving.samples), side="right") - 1
+
+
+def _features(fit: Fit, driving: Driving) -> FloatArray:
+    """Regressors, (samples, n): polynomials of the inputs now and some time ago."""
+    car = fit.model.vehicle
+    steer, v = driving.channel("steer_rad"), driving.channel("vx_mps")
+    push = driving.channel("fx_n") / car.mass_kg if driving.force_known else None
+    push = driving.channel("ax_mps2") if push is None else push
+    v, push = (np.nan_to_num(x, nan=float(np.nanmean(x))) for x in (v, push))
+    # Lateral acceleration that a neutral car would have, and some yaw rate.
+    turn = steer * v / (car.wheelbase_m * (1.0 + (v / _UNDERSTEER_MPS) ** 2))
+    columns = [v, v**2, push, push**2]
+    for lag in _LAGS_S:
+        s, t, u, p = (_ago(driving, x, lag) for x in (steer, turn, v, push))
+        a = t * u
+        columns += [s, t, a, a * np.abs(a), a**3, a**2, a * u, a * p, np.abs(a) * p, p]
+    return as_float64(np.column_stack(columns))
+
+
+def _ago(driving: Driving, x: FloatArray, seconds: float) -> FloatArray:
+    """The signal so long ago; at the begin of a stretch its first value."""
+    lag = np.round(seconds * driving.sample_rate_hz).astype(int)
+    first = begins(driving)
+    own = first[np.searchsorted(first, np.arange(len(x)), side="right") - 1]
+    return as_float64(x[np.maximum(np.arange(len(x)) - lag, own)])
+
+
+def _ridge(X: FloatArray, y: FloatArray, penalty: float) -> FloatArray:
+    gram = X.T @ X + penalty * len(X) * np.eye(X.shape[1])
+    return as_float64(np.linalg.solve(gram, X.T @ y))
+
+
+def _penalty(X: FloatArray, y: FloatArray, fold: Whole) -> float:
+    """That which predicts left-out blocks best."""
+    errors = np.zeros(len(_PENALTIES))
+    for k in np.unique(fold):
+        out = fold == k
+        mean = y[~out].mean()
+        for i, penalty in enumerate(_PENALTIES):
+            size = _ridge(X[~out], y[~out] - mean, penalty)
+            errors[i] += float(np.sum((y[out] - mean - X[out] @ size) ** 2))
+    return float(_PENALTIES[int(np.argmin(errors))])
+
+
+def _share(
+    target: str,
+    missing: FloatArray,
+    error: FloatArray,
+    piece: Whole,
+    rng: np.random.Generator,
+) -> Explainable:
+    """Share of the variance, with an interval from draws of the blocks (Efron 1979)."""
+    n = int(piece.max()) + 1
+    before, after = (np.bincount(piece, x**2, minlength=n) for x in (missing, error))
+    drawn = rng.integers(0, n, (_DRAWS, n))
+    shares = 1.0 - after[drawn].sum(axis=1) / np.maximum(before[drawn].sum(axis=1), 1e-300)
+    low, high = np.quantile(shares, (0.025, 0.975))
+    share = 1.0 - float(after.sum()) / max(float(before.sum()), 1e-300)
+    return Explainable(target, share, float(low), float(high), float(np.sqrt(np.mean(missing**2))))

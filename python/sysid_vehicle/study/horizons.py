@@ -1,0 +1,231 @@
+"""Errors some seconds ahead, in the units of the channels, block by block.
+
+Medians over blocks of the driving: one spin decides nothing. Where two models are compared, block
+is held against block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .._arrays import FloatArray, as_float64
+from .._text import html_table, number, text_table
+from ..diagnose import blocks
+from ..errors import NumericalError
+from ..estimate import MEASURED, UNITS, Driving, NoiseModel
+from ..identify import Fit
+from ..rules import Change
+from .waterfall import look_ahead
+
+__all__ = ["AHEAD", "LATERAL", "Horizons", "block_errors", "changes", "horizons"]
+
+LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2")
+AHEAD = (0.5, 1.0, 2.0, 5.0)
+_BLOCK_S, _FEWEST = 5.0, 6
+_APART = 0.1  # of the horizon, between predictions
+_NORMAL = 1.4826  # standard deviation over the median absolute deviation
+_LOST = 10.0  # logarithm of the ratio, where one of two models lost the car
+_OF_MEDIAN = float(np.sqrt(0.5 * np.pi))  # its standard error over that of a mean
+
+
+@dataclass(frozen=True, eq=False)
+class Horizons:
+    """Prediction errors of several models, in the units of the channels.
+
+    Attributes
+    ----------
+    steps : tuple of str
+        A word for each model.
+    horizons_s : tuple of float
+        How far ahead.
+    channels : tuple of str
+        Those that were measured.
+    error : array, shape (steps, horizons, channels)
+        Median over blocks of about 5 s of their root mean square errors; NaN where the driving is
+        too short, infinite where a model lost the car in most blocks.
+    low, high : array, shape (steps, horizons, channels)
+        First and last decile over the blocks.
+    noise : array, shape (channels,)
+        Standard deviation of the sensors, below which nothing can be predicted.
+    """
+
+    steps: tuple[str, ...]
+    horizons_s: tuple[float, ...]
+    channels: tuple[str, ...]
+    error: FloatArray
+    low: FloatArray
+    high: FloatArray
+    noise: FloatArray
+
+    _HEAD = ("error ahead by", "channel", "before", "after", "noise", "unit")
+
+    def _rows(self) -> list[list[str]]:
+        return [
+            [
+                f"{h:g} s",
+                c,
+                number(float(self.error[0, i, j]), 3),
+                number(float(self.error[-1, i, j]), 3),
+                number(float(self.noise[j]), 2),
+                UNITS[c],
+            ]
+            for i, h in enumerate(self.horizons_s)
+            for j, c in enumerate(self.channels)
+        ]
+
+    def __str__(self) -> str:
+        return text_table(self._HEAD, self._rows())
+
+    def _repr_html_(self) -> str:
+        return html_table(self._HEAD, self._rows())
+
+    def gains(self, step: int) -> dict[str, list[float | None]]:
+        """By channel, the error of the step before less that of a step, at each horizon."""
+        with np.errstate(invalid="ignore"):  # of two that lose the car
+            fall = self.error[step - 1] - self.error[step]
+        return {c: _finite(fall[None, :, j])[0] for j, c in enumerate(self.channels)}
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, ready for JSON; None where there are none."""
+        return {
+            "steps": list(self.steps),
+            "horizons_s": list(self.horizons_s),
+            "channels": {
+                c: {
+                    "unit": UNITS[c],
+                    "sensor_noise": float(self.noise[j]),
+                    "median": _finite(self.error[:, :, j]),
+                    "first_decile": _finite(self.low[:, :, j]),
+                    "last_decile": _finite(self.high[:, :, j]),
+                }
+                for j, c in enumerate(self.channels)
+            },
+        }
+
+
+def _finite(figures: FloatArray) -> list[list[float | None]]:
+    return [[float(v) if np.isfinite(v) else None for v in row] for row in figures]
+
+
+def horizons(
+    fits: Sequence[Fit],
+    steps: Sequence[str],
+    driving: Driving,
+    horizons_s: Sequence[float] = AHEAD,
+) -> Horizons:
+    """Work out the errors of several models some seconds ahead.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        The last one's noise starts every prediction.
+    steps : sequence of str
+        A word for each.
+    driving : Driving
+    horizons_s : sequence of float
+    """
+    noise = fits[-1].noise.floor()
+    channels = tuple(c for c in LATERAL if c in driving.present)
+    columns = [LATERAL.index(c) for c in channels]
+    by_block = np.stack(
+        [
+            np.stack([block_errors(f, noise, driving, h)[:, columns] for h in horizons_s], axis=1)
+            for f in fits
+        ]
+    )
+    with np.errstate(invalid="ignore"):
+        low, middle, high = (_quantile(by_block, q) for q in (0.1, 0.5, 0.9))
+    sensor = np.array([noise.sensor[MEASURED.index(c)] for c in channels])
+    return Horizons(
+        tuple(steps), tuple(horizons_s), channels, middle, low, high, as_float64(sensor)
+    )
+
+
+def _quantile(by_block: FloatArray, q: float) -> FloatArray:
+    """Over the blocks, (models, blocks, horizons, channels), that have a prediction."""
+    out = np.full((by_block.shape[0], *by_block.shape[2:]), np.nan)
+    for at in np.ndindex(out.shape):
+        few = by_block[at[0], :, at[1], at[2]]
+        few = np.sort(few[~np.isnan(few)])
+        if len(few):
+            # Of the sorted blocks themselves: between a finite and an infinite one lies nothing.
+            out[at] = few[round(q * (len(few) - 1))]
+    return as_float64(out)
+
+
+# The poorer model of all candidates of a step is the same one.
+@lru_cache(maxsize=64)
+def block_errors(fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float) -> FloatArray:
+    """Root mean square errors of the lateral channels, block by block.
+
+    Parameters
+    ----------
+    fit : Fit
+    noise : NoiseModel
+        Of the filter that starts the predictions.
+    driving : Driving
+    horizon_s : float
+
+    Returns
+    -------
+    array, shape (blocks, 3)
+        NaN where nothing is predicted, infinite where the model lost the car.
+    """
+    columns = [MEASURED.index(c) for c in LATERAL]
+    starts = blocks(driving, driving.usable_s / _number_of_blocks(driving))
+    try:
+        e = look_ahead(fit, noise, driving, horizon_s, apart=_APART)[:, columns]
+    except NumericalError:
+        return np.full((len(starts), len(LATERAL)), np.inf)
+    there = np.isfinite(driving.measured[:, columns]) & ~np.isnan(e)
+    squares = np.add.reduceat(np.where(there, e, 0.0) ** 2, starts, axis=0)
+    count = np.add.reduceat(there.astype(float), starts, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return as_float64(np.where(count > 0.0, np.sqrt(squares / count), np.nan))
+
+
+def _number_of_blocks(driving: Driving) -> int:
+    return max(round(driving.usable_s / _BLOCK_S), _FEWEST)
+
+
+def changes(
+    before: Fit, after: Fit, driving: Driving, horizons_s: Sequence[float]
+) -> tuple[Change, ...]:
+    """How the errors of the lateral channels change from one model to another.
+
+    Parameters
+    ----------
+    before, after : Fit
+        The noise floor of the latter starts the predictions of both.
+    driving : Driving
+    horizons_s : sequence of float
+
+    Returns
+    -------
+    tuple of Change
+        By channel and horizon, of those that enough blocks show.
+    """
+    noise = after.noise.floor()
+    found = []
+    for h in horizons_s:
+        one, other = (block_errors(fit, noise, driving, h) for fit in (before, after))
+        for j, channel in enumerate(LATERAL):
+            known = (one[:, j] > 0.0) & (other[:, j] > 0.0)
+            # Of a block that both models lose there is nothing to be learnt.
+            known &= np.isfinite(one[:, j]) | np.isfinite(other[:, j])
+            if np.count_nonzero(known) < _FEWEST - 1:
+                continue
+            with np.errstate(divide="ignore", over="ignore"):
+                ratio = np.log(other[known, j]) - np.log(one[known, j])
+            ratio = np.clip(ratio, -_LOST, _LOST)
+            middle = float(np.median(ratio))
+            scatter = _NORMAL * float(np.median(np.abs(ratio - middle)))
+            found.append(
+                Change(channel, h, middle, _OF_MEDIAN * scatter / float(np.sqrt(len(ratio))))
+            )
+    return tuple(found)

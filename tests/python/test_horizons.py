@@ -1,0 +1,80 @@
+"""Errors some seconds ahead in physical units, and how an effect changes them."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Fit, Log
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.rules import worse
+from sysid_vehicle.study.held_out import changes_ahead
+from sysid_vehicle.study.horizons import LATERAL, block_errors, changes, horizons
+from sysid_vehicle.study.waterfall import look_ahead
+
+
+@pytest.fixture(scope="module")
+def late(fit: Fit) -> Fit:
+    """The car, answered by a steering that it has not."""
+    model = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.15})
+    return replace(fit, model=model)
+
+
+def test_errors_are_in_the_units_of_the_channels(fit: Fit, late: Fit, course: Log) -> None:
+    driving = Driving.of(course)
+    found = horizons((fit, late), ("right", "late"), driving, (0.5, 2.0))
+    assert found.channels == LATERAL
+    assert found.error.shape == (2, 2, 3)
+    # Of the right model little more than the noise of the sensors is left.
+    assert np.all(found.error[0] < 3.0 * found.noise)
+    assert np.all(found.error[0] > 0.7 * found.noise)
+    assert np.all(found.low <= found.error)
+    assert np.all(found.error <= found.high)
+    yaw = LATERAL.index("yaw_rate_radps")
+    assert np.all(found.error[1, :, yaw] > 2.0 * found.error[0, :, yaw])
+    assert found.gains(1)["yaw_rate_radps"][0] < 0.0
+    told = found.to_dict()["channels"]["yaw_rate_radps"]
+    assert told["unit"] == "rad/s"
+    assert told["median"][1][0] == pytest.approx(found.error[1, 0, yaw])
+    assert "2 s" in str(found)
+    assert "rad/s" in found._repr_html_()
+
+
+def test_blocks_hold_the_errors_of_all_predictions(fit: Fit, course: Log) -> None:
+    driving, noise = Driving.of(course), fit.noise.floor()
+    whole = look_ahead(fit, noise, driving, 1.0, apart=0.1)[:, 2]
+    found = block_errors(fit, noise, driving, 1.0)[:, LATERAL.index("yaw_rate_radps")]
+    assert len(found) == round(driving.usable_s / 5.0)
+    assert np.sqrt(np.mean(found**2)) == pytest.approx(np.sqrt(np.nanmean(whole**2)), rel=0.05)
+
+
+def test_what_makes_predictions_worse_is_seen_and_the_reverse_is_not(
+    fit: Fit, late: Fit, course: Log
+) -> None:
+    driving = Driving.of(course)
+    grown = worse(changes(fit, late, driving, (1.0, 2.0)))
+    assert {c.channel for c in grown} >= {"yaw_rate_radps"}
+    assert worse(changes(late, fit, driving, (1.0, 2.0))) == ()
+    assert worse(changes(fit, fit, driving, (1.0, 2.0))) == ()
+
+
+def test_a_model_that_loses_the_car_is_worse(fit: Fit, course: Log) -> None:
+    broken = replace(fit, model=fit.model.with_values({"B_front": float("nan")}))
+    driving = Driving.of(course)
+    grown = worse(changes(fit, broken, driving, (1.0,)))
+    assert len(grown) == len(LATERAL)
+    assert worse(changes(broken, fit, driving, (1.0,))) == ()
+    assert changes(broken, broken, driving, (1.0,)) == ()
+
+
+def test_a_spin_does_not_decide(
+    fit: Fit, late: Fit, course: Log, altered: Callable[..., Log]
+) -> None:
+    """Where one block is lost by both models, the others tell."""
+    yaw = course["yaw_rate_radps"].copy()
+    few = slice(len(yaw) // 2, len(yaw) // 2 + 200)
+    yaw[few] += 3.0
+    driving = Driving.of(altered(course, yaw_rate_radps=yaw))
+    assert worse(changes_ahead(fit, late, driving))
+    assert not worse(changes_ahead(late, fit, driving))
