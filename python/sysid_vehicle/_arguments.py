@@ -97,7 +97,9 @@ def expect(value: object, wanted: type, function: str) -> None:
     kind = given
     if isinstance(value, str | os.PathLike):
         kind = "path"
-    elif isinstance(value, Mapping | np.ndarray) or hasattr(value, "columns"):
+    elif (wanted.__name__, given) not in _REMEDIES and (
+        isinstance(value, Mapping | np.ndarray) or hasattr(value, "columns")
+    ):
         kind = "table"
     name = wanted.__name__
     remedy = _REMEDIES.get((name, kind), f"pass a {name}")

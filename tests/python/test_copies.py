@@ -61,6 +61,7 @@ def results(fit: Fit, lap: Log, course: Log, truth: Model) -> dict[str, object]:
         "SensorNoise": sv.SensorNoise(),
         "RoadDisturbance": sv.RoadDisturbance(),
         "DriveLimits": sv.DriveLimits(),
+        "Rules": sv.Rules(),
         "Fit": fit,
         "Comparison": sv.compare(fit, course),
         "Diagnosis": found,
@@ -80,7 +81,7 @@ NAMES = (
     *("Vehicle", "Tyre", "Model", "Effect", "catalogue", "parameter", "Log", "ChannelMap"),
     *("Driving", "NoiseModel", "SensorNoise", "RoadDisturbance", "DriveLimits", "Fit"),
     *("Comparison", "Diagnosis", "verdicts", "where", "bias_report", "manoeuvre", "drive"),
-    *("excitation", "closed loop", "laboratory log", "NumericalError"),
+    *("excitation", "closed loop", "laboratory log", "NumericalError", "Rules"),
 )
 
 

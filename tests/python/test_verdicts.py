@@ -125,10 +125,10 @@ def test_impossible_and_negligible_values() -> None:
 
 def test_a_value_at_its_bound_has_no_error() -> None:
     rolling = effect("rolling_resistance")
-    found = _of_present(rolling, (0.012, 0.0), (0.001, float("inf")), ())
+    found = _of_present(rolling, (0.012, 0.0), (0.001, float("inf")), (), USUAL)
     assert found.sentence.startswith("missing; coefficient 0.012 +- 0.001, per_speed_spm 0 (at a")
     most = rolling.parameters[1].upper
-    beyond = _of_present(rolling, (0.012, most), (0.001, float("inf")), ())
+    beyond = _of_present(rolling, (0.012, most), (0.001, float("inf")), (), USUAL)
     assert beyond.finding == "proxy"
     assert "no car has such a value" in beyond.sentence
 

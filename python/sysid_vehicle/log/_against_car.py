@@ -28,6 +28,10 @@ _COHERENT = 0.6
 _FORCE_DOUBT, _FORCE_FACTOR = 0.15, 1.7
 _STEER_DOUBT, _STEER_FACTOR = 0.2, 2.0
 _UNDERSTEER, _UNDERSTEER_DOUBT = 0.002, 0.003  # rad of road wheels per m/s2
+_UNDERSTEER_MOST = 0.008  # rad per m/s2 either way: 4.5 deg/g, more than cars have
+_LEFT = 4.0  # times as much unexplained with this wheelbase as with another, that refuses it
+_UNEXPLAINED = 0.1  # share of the steering; less may be the curvature of tyres' curves
+_VARIES = 0.4  # standard deviation of the curvature over its root mean square
 _NEAR = 0.2  # a unit is named where the factor is so near, as a logarithm
 
 _MASS_SLIPS = (
@@ -143,7 +147,30 @@ def _steer(drive: Drive, wheelbase_m: float) -> _Told | None:
         ratio, doubt, coherence = asked(ratio)
     if ratio <= 0.0 or coherence < 0.3:
         return None
+    columns = [wheelbase_m * curvature[gentle], ay[gentle], yaw[gentle]]
+    if not _excluded(steer[gentle], columns, ratio):
+        return None
     return _Told(ratio, doubt / ratio, drive.place(steer))
+
+
+def _excluded(steer: FloatArray, columns: list[FloatArray], ratio: float) -> bool:
+    """Whether no understeer that cars have explains the steering with this wheelbase.
+
+    The columns are L r / v, a_y and dr/dt. Where the speed hardly varies the first two are one, and
+    understeer can stand for any wheelbase.
+    """
+    from scipy.optimize import lsq_linear
+
+    def left(scale: float) -> float:
+        rest = steer - scale * columns[0]
+        x = np.column_stack([*columns[1:], np.ones(rest.size)])
+        most = np.array([_UNDERSTEER_MOST * max(scale, 1.0), np.inf, np.inf])
+        return float(2.0 * lsq_linear(x, rest, (-most, most)).cost)
+
+    varies = float(np.sum((steer - np.mean(steer)) ** 2))
+    if np.std(columns[0]) < _VARIES * np.sqrt(np.mean(columns[0] ** 2)):
+        return False  # an offset of the steering would look the same
+    return left(1.0) > max(_LEFT * left(ratio), _UNEXPLAINED * varies)
 
 
 def _likely(told: _Told, slips: tuple[tuple[float, str], ...]) -> str:
