@@ -5,7 +5,7 @@ import pytest
 
 from sysid_vehicle import Fit, InvalidInput, Log, Model, identify
 from sysid_vehicle.identify import profile_fit, refit
-from sysid_vehicle.identify.estimates import box_covariance, wald
+from sysid_vehicle.identify.estimates import wald
 from sysid_vehicle.identify.objective import Penalised, gaussian_prior
 from sysid_vehicle.identify.search import Box
 
@@ -109,8 +109,8 @@ def test_a_known_inertia_can_be_freed(truth: Model) -> None:
 def test_what_is_not_determined_is_not_called_at_bound() -> None:
     box = Box([0, 1, 2], np.zeros(3), np.ones(3))
     x = np.array([1.0, 1.0, 0.5])
-    covariance = box_covariance(np.diag([1e-3, 1e6, 1e6]), box, x)
-    loose, held, free = wald("abc", dict.fromkeys("abc", "1"), x, covariance, box)
+    information = np.diag([1e-3, 1e6, 1e6])
+    (loose, held, free), _ = wald("abc", dict.fromkeys("abc", "1"), x, information, box)
     assert (loose.note, held.note, free.note) == ("not determined", "at bound", "")
     # The data say nothing: no more is known than the box. A bound leaves no standard error.
     assert loose.std == pytest.approx(np.hypot(0.5, 1.0 / np.sqrt(12.0)), rel=1e-3)

@@ -20,6 +20,7 @@ INTERVALS = ("information", "profile")
 
 _SPREAD_OF_BOX = np.sqrt(1.0 / 12.0)  # standard deviation of a uniform over a box of width 1
 _UNKNOWN = 0.2  # of the width
+_SINGULAR = 1e-12
 _WIDE = 0.5  # of the width, for an interval
 _AT_BOUND = 1e-6  # of the width
 
@@ -78,19 +79,33 @@ def box_covariance(information: FloatArray, box: Box, x: FloatArray) -> FloatArr
     return as_float64(0.5 * (inverse + inverse.T) / np.outer(scale, scale))
 
 
-def wald(
-    names: Sequence[str], units: Mapping[str, str], x: FloatArray, covariance: FloatArray, box: Box
-) -> tuple[Estimate, ...]:
-    """Estimates with the standard errors of the information matrix.
+def _std_of_data(information: FloatArray) -> FloatArray:
+    """Standard errors by the data alone, as if there were no box."""
+    scale = np.sqrt(np.diag(information))
+    std = np.full(len(scale), np.inf)
+    felt = scale > 0.0
+    if felt.any():
+        inner = information[np.ix_(felt, felt)] / np.outer(scale[felt], scale[felt])
+        values, vectors = np.linalg.eigh(inner)
+        variance = (vectors**2 / np.maximum(values, _SINGULAR)).sum(axis=1)
+        std[felt] = np.sqrt(variance) / scale[felt]
+    return std
 
-    What the data do not determine is called that, even where it ended at a bound: the bound did not
-    stop it. What they do determine and a bound stops has no standard error.
+
+def wald(
+    names: Sequence[str], units: Mapping[str, str], x: FloatArray, information: FloatArray, box: Box
+) -> tuple[tuple[Estimate, ...], FloatArray]:
+    """Estimates with the standard errors of the information matrix, and their covariance.
+
+    What the data alone do not determine is called that, even where it ended at a bound: the bound
+    did not stop it. What they do determine and a bound stops has no standard error.
     """
     width = box.upper - box.lower
+    covariance = box_covariance(information, box, x)
     std = np.sqrt(np.diag(covariance))
-    unknown = std > _UNKNOWN * width
+    unknown = _std_of_data(information) > _UNKNOWN * width
     held = (x <= box.lower + _AT_BOUND * width) | (x >= box.upper - _AT_BOUND * width)
-    return tuple(
+    estimates = tuple(
         Estimate(
             name,
             float(x[i]),
@@ -100,6 +115,7 @@ def wald(
         )
         for i, name in enumerate(names)
     )
+    return estimates, covariance
 
 
 def with_profiles(

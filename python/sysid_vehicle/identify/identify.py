@@ -14,7 +14,7 @@ from ..errors import InvalidInput, NumericalError, warn
 from ..estimate import Driving, NoiseModel, first_guess, noise_range
 from ..log import Log, check_car, check_excitation
 from ..model import Model
-from .estimates import INTERVALS, box_covariance, wald, with_profiles
+from .estimates import INTERVALS, wald, with_profiles
 from .fit import Fit
 from .objective import Objective, gaussian_prior
 from .profile import profile_all
@@ -277,12 +277,12 @@ def _summary(
     frozen = objective.freeze(p, noise.vector())
     _, _, information = objective.normal_equations(p, frozen, box.columns)
     x = p[box.columns]
-    covariance = box_covariance(information, box, x)
     units = {n: parameter.unit for n, parameter in model.parameters.items()}
+    estimates, covariance = wald(names, units, x, information, box)
     return Fit(
         model.with_values(dict(zip(names, map(float, x), strict=True))),
         noise,
-        wald(names, units, x, covariance, box),
+        estimates,
         covariance,
         float(frozen.log_likelihood),
         driving,

@@ -146,4 +146,6 @@ def settle_finely(
         value = objective.log_likelihood(p, noise)
         if value < before + _STILL:
             break
+    # Noise has moved once more since the parameters did.
+    p, value = bottom(objective, p, noise, box)
     return p, noise, value

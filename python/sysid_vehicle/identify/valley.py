@@ -22,6 +22,7 @@ from .search import Box
 __all__ = ["down_the_valley"]
 
 _LEAST_DAMPING = 1e-13
+_HARDLY_DAMPED = (_LEAST_DAMPING, 1e-9, 1e-6)
 _TRIALS = 14
 _PROBE = 0.1  # of the step: where the second derivative is taken
 _BENT = 1.5  # twice the bend over the step, beyond which the expansion means nothing
@@ -54,6 +55,14 @@ class _Slope:
     def gain(self, step: FloatArray) -> float:
         """What the quadratic model promises."""
         return float(self.gradient @ step - 0.5 * step @ self.curvature @ step)
+
+    def promises(self, gain: float) -> bool:
+        """Whether the quadratic model has a step of such a gain.
+
+        Where parameters copy each other the undamped step is lost in rounding, at a bound above
+        all, and only slightly damped ones show what is to be had.
+        """
+        return any(self.gain(self.step(damping)) >= gain for damping in _HARDLY_DAMPED)
 
     def bend(self, step: FloatArray, second: FloatArray, damping: float) -> FloatArray:
         """Second-order part of a step, from the residuals' second derivative along it."""
@@ -135,7 +144,7 @@ def down_the_valley(
 ) -> FloatArray:
     """Least squares of the prediction errors, with gains that stay as they are, to the very bottom.
 
-    It ends where the undamped step promises less than `tolerance`: that a damped one gains little
+    It ends where no undamped step promises as much as `tolerance`: that a damped one gains little
     says nothing where the parameters copy each other, for damping is what makes it short.
 
     Parameters
@@ -161,7 +170,7 @@ def down_the_valley(
     cost, damping = 0.5 * float(residuals @ residuals), 1e-3
     for _ in range(rounds):
         slope = valley.slope(x, residuals)
-        if slope.gain(slope.step(_LEAST_DAMPING)) < tolerance:
+        if not slope.promises(tolerance):
             break
         for _ in range(_TRIALS):
             found = valley.bent(x, residuals, slope, damping)

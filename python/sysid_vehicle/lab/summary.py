@@ -36,12 +36,12 @@ def summary(
     """Result with the uncertainties that the information matrix gives."""
     gains = objective.freeze(p, noise)
     _, _, information = objective.normal_equations(p, gains, box.columns)
-    covariance = box_covariance(information, box, p[box.columns])
+    estimates, covariance = wald(free, UNITS, p[box.columns], information, box)
     return TyreFit(
         vehicle,
         logs,
         p,
-        wald(free, UNITS, p[box.columns], covariance, box),
+        estimates,
         covariance,
         noise,
         float(gains.log_likelihood),
