@@ -24,6 +24,7 @@ __all__ = ["identify", "refine", "refit"]
 
 _THINNED = 3000  # samples that decide between starts
 _SAME_OPTIMUM = 1.0  # nats
+_SHARES = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, tried until the likelihood rises
 
 
 @explaining
@@ -131,20 +132,23 @@ def refine(
 
 
 def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3) -> Fit:
-    """Parameters alone, from a model's values, under a noise model that stays as it is."""
+    """Parameters alone, from a model's values, under a noise model that stays as it is.
+
+    The likelihood is never lower than that of the values it starts from.
+    """
     names = list(model.free_names)
     box = free_box(model)
     problem = driving.problem(model)
     p = model.vector()
     p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
+    frozen = problem.freeze(p, noise.vector())
     for _ in range(rounds):
-        frozen = problem.freeze(p, noise.vector())
+        before = p[box.columns]
         found = minimise(problem, p, frozen, box, rounds=8, tolerance=0.2)
-        moved = np.abs(found.x - p[box.columns])
-        p[box.columns] = found.x
-        if np.all(moved < 1e-4 * (box.upper - box.lower)):
+        p, frozen = _risen(problem, p, frozen, found.x, noise, box)
+        if np.all(np.abs(p[box.columns] - before) < 1e-4 * (box.upper - box.lower)):
             break
-    return _summary(model, driving, problem, p, noise, box, names, (), True)
+    return _summary(model, driving, problem, p, noise, box, names, (), True, frozen)
 
 
 def free_box(model: Model) -> Box:
@@ -211,6 +215,31 @@ def _polish(
     return _summary(model, driving, problem, p, noise, box, names, starts, converged)
 
 
+def _risen(
+    problem: _core.Problem,
+    p: FloatArray,
+    frozen: _core.FrozenFilter,
+    x: FloatArray,
+    noise: NoiseModel,
+    box: Box,
+) -> tuple[FloatArray, _core.FrozenFilter]:
+    """As far from `p` towards `x` as the likelihood rises, and the filter there.
+
+    The search had the gains of `p`. With its own the point that it found may be a worse one.
+    """
+    begin = p[box.columns]
+    for share in _SHARES:
+        trial = p.copy()
+        trial[box.columns] = begin + share * (x - begin)
+        try:
+            there = problem.freeze(trial, noise.vector())
+        except NumericalError:
+            continue
+        if there.log_likelihood >= frozen.log_likelihood:
+            return trial, there
+    return p, frozen
+
+
 def settle(
     problem: _core.Problem,
     thin: _core.Problem,
@@ -223,6 +252,8 @@ def settle(
 ) -> tuple[FloatArray, NoiseModel, bool]:
     """Alternate between noise, learned on `thin`, and parameters until the likelihood stands still.
 
+    It never ends below the likelihood of its start.
+
     Returns
     -------
     tuple of array, NoiseModel and bool
@@ -231,13 +262,17 @@ def settle(
     p = p.copy()
     p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
     best = -np.inf
+    frozen = problem.freeze(p, noise.vector())
     for round_ in range(rounds):
-        noise, _ = learn_noise(thin, p, noise, vehicle, rounds=6 if round_ == 0 else 3)
-        frozen = problem.freeze(p, noise.vector())
+        learned, _ = learn_noise(thin, p, noise, vehicle, rounds=6 if round_ == 0 else 3)
+        there = problem.freeze(p, learned.vector())
+        if there.log_likelihood >= frozen.log_likelihood:  # which `thin` does not warrant
+            noise, frozen = learned, there
         if frozen.log_likelihood < best + 0.5:
             return p, noise, True
         best = frozen.log_likelihood
-        p[box.columns] = minimise(problem, p, frozen, box, rounds=8, tolerance=0.05).x
+        x = minimise(problem, p, frozen, box, rounds=8, tolerance=0.05).x
+        p, frozen = _risen(problem, p, frozen, x, noise, box)
     return p, noise, False
 
 
@@ -251,8 +286,9 @@ def _summary(
     names: list[str],
     starts: tuple[Start, ...],
     converged: bool,
+    frozen: _core.FrozenFilter | None = None,
 ) -> Fit:
-    frozen = problem.freeze(p, noise.vector())
+    frozen = problem.freeze(p, noise.vector()) if frozen is None else frozen
     _, _, information = problem.normal_equations(p, frozen, box.columns)
     estimates, covariance = _estimates(model, p, box, names, information)
     return Fit(
