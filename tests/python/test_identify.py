@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import fields
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,7 +22,12 @@ from sysid_vehicle import (
     identify,
     manoeuvres,
 )
+from sysid_vehicle.errors import NumericalError
+from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import METHODS, refine, refit
+from sysid_vehicle.identify.objective import Objective
+from sysid_vehicle.identify.search import Box, minimise
+from sysid_vehicle.identify.settle import risen
 
 G = 9.80665
 WHATS = ("cornering stiffness", "peak friction", "slip at the peak")
@@ -271,3 +277,68 @@ def test_more_noise_gives_wider_intervals(fit: Fit, start: Model, truth: Model) 
     found = identify(start, noisy, starts=1)
     ratio = found.derived[0].std / fit.derived[0].std
     assert 2.0 < ratio < 5.0
+
+
+class Linear:
+    """Residuals ``J (x - best)``, of parameters that nearly copy each other."""
+
+    def __init__(self, J: np.ndarray, best: np.ndarray) -> None:
+        self.J, self.best = J, best
+
+    def half_sum_of_squares(self, p: np.ndarray, _: object) -> float:
+        return 0.5 * float(np.sum(np.square(self.J @ (p - self.best))))
+
+    def normal_equations(
+        self, p: np.ndarray, frozen: object, _: object
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        downhill = -self.J.T @ (self.J @ (p - self.best))
+        return self.half_sum_of_squares(p, frozen), downhill, self.J.T @ self.J
+
+
+def test_a_small_gain_of_a_damped_step_is_not_the_end(rng: np.random.Generator) -> None:
+    """Along the valley the curvature is a millionth of that across it, and 20 nats are to gain."""
+    common = rng.normal(size=200)
+    J = np.column_stack([common, common * (1.0 + 5e-4 * rng.normal(size=200))])
+    J *= 1e3 / np.linalg.norm(common)
+    _, _, along = np.linalg.svd(J)
+    away = along[1] / np.linalg.norm(J @ along[1]) * np.sqrt(2.0 * 20.0)
+    problem, box = Linear(J, np.zeros(2)), Box([0, 1], np.full(2, -1e3), np.full(2, 1e3))
+    found = minimise(problem, away, None, box, tolerance=0.05)  # type: ignore[arg-type]
+    assert found.settled
+    assert found.cost < 0.05
+
+
+def test_parameters_move_only_where_the_likelihood_rises() -> None:
+    """The search holds the gains of its start; with gains of its own its end may be worse."""
+
+    class Peaked:
+        def __init__(self) -> None:
+            self.asked: list[float] = []
+
+        def freeze(self, p: np.ndarray, _: object) -> SimpleNamespace:
+            self.asked.append(float(p[1]))
+            if p[1] > 0.9:
+                raise NumericalError("the car spins")
+            return SimpleNamespace(log_likelihood=-float((p[1] - 0.2) ** 2))
+
+    peaked, box = Peaked(), Box([1], np.zeros(1), np.ones(1))
+    objective = Objective(peaked)  # type: ignore[arg-type]
+    p, noise = np.array([7.0, 0.0]), np.empty(0)
+    begin = peaked.freeze(p, None)
+    reached, there = risen(objective, p, begin, np.array([1.0]), noise, box)
+    assert peaked.asked == [0.0, 1.0, 0.5, 0.25]
+    assert list(reached) == [7.0, 0.25]
+    assert there.log_likelihood > begin.log_likelihood
+    assert risen(objective, reached, there, np.array([0.8]), noise, box) == (reached, there)
+
+
+def test_a_refit_is_never_worse_than_its_start(truth: Model, altered: Callable[..., Log]) -> None:
+    """On a yaw rate that is late no effect fits, and searches go astray."""
+    log = drive(truth, manoeuvres.lap(15.0), seed=61, rate_hz=25.0)
+    yaw = np.interp(log["time_s"] - 0.1, log["time_s"], log["yaw_rate_radps"])
+    driving = Driving.of(altered(log, yaw_rate_radps=yaw))
+    fit = identify(truth, list(driving.logs), starts=1)
+    model = fit.model.add("steer_delay").with_values({"steer_delay.delay_s": 0.004})
+    begin = driving.problem(model).freeze(model.vector(), fit.noise.vector()).log_likelihood
+    assert refit(model, driving, fit.noise).log_likelihood >= begin
+    assert refine(model, driving, fit.noise).log_likelihood >= begin

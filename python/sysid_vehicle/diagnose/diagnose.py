@@ -187,7 +187,9 @@ def _score_rivals(board: ScoreBoard, score: Score, apart: float) -> tuple[str, .
 def _refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
     """The candidate with its exact dynamics, under the noise of the model without it."""
     best: Fit | None = None
-    for values in _starts(c):
+    for values in (*_starts(c), {}):
+        if not values and best is not None and best.log_likelihood >= fit.log_likelihood:
+            break  # else from the model that it contains, so that it cannot be a worse one
         model = fit.model.add(c.effect).with_values(values)
         try:
             trial = refit(model, driving, fit.noise)

@@ -19,7 +19,7 @@ from .fit import Fit
 from .objective import Objective, gaussian_prior
 from .profile import profile_all
 from .search import METHODS, Box, minimise
-from .settle import settle, settle_finely
+from .settle import risen, settle, settle_finely
 from .starts import Runner, Starts, space_filling
 from .suspects import explaining
 
@@ -163,17 +163,20 @@ def refine(
 
 
 def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3) -> Fit:
-    """Parameters alone, from a model's values, under a noise model that stays as it is."""
+    """Parameters alone, from a model's values, under a noise model that stays as it is.
+
+    The likelihood is never lower than that of the values it starts from.
+    """
     box = free_box(model)
     objective = objective_of(model, driving.problem(model))
     p = model.vector()
     p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
+    gains = objective.freeze(p, noise.vector())
     for _ in range(rounds):
-        frozen = objective.freeze(p, noise.vector())
-        found = minimise(objective, p, frozen, box, rounds=8, tolerance=0.2)
-        moved = np.abs(found.x - p[box.columns])
-        p[box.columns] = found.x
-        if np.all(moved < 1e-4 * (box.upper - box.lower)):
+        before = p[box.columns]
+        found = minimise(objective, p, gains, box, rounds=8, tolerance=0.2)
+        p, gains = risen(objective, p, gains, found.x, noise.vector(), box)
+        if np.all(np.abs(p[box.columns] - before) < 1e-4 * (box.upper - box.lower)):
             break
     return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True)
 
@@ -272,6 +275,7 @@ def _summary(
     noise: NoiseModel,
     starts: Starts,
     converged: bool,
+    frozen: _core.FrozenFilter | None = None,
 ) -> Fit:
     box, names = free_box(model), model.free_names
     frozen = objective.freeze(p, noise.vector())

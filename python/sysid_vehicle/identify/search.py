@@ -16,7 +16,7 @@ from .objective import Problem
 
 __all__ = ["METHODS", "Box", "Outcome", "minimise"]
 
-_TRUSTED = 1e-2  # damping below which a step is that of Gauss and Newton
+_LEAST_DAMPING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -76,19 +76,26 @@ def _gauss_newton(
     for _ in range(rounds):
         if not np.isfinite(cost):
             return Outcome(x, np.inf, False)
-        gained, eager = 0.0, False
+        gained, begin = 0.0, x
         for _ in range(10):
-            trial = _step(x, gradient, information, damping, box)
+            trial = _step(begin, gradient, information, damping, box)
             trial_cost = problem.half_sum_of_squares(_filled(p, box, trial), frozen)
             if trial_cost < cost:
-                gained, eager = cost - trial_cost, damping < _TRUSTED
+                gained = cost - trial_cost
                 x, cost = trial, trial_cost
-                damping = max(damping / 8.0, 1e-9)
+                damping = max(damping / 8.0, _LEAST_DAMPING)
                 break
             damping *= 6.0
-        # A small gain of a step that damping had shortened does not mean that there is no more.
-        if gained == 0.0 or (gained < tolerance and eager):
+        if gained == 0.0:
             return Outcome(x, cost, True)
+        if gained < tolerance:
+            # Where parameters copy each other damping makes steps short, and a small gain is no
+            # end: the whole step has to gain as little.
+            whole = _step(begin, gradient, information, _LEAST_DAMPING, box)
+            whole_cost = problem.half_sum_of_squares(_filled(p, box, whole), frozen)
+            if not whole_cost < cost - tolerance:
+                return Outcome(x, cost, True)
+            x, cost, damping = whole, whole_cost, _LEAST_DAMPING
         cost, gradient, information = problem.normal_equations(
             _filled(p, box, x), frozen, box.columns
         )

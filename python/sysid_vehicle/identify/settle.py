@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from .._arrays import FloatArray
+from ..errors import NumericalError
 from .objective import Objective
 from .search import Box, minimise
 from .valley import down_the_valley
 
-__all__ = ["bottom", "descend", "settle", "settle_finely"]
+__all__ = ["bottom", "descend", "risen", "settle", "settle_finely"]
 
 _STANDS = 0.5  # nats
 _STILL = 3e-4  # nats
 _REFREEZES = 8
 _ROUNDS = 12
+_SHARES = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, tried until the likelihood rises
 
 
 def descend(
@@ -45,6 +49,40 @@ def descend(
     return p, objective.log_likelihood(p, noise)
 
 
+def risen(
+    objective: Objective, p: FloatArray, gains: Any, x: FloatArray, noise: FloatArray, box: Box
+) -> tuple[FloatArray, Any]:
+    """As far from `p` towards `x` as the likelihood rises, and the gains there.
+
+    A search holds the gains of its start. With its own the point that it found may be a worse one.
+
+    Parameters
+    ----------
+    p : array, shape (parameters,)
+    gains : object
+        Those of `p`.
+    x : array, shape (free parameters,)
+    noise : array, shape (noises,)
+
+    Returns
+    -------
+    p : array, shape (parameters,)
+    gains : object
+    """
+    least = gains.log_likelihood - objective.prior_cost(p)
+    begin = p[box.columns]
+    for share in _SHARES:
+        trial = p.copy()
+        trial[box.columns] = begin + share * (x - begin)
+        try:
+            there = objective.freeze(trial, noise)
+        except NumericalError:
+            continue
+        if there.log_likelihood - objective.prior_cost(trial) >= least:
+            return trial, there
+    return p, gains
+
+
 def settle(
     objective: Objective,
     p: FloatArray,
@@ -57,6 +95,8 @@ def settle(
     rounds: int = 10,
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Alternate between noise and parameters until the likelihood stands still.
+
+    It never ends below the likelihood of its start.
 
     Parameters
     ----------
@@ -85,16 +125,18 @@ def settle(
     if parameters_first:
         p, _ = descend(objective, p, noise, box, method=method)
     best = -np.inf
+    gains = objective.freeze(p, noise)
     for round_ in range(rounds):
-        noise, _ = (thin or objective).learn_noise(p, noise, rounds=6 if round_ == 0 else 3)
-        gains = objective.freeze(p, noise)
+        learned, _ = (thin or objective).learn_noise(p, noise, rounds=6 if round_ == 0 else 3)
+        there = objective.freeze(p, learned)
+        if there.log_likelihood >= gains.log_likelihood:  # which `thin` does not warrant
+            noise, gains = learned, there
         value = gains.log_likelihood - objective.prior_cost(p)
         if value < best + _STANDS:
             return p, noise, True
         best = value
-        p[box.columns] = minimise(
-            objective, p, gains, box, method=method, rounds=8, tolerance=0.05
-        ).x
+        x = minimise(objective, p, gains, box, method=method, rounds=8, tolerance=0.05).x
+        p, gains = risen(objective, p, gains, x, noise, box)
     return p, noise, False
 
 
