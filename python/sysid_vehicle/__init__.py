@@ -26,6 +26,7 @@ from .log import Log, check_excitation
 from .model import Model
 from .read import ChannelMap, read_log
 from .rules import Rules
+from .saved import load
 from .simulate import RoadDisturbance, SensorNoise, drive, example_vehicle
 from .study import Study, improve
 from .user_effects import define_effect, forget_effect, load_effects, parameter
@@ -66,6 +67,7 @@ __all__ = [
     "forget_effect",
     "identify",
     "improve",
+    "load",
     "load_effects",
     "manoeuvres",
     "parameter",
