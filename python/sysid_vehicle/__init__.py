@@ -21,6 +21,7 @@ from .diagnose import (
 from .effects import Effect, catalogue, effect
 from .errors import InvalidInput, NumericalError, SysidError, SysidWarning
 from .estimate import Driving, NoiseModel
+from .export import casadi_function, export
 from .identify import Fit, identify
 from .log import Log, check_excitation
 from .model import Model
@@ -55,6 +56,7 @@ __all__ = [
     "Vehicle",
     "__version__",
     "bias_report",
+    "casadi_function",
     "catalogue",
     "ceiling",
     "check_excitation",
@@ -64,6 +66,7 @@ __all__ = [
     "drive",
     "effect",
     "example_vehicle",
+    "export",
     "forget_effect",
     "identify",
     "improve",

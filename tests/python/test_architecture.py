@@ -23,6 +23,7 @@ PYTHON_LAYERS = [
     {"estimate"},
     {"identify"},
     {"compare"},
+    {"export"},
     {"diagnose"},
     {"study"},
     {"lab"},
