@@ -21,11 +21,13 @@ from .diagnose import (
 from .effects import Effect, catalogue, effect
 from .errors import InvalidInput, NumericalError, SysidError, SysidWarning
 from .estimate import Driving, NoiseModel
+from .export import casadi_function, export
 from .identify import Fit, identify
 from .log import Log, check_excitation
 from .model import Model
 from .read import ChannelMap, read_log
 from .rules import Rules
+from .saved import load
 from .simulate import RoadDisturbance, SensorNoise, drive, example_vehicle
 from .study import Study, improve
 from .user_effects import define_effect, forget_effect, load_effects, parameter
@@ -54,6 +56,7 @@ __all__ = [
     "Vehicle",
     "__version__",
     "bias_report",
+    "casadi_function",
     "catalogue",
     "ceiling",
     "check_excitation",
@@ -63,9 +66,11 @@ __all__ = [
     "drive",
     "effect",
     "example_vehicle",
+    "export",
     "forget_effect",
     "identify",
     "improve",
+    "load",
     "load_effects",
     "manoeuvres",
     "parameter",

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from . import _core
 from ._arrays import FloatArray
 from .effects import Effect, Parameter, base_parameters, catalogue, effect
 from .errors import InvalidInput
+from .saved import save
 from .vehicle import Tyre, Vehicle
 
 __all__ = ["Model", "Setting", "vehicle_data"]
@@ -170,6 +172,16 @@ class Model:
     def priors(self) -> dict[str, tuple[float, float]]:
         """Means and standard deviations of the free parameters that have a prior."""
         return {n: told.prior for n, told in self.settings.items() if told.prior is not None}
+
+    def save(self, path: str | Path) -> None:
+        """Write the model; :func:`sysid_vehicle.load` reads it.
+
+        Raises
+        ------
+        InvalidInput
+            If the file cannot be written.
+        """
+        save(self, path)
 
     @property
     def parameters(self) -> dict[str, Parameter]:

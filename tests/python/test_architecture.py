@@ -14,7 +14,8 @@ MAX_LINES = 400
 # A module imports from its own layer and from the layers above it in this list, never from below.
 PYTHON_LAYERS = [
     {"errors", "_arguments", "_arrays", "_core", "_files", "_replace", "_style", "_text"}
-    | {"_progress", "_threads", "vehicle", "effects", "model", "formula", "rules", "user_effects"},
+    | {"_progress", "_threads", "vehicle", "effects", "model", "formula", "rules", "saved"}
+    | {"user_effects"},
     {"log"},
     {"read"},
     {"manoeuvres"},
@@ -22,6 +23,7 @@ PYTHON_LAYERS = [
     {"estimate"},
     {"identify"},
     {"compare"},
+    {"export"},
     {"diagnose"},
     {"study"},
     {"lab"},

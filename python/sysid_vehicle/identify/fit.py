@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from .._arrays import FloatArray
 from .._text import html_paragraph, html_table, number, text_table
 from ..estimate import Driving, NoiseModel
 from ..model import Model
+from ..saved import save
 from .estimates import Estimate, profiled
 from .profile import Profile
 from .quantities import Quantity, parameter, std_of, tyre_quantity
@@ -65,6 +67,16 @@ class Fit:
             if name in (e.name, e.name.replace(" ", "_")):
                 return e
         raise KeyError(f"'{name}'; there are {', '.join(e.name for e in every)}")
+
+    def save(self, path: str | Path) -> None:
+        """Write the fit, with the driving it was fitted to; :func:`sysid_vehicle.load` reads it.
+
+        Raises
+        ------
+        InvalidInput
+            If the file cannot be written.
+        """
+        save(self, path)
 
     @property
     def undetermined(self) -> tuple[str, ...]:

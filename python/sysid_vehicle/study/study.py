@@ -31,6 +31,7 @@ from ..estimate import Driving
 from ..identify import Fit, refine
 from ..model import Model
 from ..rules import USUAL, Rules, Verdict
+from ..saved import save
 from .added import AddedEffect
 from .horizons import Horizons, horizons
 from .record import record
@@ -101,6 +102,16 @@ class Study:
     def model(self) -> Model:
         """The improved model."""
         return self.fit.model
+
+    def save(self, path: str | Path) -> None:
+        """Write the study with all its fits and logs; :func:`sysid_vehicle.load` reads it.
+
+        Raises
+        ------
+        InvalidInput
+            If the file cannot be written.
+        """
+        save(self, path)
 
     @property
     def meaning(self) -> str:

@@ -1,0 +1,72 @@
+"""Identified models for use elsewhere: Python, C++, CasADi, property files of tyres, TOML."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .._files import as_path, write_text
+from ..errors import InvalidInput, warn
+from ..identify import Fit
+from ..model import Model
+from ..vehicle import Tyre, Vehicle
+from ._languages import casadi_function, cpp_text, python_text
+from ._tyres import tir_text
+
+__all__ = ["casadi_function", "cpp_text", "export", "identified_vehicle", "python_text", "tir_text"]
+
+_SUFFIXES = ".py, .hpp, .h, .tir or .toml"
+
+
+def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
+    """Write a model for use elsewhere; the ending of the name says as what.
+
+    Parameters
+    ----------
+    what : Model or Fit
+    path : str or Path
+        ``.py``: a module of Python that needs NumPy alone. ``.hpp`` or ``.h``: a header of C++ that
+        needs the standard library alone. ``.tir``: property files of MF 5.2, one for each axle,
+        ``_front`` and ``_rear`` added to the name. ``.toml``: a vehicle file with the tyres and the
+        yaw inertia of the model.
+
+    Returns
+    -------
+    tuple of Path
+        The files that were written.
+
+    Raises
+    ------
+    InvalidInput
+        If the ending is none of these, the model has an effect that cannot be exported, or the file
+        cannot be written.
+    """
+    model = what.model if isinstance(what, Fit) else what
+    path = as_path(path)
+    suffix = path.suffix.lower()
+    if suffix == ".tir":
+        files = {path.with_stem(f"{path.stem}_{a}"): tir_text(model, a) for a in ("front", "rear")}
+    elif suffix == ".py":
+        files = {path: python_text(model)}
+    elif suffix in (".hpp", ".h"):
+        files = {path: cpp_text(model)}
+    elif suffix == ".toml":
+        identified_vehicle(model).to_toml(path)
+        if model.effects:
+            warn(f"{path}: a vehicle file has no place for effects ({', '.join(model.effects)})")
+        return (path,)
+    else:
+        raise InvalidInput(
+            f"{path}: nothing is exported as '{suffix}'; end the name in {_SUFFIXES}"
+        )
+    for file, text in files.items():
+        write_text(file, text)
+    return tuple(files)
+
+
+def identified_vehicle(model: Model) -> Vehicle:
+    """Return the vehicle with the tyres and the yaw inertia that the model has."""
+    tyres = {
+        f"tyre_{axle}": Tyre(*(model.value(f"{letter}_{axle}") for letter in "BCDE"))
+        for axle in ("front", "rear")
+    }
+    return model.vehicle.replace(**tyres, yaw_inertia_kgm2=model.value("yaw_inertia_kgm2"))

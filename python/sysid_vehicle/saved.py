@@ -1,0 +1,222 @@
+"""Results in files: written by one process, read by another, and by later versions.
+
+A file is a NumPy archive: arrays, and one text of JSON that says of which objects they are part.
+Nothing in it is run when it is read; only dataclasses of this package are made, by their
+constructors, which check what they are given.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import io
+import json
+import math
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ._core import __version__
+from ._files import as_path, write_bytes
+from .effects import Effect, effect
+from .errors import InvalidInput
+
+__all__ = ["VERSION", "load", "save"]
+
+VERSION = 1
+_NAME = "sysid_vehicle result"
+_CONTENT = "content"
+_PACKAGE = __name__.rpartition(".")[0]
+# Stations of the package whose dataclasses may stand in a file.
+_STATIONS = (
+    *("vehicle", "effects", "model", "rules", "log", "estimate", "identify", "compare"),
+    *("diagnose", "study"),
+)
+# Where classes have moved to since a version wrote them: old place to new place.
+_MOVED: dict[str, str] = {}
+
+
+def save(result: object, path: str | Path) -> None:
+    """Write a result: a model, a fit, a study, or what else the package returns of these stations.
+
+    Parameters
+    ----------
+    result : Model, Fit, Study, ...
+    path : str or Path
+        File to write, complete or not at all; ``.npz`` is the usual ending.
+
+    Raises
+    ------
+    InvalidInput
+        If it holds something that no file can hold, or the file cannot be written.
+    """
+    writer = _Writer()
+    content = {
+        "format": _NAME,
+        "version": VERSION,
+        "package": __version__,
+        "root": writer.value(result),
+        "objects": writer.objects,
+    }
+    text = json.dumps(content, allow_nan=False, separators=(",", ":")).encode()
+    held = io.BytesIO()
+    arrays = {f"a{k}": array for k, array in enumerate(writer.arrays)}
+    np.savez_compressed(held, **{_CONTENT: np.frombuffer(text, dtype=np.uint8)}, **arrays)  # type: ignore[arg-type]
+    write_bytes(path, held.getvalue())
+
+
+def load(path: str | Path) -> Any:
+    """Read what :func:`save` or a method ``save`` wrote.
+
+    Raises
+    ------
+    InvalidInput
+        If the file cannot be read, is no such file, or was written by a later version.
+    """
+    path = as_path(path)
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            content = json.loads(bytes(archive[_CONTENT]))
+            arrays = {name: archive[name] for name in archive.files if name != _CONTENT}
+    except OSError as error:
+        raise InvalidInput(f"{path}: cannot be read ({error.strerror}); check the path") from error
+    except (ValueError, KeyError, TypeError, zipfile.BadZipFile, EOFError) as error:
+        raise InvalidInput(
+            f"{path}: is no saved result of sysid_vehicle, or is broken; save it again"
+        ) from error
+    if not isinstance(content, dict) or content.get("format") != _NAME:
+        raise InvalidInput(f"{path}: is no saved result of sysid_vehicle; give one that save wrote")
+    version = content.get("version")
+    if not isinstance(version, int) or not 1 <= version <= VERSION:
+        raise InvalidInput(
+            f"{path}: has version {version!r} of the format, written by sysid_vehicle "
+            f"{content.get('package', 'of another release')}; this one, {__version__}, reads "
+            f"versions up to {VERSION}: install a later sysid_vehicle"
+        )
+    try:
+        reader = _Reader(content["objects"], arrays)
+        return reader.value(content["root"])
+    except InvalidInput as error:
+        raise InvalidInput(f"{path}: {error}") from error
+    except (
+        LookupError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        ImportError,
+        RecursionError,
+    ) as error:
+        raise InvalidInput(
+            f"{path}: holds what this version cannot make again "
+            f"({type(error).__name__}: {error}); save it again with sysid_vehicle {__version__}"
+        ) from error
+
+
+class _Writer:
+    """Values as JSON, each object and array once however often it is referred to."""
+
+    def __init__(self) -> None:
+        self.objects: list[Any] = []
+        self.arrays: list[Any] = []
+        self._places: dict[int, dict[str, int]] = {}
+        self._kept: list[object] = []  # as long as ids count
+
+    def value(self, x: Any) -> Any:
+        if x is None or isinstance(x, bool | str) or type(x) is int:
+            return x
+        if isinstance(x, np.generic):
+            return self.value(x.item())
+        if isinstance(x, float):
+            return float(x) if math.isfinite(x) else {"float": repr(float(x))}
+        if isinstance(x, list):
+            return [self.value(y) for y in x]
+        if isinstance(x, tuple):
+            return {"tuple": [self.value(y) for y in x]}
+        if isinstance(x, dict):
+            return {"dict": [[self.value(k), self.value(v)] for k, v in x.items()]}
+        if isinstance(x, slice):
+            return {"slice": [x.start, x.stop, x.step]}
+        if isinstance(x, np.ndarray) and x.dtype.kind in "biuf":
+            return self._once(x, lambda: {"array": self._array(x)})
+        if dataclasses.is_dataclass(x) and not isinstance(x, type):
+            return self._once(x, lambda: {"object": self._object(x)})
+        raise InvalidInput(
+            f"a {type(x).__name__} cannot be saved; save the model, the fit or the study"
+        )
+
+    def _once(self, x: object, make: Any) -> dict[str, int]:
+        if id(x) not in self._places:
+            self._kept.append(x)
+            self._places[id(x)] = make()
+        return self._places[id(x)]
+
+    def _array(self, x: Any) -> int:
+        self.arrays.append(x)
+        return len(self.arrays) - 1
+
+    def _object(self, x: Any) -> int:
+        module = type(x).__module__.removeprefix(_PACKAGE + ".")
+        if module.split(".")[0] not in _STATIONS:
+            raise InvalidInput(
+                f"a {type(x).__name__} cannot be saved; save the model, the fit or the study"
+            )
+        if isinstance(x, Effect) and x.__reduce__()[0] is effect:
+            self.objects.append({"effect": x.id})
+            return len(self.objects) - 1
+        held = {f.name: self.value(getattr(x, f.name)) for f in dataclasses.fields(x) if f.init}
+        self.objects.append({"class": f"{module}:{type(x).__qualname__}", "fields": held})
+        return len(self.objects) - 1
+
+
+class _Reader:
+    """The way back."""
+
+    def __init__(self, objects: list[Any], arrays: dict[str, Any]) -> None:
+        self._objects = objects
+        self._arrays = arrays
+        self._made: dict[int, Any] = {}
+
+    def value(self, x: Any) -> Any:
+        if isinstance(x, list):
+            return [self.value(y) for y in x]
+        if not isinstance(x, dict):
+            return x
+        ((kind, held),) = x.items()
+        if kind == "float":
+            return float(held)
+        if kind == "tuple":
+            return tuple(self.value(y) for y in held)
+        if kind == "dict":
+            return {self.value(k): self.value(v) for k, v in held}
+        if kind == "slice":
+            return slice(*held)
+        if kind == "array":
+            return self._arrays[f"a{held}"]
+        if kind == "object":
+            if held not in self._made:
+                self._made[held] = self._object(self._objects[held])
+            return self._made[held]
+        raise KeyError(kind)
+
+    def _object(self, told: dict[str, Any]) -> Any:
+        if "effect" in told:
+            return effect(told["effect"])
+        place = _MOVED.get(told["class"], told["class"])
+        module, _, name = place.partition(":")
+        if module.split(".")[0] not in _STATIONS:
+            raise KeyError(place)
+        cls = getattr(importlib.import_module(f"{_PACKAGE}.{module}"), name)
+        if not (isinstance(cls, type) and dataclasses.is_dataclass(cls)):
+            raise KeyError(place)
+        if cls.__module__ != f"{_PACKAGE}.{module}":
+            raise KeyError(place)
+        known = {f.name for f in dataclasses.fields(cls) if f.init}
+        # What later versions no longer keep is left; what they keep more has its default.
+        given = {n: self.value(v) for n, v in told["fields"].items() if n in known}
+        made = cls(**given)
+        if module.split(".")[0] == "log":
+            for array in getattr(made, "_data", {}).values():
+                array.flags.writeable = False
+        return made

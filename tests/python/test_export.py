@@ -1,0 +1,236 @@
+"""Exported models drive like the compiled one."""
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle.errors import InvalidInput, SysidWarning
+from sysid_vehicle.export import cpp_text, identified_vehicle, python_text, tir_text
+from sysid_vehicle.export._equations import _ACTS
+from sysid_vehicle.simulate import drive_truth
+
+SENSORS = {
+    *("accelerometer_bias", "accelerometer_scale", "body_attitude", "gyro_bias", "gyro_scale"),
+    *("imu_lever_arm", "sensor_delay", "speed_sensor_lever_arm", "speed_sensor_misalignment"),
+}
+ALL = tuple(e for e in _ACTS if e not in SENSORS)
+
+
+def typical(model: sv.Model, *effects: str) -> sv.Model:
+    """The model with effects at their typical sizes."""
+    new = model.add(*effects)
+    sizes = {f"{e}.{p.name}": p.typical for e in effects for p in sv.effect(e).parameters}
+    return new.with_values(sizes)
+
+
+def module_of(model: sv.Model) -> dict[str, Any]:
+    space: dict[str, Any] = {}
+    exec(compile(python_text(model), "exported", "exec"), space)
+    return space
+
+
+def compiled(model: sv.Model, motion: np.ndarray, steer: float, force: float) -> np.ndarray:
+    return model.core().evaluate(model.vector(), motion, steer, force).ravel()
+
+
+@pytest.mark.parametrize("effects", [(), *((e,) for e in ALL), ALL], ids=lambda e: "+".join(e)[:30])
+def test_rates_are_those_of_the_compiled_model(
+    truth: sv.Model, effects: tuple[str, ...], rng: np.random.Generator
+) -> None:
+    model = typical(truth, *effects)
+    exported = module_of(model)
+    lagging = {"steer_lag": 1, "tyre_relaxation": 2}
+    lags = sum(lagging.get(e, 0) for e in effects)
+    for _ in range(20):
+        motion = rng.uniform((4.0, -2.0, -0.8), (50.0, 2.0, 0.8))
+        steer, force = rng.uniform(-0.15, 0.15), rng.uniform(-9000.0, 6000.0)
+        wanted = compiled(model, motion, steer, force)
+        state = np.concatenate((motion, settled(exported, motion, steer, force, lags)))
+        rate, a_x, a_y = exported["derivatives"](state, steer, force)
+        np.testing.assert_allclose([*rate[:3], a_x, a_y], wanted[:5], rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(rate[3:], 0.0, atol=1e-6)
+
+
+def settled(
+    exported: dict[str, Any], motion: np.ndarray, steer: float, force: float, lags: int
+) -> np.ndarray:
+    """Values of lags at which they rest: each follows its target at its own rate."""
+    x = np.zeros(lags)
+    for _ in range(lags):
+        zero = exported["derivatives"](np.concatenate((motion, x)), steer, force)[0][3:]
+        slope = np.zeros(lags)
+        for k in range(lags):
+            moved = x.copy()
+            moved[k] += 1.0
+            slope[k] = (
+                exported["derivatives"](np.concatenate((motion, moved)), steer, force)[0][3 + k]
+                - zero[k]
+            )
+        x = x - zero / np.where(slope == 0.0, 1.0, slope) if lags else x
+    return x
+
+
+@pytest.fixture(scope="module")
+def lap_model(truth: sv.Model) -> sv.Model:
+    """With effects that change speed, load and steering."""
+    wanted = ("tyre_load_sensitivity", "aero_downforce", "steer_offset", "rolling_resistance")
+    return typical(truth, *wanted, "combined_slip", "gyro_bias")
+
+
+@pytest.fixture(scope="module")
+def driven(lap_model: sv.Model) -> Any:
+    calm = sv.RoadDisturbance(0.0, 0.0, 0.0)
+    return drive_truth(lap_model, sv.manoeuvres.lap(60.0), seed=1, disturbance=calm)
+
+
+def test_python_over_a_lap(lap_model: sv.Model, driven: Any) -> None:
+    """Seconds of the lap side by side, as many cars; C++ drives it from end to end."""
+    exported = module_of(lap_model)
+    assert "Left out, because only sensors show it: gyro_bias" in exported["__doc__"]
+    starts = np.arange(0, len(driven.states) - 100, 100)
+    state = driven.states[starts, :3].T
+    for k in range(100):
+        before, after = driven.inputs[starts + k].T, driven.inputs[starts + k + 1].T
+        state = exported["step"](state, before, after, 0.01)
+        wanted = driven.states[starts + k + 1, :3].T
+        np.testing.assert_allclose(state, wanted, rtol=0.0, atol=1e-6)
+
+
+def test_python_drives_many_cars_at_once(truth: sv.Model) -> None:
+    exported = module_of(typical(truth, *ALL))
+    state = np.array([[10.0, 20.0], [0.1, -0.2], [0.1, 0.2], *[[0.01, 0.02]] * 3])
+    both = exported["derivatives"](state, np.array([0.1, -0.1]), np.array([-900.0, 900.0]))[0]
+    for k, (steer, force) in enumerate(((0.1, -900.0), (-0.1, 900.0))):
+        one = exported["derivatives"](state[:, k], steer, force)[0]
+        np.testing.assert_allclose(both[:, k], one, rtol=1e-12)
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="there is no g++")
+def test_cpp_over_a_lap(tmp_path: Path, lap_model: sv.Model, driven: Any) -> None:
+    (written,) = sv.export(lap_model, tmp_path / "car.hpp")
+    assert written.read_text("utf-8") == cpp_text(lap_model)
+    (tmp_path / "main.cpp").write_text(
+        '#include "car.hpp"\n#include <cstdio>\n'
+        "int main() {\n"
+        "    using namespace identified_car;\n"
+        "    State x{};\n    std::array<double, 2> before{}, after{};\n"
+        '    if (std::scanf("%lf %lf %lf %lf %lf", &x[0], &x[1], &x[2], &before[0], &before[1])'
+        " != 5) return 1;\n"
+        '    while (std::scanf("%lf %lf", &after[0], &after[1]) == 2) {\n'
+        "        x = step(x, before, after, 0.01);\n        before = after;\n"
+        '        std::printf("%.17g %.17g %.17g\\n", x[0], x[1], x[2]);\n'
+        "    }\n}\n"
+    )
+    program = tmp_path / "car"
+    build = ["g++", "-std=c++11", "-O1", "-Wall", "-Wextra", "-Werror", "-Wno-unused-variable"]
+    subprocess.run([*build, "-o", program, tmp_path / "main.cpp"], check=True)
+    rows = [" ".join(map(repr, map(float, row))) for row in driven.inputs]
+    given = " ".join(map(repr, map(float, driven.states[0, :3]))) + " " + "\n".join(rows)
+    told = subprocess.run([program], input=given, capture_output=True, text=True, check=True)
+    found = np.array([line.split() for line in told.stdout.splitlines()], dtype=float)
+    np.testing.assert_allclose(found, driven.states[1:, :3], rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="there is no g++")
+def test_cpp_of_every_effect_compiles(tmp_path: Path, truth: sv.Model) -> None:
+    sv.export(typical(truth, *ALL), tmp_path / "car.h")
+    build = ["g++", "-std=c++11", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-x", "c++"]
+    subprocess.run([*build, "-Wno-pragma-once-outside-header", tmp_path / "car.h"], check=False)
+    source = tmp_path / "a.cpp"
+    source.write_text('#include "car.h"\nint main() { return 0; }\n')
+    subprocess.run([*build[:-2], source], check=True)
+
+
+def test_casadi(truth: sv.Model, rng: np.random.Generator) -> None:
+    pytest.importorskip("casadi")
+    model = typical(truth, *ALL)
+    exported, function = module_of(model), sv.casadi_function(model)
+    for _ in range(20):
+        state = rng.uniform((4, -2, -0.8, -0.1, -0.1, -0.1), (50, 2, 0.8, 0.1, 0.1, 0.1))
+        given = rng.uniform((-0.15, -9000.0), (0.15, 6000.0))
+        rate, a_x, a_y = exported["derivatives"](state, *given)
+        found = function(state, given)
+        np.testing.assert_allclose(found[0].full().ravel(), rate, rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(found[1].full().ravel(), [a_x, a_y], rtol=1e-10)
+
+
+def magic_52(text: str, alpha: np.ndarray, load: float) -> np.ndarray:
+    """F_y of a property file: Pacejka, Tire and Vehicle Dynamics (2nd ed.), eq. (4.E19-30)."""
+    rows = (line.split("=") for line in text.splitlines() if "=" in line and line[0] != "$")
+    p = {k.strip(): v.strip() for k, v in rows}
+    number = {k: float(v) for k, v in p.items() if "'" not in v}
+    nominal = number["FNOMIN"]
+    dfz = load / nominal - 1.0
+    peak = (number["PDY1"] + number["PDY2"] * dfz) * load
+    stiffness = number["PKY1"] * nominal * np.sin(2.0 * np.arctan(load / number["PKY2"] / nominal))
+    b = stiffness / (number["PCY1"] * peak)
+    x = b * alpha
+    bent = np.arctan(x - number["PEY1"] * (x - np.arctan(x)))
+    return np.asarray(peak * np.sin(number["PCY1"] * bent))
+
+
+class TestTyres:
+    ALPHA = np.linspace(-0.2, 0.2, 41)
+
+    def test_without_load_sensitivity_at_every_load(self, truth: sv.Model) -> None:
+        tyre = truth.vehicle.tyre_front
+        text = tir_text(truth, "front")
+        for load in (800.0, 3000.0, 6000.0):
+            # The angle of the format is that of the velocity, ours that of the wheel against it.
+            found = magic_52(text, -self.ALPHA, load)
+            np.testing.assert_allclose(found, load * tyre.friction(self.ALPHA), rtol=1e-5)
+
+    @pytest.mark.parametrize("loss", [0.1, 0.3])
+    def test_with_load_sensitivity_near_the_static_load(self, truth: sv.Model, loss: float) -> None:
+        model = truth.add("tyre_load_sensitivity").with_values(
+            {"tyre_load_sensitivity.sensitivity": loss}
+        )
+        car = model.vehicle
+        static = 0.5 * car.mass_kg * 9.80665 * car.lf_m / car.wheelbase_m
+        text = tir_text(model, "rear")
+        for share, close in ((1.0, 1e-9), (0.98, 1e-3), (1.02, 1e-3), (1.3, 0.05)):
+            load = share * static
+            wanted = load * (1.0 - loss * (share - 1.0)) * car.tyre_rear.friction(self.ALPHA)
+            found = magic_52(text, -self.ALPHA, load)
+            np.testing.assert_allclose(found, wanted, rtol=close, atol=1e-9)
+
+    def test_files(self, tmp_path: Path, truth: sv.Model) -> None:
+        files = sv.export(truth, tmp_path / "tyre.tir")
+        assert [f.name for f in files] == ["tyre_front.tir", "tyre_rear.tir"]
+        assert files[1].read_text("utf-8") == tir_text(truth, "rear")
+
+    def test_friction_that_rises_with_load(self, truth: sv.Model) -> None:
+        model = truth.add("tyre_load_sensitivity").with_values(
+            {"tyre_load_sensitivity.sensitivity": -0.1}
+        )
+        with pytest.raises(InvalidInput, match=r"MF 5\.2 has no stiffness"):
+            tir_text(model, "front")
+
+
+def test_a_vehicle_file(tmp_path: Path, fit: sv.Fit, truth: sv.Model) -> None:
+    sv.export(fit, tmp_path / "car.toml")
+    read = sv.Vehicle.from_toml(tmp_path / "car.toml")
+    assert read.tyre_front == identified_vehicle(fit.model).tyre_front
+    assert fit.model.value("D_front") == read.tyre_front.D
+    with pytest.warns(SysidWarning, match=r"no place for effects \(steer_lag\)"):
+        sv.export(truth.add("steer_lag"), tmp_path / "car.toml")
+
+
+def test_what_cannot_be_exported(tmp_path: Path, truth: sv.Model) -> None:
+    for effect in {e.id for e in sv.catalogue()} - set(_ACTS):
+        with pytest.raises(InvalidInput, match=rf"{effect}: cannot be exported; drop it first"):
+            python_text(truth.add(effect))
+    with pytest.raises(InvalidInput, match=r"nothing is exported as '\.docx'; end the name in"):
+        sv.export(truth, tmp_path / "car.docx")
+
+
+def test_a_name_of_several_lines_stays_a_comment(car: sv.Vehicle) -> None:
+    model = sv.Model(car.replace(name='x\n"""\nimport os\n#error'))  # type: ignore[arg-type]
+    assert "\nimport os" not in python_text(model)
+    assert "\n#error" not in cpp_text(model)
+    assert "\nimport os" not in tir_text(model, "front")

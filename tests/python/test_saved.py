@@ -1,0 +1,161 @@
+"""Results in files: what is read is what was written, and files that cannot be used say so."""
+
+import io
+import json
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_copies import same
+
+import sysid_vehicle as sv
+from sysid_vehicle import saved
+from sysid_vehicle.errors import InvalidInput
+
+OLD = Path(__file__).parent / "saved"
+
+
+def again(result: Any, tmp_path: Path) -> Any:
+    path = tmp_path / "result.npz"
+    saved.save(result, path)
+    return sv.load(path)
+
+
+def test_a_fit(fit: sv.Fit, course: sv.Log, tmp_path: Path) -> None:
+    fit.save(tmp_path / "fit.npz")
+    read = sv.load(tmp_path / "fit.npz")
+    same(read, fit)
+    assert str(read) == str(fit)
+    assert read.driving.logs[0]["vx_mps"].flags.writeable is False
+    assert str(sv.compare(read, course)) == str(sv.compare(fit, course))
+
+
+def test_other_results(fit: sv.Fit, course: sv.Log, tmp_path: Path) -> None:
+    for result in (
+        fit.model,
+        fit.noise,
+        fit.driving.logs[0],
+        sv.example_vehicle(),
+        sv.compare(fit, course),
+    ):
+        read = again(result, tmp_path)
+        same(read, result)
+        assert str(read) == str(result)
+
+
+@pytest.mark.filterwarnings("ignore::sysid_vehicle.errors.SysidWarning")  # it is short
+def test_a_study(tmp_path: Path, truth: sv.Model) -> None:
+    logs = [sv.drive(truth, sv.manoeuvres.lap(12.0), seed=i, rate_hz=25.0) for i in (1, 2)]
+    study = sv.improve(truth, *logs, candidates=["steer_lag", "mass"], starts=1)
+    study.save(tmp_path / "study.npz")
+    read = sv.load(tmp_path / "study.npz")
+    same(read, study)
+    assert str(read) == str(study)
+    assert read.diagnoses[0].fit is read.fits[0]  # what was one is one
+
+
+def test_an_effect_of_a_user_comes_along(tmp_path: Path) -> None:
+    made = sv.define_effect(
+        "gust",
+        title="gust",
+        parameters=[sv.parameter("gain", "N", typical=50.0, lower=-500.0, upper=500.0)],
+        force_y=lambda d, p: p.gain * d.v_x / 20.0,
+    )
+    model = sv.Model(sv.example_vehicle()).add(made, "steer_lag").with_values({"gust.gain": 7.0})
+    sv.forget_effect("gust")
+    model.save(tmp_path / "model.npz")
+    read = sv.load(tmp_path / "model.npz")
+    assert read == model
+    np.testing.assert_array_equal(read.vector(), model.vector())
+    log = sv.drive(model, sv.manoeuvres.step_steer(), seed=1)
+    same(sv.drive(read, sv.manoeuvres.step_steer(), seed=1), log)
+
+
+@pytest.mark.parametrize("name", ["fit_v1.npz"])
+def test_files_of_earlier_versions_are_read(name: str) -> None:
+    read = sv.load(OLD / name)
+    assert isinstance(read, sv.Fit)
+    assert read.model.effects == ("steer_lag",)
+    assert read["B_front"].value == pytest.approx(read.model.value("B_front"))
+    assert np.isfinite(sv.compare(read, list(read.driving.logs)).error)
+
+
+def spoilt(path: Path, change: Callable[[dict[str, Any]], Any]) -> None:
+    """Write a file again with another content."""
+    with np.load(path) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    content = json.loads(bytes(arrays.pop("content")))
+    change(content)
+    text = np.frombuffer(json.dumps(content).encode(), dtype=np.uint8)
+    held = io.BytesIO()
+    np.savez(held, content=text, **arrays)
+    path.write_bytes(held.getvalue())
+
+
+def tyre(c: dict[str, Any]) -> dict[str, Any]:
+    return next(o for o in c["objects"] if o["class"] == "vehicle:Tyre")
+
+
+def vehicle(c: dict[str, Any]) -> dict[str, Any]:
+    return next(o for o in c["objects"] if o["class"] == "vehicle:Vehicle")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda c: c.update(version=99), ["version 99", "install a later sysid_vehicle"]),
+        (lambda c: c.update(version="1"), ["version '1'"]),
+        (lambda c: c.update(format="other"), ["no saved result of sysid_vehicle"]),
+        (lambda c: tyre(c).update({"class": "cli.main:main"}), ["cannot make again"]),
+        (lambda c: tyre(c).update({"class": "log._log:warn"}), ["cannot make again"]),
+        (lambda c: tyre(c).update({"class": "vehicle:Path"}), ["cannot make again"]),
+        (lambda c: vehicle(c)["fields"].pop("mass_kg"), ["cannot make again"]),
+        (lambda c: vehicle(c)["fields"].update(mass_kg=-1.0), ["mass_kg = -1 is out of range"]),
+        (lambda c: c.update(root={"object": 7}), ["cannot make again"]),
+        (lambda c: c.update(root={"code": "x", "more": 1}), ["cannot make again"]),
+        # Of versions that keep less, or more: there is a default, or it is left.
+        (lambda c: tyre(c)["fields"].pop("D"), []),
+        (lambda c: vehicle(c)["fields"].update(colour="red"), []),
+    ],
+)
+def test_files_that_cannot_be_used(
+    tmp_path: Path, change: Callable[[dict[str, Any]], Any], words: list[str]
+) -> None:
+    path = tmp_path / "car.npz"
+    saved.save(sv.example_vehicle(), path)
+    spoilt(path, change)
+    if not words:
+        assert isinstance(sv.load(path), sv.Vehicle)
+        return
+    with pytest.raises(InvalidInput) as caught:
+        sv.load(path)
+    for word in ["car.npz: ", *words]:
+        assert word in str(caught.value)
+
+
+def test_files_that_are_something_else(tmp_path: Path) -> None:
+    path = tmp_path / "x.npz"
+    with pytest.raises(InvalidInput, match=r"x\.npz: cannot be read .*check the path"):
+        sv.load(path)
+    np.savez(path, a=np.zeros(3))
+    with pytest.raises(InvalidInput, match="no saved result"):
+        sv.load(path)
+    path.write_bytes(b"time_s,vx_mps\n0,1\n")
+    with pytest.raises(InvalidInput, match="no saved result"):
+        sv.load(path)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("content.npy", b"no array")
+    with pytest.raises(InvalidInput, match="no saved result"):
+        sv.load(path)
+
+
+def test_what_no_file_can_hold(tmp_path: Path, fit: sv.Fit) -> None:
+    for thing in (print, sv.ChannelMap({}), {"f": open}, np.array([object()])):
+        with pytest.raises(InvalidInput, match="cannot be saved"):
+            saved.save(thing, tmp_path / "x.npz")
+    assert not (tmp_path / "x.npz").exists()
+    with pytest.raises(InvalidInput, match=r"the folder .* does not exist"):
+        fit.save(tmp_path / "none" / "fit.npz")
