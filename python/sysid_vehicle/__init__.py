@@ -24,6 +24,7 @@ from .identify import Fit, identify
 from .log import Log, check_excitation
 from .model import Model
 from .read import ChannelMap, read_log
+from .sensors import SensorCheck, check
 from .simulate import RoadDisturbance, SensorNoise, drive, example_vehicle
 from .study import Study, improve
 from .user_effects import define_effect, forget_effect, load_effects, parameter
@@ -43,6 +44,7 @@ __all__ = [
     "NoiseModel",
     "NumericalError",
     "RoadDisturbance",
+    "SensorCheck",
     "SensorNoise",
     "Study",
     "SysidError",
@@ -52,6 +54,7 @@ __all__ = [
     "__version__",
     "bias_report",
     "catalogue",
+    "check",
     "check_excitation",
     "compare",
     "define_effect",

@@ -19,6 +19,7 @@ PYTHON_LAYERS = [
     {"read"},
     {"manoeuvres"},
     {"simulate"},
+    {"sensors"},
     {"estimate"},
     {"identify"},
     {"compare"},

@@ -2,6 +2,7 @@
 
 from ._channels import CHANNELS, Channel
 from ._columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
+from ._held import held_rows
 from ._log import Log, check_excitation
 
 __all__ = [
@@ -12,6 +13,7 @@ __all__ = [
     "as_floats",
     "as_seconds",
     "check_excitation",
+    "held_rows",
     "listed",
     "named_columns",
     "seconds_of_stamps",
