@@ -28,6 +28,7 @@ from .model import Model
 from .read import ChannelMap, read_log
 from .rules import Rules
 from .saved import load
+from .sensors import SensorCheck, check
 from .simulate import RoadDisturbance, SensorNoise, drive, example_vehicle
 from .study import Study, improve
 from .user_effects import define_effect, forget_effect, load_effects, parameter
@@ -48,6 +49,7 @@ __all__ = [
     "NumericalError",
     "RoadDisturbance",
     "Rules",
+    "SensorCheck",
     "SensorNoise",
     "Study",
     "SysidError",
@@ -59,6 +61,7 @@ __all__ = [
     "casadi_function",
     "catalogue",
     "ceiling",
+    "check",
     "check_excitation",
     "compare",
     "define_effect",

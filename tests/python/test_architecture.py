@@ -20,6 +20,7 @@ PYTHON_LAYERS = [
     {"read"},
     {"manoeuvres"},
     {"simulate"},
+    {"sensors"},
     {"estimate"},
     {"identify"},
     {"compare"},

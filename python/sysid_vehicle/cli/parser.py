@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .. import _core
 from ..demo import DEFAULT, RANDOM
-from . import lab, mu_slip, sideslip, twin
+from . import lab, mu_slip, sensors, sideslip, twin
 from .log_arguments import LOG_HELP, add_reading
 
 __all__ = ["parse"]
@@ -70,6 +70,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     )
     _json(improve)
 
+    sensors.add_parser(commands)
     sideslip.add_parser(commands)
     mu_slip.add_parser(commands)
     _define(commands.add_parser("effects", help="the catalogue of effects"))

@@ -3,6 +3,7 @@
 from ._against_car import check_car
 from ._channels import CHANNELS, Channel
 from ._columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
+from ._held import held_rows
 from ._log import Log, check_excitation
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "as_seconds",
     "check_car",
     "check_excitation",
+    "held_rows",
     "listed",
     "named_columns",
     "seconds_of_stamps",

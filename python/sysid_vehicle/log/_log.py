@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -44,12 +44,15 @@ class Log:
         Sample rate of the uniform grid.
     uniform : bool
         Whether the source was uniform; False if it was resampled or gaps were filled with NaN.
+    corrections : tuple of str
+        What was put right in the channels after they had been read, a sentence each.
     """
 
     name: str
     rate_hz: float
     uniform: bool
     _data: dict[str, FloatArray]
+    corrections: tuple[str, ...] = ()
 
     @classmethod
     def from_arrays(
@@ -154,7 +157,27 @@ class Log:
             )
         part = {name: values[first:last] for name, values in self._data.items()}
         name = f"{self.name} [{time_s[first]:.6g} to {time_s[last - 1]:.6g} s]"
-        return Log(name, self.rate_hz, self.uniform, part)
+        return Log(name, self.rate_hz, self.uniform, part, self.corrections)
+
+    def corrected(self, channels: Mapping[str, FloatArray], what: Sequence[str]) -> Log:
+        """Return the log with some channels replaced, and with what was done recorded.
+
+        Parameters
+        ----------
+        channels : mapping of ndarray, shape (n,)
+            New values of channels that are present.
+        what : sequence of str
+            Sentences for `corrections`.
+        """
+        data = dict(self._data)
+        for name, values in channels.items():
+            if values.shape != self[name].shape:
+                raise InvalidInput(
+                    f"{self.name}: {name} has {values.size} corrected samples; give {self.n}"
+                )
+            data[name] = np.array(values, dtype=float)
+            data[name].flags.writeable = False
+        return Log(self.name, self.rate_hz, self.uniform, data, (*self.corrections, *what))
 
     def missing(self) -> dict[str, str]:
         """Return each absent optional channel with what cannot be seen without it, in words."""
@@ -223,6 +246,7 @@ class Log:
             for row in rows
         ]
         lines += [f"  absent: {name}: {lost}" for name, lost in self.missing().items()]
+        lines += [f"  corrected: {text}" for text in self.corrections]
         return "\n".join([self._title(), *lines])
 
     def __repr__(self) -> str:
@@ -237,6 +261,7 @@ class Log:
             f"<p>absent: {html.escape(name)}: {html.escape(lost)}</p>"
             for name, lost in self.missing().items()
         )
+        absent += "".join(f"<p>corrected: {html.escape(text)}</p>" for text in self.corrections)
         return (
             f"<table><caption>{html.escape(self._title())}</caption>"
             f"<tr>{cells('th', _HEADINGS)}</tr>{body}</table>{absent}"

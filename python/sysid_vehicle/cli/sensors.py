@@ -1,0 +1,44 @@
+"""The command `check`: whether the sensors of a log agree."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .._files import write_json, write_text
+from ..read import ChannelMap, read_log
+from ..report import check_page
+from ..sensors import check
+from ..vehicle import Vehicle
+from .outputs import refuse_unwritable
+
+__all__ = ["add_parser", "run"]
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "check", help="see whether the sensors of logs agree, before any tyre is assumed"
+    )
+    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="CSV file of one run")
+    parser.add_argument("--vehicle", type=Path, metavar="TOML", help="the car's own numbers")
+    parser.add_argument(
+        "--channels", type=Path, metavar="TOML", help="channel map, for other column names or units"
+    )
+    parser.add_argument("--report", type=Path, metavar="HTML", help="report to write")
+    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+
+
+def run(args: argparse.Namespace, heard: list[str]) -> None:
+    """Check, print, write."""
+    given = [path for path in (*args.logs, args.vehicle, args.channels) if path is not None]
+    refuse_unwritable([args.report, args.json], inputs=given)
+    mapping = None if args.channels is None else ChannelMap.from_toml(args.channels)
+    vehicle = None if args.vehicle is None else Vehicle.from_toml(args.vehicle)
+    found = check([read_log(path, mapping) for path in args.logs], vehicle)
+    print(found)
+    if args.json is not None:
+        write_json(args.json, {**found.to_dict(), "warnings": list(heard)})
+    if args.report is not None:
+        write_text(args.report, check_page(found, heard))
+        print(f"Report: {args.report}")

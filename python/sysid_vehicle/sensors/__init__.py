@@ -1,0 +1,7 @@
+"""Sensors: whether the channels of a log agree, before any tyre is assumed."""
+
+from ._check import check
+from ._faults import SensorFault
+from ._result import SensorCheck
+
+__all__ = ["SensorCheck", "SensorFault", "check"]

@@ -1,0 +1,362 @@
+"""Maximum likelihood of sensor faults, with the motion, the road and the noise unknown beside.
+
+Gauss-Newton over the splines of the motion and the faults at once; the faults' information is the
+Schur complement, so that their intervals hold whatever the motion was. Noise is learned from
+errors of motions drawn from the posterior (Monte Carlo EM: Wei & Tanner, JASA 85 (1990), 699-704),
+because the errors of the best motion alone are too small where it follows the noise. The splines
+are those of P. Furgale, T. D. Barfoot, G. Sibley, Continuous-time batch estimation using temporal
+basis functions, ICRA 2012, which let every reading enter at its own time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg, sparse
+
+from .._arrays import FloatArray, as_float64
+from ..errors import NumericalError
+from ._colour import Colour, fit_colour, neighbours
+from ._equations import FAULTS, Readings, predict
+from ._motion import QUICK, SLOW, Grid, IntArray
+
+__all__ = ["Estimate", "estimate", "noise_of"]
+
+_ROUNDS = 30
+_LEAST_ROUNDS = 8
+_DRAWS = 2
+_ORDER = 4  # of the colour of the noise, within the bandwidth of the splines
+_STEP_S = 0.06  # largest change of a delay in one round
+_LARGEST_DELAY_S = 0.28  # the splines reach no farther
+_OUTLIER = 4.0  # whitened errors beyond count less (Huber)
+_SETTLED = 0.03  # of a standard deviation
+# Second derivatives of speeds and yaw rate: so large that they matter only without readings.
+_ROUGH = {"vx": 300.0, "vy": 300.0, "yaw": 100.0}
+_ROAD_MPS2 = 0.05  # change of gravity along or across within a second, to begin with
+_LEAST_ROAD_MPS2 = 1e-4
+_ROAD_ROUNDS = 3  # the road is learned in every third round only
+_BLOCKS_S = (2.0, 10.0)  # errors further apart are taken as independent
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Faults with their covariance, noise, road and motion.
+
+    Attributes
+    ----------
+    faults : dict of float
+        By name.
+    covariance : ndarray, shape (n, n)
+        Of the faults, with the errors' dependence over time allowed for.
+    information : ndarray, shape (n, n)
+        Fisher information of the faults, prior included.
+    prior : ndarray, shape (n,)
+        The prior's part in its diagonal.
+    colours : dict of Colour
+        Noise by channel.
+    offsets : dict of (value, standard deviation)
+        Mean of `grade` and `bank` [m/s2].
+    road_mps2 : dict of float
+        How much they change within a second.
+    x : ndarray
+        Coefficients of the motion.
+    grid : Grid
+        Its knots.
+    rounds : int
+        Rounds until nothing moved any more.
+    settled : bool
+        Whether that was reached.
+    """
+
+    faults: dict[str, float]
+    covariance: FloatArray
+    information: FloatArray
+    prior: FloatArray
+    colours: dict[str, Colour]
+    offsets: dict[str, tuple[float, float]]
+    road_mps2: dict[str, float]
+    x: FloatArray
+    grid: Grid
+    rounds: int
+    settled: bool
+
+
+class _Band:
+    """Cholesky factor of a banded information matrix."""
+
+    def __init__(self, h: sparse.csr_matrix) -> None:
+        coo = sparse.tril(h, format="coo")
+        self.width = int((coo.row - coo.col).max())
+        self.ab = np.zeros((self.width + 1, h.shape[0]))
+        self.ab[coo.row - coo.col, coo.col] = coo.data
+        try:
+            self.factor = linalg.cholesky_banded(self.ab, lower=True, check_finite=False)
+        except linalg.LinAlgError as error:
+            raise NumericalError(
+                "the motion cannot be told from these channels; check that vx_mps, "
+                "yaw_rate_radps and ay_mps2 hold values"
+            ) from error
+
+    def solve(self, b: FloatArray) -> FloatArray:
+        x: FloatArray = linalg.cho_solve_banded((self.factor, True), b, check_finite=False)
+        return x
+
+    def draw(self, z: FloatArray) -> FloatArray:
+        """Solve with the transposed factor: normal numbers become draws of the posterior."""
+        x, info = linalg.lapack.dtbtrs(self.factor, z, uplo="L", trans="T")
+        if info:
+            raise NumericalError("the posterior of the motion is singular")
+        drawn: FloatArray = x
+        return drawn
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """Whitened linearised equations of all channels, and what is drawn from them."""
+
+    errors: dict[str, FloatArray]
+    raw_motion: dict[str, sparse.csr_matrix]
+    raw_faults: dict[str, FloatArray]
+    motion: dict[str, sparse.csr_matrix]
+    by_faults: dict[str, FloatArray]
+    white: dict[str, FloatArray]
+    weights: dict[str, FloatArray]
+
+
+def estimate(
+    readings: Sequence[Readings],
+    grid: Grid,
+    names: Sequence[str],
+    *,
+    floors: dict[str, float],
+    seed: int = 0,
+) -> Estimate:
+    """Estimate the faults `names`.
+
+    Parameters
+    ----------
+    readings : sequence of Readings
+        One per channel.
+    grid : Grid
+        Knots of the motion.
+    names : sequence of str
+        Faults to estimate, of `FAULTS`.
+    floors : dict of float
+        Least standard deviation of each channel's noise.
+    seed : int
+        Of the draws that teach the noise.
+
+    Raises
+    ------
+    NumericalError
+        If the motion cannot be told.
+    """
+    numbers = np.random.default_rng(seed).standard_normal((grid.size, _DRAWS))
+    faults = dict.fromkeys(names, 0.0)
+    typical = np.array([FAULTS[name].typical for name in names])
+    most = np.array([FAULTS[name].most for name in names])
+    runs = {r.channel: neighbours(r.stretch, r.time_s) for r in readings}
+    x, colours = _begin(readings, grid, runs, floors)
+    road = dict.fromkeys(SLOW, _ROAD_MPS2)
+    steps = {signal: grid.steps(signal) for signal in SLOW}
+    bends = {signal: grid.bends(signal) for signal in QUICK}
+    settled = False
+    for count in range(1, _ROUNDS + 1):
+        system = _linearise(readings, grid, x, faults, colours, runs)
+        rows = sparse.vstack(
+            [
+                grid.levels,
+                *(steps[s] / road[s] for s in SLOW),
+                *(bends[s] / _ROUGH[s] for s in QUICK),
+            ],
+            format="csr",
+        )
+        h, b = (rows.T @ rows), -(rows.T @ (rows @ x))
+        now = np.array([faults[name] for name in names])
+        # Cauchy's prior at its present curvature.
+        prior = np.diag(2.0 / (typical**2 + now**2) + most**-2.0)
+        hxt, htt, bt = np.zeros((grid.size, len(names))), prior.copy(), -prior @ now
+        for c, j in system.motion.items():
+            w = sparse.diags(system.weights[c])
+            wj = (w @ j).T.tocsr()
+            h = h + wj @ j
+            b = b + wj @ system.white[c]
+            hxt += wj @ system.by_faults[c]
+            wt = system.weights[c][:, None] * system.by_faults[c]
+            htt += wt.T @ system.by_faults[c]
+            bt += wt.T @ system.white[c]
+        band = _Band(h)
+        across = band.solve(hxt)
+        schur = htt - hxt.T @ across
+        std = np.sqrt(np.diag(np.linalg.inv(schur)))
+        step = np.linalg.solve(schur, bt - across.T @ b)
+        step = _bounded(step, names, faults)
+        dx = band.solve(b - hxt @ step)
+        x = x + dx
+        for name, change in zip(names, step, strict=True):
+            faults[name] += float(change)
+        moved = float(np.max(np.abs(step) / std, initial=0.0))
+        settled = count >= _LEAST_ROUNDS and moved < _SETTLED
+        if settled:
+            break
+        # The same numbers in each round: then the rounds converge.
+        drawn = band.draw(numbers)
+        if count > 1:
+            for r in readings:
+                c = r.channel
+                left = system.errors[c] - system.raw_motion[c] @ dx - system.raw_faults[c] @ step
+                errors = left[None, :] - (system.raw_motion[c] @ drawn).T
+                colours[c] = fit_colour(errors, runs[c], floors[c], _ORDER)
+            if count % _ROAD_ROUNDS == 0:
+                for signal in SLOW:
+                    road[signal] = _road(steps[signal], x, band, road[signal])
+    inverse = as_float64(np.linalg.inv(schur))
+    robust = [
+        np.diag(inverse @ _meat(readings, system, across, block) @ inverse) for block in _BLOCKS_S
+    ]
+    covariance = _inflated(inverse, np.max(robust, axis=0))
+    return Estimate(
+        faults,
+        covariance,
+        schur,
+        np.diag(prior),
+        colours,
+        _offsets(grid, x, band, across, inverse),
+        road,
+        x,
+        grid,
+        count,
+        settled,
+    )
+
+
+def noise_of(
+    readings: Sequence[Readings], found: Estimate, floors: dict[str, float]
+) -> dict[str, tuple[Colour, FloatArray]]:
+    """Noise of each channel at its own rate, and what it should have read."""
+    result = {}
+    for r in readings:
+        expected, _, _ = predict(r, found.grid, found.x, found.faults)
+        run = neighbours(r.stretch, r.time_s)
+        result[r.channel] = (
+            fit_colour((r.values - expected)[None], run, floors[r.channel]),
+            expected,
+        )
+    return result
+
+
+def _begin(
+    readings: Sequence[Readings],
+    grid: Grid,
+    runs: dict[str, IntArray],
+    floors: dict[str, float],
+) -> tuple[FloatArray, dict[str, Colour]]:
+    """Motion from speeds and yaw rate alone, noise from second differences."""
+    rows = [grid.levels, *(grid.bends(s) / _ROUGH[s] for s in QUICK)]
+    values, colours = [np.zeros(row.shape[0]) for row in rows], {}
+    for r in readings:
+        c = r.channel
+        second = np.diff(r.values, 2)
+        std = float(np.sqrt(np.mean(np.clip(second, *np.percentile(second, (2, 98))) ** 2) / 6.0))
+        std = max(std, floors[c])
+        colours[c] = Colour(std, std, np.empty(0))
+        if c in ("vx_mps", "vy_mps", "yaw_rate_radps"):
+            _, j, _ = predict(r, grid, np.zeros(grid.size), {})
+            rows.append(j / std)
+            values.append(r.values / std)
+    j = sparse.vstack(rows, format="csr")
+    return _Band(j.T @ j).solve(j.T @ np.concatenate(values)), colours
+
+
+def _linearise(
+    readings: Sequence[Readings],
+    grid: Grid,
+    x: FloatArray,
+    faults: dict[str, float],
+    colours: dict[str, Colour],
+    runs: dict[str, IntArray],
+) -> _System:
+    names = list(faults)
+    system = _System({}, {}, {}, {}, {}, {}, {})
+    for r in readings:
+        c = r.channel
+        expected, j, by = predict(r, grid, x, faults)
+        jt = np.column_stack([by.get(name, np.zeros(expected.size)) for name in names])
+        a = colours[c].whitener(runs[c])
+        error = r.values - expected
+        white = a @ error
+        system.errors[c], system.raw_motion[c], system.raw_faults[c] = error, j, jt
+        system.motion[c], system.by_faults[c], system.white[c] = a @ j, a @ jt, white
+        system.weights[c] = np.minimum(1.0, _OUTLIER / np.maximum(np.abs(white), 1e-12))
+    return system
+
+
+def _bounded(step: FloatArray, names: Sequence[str], faults: dict[str, float]) -> FloatArray:
+    result = step.copy()
+    for i, name in enumerate(names):
+        if name.startswith("delay."):
+            change = float(np.clip(step[i], -_STEP_S, _STEP_S))
+            to = float(np.clip(faults[name] + change, -_LARGEST_DELAY_S, _LARGEST_DELAY_S))
+            result[i] = to - faults[name]
+        else:
+            most = 10.0 * FAULTS[name].typical
+            result[i] = float(np.clip(step[i], -most, most))
+    return result
+
+
+def _road(rows: sparse.csr_matrix, x: FloatArray, band: _Band, now: float) -> float:
+    """New standard deviation of the change within a second (EM, exact)."""
+    inverse = band.solve(np.asarray(rows.T.todense()))
+    spread = np.asarray((rows @ inverse).diagonal()) if rows.shape[0] else np.zeros(1)
+    change = rows @ x
+    # The step of EM is too short where the road hardly moves: MacKay's is taken where it is safe.
+    seen = rows.shape[0] - float(spread.sum()) / now**2
+    em = float(np.mean(change**2 + spread))
+    quick = float(change @ change) / max(seen, 0.3 * rows.shape[0])
+    best = min(em, quick) if seen > 0.05 * rows.shape[0] else em
+    return float(np.sqrt(max(best, _LEAST_ROAD_MPS2**2)))
+
+
+def _meat(
+    readings: Sequence[Readings], system: _System, across: FloatArray, block_s: float
+) -> FloatArray:
+    """Sum over blocks of time of the squared scores of the faults, free of the motion."""
+    k = across.shape[1]
+    sums: dict[tuple[int, int], FloatArray] = {}
+    for r in readings:
+        c = r.channel
+        own = system.by_faults[c] - system.motion[c] @ across
+        scores = own * (system.weights[c] * system.white[c])[:, None]
+        block = np.floor(r.time_s / block_s).astype(np.intp)
+        keys, at = np.unique(np.stack([r.stretch, block], 1), axis=0, return_inverse=True)
+        total = np.zeros((len(keys), k))
+        np.add.at(total, np.ravel(at), scores)
+        for key, row in zip(map(tuple, keys.tolist()), total, strict=True):
+            sums[key] = sums.get(key, 0.0) + row
+    stacked = np.array(list(sums.values()))
+    result: FloatArray = stacked.T @ stacked
+    return result
+
+
+def _inflated(naive: FloatArray, robust: FloatArray) -> FloatArray:
+    """Covariance whose variances are the larger of two; few blocks make the second one noisy."""
+    ratio = np.clip(robust / np.diag(naive), 1.0, None)
+    scale = np.sqrt(ratio)
+    result: FloatArray = naive * np.outer(scale, scale)
+    return result
+
+
+def _offsets(
+    grid: Grid, x: FloatArray, band: _Band, across: FloatArray, inverse: FloatArray
+) -> dict[str, tuple[float, float]]:
+    found = {}
+    for signal in SLOW:
+        at = grid.index[signal]
+        mean = np.zeros(grid.size)
+        mean[at] = 1.0 / at.size
+        back = mean @ across
+        variance = float(mean @ band.solve(mean)) + float(back @ inverse @ back)
+        found[signal] = (float(mean @ x), float(np.sqrt(variance)))
+    return found

@@ -1,0 +1,151 @@
+"""The faults of a sensor as they are told: values with intervals, or why they cannot be told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from ._estimate import Estimate
+from ._texts import DEG, why_not
+
+__all__ = ["SensorFault", "faults_of"]
+
+_Z95 = 1.959964
+_FALSE_CLAIMS = 0.01  # over all faults of one check
+_LEARNED = 0.5  # share of what is known of a fault that has to come from the log
+
+
+@dataclass(frozen=True)
+class SensorFault:
+    """A fault that a sensor may have.
+
+    Attributes
+    ----------
+    name : str
+        Name of the fault, with its unit.
+    channel : str
+        Channel that shows it.
+    title : str
+        What it is, in words.
+    value, std : float
+        Estimate and standard deviation [`unit`].
+    unit : str
+        Unit.
+    told : bool
+        Whether the log tells the fault well enough to say whether it is there.
+    found : bool
+        Whether it is there: different from zero, at a level of 1 % over all faults together.
+    why_not : str
+        Why it cannot be told; empty where it can.
+    """
+
+    name: str
+    channel: str
+    title: str
+    value: float
+    std: float
+    unit: str
+    told: bool
+    found: bool
+    why_not: str = ""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Bounds that hold the true value with a probability of 95 %."""
+        return self.value - _Z95 * self.std, self.value + _Z95 * self.std
+
+    def __str__(self) -> str:
+        scale, unit = _SHOWN.get(self.unit, (1.0, self.unit))
+        low, high = (scale * x for x in self.interval)
+        tail = f" {unit}" if unit else ""
+        return f"{self.title}: {scale * self.value:.3g}{tail} (95 %: {low:.3g} to {high:.3g})"
+
+
+@dataclass(frozen=True)
+class _Told:
+    """A fault as it is told: sum of estimated ones; `enough` is a useful half interval."""
+
+    name: str
+    channel: str
+    title: str
+    unit: str
+    of: tuple[str, ...]
+    enough: float
+
+
+_SHOWN = {"s": (1000.0, "ms"), "rad": (1.0 / DEG, "deg"), "": (100.0, "%")}
+_TOLD = (
+    _Told("delay_vx_s", "vx_mps", "delay against ax_mps2", "s",
+          ("delay.speeds", "delay.vx_mps"), 0.03),
+    _Told("delay_vy_s", "vy_mps", "delay against yaw_rate_radps", "s",
+          ("delay.speeds", "delay.vy_mps"), 0.03),
+    _Told("delay_ay_s", "ay_mps2", "delay against yaw_rate_radps", "s",
+          ("delay.ay_mps2",), 0.02),
+    _Told("gain_yaw_rate", "yaw_rate_radps", "scale error", "",
+          ("gain.yaw_rate_radps",), 0.02),
+    _Told("gain_ax", "ax_mps2", "scale error, or gravity by pitch", "", ("gain.ax_mps2",), 0.04),
+    _Told("gain_ay", "ay_mps2", "scale error, or gravity by roll", "", ("gain.ay_mps2",), 0.04),
+    _Told("bias_yaw_rate_radps", "yaw_rate_radps", "bias", "rad/s",
+          ("bias.yaw_rate_radps",), 0.01),
+    _Told("bias_vy_mps", "vy_mps", "bias", "m/s", ("bias.vy_mps",), 0.2),
+    _Told("imu_forward_m", "ay_mps2", "IMU ahead of the speed sensor", "m", ("arm_x",), 0.3),
+    _Told("imu_left_m", "ax_mps2", "IMU left of the speed sensor", "m", ("arm_y",), 0.3),
+    _Told("imu_turn_rad", "ay_mps2", "IMU turned to the left of the speed sensor", "rad",
+          ("turn",), 0.03),
+)  # fmt: skip
+
+
+def faults_of(found: Estimate, absent: Sequence[str]) -> tuple[SensorFault, ...]:
+    """Say what an estimate tells of each fault."""
+    names = list(found.faults)
+    naive = np.linalg.inv(found.information)
+    rows = [t for t in _TOLD if t.of[-1] in names]
+    critical = float(stats.norm.isf(0.5 * _FALSE_CLAIMS / len(rows)))
+    result = []
+    for told in _TOLD:
+        if told not in rows:
+            why = why_not(told.name, absent=absent)
+            result.append(
+                SensorFault(
+                    told.name, told.channel, told.title, 0.0, math.inf, told.unit, False, False, why
+                )
+            )
+            continue
+        pick = np.array([1.0 if name in told.of else 0.0 for name in names])
+        value = float(pick @ np.array([found.faults[name] for name in names]))
+        std = float(np.sqrt(pick @ found.covariance @ pick))
+        prior = 1.0 / float(np.sum(1.0 / found.prior[pick > 0.0]))
+        learned = 1.0 - float(pick @ naive @ pick) * prior
+        claimed = abs(value) > critical * std and learned > 0.0
+        well = learned > _LEARNED and _Z95 * std < told.enough
+        reason = "" if claimed or well else _confounded(told, pick, found, naive, names)
+        result.append(
+            SensorFault(
+                told.name, told.channel, told.title, value, std, told.unit, claimed or well,
+                claimed, reason,
+            )
+        )  # fmt: skip
+    return tuple(result)
+
+
+def _confounded(
+    told: _Told,
+    pick: np.ndarray,
+    found: Estimate,
+    naive: np.ndarray,
+    names: Sequence[str],
+) -> str:
+    """What takes the information away: the driving, or another fault."""
+    own = int(np.argmax(pick * np.arange(1, pick.size + 1)))
+    data = max(found.information[own, own] - found.prior[own], 1e-300)
+    alone = 1.0 / math.sqrt(data)
+    if _Z95 * alone > told.enough:
+        return why_not(told.name, alone=alone)
+    along = naive @ pick
+    correlation = np.abs(along) / np.sqrt(np.diag(naive) * float(pick @ along))
+    correlation[pick > 0.0] = 0.0
+    return why_not(told.name, other=names[int(np.argmax(correlation))])

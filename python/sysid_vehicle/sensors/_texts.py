@@ -1,0 +1,75 @@
+"""Sentences about sensors, and lines for the channel map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+__all__ = ["DEG", "GRAVITY_MPS2", "ON_CORRECTION", "gradient", "map_line", "why_not"]
+
+DEG = math.pi / 180.0
+GRAVITY_MPS2 = 9.80665
+
+_NEEDS_EXCITATION = {
+    "delay_vx_s": "the car hardly accelerates or brakes",
+    "delay_vy_s": "the lateral speed hardly changes",
+    "delay_ay_s": "the car hardly changes its lateral acceleration",
+    "gain_yaw_rate": "the car hardly turns",
+    "gain_ax": "the car hardly accelerates or brakes",
+    "gain_ay": "the car hardly corners",
+    "bias_yaw_rate_radps": "the speed hardly changes; a bias then acts like a banked road",
+    "bias_vy_mps": "the car hardly turns",
+    "imu_forward_m": "the yaw rate changes too slowly",
+    "imu_left_m": "the yaw rate changes too slowly",
+    "imu_turn_rad": "the car hardly corners",
+}
+_OTHER = {
+    "delay.speeds": "a delay of the speeds",
+    "delay.vx_mps": "a delay of vx_mps",
+    "delay.vy_mps": "a delay of vy_mps",
+    "delay.ay_mps2": "a delay of ay_mps2",
+    "gain.yaw_rate_radps": "the scale of yaw_rate_radps",
+    "gain.ax_mps2": "the scale of ax_mps2",
+    "gain.ay_mps2": "the scale of ay_mps2",
+    "bias.yaw_rate_radps": "a bias of yaw_rate_radps",
+    "bias.vy_mps": "a bias of vy_mps",
+    "arm_x": "an IMU ahead of the speed sensor",
+    "arm_y": "an IMU left of the speed sensor",
+    "turn": "a turned IMU",
+}
+ON_CORRECTION = (
+    "delay of steer_rad: kinematics does not know the steering",
+    "delay of ax_mps2 against yaw_rate_radps: the two meet in vy_mps * yaw_rate_radps alone",
+    "place of the centre of gravity: kinematics knows only where the IMU is from the speed sensor",
+    "scale of the speeds: they are the yardstick of length",
+    "bias of ax_mps2 and ay_mps2: a road that is not level looks the same",
+)
+
+
+def why_not(name: str, *, absent: Sequence[str] = (), alone: float = 0.0, other: str = "") -> str:
+    """Why a fault cannot be told: channels are missing, the driving is dull, or another acts so."""
+    if absent:
+        return f"because {' and '.join(absent)} {'is' if len(absent) == 1 else 'are'} not logged"
+    if alone:
+        return f"because {_NEEDS_EXCITATION[name]}"
+    return f"because {_OTHER[other]} acts alike in this driving"
+
+
+def gradient(gain: float) -> float:
+    """Attitude per lateral or longitudinal acceleration that would give this gain [deg/g]."""
+    return gain / DEG
+
+
+def map_line(channel: str, delay_s: float, gain: float, bias: float) -> str:
+    """The entry of a channel map that puts a channel right.
+
+    The logged value is ``(1 + gain) true + bias``, `delay_s` late.
+    """
+    parts = ["column = ..."]
+    if gain:
+        parts.append(f"factor = {1.0 / (1.0 + gain):.5g}")
+    if bias:
+        parts.append(f"offset = {-bias / (1.0 + gain):.4g}")
+    if delay_s:
+        parts.append(f"delay_s = {delay_s:.3g}")
+    return f"{channel} = {{ {', '.join(parts)} }}"

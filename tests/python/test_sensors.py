@@ -1,0 +1,195 @@
+"""The check of the sensors against drives whose sensors have known faults."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle.cli.main import main
+from sysid_vehicle.simulate import drive_truth
+
+Channels = dict[str, np.ndarray]
+NOISE = sv.SensorNoise()
+
+
+@pytest.fixture(scope="module")
+def perfect() -> Channels:
+    """30 s of a handling course as sensors without noise and faults would write it."""
+    truth = sv.Model(sv.example_vehicle())
+    push = sv.RoadDisturbance(150.0, 200.0, 100.0, 0.3)
+    course = sv.manoeuvres.handling_course()
+    none = sv.SensorNoise.none()
+    log = drive_truth(truth, course, seed=11, noise=none, disturbance=push).log.between(0.0, 30.0)
+    return {name: np.array(log[name]) for name in log.channels}
+
+
+def noisy(channels: Channels, seed: int = 5) -> Channels:
+    rng = np.random.default_rng(seed)
+    n = channels["time_s"].size
+    return {
+        name: values + getattr(NOISE, name, 0.0) * rng.standard_normal(n)
+        for name, values in channels.items()
+    }
+
+
+def as_log(channels: Channels) -> sv.Log:
+    return sv.Log.from_arrays(channels, name="drive", check=False)
+
+
+def with_faults(perfect: Channels) -> Channels:
+    """Roll gradient of 5 deg/g, IMU 0.4 m ahead, gyro bias of 0.01 rad/s, v_y 30 ms late."""
+    c = dict(perfect)
+    dr = np.gradient(c["yaw_rate_radps"], c["time_s"])
+    c["ax_mps2"] = c["ax_mps2"] - 0.4 * c["yaw_rate_radps"] ** 2
+    c["ay_mps2"] = (1.0 + np.radians(5.0)) * (c["ay_mps2"] + 0.4 * dr)
+    c["vy_mps"] = np.interp(c["time_s"] - 0.03, c["time_s"], c["vy_mps"])
+    c["yaw_rate_radps"] = c["yaw_rate_radps"] + 0.01
+    return noisy(c)
+
+
+TRUTH = {
+    "gain_ay": np.radians(5.0),
+    "imu_forward_m": 0.4,
+    "bias_yaw_rate_radps": 0.01,
+    "delay_vy_s": 0.03,
+}
+
+
+@pytest.fixture(scope="module")
+def faulty(perfect: Channels) -> sv.SensorCheck:
+    return sv.check(as_log(with_faults(perfect)))
+
+
+def test_good_sensors_are_called_good(perfect: Channels) -> None:
+    found = sv.check(as_log(noisy(perfect)))
+    assert found.found == ()
+    assert found.map_lines == ()
+    assert "sensors agree" in str(found)
+    for fault in found.faults:
+        assert abs(fault.value) < 3.5 * fault.std, fault
+    assert found.noise["ay_mps2"][0].std == pytest.approx(NOISE.ay_mps2, rel=0.15)
+    assert found.noise["vx_mps"][0].std == pytest.approx(NOISE.vx_mps, rel=0.1)
+
+
+def test_faults_are_named_with_their_size(faulty: sv.SensorCheck) -> None:
+    assert {fault.name for fault in faulty.found} == set(TRUTH)
+    for name, true in TRUTH.items():
+        fault = faulty[name]
+        assert abs(fault.value - true) < 3.0 * fault.std, fault
+        assert fault.std < 0.1 * true, fault
+    low, high = faulty["gain_ay"].interval
+    assert low < np.radians(5.0) < high
+    assert any("roll gradient" in text for text in faulty.remarks)
+    assert {line.split()[0] for line in faulty.map_lines} == {
+        "vy_mps", "yaw_rate_radps", "ay_mps2"
+    }  # fmt: skip
+
+
+def test_a_log_put_right_holds_no_fault_any_more(faulty: sv.SensorCheck, perfect: Channels) -> None:
+    right = faulty.apply(faulty.logs[0])
+    assert len(right.corrections) == 3
+    assert right.corrections[0] in str(right)
+    assert right.between(5.0, 10.0).corrections == right.corrections
+    for name, most in (("ay_mps2", 0.1), ("vy_mps", 0.04), ("yaw_rate_radps", 3e-3)):
+        inside = slice(100, -100)
+        error = right[name][inside] - perfect[name][inside]
+        assert float(np.sqrt(np.mean(error**2))) < most, name
+    assert sv.check(right).found == ()
+    # What was not found to be wrong stays as it was.
+    assert right["steer_rad"] is faulty.logs[0]["steer_rad"]
+    assert np.array_equal(right["vx_mps"], faulty.logs[0]["vx_mps"])
+
+
+def test_a_slow_channel_enters_at_its_own_times(perfect: Channels) -> None:
+    c = with_faults(perfect)
+    for name in ("vx_mps", "vy_mps"):
+        slow = np.full(c[name].size, np.nan)
+        slow[::5] = c[name][::5]
+        c[name] = slow
+    found = sv.check(as_log(c))
+    assert {s.channel: s.rate_hz for s in found.signals}["vy_mps"] == pytest.approx(20.0)
+    for name in ("gain_ay", "delay_vy_s"):
+        assert abs(found[name].value - TRUTH[name]) < 3.5 * found[name].std
+        assert found[name].found
+
+
+def test_what_is_not_logged_cannot_be_told(perfect: Channels) -> None:
+    c = noisy(perfect)
+    del c["vy_mps"]
+    found = sv.check(as_log(c))
+    assert found.found == ()
+    lost = {fault.name: fault.why_not for fault in found.not_told}
+    assert lost["imu_forward_m"] == "because vy_mps is not logged"
+    assert "cannot be told: IMU ahead" in str(found)
+    assert "sensor_delay" not in found.settles
+
+
+def test_held_and_quantised_channels_are_seen(perfect: Channels) -> None:
+    c = noisy(perfect)
+    c["ay_mps2"] = np.repeat(c["ay_mps2"][::2], 2)[: c["ay_mps2"].size]
+    c["yaw_rate_radps"] = 0.005 * np.round(c["yaw_rate_radps"] / 0.005)
+    found = sv.check(as_log(c))
+    by = {s.channel: s for s in found.signals}
+    assert by["ay_mps2"].held_rows == pytest.approx(2.0)
+    assert by["ay_mps2"].rate_hz == pytest.approx(50.0)
+    assert by["yaw_rate_radps"].quantum == pytest.approx(0.005)
+    assert by["vx_mps"].quantum == 0.0
+    assert by["vx_mps"].held_rows == 0.0
+    assert found.found == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"yaw_rate_radps": -1.0}, "positive to the right"),
+        ({"ay_mps2": 1.0 / 9.80665}, "factor = 9.80665 for ay_mps2"),
+        ({"yaw_rate_radps": 57.29578}, "factor = 0.01745329 for yaw_rate_radps"),
+        ({"vx_mps": 3.6}, "factor = 0.2777778 for vx_mps"),
+    ],
+)
+def test_mirrored_channels_and_wrong_units_are_refused(
+    perfect: Channels, change: dict[str, float], said: str
+) -> None:
+    c = {name: change.get(name, 1.0) * values for name, values in noisy(perfect).items()}
+    with pytest.raises(sv.InvalidInput, match=said):
+        sv.check(as_log(c))
+
+
+def test_swapped_accelerations_are_refused(perfect: Channels) -> None:
+    c = noisy(perfect)
+    c["ax_mps2"], c["ay_mps2"] = c["ay_mps2"], c["ax_mps2"]
+    with pytest.raises(sv.InvalidInput, match="swapped"):
+        sv.check(as_log(c))
+
+
+def test_no_driving_is_refused(perfect: Channels) -> None:
+    c = {name: np.zeros_like(v) if name == "vx_mps" else v for name, v in perfect.items()}
+    with pytest.raises(sv.InvalidInput, match="nowhere does the car move"):
+        sv.check(as_log(c))
+    with pytest.raises(sv.InvalidInput, match="at least one"):
+        sv.check([])
+
+
+def test_result_shows_itself(faulty: sv.SensorCheck) -> None:
+    assert "<table>" in faulty._repr_html_()
+    json.dumps(faulty.to_dict())
+    with pytest.raises(sv.InvalidInput, match="imu_forward_m"):
+        faulty["imu_forwards_m"]
+    with pytest.raises(sv.InvalidInput, match="was not checked"):
+        faulty.residuals("fx_n")
+
+
+def test_command_prints_and_writes(
+    faulty: sv.SensorCheck, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    faulty.logs[0].to_csv(tmp_path / "drive.csv")
+    told = tmp_path / "told.json"
+    page = tmp_path / "check.html"
+    command = ["check", str(tmp_path / "drive.csv"), "--json", str(told), "--report", str(page)]
+    assert main(command) == 0
+    assert "IMU ahead of the speed sensor" in capsys.readouterr().out
+    faults = json.loads(told.read_text(encoding="utf-8"))["faults"]
+    assert faults["imu_forward_m"]["found"]
+    assert page.read_text(encoding="utf-8").count("<figure>") == 5
