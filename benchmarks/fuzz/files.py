@@ -16,11 +16,10 @@ from sysid_vehicle.read import ChannelMap
 
 Case = dict[str, Any]
 
-_CSV = b"""time_s,vx_mps,yaw_rate_radps,ay_mps2,steer_rad
-""" + b"".join(
-    f"{0.01 * k:.2f},{20 + 0.1 * np.sin(k):.4f},{0.1 * np.sin(0.05 * k):.5f},"
-    f"{2 * np.sin(0.05 * k):.4f},{0.01 * np.sin(0.05 * k):.6f}\n".encode()
-    for k in range(60)
+_CSV = b"time_s,vx_mps,yaw_rate_radps,ax_mps2,ay_mps2,steer_rad\n" + b"".join(
+    f"{0.05 * k:.2f},20.0,{0.1 * np.sin(0.25 * k):.5f},0.01,{2 * np.sin(0.25 * k):.4f},"
+    f"{0.01 * np.sin(0.25 * k):.6f}\n".encode()
+    for k in range(120)
 )
 _VEHICLE = b"""mass_kg = 1500.0
 lf_m = 1.2
@@ -32,8 +31,14 @@ drag_area_m2 = 0.7
 brake_front_share = 0.6
 drive_front_share = 0.0
 
-[tyre_front]
+[tyre.front]
 B = 10.0
+C = 1.4
+D = 1.0
+E = 0.0
+
+[tyre.rear]
+B = 11.0
 C = 1.4
 D = 1.0
 E = 0.0
@@ -57,6 +62,7 @@ _WORDS = (
     b"\xef\xbb\xbf", b"\r", b"\r\n", b";", b",", b",,,,", b'"', b"'", b"[", b"]]", b"{", b"=", b"#",
     b"true", b"1979-05-27", b"[" * 500, b"1" * 5000, b"1j", b"\xe2\x88\x9212", b"1,5", b"time_s",
 )  # fmt: skip
+_DIGITS = [bytes([byte]) for byte in b"0123456789"] + [b"-1", b".", b"e9", b"e-9", b"e300", b"nan"]
 
 
 def draw(number: int) -> Case:
@@ -64,6 +70,11 @@ def draw(number: int) -> Case:
     rng = np.random.default_rng([number, 21])
     reader = str(rng.choice(sorted(READERS)))
     text = bytearray(READERS[reader][0])
+    if rng.random() < 0.5:  # other numbers, so that what comes after the syntax is reached too
+        digits = [k for k, byte in enumerate(text) if byte in b"0123456789"]
+        for at in rng.choice(digits, rng.integers(0, 6)):
+            text[at : at + 1] = _DIGITS[rng.integers(len(_DIGITS))]
+        return {"reader": reader, "bytes": base64.b64encode(bytes(text)).decode()}
     for _ in range(rng.integers(1, 8)):
         at = int(rng.integers(0, len(text) + 1))
         end = at + int(rng.geometric(0.1))

@@ -70,6 +70,13 @@ def test_what_was_once_found(fuzz: ModuleType, path: Path) -> None:
         assert verdict.state != "wrong", f"{name}: {verdict.words}"
 
 
+@pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")
+def test_files_before_they_are_spoilt_are_right(fuzz: ModuleType, tmp_path: Path) -> None:
+    for name, (text, reader) in sys.modules["files"].READERS.items():
+        (tmp_path / name).write_bytes(text)
+        reader(tmp_path / name)
+
+
 def test_spoilt_files(fuzz: ModuleType) -> None:
     for number in range(300):
         case = sys.modules["files"].draw(number)

@@ -52,6 +52,7 @@ _WHEELBASE_M, _WHEELBASE_DOUBT = 2.9, 0.45
 _UNDERSTEER, _UNDERSTEER_DOUBT = 0.002, 0.003
 _NOT_A_WHEELBASE = 3.5
 _OFFSET = 0.3  # of the steering angle, as a share of its size
+_LEAST_OFFSET_RAD = 1e-6  # a steering angle that stays at zero has no size
 
 _YAW_DEG = ("yaw_rate_radps", "degrees per second", f"factor = {DEG}")
 _AY_G = ("ay_mps2", "g", "factor = 9.80665")
@@ -212,7 +213,8 @@ def _check_steer(drive: Drive) -> None:
     yaw = drive.change(c["yaw_rate_radps"])
     columns = [curvature[rows], yaw[rows], np.ones(np.count_nonzero(rows))]
     # On a circle of one radius only a small offset keeps the slope from being anything.
-    answer = fit(steer[rows], columns, [np.inf, np.inf, _OFFSET * size_of(steer[rows])])
+    offset = max(_OFFSET * size_of(steer[rows]), _LEAST_OFFSET_RAD)
+    answer = fit(steer[rows], columns, [np.inf, np.inf, offset])
     alone = cosine(curvature[rows], steer[rows])
     if answer.coherence < 0.25 and abs(alone) < 0.45 and spread_of(ay[rows]) > _CLEARLY:
         raise InvalidInput(
