@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -104,6 +105,23 @@ def test_a_late_yaw_rate_is_told_and_no_inertia_is_named(
     assert found.verdict == "unknown"
     assert all(a.stands_in for a in found.added)
     assert "yaw_rate_radps: lags behind" in str(found)
+
+
+def test_without_evidence_what_is_wrong_is_told_all_the_same(
+    truth: Model, fit: Fit, course: Log, altered: Callable[..., Log]
+) -> None:
+    dx = diagnose(fit, candidates=["steer_offset"])
+    assert not dx.significant
+    assert str(dx).startswith("no effect of the catalogue is missing; nothing left")
+    incomplete = replace(dx, omnibus=Omnibus(450.0, 50, 1e-60, "F_y"))
+    assert str(incomplete).startswith(
+        "no effect of the catalogue explains what is missing: something is left"
+    )
+    time_s = course["time_s"]
+    late = altered(course, ay_mps2=np.interp(time_s - 0.1, time_s, course["ay_mps2"]))
+    wrong = replace(dx, driving=Driving.of(late))
+    with pytest.raises(InvalidInput, match="readings are wrong: ay_mps2: lags behind"):
+        _ = wrong.best
 
 
 def test_what_the_model_delays_itself_is_no_contradiction(
