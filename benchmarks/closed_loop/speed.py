@@ -40,6 +40,12 @@ def smallest(run: Callable[[], object], repeats: int) -> float:
     return min(times)
 
 
+def first(record: ObserverRecord, samples: int) -> ObserverRecord:
+    """The first samples of a record."""
+    keys = [f.name for f in dataclasses.fields(record) if f.name not in ("rate_hz", "name")]
+    return dataclasses.replace(record, **{key: getattr(record, key)[:samples] for key in keys})
+
+
 def compare(record: ObserverRecord, form: ObserverForm, title: str) -> None:
     noise = ObserverNoise.published()
     Q, R = noise.process, noise.sensors
@@ -92,8 +98,7 @@ def main() -> None:
     options = parser.parse_args()
     record = golden(options.logs).record
     if options.quick:
-        keys = [f.name for f in dataclasses.fields(record) if f.name not in ("rate_hz", "name")]
-        record = dataclasses.replace(record, **{key: getattr(record, key)[:1500] for key in keys})
+        record = first(record, 1500)
     print(f"{len(record.readings)} samples")
     print("what                     core [ms]  NumPy [ms]  ratio   of Octave's published, target")
     compare(record, ObserverForm.published(), "published")

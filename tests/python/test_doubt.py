@@ -1,6 +1,8 @@
 """On readings that no car gives, nothing is named; what is wrong with them is."""
 
+import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from sysid_vehicle import (
     manoeuvres,
     verdicts,
 )
-from sysid_vehicle.compare import unrelated
+from sysid_vehicle.compare import out_of_time, unrelated
 from sysid_vehicle.diagnose import Omnibus
 from sysid_vehicle.diagnose.doubt import confirmed, doubt
 from sysid_vehicle.effects import effect
@@ -81,6 +83,63 @@ def test_what_its_refit_does_not_confirm_is_not_named(
     dx = diagnose(identify(truth, log, starts=1))
     assert dx.named is None or confirmed(dx.named.statistic, dx.named.effect)
     assert not [v for v in verdicts(dx).all if v.finding in ("missing", "one of a group")]
+
+
+def test_a_late_yaw_rate_is_told_and_no_inertia_is_named(
+    truth: Model, clean: Log, altered: Callable[..., Log]
+) -> None:
+    """To the model the car answers as one of larger yaw inertia does."""
+    time_s = clean["time_s"]
+    log = altered(clean, yaw_rate_radps=np.interp(time_s - 0.1, time_s, clean["yaw_rate_radps"]))
+    few = ["yaw_inertia", "tyre_relaxation"]
+    fit = identify(truth, log, starts=1)
+    dx = diagnose(fit, candidates=few)
+    assert dx.significant[0].id == "yaw_inertia"
+    assert dx.named is None
+    told = re.search(r"yaw_rate_radps: lags behind ay_mps2 by (\S+) s \(\+- (\S+)\)", dx.doubt)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(0.1, abs=2.0 * float(told[2]))
+    assert float(told[2]) < 0.02
+    assert not [v for v in verdicts(dx).all if v.finding in NAMED]
+    found = improve(truth, log, log, starts=1, candidates=few)
+    assert found.verdict == "unknown"
+    assert all(a.stands_in for a in found.added)
+    assert "yaw_rate_radps: lags behind" in str(found)
+
+
+def test_without_evidence_what_is_wrong_is_told_all_the_same(
+    truth: Model, fit: Fit, course: Log, altered: Callable[..., Log]
+) -> None:
+    dx = diagnose(fit, candidates=["steer_offset"])
+    assert not dx.significant
+    assert str(dx).startswith("no effect of the catalogue is missing; nothing left")
+    incomplete = replace(dx, omnibus=Omnibus(450.0, 50, 1e-60, "F_y"))
+    assert str(incomplete).startswith(
+        "no effect of the catalogue explains what is missing: something is left"
+    )
+    time_s = course["time_s"]
+    late = altered(course, ay_mps2=np.interp(time_s - 0.1, time_s, course["ay_mps2"]))
+    wrong = replace(dx, driving=Driving.of(late))
+    with pytest.raises(InvalidInput, match="readings are wrong: ay_mps2: lags behind"):
+        _ = wrong.best
+
+
+def test_what_the_model_delays_itself_is_no_contradiction(
+    clean: Log, altered: Callable[..., Log]
+) -> None:
+    time_s = clean["time_s"]
+
+    def late(name: str, by_s: float, *effects: str) -> dict[str, str]:
+        log = altered(clean, **{name: np.interp(time_s - by_s, time_s, clean[name])})
+        return out_of_time(Driving.of(log), effects)
+
+    assert out_of_time(Driving.of(clean), ()) == {}
+    assert set(late("yaw_rate_radps", 0.1)) == {"yaw_rate_radps"}
+    assert late("yaw_rate_radps", 0.1, "sensor_delay") == {}
+    assert set(late("yaw_rate_radps", 0.1, "steer_delay")) == {"yaw_rate_radps"}
+    assert set(late("steer_rad", 0.1, "steer_delay")) == {"steer_rad"}
+    assert set(late("steer_rad", -0.25)) == {"steer_rad"}
+    assert late("steer_rad", -0.25, "steer_delay") == {}
 
 
 def test_a_missing_effect_is_named_and_others_stay_open(

@@ -3,10 +3,13 @@
 A noise model learns whatever spread the prediction errors have, so that normalised errors never
 look gross. What tells is the channel's own variance: readings that the other channels predict
 worse than their own mean does have nothing to do with them, and readings that follow the
-prediction at another scale are in another unit, or turned round.
+prediction at another scale are in another unit, or turned round. And the laws of motion tell which
+channel comes late.
 """
 
 from __future__ import annotations
+
+from collections.abc import Collection
 
 import numpy as np
 
@@ -15,7 +18,7 @@ from .._text import number
 from ..estimate import MEASURED, Driving
 from ..estimate.inputs import white_noise_std
 
-__all__ = ["unrelated"]
+__all__ = ["out_of_time", "unrelated"]
 
 _IGNORANT = 2.0  # times the usual spread
 _WORSE = 1.1  # of the channel's variance: a prediction that errs more is worse than the mean
@@ -23,6 +26,8 @@ _FELT = 0.1  # of the channel's variance, which a prediction must have to be cal
 _SIGNAL = 0.5  # of the variance of a prediction: the rest is white noise
 _ALIKE = 0.5  # square of the correlation, beyond which readings follow their prediction
 _SCALES = (0.5, 2.0)
+_DELAYS_SENSORS = {"sensor_delay"}
+_DELAYS_STEERING = {"steer_delay", "steer_lag", "steer_compliance", "tyre_relaxation"}
 
 
 def unrelated(driving: Driving, innovation: FloatArray, spread: FloatArray) -> dict[str, str]:
@@ -66,3 +71,32 @@ def unrelated(driving: Driving, innovation: FloatArray, spread: FloatArray) -> d
             told = f"{name}: the other channels predict it worse than its own mean does"
             found.append((missed / own, name, f"{told}; check what the column holds"))
     return {name: text for _, name, text in sorted(found, reverse=True)}
+
+
+def out_of_time(driving: Driving, effects: Collection[str]) -> dict[str, str]:
+    """Find the channels that come later or earlier than the laws of motion allow.
+
+    Effects that move forces seem to explain such readings: a yaw rate that is late looks like a
+    larger yaw inertia.
+
+    Parameters
+    ----------
+    driving : Driving
+    effects : collection of str
+        Of the model; what it delays itself is no contradiction.
+
+    Returns
+    -------
+    dict of str to str
+        A sentence for each such channel, with the lag and its interval.
+    """
+    delayed = set(MEASURED) | {"steer_rad"} if _DELAYS_SENSORS & set(effects) else set()
+    answers_late = bool(_DELAYS_STEERING & set(effects))
+    found: dict[str, str] = {}
+    for log in driving.logs:
+        for name, told in log.out_of_time.items():
+            # A car that answers late makes its steering early. None makes it late.
+            early = name == "steer_rad" and not ("lags behind" in told or " late " in told)
+            if name not in delayed and not (answers_late and early):
+                found.setdefault(name, f"{log.name}: {told}" if len(driving.logs) > 1 else told)
+    return found

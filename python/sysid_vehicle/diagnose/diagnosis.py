@@ -170,10 +170,7 @@ class Diagnosis:
             There is evidence for none, or none may be named (`doubt`).
         """
         if not self.significant:
-            raise InvalidInput(
-                "no effect of the catalogue is missing as far as this driving can show: "
-                f"{self.omnibus}"
-            )
+            raise InvalidInput(self._without_evidence())
         if self.named is None:
             raise InvalidInput(
                 f"no effect can be named: {self.doubt}; check the channels and the vehicle file, "
@@ -221,6 +218,17 @@ class Diagnosis:
         worst = "; ".join(self.beside.unrelated.values())
         return f"{told}; {worst or self.beside.worst}"
 
+    def _without_evidence(self) -> str:
+        """What may be said where no effect is significant."""
+        wrong = "; ".join(self.beside.unrelated.values())
+        if wrong:
+            return (
+                f"there is evidence for no effect of the catalogue, but readings are wrong: {wrong}"
+            )
+        if self.omnibus.rejects:
+            return f"no effect of the catalogue explains what is missing: {self.omnibus}"
+        return f"no effect of the catalogue is missing; {self.omnibus}"
+
     _HEAD = ("effect", "statistic", "p", "training error with it", "size", "cannot tell from")
 
     def _rows(self, most: int = 12) -> list[list[str]]:
@@ -238,7 +246,7 @@ class Diagnosis:
 
     def _headline(self) -> str:
         if not self.significant:
-            return f"no effect of the catalogue is missing; {self.omnibus}"
+            return self._without_evidence()
         if self.named is None:
             return f"something is wrong that no effect can be named for: {self.doubt}"
         what = f"most likely missing: {self.named.effect.title}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from ._build import build
 from ._channels import CHANNELS, FloatArray
 from ._checks import excitation_note
 from ._columns import Columns
+from ._plausibility import channels_out_of_time
 from ._signals import filled, runs
 
 if TYPE_CHECKING:
@@ -111,6 +113,15 @@ class Log:
     def extras(self) -> tuple[str, ...]:
         """Names of the columns that are not canonical channels."""
         return tuple(name for name in self._data if name not in CHANNELS)
+
+    @cached_property
+    def out_of_time(self) -> dict[str, str]:
+        """Channels that come later or earlier than the laws of motion allow, and by how much.
+
+        Empty where the driving does not show it.
+        """
+        with np.errstate(over="ignore"):
+            return channels_out_of_time(self._data, self.rate_hz)
 
     def has(self, channel: str) -> bool:
         """Tell whether the channel is present."""

@@ -122,6 +122,22 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[s
     return notes + (clock or lag_notes(motion))
 
 
+def channels_out_of_time(columns: Mapping[str, FloatArray], rate_hz: float) -> dict[str, str]:
+    """Return the channels that are late or early, each with the sentence that tells by how much.
+
+    Parameters
+    ----------
+    columns, rate_hz
+        As in :func:`check_coherence`.
+    """
+    motion = Motion(columns, rate_hz)
+    try:
+        notes = clock_notes(motion) or lag_notes(motion)
+    except InvalidInput as drift:
+        notes = [str(drift)]
+    return {note.split(":")[0]: note for note in notes}
+
+
 def _check_laws(drive: Drive) -> list[str]:
     channels = drive.motion.channels
     speed = drive.mean(channels["vx_mps"])
