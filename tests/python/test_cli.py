@@ -36,6 +36,12 @@ def arguments(folder: Path) -> list[str]:
     return [str(folder / "lap.csv"), "--vehicle", str(folder / "car.toml")]
 
 
+SEARCH = [
+    *("--exclude", "rear_toe, gyro_bias", "--max-effects", "3", "--time-limit", "1e4"),
+    *("--matters", "yaw_rate=0.5deg/s, vy=0.1"),
+]
+
+
 @pytest.fixture(scope="module")
 def improved(folder: Path) -> tuple[Path, dict[str, Any]]:
     """Folder and JSON of one `improve` run."""
@@ -47,6 +53,7 @@ def improved(folder: Path) -> tuple[Path, dict[str, Any]]:
             *("--test", str(folder / "course.csv")),
             *("--report", str(folder / "out.html")),
             *("--json", str(folder / "out.json")),
+            *SEARCH,
         ]
     )
     assert status == 0
@@ -74,13 +81,17 @@ def test_improve_finds_the_effect_and_writes_json_and_report(
     found = result["effects"][0]
     assert set(found) == {
         *("id", "parameters", "error_before", "error_after", "p_value"),
-        *("confounded_with", "stands_in"),
+        *("confounded_with", "stands_in", "grade", "gains"),
     }
     lag = found["parameters"]["time_constant_s"]
     assert lag["unit"] == "s"
     assert abs(lag["value"] - 0.06) < 4.0 * lag["std"]
     assert found["error_after"] < found["error_before"]
     assert result["ranking"][0]["id"] == "steer_lag"
+    assert not {"rear_toe", "gyro_bias"} & {c["id"] for c in result["ranking"]}
+    assert set(result["horizons"]["channels"]) >= {"vy_mps", "yaw_rate_radps", "ay_mps2"}
+    assert 0.5 < result["explained"]["low"] <= result["explained"]["share"] <= 1.0
+    assert set(result["unknown"]["explainable"]) == {"F_y", "M_z"}
     for candidate in result["ranking"]:
         assert set(candidate) >= {
             "id",
@@ -112,6 +123,7 @@ def test_diagnose_prints_the_ranking_and_has_the_keys_of_improve(
             *("--vehicle", str(folder / "car.toml")),
             *("--test", str(folder / "course.csv")),
             *("--json", str(folder / "diagnosis.json")),
+            *SEARCH,
         ]
     )
     assert status == 0

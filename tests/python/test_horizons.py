@@ -6,11 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, Log
+from sysid_vehicle import Fit, InvalidInput, Log
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import worse
 from sysid_vehicle.study.held_out import changes_ahead
-from sysid_vehicle.study.horizons import LATERAL, block_errors, changes, horizons
+from sysid_vehicle.study.horizons import (
+    LATERAL,
+    PREDICTED,
+    beyond_noise,
+    block_errors,
+    changes,
+    horizons,
+)
+from sysid_vehicle.study.matters import sizes_that_matter, within
 from sysid_vehicle.study.waterfall import look_ahead
 
 
@@ -24,14 +32,14 @@ def late(fit: Fit) -> Fit:
 def test_errors_are_in_the_units_of_the_channels(fit: Fit, late: Fit, course: Log) -> None:
     driving = Driving.of(course)
     found = horizons((fit, late), ("right", "late"), driving, (0.5, 2.0))
-    assert found.channels == LATERAL
-    assert found.error.shape == (2, 2, 3)
+    assert found.channels == PREDICTED
+    assert found.error.shape == (2, 2, 5)
     # Of the right model little more than the noise of the sensors is left.
     assert np.all(found.error[0] < 3.0 * found.noise)
     assert np.all(found.error[0] > 0.7 * found.noise)
     assert np.all(found.low <= found.error)
     assert np.all(found.error <= found.high)
-    yaw = LATERAL.index("yaw_rate_radps")
+    yaw = PREDICTED.index("yaw_rate_radps")
     assert np.all(found.error[1, :, yaw] > 2.0 * found.error[0, :, yaw])
     assert found.gains(1)["yaw_rate_radps"][0] < 0.0
     told = found.to_dict()["channels"]["yaw_rate_radps"]
@@ -44,7 +52,7 @@ def test_errors_are_in_the_units_of_the_channels(fit: Fit, late: Fit, course: Lo
 def test_blocks_hold_the_errors_of_all_predictions(fit: Fit, course: Log) -> None:
     driving, noise = Driving.of(course), fit.noise.floor()
     whole = look_ahead(fit, noise, driving, 1.0, apart=0.1)[:, 2]
-    found = block_errors(fit, noise, driving, 1.0)[:, LATERAL.index("yaw_rate_radps")]
+    found = block_errors(fit, noise, driving, 1.0)[:, PREDICTED.index("yaw_rate_radps")]
     assert len(found) == round(driving.usable_s / 5.0)
     assert np.sqrt(np.mean(found**2)) == pytest.approx(np.sqrt(np.nanmean(whole**2)), rel=0.05)
 
@@ -78,3 +86,57 @@ def test_a_spin_does_not_decide(
     driving = Driving.of(altered(course, yaw_rate_radps=yaw))
     assert worse(changes_ahead(fit, late, driving))
     assert not worse(changes_ahead(late, fit, driving))
+
+
+def test_the_share_of_the_error_ahead_that_a_model_takes_away(
+    fit: Fit, late: Fit, course: Log
+) -> None:
+    driving = Driving.of(course)
+    half = replace(late, model=late.model.with_values({"steer_lag.time_constant_s": 0.075}))
+    whole = beyond_noise((late, half, fit), driving, (1.0, 2.0))
+    assert whole.squares[0] > whole.squares[1] > whole.squares[2] >= 0.0
+    assert whole.share > 0.9
+    assert 0.8 < whole.low <= whole.share <= whole.high <= 1.0
+    some = beyond_noise((late, half), driving, (1.0, 2.0))
+    # Errors go with the lag, and their squares with its square.
+    assert some.share == pytest.approx(0.75, abs=0.12)
+    assert beyond_noise((late, late), driving, (1.0,)).share == 0.0
+    assert beyond_noise((half, late), driving, (1.0,)).share < -1.0
+    assert str(some).endswith(")")
+    assert beyond_noise((late, half), Driving.of(course.between(0.0, 4.0)), (5.0,)).share == 1.0
+
+
+def test_a_model_that_loses_the_car_takes_nothing_away(fit: Fit, course: Log) -> None:
+    broken = replace(fit, model=fit.model.with_values({"B_front": float("nan")}))
+    driving = Driving.of(course)
+    assert beyond_noise((fit, broken), driving, (1.0,)).share <= 0.0
+    assert beyond_noise((broken, fit), driving, (1.0,)).share > 0.99
+
+
+def test_errors_smaller_than_matters(fit: Fit, late: Fit, course: Log) -> None:
+    driving = Driving.of(course)
+    right, wrong = (horizons((f,), ("",), driving, (1.0,)) for f in (fit, late))
+    usual = sizes_that_matter({})
+    assert usual["yaw_rate_radps"] == pytest.approx(np.radians(0.5))
+    assert within(right, usual)
+    assert not within(wrong, usual)
+    assert within(wrong, dict.fromkeys(usual, 10.0))
+    given = sizes_that_matter({"yaw_rate": "2 deg/s", "vy_mps": 0.3, "ay": "0.1g"})
+    assert given["yaw_rate_radps"] == pytest.approx(np.radians(2.0))
+    assert given["vy_mps"] == 0.3
+    assert given["ay_mps2"] == pytest.approx(0.980665)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "words"),
+    [
+        ("yaw", 1.0, "'yaw' is no channel.*yaw_rate"),
+        ("vy", "1kg", "vy = '1kg': give a number above 0, with m/s"),
+        ("vy", -1.0, "vy = -1.0: give a number above 0"),
+        ("vy", "1.2.3", "vy = '1.2.3'"),
+        ("vy", "fast", "vy = 'fast'"),
+    ],
+)
+def test_sizes_that_mean_nothing_are_refused(name: str, size: float | str, words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        sizes_that_matter({name: size})

@@ -44,7 +44,7 @@ NUMERICAL = {
     "diagnose/score.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
     "diagnose/sensitivity.py": {"_AT_ONCE"},
     "study/held_out.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED", "_AHEAD"},
-    "study/horizons.py": {"_BLOCK_S", "_FEWEST", "_APART", "_NORMAL", "_LOST"},
+    "study/horizons.py": {"_BLOCK_S", "_FEWEST", "_DRAWS", "_APART", "_NORMAL", "_LOST"},
     "study/improve.py": {"_SHORT_S"},
     "study/steps.py": {"_ALTERNATIVES"},
     # Descriptions of the unknown, of biases, and of the next drive.
@@ -222,7 +222,7 @@ def test_one_spin_neither_confirms_nor_refuses() -> None:
 def test_what_grows_clearly_and_by_more_than_matters() -> None:
     grown = Change("vy_mps", 2.0, 0.10, 0.02)
     assert worse((grown,)) == (grown,)
-    assert worse((replace(grown, error=0.08),)) == ()
+    assert worse((replace(grown, error=0.04),)) == ()
     assert worse((replace(grown, log_ratio=0.03, error=0.001),)) == ()
     assert worse((replace(grown, log_ratio=-0.5),)) == ()
     assert worse((grown,), replace(USUAL, worse=0.2)) == ()
@@ -236,7 +236,7 @@ NONE = of(0.5, 5.0)
 BEFORE = of(1e-60, 909.0)
 MASS = Added("mass", "missing", moves=frozenset({"yaw_rate_radps"}), taken=8.0)
 DRAG = Added("aero_drag", "missing", moves=frozenset({"vx_mps"}), taken=1.0)
-WHOLE = Facts(BEFORE, NONE, NONE, errors=(3.0, 1.0), added=(MASS,))
+WHOLE = Facts(BEFORE, NONE, NONE, missing=(8.0, 0.0), added=(MASS,))
 
 
 def test_what_is_left_on_validation_data_takes_more_evidence() -> None:
@@ -253,7 +253,9 @@ def test_what_is_left_on_validation_data_takes_more_evidence() -> None:
 def test_verdicts_where_nothing_was_added() -> None:
     facts = Facts(NONE, NONE)
     assert verdict(facts).verdict == "adequate"
-    assert verdict(replace(facts, candidate=0.01)).verdict == "unknown"
+    left = replace(facts, candidate=0.01)
+    assert verdict(left).verdict == "unknown"
+    assert verdict(replace(left, small=True)).verdict == "adequate"
     assert verdict(replace(facts, excited=False)).verdict == "not_testable"
     assert verdict(replace(facts, fitted=BEFORE, excited=False)).verdict == "unknown"
     said = verdict(replace(WHOLE, contradictions=("ay_mps2: turned round",)))
@@ -280,13 +282,13 @@ def test_verdicts_where_nothing_is_left() -> None:
 
 
 def test_names_beside_something_that_is_left() -> None:
-    left = replace(WHOLE, fitted=of(1e-9, 209.0), errors=(3.0, 1.2), added=(MASS, DRAG))
+    left = replace(WHOLE, fitted=of(1e-9, 209.0), missing=(8.0, 0.44), added=(MASS, DRAG))
     assert verdict(left).verdict == "partly_explained"
     assert withdrawn(left) == {}
-    error = replace(left, errors=(3.0, 2.0))
+    error = replace(left, missing=(8.0, 3.0))
     assert verdict(error).verdict == "unknown"
     assert set(withdrawn(error)) == {"mass", "aero_drag"}
-    assert withdrawn(error)["mass"] == "takes up only 62 % of what is missing"
+    assert withdrawn(error)["mass"] == "takes up only 62 % of the error 1 to 5 s ahead"
     stays = replace(left, fitted=of(1e-9, 709.0))
     assert "78 % of the evidence" in withdrawn(stays)["aero_drag"]
     little = replace(left, added=(MASS, replace(DRAG, taken=0.1)), fitted=of(0.005, 209.0))
@@ -298,7 +300,7 @@ def test_names_beside_something_that_is_left() -> None:
 
 def test_an_effect_named_alone_should_have_explained_what_is_left() -> None:
     alone = "were it what is missing, nothing would be left"
-    left = replace(WHOLE, fitted=of(1e-9, 209.0, "F_x"), errors=(3.0, 1.2))
+    left = replace(WHOLE, fitted=of(1e-9, 209.0, "F_x"), missing=(8.0, 0.44))
     assert withdrawn(left) == {"mass": alone}
     assert verdict(left).verdict == "unknown"
     assert withdrawn(replace(left, fitted=of(0.005, 209.0))) == {}

@@ -117,6 +117,7 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
         "channels",
         "effects",
         "errors",
+        "explained",
         "horizons",
         "parameters",
         "ranking",

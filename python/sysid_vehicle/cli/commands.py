@@ -156,6 +156,7 @@ def _study(args: argparse.Namespace, heard: Warnings) -> Study:
         most_effects=args.max_effects,
         exclude=args.exclude,
         time_limit_s=args.time_limit,
+        matters=args.matters,
         tell=lambda text: print(text, file=sys.stderr, flush=True),
         progress=_on_terminal(),
     )

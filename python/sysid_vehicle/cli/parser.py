@@ -132,6 +132,14 @@ def _search(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="begin no further step after S seconds and judge what was found until then",
     )
+    parser.add_argument(
+        "--matters",
+        type=_sizes,
+        metavar="CHANNEL=SIZE,...",
+        help="errors that matter, such as yaw_rate=0.5deg/s,vy=0.1m/s (vx, vy, yaw_rate, ax, ay; "
+        "others have usual sizes): a baseline whose errors 0.5 to 5 s ahead are smaller is "
+        "adequate",
+    )
 
 
 def _json(parser: argparse.ArgumentParser) -> None:
@@ -152,6 +160,11 @@ def _count(text: str) -> int:
     return value
 
 
+def _sizes(text: str) -> dict[str, str]:
+    pairs = [part.split("=") for part in _names(text)]
+    return {name.strip(): size.strip() for name, size in pairs}
+
+
 def _seconds(text: str) -> float:
     value = float(text)
     if not 0.0 < value < float("inf"):
@@ -166,4 +179,5 @@ def _names(text: str) -> tuple[str, ...]:
 # argparse says "invalid NAME value".
 _seed.__name__ = "seed (0 or more)"
 _count.__name__ = "number (0 or more)"
+_sizes.__name__ = "sizes (yaw_rate=0.5deg/s,...)"
 _seconds.__name__ = "seconds (above 0)"

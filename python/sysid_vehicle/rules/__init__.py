@@ -12,8 +12,8 @@
    training data, at `elsewhere` on validation data, and for one effect more.
 7. Nothing left: what was added explains it. An added effect is not named if its value is physically
    implausible, or differs between pieces of the driving (`spread`).
-8. Something left: names are withdrawn that take up less than `most` of the error, leave more than
-   `stays` of the evidence, take up less than is left, or should have explained what is left.
+8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead,
+   leave more than `stays` of the evidence, take up less than is left, or should have explained it.
 9. The verdict follows from what is left and which names stand (`verdict`).
 10. `Rules` holds every limit with unit, meaning, and the benchmark that chose or judges it.
 
@@ -33,6 +33,7 @@ from .verdict import (
     excess,
     grade,
     share_explained,
+    share_of,
     smaller_than,
     something_left,
     verdict,
@@ -56,6 +57,7 @@ __all__ = [
     "excess",
     "grade",
     "share_explained",
+    "share_of",
     "smaller_than",
     "something_left",
     "verdict",

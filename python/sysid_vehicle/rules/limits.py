@@ -82,6 +82,9 @@ class Rules:
     worse: float = _limit(
         0.05, "share", "by which no error 1 to 5 s ahead may grow on validation data", _EFFECTS
     )
+    grown: float = _limit(
+        3.0, "standard errors", "by which an error 1 to 5 s ahead is shown to grow", _EFFECTS
+    )
     idle: float = _limit(
         2.6, "standard errors", "from nothing, within which an effect may be needless", _EFFECTS
     )

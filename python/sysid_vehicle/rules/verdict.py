@@ -19,6 +19,7 @@ __all__ = [
     "excess",
     "grade",
     "share_explained",
+    "share_of",
     "smaller_than",
     "something_left",
     "verdict",
@@ -59,7 +60,14 @@ def share_explained(before: float, after: float) -> float:
     All of it, where nothing was beyond the noise floor.
     """
     most, left = (max(error**2 - 1.0, 0.0) for error in (before, after))
-    return 1.0 - left / most if most > 0.0 else 1.0
+    return share_of(most, left) if most > 0.0 else 1.0
+
+
+def share_of(before: float, after: float) -> float:
+    """Of what is missing, what a richer model took away; where nothing was missing, all or none."""
+    if before > 0.0:
+        return 1.0 - after / before
+    return 0.0 if after > 0.0 else 1.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +83,7 @@ class Added:
     moves : frozenset of str
         Channels that it moves.
     taken : float
-        Of the square of the training error, what it took up in its turn.
+        Of `Facts.missing`, what it took up in its turn.
     """
 
     id: str
@@ -102,22 +110,26 @@ class Facts:
         The latter on validation data; None where nothing was added.
     candidate : float
         Smallest p-value of an effect that the final model lacks.
-    errors : (float, float)
-        Training error without and with what was added, in units of the noise floor.
+    missing : (float, float)
+        Squares of errors 1 to 5 s ahead on validation data, beyond the noise of sensors, without
+        and with what was added; in one unit.
     contradictions : tuple of str
         Channels that contradict the others, in words.
     excited : bool
         Whether the training data excite the lateral motion.
+    small : bool
+        Whether no error 0.5 to 5 s ahead on validation data is as large as matters to the user.
     """
 
     before: Tested
     fitted: Tested
     validation: Tested | None = None
     candidate: float = 1.0
-    errors: tuple[float, float] = (1.0, 1.0)
+    missing: tuple[float, float] = (0.0, 0.0)
     added: tuple[Added, ...] = ()
     contradictions: tuple[str, ...] = ()
     excited: bool = True
+    small: bool = False
 
 
 @dataclass(frozen=True)
@@ -192,7 +204,7 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
         # Tyres that never met a slip angle are free, and leave chance evidence of effects.
         if not facts.excited and facts.fitted.p_value > rules.level:
             return Decision("not_testable")
-        return Decision("unknown" if left else "adequate")
+        return Decision("unknown" if left and not facts.small else "adequate")
     stand_ins = frozenset(a.id for a in facts.added if a.finding == "proxy")
     withdrawn = _withdrawn(facts, rules, names, stand_ins) if left else []
     # What only stands in for something else explains nothing, however well it fits, and what cannot
@@ -211,16 +223,17 @@ def _withdrawn(
     facts: Facts, rules: Rules, names: frozenset[str], stand_ins: frozenset[str]
 ) -> list[Withdrawn]:
     """Names that are not safe beside something that is left."""
-    share = share_explained(*facts.errors)
+    after = facts.missing[1]
+    share = share_of(*facts.missing)
     if share < rules.most:
-        because = f"takes up only {max(100 * share, 0.0):.0f} % of what is missing"
+        because = f"takes up only {max(100 * share, 0.0):.0f} % of the error 1 to 5 s ahead"
         return [Withdrawn(names, because, names)]
     stays = excess(facts.fitted) / max(excess(facts.before), 1.0)
     if stays > rules.stays:
         because = f"with it, {100 * stays:.0f} % of the evidence that something is missing stays"
         return [Withdrawn(names, because, names)]
     taken = {a.id: a.taken for a in facts.added}
-    small = smaller_than(facts.errors[1] ** 2 - 1.0, taken, stand_ins)
+    small = smaller_than(after, taken, stand_ins)
     first = Withdrawn(small, "what is left unexplained is larger", names)
     alone = _alone(facts, rules, small)
     because = "were it what is missing, nothing would be left"

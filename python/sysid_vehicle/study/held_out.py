@@ -15,10 +15,11 @@ from ..estimate import Driving, several_logs
 from ..identify import Fit, Prediction, predict
 from ..log import Log
 from ..rules import Change, Gain
-from .horizons import changes
+from .horizons import Beyond, beyond_noise, changes
 
 __all__ = [
     "as_sure",
+    "beyond_noise_ahead",
     "changes_ahead",
     "error_falls",
     "fall_in_error",
@@ -150,6 +151,11 @@ def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[Change, ...]
     """How errors 1 to 5 s ahead change, both models with parameters that serve validation data."""
     one, other = (_serving_itself(fit, test) for fit in (poorer, richer))
     return changes(one, other, test, _AHEAD)
+
+
+def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
+    """Errors 1 to 5 s ahead beyond the noise, of models whose parameters serve validation data."""
+    return beyond_noise([_serving_itself(fit, test) for fit in fits], test, _AHEAD)
 
 
 # One object for each fit: errors ahead are remembered by it.

@@ -10,23 +10,38 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
+import numpy.typing as npt
 
+from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._text import html_table, number, text_table
 from ..diagnose import blocks
 from ..errors import NumericalError
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..identify import Fit
-from ..rules import Change
+from ..rules import Change, share_of
 from .waterfall import look_ahead
 
-__all__ = ["AHEAD", "LATERAL", "Horizons", "block_errors", "changes", "horizons"]
+__all__ = [
+    "AHEAD",
+    "LATERAL",
+    "PREDICTED",
+    "Beyond",
+    "Horizons",
+    "beyond_noise",
+    "block_errors",
+    "changes",
+    "horizons",
+]
 
 LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2")
+PREDICTED = ("vx_mps", "ax_mps2", *LATERAL)
 AHEAD = (0.5, 1.0, 2.0, 5.0)
 _BLOCK_S, _FEWEST = 5.0, 6
+_DRAWS = 300
 _APART = 0.1  # of the horizon, between predictions
 _NORMAL = 1.4826  # standard deviation over the median absolute deviation
 _LOST = 10.0  # logarithm of the ratio, where one of two models lost the car
@@ -130,8 +145,8 @@ def horizons(
     horizons_s : sequence of float
     """
     noise = fits[-1].noise.floor()
-    channels = tuple(c for c in LATERAL if c in driving.present)
-    columns = [LATERAL.index(c) for c in channels]
+    channels = tuple(c for c in PREDICTED if c in driving.present)
+    columns = [PREDICTED.index(c) for c in channels]
     by_block = np.stack(
         [
             np.stack([block_errors(f, noise, driving, h)[:, columns] for h in horizons_s], axis=1)
@@ -158,10 +173,86 @@ def _quantile(by_block: FloatArray, q: float) -> FloatArray:
     return as_float64(out)
 
 
+@dataclass(frozen=True)
+class Beyond:
+    """Errors some seconds ahead beyond the noise of the sensors, in one number for each model.
+
+    Attributes
+    ----------
+    squares : tuple of float
+        Mean over channels and horizons of the square of the median error, less that of the
+        sensor noise, over the square of the first model's error.
+    share, low, high : float
+        Of the first one's, what the last model takes away; 95 % interval from draws of the blocks.
+    """
+
+    squares: tuple[float, ...]
+    share: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{100 * self.share:.0f} % ({100 * self.low:.0f} to {100 * self.high:.0f})"
+
+    def to_dict(self) -> dict[str, float]:
+        """Share and interval, ready for JSON."""
+        return {"share": self.share, "low": self.low, "high": self.high}
+
+
+def beyond_noise(
+    fits: Sequence[Fit], driving: Driving, horizons_s: Sequence[float], *, seed: int = 0
+) -> Beyond:
+    """Work out what errors some seconds ahead are beyond the noise of the sensors.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        The last one's noise starts every prediction.
+    driving : Driving
+    horizons_s : sequence of float
+    seed : int
+        Of the draws.
+    """
+    noise = fits[-1].noise.floor()
+    sensor = np.array([noise.sensor[MEASURED.index(c)] for c in PREDICTED])
+    # Shape (models, blocks, horizons, channels).
+    squares = np.array(
+        [
+            np.stack([block_errors(f, noise, driving, h) for h in horizons_s], axis=1) ** 2
+            for f in fits
+        ]
+    )
+    seen = np.isfinite(squares).any(axis=(0, 1))
+    if not seen.any():  # too short for any prediction
+        return Beyond((0.0,) * len(fits), 1.0, 0.0, 1.0)
+    # What a model loses is as wrong as anything that was seen, and much more.
+    most = np.nanmax(np.where(np.isfinite(squares), squares, 0.0), axis=(0, 1))
+    squares = np.where(np.isinf(squares), _LOST**2 * most, squares)
+    whole = _beyond(squares, sensor, seen)
+    draws = generator(seed).integers(0, squares.shape[1], (_DRAWS, squares.shape[1]))
+    shares = [_share(_beyond(squares[:, d], sensor, seen)) for d in draws]
+    low, high = np.quantile(shares, (0.025, 0.975))
+    return Beyond(tuple(map(float, whole)), _share(whole), float(low), float(high))
+
+
+def _beyond(squares: FloatArray, sensor: FloatArray, seen: npt.NDArray[np.bool_]) -> FloatArray:
+    with catch_warnings():
+        simplefilter("ignore", RuntimeWarning)  # blocks without a prediction this far ahead
+        middle = np.nanmedian(squares, axis=1)[:, seen]
+    noise = np.broadcast_to(sensor**2, seen.shape)[seen]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.maximum(middle - noise, 0.0) / middle[0]
+    return as_float64(np.nan_to_num(ratio, nan=0.0, posinf=0.0).mean(axis=1))
+
+
+def _share(squares: FloatArray) -> float:
+    return share_of(float(squares[0]), float(squares[-1]))
+
+
 # The poorer model of all candidates of a step is the same one.
 @lru_cache(maxsize=64)
 def block_errors(fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float) -> FloatArray:
-    """Root mean square errors of the lateral channels, block by block.
+    """Root mean square errors of the predicted channels, block by block.
 
     Parameters
     ----------
@@ -173,15 +264,15 @@ def block_errors(fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float
 
     Returns
     -------
-    array, shape (blocks, 3)
+    array, shape (blocks, 5)
         NaN where nothing is predicted, infinite where the model lost the car.
     """
-    columns = [MEASURED.index(c) for c in LATERAL]
+    columns = [MEASURED.index(c) for c in PREDICTED]
     starts = blocks(driving, driving.usable_s / _number_of_blocks(driving))
     try:
         e = look_ahead(fit, noise, driving, horizon_s, apart=_APART)[:, columns]
     except NumericalError:
-        return np.full((len(starts), len(LATERAL)), np.inf)
+        return np.full((len(starts), len(PREDICTED)), np.inf)
     there = np.isfinite(driving.measured[:, columns]) & ~np.isnan(e)
     squares = np.add.reduceat(np.where(there, e, 0.0) ** 2, starts, axis=0)
     count = np.add.reduceat(there.astype(float), starts, axis=0)
@@ -214,7 +305,8 @@ def changes(
     found = []
     for h in horizons_s:
         one, other = (block_errors(fit, noise, driving, h) for fit in (before, after))
-        for j, channel in enumerate(LATERAL):
+        for channel in LATERAL:
+            j = PREDICTED.index(channel)
             known = (one[:, j] > 0.0) & (other[:, j] > 0.0)
             # Of a block that both models lose there is nothing to be learnt.
             known &= np.isfinite(one[:, j]) | np.isfinite(other[:, j])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
@@ -19,7 +19,9 @@ from ..log import Log, check_excitation
 from ..model import Model
 from ..rules import USUAL, Rules, grade, verdict
 from .added import AddedEffect
-from .held_out import hold_out, serving
+from .held_out import beyond_noise_ahead, hold_out, serving
+from .horizons import horizons
+from .matters import sizes_that_matter, within
 from .search import Search, Trail
 from .steps import way
 from .study import Study
@@ -42,6 +44,7 @@ def improve(
     candidates: Sequence[str] | None = None,
     exclude: Sequence[str] = (),
     time_limit_s: float | None = None,
+    matters: Mapping[str, float | str] | None = None,
     starts: int = 8,
     seed: int = 0,
     progress: bool = False,
@@ -73,6 +76,10 @@ def improve(
     time_limit_s : float, optional
         After so many seconds no further step begins; what was found until then is judged, and a
         warning tells.
+    matters : mapping, optional
+        Errors that matter, such as ``{"yaw_rate": "0.5deg/s"}`` (`sizes_that_matter`); those not
+        given have usual sizes. A baseline whose errors 0.5 to 5 s ahead on validation data are all
+        smaller is adequate, whatever is left. By default whatever is shown to be left counts.
     tell : callable, optional
         Called with a sentence about each step.
 
@@ -84,6 +91,7 @@ def improve(
     rules = rules.at(alpha)
     began = time.perf_counter()
     ends = began + _limit(time_limit_s)
+    sizes = None if matters is None else sizes_that_matter(matters)
     if exclude:
         left_out = {effect(e).id for e in exclude}
         candidates = [e.id for e in considered(model, candidates) if e.id not in left_out]
@@ -109,9 +117,10 @@ def improve(
     on_test = [compare(f, test_driving, noise=floor) for f in fits]
     last = diagnoses[-1]
     fitted = last.omnibus if last.fit is fit else omnibus(fit, train_driving, rules)
-    validation = None
+    validation = explained = None
     if len(fits) > 1:
         validation = omnibus(serving(fit, test_driving), test_driving, rules)
+        explained = beyond_noise_ahead(fits, test_driving)
     told = judge(
         fit,
         scored=(last.scores, last.family) if last.fit is fit else None,
@@ -126,12 +135,14 @@ def improve(
     facts = facts_of(
         fits,
         told,
-        on_train,
+        on_train[-1],
+        (0.0,) if explained is None else explained.squares,
         before=diagnoses[0].omnibus,
         fitted=fitted,
         validation=validation,
         candidate=min((c.p_value for c in last.ranking), default=1.0),
         excited=_excited(train_driving),
+        small=sizes is not None and within(horizons([fit], [""], test_driving), sizes),
     )
     decision = verdict(facts, rules)
     alone, told = told, in_the_light_of(decision, told)
@@ -149,6 +160,7 @@ def improve(
         warnings=_warnings(fit, train_driving, found),
         seconds=time.perf_counter() - began,
         rules=rules,
+        explained=explained,
     )
 
 

@@ -15,13 +15,15 @@ __all__ = ["facts_of", "in_the_light_of"]
 def facts_of(
     fits: Sequence[Fit],
     told: Verdicts,
-    on_train: Sequence[Comparison],
+    on_train: Comparison,
+    missing: Sequence[float],
     *,
     before: Omnibus,
     fitted: Omnibus,
     validation: Omnibus | None,
     candidate: float,
     excited: bool,
+    small: bool = False,
 ) -> Facts:
     """Collect what is known of a final model.
 
@@ -31,19 +33,21 @@ def facts_of(
         The baseline, then one for each effect added.
     told : Verdicts
         On every effect, each for itself.
-    on_train : sequence of Comparison
-        Of every fit with what it was fitted to.
-    before, fitted, validation, candidate, excited
+    on_train : Comparison
+        Of the last fit with what it was fitted to.
+    missing : sequence of float
+        Of every fit, as in `Facts`.
+    before, fitted, validation, candidate, excited, small
         As in `Facts`.
     """
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
-    taken = _taken_up(fits, on_train)
+    taken = _taken_up(fits, missing)
     return Facts(
         before,
         fitted,
         validation,
         candidate,
-        (on_train[0].error, on_train[-1].error),
+        (missing[0], missing[-1]),
         tuple(
             Added(
                 v.effect.id,
@@ -55,8 +59,9 @@ def facts_of(
             for v in told.all
             if v.effect.id in added
         ),
-        tuple(on_train[-1].unrelated.values()),
+        tuple(on_train.unrelated.values()),
         excited,
+        small,
     )
 
 
@@ -67,15 +72,15 @@ def in_the_light_of(decision: Decision, told: Verdicts) -> Verdicts:
     return told
 
 
-def _taken_up(fits: Sequence[Fit], on_train: Sequence[Comparison]) -> dict[str, float]:
-    """Of the square of the error, by each effect that was added, in its turn.
+def _taken_up(fits: Sequence[Fit], missing: Sequence[float]) -> dict[str, float]:
+    """Of what is missing, by each effect that was added, in its turn.
 
     Of two that act alike the later one counts only for what the first could not take up: that much
     may as well be a part of what is left.
     """
     taken: dict[str, float] = {}
-    steps = zip(fits[:-1], fits[1:], on_train[:-1], on_train[1:], strict=True)
+    steps = zip(fits[:-1], fits[1:], missing[:-1], missing[1:], strict=True)
     for poorer, richer, before, after in steps:
         for e in set(richer.model.effects) - set(poorer.model.effects):
-            taken[e] = before.error**2 - after.error**2
+            taken[e] = before - after
     return taken
