@@ -25,7 +25,7 @@ from .export import casadi_function, export
 from .identify import Fit, identify
 from .log import Log, check_excitation
 from .model import Model
-from .read import ChannelMap, read_log
+from .read import ChannelMap, propose_channels, read_log
 from .rules import Rules
 from .saved import load
 from .sensors import SensorCheck, check
@@ -77,6 +77,7 @@ __all__ = [
     "load_effects",
     "manoeuvres",
     "parameter",
+    "propose_channels",
     "read_log",
     "suggest_manoeuvre",
     "unknown",

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from .._files import write_json
+from .._files import write_json, write_text
 from .._text import text_table
 from ..compare import Comparison, compare
 from ..demo import run_demo
@@ -19,7 +19,7 @@ from ..errors import warn
 from ..identify import Fit, identify
 from ..log import Log
 from ..model import Model
-from ..read import ChannelMap, read_log
+from ..read import ChannelMap, propose_channels, read_log
 from ..report import RANKING_HEAD, ranking_rows, ranking_title, summary, write_report
 from ..study import Study, improve
 from ..user_effects import load_effects
@@ -118,6 +118,18 @@ def _effects(args: argparse.Namespace, heard: Warnings) -> None:
     print("\n\n".join(str(e) for e in catalogue()))
 
 
+def _map(args: argparse.Namespace, heard: Warnings) -> None:
+    others = [path for path in (args.log, args.dbc) if path is not None]
+    refuse_unwritable([args.output], inputs=others)
+    found = propose_channels(args.log, dbc=args.dbc)
+    print(found, end="")
+    if args.output is not None:
+        write_text(args.output, found.to_toml())
+        print(f"Channel map: {args.output}", file=sys.stderr)
+    for name in found.missing:
+        warn(f"{name}: no column was found for it; name it in the channel map")
+
+
 COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
     "demo": _demo,
     "compare": _compare,
@@ -125,6 +137,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
     "improve": _improve,
     "effects": _effects,
     "check": sensors.run,
+    "map": _map,
     "lab": lab.run,
     "mu-slip": mu_slip.run,
     "twin": twin.run,

@@ -71,6 +71,11 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     _json(improve)
 
     sensors.add_parser(commands)
+    mapping = commands.add_parser("map", help="propose the channel map of a log, to be edited")
+    mapping.add_argument("log", type=Path, metavar="LOG", help=LOG_HELP)
+    mapping.add_argument("-o", "--output", type=Path, metavar="TOML", help="file to write it to")
+    mapping.add_argument("--dbc", type=Path, metavar="DBC", help="database of a log of CAN frames")
+
     sideslip.add_parser(commands)
     mu_slip.add_parser(commands)
     _define(commands.add_parser("effects", help="the catalogue of effects"))

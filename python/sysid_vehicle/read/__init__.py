@@ -15,8 +15,9 @@ from ._objects import contents_of_object
 from ._recording import Recording
 from ._registry import FORMATS, Format, blamed, read_with, recognised
 from ._table import Table
+from .propose import Proposal, propose_channels
 
-__all__ = ["FORMATS", "ChannelMap", "Format", "Source", "read_log"]
+__all__ = ["FORMATS", "ChannelMap", "Format", "Proposal", "Source", "propose_channels", "read_log"]
 
 
 def read_log(

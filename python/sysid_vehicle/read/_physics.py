@@ -1,0 +1,234 @@
+"""Units and signs of channels that say nothing of them, from how a car moves.
+
+``a_y = v r`` and ``a_x = dv/dt`` tell how the scales of channels go together, what cars usually do
+tells which of several ways is meant, and at low lateral acceleration the steering angle of the road
+wheels over the path curvature is a wheelbase.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+_DEG, _G = math.pi / 180.0, 9.80665
+_WINDOW_S = 1.0
+_MOVING = 0.15  # of the usual speed
+# Factors that are tried where no unit is stated.
+_TRIED = {
+    "vx_mps": (1.0, 1.0 / 3.6, 0.44704),
+    "yaw_rate_radps": (1.0, _DEG),
+    "ax_mps2": (1.0, _G),
+    "ay_mps2": (1.0, _G),
+}
+# What 95 % of a drive stay below, and the spread of its logarithm between drives.
+_USUAL = {
+    "vx_mps": (28.0, 0.6),
+    "yaw_rate_radps": (0.35, 0.8),
+    "ax_mps2": (3.0, 0.9),
+    "ay_mps2": (5.0, 0.9),
+}
+_LAW_DOUBT = 0.15
+_WHEELBASE_M, _WHEELBASE_DOUBT = 2.9, 0.35
+_RATIO, _RATIO_DOUBT = 15.0, 0.25  # of steering gears
+_FOLLOWS = 0.5  # cosine from which two channels are taken to go together
+_LINEAR_MPS2 = 5.0
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Factors by channel, and what was noticed."""
+
+    factors: dict[str, float]
+    notes: dict[str, str]
+    swapped: bool
+
+
+def scales(
+    time_s: FloatArray, columns: Mapping[str, FloatArray], stated: Mapping[str, float]
+) -> Scales:
+    """Find factors and signs of the channels of a drive.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,)
+        Even times.
+    columns : mapping of ndarray, shape (n,)
+        Channels as the file has them, without gaps.
+    stated : mapping of float
+        Factors of those whose unit is known.
+    """
+    drive = _Windows(time_s, columns)
+    notes: dict[str, str] = {}
+    swapped = _swapped(drive)
+    if swapped:
+        drive.swap("ax_mps2", "ay_mps2")
+        notes["ax_mps2"] = notes["ay_mps2"] = (
+            "swapped against its name: this column goes with the other acceleration"
+        )
+    factors = _likeliest(drive, stated, notes)
+    _signs(drive, factors, notes)
+    if "steer_rad" in columns:
+        factors["steer_rad"] = _steer(drive, factors, stated.get("steer_rad"), notes)
+    return Scales(factors, notes, swapped)
+
+
+class _Windows:
+    """Means and changes of channels over windows of a second."""
+
+    def __init__(self, time_s: FloatArray, columns: Mapping[str, FloatArray]) -> None:
+        dt = float(np.median(np.diff(time_s)))
+        self._half = max(1, round(0.5 * _WINDOW_S / dt))
+        self._centres = np.arange(self._half, time_s.size - self._half, self._half)
+        self._span = 2 * self._half * dt
+        self._columns = dict(columns)
+
+    def swap(self, a: str, b: str) -> None:
+        self._columns[a], self._columns[b] = self._columns[b], self._columns[a]
+
+    def has(self, *names: str) -> bool:
+        return all(name in self._columns for name in names)
+
+    def mean(self, name: str, by: str | None = None) -> FloatArray:
+        values = self._columns[name] if by is None else self._columns[name] * self._columns[by]
+        area = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))))
+        over = area[self._centres + self._half] - area[self._centres - self._half]
+        result: FloatArray = over / (2.0 * self._half)
+        return result
+
+    def change(self, name: str) -> FloatArray:
+        values = self._columns[name]
+        over = values[self._centres + self._half] - values[self._centres - self._half]
+        result: FloatArray = over / self._span
+        return result
+
+
+def _cosine(x: FloatArray, y: FloatArray) -> float:
+    x, y = x - np.median(x), y - np.median(y)
+    size = float(np.linalg.norm(x) * np.linalg.norm(y))
+    return float(x @ y) / size if size > 0.0 else 0.0
+
+
+def _slope(y: FloatArray, x: FloatArray) -> float:
+    """Size of the slope of y over x, errors in both."""
+    return float(np.std(y) / max(float(np.std(x)), 1e-300))
+
+
+def _swapped(drive: _Windows) -> bool:
+    if not drive.has("vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2"):
+        return False
+    turn, ramp = drive.mean("vx_mps", "yaw_rate_radps"), drive.change("vx_mps")
+    ax, ay = drive.mean("ax_mps2"), drive.mean("ay_mps2")
+    as_named = abs(_cosine(turn, ay)) + abs(_cosine(ramp, ax))
+    other = abs(_cosine(turn, ax)) + abs(_cosine(ramp, ay))
+    return other > as_named + _FOLLOWS and abs(_cosine(turn, ax)) > _FOLLOWS
+
+
+def _likeliest(
+    drive: _Windows, stated: Mapping[str, float], notes: dict[str, str]
+) -> dict[str, float]:
+    """The factors of speed, yaw rate and accelerations that explain the drive best together."""
+    names = [name for name in _TRIED if drive.has(name)]
+    size = {name: float(np.percentile(np.abs(drive.mean(name)), 95)) for name in names}
+    laws: list[tuple[dict[str, float], float]] = []
+    if drive.has("vx_mps", "yaw_rate_radps", "ay_mps2"):
+        turn, ay = drive.mean("vx_mps", "yaw_rate_radps"), drive.mean("ay_mps2")
+        if abs(_cosine(turn, ay)) > _FOLLOWS:
+            exponents = {"ay_mps2": 1.0, "vx_mps": -1.0, "yaw_rate_radps": -1.0}
+            laws.append((exponents, math.log(_slope(ay, turn))))
+    if drive.has("vx_mps", "ax_mps2"):
+        ramp, ax = drive.change("vx_mps"), drive.mean("ax_mps2")
+        if abs(_cosine(ramp, ax)) > _FOLLOWS:
+            laws.append(({"ax_mps2": 1.0, "vx_mps": -1.0}, math.log(_slope(ax, ramp))))
+    best, least = dict.fromkeys(names, 1.0), math.inf
+    for tried in itertools.product(*(_choices(name, stated) for name in names)):
+        factors = dict(zip(names, tried, strict=True))
+        cost = sum(
+            ((sum(e * math.log(factors[n]) for n, e in law.items()) + told) / _LAW_DOUBT) ** 2
+            for law, told in laws
+        )
+        for name in names:
+            usual, spread = _USUAL[name]
+            cost += (math.log(max(size[name] * factors[name], 1e-9) / usual) / spread) ** 2
+        if cost < least:
+            best, least = factors, cost
+    for name in names:
+        if name not in stated and best[name] != 1.0:
+            notes.setdefault(name, "unit found by the laws of motion and by what cars do")
+    return best
+
+
+def _choices(name: str, stated: Mapping[str, float]) -> tuple[float, ...]:
+    return (abs(stated[name]),) if name in stated else _TRIED[name]
+
+
+def _signs(drive: _Windows, factors: dict[str, float], notes: dict[str, str]) -> None:
+    """Turn round what moves against the others."""
+
+    def turn_round(name: str, why: str) -> None:
+        factors[name] = -factors[name]
+        notes[name] = f"turned round: {why}"
+
+    if "vx_mps" in factors and float(np.median(drive.mean("vx_mps"))) < 0.0:
+        turn_round("vx_mps", "it is negative for most of the drive")
+    forward = math.copysign(1.0, factors.get("vx_mps", 1.0))
+    if drive.has("vx_mps", "ax_mps2"):
+        told = _cosine(forward * drive.change("vx_mps"), drive.mean("ax_mps2"))
+        if told < -_FOLLOWS:
+            turn_round("ax_mps2", "it moves against the change of the speed")
+    if not drive.has("vx_mps", "yaw_rate_radps", "ay_mps2"):
+        return
+    turn = forward * drive.mean("vx_mps", "yaw_rate_radps")
+    ay = drive.mean("ay_mps2")
+    if _cosine(turn, ay) < -_FOLLOWS:
+        odd = "ay_mps2"
+        if drive.has("steer_rad") and _cosine(drive.mean("steer_rad"), turn) < 0.0:
+            odd = "yaw_rate_radps"
+        turn_round(
+            odd,
+            "it moves against the other two of yaw rate, a_y and steering; where these are "
+            "positive to the right, turn round all of them instead",
+        )
+
+
+def _steer(
+    drive: _Windows, factors: Mapping[str, float], stated: float | None, notes: dict[str, str]
+) -> float:
+    """The factor to road wheels: by the wheelbase that would answer so."""
+    own = (1.0, _DEG) if stated is None else (abs(stated),)
+    if not drive.has("vx_mps", "yaw_rate_radps"):
+        return own[0]
+    speed = factors["vx_mps"] * drive.mean("vx_mps")
+    yaw = factors["yaw_rate_radps"] * drive.mean("yaw_rate_radps")
+    rows = (speed > _MOVING * float(np.median(speed))) & (np.abs(speed * yaw) < _LINEAR_MPS2)
+    curvature, steer = yaw[rows] / np.maximum(speed[rows], 1.0), drive.mean("steer_rad")[rows]
+    alike = _cosine(curvature, steer)
+    if abs(alike) < _FOLLOWS:
+        notes["steer_rad"] = "does not turn with the car: check the column"
+        return own[0]
+    sign = math.copysign(1.0, alike)
+    if sign < 0.0:
+        notes["steer_rad"] = "turned round: it moves against yaw rate and a_y"
+    base = _slope(steer, curvature)
+    # Understeer makes it look longer by K v^2.
+    usual = _WHEELBASE_M + 0.002 * float(np.median(speed[rows])) ** 2
+    ways = [(f, 1.0, _WHEELBASE_DOUBT) for f in own]
+    ways += [(f, _RATIO, math.hypot(_WHEELBASE_DOUBT, _RATIO_DOUBT)) for f in own]
+    factor, ratio, _ = min(
+        ways, key=lambda way: abs(math.log(base * way[0] / way[1] / usual)) / way[2]
+    )
+    if ratio == 1.0:
+        return sign * factor
+    found = base * factor / usual
+    told = (
+        f"angle of the steering wheel; a steering ratio of about {found:.2g} was found: put in "
+        f"the car's"
+    )
+    notes["steer_rad"] = "; ".join(filter(None, [notes.get("steer_rad", ""), told]))
+    return sign * factor / float(f"{found:.3g}")

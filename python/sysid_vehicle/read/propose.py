@@ -1,0 +1,246 @@
+"""A channel map for a log that nobody has mapped yet: proposed, told why, to be edited."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .._files import as_path
+from ..errors import InvalidInput
+from ..log import CHANNELS, Columns, Log, listed
+from ._channel_map import ChannelMap, Source
+from ._names import rank
+from ._physics import scales
+from ._recording import Recording
+from ._registry import blamed, recognised
+from ._table import Table
+from ._units import factor_to
+
+FloatArray = npt.NDArray[np.float64]
+
+_RATE_HZ = 50.0  # at which units and signs are looked for
+_FEWEST = 100
+_FINER = ((0.5, 1.0), (500.0, 1e-3), (5e5, 1e-6), (np.inf, 1e-9))  # steps below, factor of time
+
+
+@dataclass(frozen=True)
+class Proposed:
+    """Where a channel is to come from, and why."""
+
+    column: str
+    factor: float
+    unit: str
+    why: str
+    others: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A proposed channel map.
+
+    Attributes
+    ----------
+    channels : mapping of Proposed
+        By canonical channel.
+    missing : tuple of str
+        Needed channels for which nothing was found.
+    """
+
+    channels: Mapping[str, Proposed]
+    missing: tuple[str, ...]
+
+    @property
+    def channel_map(self) -> ChannelMap:
+        """The map, ready for `read_log`."""
+        return ChannelMap({c: Source(p.column, p.factor) for c, p in self.channels.items()})
+
+    def to_toml(self) -> str:
+        """The map as a file to look through and to edit."""
+        lines = ["# Proposed channel map: look at every line, mend what is wrong.", "[channels]"]
+        for channel, p in self.channels.items():
+            lines.append(f"# {CHANNELS[channel].meaning} [{CHANNELS[channel].unit}]: {p.why}")
+            if p.others:
+                lines.append(f"#   or one of: {listed(map(_quoted, p.others))}")
+            entry = f"column = {_quoted(p.column)}, factor = {p.factor!r}"
+            lines.append(f"{channel} = {{ {entry} }}")
+        for name in self.missing:
+            lines.append(f"# {CHANNELS[name].meaning} [{CHANNELS[name].unit}]: nothing was found")
+            lines.append(f'# {name} = {{ column = "", factor = 1.0 }}')
+        return "\n".join(lines) + "\n"
+
+    def __str__(self) -> str:
+        return self.to_toml()
+
+
+def propose_channels(
+    source: str | Path | Columns | Log, *, dbc: str | Path | None = None
+) -> Proposal:
+    """Propose which column of a log is which channel, in which unit and with which sign.
+
+    Columns are found by their names and by the units that the file states. Units that it does not
+    state, signs, swapped accelerations and the angle of the steering wheel in place of the road
+    wheels' are found by the laws of motion; an estimated steering ratio is only as good as a usual
+    wheelbase.
+
+    Parameters
+    ----------
+    source : str, Path, table or Log
+        As for `read_log`.
+    dbc : str or Path, optional
+        Database of the CAN frames that the file holds.
+
+    Returns
+    -------
+    Proposal
+
+    Raises
+    ------
+    InvalidInput
+        If the log cannot be read.
+    """
+    from . import contents
+
+    if isinstance(source, Log):
+        source = {name: source[name] for name in source.channels}
+    is_path = isinstance(source, (str, Path))
+    entry = recognised(as_path(source)) if is_path else None
+    with blamed(entry, source if is_path else "log"):
+        held = contents(source, dbc, entry)
+        view = _View(held)
+        chosen = {
+            channel: found
+            for channel in CHANNELS
+            if not (channel == "time_s" and view.has_times) and (found := _ranked(view, channel))
+        }
+        return _proposal(view, chosen)
+
+
+class _View:
+    """A table or a recording, alike: names, units, values with times."""
+
+    def __init__(self, held: Table | Recording) -> None:
+        self._held = held
+        self.has_times = isinstance(held, Recording)
+        self.names = list(held.entries) if isinstance(held, Recording) else list(held.columns)
+        if isinstance(held, Table):
+            self.names += [n for n in held.seconds if n not in self.names]
+
+    def unit(self, name: str) -> str:
+        if isinstance(self._held, Recording):
+            return self._held.entries[name].unit
+        return self._held.units.get(name, "")
+
+    def is_stamps(self, name: str) -> bool:
+        return isinstance(self._held, Table) and name in self._held.seconds
+
+    def values(
+        self, names: list[str], time: str | None
+    ) -> dict[str, tuple[FloatArray, FloatArray]]:
+        if isinstance(self._held, Recording):
+            signals = self._held.signals(names, [])
+            return {name: (s.time_s, s.values) for name, s in signals.items()}
+        if time is None:
+            return {}
+        clock = self._held.seconds.get(time, self._held.columns.get(time))
+        assert clock is not None
+        return {name: (clock, self._held.columns[name]) for name in names}
+
+
+def _ranked(view: _View, channel: str) -> list[str]:
+    scored = [(rank(name, view.unit(name), channel), name) for name in view.names]
+    kept = [(score, name) for score, name in scored if score > 0.0]
+    return [name for _, name in sorted(kept, key=lambda pair: -pair[0])]
+
+
+def _proposal(view: _View, chosen: dict[str, list[str]]) -> Proposal:
+    # A column is one channel: the one that is first in the list of channels.
+    first: dict[str, str] = {}
+    for channel, names in chosen.items():
+        free = [name for name in names if name not in first.values()]
+        if free:
+            first[channel] = free[0]
+    stated: dict[str, float] = {}
+    for channel, name in first.items():
+        factor = factor_to(CHANNELS[channel].unit, view.unit(name))
+        if factor is not None:
+            stated[channel] = factor
+        elif name == channel:
+            stated[channel] = 1.0
+    time = first.get("time_s")
+    driven = {c: n for c, n in first.items() if c not in ("time_s", "fx_n", "vy_mps")}
+    held = view.values(list(driven.values()), time)
+    factors = dict(stated)
+    why: dict[str, str] = {}
+    if time is not None:
+        factors["time_s"], why["time_s"] = _time_factor(view, time, held, stated.get("time_s"))
+    even = _even({c: held[n] for c, n in driven.items() if n in held}, factors.get("time_s", 1.0))
+    if even is not None:
+        # The sign and the gear of the steering are no matter of its unit: they are always sought.
+        found = scales(*even, {c: f for c, f in stated.items() if c in even[1]})
+        if found.swapped:
+            first["ax_mps2"], first["ay_mps2"] = first["ay_mps2"], first["ax_mps2"]
+        factors.update(found.factors)
+        why.update(found.notes)
+    channels = {
+        channel: Proposed(
+            name,
+            factors.get(channel, 1.0),
+            view.unit(name),
+            "; ".join(filter(None, [_by_name(channel, name, view.unit(name)), why.get(channel)])),
+            tuple(n for n in chosen[channel] if n != name)[:5],
+        )
+        for channel, name in first.items()
+    }
+    needed = [c for c in CHANNELS if CHANNELS[c].required and c not in channels]
+    if view.has_times:
+        needed = [c for c in needed if c != "time_s"]
+    return Proposal(channels, tuple(needed))
+
+
+def _by_name(channel: str, name: str, unit: str) -> str:
+    text = "by its name" if name != channel else "so called"
+    return f"{text}, the file states '{unit}'" if unit else text
+
+
+def _time_factor(
+    view: _View, time: str, held: Mapping[str, Any], stated: float | None
+) -> tuple[float, str]:
+    if view.is_stamps(time):
+        return 1.0, "time stamps"
+    if stated is not None or not held:
+        return stated or 1.0, ""
+    clock = next(iter(held.values()))[0]
+    step = float(np.median(np.diff(clock))) if clock.size > 1 else 0.0
+    factor = next(f for below, f in _FINER if step < below)
+    return factor, f"steps of {step:.4g}"
+
+
+def _even(
+    held: Mapping[str, tuple[FloatArray, FloatArray]], factor: float
+) -> tuple[FloatArray, dict[str, FloatArray]] | None:
+    """The channels on common even times, to look at: interpolated, for nothing else."""
+    known = {}
+    for channel, (clock, values) in held.items():
+        there = np.isfinite(clock) & np.isfinite(values)
+        if np.count_nonzero(there) >= _FEWEST and (np.diff(clock[there]) > 0.0).all():
+            known[channel] = factor * clock[there], values[there]
+    if not known:
+        return None
+    begin = max(float(t[0]) for t, _ in known.values())
+    end = min(float(t[-1]) for t, _ in known.values())
+    if (end - begin) * _RATE_HZ < _FEWEST:
+        return None
+    time_s = np.arange(begin, end, 1.0 / _RATE_HZ)
+    return time_s, {c: np.interp(time_s, t, values) for c, (t, values) in known.items()}
+
+
+def _quoted(name: str) -> str:
+    text = name.replace("\\", "\\\\").replace('"', '\\"')
+    if any(ord(c) < 32 for c in text):
+        raise InvalidInput(f"column {name!r}: its name holds a control character; rename it")
+    return f'"{text}"'

@@ -1,0 +1,170 @@
+"""Channel maps that are proposed: names, units, signs and swaps are found."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle.cli import main
+from sysid_vehicle.errors import InvalidInput
+
+DEG, G = np.pi / 180.0, 9.80665
+CHANNELS = ("vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2", "steer_rad")
+
+# Names as loggers have them, with what each is multiplied by to get there.
+LOGGERS: dict[str, dict[str, tuple[str, float]]] = {
+    "MoTeC": {
+        "time_s": ("Time", 1.0),
+        "vx_mps": ("Corr Speed", 3.6),
+        "yaw_rate_radps": ("Gyro Yaw Velocity", 1 / DEG),
+        "ax_mps2": ("G Force Long", 1 / G),
+        "ay_mps2": ("G Force Lat", -1 / G),
+        "steer_rad": ("Steered Angle", -1 / DEG),
+    },
+    "CAN": {
+        "time_s": ("timestamps", 1e3),
+        "vx_mps": ("VehicleSpeed", 3.6),
+        "yaw_rate_radps": ("ESP_YawRate", 1 / DEG),
+        "ax_mps2": ("ESP_LongAcc", 1.0),
+        "ay_mps2": ("ESP_LatAcc", 1.0),
+        "steer_rad": ("SteeringWheelAngle", 15.0 / DEG),
+    },
+    "ROS": {
+        "time_s": ("t", 1.0),
+        "vx_mps": ("/odom/twist/twist/linear/x", 1.0),
+        "yaw_rate_radps": ("/imu/angular_velocity/z", 1.0),
+        "ax_mps2": ("/imu/linear_acceleration/x", 1.0),
+        "ay_mps2": ("/imu/linear_acceleration/y", 1.0),
+        "steer_rad": ("/vehicle/steering_angle", 1.0),
+    },
+    "z down": {
+        "time_s": ("time", 1.0),
+        "vx_mps": ("speed", 1 / 0.44704),
+        "yaw_rate_radps": ("gyro_z", -1.0),
+        "ax_mps2": ("acc_x", -1.0),
+        "ay_mps2": ("acc_y", 1.0),
+        "steer_rad": ("hand_wheel", 15.0),
+    },
+    "German": {
+        "time_s": ("Zeit", 1.0),
+        "vx_mps": ("Geschwindigkeit", 3.6),
+        "yaw_rate_radps": ("Gierrate", 1 / DEG),
+        "ax_mps2": ("Laengsbeschleunigung", 1.0),
+        "ay_mps2": ("Querbeschleunigung", 1.0),
+        "steer_rad": ("Lenkradwinkel", 15.0 / DEG),
+    },
+}
+OTHERS = ("WheelSpeed_FL", "Engine RPM", "SteeringTorque", "Lap Time", "Oil Temp", "acc_z")
+
+
+@pytest.fixture(scope="module")
+def right(truth: sv.Model) -> sv.Log:
+    return sv.drive(truth, sv.manoeuvres.handling_course(30.0), seed=7, rate_hz=50.0)
+
+
+def renamed(log: sv.Log, names: dict[str, tuple[str, float]]) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(3)
+    data = {other: rng.normal(size=log.n) for other in OTHERS}
+    data.update({name: log[channel] * factor for channel, (name, factor) in names.items()})
+    return data
+
+
+def found(data: Any, right: sv.Log, channels: tuple[str, ...] = CHANNELS) -> sv.Log:
+    """Read with the proposed map, and hold every channel against the right one.
+
+    Left and right may be exchanged in all lateral channels together: nothing in a log tells.
+    """
+    proposal = sv.propose_channels(data)
+    assert proposal.missing == ()
+    log = sv.read_log(data, proposal.channel_map, check=False)
+    side = np.sign(log["ay_mps2"] @ right["ay_mps2"])
+    for channel in channels:
+        wanted = 1.0 if channel in ("vx_mps", "ax_mps2") else side
+        ratio = float(log[channel] @ right[channel]) / float(right[channel] @ right[channel])
+        assert ratio == pytest.approx(wanted, abs=0.02), channel
+    return log
+
+
+@pytest.mark.parametrize("logger", LOGGERS)
+def test_names_units_and_signs(right: sv.Log, logger: str) -> None:
+    names = LOGGERS[logger]
+    gear = abs(names["steer_rad"][1]) in (15.0, 15.0 / DEG)
+    data = renamed(right, names)
+    proposal = sv.propose_channels(data)
+    assert {c: p.column for c, p in proposal.channels.items()} == {
+        c: name for c, (name, _) in names.items()
+    }
+    log = found(data, right, CHANNELS[:-1] if gear else CHANNELS)
+    np.testing.assert_allclose(log["time_s"], right["time_s"], atol=1e-9)
+    if gear:  # as well as the wheelbase and the understeer are usual
+        ratio = np.std(log["steer_rad"]) / np.std(right["steer_rad"])
+        assert 0.6 < ratio < 1.6
+        assert "steering ratio of about" in proposal.channels["steer_rad"].why
+    sv.read_log(data, proposal.channel_map)  # it passes every check of a log
+
+
+def test_swapped_accelerations_are_found(right: sv.Log) -> None:
+    names = dict(LOGGERS["ROS"])
+    names["ax_mps2"], names["ay_mps2"] = names["ay_mps2"], names["ax_mps2"]
+    proposal = sv.propose_channels(renamed(right, names))
+    assert proposal.channels["ay_mps2"].column == "/imu/linear_acceleration/x"
+    assert "swapped against its name" in proposal.channels["ay_mps2"].why
+    found(renamed(right, names), right)
+
+
+def test_canonical_names_are_taken_as_they_are(right: sv.Log) -> None:
+    proposal = sv.propose_channels(right)
+    assert {c: (p.column, p.factor) for c, p in proposal.channels.items()} == {
+        c: (c, 1.0) for c in right.channels
+    }
+
+
+def test_a_stated_unit_counts_more_than_a_usual_size(tmp_path: Path, right: sv.Log) -> None:
+    slow = {name: right[name] for name in right.channels}
+    names, units = list(slow), ["s", "m/s", "m/s", "deg/s", "m/s2", "g", "rad", "kN"]
+    slow["yaw_rate_radps"] = slow["yaw_rate_radps"] / DEG
+    slow["ay_mps2"], slow["fx_n"] = slow["ay_mps2"] / G, slow["fx_n"] * 1e-3
+    assert names == [*("time_s", "vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2"),
+                     *("steer_rad", "fx_n")]  # fmt: skip
+    rows = [",".join(map(repr, map(float, row))) for row in zip(*slow.values(), strict=True)]
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join([",".join(names), ",".join(units), *rows]))
+    factors = {c: p.factor for c, p in sv.propose_channels(path).channels.items()}
+    assert factors["fx_n"] == 1000.0
+    assert factors["ay_mps2"] == pytest.approx(G)
+    assert factors["yaw_rate_radps"] == pytest.approx(DEG)
+
+
+def test_what_is_not_found_is_left_to_fill_in() -> None:
+    data = {"time": np.arange(200) * 0.01, "speed": np.full(200, 20.0), "x1": np.zeros(200)}
+    proposal = sv.propose_channels(data)
+    assert proposal.missing == ("yaw_rate_radps", "ay_mps2", "steer_rad")
+    assert '# steer_rad = { column = "", factor = 1.0 }' in proposal.to_toml()
+
+
+def test_on_the_command_line(
+    tmp_path: Path, right: sv.Log, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = renamed(right, LOGGERS["MoTeC"])
+    rows = [",".join(map(repr, map(float, row))) for row in zip(*data.values(), strict=True)]
+    (tmp_path / "run.csv").write_text("\n".join([",".join(data), *rows]))
+    target = tmp_path / "map.toml"
+    assert main(["map", str(tmp_path / "run.csv"), "-o", str(target)]) == 0
+    assert capsys.readouterr().out == target.read_text("utf-8")
+    log = sv.read_log(tmp_path / "run.csv", target)
+    np.testing.assert_allclose(abs(log["ay_mps2"]), abs(right["ay_mps2"]), atol=1e-9)
+    assert main(["map", str(tmp_path / "run.csv"), "-o", str(tmp_path / "run.csv")]) == 2
+    assert "is also an input" in capsys.readouterr().err
+
+
+def test_names_that_toml_cannot_hold() -> None:
+    data = {"time\n": np.arange(9.0), "speed": np.arange(9.0)}
+    proposal = sv.propose_channels({'speed "x" \\': np.arange(9.0), "time": np.arange(9.0)})
+    import sysid_vehicle._files as files
+
+    text = files.tomllib.loads(proposal.to_toml())["channels"]["vx_mps"]["column"]
+    assert text == 'speed "x" \\'
+    with pytest.raises(InvalidInput, match="control character"):
+        sv.propose_channels(data).to_toml()
