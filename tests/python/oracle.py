@@ -25,6 +25,7 @@ from sysid_vehicle import (
     identify,
     lab,
     online,
+    twin,
 )
 from sysid_vehicle.estimate import Driving, first_guess
 
@@ -145,6 +146,42 @@ def observed(columns: Columns, vehicle: Vehicle) -> Any:
     return {"state": found.state, "log_likelihood": found.log_likelihood}
 
 
+def mu_slip(columns: Columns, vehicle: Vehicle) -> Any:
+    """The estimators of the mu-slip curve; yaw rate and lateral acceleration stand in."""
+    data = online.MuSlipData(np.abs(columns["yaw_rate_radps"]), columns["ay_mps2"] / 9.81)
+    fitted = online.mu_slip_fit(data)
+    filtered = online.mu_slip_ekf(data, iterations=2)
+    smoothed = online.mu_slip_smooth(data)
+    return [
+        fitted.values,
+        fitted.covariance,
+        *((run.mean, run.covariance) for run in (filtered, smoothed)),
+    ]
+
+
+def twinned(columns: Columns, vehicle: Vehicle) -> Any:
+    """An observer with twins side by side, which is given what the columns hold."""
+    n = len(columns["time_s"])
+    inputs = np.zeros((n, len(twin.INPUTS)))
+    inputs[:, :2] = columns["steer_rad"][:, None]
+    inputs[:, 2:6] = columns.get("fx_n", np.zeros(n))[:, None] * 0.08
+    values = np.full((n, len(twin.READINGS)), np.nan)
+    for name in ("ax_mps2", "ay_mps2"):
+        values[:, twin.READINGS.index(name)] = columns.get(name, np.nan)
+    read = twin.Readings(values, {}, 1e-3)
+    batch = twin.SideBySide(twin.unknowns("mass_kg", "cg_z_m"), {"ax_mps2": 0.1, "ay_mps2": 0.1})
+    speed = float(columns["vx_mps"][0]) if n else 20.0
+    found = twin.observe(
+        twin.TwinCar(),
+        twin.NOMINAL_SUV,
+        inputs,
+        read,
+        twin.Observer(batch=batch),
+        speed_mps=speed,
+    )
+    return {"parameters": found.parameters, "spread": found.spread}
+
+
 CALLS: dict[str, Callable[[Columns, Vehicle], Any]] = {
     "read": read,
     "identify": fit,
@@ -154,4 +191,6 @@ CALLS: dict[str, Callable[[Columns, Vehicle], Any]] = {
     **{f"sideslip {kind}": sideslip(kind) for kind in ("dual", "ukf", "ekf", "square-root-ukf")},
     "cornering": cornering,
     "observer": observed,
+    "mu-slip": mu_slip,
+    "twin": twinned,
 }
