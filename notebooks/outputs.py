@@ -23,7 +23,6 @@ NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 RELATIVE = 0.05
 LAST_DIGITS = 2.0
 DPI = 72
-COLOURS = 48
 
 Notebook = dict[str, Any]
 
@@ -34,12 +33,12 @@ def notebooks(names: list[str]) -> list[Path]:
 
 
 def small_png(data: str) -> str:
-    """Base64 of a picture with few colours, which lines and text do not miss."""
+    """Base64 of a picture without transparency, compressed as far as it goes."""
     from PIL import Image
 
     picture = Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")
     out = io.BytesIO()
-    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
+    picture.save(out, "PNG", optimize=True)
     return base64.b64encode(out.getvalue()).decode()
 
 
