@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from .._arrays import FloatArray
 from ..log import Log
@@ -74,8 +74,8 @@ def _accelerations(
     if lx or ly:
         r = _filled(now.get("yaw_rate_radps", log["yaw_rate_radps"]))
         width = max(3, 2 * round(0.5 * _SMOOTH_S * log.rate_hz) + 1)
-        smooth = signal.savgol_filter(r, width, 2)
-        dr = signal.savgol_filter(r, width, 2, deriv=1, delta=1.0 / log.rate_hz)
+        smooth = scipy.signal.savgol_filter(r, width, 2)
+        dr = scipy.signal.savgol_filter(r, width, 2, deriv=1, delta=1.0 / log.rate_hz)
         along = along + lx * smooth**2 + ly * dr
         across = across - lx * dr + ly * smooth**2
     if gx or turn or lx or ly:

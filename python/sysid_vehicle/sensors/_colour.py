@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, sparse
+import scipy
 
 from .._arrays import FloatArray
 from ._motion import IntArray
@@ -34,7 +34,7 @@ class Colour:
     white_std: float
     phi: FloatArray
 
-    def whitener(self, run: IntArray) -> sparse.csr_matrix:
+    def whitener(self, run: IntArray) -> scipy.sparse.csr_matrix:
         """Matrix that turns n errors into white ones of unit variance.
 
         Parameters
@@ -48,7 +48,7 @@ class Colour:
         diagonals = [scale]
         for k, phi in enumerate(self.phi, start=1):
             diagonals.append(np.where(full, -phi / self.white_std, 0.0)[k:])
-        return sparse.diags(diagonals, -np.arange(p + 1), shape=(n, n), format="csr")
+        return scipy.sparse.diags(diagonals, -np.arange(p + 1), shape=(n, n), format="csr")
 
     def words(self, rate_hz: float) -> str:
         """Say where in frequency the noise lies."""
@@ -111,7 +111,7 @@ def fit_colour(errors: FloatArray, run: IntArray, floor: float, longest: int = _
     for p in range(1, longest + 1):
         r = np.array(lagged[: p + 1])
         r[0] = variance * (1.0 + 1e-6)
-        phi = linalg.solve_toeplitz(r[:-1], r[1:])
+        phi = scipy.linalg.solve_toeplitz(r[:-1], r[1:])
         white = r[0] - float(phi @ r[1:])
         if white <= 0.0:
             break

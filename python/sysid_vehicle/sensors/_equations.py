@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
+import scipy
 
 from .._arrays import FloatArray
 from ._motion import Basis, Grid, IntArray
@@ -92,7 +92,7 @@ class Readings:
 
 def predict(
     readings: Readings, grid: Grid, x: FloatArray, faults: dict[str, float]
-) -> tuple[FloatArray, sparse.csr_matrix, dict[str, FloatArray]]:
+) -> tuple[FloatArray, scipy.sparse.csr_matrix, dict[str, FloatArray]]:
     """Return what the channel should read, and the derivatives.
 
     Returns
@@ -124,7 +124,7 @@ def predict(
     columns = np.concatenate([c for c, _ in blocks], axis=1)
     weights = np.concatenate([w for _, w in blocks], axis=1)
     n, k = columns.shape
-    by_motion = sparse.csr_matrix(
+    by_motion = scipy.sparse.csr_matrix(
         (weights.ravel(), columns.ravel(), np.arange(0, n * k + 1, k)), shape=(n, grid.size)
     )
     return expected, by_motion, {key: d for key, d in by_fault.items() if key in faults}

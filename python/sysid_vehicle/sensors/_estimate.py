@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, sparse
+import scipy
 
 from .._arrays import FloatArray, as_float64
 from ..errors import NumericalError
@@ -86,26 +86,26 @@ class Estimate:
 class _Band:
     """Cholesky factor of a banded information matrix."""
 
-    def __init__(self, h: sparse.csr_matrix) -> None:
-        coo = sparse.tril(h, format="coo")
+    def __init__(self, h: scipy.sparse.csr_matrix) -> None:
+        coo = scipy.sparse.tril(h, format="coo")
         self.width = int((coo.row - coo.col).max())
         self.ab = np.zeros((self.width + 1, h.shape[0]))
         self.ab[coo.row - coo.col, coo.col] = coo.data
         try:
-            self.factor = linalg.cholesky_banded(self.ab, lower=True, check_finite=False)
-        except linalg.LinAlgError as error:
+            self.factor = scipy.linalg.cholesky_banded(self.ab, lower=True, check_finite=False)
+        except scipy.linalg.LinAlgError as error:
             raise NumericalError(
                 "the motion cannot be told from these channels; check that vx_mps, "
                 "yaw_rate_radps and ay_mps2 hold values"
             ) from error
 
     def solve(self, b: FloatArray) -> FloatArray:
-        x: FloatArray = linalg.cho_solve_banded((self.factor, True), b, check_finite=False)
+        x: FloatArray = scipy.linalg.cho_solve_banded((self.factor, True), b, check_finite=False)
         return x
 
     def draw(self, z: FloatArray) -> FloatArray:
         """Solve with the transposed factor: normal numbers become draws of the posterior."""
-        x, info = linalg.lapack.dtbtrs(self.factor, z, uplo="L", trans="T")
+        x, info = scipy.linalg.lapack.dtbtrs(self.factor, z, uplo="L", trans="T")
         if info:
             raise NumericalError("the posterior of the motion is singular")
         drawn: FloatArray = x
@@ -117,9 +117,9 @@ class _System:
     """Whitened linearised equations of all channels, and what is drawn from them."""
 
     errors: dict[str, FloatArray]
-    raw_motion: dict[str, sparse.csr_matrix]
+    raw_motion: dict[str, scipy.sparse.csr_matrix]
     raw_faults: dict[str, FloatArray]
-    motion: dict[str, sparse.csr_matrix]
+    motion: dict[str, scipy.sparse.csr_matrix]
     by_faults: dict[str, FloatArray]
     white: dict[str, FloatArray]
     weights: dict[str, FloatArray]
@@ -165,7 +165,7 @@ def estimate(
     settled = False
     for count in range(1, _ROUNDS + 1):
         system = _linearise(readings, grid, x, faults, colours, runs)
-        rows = sparse.vstack(
+        rows = scipy.sparse.vstack(
             [
                 grid.levels,
                 *(steps[s] / road[s] for s in SLOW),
@@ -179,7 +179,7 @@ def estimate(
         prior = np.diag(2.0 / (typical**2 + now**2) + most**-2.0)
         hxt, htt, bt = np.zeros((grid.size, len(names))), prior.copy(), -prior @ now
         for c, j in system.motion.items():
-            w = sparse.diags(system.weights[c])
+            w = scipy.sparse.diags(system.weights[c])
             wj = (w @ j).T.tocsr()
             h = h + wj @ j
             b = b + wj @ system.white[c]
@@ -266,7 +266,7 @@ def _begin(
             _, j, _ = predict(r, grid, np.zeros(grid.size), {})
             rows.append(j / std)
             values.append(r.values / std)
-    j = sparse.vstack(rows, format="csr")
+    j = scipy.sparse.vstack(rows, format="csr")
     return _Band(j.T @ j).solve(j.T @ np.concatenate(values)), colours
 
 
@@ -306,7 +306,7 @@ def _bounded(step: FloatArray, names: Sequence[str], faults: dict[str, float]) -
     return result
 
 
-def _road(rows: sparse.csr_matrix, x: FloatArray, band: _Band, now: float) -> float:
+def _road(rows: scipy.sparse.csr_matrix, x: FloatArray, band: _Band, now: float) -> float:
     """New standard deviation of the change within a second (EM, exact)."""
     inverse = band.solve(np.asarray(rows.T.todense()))
     spread = np.asarray((rows @ inverse).diagonal()) if rows.shape[0] else np.zeros(1)

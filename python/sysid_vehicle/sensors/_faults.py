@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from ._estimate import Estimate
 from ._texts import DEG, why_not
@@ -104,7 +104,7 @@ def faults_of(found: Estimate, absent: Sequence[str]) -> tuple[SensorFault, ...]
     names = list(found.faults)
     naive = np.linalg.inv(found.information)
     rows = [t for t in _TOLD if t.of[-1] in names]
-    critical = float(stats.norm.isf(0.5 * _FALSE_CLAIMS / len(rows)))
+    critical = float(scipy.stats.norm.isf(0.5 * _FALSE_CLAIMS / len(rows)))
     result = []
     for told in _TOLD:
         if told not in rows:

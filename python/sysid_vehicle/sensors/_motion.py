@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy import sparse
+import scipy
 
 from .._arrays import FloatArray
 
@@ -132,34 +132,34 @@ class Grid:
         return at
 
     @cached_property
-    def levels(self) -> sparse.csr_matrix:
+    def levels(self) -> scipy.sparse.csr_matrix:
         """Rows, divided by their standard deviation, that matter only where no sensor speaks."""
         rows = [
             self._rows([self.index[signal]], np.array([1.0 / level]))
             for signal, level in _LEVEL.items()
         ]
-        return sparse.vstack(rows, format="csr")
+        return scipy.sparse.vstack(rows, format="csr")
 
-    def bends(self, signal: str) -> sparse.csr_matrix:
+    def bends(self, signal: str) -> scipy.sparse.csr_matrix:
         """Rows of the second derivative of a speed or of the yaw rate from knot to knot."""
         places = np.split(self.index[signal], np.cumsum(self._counts[0])[:-1])
         rows = [
             self._rows([at[:-2], at[1:-1], at[2:]], np.array([1.0, -2.0, 1.0]) / self.step_s**2)
             for at in places
         ]
-        return sparse.vstack(rows, format="csr")
+        return scipy.sparse.vstack(rows, format="csr")
 
-    def steps(self, signal: str) -> sparse.csr_matrix:
+    def steps(self, signal: str) -> scipy.sparse.csr_matrix:
         """Rows of the change of `signal` from knot to knot."""
         places = np.split(self.index[signal], np.cumsum(self._counts[1])[:-1])
         ahead = np.concatenate([at[1:] for at in places])
         behind = np.concatenate([at[:-1] for at in places])
         return self._rows([behind, ahead], np.array([-1.0, 1.0]))
 
-    def _rows(self, picks: list[IntArray], weights: FloatArray) -> sparse.csr_matrix:
+    def _rows(self, picks: list[IntArray], weights: FloatArray) -> scipy.sparse.csr_matrix:
         n, k = picks[0].size, len(picks)
         values = np.broadcast_to(weights, (n, k)).ravel()
         pointers = np.arange(0, n * k + 1, k)
-        return sparse.csr_matrix(
+        return scipy.sparse.csr_matrix(
             (values, np.stack(picks, 1).ravel(), pointers), shape=(n, self.size)
         )
