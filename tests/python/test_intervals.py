@@ -107,14 +107,16 @@ def test_a_known_inertia_can_be_freed(truth: Model) -> None:
 
 
 def test_what_is_not_determined_is_not_called_at_bound() -> None:
-    box = Box([0, 1, 2], np.zeros(3), np.ones(3))
-    x = np.array([1.0, 1.0, 0.5])
-    information = np.diag([1e-3, 1e6, 1e6])
-    (loose, held, free), _ = wald("abc", dict.fromkeys("abc", "1"), x, information, box)
-    assert (loose.note, held.note, free.note) == ("not determined", "at bound", "")
+    box = Box([0, 1, 2, 3, 4], np.zeros(5), np.ones(5))
+    x = np.array([0.9, 1.0, 1.0, 0.5, 0.5])
+    information = np.diag([1e-3, 1e-3, 1e6, 1e6, 0.0])
+    found, _ = wald("abcde", dict.fromkeys("abcde", "1"), x, information, box)
+    unknown = "not determined"
+    assert [e.note for e in found] == [unknown, unknown, "at bound", "", unknown]
+    loose, loose_held, held, free, never_felt = found
     # The data say nothing: no more is known than the box. A bound leaves no standard error.
-    assert loose.std == pytest.approx(np.hypot(0.5, 1.0 / np.sqrt(12.0)), rel=1e-3)
-    assert held.std == np.inf
+    assert loose.std == pytest.approx(np.hypot(0.4, 1.0 / np.sqrt(12.0)), rel=1e-3)
+    assert loose_held.std == held.std == never_felt.std == np.inf
     assert free.std == pytest.approx(1e-3, rel=1e-4)
 
 

@@ -32,7 +32,7 @@ class Estimate:
     Attributes
     ----------
     std : float
-        Standard error; infinite where a bound holds the value.
+        Standard error; infinite where a bound holds the value, or the data never felt it.
     note : str
         Empty, or why the value says little: `not determined`, `at bound`, `no lower end`, `no upper
         end` (of the interval).
@@ -98,18 +98,20 @@ def wald(
     """Estimates with the standard errors of the information matrix, and their covariance.
 
     What the data alone do not determine is called that, even where it ended at a bound: the bound
-    did not stop it. What they do determine and a bound stops has no standard error.
+    is not what stopped it. At a bound there is no standard error, nor for what they never felt.
     """
     width = box.upper - box.lower
     covariance = box_covariance(information, box, x)
     std = np.sqrt(np.diag(covariance))
-    unknown = _std_of_data(information) > _UNKNOWN * width
+    of_data = _std_of_data(information)
+    unknown = of_data > _UNKNOWN * width
     held = (x <= box.lower + _AT_BOUND * width) | (x >= box.upper - _AT_BOUND * width)
+    silent = held | np.isinf(of_data)
     estimates = tuple(
         Estimate(
             name,
             float(x[i]),
-            float("inf") if held[i] and not unknown[i] else float(std[i]),
+            float("inf") if silent[i] else float(std[i]),
             units[name],
             "not determined" if unknown[i] else "at bound" if held[i] else "",
         )
