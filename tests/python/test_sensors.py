@@ -1,6 +1,7 @@
 """The check of the sensors against drives whose sensors have known faults."""
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -179,6 +180,29 @@ def test_result_shows_itself(faulty: sv.SensorCheck) -> None:
         faulty["imu_forwards_m"]
     with pytest.raises(sv.InvalidInput, match="was not checked"):
         faulty.residuals("fx_n")
+
+
+def test_a_study_uses_what_the_check_settled(
+    faulty: sv.SensorCheck, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Stop(Exception):
+        pass
+
+    heard: list[sv.Driving] = []
+
+    def stop(model: sv.Model, driving: sv.Driving, **_: object) -> None:
+        heard.append(driving)
+        raise Stop
+
+    from sysid_vehicle.study import improve as module
+
+    monkeypatch.setitem(vars(sys.modules[module.__module__]), "identify", stop)
+    with pytest.raises(Stop):
+        sv.improve(sv.Model(sv.example_vehicle()), faulty.logs[0], faulty.logs[0], sensors=faulty)
+    (driving,) = heard
+    assert all(log.corrections for log in driving.logs)
+    assert "gyro_bias" in faulty.settles
+    assert "imu_lever_arm" not in faulty.settles
 
 
 def test_command_prints_and_writes(

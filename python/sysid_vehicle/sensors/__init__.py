@@ -2,6 +2,6 @@
 
 from ._check import check
 from ._faults import SensorFault
-from ._result import SensorCheck
+from ._result import SensorCheck, put_right
 
-__all__ = ["SensorCheck", "SensorFault", "check"]
+__all__ = ["SensorCheck", "SensorFault", "check", "put_right"]

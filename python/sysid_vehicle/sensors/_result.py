@@ -28,7 +28,7 @@ from ._texts import ON_CORRECTION, gradient, map_line
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["SensorCheck"]
+__all__ = ["SensorCheck", "put_right"]
 
 _HEAD = ("fault", "channel", "value", "95 % interval", "verdict")
 _SIGNAL_HEAD = ("channel", "rate", "held", "quantum", "missing", "noise", "colour")
@@ -327,6 +327,10 @@ class SensorCheck:
         }
 
 
-def checks_of(sensors: SensorCheck | None, logs: Sequence[Log]) -> list[Log]:
+def put_right(
+    sensors: SensorCheck | None, logs: Log | Sequence[Log] | None
+) -> Log | Sequence[Log] | None:
     """The logs, put right where a check is given."""
-    return list(logs) if sensors is None else [sensors.apply(log) for log in logs]
+    if sensors is None or logs is None:
+        return logs
+    return sensors.apply(logs) if isinstance(logs, Log) else [sensors.apply(log) for log in logs]

@@ -18,6 +18,7 @@ from ..identify import Fit, explaining, identify
 from ..log import Log, check_excitation
 from ..model import Model
 from ..rules import USUAL, Rules, grade, verdict
+from ..sensors import SensorCheck, put_right
 from .added import AddedEffect
 from .held_out import beyond_noise_ahead, hold_out, serving
 from .horizons import horizons
@@ -43,6 +44,7 @@ def improve(
     rules: Rules = USUAL,
     candidates: Sequence[str] | None = None,
     exclude: Sequence[str] = (),
+    sensors: SensorCheck | None = None,
     time_limit_s: float | None = None,
     matters: Mapping[str, float | str] | None = None,
     starts: int = 8,
@@ -73,6 +75,9 @@ def improve(
         Effects to consider; by default all that the model lacks.
     exclude : sequence of str, optional
         Effects not to consider.
+    sensors : SensorCheck, optional
+        Check of the sensors: all logs are put right by it, and what kinematics settled is not
+        considered.
     time_limit_s : float, optional
         After so many seconds no further step begins; what was found until then is judged, and a
         warning tells.
@@ -92,6 +97,10 @@ def improve(
     began = time.perf_counter()
     ends = began + _limit(time_limit_s)
     sizes = None if matters is None else sizes_that_matter(matters)
+    if sensors is not None:
+        train = [sensors.apply(log) for log in ([train] if isinstance(train, Log) else train)]
+        test = put_right(sensors, test)
+        exclude = (*exclude, *sensors.settles)
     if exclude:
         left_out = {effect(e).id for e in exclude}
         candidates = [e.id for e in considered(model, candidates) if e.id not in left_out]
