@@ -62,6 +62,7 @@ def results(fit: Fit, lap: Log, course: Log, truth: Model) -> dict[str, object]:
         "RoadDisturbance": sv.RoadDisturbance(),
         "DriveLimits": sv.DriveLimits(),
         "Rules": sv.Rules(),
+        "SensorCheck": sv.check(lap),
         "Fit": fit,
         "Comparison": sv.compare(fit, course),
         "Diagnosis": found,
@@ -82,6 +83,7 @@ NAMES = (
     *("Driving", "NoiseModel", "SensorNoise", "RoadDisturbance", "DriveLimits", "Fit"),
     *("Comparison", "Diagnosis", "verdicts", "where", "bias_report", "manoeuvre", "drive"),
     *("excitation", "closed loop", "laboratory log", "NumericalError", "Rules"),
+    "SensorCheck",
 )
 
 

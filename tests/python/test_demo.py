@@ -87,6 +87,7 @@ def test_the_story_finds_the_default_effect_and_names_it_last(tmp_path: Path) ->
     assert report.stat().st_size > 10_000
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_a_miss_is_told_as_a_miss(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     json_path = tmp_path / "out.json"

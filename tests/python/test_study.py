@@ -246,6 +246,7 @@ def test_what_no_candidate_explains_is_not_explained(
     assert found.omnibus.p_value < 0.01 or found.train[-1].error > 1.1
 
 
+@pytest.mark.slow
 def test_one_effect_that_leaves_something_is_none(
     start: Model, truth: Model, drives: Drives
 ) -> None:
@@ -263,6 +264,7 @@ def test_one_effect_that_leaves_something_is_none(
     assert both.verdict == "explained"
 
 
+@pytest.mark.slow
 def test_what_leaves_the_evidence_as_it_was_is_a_stand_in(
     start: Model, truth: Model, drives: Drives
 ) -> None:

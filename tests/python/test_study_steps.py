@@ -58,6 +58,7 @@ def by_id(dx: Diagnosis, name: str) -> Fit:
     return found
 
 
+@pytest.mark.slow
 def test_a_head_wind_gives_way_to_drag_and_rolling_resistance(
     dx: Diagnosis, driving: tuple[Driving, Driving]
 ) -> None:
@@ -169,6 +170,7 @@ def search(test: Driving, most_effects: int, told: list[str]) -> Search:
     )
 
 
+@pytest.mark.slow
 def test_no_more_effects_are_added_than_allowed(
     baseline: Fit, driving: tuple[Driving, Driving]
 ) -> None:
