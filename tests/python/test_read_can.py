@@ -90,7 +90,7 @@ def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     )
     example_vehicle().to_toml(tmp_path / "car.toml")
     known = ["--vehicle", str(tmp_path / "car.toml"), "--channels", str(tmp_path / "map.toml")]
-    for command in (["compare"], ["lab", "identify"]):
+    for command in (["compare"], ["check"], ["lab", "identify"]):
         assert main([*command, str(path), *known, "--dbc", str(dbc)]) == 2
         # It was decoded: the four seconds of it are too short a drive.
         assert "only 4 s of the log can be used" in capsys.readouterr().err

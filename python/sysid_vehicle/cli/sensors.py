@@ -10,6 +10,7 @@ from ..read import ChannelMap, read_log
 from ..report import check_page
 from ..sensors import check
 from ..vehicle import Vehicle
+from .log_arguments import LOG_HELP, add_reading
 from .outputs import refuse_unwritable
 
 __all__ = ["add_parser", "run"]
@@ -20,22 +21,22 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = commands.add_parser(
         "check", help="see whether the sensors of logs agree, before any tyre is assumed"
     )
-    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="CSV file of one run")
+    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help=LOG_HELP)
     parser.add_argument("--vehicle", type=Path, metavar="TOML", help="the car's own numbers")
-    parser.add_argument(
-        "--channels", type=Path, metavar="TOML", help="channel map, for other column names or units"
-    )
+    add_reading(parser)
     parser.add_argument("--report", type=Path, metavar="HTML", help="report to write")
     parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Check, print, write."""
-    given = [path for path in (*args.logs, args.vehicle, args.channels) if path is not None]
+    given = [
+        path for path in (*args.logs, args.vehicle, args.channels, args.dbc) if path is not None
+    ]
     refuse_unwritable([args.report, args.json], inputs=given)
     mapping = None if args.channels is None else ChannelMap.from_toml(args.channels)
     vehicle = None if args.vehicle is None else Vehicle.from_toml(args.vehicle)
-    found = check([read_log(path, mapping) for path in args.logs], vehicle)
+    found = check([read_log(path, mapping, dbc=args.dbc) for path in args.logs], vehicle)
     print(found)
     if args.json is not None:
         write_json(args.json, {**found.to_dict(), "warnings": list(heard)})
