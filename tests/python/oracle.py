@@ -42,7 +42,7 @@ class Verdict:
 
 def judge(call: Callable[[], Any]) -> Verdict:
     """Make a call and say how it ended."""
-    with warnings.catch_warnings(record=True) as heard, np.errstate(all="warn"):
+    with warnings.catch_warnings(record=True) as heard, np.errstate(all="warn", under="ignore"):
         warnings.simplefilter("always")
         try:
             result = call()
@@ -140,6 +140,9 @@ def cornering(columns: Columns, vehicle: Vehicle) -> Any:
 
 def observed(columns: Columns, vehicle: Vehicle) -> Any:
     """The laboratory's observer, with noise of its usual size."""
+    if vehicle.yaw_inertia_kgm2 is None:
+        usual = vehicle.mass_kg * vehicle.lf_m * vehicle.lr_m
+        vehicle = vehicle.replace(yaw_inertia_kgm2=usual)
     car = lab.ObserverCar.of(vehicle)
     record = lab.ObserverRecord.from_log(_log(columns), car, (10.0, 11.0))
     found = lab.Observer(car, lab.ObserverNoise.first_guess(record, car)).smoothed(record)
