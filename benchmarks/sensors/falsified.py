@@ -46,50 +46,50 @@ def moved(c: Channels, forward_m: float, left_m: float = 0.0) -> None:
     c["ay_mps2"] = c["ay_mps2"] + forward_m * dr - left_m * r**2
 
 
-def _nothing(c: Channels) -> dict[str, float]:
+def _nothing(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     return {}
 
 
-def _ay_late(c: Channels) -> dict[str, float]:
+def _ay_late(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     late(c, "ay_mps2", 0.02)
     return {"delay_ay_s": 0.02}
 
 
-def _vy_late(c: Channels) -> dict[str, float]:
+def _vy_late(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     late(c, "vy_mps", 0.02)
     return {"delay_vy_s": 0.02}
 
 
-def _imu(c: Channels) -> dict[str, float]:
+def _imu(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     moved(c, 0.4)
     return {"imu_forward_m": 0.4}
 
 
-def _roll(c: Channels) -> dict[str, float]:
+def _roll(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     gain = np.radians(5.0)
     c["ay_mps2"] = (1.0 + gain) * c["ay_mps2"]
     return {"gain_ay": gain}
 
 
-def _scale(c: Channels) -> dict[str, float]:
+def _scale(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     c["ay_mps2"] = 1.06 * c["ay_mps2"]
     return {"gain_ay": 0.06}
 
 
-def _gyro_bias(c: Channels) -> dict[str, float]:
+def _gyro_bias(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     c["yaw_rate_radps"] = c["yaw_rate_radps"] + 0.01
     return {"bias_yaw_rate_radps": 0.01}
 
 
-def _several(c: Channels) -> dict[str, float]:
+def _several(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     """A roll gradient, an IMU ahead, and speeds of a slow and late sensor."""
-    truth = {**_roll(c), **_imu_before_roll(c)}
+    truth = {**_roll(c, rng), **_imu_before_roll(c, rng)}
     for name in ("vx_mps", "vy_mps"):
         late(c, name, 0.03)
     return {**truth, "delay_vx_s": 0.03, "delay_vy_s": 0.03}
 
 
-def _imu_before_roll(c: Channels) -> dict[str, float]:
+def _imu_before_roll(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     r = c["yaw_rate_radps"]
     dr = np.gradient(r, c["time_s"])
     c["ax_mps2"] = c["ax_mps2"] - 0.4 * r**2
@@ -97,11 +97,11 @@ def _imu_before_roll(c: Channels) -> dict[str, float]:
     return {"imu_forward_m": 0.4}
 
 
-def _bank(c: Channels) -> dict[str, float]:
+def _bank(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     """A road that wanders by 1.5 deg rms across and along, over 5 s, in all that is felt."""
     n = c["time_s"].size
     keep = np.exp(-0.01 / 5.0)
-    fresh = np.random.default_rng(n).standard_normal((2, n)) * np.sqrt(1.0 - keep**2)
+    fresh = rng.standard_normal((2, n)) * np.sqrt(1.0 - keep**2)
     slope = 9.81 * np.radians(1.5) * signal.lfilter([1.0], [1.0, -keep], fresh)
     c["ax_mps2"] = c["ax_mps2"] + slope[0]
     c["ay_mps2"] = c["ay_mps2"] + slope[1]
@@ -109,19 +109,19 @@ def _bank(c: Channels) -> dict[str, float]:
 
 
 # Acting on the readings with their noise.
-def _held(c: Channels) -> dict[str, float]:
+def _held(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     for name in ("ay_mps2", "ax_mps2"):
         c[name] = np.repeat(c[name][::2], 2)[: c[name].size]
     return {}
 
 
-def _quantised(c: Channels) -> dict[str, float]:
+def _quantised(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     for name, q in (("ay_mps2", 0.1), ("ax_mps2", 0.1), ("yaw_rate_radps", 0.005), ("vx_mps", 0.1)):
         c[name] = q * np.round(c[name] / q)
     return {}
 
 
-def _slow(c: Channels) -> dict[str, float]:
+def _slow(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     for name in ("vx_mps", "vy_mps"):
         every = np.full(c[name].size, np.nan)
         every[::5] = c[name][::5]
@@ -129,15 +129,14 @@ def _slow(c: Channels) -> dict[str, float]:
     return {}
 
 
-def _vibrating(c: Channels) -> dict[str, float]:
+def _vibrating(c: Channels, rng: np.random.Generator) -> dict[str, float]:
     t = c["time_s"]
-    rng = np.random.default_rng(t.size)
     phase = np.cumsum(rng.standard_normal(t.size)) * 0.05
     c["ay_mps2"] = c["ay_mps2"] + 0.7 * np.sin(2 * np.pi * 12.0 * t + phase)
     return {}
 
 
-CASES: dict[str, tuple[Callable[[Channels], dict[str, float]], bool]] = {
+CASES: dict[str, tuple[Callable[[Channels, np.random.Generator], dict[str, float]], bool]] = {
     "nothing": (_nothing, False),
     "ay 20 ms late": (_ay_late, False),
     "vy 20 ms late": (_vy_late, False),
@@ -157,11 +156,12 @@ CASES: dict[str, tuple[Callable[[Channels], dict[str, float]], bool]] = {
 def falsified(case: str, seed: int) -> tuple[sv.Log, dict[str, float]]:
     """A log with the fault, and the true values of the faults that are not zero."""
     act, on_readings = CASES[case]
+    rng = np.random.default_rng([seed, 2])
     c = clean(seed)
     if on_readings:
         c = noisy(c, seed)
-        truth = act(c)
+        truth = act(c, rng)
     else:
-        truth = act(c)
+        truth = act(c, rng)
         c = noisy(c, seed)
     return sv.Log.from_arrays(c, name=f"{case}, seed {seed}", check=False), truth

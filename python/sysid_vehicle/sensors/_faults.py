@@ -38,7 +38,8 @@ class SensorFault:
     told : bool
         Whether the log tells the fault well enough to say whether it is there.
     found : bool
-        Whether it is there: different from zero, at a level of 1 % over all faults together.
+        Whether it is there: different from zero, at a level of 1 % over all faults together, and
+        large enough to matter.
     why_not : str
         Why it cannot be told; empty where it can.
     """
@@ -67,7 +68,10 @@ class SensorFault:
 
 @dataclass(frozen=True)
 class _Told:
-    """A fault as it is told: sum of estimated ones; `enough` is a useful half interval."""
+    """A fault as it is told, the sum of estimated ones.
+
+    `enough` is a useful half interval; faults smaller than `negligible` harm nothing.
+    """
 
     name: str
     channel: str
@@ -75,27 +79,30 @@ class _Told:
     unit: str
     of: tuple[str, ...]
     enough: float
+    negligible: float
 
 
 _SHOWN = {"s": (1000.0, "ms"), "rad": (1.0 / DEG, "deg"), "": (100.0, "%")}
 _TOLD = (
     _Told("delay_vx_s", "vx_mps", "delay against ax_mps2", "s",
-          ("delay.speeds", "delay.vx_mps"), 0.03),
+          ("delay.speeds", "delay.vx_mps"), 0.03, 0.002),
     _Told("delay_vy_s", "vy_mps", "delay against yaw_rate_radps", "s",
-          ("delay.speeds", "delay.vy_mps"), 0.03),
+          ("delay.speeds", "delay.vy_mps"), 0.03, 0.002),
     _Told("delay_ay_s", "ay_mps2", "delay against yaw_rate_radps", "s",
-          ("delay.ay_mps2",), 0.02),
+          ("delay.ay_mps2",), 0.02, 0.002),
     _Told("gain_yaw_rate", "yaw_rate_radps", "scale error", "",
-          ("gain.yaw_rate_radps",), 0.02),
-    _Told("gain_ax", "ax_mps2", "scale error, or gravity by pitch", "", ("gain.ax_mps2",), 0.04),
-    _Told("gain_ay", "ay_mps2", "scale error, or gravity by roll", "", ("gain.ay_mps2",), 0.04),
+          ("gain.yaw_rate_radps",), 0.02, 0.002),
+    _Told("gain_ax", "ax_mps2", "scale error, or gravity by pitch", "",
+          ("gain.ax_mps2",), 0.04, 0.002),
+    _Told("gain_ay", "ay_mps2", "scale error, or gravity by roll", "",
+          ("gain.ay_mps2",), 0.04, 0.002),
     _Told("bias_yaw_rate_radps", "yaw_rate_radps", "bias", "rad/s",
-          ("bias.yaw_rate_radps",), 0.01),
-    _Told("bias_vy_mps", "vy_mps", "bias", "m/s", ("bias.vy_mps",), 0.2),
-    _Told("imu_forward_m", "ay_mps2", "IMU ahead of the speed sensor", "m", ("arm_x",), 0.3),
-    _Told("imu_left_m", "ax_mps2", "IMU left of the speed sensor", "m", ("arm_y",), 0.3),
+          ("bias.yaw_rate_radps",), 0.01, 0.0005),
+    _Told("bias_vy_mps", "vy_mps", "bias", "m/s", ("bias.vy_mps",), 0.2, 0.02),
+    _Told("imu_forward_m", "ay_mps2", "IMU ahead of the speed sensor", "m", ("arm_x",), 0.3, 0.03),
+    _Told("imu_left_m", "ax_mps2", "IMU left of the speed sensor", "m", ("arm_y",), 0.3, 0.03),
     _Told("imu_turn_rad", "ay_mps2", "IMU turned to the left of the speed sensor", "rad",
-          ("turn",), 0.03),
+          ("turn",), 0.03, 0.002),
 )  # fmt: skip
 
 
@@ -120,7 +127,7 @@ def faults_of(found: Estimate, absent: Sequence[str]) -> tuple[SensorFault, ...]
         std = float(np.sqrt(pick @ found.covariance @ pick))
         prior = 1.0 / float(np.sum(1.0 / found.prior[pick > 0.0]))
         learned = 1.0 - float(pick @ naive @ pick) * prior
-        claimed = abs(value) > critical * std and learned > 0.0
+        claimed = abs(value) > max(critical * std, told.negligible) and learned > 0.0
         well = learned > _LEARNED and _Z95 * std < told.enough
         reason = "" if claimed or well else _confounded(told, pick, found, naive, names)
         result.append(
