@@ -1,9 +1,7 @@
-# sysid_compiler carries the flags that every target of the project shares.
+# sysid_compiler carries the flags that every target of the project shares. They are for its own
+# sources: who links the library compiles with flags of their own.
 
 add_library(sysid_compiler INTERFACE)
-
-# Eigen's own threads would compete with the Python threads that run the kernels side by side.
-target_compile_definitions(sysid_compiler INTERFACE EIGEN_MPL2_ONLY EIGEN_DONT_PARALLELIZE)
 
 if(CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
   # Nobody reads errno or floating-point traps here; without them the loops vectorise. NaN and
