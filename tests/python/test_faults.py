@@ -192,7 +192,7 @@ def test_an_interrupted_command_says_so_and_writes_nothing(tmp_path: Path, lap: 
     sv.example_vehicle().to_toml(tmp_path / "car.toml")
     lap.to_csv(tmp_path / "lap.csv")
     out = tmp_path / "out.json"
-    given = ["improve", str(tmp_path / "lap.csv"), "--vehicle", str(tmp_path / "car.toml")]
+    given = ["diagnose", str(tmp_path / "lap.csv"), "--vehicle", str(tmp_path / "car.toml")]
     with subprocess.Popen(
         [sys.executable, "-c", _ONCE, *given, "--json", str(out)],
         stdout=subprocess.PIPE,

@@ -32,8 +32,8 @@ def main(argv: list[str] | None = None) -> int:
     int
         Exit status: 0, 2 for input that cannot be used, 130 after Ctrl-C.
     """
-    args = parse(argv)
     try:
+        args = parse(argv)
         with _warnings_as_lines() as heard:
             COMMANDS[args.command](args, heard)
         sys.stdout.flush()
