@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
-from .._text import number
+from .._text import brief, number
 from ..effects import Effect
 from ..user_effects import define_effect, parameter
 from .coordinates import blocks
@@ -75,6 +75,8 @@ class Proposal:
         """What it adds to each target, with names for the gains."""
         product = str(self.form)
         return ", ".join(f"{t} += {_gain_name(t, self.gain)} {product}".rstrip() for t in self.gain)
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         sizes = ", ".join(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._arrays import FloatArray
+from .._text import brief
 from ..estimate import Driving
 from ..identify import Fit, explaining
 from ..log import Log
@@ -51,6 +52,8 @@ class Unknown:
         if not self.proposals:
             told.append("no formula explains it and also holds on held-out driving")
         return tuple(told)
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return "\n".join(["What is missing", *(f"  {line}" for line in self.lines)])

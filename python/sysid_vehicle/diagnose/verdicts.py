@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from .._text import html_table, number, with_error
+from .._text import brief, html_table, number, with_error
 from ..effects import Effect
 from ..identify import Fit
 from ..rules import USUAL, Rules
@@ -143,6 +143,8 @@ class Verdicts:
     def of(self, finding: Finding) -> tuple[EffectVerdict, ...]:
         """All of one kind."""
         return tuple(v for v in self.all if v.finding == finding)
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         width = max((len(v.effect.id) for v in self.all), default=0)
