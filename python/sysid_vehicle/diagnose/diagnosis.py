@@ -214,7 +214,7 @@ class Diagnosis:
         if c.fit is not None and not confirmed(c.statistic, c.effect, self.rules):
             told = f"{c.id} is likeliest by its score, but refitted the model predicts no better"
         else:
-            told = f"{c.id} fits best, but no car has such a value ({c.size})"
+            told = f"{c.id} fits best, but its value is physically implausible ({c.size})"
         worst = "; ".join(self.beside.unrelated.values())
         return f"{told}; {worst or self.beside.worst}"
 

@@ -27,7 +27,7 @@ __all__ = ["Unknown", "unknown"]
 
 @dataclass(frozen=True, eq=False)
 class Unknown:
-    """The shape of a missing force, and formulas that hold on driving the fit never saw.
+    """The shape of a missing force, and formulas that hold on validation data.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Unknown:
         told = shown or ["no band excludes that there is no such force"]
         told += [f"proposal {i}: {p}" for i, p in enumerate(self.proposals, 1)]
         if not self.proposals:
-            told.append("no formula explains it and also holds on held-out driving")
+            told.append("no formula explains it and also holds on validation data")
         return tuple(told)
 
     __repr__ = brief

@@ -315,7 +315,7 @@ def _of_present(
     if not possible(effect, value, std, rules):
         finding, group = "proxy", ()
         size = _listed(effect, [with_error(v, s) for v, s in zip(value, std, strict=True)])
-        because = f"no car has such a value ({size})"
+        because = f"the value is physically implausible ({size})"
     elif all(abs(d) + s < p.matters for p, d, s in sizes(effect, value, std, rules)):
         finding, group = "negligible", ()
     bound = _bound(effect, value, std, rules)

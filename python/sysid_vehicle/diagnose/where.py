@@ -164,7 +164,7 @@ def where(
     fit : Fit
     logs : Log, sequence of Log, or Driving, optional
         By default what the model was fitted to. Change points and delays leave the fitted
-        parameters free, so that driving the fit never saw is right as well.
+        parameters free, so that validation data are right as well.
     alpha : float
         Rate of change points claimed where the car stays the same.
     seed : int
