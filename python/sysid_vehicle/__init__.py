@@ -1,7 +1,7 @@
 """From a driving log to a better car model.
 
 Compare a single-track model with what was measured, see where it fails, learn which physical effect
-is missing, add it, and watch the error fall on driving the fit never saw.
+is missing, add it, and watch the error fall on validation data.
 """
 
 from . import manoeuvres

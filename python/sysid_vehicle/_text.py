@@ -7,6 +7,7 @@ from html import escape
 from math import isfinite
 
 __all__ = [
+    "brief",
     "html_list",
     "html_paragraph",
     "html_table",
@@ -15,6 +16,11 @@ __all__ = [
     "text_table",
     "with_error",
 ]
+
+
+def brief(self: object) -> str:
+    """Return the `repr` of a result: its type, and the first line of what it prints."""
+    return f"<{type(self).__name__}: {str(self).partition(chr(10))[0]}>"
 
 
 def number(x: float, digits: int = 4) -> str:

@@ -153,3 +153,10 @@ def test_no_log_at_all(truth: Model) -> None:
 
 def test_arguments_may_be_named(fit: Fit, lap: Log) -> None:
     assert sv.compare(logs=lap, fit=fit).error == sv.compare(fit, lap).error
+
+
+def test_results_are_short_where_a_traceback_or_a_list_shows_them(fit: Fit, lap: Log) -> None:
+    for shown in (fit, sv.compare(fit, lap), fit.driving, [fit]):
+        assert "\n" not in repr(shown)
+        assert len(repr(shown)) < 300
+    assert repr(fit).startswith("<Fit: ")

@@ -193,7 +193,7 @@ def test_a_study_that_added_nothing_has_one_column_and_no_equations(
     path = tmp_path / "report.html"
     nothing_added.report(path)
     text = " ".join(read(path).text)
-    assert "none of them holds on held-out driving" in text
+    assert "none of them holds on validation data" in text
     assert "final model" not in re.sub(
         "Parameters of the final model|the final model still", "", text
     )

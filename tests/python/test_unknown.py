@@ -1,4 +1,4 @@
-"""What is missing has no name: its shape with bands, and formulas that hold on held-out driving."""
+"""What is missing has no name: its shape with bands, and formulas that hold on validation data."""
 
 import json
 from collections.abc import Callable

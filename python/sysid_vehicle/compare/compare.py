@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._arrays import FloatArray
-from .._text import html_list, html_paragraph, html_table, number, text_table
+from .._text import brief, html_list, html_paragraph, html_table, number, text_table
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..identify import Fit, explaining
 from ..log import Log
@@ -88,6 +88,8 @@ class Comparison:
 
     def _headline(self) -> str:
         return f"{self.title}: error {self.error:.3f} of the noise floor, one step ahead"
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         parts = [self._headline(), text_table(self._HEAD, self._rows())]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .._arguments import generator
+from .._text import brief
 from ..model import Model
 from ..report import write_report
 from ..study import Study, improve
@@ -37,6 +38,8 @@ class Demonstration:
     def found(self) -> bool:
         """Whether the final model has the hidden effect."""
         return set(self.truth.effects) <= set(self.study.model.effects)
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return "\n\n".join([*story.findings(self.study), story.revelation(self.study, self.truth)])

@@ -16,7 +16,7 @@ import scipy
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._style import axes_or_new, tidy
-from .._text import html_text
+from .._text import brief, html_text
 from ..estimate import MEASURED
 from .delay import HIGHEST_HZ, Delay, delay, pieces_of
 from .evidence import Evidence
@@ -61,6 +61,8 @@ class Coherence:
         channel = max(self.coherence, key=lambda c: float(self.coherence[c].max()))
         at = int(np.argmax(self.coherence[channel]))
         return channel, float(self.frequency_hz[at]), float(self.coherence[channel][at])
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         channel, f, c = self.peak

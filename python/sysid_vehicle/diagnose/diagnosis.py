@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._text import html_paragraph, html_table, text_table, with_error
+from .._text import brief, html_paragraph, html_table, text_table, with_error
 from ..compare import compare
 from ..effects import Effect
 from ..errors import InvalidInput, NumericalError
@@ -214,7 +214,7 @@ class Diagnosis:
         if c.fit is not None and not confirmed(c.statistic, c.effect, self.rules):
             told = f"{c.id} is likeliest by its score, but refitted the model predicts no better"
         else:
-            told = f"{c.id} fits best, but no car has such a value ({c.size})"
+            told = f"{c.id} fits best, but its value is physically implausible ({c.size})"
         worst = "; ".join(self.beside.unrelated.values())
         return f"{told}; {worst or self.beside.worst}"
 
@@ -255,6 +255,8 @@ class Diagnosis:
             what += f" (this driving cannot tell it from {twins})"
         # The test against unknown forces is blunter than that of one effect: its silence is none.
         return f"{what}; with it {self.beside.omnibus}" if self.omnibus.rejects else what
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from .._arrays import FloatArray, as_float64
 from .._style import axes_or_new, tidy
-from .._text import html_text
+from .._text import brief, html_text
 from ..estimate import Driving
 from ..identify import Fit
 from .coordinates import COORDINATES, coordinates
@@ -102,6 +102,8 @@ class ForceMap:
             f"{target} {self.force[(i, *at)]:+.3g} +- {self.std[(i, *at)]:.2g} {UNITS[target]} at "
             f"{where}"
         )
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         head = f"missing force over {self.title}: predicts {100 * max(self.share, 0.0):.0f} %"

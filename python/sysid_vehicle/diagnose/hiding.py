@@ -15,7 +15,7 @@ import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from .._progress import with_progress
-from .._text import html_table, number, text_table
+from .._text import brief, html_table, number, text_table
 from .._threads import Workers
 from ..effects import Effect, base_parameters, effect
 from ..errors import InvalidInput, NumericalError
@@ -111,6 +111,8 @@ class BiasReport:
             stiff = [f"{100.0 * b.relative[f'stiffness_{a}']:+.1f} %" for a in _AXLES]
             rows.append([b.effect.id, size, *stiff, worst])
         return rows
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return "What the identified parameters would hide\n" + text_table(self._HEAD, self._rows())

@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import manoeuvres
 from .._progress import with_progress
-from .._text import html_paragraph, html_table, text_table
+from .._text import brief, html_paragraph, html_table, text_table
 from ..effects import Effect, effect
 from ..errors import InvalidInput, NumericalError
 from ..estimate import MEASURED, Driving
@@ -139,6 +139,8 @@ class NextDrive:
     def _headline(self) -> str:
         pair = f"{self.first.id} and {self.second.id}"
         return f"{pair} are {self.now:.1f} standard errors apart; after"
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"

@@ -1,4 +1,4 @@
-"""Formulas for a missing force or a false reading, tried on driving the fit never saw.
+"""Formulas for a missing force or a false reading, tried on validation data.
 
 Each formula of the grammar is a column of sensitivities, projected on all that the fitted
 parameters can do; forces at an unknown place act on F_y and M_z at once. The best by
@@ -7,7 +7,7 @@ parameters can do; forces at an unknown place act on F_y and M_z at once. The be
 
 (T the fall of the sum of squares, q gains, n samples, N formulas tried: Chen & Chen, Biometrika
 2008) is kept if, with its gains and the shift of the fitted parameters taken over unchanged, the
-held-out driving becomes likelier by more than a standard error. What remains is searched again.
+validation data become likelier by more than a standard error. What remains is searched again.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
-from .._text import number
+from .._text import brief, number
 from ..effects import Effect
 from ..user_effects import define_effect, parameter
 from .coordinates import blocks
@@ -31,7 +31,7 @@ from .shape import known
 __all__ = ["Proposal", "propose"]
 
 _MOST = 3
-_TRIED = 4  # on held-out driving, before a step gives up
+_TRIED = 4  # on validation data, before a step gives up
 _ALIKE = 9.0  # difference of statistics that does not tell two formulas apart
 _BLOCK_S = 5.0
 _RETAINED = 0.02  # below that the formula is what a fitted parameter does as well
@@ -52,7 +52,7 @@ class Proposal:
     statistic : float
         Fall of the sum of squared residuals in training.
     held_out_gain, held_out_error : float
-        Gain in log-likelihood on driving the fit never saw, and its standard error.
+        Gain in log-likelihood on validation data, and its standard error.
     alike : tuple of str
         Other formulas that this driving hardly tells from it.
     """
@@ -76,6 +76,8 @@ class Proposal:
         product = str(self.form)
         return ", ".join(f"{t} += {_gain_name(t, self.gain)} {product}".rstrip() for t in self.gain)
 
+    __repr__ = brief
+
     def __str__(self) -> str:
         sizes = ", ".join(
             f"{_gain_name(t, self.gain)} = {number(g, 3)} +- {number(self.std[t], 2)} "
@@ -83,7 +85,7 @@ class Proposal:
             for t, g in self.gain.items()
         )
         text = (
-            f"{self.equation} with {sizes}; held-out driving becomes likelier by "
+            f"{self.equation} with {sizes}; validation data become likelier by "
             f"{self.held_out_gain:.0f} +- {self.held_out_error:.0f} nats"
         )
         return f"{text}; much like {', '.join(self.alike)}" if self.alike else text
@@ -156,7 +158,7 @@ class _Candidate:
 
 
 def propose(train: Evidence, held_out: Evidence) -> tuple[Proposal, ...]:
-    """Find at most three formulas that explain what is left and also hold on held-out driving."""
+    """Find at most three formulas that explain what is left and also hold on validation data."""
     targets = train.targets(*FORCES, *READINGS)
     acting = [
         (t, f) for t in targets for f in forms(t) if train.driving.force_known or not f.uses("F_x")
@@ -253,7 +255,7 @@ def _statistic(
 def _on_held_out(
     train: Evidence, held_out: Evidence, here: FloatArray, there: FloatArray, new: int
 ) -> tuple[float, float]:
-    """Gain in log-likelihood on held-out driving of the last columns, and its standard error.
+    """Gain in log-likelihood on validation data of the last columns, and its standard error.
 
     Gains and the shift of the fitted parameters beside them are those of the training.
     """

@@ -26,6 +26,7 @@ import scipy
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, axes_or_new, tidy
+from .._text import brief
 from .coordinates import COORDINATES, Coordinate, coordinates, late
 from .evidence import FORCES, Evidence
 from .force_map import UNITS
@@ -75,6 +76,8 @@ class Curve:
     def shown(self) -> bool:
         """Whether the band excludes that there is no such force."""
         return bool(np.any(np.abs(self.force) > self.half_width))
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         at = int(np.argmax(np.abs(self.force) / np.maximum(self.half_width, 1e-300)))

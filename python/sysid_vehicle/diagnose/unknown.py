@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._arrays import FloatArray
+from .._text import brief
 from ..estimate import Driving
 from ..identify import Fit, explaining
 from ..log import Log
@@ -26,7 +27,7 @@ __all__ = ["Unknown", "unknown"]
 
 @dataclass(frozen=True, eq=False)
 class Unknown:
-    """The shape of a missing force, and formulas that hold on driving the fit never saw.
+    """The shape of a missing force, and formulas that hold on validation data.
 
     Attributes
     ----------
@@ -49,8 +50,10 @@ class Unknown:
         told = shown or ["no band excludes that there is no such force"]
         told += [f"proposal {i}: {p}" for i, p in enumerate(self.proposals, 1)]
         if not self.proposals:
-            told.append("no formula explains it and also holds on held-out driving")
+            told.append("no formula explains it and also holds on validation data")
         return tuple(told)
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return "\n".join(["What is missing", *(f"  {line}" for line in self.lines)])

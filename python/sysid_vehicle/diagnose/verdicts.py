@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from .._text import html_table, number, with_error
+from .._text import brief, html_table, number, with_error
 from ..effects import Effect
 from ..identify import Fit
 from ..rules import USUAL, Rules
@@ -143,6 +143,8 @@ class Verdicts:
     def of(self, finding: Finding) -> tuple[EffectVerdict, ...]:
         """All of one kind."""
         return tuple(v for v in self.all if v.finding == finding)
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         width = max((len(v.effect.id) for v in self.all), default=0)
@@ -313,7 +315,7 @@ def _of_present(
     if not possible(effect, value, std, rules):
         finding, group = "proxy", ()
         size = _listed(effect, [with_error(v, s) for v, s in zip(value, std, strict=True)])
-        because = f"no car has such a value ({size})"
+        because = f"the value is physically implausible ({size})"
     elif all(abs(d) + s < p.matters for p, d, s in sizes(effect, value, std, rules)):
         finding, group = "negligible", ()
     bound = _bound(effect, value, std, rules)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from .._text import brief
 from ..estimate import Driving
 from ..identify import Fit, explaining
 from ..log import Log
@@ -82,6 +83,8 @@ class Where:
         if self.change_points is not None:
             told += [str(c) for c in self.change_points] or ["no moment at which the car changed"]
         return (*told, *(str(c) for c in self.coherence))
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return "\n".join([self.title, *(f"  {line}" for line in self.lines)])
@@ -161,7 +164,7 @@ def where(
     fit : Fit
     logs : Log, sequence of Log, or Driving, optional
         By default what the model was fitted to. Change points and delays leave the fitted
-        parameters free, so that driving the fit never saw is right as well.
+        parameters free, so that validation data are right as well.
     alpha : float
         Rate of change points claimed where the car stays the same.
     seed : int

@@ -12,6 +12,7 @@ import numpy as np
 from .. import _core
 from .._arguments import expect
 from .._arrays import FloatArray, as_float64
+from .._text import brief
 from ..errors import InvalidInput
 from ..log import Log
 from ..model import Model
@@ -209,6 +210,8 @@ class Driving:
                 if stop - start > length // 2 or not pieces:
                     pieces.append((log, slice(start, stop), at + start - where.start))
         return pieces
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         names = ", ".join(log.name for log in self.logs)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from .._arrays import FloatArray
-from .._text import html_paragraph, html_table, number, text_table
+from .._text import brief, html_paragraph, html_table, number, text_table
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
@@ -152,6 +152,8 @@ class Fit:
         if not self.converged:
             text += "; NOT CONVERGED"
         return text
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return f"{self._headline()}\n{text_table(self._head, self._rows())}\nNoise\n{self.noise}"

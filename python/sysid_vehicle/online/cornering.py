@@ -16,6 +16,7 @@ import scipy
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, MEASURED, axes_or_new, tidy
+from .._text import brief
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..log import Log
@@ -157,6 +158,8 @@ class CorneringRun:
     def excited(self) -> bool:
         """Whether enough samples held slip for the result to mean something."""
         return int(self.used.sum()) >= _ENOUGH
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return (

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from html import escape
 from typing import Any
 
-from .._text import text_table
+from .._text import brief, text_table
 from ..errors import InvalidInput
 from .mu_slip_curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
 from .mu_slip_data import MuSlipData
@@ -41,6 +41,8 @@ class MuSlipComparison:
     def best(self) -> MuSlipEstimate:
         """The recommended one, which is the last."""
         return self.estimates[-1]
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         names = self.best.curve.parameters

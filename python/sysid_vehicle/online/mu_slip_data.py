@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
+from .._text import brief
 from ..errors import InvalidInput, near_names
 from ..read._csv import read_table
 from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
@@ -87,6 +88,8 @@ class MuSlipData:
             if str(error).startswith(str(path)):
                 raise
             raise InvalidInput(f"{path}: {error}") from error
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         there = np.isfinite(self.mu)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._style import FLOOR, axes_or_new, tidy
-from .._text import html_text, text_table
+from .._text import brief, html_text, text_table
 from ..errors import InvalidInput
 from .mu_slip_compare import compare_mu_slip
 from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
@@ -80,6 +80,8 @@ class MuSlipNoiseStudy:
             f"{self.curve.name} curve, {truth}: rms error of mu_peak over {self.sets} sets, and "
             f"how many times smaller than the noise of a reading"
         )
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         head = ["noise of a reading", *(f"{s:.4g}" for s in self.noise_std)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from .._arrays import FloatArray
 from .._style import AFTER, MEASURED, axes_or_new, tidy
-from .._text import text_table
+from .._text import brief, text_table
 from .mu_slip_curve import MuSlipCurve, magic_formula_coefficients
 from .mu_slip_data import MuSlipData
 
@@ -54,6 +54,8 @@ class MuSlipEstimate:
         mu, gradient, _ = self.curve.points(slip, self.values)
         variance = np.einsum("ki,ij,kj->k", gradient, self.covariance, gradient)
         return mu, np.sqrt(np.maximum(variance, 0.0))
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         rows = [
@@ -142,6 +144,8 @@ class MuSlipRun:
         notes = cautions(self.curve, self.data, values, kernels.LOWER, kernels.UPPER)
         return MuSlipEstimate(self.method, self.curve, values, self.covariance[-1], notes)
 
+    __repr__ = brief
+
     def __str__(self) -> str:
         return str(self.estimate)
 
@@ -178,6 +182,8 @@ class MuSlipSmoothed:
         if not self.converged:
             notes = (f"not at rest after {self.rounds} rounds", *notes)
         return MuSlipEstimate("iterated smoother", self.curve, values, self.covariance[-1], notes)
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return str(self.estimate)

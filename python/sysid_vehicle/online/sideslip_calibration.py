@@ -12,6 +12,7 @@ import numpy as np
 
 from .._arguments import generator
 from .._arrays import FloatArray
+from .._text import brief
 from ..errors import InvalidInput
 from ..identify import Fit
 from ..log import Log
@@ -51,6 +52,8 @@ class SideslipCalibration:
     after: SideslipRun
     score_before: float
     score_after: float
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         score = f"{self.score_before:.3f} to {self.score_after:.3f} per sample"

@@ -11,7 +11,7 @@ import numpy as np
 
 from .._arrays import FloatArray
 from .._style import AFTER, MEASURED, TRUTH, axes_or_new, new_figure, tidy
-from .._text import text_table
+from .._text import brief, text_table
 from ..vehicle import Vehicle
 from .sideslip_settings import SideslipSettings
 
@@ -126,6 +126,8 @@ class SideslipRun:
             float(np.mean(np.abs(off) <= 2.0 * self.beta_std_rad[known])),
             tuple(bands),
         )
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         beta = np.degrees(self.beta_rad)

@@ -42,7 +42,7 @@ class Excerpt:
 
 
 def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5) -> Excerpt | None:
-    """Find the part of the held-out driving in which the baseline predicted worst.
+    """Find the part of the validation data in which the baseline predicted worst.
 
     Returns None if no stretch is long enough to predict that far.
     """

@@ -60,11 +60,11 @@ def unknown(study: Study, truth: Model | None) -> list[str]:
     if found.proposals:
         parts += [
             paragraph(
-                "Formulas that also hold on driving the fit never saw; each can be made an effect "
+                "Formulas that also hold on validation data; each can be made an effect "
                 "of the model:"
             ),
             bullets(f"{p}." for p in found.proposals),
         ]
     else:
-        parts.append(paragraph("No formula that was tried holds on driving the fit never saw."))
+        parts.append(paragraph("No formula that was tried holds on validation data."))
     return parts

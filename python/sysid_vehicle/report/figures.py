@@ -32,14 +32,14 @@ _WIDE_RANGE = 8.0  # largest over smallest error that still reads well on a line
 
 
 def errors_by_step(study: Study, ax: Axes | None = None) -> Axes:
-    """Draw held-out errors by step as bars, training errors as marks, and the noise floor."""
+    """Draw validation errors by step as bars, training errors as marks, and the noise floor."""
     ax = axes_or_new(ax, 7.0, 3.0)
     labels = list(study.steps)
     held_out = [c.error for c in study.test]
     train = [c.error for c in study.train]
     at = np.arange(len(held_out))
     colours = [BEFORE, *([AFTER] * (len(held_out) - 1))]
-    ax.bar(at, held_out, width=0.55, color=colours, alpha=0.85, label="held-out driving")
+    ax.bar(at, held_out, width=0.55, color=colours, alpha=0.85, label="validation data")
     ax.plot(at, train, "D", color=MEASURED, markersize=6, label="training driving")
     ax.axhline(1.0, color=FLOOR, linestyle="--", linewidth=1.2, label="noise floor")
     for i, e in enumerate(held_out):
@@ -64,7 +64,7 @@ def errors_by_step(study: Study, ax: Axes | None = None) -> Axes:
 
 
 def failure_maps(study: Study, axes: Sequence[Axes]) -> None:
-    """Draw where the model of each stage fails on held-out driving, on one colour scale."""
+    """Draw where the model of each stage fails on validation data, on one colour scale."""
     maps = [study.test[i].failure_map for _, i in stages(study)]
     # Single extreme cells would leave all others in one colour.
     cells = np.concatenate([m.error[np.isfinite(m.error)] for m in maps])

@@ -59,7 +59,7 @@ def _where(study: Study, truth: Model | None) -> list[str]:
     axes = figure.subplots(1, len(shown), sharey=True, squeeze=False)
     figures.failure_maps(study, list(axes[0]))
     parts = [
-        heading("Errors on held-out driving"),
+        heading("Errors on validation data"),
         table(head, rows),
         paragraph(
             "One step ahead. Normalised errors are in units of the spread that the noise model "
@@ -102,8 +102,8 @@ def _which(study: Study, truth: Model | None) -> list[str]:
     parts.append(
         paragraph(
             "Each candidate was refitted or scored as if it alone were missing, so sizes of rivals "
-            "are not to be added up. 'held-out error with it' is the one-step-ahead error on the "
-            "held-out driving of the model with that effect, refitted to the driving of the fit, "
+            "are not to be added up. 'validation error with it' is the one-step-ahead error on the "
+            "validation data of the model with that effect, refitted to the driving of the fit, "
             f"in units of the noise floor of the {whose} model; where there is none nothing was "
             "refitted. 'cannot tell from' names effects that would explain the driving of the fit "
             "as well."
@@ -233,7 +233,7 @@ def _excerpt(study: Study, truth: Model | None) -> list[str]:
         heading("Where the baseline failed most"),
         picture(
             figure,
-            f"{excerpt.log}, held-out driving, predicted {excerpt.horizon_s:g} s ahead from what "
+            f"{excerpt.log}, validation data, predicted {excerpt.horizon_s:g} s ahead from what "
             "was known by then and the steering and force since.",
         ),
     ]
@@ -254,7 +254,7 @@ def _remains(study: Study, truth: Model | None) -> list[str]:
     parts = [
         heading("What remains"),
         paragraph(study.in_the_end),
-        picture(figure, "Residuals on held-out driving, running root mean square per channel."),
+        picture(figure, "Residuals on validation data, running root mean square per channel."),
         heading("Noise model", 3),
         table(("sensor", "white noise", "unit"), sensors),
         paragraph(
@@ -278,7 +278,7 @@ _METHOD = (
     "7.4). Effects are ranked by score tests of the whitened residuals after projection on the "
     "fitted parameters (Basseville, Automatica 1998; Bera & Bilias, J. Statistical Planning and "
     "Inference 2001), the best ones refitted with their exact dynamics. An effect is added only "
-    "if it also predicts the held-out driving better. Whether anything is left is decided by a "
+    "if it also predicts the validation data better. Whether anything is left is decided by a "
     "score test against unknown forces that depend on the driving (Lin, Biometrika 1997). All "
     "models are judged with the noise of the final one."
 )

@@ -21,7 +21,7 @@ __all__ = [
     "unit",
 ]
 
-RANKING_HEAD = ("effect", "statistic", "p", "held-out error with it", "size", "cannot tell from")
+RANKING_HEAD = ("effect", "statistic", "p", "validation error with it", "size", "cannot tell from")
 
 
 def unit(name: str) -> str:
@@ -64,15 +64,15 @@ def summary(study: Study) -> tuple[str, str, str]:
         what = f"The model got {names}."
     elif study.diagnoses[0].significant:
         names = ", ".join(c.id for c in study.diagnoses[0].significant[:3])
-        what = f"There is evidence for {names}, but none of them holds on held-out driving."
+        what = f"There is evidence for {names}, but none of them holds on validation data."
     else:
         what = "No effect was added: there is evidence for none of the catalogue."
-    error = f"On driving the fit never saw, the one-step-ahead error {errors(study)}."
+    error = f"On validation data, the one-step-ahead error {errors(study)}."
     return verdict, what, error
 
 
 def errors(study: Study) -> str:
-    """Say how the held-out error changed, as a predicate."""
+    """Say how the validation error changed, as a predicate."""
     before, after = (f"{study.test[i].error:.2f}" for i in (0, -1))
     if not study.added:
         return f"is {before} times the noise floor"

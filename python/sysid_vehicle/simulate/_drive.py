@@ -11,6 +11,7 @@ import numpy as np
 from .. import _core
 from .._arguments import generator
 from .._arrays import FloatArray
+from .._text import brief
 from ..errors import NumericalError
 from ..log import Log
 from ..manoeuvres import Manoeuvre
@@ -58,6 +59,8 @@ class Drive:
     states: FloatArray
     outputs: FloatArray
     disturbance: FloatArray
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         steer, force = np.abs(self.inputs).max(axis=0)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .._files import write_json
-from .._text import html_list, html_paragraph, html_table, text_table
+from .._text import brief, html_list, html_paragraph, html_table, text_table
 from ..compare import Comparison
 from ..diagnose import (
     INPUTS,
@@ -255,6 +255,8 @@ class Study:
             [label, f"{a.error:.3f}", f"{b.error:.3f}"]
             for label, a, b in zip(self.steps, self.train, self.test, strict=False)
         ] + [["noise floor", "1.000", "1.000"]]
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         lines = [f"Verdict: {self.verdict} - {self.meaning}."]

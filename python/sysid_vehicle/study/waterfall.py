@@ -10,7 +10,7 @@ import numpy as np
 
 from .._arrays import FloatArray
 from .._style import AFTER, BEFORE, axes_or_new, tidy
-from .._text import html_table, text_table
+from .._text import brief, html_table, text_table
 from ..compare import Comparison
 from ..errors import NumericalError
 from ..estimate import MEASURED, Driving, NoiseModel
@@ -53,6 +53,8 @@ class Waterfall:
         ]
         floor = ["1.00" if h == 0.0 else "" for h in self.horizons_s]
         return [*rows, ["noise floor", *floor, *floor]]
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return text_table(self._head(), self._rows())

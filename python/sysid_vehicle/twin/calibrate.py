@@ -18,6 +18,7 @@ import numpy as np
 from .._arguments import generator
 from .._arrays import FloatArray
 from .._style import AFTER, MEASURED, axes_or_new, tidy
+from .._text import brief
 from ..errors import InvalidInput, NumericalError
 from .drives import Drive14
 from .observer import Observation
@@ -269,6 +270,8 @@ class Calibration:
             )
         ax.legend(frameon=False)
         return tidy(ax, xlabel="trial", ylabel="cost")
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         lines = [f"Cost {self.cost:.4g} after {len(self.tried)} trials, {self.lost} lost the twin"]

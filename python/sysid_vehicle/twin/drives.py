@@ -10,6 +10,7 @@ import scipy
 from .. import _core
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
+from .._text import brief
 from ..errors import InvalidInput, NumericalError
 from ..manoeuvres import Manoeuvre
 from .car import Load, TwinCar
@@ -98,6 +99,8 @@ class Drive14:
         if name in OUTPUTS:
             return self.outputs[:, OUTPUTS.index(name)]
         return self.inputs[:, INPUTS.index(name)]
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         v, ay = self["vx_mps"], self["plane_ay_mps2"]

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from .._text import brief
 from ..errors import InvalidInput
 from .car import LOAD_NAMES, LOADED_SUV, NOMINAL_SUV, Load, TwinCar
 from .drives import INPUTS, Drive14, rough_road, swept_steer, urban_cycle
@@ -96,6 +97,8 @@ class LoadExperiment:
     def plot(self, name: str, *, ax: Axes | None = None) -> Axes:
         """Draw an estimate over time."""
         return self.found.plot(name, truth=getattr(self.true, name), ax=ax)
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         lines = [f"{self.name}: {self.drive}"]

@@ -16,6 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from .._arrays import FloatArray
+from .._text import brief
 from ..errors import InvalidInput
 from ..manoeuvres import double_lane_change, lap
 from .calibrate import Box, sideslip_and_mass_cost
@@ -168,6 +169,8 @@ class JointExperiment:
     def to_dict(self) -> dict[str, Any]:
         """All figures, for a file."""
         return {"course": self.drive.name, **self.figures()}
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         lines = [str(self.drive)]

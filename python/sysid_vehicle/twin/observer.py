@@ -15,6 +15,7 @@ import numpy as np
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, TRUTH, axes_or_new, tidy
+from .._text import brief
 from ..errors import InvalidInput, NumericalError, warn
 from .car import LOAD_NAMES, Load, TwinCar
 from .checks import checked_rows, checked_step, checked_stride
@@ -178,6 +179,8 @@ class Observation:
             ax.axhline(truth, color=TRUTH, linestyle="--", label="true")
         ax.legend(frameon=False)
         return tidy(ax, xlabel="time [s]", ylabel=name)
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         lines = [f"Observer over {self.time_s[-1]:.0f} s; parameters from first to last:"]

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._text import brief
 from ..errors import InvalidInput
 from .car import LOADED_SUV, NOMINAL_SUV, Load, TwinCar
 from .drives import Drive14
@@ -115,6 +116,8 @@ class ScheduleRun:
             if name in stage.found.moved():
                 return stage.plot(name, ax=ax)
         raise InvalidInput(f"no stage looked for '{name}'; there are {', '.join(self.rows())}")
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         lines = [str(stage.drive) for stage in self.stages]
