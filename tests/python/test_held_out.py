@@ -1,11 +1,12 @@
-"""What held-out driving says of two models, and how surely."""
+"""Validation data: what is held out, what it says of two models, and how surely."""
 
 import numpy as np
 import pytest
 
 from sysid_vehicle import Log
+from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.estimate import Driving
-from sysid_vehicle.study.held_out import _with_error
+from sysid_vehicle.study.held_out import _with_error, hold_out
 
 
 @pytest.mark.parametrize("length_s", [60.0, 3.0])
@@ -51,3 +52,25 @@ def test_what_lasts_for_seconds_is_not_taken_for_many_pieces_of_evidence(
     gains = [_with_error(d[: test.samples], test) for d in drawn]
     sums, errors = [g.value for g in gains], [g.error for g in gains]
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(sums), rel=0.25)
+
+
+def test_the_end_of_the_only_log_is_held_out(lap: Log) -> None:
+    with pytest.warns(SysidWarning, match="'lap' is fitted up to 28.0 s and the rest is held out"):
+        train, test = hold_out(lap, None)
+    assert train.logs[0]["time_s"][-1] == pytest.approx(28.0)
+    assert test.logs[0]["time_s"][-1] == lap["time_s"][-1]
+    assert abs(train.samples + test.samples - lap.n) <= 1
+
+
+def test_the_last_of_several_logs_is_held_out(lap: Log, course: Log) -> None:
+    with pytest.warns(SysidWarning, match="'handling_course' is held out"):
+        train, test = hold_out([lap, course], None)
+    assert train.logs == (lap,)
+    assert test.logs == (course,)
+
+
+def test_logs_given_are_taken_as_they_are(lap: Log, course: Log) -> None:
+    train, test = hold_out([lap], course)
+    assert (train.logs, test.logs) == ((lap,), (course,))
+    with pytest.raises(InvalidInput, match="no log was given"):
+        hold_out([], None)

@@ -326,28 +326,6 @@ def test_absent_channels_are_among_the_warnings(
     assert [w for w in found.warnings if w.startswith("lap") and train.missing()["vy_mps"] in w]
 
 
-def test_the_end_of_the_only_log_is_held_out(lap: Log) -> None:
-    with pytest.warns(SysidWarning, match="'lap' is fitted up to 28.0 s and the rest is held out"):
-        train, test = hold_out(lap, None)
-    assert train.logs[0]["time_s"][-1] == pytest.approx(28.0)
-    assert test.logs[0]["time_s"][-1] == lap["time_s"][-1]
-    assert abs(train.samples + test.samples - lap.n) <= 1
-
-
-def test_the_last_of_several_logs_is_held_out(lap: Log, course: Log) -> None:
-    with pytest.warns(SysidWarning, match="'handling_course' is held out"):
-        train, test = hold_out([lap, course], None)
-    assert train.logs == (lap,)
-    assert test.logs == (course,)
-
-
-def test_logs_given_are_taken_as_they_are(lap: Log, course: Log) -> None:
-    train, test = hold_out([lap], course)
-    assert (train.logs, test.logs) == ((lap,), (course,))
-    with pytest.raises(InvalidInput, match="no log was given"):
-        hold_out([], None)
-
-
 def test_held_out_driving_tells_the_richer_model(study: Study, lagging: tuple[Log, Log]) -> None:
     test = hold_out(*lagging)[1]
     poorer, richer = study.fits
