@@ -77,10 +77,10 @@ def _null(outcomes: Sequence[Outcome]) -> list[Row]:
         these = [o for o in found if o["trial"]["driving"] == name]
         rows.append((f"any effect claimed, {name}", str(Rate.over(map(_claims, these))), "5 %"))
         rows.append(
-            ("  evidence before held-out driving", str(Rate.over(map(detected, these))), "5 %")
+            ("  evidence before validation data", str(Rate.over(map(detected, these))), "5 %")
         )
     rows.append(("any effect claimed, all sets", str(Rate.over(map(_claims, found))), "5 %"))
-    rows.append(("  evidence before held-out driving", str(Rate.over(map(detected, found))), "5 %"))
+    rows.append(("  evidence before validation data", str(Rate.over(map(detected, found))), "5 %"))
     rows.append(
         ("verdict not adequate", str(Rate.over(o["verdict"] not in QUIET for o in found)), "6 %")
     )
@@ -129,8 +129,8 @@ def _improving(outcomes: Sequence[Outcome]) -> list[Row]:
         if np.isfinite(std)
     ]
     return [
-        ("held-out error improved by what was added", str(better), ">= 98 %"),
-        ("held-out error after, of the true car's, median", _quantile(to_truth, 0.5), "<= 1.03"),
+        ("validation error improved by what was added", str(better), ">= 98 %"),
+        ("validation error after, of the true car's, median", _quantile(to_truth, 0.5), "<= 1.03"),
         ("  95th percentile", _quantile(to_truth, 0.95), "<= 1.10"),
         ("  of the noise floor, where noise is white, median", _quantile(plain, 0.5), "<= 1.03"),
         ("  95th percentile", _quantile(plain, 0.95), "<= 1.10"),

@@ -120,7 +120,7 @@ def test_rates_are_counted_against_what_was_hidden(exam: SimpleNamespace) -> Non
     assert rows["of these named first"].startswith("1/2 ")
     assert rows["true one in the named group"].startswith("2/2 ")
     assert rows["mean size of the group"] == "1.50 of 2"
-    assert rows["held-out error improved by what was added"].startswith("1/2 ")
+    assert rows["validation error improved by what was added"].startswith("1/2 ")
     assert rows["95 % intervals that hold the true parameter"].startswith("1/2 ")
     assert rows["lag or relaxation named first"].startswith("1/1 ")
     assert rows["something else left or added"].startswith("0/1 ")

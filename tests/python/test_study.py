@@ -368,7 +368,7 @@ def test_the_waterfall_falls_at_every_horizon(study: Study) -> None:
     assert np.all(falls.train[1] < falls.train[0])
     assert falls.test[1, 0] == pytest.approx(study.test[-1].error, rel=0.1)
     assert np.all(np.diff(falls.test[0]) > 0.0)  # the further, the worse
-    assert "held out 0.5 s" in str(falls)
+    assert "validation 0.5 s" in str(falls)
     assert "<table" in falls._repr_html_()
     assert falls.plot().get_xlabel() == "predicted ahead"
 

@@ -162,7 +162,7 @@ def overlay(excerpt: Excerpt, axes: Sequence[Axes]) -> None:
 
 
 def residuals(study: Study, axes: Sequence[Axes]) -> None:
-    """Draw the running size of the held-out residuals at each stage of the study, by channel."""
+    """Draw the running size of the validation residuals at each stage of the study, by channel."""
     for ax, (title, i) in zip(axes, stages(study), strict=True):
         study.test[i].plot_residuals(ax)
         _as_pixels(ax)

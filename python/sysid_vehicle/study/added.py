@@ -21,7 +21,7 @@ class AddedEffect:
     parameters : tuple of Estimate
         In the final model.
     error_before, error_after : float
-        On the held-out driving, in units of the noise floor.
+        On the validation data, in units of the noise floor.
     p_value : float
         Of the model without it being complete.
     confounded_with : tuple of str

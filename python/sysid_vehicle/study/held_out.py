@@ -38,7 +38,7 @@ _NONE = Gain(-np.inf, 0.0, -np.inf, 0.0)
 def hold_out(
     train: Log | Sequence[Log], test: Log | Sequence[Log] | None
 ) -> tuple[Driving, Driving]:
-    """Training and held-out driving; without `test`: the last log, or 30 % of the only one."""
+    """Training and validation data; without `test`: the last log, or 30 % of the only one."""
     logs = several_logs(train)
     if test is not None:
         return Driving.of(logs), Driving.of(test)
@@ -64,7 +64,7 @@ def gain_in_log_likelihood(
     its own noise, or both with that of the poorer one: a richer model that has only learnt larger
     noise gains by the first and loses by the second, and none is taken to be surer than
     `NoiseModel.elsewhere`. The error comes from pieces (`_with_error`). A model that fails on the
-    held-out driving gains minus infinity.
+    validation data gains minus infinity.
     """
     try:
         before = _prediction(poorer, test, poorer)
@@ -75,7 +75,7 @@ def gain_in_log_likelihood(
 
 
 def as_sure(poorer: Fit, richer: Fit, test: Driving) -> bool:
-    """Whether the richer model, with noise of its own, is no less sure of held-out driving.
+    """Whether the richer model, with noise of its own, is no less sure of validation data.
 
     What such a model gains does not come from having learnt larger noise.
     """
@@ -89,12 +89,12 @@ def as_sure(poorer: Fit, richer: Fit, test: Driving) -> bool:
 # The poorer model of all candidates of a step is the same one.
 @lru_cache(maxsize=8)
 def _prediction(fit: Fit, test: Driving, like: Fit) -> Prediction:
-    """Of held-out driving by a fit, with another's noise."""
+    """Of validation data by a fit, with another's noise."""
     return predict(fit, test, like.noise.elsewhere(fit.model.vehicle))
 
 
 def serving(fit: Fit, test: Driving) -> Fit:
-    """The fit with parameters that serve held-out driving too, as far as it left them unsure.
+    """The fit with parameters that serve validation data too, as far as it left them unsure.
 
     The fit itself, where the model fails there.
     """
@@ -168,5 +168,5 @@ def _serving_itself(fit: Fit, test: Driving) -> Fit:
 
 
 def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:
-    """Whether the richer model errs less on held-out driving (`fall_in_error`)."""
+    """Whether the richer model errs less on validation data (`fall_in_error`)."""
     return fall_in_error(poorer, richer, test).value > 0.0

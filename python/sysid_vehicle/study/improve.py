@@ -55,7 +55,7 @@ def improve(
     """Improve a model step by step until nothing more is missing that the driving can show.
 
     Each step scores all effects, refits the best few with their exact dynamics, and adds the best
-    one that also predicts the held-out driving better. An effect that became idle is dropped again.
+    one that also predicts the validation data better. An effect that became idle is dropped again.
 
     Parameters
     ----------

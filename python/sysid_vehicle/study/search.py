@@ -117,7 +117,7 @@ class Search:
     def _beside_another(self, dx: Diagnosis, trail: Trail) -> tuple[Candidate, Fit] | None:
         """The likeliest candidate, where it holds only together with one that is missing too.
 
-        What the other one does to the held-out driving may be larger than what the first explains.
+        What the other one does to the validation data may be larger than what the first explains.
         As neither has been seen to hold, they count only where together they leave nothing.
         """
         first = likeliest(dx)

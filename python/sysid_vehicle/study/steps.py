@@ -30,10 +30,10 @@ _ALTERNATIVES = 2  # tried in place of one effect
 
 
 def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate, Fit] | None:
-    """The likeliest candidate that fits better and predicts the held-out driving better.
+    """The likeliest candidate that fits better and predicts the validation data better.
 
     One with a value that a car can have comes before one that only acts like something else. Among
-    those that the fitted driving cannot tell apart the held-out driving has a say too. With it
+    those that the training data cannot tell apart the validation data have a say too. With it
     comes its fit, without what is idle then.
     """
     rules = dx.rules

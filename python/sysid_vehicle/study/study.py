@@ -70,7 +70,7 @@ class Study:
     added : tuple of AddedEffect
     omnibus, omnibus_held_out : Omnibus
         Whether the final model leaves anything that depends on the driving it was fitted to, or on
-        the held-out driving; the latter is not asked where nothing was added.
+        the validation data; the latter are not asked where nothing was added.
     verdicts : Verdicts
         What is to be said of every effect that the baseline lacks.
     seconds : float
@@ -248,7 +248,7 @@ class Study:
             horizons_s,
         )
 
-    _HEAD = ("step", "train error", "held-out error")
+    _HEAD = ("step", "train error", "validation error")
 
     def _rows(self) -> list[list[str]]:
         return [
@@ -276,11 +276,11 @@ class Study:
         more = beyond is not None and beyond.p_value < self.rules.elsewhere
         if beyond is not None and beyond.rejects and not more:
             said += (
-                " On the held-out driving: no more than parameters may leave that the fit knows "
+                " On the validation data: no more than parameters may leave that the fit knows "
                 f"only in part (p = {beyond.p_value:.2g})."
             )
         elif beyond is not None:
-            said += f" On the held-out driving: {beyond}."
+            said += f" On the validation data: {beyond}."
         if self.train[-1].unrelated:
             wrong = "; ".join(self.train[-1].unrelated.values())
             return f"{said} Something else is wrong: {wrong}."
@@ -292,7 +292,7 @@ class Study:
             said += f" What is missing was taken up by stand-ins: {', '.join(stand_ins)}."
         elif not self.added and self.diagnoses[-1].significant:
             some = ", ".join(c.id for c in self.diagnoses[-1].significant[:3])
-            said += f" There is evidence for {some}, which predict held-out driving no better."
+            said += f" There is evidence for {some}, which predict validation data no better."
         return said
 
     def _repr_html_(self) -> str:

@@ -44,7 +44,8 @@ class Waterfall:
 
     def _head(self) -> list[str]:
         ahead = ["one step" if h == 0.0 else f"{h:g} s" for h in self.horizons_s]
-        return ["error ahead by", *(f"train {a}" for a in ahead), *(f"held out {a}" for a in ahead)]
+        errors = (f"{data} {a}" for data in ("train", "validation") for a in ahead)
+        return ["error ahead by", *errors]
 
     def _rows(self) -> list[list[str]]:
         rows = [
@@ -63,7 +64,7 @@ class Waterfall:
         return html_table(self._head(), self._rows())
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the held-out errors over the horizon, one line for each step.
+        """Draw the validation errors over the horizon, one line for each step.
 
         Parameters
         ----------
@@ -83,7 +84,7 @@ class Waterfall:
         ax.set_yscale("log")
         ax.set_xticks(places, ["one step" if h == 0.0 else f"{h:g} s" for h in self.horizons_s])
         ax.legend()
-        return tidy(ax, xlabel="predicted ahead", ylabel="held-out error / noise floor")
+        return tidy(ax, xlabel="predicted ahead", ylabel="validation error / noise floor")
 
 
 def waterfall(
