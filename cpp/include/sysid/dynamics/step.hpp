@@ -165,6 +165,7 @@ constexpr int kParameterPass = 8, kShortParameterPass = 4;
 
 // The model takes seconds to compile for each scalar. These are what kernels use; each is compiled
 // once, by the files of this name in `src/dynamics/`.
+// NOLINTBEGIN(bugprone-macro-parentheses): types take none
 #define SYSID_COMPILED_MODEL(PREFIX, S, T)                                                     \
     PREFIX template Workings<S> SingleTrack::evaluate(const S*, const S*, const Lags<S>&,      \
                                                       const Input&, const T*, S*) const;       \
@@ -175,6 +176,7 @@ constexpr int kParameterPass = 8, kShortParameterPass = 4;
                                                    const S*, const Input&, const T*);          \
     PREFIX template void settle_auxiliary(const SingleTrack&, ModelState<S>&, const S*,        \
                                           const Input&, const T*);
+// NOLINTEND(bugprone-macro-parentheses)
 
 SYSID_COMPILED_MODEL(extern, double, double)
 SYSID_COMPILED_MODEL(extern, Dual<kStatePass>, double)
