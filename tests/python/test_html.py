@@ -96,7 +96,7 @@ def test_no_object_of_a_study_shows_markup_of_others(study: sv.Study) -> None:
     found = reachable(study)
     found += reachable(sv.where(fit))
     found += reachable(sv.verdicts(study.diagnoses[0]))
-    found += reachable(sv.bias_report(study.fits[0]))
+    found += reachable(sv.bias_report(study.fits[0], [sv.effect("mass")]))
     found += reachable(sv.unknown(study.fits[0], study.fit.driving))
     found += reachable(sv.compare(fit, fit.driving))
     found += reachable(sv.simulate.drive_truth(fit.model, sv.manoeuvres.step_steer(), seed=0))

@@ -292,6 +292,7 @@ def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: D
         assert abs(found.fit[name].value - value) < 4.0 * found.fit[name].std
 
 
+@pytest.mark.slow
 def test_it_stops_at_the_most_effects_allowed(start: Model, lagging: tuple[Log, Log]) -> None:
     short = [log.between(0.0, 21.0) for log in lagging]
     none = improve(start, *short, starts=1, most_effects=0, exclude=["steer_lag"])

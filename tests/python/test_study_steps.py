@@ -82,6 +82,7 @@ def test_what_fits_to_the_last_digit_alike_is_no_alternative(dx: Diagnosis) -> N
     assert [c.id for c in alternatives(replace(dx, ranking=others), wind)] == ["rolling_resistance"]
 
 
+@pytest.mark.slow
 def test_a_slope_and_a_bias_give_way_to_rolling_resistance(start: Model, truth: Model) -> None:
     """Beside the slope the bias does to the last digit what rolling resistance does alone."""
     car = truth.add("rolling_resistance").with_values({"rolling_resistance.coefficient": 0.02})
