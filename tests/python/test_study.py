@@ -258,7 +258,7 @@ def test_one_effect_that_leaves_something_is_none(
     assert share_explained(found.train[0].error, found.train[-1].error) > 0.8
     assert found.verdict == "unknown"
     assert found.verdicts["mass"].finding == "proxy"
-    assert "of what is missing" in found.verdicts["mass"].sentence
+    assert "of the error 1 to 5 s ahead" in found.verdicts["mass"].sentence
     both = improve(start, *drives(car, 51), starts=1, candidates=["mass", "accelerometer_scale"])
     assert [a.id for a in both.added] == ["accelerometer_scale"]
     assert both.verdict == "explained"
