@@ -101,7 +101,7 @@ def _against(study: sv.Study, trial: Trial) -> Outcome:
         return told
     # Where the road pushes at random the true car itself errs by more than the noise floor.
     truth = replace(study.fit, model=truths.hidden(trial))
-    told["true_error"] = sv.compare(truth, study.held_out, noise=study.fit.noise).error
+    told["true_error"] = sv.compare(truth, study.validation, noise=study.fit.noise).error
     if trial.kind == "pair":
         told["shown"] = _shown(study, trial)
     for name, true in truths.true_values(trial).items():

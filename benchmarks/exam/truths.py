@@ -15,7 +15,7 @@ RATE_HZ = 50.0
 _G = 9.81
 # A car that spins tells nothing: the driver tries again with less.
 _EASIER = (1.0, 0.85, 0.7, 0.55)
-# Held-out driving asks no more of the tyres than the fit has seen: no model knows what comes then.
+# Validation data asks no more of the tyres than the fit has seen: no model knows what comes then.
 _COURSE_MPS2 = {"ramp": 8.0, "sweep": 3.0, "step": 5.5, "lap": 8.0, "all": 8.0}
 
 Array = npt.NDArray[np.float64]
@@ -94,7 +94,7 @@ def rival_size(trial: Trial) -> tuple[float, ...]:
 
 
 def sample(trial: Trial) -> tuple[list[sv.Log], sv.Log, float]:
-    """Drive the training manoeuvres and a held-out course: logs, and how easily it went.
+    """Drive the training manoeuvres and a validation course: logs, and how easily it went.
 
     Raises
     ------

@@ -3,7 +3,7 @@
     python benchmarks/finding_effects/false_claims.py [MANOEUVRE ...] [--seeds N] [--first-seed N]
 
 Every built-in manoeuvre is driven with a car that the model describes completely, and the whole
-search for missing effects runs on it, with a handling course as held-out driving.
+search for missing effects runs on it, with a handling course as validation data.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ OTHER_TYRES = {
 }
 HEAD = (
     f"{'effect':<22} {'seed':>4} {'place':<28} {'z of its parameters':<20} "
-    f"{'held-out error':>22} {'to true car':>11} {'verdict':<17} {'s':>4}"
+    f"{'validation error':>22} {'to true car':>11} {'verdict':<17} {'s':>4}"
 )
 
 
@@ -101,7 +101,7 @@ def main() -> None:
     met = [run(name, seed) for name in args.effects or HIDDEN for seed in range(args.seeds)]
     print(
         f"{sum(met)} of {len(met)} met: ranked first or indistinguishable from it, parameters "
-        "within 3 standard errors, held-out error at most 1.05 of the noise floor"
+        "within 3 standard errors, validation error at most 1.05 of the noise floor"
     )
     print(f"largest number of standard errors allowed: 3; numpy {np.__version__}")
 

@@ -30,10 +30,10 @@ START = {
     "roll_expected": 0.03023,
     "roll_share": 0.0373,
     "error_load": 0.001777,
-    "yaw_wander_radps": 0.03,
-    "sideslip_wander_rad": 0.0003348,
+    "yaw_walk_radps": 0.03,
+    "sideslip_walk_rad": 0.0003348,
     "stiffness_prior": 0.3332,
-    "stiffness_wander": 0.0002743,
+    "stiffness_walk": 0.0002743,
     "friction_prior": 0.2175,
 }
 # What these simulators cannot tell. Their tyres are Magic Formulas, as the observer's are: with
@@ -51,7 +51,7 @@ KNOWN = {
     "error_drive": 0.05,
     "friction_time_s": 50.0,
     "relaxation_m": 0.5,
-    "relaxation_doubt": 0.3,
+    "relaxation_std": 0.3,
 }
 MOST_SQUARED = 16.0
 LENGTH_S = 22.0  # of each drive; the rest costs time and tells little more
@@ -77,9 +77,9 @@ def score(case: fleet.Case, target: np.ndarray, changes: dict[str, float]) -> fl
     squared = np.minimum((off / std) ** 2, MOST_SQUARED)
     sideslip = float(np.mean(-0.5 * squared - np.log(std)))
     now = np.array([run.cf_npr[-1], run.cr_npr[-1]]) / target
-    doubt = np.hypot(np.array([run.cf_std_npr[-1], run.cr_std_npr[-1]]) / target, TOLERANCE)
-    squared = np.minimum(((now - 1.0) / doubt) ** 2, MOST_SQUARED)
-    return sideslip + STIFFNESS_WEIGHT * float(np.mean(-0.5 * squared - np.log(doubt)))
+    deviation = np.hypot(np.array([run.cf_std_npr[-1], run.cr_std_npr[-1]]) / target, TOLERANCE)
+    squared = np.minimum(((now - 1.0) / deviation) ** 2, MOST_SQUARED)
+    return sideslip + STIFFNESS_WEIGHT * float(np.mean(-0.5 * squared - np.log(deviation)))
 
 
 def balanced(

@@ -2,9 +2,9 @@
 
     python benchmarks/real_driving/improve.py DATA [SET ...] [--report FOLDER]
 
-DATA is the folder that holds the data sets; none is part of this project. Prints the held-out error
-before and after, the effects added, the verdicts that name something, and the waterfall. What the
-data's authors know of their cars, and whether it agrees, is in README.md beside this file.
+DATA is the folder that holds the data sets; none is part of this project. Prints the validation
+error before and after, the effects added, the verdicts that name something, and the waterfall. What
+the data's authors know of their cars, and whether it agrees, is in README.md beside this file.
 """
 
 from __future__ import annotations

@@ -70,7 +70,7 @@ def main() -> None:
             "two twins side by side",
             Observer(
                 batch=SideBySide(
-                    unknowns("mass_kg", around=SPORTS_CAR.design), {"ax_mps2": 0.1}, input_doubt=0.0
+                    unknowns("mass_kg", around=SPORTS_CAR.design), {"ax_mps2": 0.1}, input_std=0.0
                 )
             ),
         ),

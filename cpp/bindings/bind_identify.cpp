@@ -37,7 +37,7 @@ Noise to_noise(const Array& values) {
     Noise noise;
     for (auto& s : noise.sensor) s = *v++;
     for (auto& s : noise.motion) s = *v++;
-    for (auto& s : noise.wander) s = *v++;
+    for (auto& s : noise.disturbance) s = *v++;
     noise.correlation_time_s = *v;
     return noise;
 }
@@ -67,7 +67,7 @@ void register_identify(py::module_& m) {
     m.attr("NOISE_PARAMETERS") = kNoiseParameters;
     m.attr("PARAMETERS") = kParameterCount;
     m.attr("CHANNELS") = static_cast<int>(kChannels);
-    m.attr("PUSHES") = static_cast<int>(kPushes);
+    m.attr("EXTERNALS") = static_cast<int>(kExternals);
     py::class_<FrozenFilter>(m, "FrozenFilter")
         .def_readonly("log_likelihood", &FrozenFilter::log_likelihood)
         .def_readonly("observed", &FrozenFilter::observed);
@@ -142,7 +142,7 @@ void register_identify(py::module_& m) {
             [](const Problem& self, const Array& p, const FrozenFilter& filter,
                const Array& signals, const std::vector<int>& targets) {
                 check(self, filter);
-                check(targets, kPushes + kChannels, "targets");
+                check(targets, kExternals + kChannels, "targets");
                 const double* values = values_of(p);
                 const double* s = matrix(signals, static_cast<py::ssize_t>(self.samples()),
                                          static_cast<py::ssize_t>(targets.size()), "signals");

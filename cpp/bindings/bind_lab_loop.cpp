@@ -42,13 +42,13 @@ void set_actuator(lab::Actuator& actuator, const std::array<double, 4>& v) {
 }
 
 py::dict run(const LabLoop& settings, const SingleTrack& model, const Array& parameters,
-             const Array& wanted, const Array& normal, const Array& push) {
+             const Array& wanted, const Array& normal, const Array& external) {
     const auto n = wanted.ndim() == 2 ? wanted.shape(0) : 0;
     if (n < 2) throw std::invalid_argument("wanted: expected two samples or more");
     const double* w = matrix(wanted, n, 5, "wanted");
     const double* values = vector(parameters, kParameterCount, "parameters");
     const double* noise = matrix(normal, n, lab::kSensorCount, "normal");
-    const double* outside = matrix(push, n, 3, "push");
+    const double* outside = matrix(external, n, 3, "external");
     if (settings.loop.steer_by == lab::SteerBy::kTrack && settings.loop.track.points.size() < 3)
         throw std::invalid_argument("track: expected three points or more");
     std::vector<lab::Wanted> references(static_cast<std::size_t>(n));
@@ -124,7 +124,7 @@ void register_lab_loop(py::module_& m) {
             "set_published_form",
             [](LabLoop& s, bool published) {
                 s.observer.form =
-                    published ? lab::ObserverForm::published() : lab::ObserverForm::mended();
+                    published ? lab::ObserverForm::published() : lab::ObserverForm::corrected();
             },
             py::arg("published"))
         .def_property(
@@ -142,7 +142,7 @@ void register_lab_loop(py::module_& m) {
             },
             py::arg("speed_mps"), py::arg("x_m"), py::arg("y_m"))
         .def(
-            "set_habits",
+            "set_published_ways",
             [](LabLoop& s, double pose_gain, bool load_sensors, bool late_feedback,
                double first_late_load_n, bool certain_start, bool inputs_linear) {
                 s.loop.pose_gain = pose_gain;
@@ -164,7 +164,7 @@ void register_lab_loop(py::module_& m) {
             py::arg("load_share"), py::arg("late_loads"), py::arg("air_speed_of_both"),
             py::arg("steps"), py::arg("tolerance"), py::arg("gravity_mps2"))
         .def("run", &run, py::arg("model"), py::arg("parameters"), py::arg("wanted"),
-             py::arg("normal"), py::arg("push"));
+             py::arg("normal"), py::arg("external"));
 }
 
 }  // namespace sysid::bindings

@@ -77,7 +77,7 @@ Array evaluate(const SingleTrack& model, const Array& p, const Array& motion, do
                double longitudinal) {
     const double* values = vector(p, kParameterCount, "parameters");
     const double* x = vector(motion, kMotionStates, "motion");
-    const std::array<double, kPushes> calm{};
+    const std::array<double, kExternals> calm{};
     const Input u{steer, longitudinal};
     ModelState<double> state{};
     std::copy(x, x + kMotionStates, state.begin());

@@ -47,7 +47,7 @@ PARAMETERS: int
 USER_EFFECTS: int
 USER_OFFSET: int
 USER_PARAMETERS: int
-PUSHES: int
+EXTERNALS: int
 
 @type_check_only
 class _Bound(type): ...
@@ -202,7 +202,7 @@ class LabLoop(metaclass=_Bound):
     def set_noise(self, process: _Array, sensors: _Array) -> None: ...
     def set_track(self, points: _Array, metres: float, seconds: float) -> None: ...
     def set_published_form(self, published: bool) -> None: ...
-    def set_habits(
+    def set_published_ways(
         self,
         pose_gain: float,
         load_sensors: bool,
@@ -227,7 +227,7 @@ class LabLoop(metaclass=_Bound):
         parameters: _Array,
         wanted: _Array,
         normal: _Array,
-        push: _Array,
+        external: _Array,
     ) -> _LoopRecord: ...
 
 def base_parameters() -> list[dict[str, Any]]: ...

@@ -35,7 +35,20 @@ _STATIONS = (
     *("diagnose", "study"),
 )
 # Where classes have moved to since a version wrote them: old place to new place.
-_MOVED: dict[str, str] = {}
+_MOVED: dict[str, str] = {"diagnose.doubt:Beside": "diagnose.reservation:Beside"}
+# Fields that have another name since, by class.
+_RENAMED: dict[str, dict[str, str]] = {
+    "estimate.noise:NoiseModel": {"wander": "disturbance"},
+    "rules.limits:Rules": {"idle": "insignificant"},
+    "diagnose.proposals:Proposal": {
+        "held_out_gain": "validation_gain",
+        "held_out_error": "validation_gain_std",
+    },
+    "study.study:Study": {
+        "held_out": "validation",
+        "omnibus_held_out": "omnibus_validation",
+    },
+}
 
 
 def save(result: object, path: str | Path) -> None:
@@ -214,7 +227,9 @@ class _Reader:
             raise KeyError(place)
         known = {f.name for f in dataclasses.fields(cls) if f.init}
         # What later versions no longer keep is left; what they keep more has its default.
-        given = {n: self.value(v) for n, v in told["fields"].items() if n in known}
+        renamed = _RENAMED.get(place, {})
+        told_fields = {renamed.get(n, n): v for n, v in told["fields"].items()}
+        given = {n: self.value(v) for n, v in told_fields.items() if n in known}
         made = cls(**given)
         if module.split(".")[0] == "log":
             for array in getattr(made, "_data", {}).values():

@@ -81,7 +81,7 @@ inline std::array<double, kMotionStates> motion_of(const ModelState<double>& rat
     return {rate[0], rate[1], rate[2]};
 }
 
-constexpr std::array<double, kPushes> kCalm{};
+constexpr std::array<double, kExternals> kCalm{};
 
 /// One evaluation: the workings, the derivatives of the state, the readings.
 struct Evaluation {
@@ -91,9 +91,10 @@ struct Evaluation {
 };
 
 inline Evaluation evaluate(const SingleTrack& model, const ModelState<double>& x, const Input& u,
-                           const Parameters& p, const std::array<double, kPushes>& push = kCalm) {
+                           const Parameters& p,
+                           const std::array<double, kExternals>& external = kCalm) {
     Evaluation e;
-    e.w = model.evaluate(x.data(), push.data(), x.data() + kMotionStates, u, p.data(),
+    e.w = model.evaluate(x.data(), external.data(), x.data() + kMotionStates, u, p.data(),
                          e.rate.data(), e.rate.data() + kMotionStates);
     model.sense(e.w, p.data(), x.data() + kMotionStates, e.y.data());
     return e;
@@ -128,7 +129,7 @@ inline Noise ordinary_noise() {
     Noise noise;
     noise.sensor = {0.05, 0.03, 0.003, 0.1, 0.1};
     noise.motion = {0.05, 0.05, 0.01};
-    noise.wander = {150.0, 150.0, 100.0};
+    noise.disturbance = {150.0, 150.0, 100.0};
     noise.correlation_time_s = 0.5;
     return noise;
 }

@@ -16,7 +16,7 @@ TEST(Covariances, OfTheGreyBoxOfTheMainJob) {
         Noise noise = ordinary_noise();
         for (double& s : noise.sensor) s *= std::min(1.0, 1.0 / ratio);
         for (double& s : noise.motion) s *= std::min(1.0, ratio);
-        for (double& s : noise.wander) s *= std::min(1.0, ratio);
+        for (double& s : noise.disturbance) s *= std::min(1.0, ratio);
         std::size_t lost = 0;
         const auto used = kStatesPlain + static_cast<int>(active_states(model.effects).count);
         filter_run<kStatesFew>(RunSystem<kStatesFew>(model, run, p.data(), noise),

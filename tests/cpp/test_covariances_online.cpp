@@ -99,8 +99,8 @@ ObserverSettings scaled_settings(double ratio) {
     ObserverSettings s;
     for (double* v : {&s.vx_mps, &s.yaw_rate_radps, &s.ax_mps2, &s.ay_mps2, &s.model_ay_mps2})
         *v *= sensor;
-    for (double* v : {&s.force_wander, &s.yaw_wander_radps, &s.sideslip_wander_rad,
-                      &s.stiffness_wander, &s.fx_wander, &s.beta_wander_radps})
+    for (double* v : {&s.force_walk, &s.yaw_walk_radps, &s.sideslip_walk_rad, &s.stiffness_walk,
+                      &s.fx_walk, &s.beta_walk_radps})
         *v *= process;
     return s;
 }

@@ -12,7 +12,7 @@ using Outputs = Eigen::Matrix<double, kOutputs, 1>;
 struct Place {
     ModelState<double> x{};
     Input u;
-    std::array<double, kPushes> push{};
+    std::array<double, kExternals> external{};
     Parameters p{};
     bool force_known = true;
     EffectMask others = 0;
@@ -23,10 +23,10 @@ template <class S>
 std::array<S, kOutputs> outputs(const SingleTrack& model, const Place& at, const S* p) {
     ModelState<S> x;
     std::copy(at.x.begin(), at.x.end(), x.begin());
-    std::array<S, kPushes> push;
-    std::copy(at.push.begin(), at.push.end(), push.begin());
+    std::array<S, kExternals> external;
+    std::copy(at.external.begin(), at.external.end(), external.begin());
     std::array<S, kOutputs> out;
-    const auto w = model.evaluate(x.data(), push.data(), x.data() + kMotionStates, at.u, p,
+    const auto w = model.evaluate(x.data(), external.data(), x.data() + kMotionStates, at.u, p,
                                   out.data(), out.data() + kMotionStates);
     model.sense(w, p, x.data() + kMotionStates, out.data() + kModelStates);
     return out;
@@ -52,8 +52,8 @@ Place random_place(std::mt19937& generator, std::size_t effect) {
     for (std::size_t i = kMotionStates; i < kModelStates; ++i) at.x[i] = 0.1 * part(generator);
     at.u = {0.15 * part(generator), (at.force_known ? 5000.0 : 5.0) * part(generator),
             10.0 + 10.0 * part(generator)};
-    at.push = {200.0 * part(generator), 200.0 * part(generator), 200.0 * part(generator),
-               0.3 * part(generator), 0.3 * part(generator)};
+    at.external = {200.0 * part(generator), 200.0 * part(generator), 200.0 * part(generator),
+                   0.3 * part(generator), 0.3 * part(generator)};
     return at;
 }
 

@@ -37,15 +37,17 @@ TEST_P(AnyEffect, AtItsNullValueIsNotThere) {
             for (std::size_t i = kMotionStates; i < kModelStates; ++i) x[i] = 0.1 * part(generator);
             const Input u{0.1 * part(generator), (force_known ? 5000.0 : 4.0) * part(generator),
                           5.0 + part(generator)};
-            const std::array<double, kPushes> push{100.0 * part(generator), 100.0 * part(generator),
-                                                   100.0 * part(generator), 0.1, -0.1};
-            const auto off = evaluate({saloon(), 0, force_known}, x, u, p, push);
-            const auto on = evaluate({saloon(), mask(), force_known}, x, u, p, push);
+            const std::array<double, kExternals> external{100.0 * part(generator),
+                                                          100.0 * part(generator),
+                                                          100.0 * part(generator), 0.1, -0.1};
+            const auto off = evaluate({saloon(), 0, force_known}, x, u, p, external);
+            const auto on = evaluate({saloon(), mask(), force_known}, x, u, p, external);
             EXPECT_EQ(motion_of(on.rate), motion_of(off.rate));
             EXPECT_EQ(on.y, off.y);
             const auto without =
-                evaluate({saloon(), kAllEffects & ~mask(), force_known}, x, u, others, push);
-            const auto with = evaluate({saloon(), kAllEffects, force_known}, x, u, others, push);
+                evaluate({saloon(), kAllEffects & ~mask(), force_known}, x, u, others, external);
+            const auto with =
+                evaluate({saloon(), kAllEffects, force_known}, x, u, others, external);
             EXPECT_EQ(motion_of(with.rate), motion_of(without.rate));
             EXPECT_EQ(with.y, without.y);
         }
@@ -76,7 +78,7 @@ TEST_P(AnyEffect, MovesTheChannelsItNames) {
         p[first() + j].d[j] = 1.0;
         ModelState<D> x{};
         x[0] = D(25.0);
-        const std::array<D, kPushes> calm{};
+        const std::array<D, kExternals> calm{};
         std::array<double, kChannels> most{};
         for (int k = 0; k < 150; ++k) {
             advance(model, x, calm.data(), driven(k * dt), driven((k + 1) * dt), p.data(), dt, 4);

@@ -58,10 +58,10 @@ LoopRecord drive(const LoopData& data, const std::vector<Wanted>& wanted,
     const auto p = plain_parameters();
     std::mt19937 generator(5);
     std::normal_distribution<double> normal;
-    std::vector<double> noise(kSensorCount * wanted.size()), push(3 * wanted.size(), 0.0);
+    std::vector<double> noise(kSensorCount * wanted.size()), external(3 * wanted.size(), 0.0);
     for (double& v : noise) v = normal(generator);
     return run_closed_loop(data, Plant({saloon(), 0}, p.data(), options), observer_data(), wanted,
-                           noise.data(), push.data());
+                           noise.data(), external.data());
 }
 
 double truth(const LoopRecord& r, std::size_t k, int column) {
@@ -111,7 +111,7 @@ TEST(LabLoop, TheSameDriveWithInputsThatMoveEvenly) {
     // Moving evenly from one sample's input to the next's repeats the drive.
     Plant plant({saloon(), 0}, plain_parameters().data(), {});
     PlantState x = plant.at_rest(data.first_speed_mps);
-    const Plant::Pushes calm{};
+    const Plant::Externals calm{};
     for (std::size_t k = 0; k + 1 < kSamples; ++k) {
         const double* now = &even.inputs[LoopRecord::kInputs * k];
         const double* next = now + LoopRecord::kInputs;

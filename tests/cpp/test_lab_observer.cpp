@@ -23,7 +23,7 @@ ObserverNoise noise_of_a_good_car() {
 ObserverLog pushed_car(ObserverForm form, std::size_t samples, double side_force) {
     constexpr double dt = 0.01;
     const ObserverModel model(kCar, form, dt);
-    const ObserverModel truth(kCar, ObserverForm::mended(), dt);
+    const ObserverModel truth(kCar, ObserverForm::corrected(), dt);
     ObserverLog log{model, {}, {}, {}};
     ObserverVec x = ObserverVec::Zero();
     x[0] = 12.0;
@@ -123,8 +123,8 @@ TEST(ObserverModel, ExactSamplingIsTheLimitOfFineSteps) {
     ObserverForm euler;
     euler.exact_sampling = false;
     for (const double v_x : {5.0, 40.0}) {
-        const ObserverVec coarse = after_a_second(ObserverForm::mended(), 1, v_x);
-        const ObserverVec fine = after_a_second(ObserverForm::mended(), 20, v_x);
+        const ObserverVec coarse = after_a_second(ObserverForm::corrected(), 1, v_x);
+        const ObserverVec fine = after_a_second(ObserverForm::corrected(), 20, v_x);
         const ObserverVec reference = 2.0 * after_a_second(euler, 2000, v_x) -
                                       after_a_second(euler, 1000, v_x);  // Richardson
         EXPECT_LT((fine - reference).norm(), 1e-4);
@@ -141,7 +141,7 @@ TEST(ObserverModel, StaysStableAtWalkingPaceUnlikeEuler) {
         model.predict(x, kNow, kNow, A);
         return A.topLeftCorner<3, 3>().eigenvalues().cwiseAbs().maxCoeff();
     };
-    EXPECT_LE(radius(ObserverForm::mended()), 1.0);
+    EXPECT_LE(radius(ObserverForm::corrected()), 1.0);
     EXPECT_GT(radius(ObserverForm::published()), 2.0);
 }
 
@@ -172,7 +172,7 @@ TEST(ObserverModel, PublishedFormIsItsMatrices) {
 
 TEST(Observer, StepByStepIsTheFilterOverTheLog) {
     const ObserverNoise noise = noise_of_a_good_car();
-    for (const auto& form : {ObserverForm::mended(), ObserverForm::published()}) {
+    for (const auto& form : {ObserverForm::corrected(), ObserverForm::published()}) {
         const ObserverLog log = pushed_car(form, 300, 400.0);
         const ObserverTrace whole = trace(log, noise, false);
         Observer observer(log.model, noise, log.start);
@@ -187,7 +187,7 @@ TEST(Observer, StepByStepIsTheFilterOverTheLog) {
 }
 
 TEST(Observer, FeelsAnUnknownSideForce) {
-    const ObserverLog log = pushed_car(ObserverForm::mended(), 1500, 900.0);
+    const ObserverLog log = pushed_car(ObserverForm::corrected(), 1500, 900.0);
     const ObserverTrace found = trace(log, noise_of_a_good_car(), true);
     double error = 0.0, spread = 0.0;
     for (std::size_t k = 0; k < log.size(); ++k) {
@@ -206,8 +206,8 @@ TEST(Observer, CoastsThroughAMinuteWithoutReadings) {
     constexpr double dt = 0.01;
     constexpr std::size_t kLost = 1000, kBack = 7000, kSamples = 7300;
     const ObserverNoise noise = noise_of_a_good_car();
-    for (const auto& form : {ObserverForm::mended(), ObserverForm::published()}) {
-        const ObserverModel truth(kCar, ObserverForm::mended(), dt);
+    for (const auto& form : {ObserverForm::corrected(), ObserverForm::published()}) {
+        const ObserverModel truth(kCar, ObserverForm::corrected(), dt);
         ObserverLog log{ObserverModel(kCar, form, dt), {}, {}, {}};
         ObserverVec x = ObserverVec::Zero();
         x[0] = 12.0;
@@ -253,7 +253,7 @@ TEST(Observer, CoastsThroughAMinuteWithoutReadings) {
 }
 
 TEST(ObserverEm, LearnsTheSensorsWithoutFalling) {
-    const ObserverLog log = pushed_car(ObserverForm::mended(), 3000, 500.0);
+    const ObserverLog log = pushed_car(ObserverForm::corrected(), 3000, 500.0);
     ObserverNoise start;
     start.process =
         (ObserverVec() << 1e-3, 1e-3, 1e-3, 500.0, 500.0, 500.0).finished().asDiagonal();

@@ -13,7 +13,7 @@ Noise scaled(const Noise& noise, const Values& logs) {
     int i = 0;
     for (double& s : out.sensor) s *= std::exp(logs[i++]);
     for (double& s : out.motion) s *= std::exp(logs[i++]);
-    for (double& s : out.wander) s *= std::exp(logs[i++]);
+    for (double& s : out.disturbance) s *= std::exp(logs[i++]);
     out.correlation_time_s *= std::exp(logs[i]);
     return out;
 }
@@ -107,7 +107,7 @@ TEST_P(NoiseScore, HasMeanZeroAndTheInformationAsVariance) {
     const Parameters p = typical_parameters();
     Noise noise = ordinary_noise();
     for (double& s : noise.motion) s = 1e-6;
-    for (double& s : noise.wander) s = 1e-3;
+    for (double& s : noise.disturbance) s = 1e-3;
     const int records = 12;
     Values sum = Values::Zero();
     Values squares = Values::Zero();

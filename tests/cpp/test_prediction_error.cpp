@@ -185,7 +185,7 @@ TEST(PredictionError, ConstantSignalsAnswerLikeTheEffectsThatAreConstant) {
     const Problem problem = two_runs(kLagging);
     const Parameters p = typical_parameters();
     const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
-    const std::vector<int> targets{kForceY, kMomentZ, kGravityX, kPushes + kYawRate};
+    const std::vector<int> targets{kForceY, kMomentZ, kGravityX, kExternals + kYawRate};
     const Table ones = Table::Ones(static_cast<int>(problem.samples()), 4);
     const Table answers = signals_of(problem, p, filter, ones, targets);
     const Table G = sensitivities_of(problem, p, filter,
@@ -208,7 +208,7 @@ TEST(PredictionError, SignalOnAReadingIsTakenOffTheMeasurement) {
     const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
     const auto n = static_cast<int>(problem.samples());
     std::vector<int> targets;
-    for (int j = 0; j < 10; ++j) targets.push_back(kPushes + j % kChannels);
+    for (int j = 0; j < 10; ++j) targets.push_back(kExternals + j % kChannels);
     Table signals(n, 10);
     for (int k = 0; k < n; ++k)
         for (int j = 0; j < 10; ++j) signals(k, j) = 1e-3 * std::sin(0.1 * (j + 1) * k + j);

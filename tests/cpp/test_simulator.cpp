@@ -155,7 +155,7 @@ TEST(Simulator, RecordsWhatTheModelComputes) {
     const Drive drive = drive_along(references, {}, 22.0, gust, kAllEffects);
     const SingleTrack model{saloon(), kAllEffects};
     const Parameters p = typical_parameters();
-    const std::array<double, kPushes> push{50.0, -80.0, 30.0, 0.0, 0.0};
+    const std::array<double, kExternals> external{50.0, -80.0, 30.0, 0.0, 0.0};
     for (std::size_t k = 0; k + 1 < samples(drive); ++k) {
         ModelState<double> x;
         std::copy_n(&drive.states[k * kModelStates], kModelStates, x.begin());
@@ -163,10 +163,10 @@ TEST(Simulator, RecordsWhatTheModelComputes) {
             return Input{drive.inputs[2 * at], drive.inputs[2 * at + 1],
                          static_cast<double>(at) * kStep};
         };
-        const auto y = sense(model, x, push.data(), input(k), p.data());
+        const auto y = sense(model, x, external.data(), input(k), p.data());
         for (std::size_t i = 0; i < kChannels; ++i)
             EXPECT_EQ(drive.outputs[k * kChannels + i], y[i]);
-        advance(model, x, push.data(), input(k), input(k + 1), p.data(), kStep, 60);
+        advance(model, x, external.data(), input(k), input(k + 1), p.data(), kStep, 60);
         for (std::size_t i = 0; i < kModelStates; ++i)
             EXPECT_NEAR(drive.states[(k + 1) * kModelStates + i], x[i], 1e-6);
     }

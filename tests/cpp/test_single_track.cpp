@@ -44,22 +44,22 @@ TEST(SingleTrack, NewtonAndEulerHoldAtRandomPoints) {
         const double vy = 2.0 * part(generator);
         const double r = 0.5 * part(generator);
         const Input u{0.2 * part(generator), 8000.0 * part(generator)};
-        const std::array<double, kPushes> push{300.0, -200.0, 150.0, -0.3, 0.4};
-        const auto e = evaluate(model, {vx, vy, r}, u, p, push);
+        const std::array<double, kExternals> external{300.0, -200.0, 150.0, -0.3, 0.4};
+        const auto e = evaluate(model, {vx, vy, r}, u, p, external);
         const double c = std::cos(u.steer_rad);
         const double s = std::sin(u.steer_rad);
         const double share = u.longitudinal < 0.0 ? 0.6 : 0.0;
         const double fx_f = share * u.longitudinal;
         const double fx_r = (1.0 - share) * u.longitudinal;
         const double drag = 0.5 * 1.225 * car.drag_area_m2 * vx * vx;
-        const double x_sum = fx_f * c - e.w.fy_f * s + fx_r - drag + push[kForceX];
-        const double y_sum = e.w.fy_f * c + fx_f * s + e.w.fy_r + push[kForceY];
+        const double x_sum = fx_f * c - e.w.fy_f * s + fx_r - drag + external[kForceX];
+        const double y_sum = e.w.fy_f * c + fx_f * s + e.w.fy_r + external[kForceY];
         const double z_sum =
-            car.lf_m * (e.w.fy_f * c + fx_f * s) - car.lr_m * e.w.fy_r + push[kMomentZ];
+            car.lf_m * (e.w.fy_f * c + fx_f * s) - car.lr_m * e.w.fy_r + external[kMomentZ];
         EXPECT_NEAR(e.y[kAx], x_sum / car.mass_kg, 1e-11);
         EXPECT_NEAR(e.y[kAy], y_sum / car.mass_kg, 1e-11);
-        EXPECT_NEAR(e.rate[0], x_sum / car.mass_kg + vy * r + push[kGravityX], 1e-11);
-        EXPECT_NEAR(e.rate[1], y_sum / car.mass_kg - vx * r + push[kGravityY], 1e-11);
+        EXPECT_NEAR(e.rate[0], x_sum / car.mass_kg + vy * r + external[kGravityX], 1e-11);
+        EXPECT_NEAR(e.rate[1], y_sum / car.mass_kg - vx * r + external[kGravityY], 1e-11);
         EXPECT_NEAR(e.rate[2], z_sum / p[kYawInertia], 1e-11);
         EXPECT_NEAR(e.w.alpha_f, u.steer_rad - std::atan((vy + car.lf_m * r) / vx), 1e-14);
         EXPECT_NEAR(e.w.alpha_r, -std::atan((vy - car.lr_m * r) / vx), 1e-14);
@@ -103,7 +103,7 @@ TEST(SingleTrack, SteadyYawRateOfTheLinearBicycle) {
         double r = 0.0;
         for (int newton = 0; newton < 8; ++newton) {  // dv_y/dt = dr/dt = 0 at constant v_x
             const ModelState<D> x{D(v), D::seeded(vy, 0), D::seeded(r, 1)};
-            const std::array<D, kPushes> calm{};
+            const std::array<D, kExternals> calm{};
             ModelState<D> rate;
             model.evaluate(x.data(), calm.data(), x.data() + kMotionStates, {steer, 0.0}, p.data(),
                            rate.data(), rate.data() + kMotionStates);
@@ -196,7 +196,7 @@ TEST(SingleTrack, FastestRateBoundsTheEigenvaluesOfTheMotion) {
     for (double v : {5.0, 15.0, 40.0}) {
         using D = Dual<3>;
         const ModelState<D> x{D::seeded(v, 0), D::seeded(0.0, 1), D::seeded(0.0, 2)};
-        const std::array<D, kPushes> calm{};
+        const std::array<D, kExternals> calm{};
         ModelState<D> rate;
         model.evaluate(x.data(), calm.data(), x.data() + kMotionStates, {}, p.data(), rate.data(),
                        rate.data() + kMotionStates);

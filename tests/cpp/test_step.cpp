@@ -6,7 +6,7 @@ namespace sysid::test {
 namespace {
 
 const ModelState<double> kStart{25.0, 0.3, 0.2, 0.02, 0.01, 0.005};
-const std::array<double, kPushes> kPush{200.0, -150.0, 100.0, 0.1, -0.2};
+const std::array<double, kExternals> kPush{200.0, -150.0, 100.0, 0.1, -0.2};
 const std::array<double, kChannels> kSensorNoise{0.05, 0.03, 0.003, 0.1, 0.1};
 
 double distance(const ModelState<double>& a, const ModelState<double>& b) {
@@ -200,7 +200,7 @@ TEST(Step, SettledAuxiliaryStatesStandStill) {
 struct Point {
     const char* name;
     ModelState<double> x;
-    std::array<double, kPushes> push;
+    std::array<double, kExternals> external;
     Input from, to;
 };
 
@@ -218,7 +218,7 @@ std::vector<Point> points() {
     for (int n = 0; n < 4; ++n) {
         Point point{"random", {}, {}, {}, {}};
         point.x = {25.0 + 12.0 * part(generator), part(generator), 0.4 * part(generator)};
-        for (double& push : point.push) push = 0.3 * part(generator);
+        for (double& external : point.external) external = 0.3 * part(generator);
         point.from = {0.08 * part(generator), 2000.0 + 1000.0 * part(generator)};
         point.to = {point.from.steer_rad + 0.01, point.from.longitudinal + 200.0};
         all.push_back(point);
@@ -236,9 +236,10 @@ using Readings = Vec<kModelStates + kChannels>;
 
 template <class S, class T>
 std::array<S, kModelStates + kChannels> step_and_read(const SingleTrack& model, ModelState<S> x,
-                                                      const S* push, const Point& at, const T* p) {
-    advance(model, x, push, at.from, at.to, p, 0.01, 3);
-    const auto y = sense(model, x, push, at.to, p);
+                                                      const S* external, const Point& at,
+                                                      const T* p) {
+    advance(model, x, external, at.from, at.to, p, 0.01, 3);
+    const auto y = sense(model, x, external, at.to, p);
     std::array<S, kModelStates + kChannels> out;
     std::copy(x.begin(), x.end(), out.begin());
     std::copy(y.begin(), y.end(), out.begin() + kModelStates);
@@ -275,28 +276,28 @@ Point in_mode(Point point, bool force_known) {
 }
 
 TEST_P(StepDerivatives, OfStateAndPush) {
-    using D = Dual<kModelStates + kPushes>;
+    using D = Dual<kModelStates + kExternals>;
     const SingleTrack model{saloon(), kAllEffects, GetParam()};
     const Parameters p = typical_parameters();
     for (const Point& plain : points()) {
         const Point at = in_mode(plain, GetParam());
         ModelState<D> x;
-        std::array<D, kPushes> push;
+        std::array<D, kExternals> external;
         for (int i = 0; i < kModelStates; ++i)
             x[static_cast<std::size_t>(i)] = D::seeded(at.x[static_cast<std::size_t>(i)], i);
-        for (int i = 0; i < kPushes; ++i)
-            push[static_cast<std::size_t>(i)] =
-                D::seeded(at.push[static_cast<std::size_t>(i)], kModelStates + i);
-        const auto dual = step_and_read(model, x, push.data(), at, p.data());
-        for (std::size_t i = 0; i < kModelStates + kPushes; ++i) {
+        for (int i = 0; i < kExternals; ++i)
+            external[static_cast<std::size_t>(i)] =
+                D::seeded(at.external[static_cast<std::size_t>(i)], kModelStates + i);
+        const auto dual = step_and_read(model, x, external.data(), at, p.data());
+        for (std::size_t i = 0; i < kModelStates + kExternals; ++i) {
             const bool state = i < kModelStates;
             const bool newtons = i >= kModelStates && i < kModelStates + kGravityX;
             const double step = newtons ? 10.0 : 4e-4;
-            const double middle = state ? at.x[i] : at.push[i - kModelStates];
+            const double middle = state ? at.x[i] : at.external[i - kModelStates];
             const auto difference = central_difference(
                 [&](double value) {
                     ModelState<double> moved = at.x;
-                    auto pushed = at.push;
+                    auto pushed = at.external;
                     (state ? moved[i] : pushed[i - kModelStates]) = value;
                     return values(step_and_read(model, moved, pushed.data(), at, p.data()));
                 },
@@ -315,19 +316,19 @@ TEST_P(StepDerivatives, OfParameters) {
         const Point at = in_mode(plain, GetParam());
         ModelState<D> x;
         std::copy(at.x.begin(), at.x.end(), x.begin());
-        std::array<D, kPushes> push;
-        std::copy(at.push.begin(), at.push.end(), push.begin());
+        std::array<D, kExternals> external;
+        std::copy(at.external.begin(), at.external.end(), external.begin());
         std::vector<D> parameters;
         for (std::size_t i = 0; i < kParameterCount; ++i)
             parameters.push_back(D::seeded(p[i], static_cast<int>(i)));
-        const auto dual = step_and_read(model, x, push.data(), at, parameters.data());
+        const auto dual = step_and_read(model, x, external.data(), at, parameters.data());
         for (std::size_t i = 0; i < kParameterCount; ++i) {
             const double step = std::max(1e-3 * std::abs(p[i]), 1e-9);
             const auto difference = central_difference(
                 [&](double value) {
                     Parameters q = p;
                     q[i] = value;
-                    return values(step_and_read(model, at.x, at.push.data(), at, q.data()));
+                    return values(step_and_read(model, at.x, at.external.data(), at, q.data()));
                 },
                 p[i], step);
             expect_column(dual, i, difference, step,

@@ -12,7 +12,7 @@ from sysid_vehicle.estimate import MEASURED
 
 
 @pytest.fixture(scope="module")
-def held_out(fit: Fit, course: Log) -> Comparison:
+def validation(fit: Fit, course: Log) -> Comparison:
     return compare(fit, course)
 
 
@@ -24,9 +24,9 @@ def dragged(fit: Fit, truth: Model) -> Comparison:
     return compare(fit, log)
 
 
-def test_a_complete_model_is_at_the_noise_floor(held_out: Comparison) -> None:
-    assert held_out.error == pytest.approx(1.0, abs=0.03)
-    for score in held_out.channels.values():
+def test_a_complete_model_is_at_the_noise_floor(validation: Comparison) -> None:
+    assert validation.error == pytest.approx(1.0, abs=0.03)
+    for score in validation.channels.values():
         assert score.nrmse == pytest.approx(1.0, abs=0.05)
         assert score.rmse == pytest.approx(score.noise_floor, rel=0.05)
         assert score.r2 > 0.99
@@ -58,8 +58,8 @@ def test_regions_lie_where_the_effect_acts(fit: Fit, truth: Model) -> None:
     assert 0.0 < sum(shares) <= 1.0 + 1e-12
 
 
-def test_every_measured_channel_has_a_score(held_out: Comparison) -> None:
-    assert tuple(held_out.channels) == MEASURED
+def test_every_measured_channel_has_a_score(validation: Comparison) -> None:
+    assert tuple(validation.channels) == MEASURED
 
 
 def test_channels_that_were_not_measured_have_none(
@@ -73,14 +73,14 @@ def test_channels_that_were_not_measured_have_none(
     assert "ax_mps2" not in no_force.channels
 
 
-def test_samples_keep_their_place(held_out: Comparison, fit: Fit, course: Log) -> None:
-    assert np.array_equal(held_out.time_s, course["time_s"])
-    assert held_out.residual.shape == (course.n, 5)
+def test_samples_keep_their_place(validation: Comparison, fit: Fit, course: Log) -> None:
+    assert np.array_equal(validation.time_s, course["time_s"])
+    assert validation.residual.shape == (course.n, 5)
     both = compare(fit, [course, course])
     assert both.log_number.tolist() == [0.0] * course.n + [1.0] * course.n
     assert np.array_equal(both.residual[: course.n], both.residual[course.n :])
-    assert both.error == pytest.approx(held_out.error, rel=1e-12)
-    assert both.log_likelihood == pytest.approx(2.0 * held_out.log_likelihood, rel=1e-12)
+    assert both.error == pytest.approx(validation.error, rel=1e-12)
+    assert both.log_likelihood == pytest.approx(2.0 * validation.log_likelihood, rel=1e-12)
 
 
 def test_louder_noise_makes_the_same_error_smaller(fit: Fit, course: Log) -> None:
@@ -103,7 +103,7 @@ def test_the_map_counts_excess_and_leaves_empty_cells_out(fit: Fit, course: Log)
     assert FailureMap.of(driving, 0.9 * np.ones((driving.samples, 5))).worst() == ()
 
 
-def test_it_prints_and_draws(held_out: Comparison, dragged: Comparison) -> None:
+def test_it_prints_and_draws(validation: Comparison, dragged: Comparison) -> None:
     for text in (str(dragged), dragged._repr_html_()):
         assert "vx_mps" in text
         assert f"{dragged.error:.3f} of the noise floor" in text
@@ -111,8 +111,8 @@ def test_it_prints_and_draws(held_out: Comparison, dragged: Comparison) -> None:
     _, (left, right) = pyplot.subplots(1, 2)
     assert dragged.plot(left) is left
     assert left.get_ylabel() == "speed [m/s]"
-    assert held_out.plot_residuals(right) is right
+    assert validation.plot_residuals(right) is right
     drawn = {line.get_label() for line in right.get_lines()}
     assert set(MEASURED) <= drawn
-    assert held_out.plot() is not None
-    assert held_out.plot_residuals() is not None
+    assert validation.plot() is not None
+    assert validation.plot_residuals() is not None

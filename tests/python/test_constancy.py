@@ -56,16 +56,16 @@ def test_with_an_effect_its_rivals_are_doubted() -> None:
             EffectVerdict(rolling, "one of a group", group=("aero_drag",)),
         )
     )
-    doubted = told.doubting({"aero_drag"}, "it explains little", added={"aero_drag"})
-    assert [v.finding for v in doubted.all] == ["missing", "proxy", "proxy"]
-    assert doubted["rolling_resistance"].sentence == (
+    reserved = told.with_reservation({"aero_drag"}, "it explains little", added={"aero_drag"})
+    assert [v.finding for v in reserved.all] == ["missing", "proxy", "proxy"]
+    assert reserved["rolling_resistance"].sentence == (
         "something acts like it, but it explains little"
     )
     # What was added does not fall with a rival.
     both = {"aero_drag", "rolling_resistance"}
-    kept = told.doubting({"rolling_resistance"}, "it explains little", added=both)
+    kept = told.with_reservation({"rolling_resistance"}, "it explains little", added=both)
     assert [kept[e].finding for e in sorted(both)] == ["one of a group", "proxy"]
-    assert told.doubting((), "nothing").all == told.all
+    assert told.with_reservation((), "nothing").all == told.all
 
 
 def test_the_only_log_is_cut_into_pieces(hidden_fit: Callable[[str, float], Fit]) -> None:

@@ -115,7 +115,7 @@ def test_a_filter_of_other_runs_is_refused(problem: _core.Problem, fit: Fit) -> 
             use()
 
 
-@pytest.mark.parametrize("target", [-1, _core.PUSHES + _core.CHANNELS])
+@pytest.mark.parametrize("target", [-1, _core.EXTERNALS + _core.CHANNELS])
 def test_a_target_that_is_not_there_is_refused(
     target: int, problem: _core.Problem, fit: Fit
 ) -> None:

@@ -9,7 +9,6 @@ import pytest
 from sysid_vehicle import Fit, InvalidInput, Log
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import worse
-from sysid_vehicle.study.held_out import changes_ahead
 from sysid_vehicle.study.horizons import (
     LATERAL,
     PREDICTED,
@@ -19,6 +18,7 @@ from sysid_vehicle.study.horizons import (
     horizons,
 )
 from sysid_vehicle.study.matters import sizes_that_matter, within
+from sysid_vehicle.study.validation import changes_ahead
 from sysid_vehicle.study.waterfall import look_ahead
 
 

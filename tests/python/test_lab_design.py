@@ -38,7 +38,7 @@ def believed(setup: Setup) -> Model:
 
 @pytest.fixture(scope="module")
 def design(setup: Setup, believed: Model) -> Design:
-    return design_excitation(setup, believed=believed, duration_s=20.0, trials=12, doubt=0.05)
+    return design_excitation(setup, believed=believed, duration_s=20.0, trials=12, uncertainty=0.05)
 
 
 def test_a_tyre_knows_its_curve_and_its_peak() -> None:
@@ -153,7 +153,7 @@ def test_a_design_is_repeatable_and_better_with_more_trials(
     design: Design, setup: Setup, believed: Model
 ) -> None:
     again = design_excitation(
-        setup, believed=believed, duration_s=20.0, trials=12, doubt=0.05, workers=1
+        setup, believed=believed, duration_s=20.0, trials=12, uncertainty=0.05, workers=1
     )
     assert again.excitation == design.excitation
     assert design.best.cost <= min(t.cost for t in design.trials[:6])
@@ -168,7 +168,7 @@ def test_a_design_draws_and_shows_itself(design: Design) -> None:
 def test_limits_that_leave_nothing_are_told(setup: Setup) -> None:
     with pytest.raises(NumericalError, match="lateral acceleration"):
         design_excitation(
-            setup, limits=Limits(lateral_mps2=2.0), duration_s=10.0, trials=2, doubt=0.0
+            setup, limits=Limits(lateral_mps2=2.0), duration_s=10.0, trials=2, uncertainty=0.0
         )
 
 

@@ -15,9 +15,9 @@ def test_the_core_vector_keeps_every_number() -> None:
     assert NoiseModel.from_vector(v) == SOME
 
 
-def test_the_floor_has_no_wandering() -> None:
+def test_the_floor_has_no_disturbances() -> None:
     floor = SOME.floor()
-    assert floor.wander == (0.0, 0.0, 0.0)
+    assert floor.disturbance == (0.0, 0.0, 0.0)
     assert (floor.sensor, floor.motion) == (SOME.sensor, SOME.motion)
 
 
@@ -60,14 +60,14 @@ def test_a_restless_road_is_learned(truth: Model) -> None:
     guess = first_guess(driving, truth.vehicle)
     noise, _ = learn_noise(driving.problem(truth), truth.vector(), guess, truth.vehicle, rounds=20)
     # 40 s hold about 65 independent values of each: 9 % of standard error.
-    np.testing.assert_allclose(noise.wander, [road.fx_n, road.fy_n, road.mz_nm], rtol=0.3)
+    np.testing.assert_allclose(noise.disturbance, [road.fx_n, road.fy_n, road.mz_nm], rtol=0.3)
     assert noise.correlation_time_s == pytest.approx(road.correlation_time_s, rel=0.3)
 
 
 def test_elsewhere_no_model_is_sure_to_less_than_a_thousandth_of_the_weight(truth: Model) -> None:
     weight = truth.vehicle.mass_kg * 9.81
     quiet = NoiseModel(SOME.sensor, SOME.motion, (0.1, 2.0 * weight, 0.1), 0.25)
-    x, y, moment = quiet.elsewhere(truth.vehicle).wander
+    x, y, moment = quiet.elsewhere(truth.vehicle).disturbance
     assert x == pytest.approx(1e-3 * weight)
     assert y == 2.0 * weight
     assert moment == pytest.approx(1e-3 * weight * truth.vehicle.wheelbase_m / 4.0)

@@ -364,7 +364,7 @@ def test_the_worst_excerpt_is_where_the_baseline_is_worst(study: sv.Study) -> No
     assert excerpt is not None
     assert excerpt.channels == ("yaw_rate_radps", "ay_mps2")
     assert excerpt.time_s[-1] - excerpt.time_s[0] == pytest.approx(4.0 - 0.02)
-    log = study.held_out.logs[0]
+    log = study.validation.logs[0]
     first = int(np.searchsorted(log["time_s"], excerpt.time_s[0]))
     np.testing.assert_array_equal(
         excerpt.measured[:, 1], log["ay_mps2"][first : first + len(excerpt.time_s)]

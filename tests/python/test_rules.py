@@ -43,7 +43,7 @@ NUMERICAL = {
     },
     "diagnose/score.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
     "diagnose/sensitivity.py": {"_AT_ONCE"},
-    "study/held_out.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED", "_AHEAD"},
+    "study/validation.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED", "_AHEAD"},
     "study/horizons.py": {"_BLOCK_S", "_FEWEST", "_DRAWS", "_APART", "_NORMAL", "_LOST"},
     "study/improve.py": {"_SHORT_S"},
     "study/steps.py": {"_ALTERNATIVES"},
@@ -115,7 +115,7 @@ def test_no_limit_that_decides_a_claim_stands_elsewhere() -> None:
 
 def test_deciding_files_compare_with_no_number_of_their_own() -> None:
     deciding = ["study/steps.py", "study/search.py", "study/verdict.py", "study/improve.py"]
-    deciding += [f"diagnose/{n}.py" for n in ("doubt", "verdicts", "constancy", "possible")]
+    deciding += [f"diagnose/{n}.py" for n in ("reservation", "verdicts", "constancy", "possible")]
     deciding += ["rules/accept.py", "rules/verdict.py"]
     found = {p: list(compared_numbers((PACKAGE / p).read_text("utf-8"))) for p in deciding}
     assert {p: n for p, n in found.items() if n} == {}
@@ -146,7 +146,7 @@ def test_every_limit_says_what_it_is_and_what_chose_it() -> None:
         ("most", 1.5, "most = 1.5: give a number between 0 and 1"),
         ("sure", float("nan"), "sure = nan: give a number above 0, finite"),
         ("clear", float("inf"), "clear = inf: give a number above 0, finite"),
-        ("idle", "2", "idle = '2': give a number above 0, finite"),
+        ("insignificant", "2", "insignificant = '2': give a number above 0, finite"),
     ],
 )
 def test_limits_that_mean_nothing_are_refused(limit: str, value: float, words: str) -> None:
@@ -326,7 +326,7 @@ def test_what_took_up_less_than_is_left_is_doubted() -> None:
     taken = {"large": 10.0, "middle": 2.0, "tiny": 0.1}
     assert smaller_than(0.01, taken, frozenset()) == set()
     assert smaller_than(0.5, taken, frozenset()) == {"tiny"}
-    # What proxies took up is unexplained too, and so is what was doubted for it.
+    # What proxies took up is unexplained too, and so is what was reserved for it.
     assert smaller_than(1.95, taken, frozenset()) == {"tiny", "middle"}
     assert smaller_than(0.5, taken, frozenset({"large"})) == {"tiny", "middle"}
     assert smaller_than(1.0, {}, frozenset()) == set()

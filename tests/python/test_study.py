@@ -21,10 +21,10 @@ from sysid_vehicle import (
     manoeuvres,
 )
 from sysid_vehicle.rules import Gain, share_explained
-from sysid_vehicle.study.held_out import (
+from sysid_vehicle.study.validation import (
     error_falls,
     gain_in_log_likelihood,
-    hold_out,
+    set_aside,
 )
 
 LAG = "steer_lag.time_constant_s", 0.06
@@ -184,9 +184,9 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     assert told["channels"]["after"]["test"]["ay_mps2"]["nrmse"] < 1.1
     # Where the verdict does not ask for it, the shape of the unknown is not sought.
     assert study.unknown is None
-    assert sorted(told["unknown"]) == ["explainable", "held_out", "p_value", "strongest"]
-    assert sorted(told["unknown"]["held_out"]) == ["p_value", "strongest"]
-    assert told["unknown"]["held_out"]["p_value"] > 1e-4
+    assert sorted(told["unknown"]) == ["explainable", "validation", "p_value", "strongest"]
+    assert sorted(told["unknown"]["validation"]) == ["p_value", "strongest"]
+    assert told["unknown"]["validation"]["p_value"] > 1e-4
     # The final model has the lag: beside it there is no delay, without it there is.
     delay = told["where"]["delays"]["steer"]
     assert abs(delay["delay_s"]) < 3.0 * delay["std_s"]
@@ -328,7 +328,7 @@ def test_absent_channels_are_among_the_warnings(
 
 
 def test_held_out_driving_tells_the_richer_model(study: Study, lagging: tuple[Log, Log]) -> None:
-    test = hold_out(*lagging)[1]
+    test = set_aside(*lagging)[1]
     poorer, richer = study.fits
     gain = gain_in_log_likelihood(poorer, richer, test)
     assert gain.value > 2.0 * gain.error > 0.0
@@ -346,7 +346,7 @@ def test_held_out_driving_tells_the_richer_model(study: Study, lagging: tuple[Lo
 
 
 def test_a_model_that_fails_on_held_out_driving_gains_nothing(fit: Fit, course: Log) -> None:
-    test = hold_out([course], course)[1]
+    test = set_aside([course], course)[1]
     broken = Fit(
         fit.model.with_values({"B_front": float("nan")}),
         *(getattr(fit, f) for f in list(Fit.__dataclass_fields__)[1:]),
@@ -356,9 +356,9 @@ def test_a_model_that_fails_on_held_out_driving_gains_nothing(fit: Fit, course: 
 
 def test_what_is_added_lowers_the_error_by_the_richer_models_own_measure(study: Study) -> None:
     baseline, found = study.fits
-    assert error_falls(baseline, found, study.held_out)
-    assert not error_falls(found, baseline, study.held_out)
-    assert not error_falls(found, found, study.held_out)
+    assert error_falls(baseline, found, study.validation)
+    assert not error_falls(found, baseline, study.validation)
+    assert not error_falls(found, found, study.validation)
 
 
 def test_the_waterfall_falls_at_every_horizon(study: Study) -> None:

@@ -11,11 +11,6 @@ from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
 from sysid_vehicle.rules import USUAL, share_explained
-from sysid_vehicle.study.held_out import (
-    error_falls,
-    fall_in_error,
-    gain_in_log_likelihood,
-)
 from sysid_vehicle.study.search import Search, Trail, _more
 from sysid_vehicle.study.steps import (
     _distance,
@@ -27,7 +22,12 @@ from sysid_vehicle.study.steps import (
     lead,
     likeliest,
     way,
-    without_idle,
+    without_insignificant,
+)
+from sysid_vehicle.study.validation import (
+    error_falls,
+    fall_in_error,
+    gain_in_log_likelihood,
 )
 
 AGAINST = ["aero_drag", "rolling_resistance", "head_wind"]
@@ -206,10 +206,10 @@ def test_the_story_leads_over_every_effect_of_its_end(
 
 def test_what_is_not_there_is_dropped_and_what_is_needed_stays(dx: Diagnosis) -> None:
     fit = by_id(dx, "aero_drag")
-    assert without_idle(fit).model.effects == ("aero_drag",)
+    assert without_insignificant(fit).model.effects == ("aero_drag",)
     model = fit.model.add("steer_offset")
-    idle = identify(model, fit.driving, starts=1)
-    assert without_idle(idle).model.effects == ("aero_drag",)
+    insignificant = identify(model, fit.driving, starts=1)
+    assert without_insignificant(insignificant).model.effects == ("aero_drag",)
 
 
 def test_what_is_at_a_bound_stays_only_where_it_is_needed(
@@ -222,11 +222,13 @@ def test_what_is_at_a_bound_stays_only_where_it_is_needed(
     # Steering that is late by less than the filter resolves is felt by nothing, nor is it nothing.
     fit = by_id(dx, "aero_drag")
     late = fit.model.add("steer_delay").with_values({"steer_delay.delay_s": 0.001})
-    assert without_idle(refine(late, fit.driving, fit.noise)).model.effects == ("aero_drag",)
-    # A resistance at the end of its range is far from idle, though no error of it is known.
+    assert without_insignificant(refine(late, fit.driving, fit.noise)).model.effects == (
+        "aero_drag",
+    )
+    # A resistance at the end of its range is significant, though no error of it is known.
     bounded = identify(fit.model.drop("aero_drag").add("rolling_resistance"), fit.driving, starts=1)
     assert not np.isfinite(bounded["rolling_resistance.per_speed_spm"].std)
-    assert without_idle(bounded).model.effects == ("rolling_resistance",)
+    assert without_insignificant(bounded).model.effects == ("rolling_resistance",)
     assert _distance(Estimate("a", 0.3, 0.1, "m2", ""), drag) == pytest.approx(3.0)
 
 

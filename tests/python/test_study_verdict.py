@@ -32,5 +32,5 @@ def test_tyres_that_the_fit_never_saw_do_not_speak_against_the_right_effect(
     assert [a.id for a in study.added] == ["accelerometer_scale"]
     assert study.test[-1].error > 2.0  # the lap is beyond what the fit knows of the tyres
     assert study.verdict == "explained"
-    assert study.omnibus_held_out is not None
-    assert not study.omnibus_held_out.rejects
+    assert study.omnibus_validation is not None
+    assert not study.omnibus_validation.rejects

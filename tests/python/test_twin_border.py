@@ -294,7 +294,7 @@ def test_torques_told_wrong_stay_inside_the_interval_of_the_mass() -> None:
                 Observer(batch=SideBySide(unknown, noise, **doubt)),
                 speed_mps=12.0,
             )
-            for doubt in ({"input_doubt": 0.0}, {})
+            for doubt in ({"input_std": 0.0}, {})
         )
         assert blind.last("mass_kg") == aware.last("mass_kg")
         off = abs(blind.last("mass_kg") - LOADED_SUV.mass_kg)
@@ -315,13 +315,13 @@ def test_the_factor_of_inputs_is_considered_on_any_twin_that_takes_them() -> Non
     )
     np.testing.assert_allclose(slow.parameters["mass_kg"], fast.parameters["mass_kg"], rtol=1e-9)
     assert slow.spread == pytest.approx(fast.spread, rel=1e-6)
-    sure = Observer(batch=SideBySide(unknowns("mass_kg"), {"ax_mps2": 0.1}, input_doubt=0.0))
+    sure = Observer(batch=SideBySide(unknowns("mass_kg"), {"ax_mps2": 0.1}, input_std=0.0))
     exact = observe(TwinCar(), first, drive.inputs, readings, sure, speed_mps=12.0)
     assert fast.spread["mass_kg"] > 1.001 * exact.spread["mass_kg"]
     with pytest.raises(InvalidInput, match="steering has no factor"):
-        SideBySide(unknowns("mass_kg"), {"ax_mps2": 0.1}, doubted_inputs=("steer_fl_rad",))
-    with pytest.raises(InvalidInput, match="input_doubt"):
-        SideBySide(unknowns("mass_kg"), {"ax_mps2": 0.1}, input_doubt=-1.0)
+        SideBySide(unknowns("mass_kg"), {"ax_mps2": 0.1}, uncertain_inputs=("steer_fl_rad",))
+    with pytest.raises(InvalidInput, match="input_std"):
+        SideBySide(unknowns("mass_kg"), {"ax_mps2": 0.1}, input_std=-1.0)
     with pytest.raises(InvalidInput, match=r"a noise of 0\.0"):
         SideBySide(unknowns("mass_kg"), {"ax_mps2": 0.0})
 

@@ -91,7 +91,7 @@ def test_the_formula_is_found(wind: Unknown) -> None:
     assert abs(first.gain["M_z"] - MOMENT) < 3.0 * first.std["M_z"]
     assert first.std["F_y"] < 0.2 * FORCE
     assert first.units == {"F_y": "N s2/m2", "M_z": "N s2/m"}
-    assert first.held_out_gain > first.held_out_error > 0.0
+    assert first.validation_gain > first.validation_gain_std > 0.0
     assert "F_y += gain_f_y v_x^2, M_z += gain_m_z v_x^2" in str(wind)
 
 

@@ -23,7 +23,7 @@ using Gain = Eigen::Matrix<double, Eigen::Dynamic, kChannels>;
 using Row = Eigen::Matrix<double, kChannels, Eigen::Dynamic>;
 
 constexpr int motion_lane(int i) { return kChannels + i; }
-constexpr int wander_lane(int i) { return kChannels + kMotionStates + i; }
+constexpr int disturbance_lane(int i) { return kChannels + kMotionStates + i; }
 
 /// Derivatives of the filter's mean and covariance by the logarithms of the noise parameters, along
 /// a run. Only the first `n` states take part; the others stand still and are certain.
@@ -42,11 +42,11 @@ class Answer {
         for (int i = 0; i < kMotionStates; ++i) {
             const auto m = static_cast<std::size_t>(i);
             const int w = kMotionStates + i;
-            const double variance = noise.wander[m] * noise.wander[m];
+            const double variance = noise.disturbance[m] * noise.disturbance[m];
             process_(i, motion_lane(i)) = 2.0 * noise.motion[m] * noise.motion[m] * run.dt;
-            process_(w, wander_lane(i)) = 2.0 * variance * (1.0 - forget * forget);
+            process_(w, disturbance_lane(i)) = 2.0 * variance * (1.0 - forget * forget);
             process_(w, kTimeLane) = -2.0 * variance * forget * slope_;
-            at(w, w)[wander_lane(i)] = 2.0 * variance;  // of the stationary start
+            at(w, w)[disturbance_lane(i)] = 2.0 * variance;  // of the stationary start
         }
         for (int i = 0; i < kChannels; ++i) {
             const double s = noise.sensor[static_cast<std::size_t>(i)];
@@ -64,7 +64,7 @@ class Answer {
                 Lanes& d = at(i, j);
                 for (int c = 0; c < kChannels; ++c) d[c] += seen_[c] * gain(i, c) * gain(j, c);
             }
-        // The transition's own diagonal for the wandering states depends on the correlation time.
+        // The transition's own diagonal for the disturbance states depends on the correlation time.
         const Eigen::Matrix<double, kMotionStates, Eigen::Dynamic> cross =
             slope_ * covariance_after_.middleRows<kMotionStates>(kMotionStates)
                          .lazyProduct(transition.transpose());

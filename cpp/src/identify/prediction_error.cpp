@@ -36,25 +36,25 @@ void freeze_run(const Problem& problem, const Run& run, const double* p, const N
         });
 }
 
-/// The mean of the filter with frozen gains. `disturb(k, push)` may add to the disturbance acting
-/// from sample k-1 to k and `shift(k, y)` to the expected reading; `keep(k, e)` gets whitened
-/// errors.
+/// The mean of the filter with frozen gains. `disturb(k, external)` may add to the disturbance
+/// acting from sample k-1 to k and `shift(k, y)` to the expected reading; `keep(k, e)` gets
+/// whitened errors.
 template <class S, class T, class Disturb, class Shift, class Keep>
 void run_frozen(const SingleTrack& model, const Run& run, const double* p_values, const T* p,
                 const std::vector<FrozenStep>& steps, double correlation_time, Disturb&& disturb,
                 Shift&& shift, Keep&& keep) {
     const ActiveStates own = active_states(model.effects);
     ModelState<S> x = initial_state<S>(model, run, p);
-    std::array<S, kMotionStates> wander;
-    wander.fill(S(0.0));
+    std::array<S, kMotionStates> disturbance;
+    disturbance.fill(S(0.0));
     const double forget = std::exp(-run.dt / correlation_time);
-    std::array<S, kPushes> push;
+    std::array<S, kExternals> external;
     std::array<S, kChannels> error;
     std::array<S, kChannels> white;
     const auto fill_push = [&](std::size_t k) {
-        push.fill(S(0.0));
-        for (std::size_t i = 0; i < kMotionStates; ++i) push[i] = wander[i];
-        disturb(k, push);
+        external.fill(S(0.0));
+        for (std::size_t i = 0; i < kMotionStates; ++i) external[i] = disturbance[i];
+        disturb(k, external);
     };
     for (std::size_t k = 0; k < run.size(); ++k) {
         poll_interrupt(k);
@@ -63,11 +63,12 @@ void run_frozen(const SingleTrack& model, const Run& run, const double* p_values
             // More of them only far from where the filter was frozen, where fewer were unstable.
             const int substeps = std::max(
                 steps[k].substeps, substeps_for(model, p_values, value_of(x[0]), run.dt, kTurn));
-            advance(model, x, push.data(), run.inputs[k - 1], run.inputs[k], p, run.dt, substeps);
-            for (S& w : wander) w = forget * w;
+            advance(model, x, external.data(), run.inputs[k - 1], run.inputs[k], p, run.dt,
+                    substeps);
+            for (S& w : disturbance) w = forget * w;
             fill_push(k);
         }
-        auto y = sense(model, x, push.data(), run.inputs[k], p);
+        auto y = sense(model, x, external.data(), run.inputs[k], p);
         shift(k, y);
         const FrozenStep& step = steps[k];
         for (int i = 0; i < kChannels; ++i) {
@@ -90,7 +91,7 @@ void run_frozen(const SingleTrack& model, const Run& run, const double* p_values
         };
         for (int i = 0; i < kMotionStates; ++i) {
             correct(i, x[static_cast<std::size_t>(i)]);
-            correct(kMotionStates + i, wander[static_cast<std::size_t>(i)]);
+            correct(kMotionStates + i, disturbance[static_cast<std::size_t>(i)]);
         }
         for (std::size_t i : own) correct(kStatesPlain + static_cast<int>(i), x[kMotionStates + i]);
     }
@@ -214,8 +215,8 @@ void signal_sensitivities(const Problem& problem, const double* p, const FrozenF
             };
             run_frozen<Wide>(
                 problem.model, problem.runs[i], p, p, filter.runs[i], filter.correlation_time_s,
-                [&](std::size_t k, auto& push) { add(k, push, 0); },
-                [&](std::size_t k, auto& y) { add(k, y, kPushes); },
+                [&](std::size_t k, auto& external) { add(k, external, 0); },
+                [&](std::size_t k, auto& y) { add(k, y, kExternals); },
                 [&](std::size_t, const auto& white) {
                     for (const Wide& e : white) {
                         for (std::size_t j = 0; j < count; ++j) row[j] = -e.d[j];

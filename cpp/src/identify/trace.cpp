@@ -59,7 +59,7 @@ void look_ahead_run(const Problem& problem, const Run& run, const double* p, con
     filter_run<NX>(system,
                    [&](std::size_t k, const FilterStep<NX, kChannels>& s) { means[k] = s.mean; });
     std::fill(errors, errors + run.size() * kChannels, std::nan(""));
-    const std::array<double, kPushes> calm{};
+    const std::array<double, kExternals> calm{};
     for (std::size_t k = 0; k + ahead < run.size(); k += every) {
         poll_interrupt();
         ModelState<double> x = system.start();

@@ -4,9 +4,9 @@ namespace sysid::lab {
 
 LoopRecord run_closed_loop(const LoopData& data, const Plant& plant,
                            const LoopObserverData& observer, const std::vector<Wanted>& wanted,
-                           const double* normal, const double* push) {
+                           const double* normal, const double* external) {
     ClosedLoop<LoopObserver> loop(data, plant, LoopObserver(observer, data.car, data.dt));
-    return loop.run(wanted, normal, push);
+    return loop.run(wanted, normal, external);
 }
 
 }  // namespace sysid::lab

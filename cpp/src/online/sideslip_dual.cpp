@@ -7,10 +7,11 @@ namespace {
 constexpr double kSlowestMps = 1.0;  // keeps what divides by speed finite
 constexpr double kFullUse = 0.3;     // lateral force over load at which tyres tell all they can
 constexpr double kMostStiffness = 1.6, kMostFriction = 0.8, kMostRelaxation = 3.0;  // logarithms
-constexpr double kRelaxationWander = 0.01;                                          // [1/sqrt(s)]
+constexpr double kRelaxationWalk = 0.01;                                            // [1/sqrt(s)]
 constexpr double kContradictionTimeS = 1.0, kTolerated = 1.5;  // of the innovations
-constexpr double kContradicted = 0.3;   // wander of the stiffness for each sigma above [1/sqrt(s)]
-constexpr double kSteerUnknown = 0.15;  // wander of its angle [rad/sqrt(s)]
+constexpr double kContradicted =
+    0.3;  // random walk of the stiffness for each sigma above [1/sqrt(s)]
+constexpr double kSteerUnknown = 0.15;  // random walk of its angle [rad/sqrt(s)]
 constexpr double kBlindSideslip = 0.1, kBlindYawRate = 0.5;  // doubt of a start without sensors
 
 double share_of(double dt, double time_s) { return std::exp(-dt / time_s); }
@@ -42,13 +43,13 @@ void ForceModel::observe(const Input& u, const S* x, S* y) const {
 
 Mat<5, 5> ForceModel::process_noise(const Input& u) const {
     const VehicleData& c = car.data;
-    const double root = settings.force_wander * std::sqrt(u.dt);
+    const double root = settings.force_walk * std::sqrt(u.dt);
     const double weight = c.mass_kg * kGravity;
     // A force that has changed by the end of the interval has acted with half the change.
     Mat<5, 3> G = Mat<5, 3>::Zero();
     G(kFyf, 0) = root * u.fz_f;
     G(kFyr, 1) = root * u.fz_r;
-    G(kFx, 2) = settings.fx_wander * std::sqrt(u.dt) * weight;
+    G(kFx, 2) = settings.fx_walk * std::sqrt(u.dt) * weight;
     const double half = 0.5 * u.dt;
     G(kYawRate, 0) = half * c.lf_m / car.yaw_inertia_kgm2 * G(kFyf, 0);
     G(kYawRate, 1) = -half * c.lr_m / car.yaw_inertia_kgm2 * G(kFyr, 1);
@@ -141,13 +142,13 @@ Mat<15, 15> TyreModel::process_noise(const Input& u) const {
     const ObserverSettings& s = settings;
     const auto fresh = [&](double time_s) { return 1.0 - squared(share_of(u.dt, time_s)); };
     Vec<15> q;
-    q[kBeta] = u.dt * squared(s.sideslip_wander_rad);
-    q[kYawRate] = u.dt * squared(s.yaw_wander_radps);
-    q[kSlipF] = u.dt * squared(u.slip_f_wander) + 1e-12;
+    q[kBeta] = u.dt * squared(s.sideslip_walk_rad);
+    q[kYawRate] = u.dt * squared(s.yaw_walk_radps);
+    q[kSlipF] = u.dt * squared(u.slip_f_walk) + 1e-12;
     q[kSlipR] = 1e-12;
-    q[kStiffF] = u.dt * squared(u.stiffness_wander_f);
-    q[kStiffR] = u.dt * squared(u.stiffness_wander_r);
-    q[kRelax] = u.dt * squared(kRelaxationWander);
+    q[kStiffF] = u.dt * squared(u.stiffness_walk_f);
+    q[kStiffR] = u.dt * squared(u.stiffness_walk_r);
+    q[kRelax] = u.dt * squared(kRelaxationWalk);
     q[kGripF] = q[kGripR] = squared(s.friction_prior) * fresh(s.friction_time_s);
     q[kRoad] = squared(s.road_mps2) * fresh(s.road_time_s);
     q[kRoll] = 1e-16;  // a property of the car
@@ -249,7 +250,7 @@ void SideslipDual::start(double dt, const SensorSample& s) {
     const double unseen = blind ? kBlindSideslip : 0.0;
     doubt << 0.01 + std::abs(slip_r) + unseen, blind ? kBlindYawRate : 0.1,
         0.005 + std::abs(slip_f), 0.005 + std::abs(slip_r), stiff, stiff, grip, grip,
-        settings_.relaxation_doubt, settings_.roll_share, settings_.road_mps2, 1.0, 1.0, 1.0, 0.5;
+        settings_.relaxation_std, settings_.roll_share, settings_.road_mps2, 1.0, 1.0, 1.0, 0.5;
     Mat<15, 15> P = doubt.cwiseAbs2().asDiagonal();
     if (!first) P.block<learnt, learnt>(at, at) = known;
     // An error of beta is one of both slip angles, which are doubtful by themselves as well.
@@ -289,11 +290,11 @@ void SideslipDual::run_tyres(double dt, const SensorSample& s) {
     u.drive_nm =
         settings_.error_drive * std::abs(u.loads.fx_f + u.loads.fx_r) * 0.5 * car_.wheelbase_m();
     // Stiffness is doubted anew where readings are farther off than the model allows.
-    const double wander = settings_.stiffness_wander +
-                          kContradicted * std::max(std::sqrt(contradiction_) - kTolerated, 0.0);
-    u.stiffness_wander_f = wander * std::min(std::abs(front) / (kFullUse * u.loads.fz_f), 1.0);
-    u.stiffness_wander_r = wander * std::min(std::abs(rear) / (kFullUse * u.loads.fz_r), 1.0);
-    u.slip_f_wander = watch_.steer_gap_s() > 0.0 ? kSteerUnknown : 0.0;
+    const double walk = settings_.stiffness_walk +
+                        kContradicted * std::max(std::sqrt(contradiction_) - kTolerated, 0.0);
+    u.stiffness_walk_f = walk * std::min(std::abs(front) / (kFullUse * u.loads.fz_f), 1.0);
+    u.stiffness_walk_r = walk * std::min(std::abs(rear) / (kFullUse * u.loads.fz_r), 1.0);
+    u.slip_f_walk = watch_.steer_gap_s() > 0.0 ? kSteerUnknown : 0.0;
     tyres_.step(u, Vec<2>(s.yaw_rate_radps, s.ay_mps2));
     const int observed = tyres_.state().update.observed;
     if (observed > 0) {

@@ -69,8 +69,8 @@ void SideslipModel::observe(const Input& u, const S* x, S* y) const {
 }
 
 Mat<3, 3> SideslipModel::process_noise(const Input& u) const {
-    const double beta = settings.beta_wander_radps, rate = u.yaw_rate_std;
-    const double fx = settings.fx_wander * car.data.mass_kg * kGravity;
+    const double beta = settings.beta_walk_radps, rate = u.yaw_rate_std;
+    const double fx = settings.fx_walk * car.data.mass_kg * kGravity;
     return Vec<3>(u.dt * beta * beta + u.dt * u.dt * rate * rate, u.dt * fx * fx, u.dt * fx * fx)
         .asDiagonal();
 }

@@ -89,8 +89,8 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
         0.5 * model.car.air_density_kgpm3 * model.car.drag_area_m2 * beginning.v_x * beginning.v_x,
         beginning.time_s,
     };
-    std::array<double, kPushes> push{};
-    settle_auxiliary(model, x, push.data(), u, p);
+    std::array<double, kExternals> external{};
+    settle_auxiliary(model, x, external.data(), u, p);
     const std::size_t last = references.size() - 1;
     const auto delay = static_cast<std::size_t>(std::lround(driver.reaction_s / dt));
     // Half of the reaction time is made up for by looking ahead; open-loop steering keeps its time.
@@ -99,8 +99,8 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
     for (std::size_t k = 0; k < references.size(); ++k) {
         poll_interrupt(k);
         u.time_s = beginning.time_s + static_cast<double>(k) * dt;
-        for (std::size_t i = 0; i < kMotionStates; ++i) push[i] = disturbance[3 * k + i];
-        const auto y = sense(model, x, push.data(), u, p);
+        for (std::size_t i = 0; i < kMotionStates; ++i) external[i] = disturbance[3 * k + i];
+        const auto y = sense(model, x, external.data(), u, p);
         out.inputs.insert(out.inputs.end(), {u.steer_rad, u.longitudinal});
         out.states.insert(out.states.end(), x.begin(), x.end());
         out.outputs.insert(out.outputs.end(), y.begin(), y.end());
@@ -120,7 +120,7 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
             hands.next(u, references[ahead], acceleration, {state[0], state[2], references[then]});
         next.time_s = u.time_s + dt;
         const int substeps = std::max(fewest, substeps_for(model, p, x[0], dt));
-        advance(model, x, push.data(), u, next, p, dt, substeps);
+        advance(model, x, external.data(), u, next, p, dt, substeps);
         u = next;
     }
     return out;

@@ -71,7 +71,7 @@ def _run_arguments(parser: argparse.ArgumentParser) -> None:
         "--preset",
         choices=tuple(_PRESETS),
         default="default",
-        help="laboratory: as mended, or with all habits of the published one (default: mended)",
+        help="laboratory: as corrected, or as published, with its defects (default: corrected)",
     )
     parser.add_argument(
         "--vehicle", type=Path, metavar="TOML", help="the car (default: the published one)"

@@ -57,13 +57,13 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
 
     diagnose = commands.add_parser("diagnose", help="learn which physical effect is missing")
     _driving(diagnose)
-    _held_out(diagnose)
+    _validation(diagnose)
     _search(diagnose)
     _json(diagnose)
 
     improve = commands.add_parser("improve", help="add what is missing, write a report")
     _driving(improve)
-    _held_out(improve)
+    _validation(improve)
     _search(improve)
     improve.add_argument(
         "--report", type=Path, required=True, metavar="HTML", help="report to write"
@@ -105,7 +105,7 @@ def _define(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _held_out(parser: argparse.ArgumentParser) -> None:
+def _validation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--test",
         nargs="+",

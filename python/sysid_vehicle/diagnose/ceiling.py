@@ -177,14 +177,14 @@ def _features(fit: Fit, driving: Driving) -> FloatArray:
     """Regressors, (samples, n): polynomials of the inputs now and some time ago."""
     car = fit.model.vehicle
     steer, v = driving.channel("steer_rad"), driving.channel("vx_mps")
-    push = driving.channel("fx_n") / car.mass_kg if driving.force_known else None
-    push = driving.channel("ax_mps2") if push is None else push
-    v, push = (np.nan_to_num(x, nan=float(np.nanmean(x))) for x in (v, push))
+    pull = driving.channel("fx_n") / car.mass_kg if driving.force_known else None
+    pull = driving.channel("ax_mps2") if pull is None else pull
+    v, pull = (np.nan_to_num(x, nan=float(np.nanmean(x))) for x in (v, pull))
     # Lateral acceleration that a neutral car would have, and some yaw rate.
     turn = steer * v / (car.wheelbase_m * (1.0 + (v / _UNDERSTEER_MPS) ** 2))
-    columns = [v, v**2, push, push**2]
+    columns = [v, v**2, pull, pull**2]
     for lag in _LAGS_S:
-        s, t, u, p = (_ago(driving, x, lag) for x in (steer, turn, v, push))
+        s, t, u, p = (_ago(driving, x, lag) for x in (steer, turn, v, pull))
         a = t * u
         columns += [s, t, a, a * np.abs(a), a**3, a**2, a * u, a * p, np.abs(a) * p, p]
     return as_float64(np.column_stack(columns))

@@ -14,7 +14,7 @@ something at all times they are not. So a change has to stand out from what it l
 the scores of that, turned at random some seconds at a time. Where one was found both sides are
 searched again (binary segmentation).
 
-The wandering forces of the filter soon take up a change, which shows at once or not at all. So the
+The disturbances of the filter soon take up a change, which shows at once or not at all. So the
 moment is read from the response to forces that step there; its interval is that of Hansen
 (Econometrica 2000): all moments whose statistic is within 7.35 of the largest.
 """

@@ -67,13 +67,13 @@ def coordinates(fit: Fit, driving: Driving, state: FloatArray) -> dict[str, Floa
     car = fit.model.vehicle
     v, side, r = state[:, 0], state[:, 1], state[:, 2]
     steer = driving.channel("steer_rad")
-    push = (
+    pull = (
         driving.channel("fx_n") / car.mass_kg if driving.force_known else driving.channel("ax_mps2")
     )
     return {
         "vx_mps": v,
         "ay_mps2": v * r,
-        "ax_mps2": push,
+        "ax_mps2": pull,
         "slip_front_rad": steer - np.arctan2(side + car.lf_m * r, v),
         "slip_rear_rad": -np.arctan2(side - car.lr_m * r, v),
         "steer_rad": steer,

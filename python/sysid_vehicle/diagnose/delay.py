@@ -178,8 +178,8 @@ def _by_input_noise(
     looks smaller than it is.
     """
     driving = evidence.driving
-    push = driving.channel("fx_n" if driving.force_known else "ax_mps2")
-    measured = np.column_stack([driving.channel("steer_rad"), push])
+    pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
+    measured = np.column_stack([driving.channel("steer_rad"), pull])
     p = evidence.fit.model.vector()
     scores = []
     for _ in range(_DRAWS):

@@ -15,9 +15,9 @@ from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving, NoiseModel
 from ..identify import Fit
 from ..rules import Rules
-from .doubt import Beside, beside, confirmed, doubt
 from .omnibus import Omnibus
 from .possible import Size, possible
+from .reservation import Beside, beside, confirmed, reservation
 from .score import Score
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ class Diagnosis:
         The likeliest that a refit confirms, with a value that a car can have, or one that is nearly
         as likely.
         """
-        return None if self.doubt else self._likeliest
+        return None if self.reservation else self._likeliest
 
     @property
     def best(self) -> Effect:
@@ -167,26 +167,26 @@ class Diagnosis:
         Raises
         ------
         InvalidInput
-            There is evidence for none, or none may be named (`doubt`).
+            There is evidence for none, or none may be named (`reservation`).
         """
         if not self.significant:
             raise InvalidInput(self._without_evidence())
         if self.named is None:
             raise InvalidInput(
-                f"no effect can be named: {self.doubt}; check the channels and the vehicle file, "
-                "or add one of `ranking` to look further"
+                f"no effect can be named: {self.reservation}; check the channels and the vehicle "
+                "file, or add one of `ranking` to look further"
             )
         return self.named.effect
 
     @cached_property
-    def doubt(self) -> str:
+    def reservation(self) -> str:
         """Why no effect may be called missing, though there is evidence for some; else empty."""
         if not self.significant:
             return ""
         first = self._likeliest
         if first is None:
             return self._refused(self.significant[0])
-        return doubt(self.beside, self.omnibus, self.error, first.error, self.rules)
+        return reservation(self.beside, self.omnibus, self.error, first.error, self.rules)
 
     @cached_property
     def beside(self) -> Beside:
@@ -248,7 +248,7 @@ class Diagnosis:
         if not self.significant:
             return self._without_evidence()
         if self.named is None:
-            return f"something is wrong that no effect can be named for: {self.doubt}"
+            return f"something is wrong that no effect can be named for: {self.reservation}"
         what = f"most likely missing: {self.named.effect.title}"
         if self.named.indistinguishable_from:
             twins = ", ".join(self.named.indistinguishable_from)

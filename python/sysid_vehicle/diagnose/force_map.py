@@ -1,6 +1,6 @@
 """Maps of the force that the model lacks, over what the car was doing.
 
-The smoother attributes what the model does not explain to forces that wander. Their mean in a cell
+The smoother attributes what the model does not explain to disturbances. Their mean in a cell
 of, say, speed and lateral acceleration has a standard error from their autocorrelation rho, which
 is found over the whole drive: with 1(k) telling whether sample k lies in the cell,
 
@@ -176,8 +176,8 @@ def missing_forces(fit: Fit, driving: Driving) -> MissingForces:
     weight = 9.81 * car.mass_kg
     # A disturbance that was learned small would shrink the forces that are looked for.
     least = 0.02 * weight * np.array([1.0, 1.0, 0.5 * car.wheelbase_m])
-    wander = np.maximum(fit.noise.wander, least)
-    noise = replace(fit.noise, wander=tuple(map(float, wander)))
+    disturbance = np.maximum(fit.noise.disturbance, least)
+    noise = replace(fit.noise, disturbance=tuple(map(float, disturbance)))
     trace = driving.problem(fit.model).trace(fit.model.vector(), noise.vector(), True)
     targets = tuple(t for t in FORCES if t != "F_x" or driving.force_known)
     columns = [3 + FORCES[t] for t in targets]
@@ -193,9 +193,9 @@ def force_maps(
     With them the mean of each force over all the driving, and its standard error.
     """
     found = missing_forces(fit, driving)
-    targets, force, doubt = found.targets, found.force, found.std
+    targets, force, deviation = found.targets, found.force, found.std
     where = coordinates(fit, driving, found.state)
-    maps = [_map(driving, names, where, targets, force, doubt) for names in PAIRS]
+    maps = [_map(driving, names, where, targets, force, deviation) for names in PAIRS]
     everywhere = np.zeros(driving.samples, dtype=np.intp), np.array([float(driving.samples)])
     steady = {}
     for i, target in enumerate(targets):
@@ -210,7 +210,7 @@ def _map(
     where: dict[str, FloatArray],
     targets: tuple[str, ...],
     force: FloatArray,
-    doubt: FloatArray,
+    deviation: FloatArray,
 ) -> ForceMap:
     shape = _CELLS if len(names) == 2 else (_CELLS_ALONE,)
     edges = tuple(
@@ -230,7 +230,7 @@ def _map(
         mean.append(np.where(count >= _FEWEST, m, np.nan))
         std.append(np.where(count >= _FEWEST, s, np.nan))
         share[target] = _predicted(driving, cell, cells, force[:, i], window)
-    weight = np.var(force, axis=0) / np.maximum(np.mean(doubt**2, axis=0), 1e-300)
+    weight = np.var(force, axis=0) / np.maximum(np.mean(deviation**2, axis=0), 1e-300)
     return ForceMap(
         names,
         edges,

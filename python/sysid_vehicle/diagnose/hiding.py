@@ -262,9 +262,9 @@ def _bias(
         off.append(other - one)
     first, second = (told.relative(o) for o in off)
     mean = told.relative(as_float64((off[0] + off[1]) / 2.0))
-    doubt = {n: abs(first[n] - second[n]) / 2.0 - max(_NEAR, _SHARE * abs(mean[n])) for n in mean}
-    worst = max(doubt, key=lambda n: doubt[n])
-    if doubt[worst] > 0.0:
+    excess = {n: abs(first[n] - second[n]) / 2.0 - max(_NEAR, _SHARE * abs(mean[n])) for n in mean}
+    worst = max(excess, key=lambda n: excess[n])
+    if excess[worst] > 0.0:
         between = " or ".join(f"{100.0 * x[worst]:+.1f} %" for x in (first, second))
         because = f"{between} to {worst}, by the driver, the noise, and tyres that fit as well"
         return Bias(e, size, {}, because)

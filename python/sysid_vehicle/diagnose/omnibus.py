@@ -23,7 +23,7 @@ from .projection import pseudo_inverse, variance_ratio
 
 __all__ = ["Omnibus", "omnibus", "omnibus_of"]
 
-# Targets in the core's order: pushes F_x, F_y, M_z, then accelerations, then sensor readings.
+# Targets in the core's order: external F_x, F_y, M_z, then accelerations, then sensor readings.
 _TARGETS = {"F_x": 0, "F_y": 1, "M_z": 2, "dv_x/dt": 3, "dv_y/dt": 4}
 _SENSORS = {"r": 7, "a_x": 8, "a_y": 9}
 
@@ -116,16 +116,16 @@ def _virtual(evidence: Evidence) -> tuple[list[str], FloatArray, list[int]]:
     v, r = state[:, 0], state[:, 2]
     a = v * r / 9.81
     steer = driving.channel("steer_rad")
-    push = driving.channel("fx_n" if driving.force_known else "ax_mps2")
-    push = push / max(float(np.nanstd(push)), 1e-9)
+    pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
+    pull = pull / max(float(np.nanstd(pull)), 1e-9)
     w = v / 20.0
     one = np.ones_like(v)
-    shapes = [one, w**2, a, a**3, a * w**2, a**2, push, push * a, push * np.abs(a), push**2, r]
+    shapes = [one, w**2, a, a**3, a * w**2, a**2, pull, pull * a, pull * np.abs(a), pull**2, r]
     turn = steer - late(driving, steer)
     turn[begins(driving)] = 0.0  # what lay between two stretches is no turn of the wheel
     shapes.append(turn / max(float(np.std(turn)), 1e-9))
     force = np.column_stack(shapes)
-    few = np.column_stack([one, w**2, a, push])
+    few = np.column_stack([one, w**2, a, pull])
     # Known one sample earlier; the first sample of a stretch knows nothing.
     force, few = late(driving, force), late(driving, few)
     names: list[str] = []

@@ -114,7 +114,7 @@ def long_run_ratios(terms: FloatArray, naive: FloatArray) -> FloatArray:
 
     Bartlett weights over 10, 30 and 100 samples (Newey & West, Econometrica 1987), which are those
     of sums over all windows of so many; the largest counts, each less what it may be by chance: few
-    lags see little of what wanders slowly, and many scatter too much to see what does not.
+    lags see little of slow disturbances, and many scatter too much to see what does not.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ class Proposal:
         By target: the number before the formula, and its standard error.
     statistic : float
         Fall of the sum of squared residuals in training.
-    held_out_gain, held_out_error : float
+    validation_gain, validation_gain_std : float
         Gain in log-likelihood on validation data, and its standard error.
     alike : tuple of str
         Other formulas that this driving hardly tells from it.
@@ -61,8 +61,8 @@ class Proposal:
     gain: dict[str, float]
     std: dict[str, float]
     statistic: float
-    held_out_gain: float
-    held_out_error: float
+    validation_gain: float
+    validation_gain_std: float
     alike: tuple[str, ...]
 
     @property
@@ -86,7 +86,7 @@ class Proposal:
         )
         text = (
             f"{self.equation} with {sizes}; validation data become likelier by "
-            f"{self.held_out_gain:.0f} +- {self.held_out_error:.0f} nats"
+            f"{self.validation_gain:.0f} +- {self.validation_gain_std:.0f} nats"
         )
         return f"{text}; much like {', '.join(self.alike)}" if self.alike else text
 
@@ -129,8 +129,8 @@ class Proposal:
                 for t, g in self.gain.items()
             },
             "statistic": self.statistic,
-            "held_out_gain": self.held_out_gain,
-            "held_out_error": self.held_out_error,
+            "validation_gain": self.validation_gain,
+            "validation_gain_std": self.validation_gain_std,
             "alike": list(self.alike),
         }
 
@@ -157,7 +157,7 @@ class _Candidate:
         return f"{' and '.join(self.targets)} with {str(self.form) or 'no change'}"
 
 
-def propose(train: Evidence, held_out: Evidence) -> tuple[Proposal, ...]:
+def propose(train: Evidence, validation: Evidence) -> tuple[Proposal, ...]:
     """Find at most three formulas that explain what is left and also hold on validation data."""
     targets = train.targets(*FORCES, *READINGS)
     acting = [
@@ -190,11 +190,11 @@ def propose(train: Evidence, held_out: Evidence) -> tuple[Proposal, ...]:
             if own.statistic - dear * len(c.columns) - tried_price <= 0.0:
                 continue
             few = [acting[i] for i in places]
-            here, there = _columns(train, few), _columns(held_out, few)
+            here, there = _columns(train, few), _columns(validation, few)
             whole, part = (np.linalg.norm(m, axis=0) for m in (here, R[:, places]))
             if np.any(part < _RETAINED * whole):
                 continue
-            gain, error = _on_held_out(train, held_out, here, there, len(c.columns))
+            gain, error = _on_validation(train, validation, here, there, len(c.columns))
             if gain > error:
                 near = np.flatnonzero(merit > merit[k] - _ALIKE)
                 alike = [candidates[j].text for j in near[np.argsort(-merit[near])] if j != k]
@@ -252,8 +252,8 @@ def _statistic(
     return float(S @ np.linalg.pinv(gram[np.ix_(few, few)] / np.outer(scale, scale), 1e-8) @ S)
 
 
-def _on_held_out(
-    train: Evidence, held_out: Evidence, here: FloatArray, there: FloatArray, new: int
+def _on_validation(
+    train: Evidence, validation: Evidence, here: FloatArray, there: FloatArray, new: int
 ) -> tuple[float, float]:
     """Gain in log-likelihood on validation data of the last columns, and its standard error.
 
@@ -266,11 +266,11 @@ def _on_held_out(
             gains = solve(train.project(here[:, :count]), train.left).size
         rest = train.residual - here[:, :count] @ gains
         shift = np.linalg.lstsq(train.fitted, rest, rcond=1e-6)[0]
-        predicted = held_out.fitted @ shift + there[:, :count] @ gains
-        residuals.append(held_out.residual - predicted)
+        predicted = validation.fitted @ shift + there[:, :count] @ gains
+        residuals.append(validation.residual - predicted)
     fall = 0.5 * (residuals[0] ** 2 - residuals[1] ** 2)
-    by_sample = fall.reshape(held_out.driving.samples, -1).sum(axis=1)
-    sums = np.add.reduceat(by_sample, blocks(held_out.driving, _BLOCK_S))
+    by_sample = fall.reshape(validation.driving.samples, -1).sum(axis=1)
+    sums = np.add.reduceat(by_sample, blocks(validation.driving, _BLOCK_S))
     return float(fall.sum()), float(np.std(sums) * np.sqrt(len(sums)))
 
 

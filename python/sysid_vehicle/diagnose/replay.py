@@ -51,7 +51,7 @@ class _Stretch:
     seen : array of bool, shape (n, 5)
         Which measurements there are.
     road : array, shape (n, 3)
-        F_x, F_y [N] and M_z [N m] that push the car.
+        F_x, F_y [N] and M_z [N m] that act on the car.
     scatter : array, shape (n, 5)
         Noise of the sensors.
     """
@@ -119,7 +119,7 @@ class Replay:
         model, box = self.fit.model, free_box(self.fit.model)
         every = _every(self.fit.driving.logs[0])
         noise = generous([s / np.sqrt(every) for s in self.fit.noise.sensor], model.vehicle)
-        # First with a motion that may be pushed anywhere: noise that is sure of the model, or has
+        # First with disturbances everywhere: noise that is sure of the model, or has
         # taken up the effect before the parameters could, holds them where they are.
         p = model.vector()
         frozen = problem.freeze(p, noise.vector())
@@ -283,14 +283,16 @@ class Replay:
         return tuple(made)
 
     def _road(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
-        """What pushes the car by the fit's noise: forces that wander, and white ones."""
+        """The disturbances that the fit's noise stands for: Ornstein-Uhlenbeck and white forces."""
         noise, model = self.fit.noise, self.fit.model
-        x, y, moment = noise.wander
-        wander = RoadDisturbance(x, y, moment, noise.correlation_time_s).sample(n, 1.0 / dt, rng)
+        x, y, moment = noise.disturbance
+        disturbance = RoadDisturbance(x, y, moment, noise.correlation_time_s).sample(
+            n, 1.0 / dt, rng
+        )
         mass = model.vehicle.mass_kg
         inertia = np.array([mass, mass, model.value("yaw_inertia_kgm2")])
         white = rng.standard_normal((n, 3)) * np.array(noise.motion) * inertia / np.sqrt(dt)
-        return as_float64(wander + white)
+        return as_float64(disturbance + white)
 
     def _windows(self) -> Iterator[tuple[Log, slice, int]]:
         """Logs, samples of them, and the place of the first among all usable samples.

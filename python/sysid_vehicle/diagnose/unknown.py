@@ -110,7 +110,7 @@ def unknown(
     ----------
     fit : Fit
     test : Log, sequence of Log, or Driving
-        Driving the fit never saw: no formula is proposed that does not hold on it.
+        Validation data: no formula is proposed that does not hold on it.
     logs : Log, sequence of Log, or Driving, optional
         Driving to look at; by default what the model was fitted to.
     seed : int

@@ -120,19 +120,19 @@ class Verdicts:
                 return v
         raise KeyError(f"'{effect}'; there are {', '.join(v.effect.id for v in self.all)}")
 
-    def doubting(
+    def with_reservation(
         self, effects: Iterable[str], because: str, *, added: Iterable[str] = ()
     ) -> Verdicts:
         """The same, but these effects, and rivals of nothing else, are called proxies.
 
         What was `added` is no mere rival: it stands or falls by itself.
         """
-        doubted, model = set(effects), set(added)
+        reserved, model = set(effects), set(added)
 
         def falls(v: EffectVerdict) -> bool:
             if v.effect.id in model:
-                return v.effect.id in doubted and v.finding in _NAMED
-            return v.finding == "one of a group" and set(v.group) <= doubted
+                return v.effect.id in reserved and v.finding in _NAMED
+            return v.finding == "one of a group" and set(v.group) <= reserved
 
         told = [
             replace(v, finding="proxy", group=(), because=because) if falls(v) else v
@@ -199,10 +199,10 @@ def verdicts(dx: Diagnosis, *, seed: int = 0) -> Verdicts:
         seed=seed,
         refitted=dx.sizes,
     )
-    if not dx.doubt:
+    if not dx.reservation:
         return told
     named = {v.effect.id for v in told.all if v.finding in _NAMED}
-    return told.doubting(named, dx.doubt, added=named)
+    return told.with_reservation(named, dx.reservation, added=named)
 
 
 def judge(

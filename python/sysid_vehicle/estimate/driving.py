@@ -158,8 +158,8 @@ class Driving:
         return as_float64(np.vstack([self._inputs(log, where) for log, where in whole]))
 
     def _inputs(self, log: Log, where: slice) -> FloatArray:
-        push = "fx_n" if self.force_known else "ax_mps2"
-        return np.column_stack([quiet(log["steer_rad"][where]), quiet(log[push][where])])
+        pull = "fx_n" if self.force_known else "ax_mps2"
+        return np.column_stack([quiet(log["steer_rad"][where]), quiet(log[pull][where])])
 
     def problem(
         self,

@@ -23,9 +23,9 @@ from ..errors import InvalidInput, NumericalError
 __all__ = ["FilterRun", "FilterState", "LateMeasurements", "StateFilter", "StateModel"]
 
 METHODS = ("ekf", "ukf")
-_STEP = (
-    1e-4  # of central differences, of the size or doubt of the state: rounding stays below 1e-11
-)
+# Of central differences, of the size or standard deviation of the state: rounding stays below
+# 1e-11.
+_STEP = 1e-4
 _SUREST = 1e-12  # variance, of the largest, below which a correlation's eigenvalue is rounding
 
 

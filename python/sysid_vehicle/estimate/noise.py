@@ -20,7 +20,7 @@ __all__ = ["NoiseModel", "first_guess", "generous", "learn_noise", "maximise_noi
 
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
-_WANDER = slice(8, 11)
+_DISTURBANCE = slice(8, 11)
 _TIME = 11
 
 
@@ -34,21 +34,21 @@ class NoiseModel:
         vx, vy [m/s], yaw rate [rad/s], ax, ay [m/s2].
     motion : tuple of 3 floats
         White disturbance of vx, vy [m/s per root second], yaw rate [rad/s per root second].
-    wander : tuple of 3 floats
-        Wandering force x, y [N] and yaw moment [N m] (Ornstein-Uhlenbeck). Takes up what the model
-        does not explain.
+    disturbance : tuple of 3 floats
+        Disturbance force x, y [N] and yaw moment [N m] (Ornstein-Uhlenbeck). Takes up what
+        the model does not explain.
     correlation_time_s : float
-        Correlation time of the wandering.
+        Correlation time of the disturbances.
     """
 
     sensor: tuple[float, ...]
     motion: tuple[float, ...]
-    wander: tuple[float, ...]
+    disturbance: tuple[float, ...]
     correlation_time_s: float
 
     def vector(self) -> FloatArray:
         """In the core's order."""
-        return as_float64([*self.sensor, *self.motion, *self.wander, self.correlation_time_s])
+        return as_float64([*self.sensor, *self.motion, *self.disturbance, self.correlation_time_s])
 
     @classmethod
     def from_vector(cls, v: FloatArray) -> NoiseModel:
@@ -56,19 +56,19 @@ class NoiseModel:
         return cls(
             tuple(map(float, v[_SENSORS])),
             tuple(map(float, v[_MOTION])),
-            tuple(map(float, v[_WANDER])),
+            tuple(map(float, v[_DISTURBANCE])),
             float(v[_TIME]),
         )
 
     def floor(self) -> NoiseModel:
-        """The same noise without the wandering: what remains if the model explains everything.
+        """The same noise without the disturbances: what remains if the model explains everything.
 
         The motion keeps a least noise of its own. No log can tell how far below that it lies, yet
         the less there is, the longer the filter trusts its model, and the larger the same fault of
         the model would appear.
         """
         x, y, yaw = (max(m, least) for m, least in zip(self.motion, _LEAST_MOTION, strict=True))
-        return replace(self, motion=(x, y, yaw), wander=(0.0, 0.0, 0.0))
+        return replace(self, motion=(x, y, yaw), disturbance=(0.0, 0.0, 0.0))
 
     def elsewhere(self, vehicle: Vehicle) -> NoiseModel:
         """The same noise on other driving: nowhere sure to less than a thousandth of the weight.
@@ -77,17 +77,17 @@ class NoiseModel:
         of its model wherever it is taken.
         """
         force, moment = _weight_and_moment(vehicle)
-        least = _LEAST_WANDER * np.array([force, force, moment])
-        return replace(self, wander=tuple(map(float, np.maximum(self.wander, least))))
+        least = _LEAST_DISTURBANCE * np.array([force, force, moment])
+        return replace(self, disturbance=tuple(map(float, np.maximum(self.disturbance, least))))
 
     def __str__(self) -> str:
         lines = [
             f"  {c:15s} {s:10.3g} {UNITS[c]}" for c, s in zip(MEASURED, self.sensor, strict=True)
         ]
-        force_x, force_y, moment = self.wander
+        force_x, force_y, moment = self.disturbance
         lines.append(
             f"  unexplained force {force_x:.3g} N forward, {force_y:.3g} N sideways, yaw moment "
-            f"{moment:.3g} N m, wandering over {self.correlation_time_s:.2g} s"
+            f"{moment:.3g} N m, correlation time {self.correlation_time_s:.2g} s"
         )
         return "\n".join(lines)
 
@@ -97,7 +97,7 @@ class NoiseModel:
 
 # Per square root of a second: over one, 5 mm/s and 1 mrad/s.
 _LEAST_MOTION = (5e-3, 5e-3, 1e-3)
-_LEAST_WANDER = 1e-3  # of the weight
+_LEAST_DISTURBANCE = 1e-3  # of the weight
 _SMALLEST = np.array([1e-3, 1e-3, 1e-4, 5e-3, 5e-3])
 
 
@@ -130,8 +130,8 @@ def first_guess(driving: Driving, vehicle: Vehicle) -> NoiseModel:
 def generous(sensor: Sequence[float], vehicle: Vehicle) -> NoiseModel:
     """These sensors, and a motion that is disturbed so much that it follows whatever they say."""
     weight = vehicle.mass_kg * 9.81
-    wander = (0.02 * weight, 0.04 * weight, 0.02 * weight * vehicle.wheelbase_m / 2.0)
-    return NoiseModel(tuple(map(float, sensor)), (0.02, 0.02, 0.01), wander, 0.3)
+    disturbance = (0.02 * weight, 0.04 * weight, 0.02 * weight * vehicle.wheelbase_m / 2.0)
+    return NoiseModel(tuple(map(float, sensor)), (0.02, 0.02, 0.01), disturbance, 0.3)
 
 
 def learn_noise(

@@ -43,7 +43,7 @@ _SHOWN = 4
 
 
 def suspects(model: Model | None, logs: Sequence[Log]) -> str:
-    """Name the parameters no car has, and the channels that stand still or leave all range."""
+    """Name physically implausible parameters, and channels that are constant or out of range."""
     found = [*(_of_car(model) if model is not None else ()), *_of_driving(logs)]
     if not found:
         return (

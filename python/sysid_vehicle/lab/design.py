@@ -195,7 +195,7 @@ def design_excitation(
     duration_s: float = 60.0,
     free: Sequence[str] = TYRES,
     readings: Sequence[str] = READINGS,
-    doubt: float = 0.1,
+    uncertainty: float = 0.1,
     trials: int = 32,
     seed: int = 0,
     workers: int = 2,
@@ -218,7 +218,7 @@ def design_excitation(
         Parameters that are not known; the tyres if left out.
     readings : sequence of str
         Readings that will be used.
-    doubt : float
+    uncertainty : float
         The tyres' grip may be wrong by this share. Every trial is also computed with front and
         rear wrong in opposite senses, and judged by its worst.
     trials : int
@@ -245,12 +245,14 @@ def design_excitation(
     setup = setup if setup is not None else Setup.default()
     believed = believed if believed is not None else setup.plant
     limits = limits if limits is not None else Limits()
-    if not (trials >= 2 and 0.0 <= doubt < 0.5 and 10.0 <= duration_s <= 1000.0):
+    if not (trials >= 2 and 0.0 <= uncertainty < 0.5 and 10.0 <= duration_s <= 1000.0):
         raise InvalidInput(
-            f"design_excitation: trials = {trials!r}, doubt = {doubt!r}, duration_s = "
-            f"{duration_s!r}; give 2 trials or more, a doubt below 0.5, and 10 to 1000 s"
+            f"design_excitation: trials = {trials!r}, uncertainty = {uncertainty!r}, duration_s = "
+            f"{duration_s!r}; give 2 trials or more, an uncertainty below 0.5, and 10 to 1000 s"
         )
-    designer = _Designer(_prepared(setup, believed), believed, limits, free, readings, doubt, seed)
+    designer = _Designer(
+        _prepared(setup, believed), believed, limits, free, readings, uncertainty, seed
+    )
     box = _box(believed, setup, limits)
     tried: list[Trial] = []
     spread = trials - trials // 2
@@ -342,15 +344,15 @@ class _Designer:
     limits: Limits
     free: Sequence[str]
     readings: Sequence[str]
-    doubt: float
+    uncertainty: float
     seed: int
 
     def cars(self) -> list[Model]:
         """The car as believed, and with the grip of front and rear wrong in opposite senses."""
         cars = [self.believed]
-        for sign in (1.0, -1.0) if self.doubt > 0.0 else ():
+        for sign in (1.0, -1.0) if self.uncertainty > 0.0 else ():
             grip = {
-                f"D_{axle}": self.believed.value(f"D_{axle}") * (1.0 + side * self.doubt)
+                f"D_{axle}": self.believed.value(f"D_{axle}") * (1.0 + side * self.uncertainty)
                 for axle, side in (("front", sign), ("rear", -sign))
             }
             cars.append(self.believed.with_values(grip))

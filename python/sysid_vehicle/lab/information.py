@@ -75,7 +75,7 @@ def problem_of(
 
 
 def sensor_noise(drive: ClosedLoop, motion: tuple[float, float, float]) -> NoiseModel:
-    """The noise that the sensors of a drive are known to have, and no wandering force."""
+    """The noise that the sensors of a drive are known to have, and no disturbance force."""
     sensors = drive.setup.sensors
     std = [max(float(getattr(sensors, name).noise_std), _LEAST_STD) for name in MEASURED]
     return NoiseModel(tuple(std), motion, (0.0, 0.0, 0.0), 0.3)

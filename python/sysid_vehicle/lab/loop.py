@@ -257,7 +257,7 @@ def run_closed_loop(
     n = len(wanted)
     if normal is None:
         normal = setup.sensors.normal(n, rng)
-    push = (disturbance or RoadDisturbance()).sample(n, setup.rate_hz, rng)
+    external = (disturbance or RoadDisturbance()).sample(n, setup.rate_hz, rng)
     first = setup.first_speed_mps
     speed = first if first is not None else max(float(wanted[0, 0]), 5.0)
     core = setup.core(excitation.steer_by, speed, excitation.start)
@@ -268,7 +268,7 @@ def run_closed_loop(
         raise InvalidInput(
             f"normal: has shape {normal.shape}; give {n} samples of {len(Sensors.names())} sensors"
         )
-    out = core.run(model.core(), model.vector(), wanted, as_float64(normal), push)
+    out = core.run(model.core(), model.vector(), wanted, as_float64(normal), external)
     lost = int(out["lost_at"])
     kept = lost if lost < n else n
     if kept < 2:

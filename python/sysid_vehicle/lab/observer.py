@@ -1,7 +1,7 @@
 """The extended-state observer: motion and unexplained forces from a log, filtered or smoothed.
 
 The model is a single-track car with linear tyres; what it does not explain is a force ahead, a
-force sideways and a yaw moment that wander freely: a virtual force sensor.
+force sideways and a yaw moment that are random walks: a virtual force sensor.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True)
 class ObserverForm:
-    """Which equations the observer uses; by default all are mended.
+    """Which equations the observer uses; by default all are corrected.
 
     Attributes
     ----------
@@ -103,9 +103,9 @@ class ObserverNoise:
         sensors = np.maximum(scatter, smallest) ** 2
         dt = 1.0 / record.rate_hz
         force = 0.02 * car.mass_kg * GRAVITY
-        wander = np.array([force, force, 0.5 * force * (car.lf_m + car.lr_m)])
+        disturbance = np.array([force, force, 0.5 * force * (car.lf_m + car.lr_m)])
         motion = np.array([0.05, 0.05, 0.05])
-        return cls.from_variances(dt * np.concatenate([motion, wander]) ** 2, sensors)
+        return cls.from_variances(dt * np.concatenate([motion, disturbance]) ** 2, sensors)
 
 
 def _refuse_no_covariance(C: FloatArray, names: tuple[str, ...], what: str, *, zero: bool) -> None:
@@ -143,7 +143,7 @@ class Observer:
     noise : ObserverNoise
         Covariances; `learn_observer_noise` finds them.
     form : ObserverForm
-        The equations; mended by default.
+        The equations; corrected by default.
     """
 
     car: ObserverCar

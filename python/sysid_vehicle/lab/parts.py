@@ -240,7 +240,7 @@ class Online:
     sensors : tuple of 4 floats
         Variances of the readings of v_x, v_y, r, a_y.
     published_form : bool
-        The published equations with their defects, in place of the mended ones.
+        The published equations with their defects, in place of the corrected ones.
     certain_start : bool
         Begin with the drive's first speed, certain; otherwise with the first reading.
     """

@@ -109,7 +109,7 @@ class Setup:
 
     @classmethod
     def default(cls) -> Setup:
-        """Return the published car at its full load, with the mended loop."""
+        """Return the published car at its full load, with the corrected loop."""
         return cls.of(_published_plant())
 
     @classmethod
@@ -147,7 +147,7 @@ class Setup:
         o, s = self.observer, self.simulator
         loop.set_noise(np.diag(o.process).astype(float), np.diag(o.sensors).astype(float))
         loop.set_published_form(o.published_form)
-        loop.set_habits(
+        loop.set_published_ways(
             self.pose_gain,
             s.load_sensors,
             s.late_feedback,

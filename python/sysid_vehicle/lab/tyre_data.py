@@ -40,7 +40,7 @@ class GreyBoxVehicle:
         where loads are held from sample to sample.
     mass_tolerance, yaw_inertia_tolerance : float
         Relative standard deviation of the mass and of the yaw inertia; 0 where they are exact. A
-        tolerance makes them unknowns with that prior, and every interval carries the doubt.
+        tolerance makes them unknowns with that prior, and every interval includes it.
     """
 
     mass_kg: float

@@ -25,9 +25,9 @@ _SURE = 3.0  # deviations
 _COHERENT = 0.6
 # What logs of good cars are off by: the commanded force by its gain and by slopes, the steering by
 # compliance and by tyres.
-_FORCE_DOUBT, _FORCE_FACTOR = 0.15, 1.7
-_STEER_DOUBT, _STEER_FACTOR = 0.2, 2.0
-_UNDERSTEER, _UNDERSTEER_DOUBT = 0.002, 0.003  # rad of road wheels per m/s2
+_FORCE_STD, _FORCE_FACTOR = 0.15, 1.7
+_STEER_STD, _STEER_FACTOR = 0.2, 2.0
+_UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003  # rad of road wheels per m/s2
 _UNDERSTEER_MOST = 0.008  # rad per m/s2 either way: 4.5 deg/g, more than cars have
 _LEFT = 4.0  # times as much unexplained with this wheelbase as with another, that refuses it
 _UNEXPLAINED = 0.1  # share of the steering; less may be the curvature of tyres' curves
@@ -52,13 +52,13 @@ class _Told:
     """A ratio that should be one, and its relative standard deviation were it one."""
 
     ratio: float
-    doubt: float
+    deviation: float
     place: str
 
     def off(self, factor: float, usual: float) -> bool:
         """Whether it is surely beyond a factor."""
         size = max(self.ratio, 1.0 / self.ratio)
-        return size > factor and size - 1.0 > _SURE * math.hypot(usual, self.doubt)
+        return size > factor and size - 1.0 > _SURE * math.hypot(usual, self.deviation)
 
 
 def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
@@ -77,7 +77,7 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
         return
     drive = Drive(motion, rows)
     mass = _mass(drive, mass_kg) if log.has("fx_n") else None
-    if mass is not None and mass.off(_FORCE_FACTOR, _FORCE_DOUBT):
+    if mass is not None and mass.off(_FORCE_FACTOR, _FORCE_STD):
         likely = _likely(mass, _MASS_SLIPS) or (
             "check mass_kg, and that fx_n is the force of all wheels together; leave fx_n out if "
             "it is only an estimate"
@@ -87,7 +87,7 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
             f"{mass_kg / mass.ratio:.4g} kg, {mass.place}; {likely}"
         )
     steer = _steer(drive, wheelbase_m)
-    if steer is not None and steer.off(_STEER_FACTOR, _STEER_DOUBT):
+    if steer is not None and steer.off(_STEER_FACTOR, _STEER_STD):
         likely = _likely(steer, _LENGTH_SLIPS) or (
             f"if it was made from the angle of the steering wheel, the steering ratio is about "
             f"{steer.ratio:.2g} times the one that was taken: put factor = {1.0 / steer.ratio:.3g} "
@@ -129,28 +129,28 @@ def _steer(drive: Drive, wheelbase_m: float) -> _Told | None:
         # Everything the steering does has its scale, understeer too: the prior is scaled with it.
         columns: list[FloatArray] = [wheelbase_m * curvature[gentle], ay[gentle], yaw[gentle]]
         columns.append(np.ones(np.count_nonzero(gentle)))
-        spread = [np.inf, s * _UNDERSTEER_DOUBT, s * 0.05, 0.3 * scale]
+        spread = [np.inf, s * _UNDERSTEER_STD, s * 0.05, 0.3 * scale]
         found = fit(steer[gentle], columns, spread, [0.0, s * _UNDERSTEER, 0.0, 0.0])
         # What the prior leaves open of the first coefficient where the speed hardly varies.
         x = columns[0]
         shared = float(x @ ay[gentle] / max(float(x @ x), 1e-12))
         rest = ay[gentle] - shared * x
         open_ = float(np.sum(rest**2) / max(np.sum(ay[gentle] ** 2), 1e-12))
-        doubt = abs(shared) * s * _UNDERSTEER_DOUBT * (1.0 if open_ < 0.05 else 0.3)
+        deviation = abs(shared) * s * _UNDERSTEER_STD * (1.0 if open_ < 0.05 else 0.3)
         ratio = float(found.coefficients[0])
-        return ratio, math.hypot(float(found.deviations[0]), doubt), found.coherence
+        return ratio, math.hypot(float(found.deviations[0]), deviation), found.coherence
 
-    ratio, doubt, coherence = asked(1.0)
+    ratio, deviation, coherence = asked(1.0)
     for _ in range(3):
         if ratio <= 0.0:
             return None
-        ratio, doubt, coherence = asked(ratio)
+        ratio, deviation, coherence = asked(ratio)
     if ratio <= 0.0 or coherence < 0.3:
         return None
     columns = [wheelbase_m * curvature[gentle], ay[gentle], yaw[gentle]]
     if not _excluded(steer[gentle], columns, ratio):
         return None
-    return _Told(ratio, doubt / ratio, drive.place(steer))
+    return _Told(ratio, deviation / ratio, drive.place(steer))
 
 
 def _excluded(steer: FloatArray, columns: list[FloatArray], ratio: float) -> bool:
@@ -176,4 +176,4 @@ def _excluded(steer: FloatArray, columns: list[FloatArray], ratio: float) -> boo
 def _likely(told: _Told, slips: tuple[tuple[float, str], ...]) -> str:
     near = [(abs(math.log(told.ratio / factor)), text) for factor, text in slips]
     off, text = min(near)
-    return text if off < max(_NEAR, told.doubt) else ""
+    return text if off < max(_NEAR, told.deviation) else ""

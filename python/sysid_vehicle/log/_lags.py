@@ -164,9 +164,9 @@ def _told(lag: Lag, late_s: float, early_s: float, least: float = _MIN_GAIN_ELSE
 
 def _note(name: str, other: str, lag: Lag) -> str:
     verb = "lags behind" if lag.seconds > 0.0 else "runs ahead of"
-    doubt = max(2.0 * lag.deviation, 0.001)
+    deviation = max(2.0 * lag.deviation, 0.001)
     return (
-        f"{name}: {verb} {other} by {abs(lag.seconds):.2g} s (+- {doubt:.1g}) over the whole "
+        f"{name}: {verb} {other} by {abs(lag.seconds):.2g} s (+- {deviation:.1g}) over the whole "
         f"log; a shift in time looks like a lag of the car: put delay_s = {lag.seconds:.2g} for "
         f"{name} in the channel map, or set the clocks right"
     )

@@ -15,7 +15,7 @@ from ._regression import Regression, regress
 WINDOW_S = 1.0
 EXCITED = 0.5  # m/s2 that one side must reach before anything is compared
 # Scale errors of good sensors, gravity through roll, and geometry that is not known.
-SCALE_DOUBT = 0.12
+SCALE_STD = 0.12
 
 _NOT_ONE = 5.0  # deviations from the right unit before another is looked for
 _FITS = 3.0  # deviations within which another unit fits
@@ -83,7 +83,7 @@ def wrong_sign(channel: str, what: str, values: FloatArray, drive: Drive) -> str
 
 def check_scale(
     ratio: float,
-    doubt: float,
+    deviation: float,
     usual: float,
     slips: Slips,
     formula: str,
@@ -96,7 +96,7 @@ def check_scale(
     The logarithm of the ratio is taken as normal about that of each unit, with the deviation of
     the fit and the `usual` one of sensors; compared are the likelihoods.
     """
-    deviation = math.hypot(usual, doubt / ratio)
+    deviation = math.hypot(usual, deviation / ratio)
     off = abs(math.log(ratio)) / deviation
     best, channels = min(slips, key=lambda slip: abs(math.log(ratio / slip[0])))
     miss = abs(math.log(ratio / best)) / deviation

@@ -88,7 +88,7 @@ class Log:
         Warns
         -----
         SysidWarning
-            If the data can be used but something was mended or looks doubtful.
+            If the data can be used but something was corrected or looks implausible.
         """
         built = build(data, name, despike, check)
         return cls(name, built.rate_hz, built.uniform, built.channels)

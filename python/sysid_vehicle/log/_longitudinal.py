@@ -9,7 +9,7 @@ from ._channels import FloatArray
 from ._lags import sideways
 from ._laws import (
     EXCITED,
-    SCALE_DOUBT,
+    SCALE_STD,
     Drive,
     Slips,
     check_scale,
@@ -48,8 +48,8 @@ def check_longitudinal(drive: Drive) -> None:
     ramp, ax, found = ramp_on(drive, "ax_mps2")
     if max(size_of(ramp), size_of(ax)) < EXCITED:
         return
-    ratio, doubt = float(found.coefficients[0]), float(found.deviations[0])
-    if ratio < -4.0 * doubt and found.coherence > 0.3 and cosine(ramp, ax) < -0.3:
+    ratio, deviation = float(found.coefficients[0]), float(found.deviations[0])
+    if ratio < -4.0 * deviation and found.coherence > 0.3 and cosine(ramp, ax) < -0.3:
         text = "moves against the change of vx_mps"
         raise InvalidInput(wrong_sign("ax_mps2", text, ax, drive))
     if found.coherence < 0.15 and (
@@ -61,7 +61,7 @@ def check_longitudinal(drive: Drive) -> None:
         )
     if found.coherence > 0.6 and ratio > 0.0 and size_of(ramp) > EXCITED:
         formula = "(d vx_mps / dt) / ax_mps2"
-        check_scale(ratio, doubt, SCALE_DOUBT, _LONGITUDINAL_SLIPS, formula, ramp, drive, True)
+        check_scale(ratio, deviation, SCALE_STD, _LONGITUDINAL_SLIPS, formula, ramp, drive, True)
 
 
 def ramp_on(drive: Drive, name: str) -> tuple[FloatArray, FloatArray, Regression]:
@@ -102,8 +102,8 @@ def check_force(drive: Drive) -> None:
     ramp, force, found = ramp_on(drive, "fx_n")
     if spread_of(ramp) < EXCITED or np.ptp(force) == 0.0:
         return
-    inverse, doubt = float(found.coefficients[0]), float(found.deviations[0])
-    if inverse < -4.0 * doubt and found.coherence > 0.3 and cosine(ramp, force) < -0.3:
+    inverse, deviation = float(found.coefficients[0]), float(found.deviations[0])
+    if inverse < -4.0 * deviation and found.coherence > 0.3 and cosine(ramp, force) < -0.3:
         text = "moves against the change of vx_mps"
         raise InvalidInput(wrong_sign("fx_n", text, force, drive))
     if found.coherence < 0.15 and spread_of(ramp) > _CLEARLY_DRIVEN:

@@ -19,7 +19,7 @@ from ._clock import clock_notes
 from ._lags import lag_notes
 from ._laws import (
     EXCITED,
-    SCALE_DOUBT,
+    SCALE_STD,
     WINDOW_S,
     Drive,
     KnownUnit,
@@ -44,12 +44,12 @@ _CLEARLY = 1.5  # m/s2 that it must reach before channels are called unrelated
 _LINEAR_MPS2 = 5.0
 
 # Lever arms and roll bend the lateral speed more than the accelerations.
-_SLIDE_DOUBT = 0.35
+_SLIDE_STD = 0.35
 
 # The wheelbase that answers, from karts to coaches [m], what understeer adds [m/(m/s)^2], how far
 # they vary, and the deviations from them at which the steering angle is none of road wheels.
-_WHEELBASE_M, _WHEELBASE_DOUBT = 2.9, 0.45
-_UNDERSTEER, _UNDERSTEER_DOUBT = 0.002, 0.003
+_WHEELBASE_M, _WHEELBASE_STD = 2.9, 0.45
+_UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003
 _NOT_A_WHEELBASE = 3.5
 _OFFSET = 0.3  # of the steering angle, as a share of its size
 _LEAST_OFFSET_RAD = 1e-6  # a steering angle that stays at zero has no size
@@ -88,7 +88,7 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[s
     Returns
     -------
     list of str
-        What is doubtful, in words.
+        What looks implausible, in words.
 
     Raises
     ------
@@ -171,8 +171,8 @@ def _check_lateral(drive: Drive) -> None:
     alone = cosine(turn, ay)
     if both.coherence < 0.3 and abs(alone) < 0.6 and max(spread_of(turn), spread_of(ay)) > _CLEARLY:
         _refuse_lateral(drive, turn, ay)
-    ratio, doubt = float(both.coefficients[0]), float(both.deviations[0])
-    if alone < -0.5 and ratio < -3.0 * doubt and both.coherence > 0.3:
+    ratio, deviation = float(both.coefficients[0]), float(both.deviations[0])
+    if alone < -0.5 and ratio < -3.0 * deviation and both.coherence > 0.3:
         # Two of the three channels agree; the third is the odd one out.
         steer = drive.mean(c["steer_rad"])
         odd = "ay_mps2" if cosine(steer, turn) > 0.0 else "yaw_rate_radps"
@@ -181,7 +181,7 @@ def _check_lateral(drive: Drive) -> None:
         raise InvalidInput(wrong_sign(odd, text, drive.mean(c[odd]), drive))
     if both.coherence > 0.6 and ratio > 0.0:
         formula = "ay_mps2 / (vx_mps * yaw_rate_radps)"
-        check_scale(ratio, doubt, SCALE_DOUBT, _LATERAL_SLIPS, formula, turn, drive)
+        check_scale(ratio, deviation, SCALE_STD, _LATERAL_SLIPS, formula, turn, drive)
 
 
 def _refuse_lateral(drive: Drive, turn: FloatArray, ay: FloatArray) -> None:
@@ -237,16 +237,16 @@ def _check_steer(drive: Drive) -> None:
             f"steer_rad: does not turn with yaw_rate_radps and ay_mps2, {drive.place(ay)}; check "
             f"that the column holds the steering angle, in the order of time"
         )
-    base, doubt = float(answer.coefficients[0]), float(answer.deviations[0])
-    if base < -3.0 * doubt and alone < -0.5 and answer.coherence > 0.3:
+    base, deviation = float(answer.coefficients[0]), float(answer.deviations[0])
+    if base < -3.0 * deviation and alone < -0.5 and answer.coherence > 0.3:
         text = "moves against both yaw_rate_radps and ay_mps2"
         raise InvalidInput(wrong_sign("steer_rad", text, steer, drive))
     if base <= 0.0 or answer.coherence < 0.5:
         return
     speed_2 = float(np.median(drive.mean(c["vx_mps"]))) ** 2
     expected = _WHEELBASE_M + _UNDERSTEER * speed_2
-    spread = math.hypot(_WHEELBASE_DOUBT * _WHEELBASE_M, _UNDERSTEER_DOUBT * speed_2) / expected
-    off = abs(math.log(base / expected)) / math.hypot(spread, doubt / base)
+    spread = math.hypot(_WHEELBASE_STD * _WHEELBASE_M, _UNDERSTEER_STD * speed_2) / expected
+    off = abs(math.log(base / expected)) / math.hypot(spread, deviation / base)
     if off < _NOT_A_WHEELBASE or 0.2 < base / expected < 5.0:
         return
     ratio = base / expected
@@ -283,12 +283,12 @@ def _check_sliding(drive: Drive) -> None:
     # and where the speed is not measured at the centre of gravity the yaw rate adds to it.
     columns = [expected, turn, drive.change(c["yaw_rate_radps"]), ones(drive)]
     found = fit(slide, columns, [np.inf, 0.06, 1.0, np.inf])
-    ratio, doubt = float(found.coefficients[0]), float(found.deviations[0])
-    if ratio < -4.0 * doubt and found.coherence > 0.3:
+    ratio, deviation = float(found.coefficients[0]), float(found.deviations[0])
+    if ratio < -4.0 * deviation and found.coherence > 0.3:
         text = "changes against what ay_mps2 - vx_mps * yaw_rate_radps demands"
         raise InvalidInput(wrong_sign("vy_mps", text, drive.mean(c["vy_mps"]), drive))
     # Of a channel in disorder nothing of the change is left, and it is white.
-    lost = found.coherence < 0.1 and ratio + 5.0 * doubt < 0.8 and ratio < 0.3
+    lost = found.coherence < 0.1 and ratio + 5.0 * deviation < 0.8 and ratio < 0.3
     clear = spread_of(expected - found.coefficients[1] * turn) > _CLEARLY
     if lost and (clear or drive.motion.disorder["vy_mps"] > WHITE):
         raise InvalidInput(
@@ -298,4 +298,4 @@ def _check_sliding(drive: Drive) -> None:
         )
     if found.coherence > 0.5 and ratio > 0.0:
         formula = "(d vy_mps / dt) / (ay_mps2 - vx_mps * yaw_rate_radps)"
-        check_scale(ratio, doubt, _SLIDE_DOUBT, _SLIDING_SLIPS, formula, slide, drive)
+        check_scale(ratio, deviation, _SLIDE_STD, _SLIDING_SLIPS, formula, slide, drive)

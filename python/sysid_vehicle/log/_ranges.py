@@ -23,7 +23,7 @@ _HOLDING_N, _HOLDING_NS2PM2 = 5e4, 6.2
 
 @dataclass(frozen=True)
 class _Range:
-    """Largest magnitude of a channel, white noise that is impossible and that is doubtful.
+    """Largest magnitude of a channel, white noise that is impossible, and that is unusual.
 
     `likely` is what the channel may be instead, and the remedy.
     """

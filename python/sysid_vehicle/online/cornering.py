@@ -45,7 +45,7 @@ class CorneringRls:
     forgetting : float
         Weight of the past per used sample, 0.98 to 1.
     prior_std_npr : float
-        Doubt of the start [N/rad]; the covariance never grows beyond it.
+        Standard deviation at the start [N/rad]; the covariance never grows beyond it.
     ay_std_mps2, yaw_acceleration_std_radps2 : float
         Noise of the two readings, by which they are weighted.
     least_slip_rad, most_slip_rad : float
@@ -115,7 +115,7 @@ class CorneringRls:
         return self._core.run(readings)
 
     def reset(self) -> None:
-        """Doubt the estimate as at the start, without changing it: the road or tyres are others."""
+        """Reset the covariance, not the estimate: the road or the tyres are others."""
         self._core.reset()
 
     @property

@@ -78,8 +78,8 @@ class SideslipObserver:
 
     Readings that no car gives, by their size or by how fast they change, are refused: the tyre
     model stands in, and `mode` says so. Steps beyond 0.05 s are divided. After a step of more than
-    1 s, or where the estimate leaves 1.2 rad, the motion begins again with its full doubt, and what
-    was learnt of the tyres stays. The published kind, which needs every reading, raises instead.
+    1 s, or where the estimate leaves 1.2 rad, the motion begins again with its initial covariance;
+    what was learnt of the tyres stays. The published kind needs every reading and raises instead.
 
     Calls from several threads take turns. An observer pickles and copies with its state.
     """

@@ -66,7 +66,7 @@ def read_log(
     Warns
     -----
     SysidWarning
-        If the data can be used but something was mended or looks doubtful.
+        If the data can be used but something was corrected or looks implausible.
     """
     if channels is None:
         mapping = ChannelMap({})

@@ -34,9 +34,9 @@ _USUAL = {
     "ax_mps2": (3.0, 0.9),
     "ay_mps2": (5.0, 0.9),
 }
-_LAW_DOUBT = 0.15
-_WHEELBASE_M, _WHEELBASE_DOUBT = 2.9, 0.35
-_RATIO, _RATIO_DOUBT = 15.0, 0.25  # of steering gears
+_LAW_STD = 0.15
+_WHEELBASE_M, _WHEELBASE_STD = 2.9, 0.35
+_RATIO, _RATIO_STD = 15.0, 0.25  # of steering gears
 _FOLLOWS = 0.5  # cosine from which two channels are taken to go together
 _LINEAR_MPS2 = 5.0
 
@@ -150,7 +150,7 @@ def _likeliest(
     for tried in itertools.product(*(_choices(name, stated) for name in names)):
         factors = dict(zip(names, tried, strict=True))
         cost = sum(
-            ((sum(e * math.log(factors[n]) for n, e in law.items()) + told) / _LAW_DOUBT) ** 2
+            ((sum(e * math.log(factors[n]) for n, e in law.items()) + told) / _LAW_STD) ** 2
             for law, told in laws
         )
         for name in names:
@@ -218,8 +218,8 @@ def _steer(
     base = _slope(steer, curvature)
     # Understeer makes it look longer by K v^2.
     usual = _WHEELBASE_M + 0.002 * float(np.median(speed[rows])) ** 2
-    ways = [(f, 1.0, _WHEELBASE_DOUBT) for f in own]
-    ways += [(f, _RATIO, math.hypot(_WHEELBASE_DOUBT, _RATIO_DOUBT)) for f in own]
+    ways = [(f, 1.0, _WHEELBASE_STD) for f in own]
+    ways += [(f, _RATIO, math.hypot(_WHEELBASE_STD, _RATIO_STD)) for f in own]
     factor, ratio, _ = min(
         ways, key=lambda way: abs(math.log(base * way[0] / way[1] / usual)) / way[2]
     )

@@ -46,7 +46,7 @@ def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5)
 
     Returns None if no stretch is long enough to predict that far.
     """
-    driving = study.held_out
+    driving = study.validation
     channels = tuple(c for c in _SHOWN if c in driving.present)
     columns = [MEASURED.index(c) for c in channels]
     errors = {

@@ -35,14 +35,14 @@ def errors_by_step(study: Study, ax: Axes | None = None) -> Axes:
     """Draw validation errors by step as bars, training errors as marks, and the noise floor."""
     ax = axes_or_new(ax, 7.0, 3.0)
     labels = list(study.steps)
-    held_out = [c.error for c in study.test]
+    validation = [c.error for c in study.test]
     train = [c.error for c in study.train]
-    at = np.arange(len(held_out))
-    colours = [BEFORE, *([AFTER] * (len(held_out) - 1))]
-    ax.bar(at, held_out, width=0.55, color=colours, alpha=0.85, label="validation data")
+    at = np.arange(len(validation))
+    colours = [BEFORE, *([AFTER] * (len(validation) - 1))]
+    ax.bar(at, validation, width=0.55, color=colours, alpha=0.85, label="validation data")
     ax.plot(at, train, "D", color=MEASURED, markersize=6, label="training driving")
     ax.axhline(1.0, color=FLOOR, linestyle="--", linewidth=1.2, label="noise floor")
-    for i, e in enumerate(held_out):
+    for i, e in enumerate(validation):
         ax.annotate(
             f"{e:.2f}",
             (i - 0.25, e),
@@ -51,7 +51,7 @@ def errors_by_step(study: Study, ax: Axes | None = None) -> Axes:
             color="white",
             fontweight="bold",
         )
-    top = max(*held_out, *train)
+    top = max(*validation, *train)
     if top > _WIDE_RANGE:
         ax.set_yscale("log")
         ax.set_ylim(0.8, 2.0 * top)

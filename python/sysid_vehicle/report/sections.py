@@ -169,7 +169,7 @@ def _ahead(study: Study, truth: Model | None) -> list[str]:
         heading("Further ahead"),
         picture(
             figure,
-            "Held-out error over how far ahead was predicted, from what was known then and the "
+            "validation error over how far ahead was predicted, from what was known then and the "
             "steering and force since; in units of the noise floor of one step.",
         ),
     ]
@@ -250,7 +250,7 @@ def _remains(study: Study, truth: Model | None) -> list[str]:
         for c, s in zip(UNITS, noise.sensor, strict=True)
         if c in study.fit.driving.present
     ]
-    x, y, moment = noise.wander
+    x, y, moment = noise.disturbance
     parts = [
         heading("What remains"),
         paragraph(study.in_the_end),
@@ -258,7 +258,7 @@ def _remains(study: Study, truth: Model | None) -> list[str]:
         heading("Noise model", 3),
         table(("sensor", "white noise", "unit"), sensors),
         paragraph(
-            "Beyond its equations the final model still needs a wandering force of "
+            "Beyond its equations the final model still needs a disturbance force of "
             f"{number(x, 2)} N forward and {number(y, 2)} N sideways and a yaw moment of "
             f"{number(moment, 2)} N m (standard deviations; correlation time "
             f"{number(noise.correlation_time_s, 2)} s)."
@@ -286,10 +286,10 @@ _METHOD = (
 
 def _method(study: Study, truth: Model | None) -> list[str]:
     starts = study.fits[0].starts
-    held_out = study.test[0].title.split(" on ", 1)[1]
+    validation = study.test[0].title.split(" on ", 1)[1]
     parts = [
         heading("How it was computed"),
-        paragraph(f"Fitted to {study.fit.driving}. Held out: {held_out}."),
+        paragraph(f"Fitted to {study.fit.driving}. Validation data: {validation}."),
         paragraph(_METHOD),
         paragraph(
             f"{sum(s.agrees for s in starts)} of {len(starts)} starts of the search for the "

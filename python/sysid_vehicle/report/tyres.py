@@ -50,12 +50,12 @@ def driven_slip(fit: Fit) -> tuple[float, float]:
     p = model.vector()
     motion = driving.problem(model).trace(p, fit.noise.vector(), False)["state"][:, :3]
     steer = driving.channel("steer_rad")
-    push = driving.channel("fx_n" if driving.force_known else "ax_mps2")
+    pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
     core = model.core(force_known=driving.force_known)
     slip = np.array(
         [
             core.evaluate(p, as_float64(x), d, f)[0, _SLIP]
-            for x, d, f in zip(motion[::5], steer[::5].tolist(), push[::5].tolist(), strict=True)
+            for x, d, f in zip(motion[::5], steer[::5].tolist(), pull[::5].tolist(), strict=True)
         ]
     )
     front, rear = np.percentile(np.abs(slip), _RARE, axis=0)

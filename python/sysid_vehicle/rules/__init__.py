@@ -7,7 +7,7 @@
    (`lean`, `clear`), or its likelihood alone (`sure`), and no error 1 to 5 s ahead grows (`worse`).
 4. Effects whose likelihoods differ by less than `apart` are confounded; validation data choose. An
    accepted effect gives way to others of its kind (`near`) that lead by `apart`, or are simpler.
-5. An effect within `idle` standard errors of nothing is dropped unless BIC needs it.
+5. An effect within `insignificant` standard errors of nothing is dropped unless BIC needs it.
 6. When nothing is added any more, the final model is tested for anything left: at `level` on the
    training data, at `elsewhere` on validation data, and for one effect more.
 7. Nothing left: what was added explains it. An added effect is not named if its value is physically

@@ -42,7 +42,7 @@ class Rules:
         0.01, "probability", "below which a single test of a complete model rejects it", _NULLS
     )
     strict: float = _limit(
-        1e-3, "probability", "below which what is left puts names in doubt", _OUTSIDE
+        1e-3, "probability", "below which what is left makes names uncertain", _OUTSIDE
     )
     elsewhere: float = _limit(
         1e-4,
@@ -85,7 +85,7 @@ class Rules:
     grown: float = _limit(
         3.0, "standard errors", "by which an error 1 to 5 s ahead is shown to grow", _EFFECTS
     )
-    idle: float = _limit(
+    insignificant: float = _limit(
         2.6, "standard errors", "from nothing, within which an effect may be needless", _EFFECTS
     )
     apart: float = _limit(

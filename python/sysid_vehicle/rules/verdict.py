@@ -1,4 +1,4 @@
-"""The verdict on the whole, and the names that what is left puts in doubt."""
+"""The verdict on the whole, and the names that what is left makes uncertain."""
 
 from __future__ import annotations
 
@@ -265,13 +265,13 @@ def smaller_than(
 
     What a proxy took up is unexplained too.
     """
-    doubted = set(proxies)
+    uncertain = set(proxies)
     while True:
-        unexplained = left + sum(max(taken.get(e, 0.0), 0.0) for e in doubted)
-        more = {e for e, t in taken.items() if e not in doubted and t < unexplained}
+        unexplained = left + sum(max(taken.get(e, 0.0), 0.0) for e in uncertain)
+        more = {e for e, t in taken.items() if e not in uncertain and t < unexplained}
         if not more:
-            return frozenset(doubted - proxies)
-        doubted |= more
+            return frozenset(uncertain - proxies)
+        uncertain |= more
 
 
 def _on_validation(facts: Facts, rules: Rules) -> bool:

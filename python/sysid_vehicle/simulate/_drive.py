@@ -48,7 +48,7 @@ class Drive:
     outputs : ndarray, shape (n, 5)
         Sensor readings free of noise: v_x, v_y, yaw rate, a_x, a_y.
     disturbance : ndarray, shape (n, 3)
-        F_x [N], F_y [N] and M_z [N m] that pushed the car.
+        F_x [N], F_y [N] and M_z [N m] that acted on the car.
     """
 
     log: Log
@@ -114,14 +114,14 @@ def drive_truth(
     rng = generator(seed)
     references = manoeuvre.references(model.vehicle, rate_hz)
     n = len(references)
-    push = (disturbance or RoadDisturbance()).sample(n, rate_hz, rng)
+    external = (disturbance or RoadDisturbance()).sample(n, rate_hz, rng)
     inputs, states, outputs, lost_at = _core.simulate(
         model.core(),
         model.vector(),
         1.0 / rate_hz,
         references,
         manoeuvre.driver(model.vehicle),
-        push,
+        external,
         float(references[0, 0]),
     )
     if lost_at < n:
@@ -143,7 +143,7 @@ def drive_truth(
         deviation = getattr(sensors, field.name)
         columns[field.name] = columns[field.name] + deviation * rng.standard_normal(n)
     log = Log.from_arrays(columns, name=name or manoeuvre.name, check=False)
-    return Drive(log, model, manoeuvre, references, inputs, states[:, :3], outputs, push)
+    return Drive(log, model, manoeuvre, references, inputs, states[:, :3], outputs, external)
 
 
 def drive(

@@ -20,12 +20,12 @@ from ..model import Model
 from ..rules import USUAL, Rules, grade, verdict
 from ..sensors import SensorCheck, put_right
 from .added import AddedEffect
-from .held_out import beyond_noise_ahead, hold_out, serving
 from .horizons import horizons
 from .matters import sizes_that_matter, within
 from .search import Search, Trail
 from .steps import way
 from .study import Study
+from .validation import beyond_noise_ahead, serving, set_aside
 from .verdict import facts_of, in_the_light_of
 
 __all__ = ["improve"]
@@ -55,14 +55,15 @@ def improve(
     """Improve a model step by step until nothing more is missing that the driving can show.
 
     Each step scores all effects, refits the best few with their exact dynamics, and adds the best
-    one that also predicts the validation data better. An effect that became idle is dropped again.
+    one that also predicts the validation data better. An effect that is no longer significant is
+    dropped again.
 
     Parameters
     ----------
     model : Model
         The baseline.
     train, test : Log or sequence of Log
-        What to fit to, and driving the fit never sees. Without `test` the last 30 % of the training
+        What to fit to, and validation data. Without `test` the last 30 % of the training
         driving are held out.
     most_effects : int
         Stop after so many.
@@ -105,7 +106,7 @@ def improve(
         left_out = {effect(e).id for e in exclude}
         candidates = [e.id for e in considered(model, candidates) if e.id not in left_out]
     say = tell if tell is not None else _silent
-    train_driving, test_driving = hold_out(train, test)
+    train_driving, test_driving = set_aside(train, test)
     baseline = identify(model, train_driving, starts=starts, seed=seed, progress=progress)
     say(f"Fitted the baseline to {train_driving}.")
     search = Search(
@@ -161,10 +162,10 @@ def improve(
         diagnoses=tuple(diagnoses),
         train=tuple(on_train),
         test=tuple(on_test),
-        held_out=test_driving,
+        validation=test_driving,
         added=_added(fits, on_test, found, told, alone),
         omnibus=fitted,
-        omnibus_held_out=validation,
+        omnibus_validation=validation,
         verdicts=told,
         warnings=_warnings(fit, train_driving, found),
         seconds=time.perf_counter() - began,

@@ -50,7 +50,7 @@ def record(study: Study) -> dict[str, Any]:
         "unknown": {
             "p_value": study.omnibus.p_value,
             "strongest": study.omnibus.strongest,
-            **_held_out(study.omnibus_held_out),
+            **_validation(study.omnibus_validation),
             "explainable": study.ceiling.to_dict(),
             **({} if study.unknown is None else study.unknown.to_dict()),
         },
@@ -69,10 +69,10 @@ def _where(study: Study) -> dict[str, Any]:
     return {**told, "delays_without_lags": late} if late else told
 
 
-def _held_out(o: Omnibus | None) -> dict[str, Any]:
+def _validation(o: Omnibus | None) -> dict[str, Any]:
     if o is None:
         return {}
-    return {"held_out": {"p_value": o.p_value, "strongest": o.strongest}}
+    return {"validation": {"p_value": o.p_value, "strongest": o.strongest}}
 
 
 def _candidate(

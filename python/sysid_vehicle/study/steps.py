@@ -13,7 +13,7 @@ from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Estimate, Fit, refine
 from ..rules import USUAL, Measures, Rules, accept, bic, worse
-from .held_out import as_sure, changes_ahead, error_falls, fall_in_error, gain_in_log_likelihood
+from .validation import as_sure, changes_ahead, error_falls, fall_in_error, gain_in_log_likelihood
 
 __all__ = [
     "alternatives",
@@ -23,7 +23,7 @@ __all__ = [
     "lead",
     "likeliest",
     "way",
-    "without_idle",
+    "without_insignificant",
 ]
 
 _ALTERNATIVES = 2  # tried in place of one effect
@@ -34,7 +34,7 @@ def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate,
 
     One with a value that a car can have comes before one that only acts like something else. Among
     those that the training data cannot tell apart the validation data have a say too. With it
-    comes its fit, without what is idle then.
+    comes its fit, without what is not significant then.
     """
     rules = dx.rules
     likely = sorted(dx.significant, key=lambda c: not _can_be(c, rules))
@@ -47,7 +47,7 @@ def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate,
             continue
         if c.fit is None or not _sound(c, rules):
             continue
-        lean = without_idle(c.fit, rules)
+        lean = without_insignificant(c.fit, rules)
         if c.id not in lean.model.effects:
             continue
         found = _measures(fit, c, test, rules)
@@ -161,7 +161,7 @@ def exchanged(
 
 
 def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules) -> Fit | None:
-    """The fit with others in place of an effect, and without what is idle then.
+    """The fit with others in place of an effect, and without what is not significant then.
 
     None where the search fails.
     """
@@ -170,7 +170,7 @@ def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules)
         values = zip(c.effect.parameters, c.value, strict=True)
         model = model.add(c.effect).with_values({f"{c.id}.{p.name}": v for p, v in values})
     try:
-        return without_idle(refine(model, fit.driving, fit.noise), rules)
+        return without_insignificant(refine(model, fit.driving, fit.noise), rules)
     except (NumericalError, np.linalg.LinAlgError):
         return None
 
@@ -218,7 +218,7 @@ def _real(fit: Fit, name: str, rules: Rules) -> bool:
     return possible(found, [e.value for e in estimates], [e.std for e in estimates], rules)
 
 
-def without_idle(fit: Fit, rules: Rules = USUAL) -> Fit:
+def without_insignificant(fit: Fit, rules: Rules = USUAL) -> Fit:
     """The fit without effects that have become indistinguishable from nothing, and unnecessary.
 
     Of two effects that act alike neither may be told from nothing while the model needs one of
@@ -226,12 +226,14 @@ def without_idle(fit: Fit, rules: Rules = USUAL) -> Fit:
     """
     kept: set[str] = set()
     while True:
-        idle = [
-            e.id for e in fit.model.parts if e.id not in kept and _strength(fit, e.id) < rules.idle
+        insignificant = [
+            e.id
+            for e in fit.model.parts
+            if e.id not in kept and _strength(fit, e.id) < rules.insignificant
         ]
-        if not idle:
+        if not insignificant:
             return fit
-        weakest = min(idle, key=lambda name: _strength(fit, name))
+        weakest = min(insignificant, key=lambda name: _strength(fit, name))
         without = refine(fit.model.drop(weakest), fit.driving, fit.noise)
         if _merit(without) + rules.apart < _merit(fit):
             kept.add(weakest)

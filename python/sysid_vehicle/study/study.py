@@ -65,10 +65,10 @@ class Study:
         One before each step, and the last one, which found nothing more to add.
     train, test : tuple of Comparison
         For each fit, all against the noise floor of the final one.
-    held_out : Driving
-        The driving the fits never saw.
+    validation : Driving
+        The validation data.
     added : tuple of AddedEffect
-    omnibus, omnibus_held_out : Omnibus
+    omnibus, omnibus_validation : Omnibus
         Whether the final model leaves anything that depends on the driving it was fitted to, or on
         the validation data; the latter are not asked where nothing was added.
     verdicts : Verdicts
@@ -87,10 +87,10 @@ class Study:
     diagnoses: tuple[Diagnosis, ...]
     train: tuple[Comparison, ...]
     test: tuple[Comparison, ...]
-    held_out: Driving
+    validation: Driving
     added: tuple[AddedEffect, ...]
     omnibus: Omnibus
-    omnibus_held_out: Omnibus | None
+    omnibus_validation: Omnibus | None
     verdicts: Verdicts
     warnings: tuple[str, ...]
     seconds: float
@@ -154,7 +154,7 @@ class Study:
         found = []
         for dx in self.diagnoses:
             train = dx.errors_on(self.fit.driving, floor)
-            test = dx.errors_on(self.held_out, floor)
+            test = dx.errors_on(self.validation, floor)
             found.append({e: (train[e], test[e]) for e in train})
         return tuple(found)
 
@@ -204,12 +204,12 @@ class Study:
         """
         if self.verdict not in ("unknown", "partly_explained"):
             return None
-        return unknown(self.fit, self.held_out)
+        return unknown(self.fit, self.validation)
 
     @cached_property
     def ceiling(self) -> Ceiling:
         """How much of what the final model lacks any function of the driving could explain."""
-        return ceiling(self.fit, self.held_out, rules=self.rules)
+        return ceiling(self.fit, self.validation, rules=self.rules)
 
     def with_warnings(self, warnings: Sequence[str]) -> Study:
         """The same study with these warnings; what it has worked out so far it keeps."""
@@ -230,7 +230,7 @@ class Study:
     @cached_property
     def horizons(self) -> Horizons:
         """Errors of every step 0.5 to 5 s ahead on the validation data, in physical units."""
-        return horizons(self.fits, self.steps, self.held_out)
+        return horizons(self.fits, self.steps, self.validation)
 
     def waterfall(self, horizons_s: Sequence[float] = (0.5, 1.0, 2.0, 5.0)) -> Waterfall:
         """Errors of every step, one sample and further ahead, in training and held out.
@@ -244,7 +244,7 @@ class Study:
             self.fits,
             self.steps,
             (self.fit.driving, self.train[-1]),
-            (self.held_out, self.test[-1]),
+            (self.validation, self.test[-1]),
             horizons_s,
         )
 
@@ -272,7 +272,7 @@ class Study:
         said = f"In the end: {self.omnibus}."
         if self.explained is not None:
             said = f"Of the error 1 to 5 s ahead, {self.explained} is gone. {said}"
-        beyond = self.omnibus_held_out
+        beyond = self.omnibus_validation
         more = beyond is not None and beyond.p_value < self.rules.elsewhere
         if beyond is not None and beyond.rejects and not more:
             said += (

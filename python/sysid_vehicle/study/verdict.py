@@ -68,7 +68,7 @@ def facts_of(
 def in_the_light_of(decision: Decision, told: Verdicts) -> Verdicts:
     """Verdicts on every effect, without the names that the decision withdraws."""
     for w in decision.withdrawn:
-        told = told.doubting(w.effects, w.because, added=w.beside)
+        told = told.with_reservation(w.effects, w.because, added=w.beside)
     return told
 
 

@@ -115,7 +115,7 @@ class Load:
         return dataclasses.replace(self, **changes)
 
     def with_masses(self, masses: Sequence[PointMass]) -> Load:
-        """Add point masses: Dettu et al. (2023), eqs. (6) to (8), mended.
+        """Add point masses: Dettu et al. (2023), eqs. (6) to (8), corrected.
 
         Equation (6) lacks the division by the total mass, and (8) subtracts the chassis' parallel-
         axis term where the theorem of Huygens and Steiner adds it.

@@ -165,11 +165,11 @@ def _first(names: Sequence[str], errors: Sequence[float] | None) -> dict[str, fl
 
 
 def _batch(
-    readings: Readings, channels: Sequence[str], names: Sequence[str], doubt: float = 0.0
+    readings: Readings, channels: Sequence[str], names: Sequence[str], torque_std: float = 0.0
 ) -> Observer:
-    """Twins side by side; unless doubted, the torques are exact, as the paper's twin has them."""
+    """Twins side by side; by default the torques are exact, as the paper's twin has them."""
     noise = {c: max(readings.noise[c], NOISE_FLOOR[c]) for c in channels}
-    return Observer(batch=SideBySide(unknowns(*names), noise, input_doubt=doubt))
+    return Observer(batch=SideBySide(unknowns(*names), noise, input_std=torque_std))
 
 
 def estimate_mass(
@@ -181,7 +181,7 @@ def estimate_mass(
     first_error: Sequence[float] | None = None,
     duration_s: float = 180.0,
     torque_error: float = 0.0,
-    torque_doubt: float = 0.0,
+    torque_std: float = 0.0,
 ) -> LoadExperiment:
     """Estimate the mass in town: table 4, figures 4 and 5.
 
@@ -202,17 +202,17 @@ def estimate_mass(
         Length of the drive.
     torque_error : float
         The twin is told torques that are larger by this part.
-    torque_doubt : float
+    torque_std : float
         Standard deviation of such an error, which twins side by side then consider.
 
     Raises
     ------
     InvalidInput
-        If the error or the doubt of the torques is no part of one.
+        If the error or the standard deviation of the torques is no part of one.
     """
-    if not (abs(torque_error) < 1.0 and 0.0 <= torque_doubt < 1.0):
+    if not (abs(torque_error) < 1.0 and 0.0 <= torque_std < 1.0):
         raise InvalidInput(
-            f"torque_error = {torque_error!r}, torque_doubt = {torque_doubt!r}; give parts of one"
+            f"torque_error = {torque_error!r}, torque_std = {torque_std!r}; give parts of one"
         )
     drive = _town(duration_s)
     first = LOADED_SUV.replace(**_first(["mass_kg"], first_error), **_centre(wrong_cg))
@@ -221,7 +221,7 @@ def estimate_mass(
     channels = ["ax_mps2", "pitch_rate_radps"] if law == "side_by_side" else ["ax_mps2"]
     readings = measure(drive, channels, snr=snr, seed=seed)
     if law == "side_by_side":
-        observer = _batch(readings, channels, ["mass_kg", "cg_x_m", "cg_z_m"], torque_doubt)
+        observer = _batch(readings, channels, ["mass_kg", "cg_x_m", "cg_z_m"], torque_std)
     elif law == "published":
         observer = Observer(laws=[mass_law(150.0, yaw_rate_below_radps=np.inf)])
     else:

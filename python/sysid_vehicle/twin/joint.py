@@ -200,7 +200,7 @@ def mass_and_sideslip(
     course : {"lap", "double_lane_change"}
         What is driven.
     law : {"side_by_side", "published"}
-        Law of the mass: least squares on two twins, or eq. (24) with its sign mended.
+        Law of the mass: least squares on two twins, or eq. (24) with its sign corrected.
     gains, benchmark_gains : mapping of str to float
         By the names of `TWIN_BOX` and `BENCHMARK_BOX`; by default those that were calibrated.
     seed : int
@@ -249,7 +249,7 @@ def _twin(drive: Drive14, readings: Readings, gains: Mapping[str, float], law: L
         corrections.append(StateGain(channel, channel, gains["wheel"]))
     if law == "side_by_side":
         noise = {"ax_mps2": readings.noise["ax_mps2"]}
-        batch = SideBySide(unknowns("mass_kg", around=load), noise, input_doubt=0.0)
+        batch = SideBySide(unknowns("mass_kg", around=load), noise, input_std=0.0)
         observer = Observer(gains=corrections, batch=batch)
     else:
         observer = Observer(gains=corrections, laws=[mass_law(gains["mass"], around=load)])

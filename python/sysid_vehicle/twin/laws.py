@@ -160,7 +160,7 @@ class Unknown:
     lower, upper : float
         Limits.
     walk_per_root_s : float
-        How far the truth may wander in a second; zero for a constant.
+        How far the truth may change in a second; zero for a constant.
     """
 
     parameter: str
@@ -231,13 +231,13 @@ class SideBySide:
         For so long data count less, the earlier the less: the first steps are long.
     high_pass_hz : float
         Slower differences between car and twin are left alone; zero leaves none.
-    input_doubt : float
-        Standard deviation of a factor of the doubted inputs, 0.03 by default. Under torques told
+    input_std : float
+        Standard deviation of a factor of the uncertain inputs, 0.03 by default. Under torques told
         2 % too high a mass 2 % too large fits as well; only drag and rolling resistance, themselves
         not known so well, tell the two apart. So the factor is not estimated but considered: where
-        ``mass_kg`` is looked for and the twin takes such inputs, the spreads hold what its doubt
-        does to the estimates. It costs one twin more. Zero: the inputs are exact.
-    doubted_inputs : sequence of str
+        ``mass_kg`` is looked for and the twin takes such inputs, the spreads hold what its
+        uncertainty does to the estimates. It costs one twin more. Zero: the inputs are exact.
+    uncertain_inputs : sequence of str
         Inputs that have this factor, those of them that the twin takes; not the steering.
 
     Raises
@@ -254,8 +254,8 @@ class SideBySide:
     clip: float = 4.0
     gentle_s: float = 20.0
     high_pass_hz: Mapping[str, float] = field(default_factory=dict)
-    input_doubt: float = 0.03
-    doubted_inputs: Sequence[str] = _TORQUES
+    input_std: float = 0.03
+    uncertain_inputs: Sequence[str] = _TORQUES
 
     def __post_init__(self) -> None:
         for u in self.unknowns:
@@ -268,25 +268,25 @@ class SideBySide:
                 raise InvalidInput(
                     f"{channel}: a noise of {noise!r}; give its standard deviation, positive"
                 )
-        if not 0.0 <= self.input_doubt < 1.0:
-            raise InvalidInput(f"input_doubt = {self.input_doubt!r}; give a part from 0 to 1")
-        if any(name.startswith("steer") for name in self.doubted_inputs):
-            raise InvalidInput("doubted_inputs: the steering has no factor; leave it out")
+        if not 0.0 <= self.input_std < 1.0:
+            raise InvalidInput(f"input_std = {self.input_std!r}; give a part from 0 to 1")
+        if any(name.startswith("steer") for name in self.uncertain_inputs):
+            raise InvalidInput("uncertain_inputs: the steering has no factor; leave it out")
 
     def scaled(self, inputs: Sequence[str]) -> list[int]:
-        """Positions of the doubted inputs among a twin's, none if no factor is considered."""
+        """Positions of the uncertain inputs among a twin's, none if no factor is considered."""
         looked_for = any(u.parameter == "mass_kg" for u in self.unknowns)
-        if not looked_for or self.input_doubt == 0.0:
+        if not looked_for or self.input_std == 0.0:
             return []
-        return [i for i, name in enumerate(inputs) if name in self.doubted_inputs]
+        return [i for i, name in enumerate(inputs) if name in self.uncertain_inputs]
 
     def looked_for(self, inputs: Sequence[str]) -> tuple[Unknown, ...]:
-        """Unknowns for a twin with these inputs, last the factor of the doubted ones, if any."""
+        """Unknowns for a twin with these inputs, last the factor of the uncertain ones, if any."""
         if not self.scaled(inputs):
             return tuple(self.unknowns)
-        doubt = self.input_doubt
-        most = min(6.0 * doubt, 0.9)
-        scale = Unknown(INPUT_SCALE, doubt, 0.2 * doubt, 1.0 - most, 1.0 + most)
+        deviation = self.input_std
+        most = min(6.0 * deviation, 0.9)
+        scale = Unknown(INPUT_SCALE, deviation, 0.2 * deviation, 1.0 - most, 1.0 + most)
         return (*self.unknowns, scale)
 
     def core(

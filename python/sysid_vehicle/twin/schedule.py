@@ -213,7 +213,7 @@ def _run(
         noise = {c: max(readings.noise[c], NOISE_FLOOR[c]) for c in channels}
         looked_for = unknowns(*stage.names, *stage.beside, around=load)
         observer = Observer(
-            batch=SideBySide([_narrowed(u, known) for u in looked_for], noise, input_doubt=0.0)
+            batch=SideBySide([_narrowed(u, known) for u in looked_for], noise, input_std=0.0)
         )
     elif stage.names == ("mass_kg",):
         gain = 150.0 if law == "published" else 400.0

@@ -27,7 +27,7 @@ struct Input {
 };
 
 /// What disturbs the motion: forces and a moment, and accelerations that no accelerometer feels.
-enum Push : int { kForceX, kForceY, kMomentZ, kGravityX, kGravityY, kPushes };
+enum External : int { kForceX, kForceY, kMomentZ, kGravityX, kGravityY, kExternals };
 
 /// Axle loads that the tyres feel instead of those of the motion: a simulator that closes the
 /// loop between force and load over a sample has them from the sample before.
@@ -44,18 +44,18 @@ struct SingleTrack {
     HeldLoads held{};
     UserEffects user = nullptr;  // those that act; `effects` has no bits of theirs
 
-    /// Evaluates (1) to (5). `motion` = v_x, v_y, r; `push` = disturbance, see `Push`; `lags` =
-    /// how the auxiliary states move; `rate` receives the derivatives of the motion.
+    /// Evaluates (1) to (5). `motion` = v_x, v_y, r; `external` = disturbance, see `External`;
+    /// `lags` = how the auxiliary states move; `rate` receives the derivatives of the motion.
     template <class S, class T>
-    Workings<S> evaluate(const S* motion, const S* push, const Lags<S>& lags, const Input& u,
+    Workings<S> evaluate(const S* motion, const S* external, const Lags<S>& lags, const Input& u,
                          const T* p, S* rate) const;
 
     /// The same with the derivatives of the auxiliary states `aux`.
     template <class S, class T>
-    Workings<S> evaluate(const S* motion, const S* push, const S* aux, const Input& u, const T* p,
-                         S* rate, S* aux_rate) const {
+    Workings<S> evaluate(const S* motion, const S* external, const S* aux, const Input& u,
+                         const T* p, S* rate, S* aux_rate) const {
         for (int i = 0; i < kAuxiliaryStates; ++i) aux_rate[i] = S(0.0);
-        return evaluate(motion, push, Lags<S>(LagStage::kRates, aux, aux_rate), u, p, rate);
+        return evaluate(motion, external, Lags<S>(LagStage::kRates, aux, aux_rate), u, p, rate);
     }
 
     /// What the sensors read: v_x, v_y, r, a_x, a_y.
@@ -83,8 +83,8 @@ struct SingleTrack {
 
     // `w.r_dot` is the yaw acceleration as far as it is known.
     template <class S, class T>
-    void once(Workings<S>& w, const S* motion, const S* push, const Lags<S>& lags, const Input& u,
-              const T* p) const {
+    void once(Workings<S>& w, const S* motion, const S* external, const Lags<S>& lags,
+              const Input& u, const T* p) const {
         begin(w, motion, u, p);
         const T* q = p + kBaseParameterCount;
         const auto each = [&](auto&& visit) { for_each_active(effects, q, visit); };
@@ -94,7 +94,7 @@ struct SingleTrack {
         for_each_active_backwards(effects, q,
                                   [&](auto e, const T* own, At) { return e.input(own, w); });
         each([&](auto e, const T* own, At at) { return e.steering(own, w, lags.from(at)); });
-        settle_outside_forces(w, push);
+        settle_outside_forces(w, external);
         each([&](auto e, const T* own, At) { return e.body(own, w); });
         user_body(user, q, w);
         slip_angles(w);
@@ -138,13 +138,13 @@ struct SingleTrack {
     }
 
     template <class S>
-    static void settle_outside_forces(Workings<S>& w, const S* push) {
+    static void settle_outside_forces(Workings<S>& w, const S* external) {
         const S speed_squared = w.v_x * abs_of(w.v_x);
-        w.force_x = push[kForceX] - 0.5 * w.rho * (w.drag_area * speed_squared);
-        w.force_y = push[kForceY];
-        w.moment_z = push[kMomentZ];
-        w.gravity_x = push[kGravityX];
-        w.gravity_y = push[kGravityY];
+        w.force_x = external[kForceX] - 0.5 * w.rho * (w.drag_area * speed_squared);
+        w.force_y = external[kForceY];
+        w.moment_z = external[kMomentZ];
+        w.gravity_x = external[kGravityX];
+        w.gravity_y = external[kGravityY];
     }
 
     template <class S>
@@ -220,7 +220,7 @@ struct SingleTrack {
 // Not inside the class: there they would be inline, and compiled by every user of the model.
 
 template <class S, class T>
-Workings<S> SingleTrack::evaluate(const S* motion, const S* push, const Lags<S>& lags,
+Workings<S> SingleTrack::evaluate(const S* motion, const S* external, const Lags<S>& lags,
                                   const Input& u, const T* p, S* rate) const {
     // An accelerometer beside the centre of gravity makes the measured a_x, which stands for
     // the force, depend on the yaw acceleration it brings about. Each pass shrinks the error
@@ -228,7 +228,7 @@ Workings<S> SingleTrack::evaluate(const S* motion, const S* push, const Lags<S>&
     const int passes = !force_known && (effects & kReadYawAcceleration) != 0 ? 4 : 1;
     Workings<S> w;
     w.r_dot = S(0.0);
-    for (int i = 0; i < passes; ++i) once(w, motion, push, lags, u, p);
+    for (int i = 0; i < passes; ++i) once(w, motion, external, lags, u, p);
     rate[0] = w.a_x + w.v_y * w.r + w.gravity_x;
     rate[1] = w.a_y - w.v_x * w.r + w.gravity_y;
     rate[2] = w.r_dot;

@@ -79,15 +79,15 @@ struct NoLags {
 /// One classical Runge-Kutta step of the motion. Lags move by their exact solution between the
 /// targets of its stages, slow states with the motion.
 template <class S, class T, class Memory>
-void runge_kutta_step(const SingleTrack& model, ModelState<S>& x, const S* push, const Input& from,
-                      const Input& to, const T* p, double h, const ActiveStates& own,
-                      Memory& memory) {
+void runge_kutta_step(const SingleTrack& model, ModelState<S>& x, const S* external,
+                      const Input& from, const Input& to, const T* p, double h,
+                      const ActiveStates& own, Memory& memory) {
     const LagStep<S> lags = memory.begin(x, h);
     const auto rate = [&](LagStage stage, const ModelState<S>& at, const Input& u) {
         ModelState<S> k{};
         S* own_rate = k.data() + kMotionStates;
-        model.evaluate(at.data(), push, Lags<S>(stage, at.data() + kMotionStates, own_rate, lags),
-                       u, p, k.data());
+        model.evaluate(at.data(), external,
+                       Lags<S>(stage, at.data() + kMotionStates, own_rate, lags), u, p, k.data());
         return k;
     };
     const auto for_moved = [&](auto&& use) {
@@ -113,16 +113,16 @@ void runge_kutta_step(const SingleTrack& model, ModelState<S>& x, const S* push,
         if (memory.exact(i)) x[kMotionStates + i] = memory.after(i);
 }
 
-/// Moves `x` over `dt` seconds in `substeps` equal parts; `push` is held.
+/// Moves `x` over `dt` seconds in `substeps` equal parts; `external` is held.
 template <class S, class T>
-void advance(const SingleTrack& model, ModelState<S>& x, const S* push, const Input& from,
+void advance(const SingleTrack& model, ModelState<S>& x, const S* external, const Input& from,
              const Input& to, const T* p, double dt, int substeps) {
     const ActiveStates own = active_states(model.effects);
     const auto steps = [&](auto&& memory) {
         for (int n = 0; n < substeps; ++n)
-            runge_kutta_step(model, x, push, between(from, to, static_cast<double>(n) / substeps),
-                             between(from, to, (n + 1.0) / substeps), p, dt / substeps, own,
-                             memory);
+            runge_kutta_step(
+                model, x, external, between(from, to, static_cast<double>(n) / substeps),
+                between(from, to, (n + 1.0) / substeps), p, dt / substeps, own, memory);
     };
     if (own.count == 0)
         steps(NoLags<S>{});
@@ -132,10 +132,10 @@ void advance(const SingleTrack& model, ModelState<S>& x, const S* push, const In
 
 /// The sensors' readings in state `x`.
 template <class S, class T>
-std::array<S, kChannels> sense(const SingleTrack& model, const ModelState<S>& x, const S* push,
+std::array<S, kChannels> sense(const SingleTrack& model, const ModelState<S>& x, const S* external,
                                const Input& u, const T* p) {
     ModelState<S> rate;
-    const auto w = model.evaluate(x.data(), push, x.data() + kMotionStates, u, p, rate.data(),
+    const auto w = model.evaluate(x.data(), external, x.data() + kMotionStates, u, p, rate.data(),
                                   rate.data() + kMotionStates);
     std::array<S, kChannels> y;
     model.sense(w, p, x.data() + kMotionStates, y.data());
@@ -144,7 +144,7 @@ std::array<S, kChannels> sense(const SingleTrack& model, const ModelState<S>& x,
 
 /// Auxiliary states that have settled: they equal what they follow.
 template <class S, class T>
-void settle_auxiliary(const SingleTrack& model, ModelState<S>& x, const S* push, const Input& u,
+void settle_auxiliary(const SingleTrack& model, ModelState<S>& x, const S* external, const Input& u,
                       const T* p) {
     const ActiveStates own = active_states(model.effects);
     if (own.count == 0) return;
@@ -155,7 +155,7 @@ void settle_auxiliary(const SingleTrack& model, ModelState<S>& x, const S* push,
     step.after = x.data() + kMotionStates;
     const Lags<S> lags(LagStage::kSettle, step.after, nullptr, step);
     for (int round = 0; round < kRounds; ++round)
-        model.evaluate(x.data(), push, lags, u, p, rate.data());
+        model.evaluate(x.data(), external, lags, u, p, rate.data());
 }
 
 /// Directions that one pass through the model differentiates by: states in a filter, in one with

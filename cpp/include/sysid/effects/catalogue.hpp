@@ -135,11 +135,11 @@ constexpr EffectMask kReadYawAcceleration =
 
 namespace detail {
 
-// An effect for which `visit` returns `Idle` does not act there, and leaves no code behind.
+// An effect for which `visit` returns `Inactive` does not act there, and leaves no code behind.
 template <std::size_t I, class T, class Visit>
 void visit_one(EffectMask mask, const T* p, Visit& visit) {
     using E = std::tuple_element_t<I, Catalogue>;
-    if constexpr (!std::is_same_v<decltype(visit(E{}, p, I)), Idle>) {
+    if constexpr (!std::is_same_v<decltype(visit(E{}, p, I)), Inactive>) {
         constexpr std::size_t at = effect_offset(I);
         constexpr std::size_t state = effect_state_offset(I);
         if ((mask >> I) & 1U) visit(E{}, p + at, state);
@@ -160,7 +160,7 @@ void visit_backwards(EffectMask mask, const T* p, Visit& visit,
 }  // namespace detail
 
 /// Calls `visit(effect, its parameters, index of its first state)` for every effect of `mask`, in
-/// catalogue order. Effects for which that returns `Idle` cost nothing.
+/// catalogue order. Effects for which that returns `Inactive` cost nothing.
 template <class T, class Visit>
 void for_each_active(EffectMask mask, const T* effect_parameters, Visit&& visit) {
     if (mask == 0) return;

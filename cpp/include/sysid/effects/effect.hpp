@@ -53,7 +53,7 @@ struct EffectInfo {
 };
 
 /// What a stage returns at which an effect does not act: it is left out when compiling.
-struct Idle {};
+struct Inactive {};
 
 struct Effect {
     /// States of the effect's own; each follows something with a first-order lag.
@@ -64,45 +64,46 @@ struct Effect {
     static constexpr bool reads_yaw_acceleration = false;
 
     template <class T, class S>
-    static Idle vehicle(const T* /*p*/, Workings<S>& /*w*/) {
+    static Inactive vehicle(const T* /*p*/, Workings<S>& /*w*/) {
         return {};
     }
     template <class T, class S>
-    static Idle input(const T* /*p*/, Workings<S>& /*w*/) {
+    static Inactive input(const T* /*p*/, Workings<S>& /*w*/) {
         return {};
     }
     template <class T, class S>
-    static Idle steering(const T* /*p*/, Workings<S>& /*w*/, Lags<S> /*lags*/) {
+    static Inactive steering(const T* /*p*/, Workings<S>& /*w*/, Lags<S> /*lags*/) {
         return {};
     }
     template <class T, class S>
-    static Idle body(const T* /*p*/, Workings<S>& /*w*/) {
+    static Inactive body(const T* /*p*/, Workings<S>& /*w*/) {
         return {};
     }
     template <class T, class S>
-    static Idle slip(const T* /*p*/, Workings<S>& /*w*/, Lags<S> /*lags*/) {
+    static Inactive slip(const T* /*p*/, Workings<S>& /*w*/, Lags<S> /*lags*/) {
         return {};
     }
     template <class T, class S>
-    static Idle loads(const T* /*p*/, Workings<S>& /*w*/) {
+    static Inactive loads(const T* /*p*/, Workings<S>& /*w*/) {
         return {};
     }
     template <class T, class S>
-    static Idle grip(const T* /*p*/, Workings<S>& /*w*/, const S* /*state*/) {
+    static Inactive grip(const T* /*p*/, Workings<S>& /*w*/, const S* /*state*/) {
         return {};
     }
     /// The lateral axle forces are known, their sums are not yet formed.
     template <class T, class S>
-    static Idle forces(const T* /*p*/, Workings<S>& /*w*/) {
+    static Inactive forces(const T* /*p*/, Workings<S>& /*w*/) {
         return {};
     }
     /// Everything is known: for states that follow results.
     template <class T, class S>
-    static Idle follow(const T* /*p*/, const Workings<S>& /*w*/, Lags<S> /*lags*/) {
+    static Inactive follow(const T* /*p*/, const Workings<S>& /*w*/, Lags<S> /*lags*/) {
         return {};
     }
     template <class T, class S>
-    static Idle sensors(const T* /*p*/, const Workings<S>& /*w*/, const S* /*state*/, S* /*y*/) {
+    static Inactive sensors(const T* /*p*/, const Workings<S>& /*w*/, const S* /*state*/,
+                            S* /*y*/) {
         return {};
     }
 };

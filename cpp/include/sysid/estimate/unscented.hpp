@@ -42,10 +42,10 @@ Mat<N, N> factor_of(const Mat<N, N>& P, std::size_t sample) {
     Mat<N, N> lower, inverse;
     if (!P.allFinite()) throw NumericalFailure("the covariance is not finite", sample);
     if (cholesky<N>(P, lower, inverse)) return lower;
-    Mat<N, N> mended = P;
-    if (!(lift_correlations<N>(mended, 1e-3 * kRounding) > -kRounding))
+    Mat<N, N> repaired = P;
+    if (!(lift_correlations<N>(repaired, 1e-3 * kRounding) > -kRounding))
         throw NumericalFailure("the covariance is not positive definite", sample);
-    if (!cholesky<N>(mended, lower, inverse))
+    if (!cholesky<N>(repaired, lower, inverse))
         throw NumericalFailure("the covariance is not positive definite", sample);
     return lower;
 }

@@ -48,13 +48,14 @@ double normal_equations(const Problem& problem, const double* p, const FrozenFil
 /// Half the sum of squared residuals alone.
 double half_sum_of_squares(const Problem& problem, const double* p, const FrozenFilter& filter);
 
-/// Sensitivities to signals that push or shift: column b answers to `signals` (samples x count,
-/// row-major) added to target b: a `Push`, or kPushes + a `Channel` for a sensor reading.
+/// Sensitivities to signals that act as forces or shift readings: column b answers to `signals`
+/// (samples x count, row-major) added to target b: an `External`, or kExternals + a `Channel` for a
+/// sensor reading.
 void signal_sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,
                           const double* signals, const std::vector<int>& targets, double* out);
 
 /// Derivatives of the log-likelihood with respect to the logarithms of the noise parameters
-/// (sensor, motion, wander, correlation time), and their expected information (row-major).
+/// (sensor, motion, disturbance, correlation time), and their expected information (row-major).
 double noise_score(const Problem& problem, const double* p, const Noise& noise, double* gradient,
                    double* information);
 

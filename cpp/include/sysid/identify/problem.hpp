@@ -24,17 +24,17 @@ struct Run {
 /// The noise model that fitting, comparing, diagnosing and validating share.
 ///
 /// Sensors are white. The motion is disturbed by white accelerations, and by forces and a moment
-/// that wander with one correlation time (Ornstein-Uhlenbeck): they take up what the model cannot
+/// with one correlation time (Ornstein-Uhlenbeck): they take up what the model cannot
 /// explain, so that the innovations stay white and the uncertainty honest.
 struct Noise {
-    std::array<double, kChannels> sensor{};      // standard deviations, in the channels' units
-    std::array<double, kMotionStates> motion{};  // per square root of a second
-    std::array<double, kMotionStates> wander{};  // F_x, F_y [N], M_z [N m]
+    std::array<double, kChannels> sensor{};           // standard deviations, in the channels' units
+    std::array<double, kMotionStates> motion{};       // per square root of a second
+    std::array<double, kMotionStates> disturbance{};  // F_x, F_y [N], M_z [N m]
     double correlation_time_s = 0.5;
 };
 constexpr int kNoiseParameters = kChannels + 2 * kMotionStates + 1;
 
-/// Motion and wandering disturbance; with the auxiliary states where an effect has states of its
+/// Motion and disturbance; with the auxiliary states where an effect has states of its
 /// own.
 constexpr int kStatesPlain = 2 * kMotionStates;
 constexpr int kStatesFull = kStatesPlain + kAuxiliaryStates;
@@ -64,7 +64,7 @@ ModelState<S> initial_state(const SingleTrack& model, const Run& run, const T* p
     x[0] = S(first(kVx, 10.0));
     x[1] = S(first(kVy, 0.0));
     x[2] = S(first(kYawRate, 0.0));
-    const std::array<S, kPushes> calm{};
+    const std::array<S, kExternals> calm{};
     settle_auxiliary(model, x, calm.data(), run.inputs.front(), p);
     return x;
 }

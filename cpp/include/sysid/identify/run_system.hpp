@@ -24,9 +24,9 @@ class RunSystem {
         for (int i = 0; i < kMotionStates; ++i) {
             const auto n = static_cast<std::size_t>(i);
             process_(i, i) = noise.motion[n] * noise.motion[n] * run.dt;
-            wander_variance_[i] = noise.wander[n] * noise.wander[n];
+            disturbance_variance_[i] = noise.disturbance[n] * noise.disturbance[n];
             process_(kMotionStates + i, kMotionStates + i) =
-                wander_variance_[i] * (1.0 - forget_ * forget_);
+                disturbance_variance_[i] * (1.0 - forget_ * forget_);
         }
         sensors_.setZero();
         for (int i = 0; i < kChannels; ++i) {
@@ -52,7 +52,7 @@ class RunSystem {
         variance[0] = 1.0;
         variance[1] = 1.0;
         variance[2] = 0.04;
-        variance.template segment<kMotionStates>(kMotionStates) = wander_variance_;
+        variance.template segment<kMotionStates>(kMotionStates) = disturbance_variance_;
         constexpr auto spreads = effect_state_spreads();
         for (std::size_t i = 0; i < own_.count; ++i)
             variance[packed(i)] = spreads[own_.place[i]] * spreads[own_.place[i]];
@@ -69,8 +69,8 @@ class RunSystem {
             A(i, i) = forget_;
         }
         const int substeps = substeps_for(model_, p_, x[0], run_.dt);
-        in_passes(x, [&](ModelState<D>& s, const auto& push, auto&& keep) {
-            advance(model_, s, push.data(), run_.inputs[k - 1], run_.inputs[k], p_, run_.dt,
+        in_passes(x, [&](ModelState<D>& s, const auto& external, auto&& keep) {
+            advance(model_, s, external.data(), run_.inputs[k - 1], run_.inputs[k], p_, run_.dt,
                     substeps);
             for (int i = 0; i < kMotionStates; ++i)
                 keep(s[static_cast<std::size_t>(i)], i, next, A);
@@ -82,8 +82,8 @@ class RunSystem {
 
     Vec<kChannels> observe(std::size_t k, const Vec<NX>& x, Mat<kChannels, NX>& H) const {
         Vec<kChannels> expected;
-        in_passes(x, [&](ModelState<D>& s, const auto& push, auto&& keep) {
-            const auto y = sense(model_, s, push.data(), run_.inputs[k], p_);
+        in_passes(x, [&](ModelState<D>& s, const auto& external, auto&& keep) {
+            const auto y = sense(model_, s, external.data(), run_.inputs[k], p_);
             for (int i = 0; i < kChannels; ++i)
                 keep(y[static_cast<std::size_t>(i)], i, expected, H);
         });
@@ -110,7 +110,7 @@ class RunSystem {
         const int wanted = kStatesPlain + static_cast<int>(own_.count);
         for (int first = 0; first < NX; first += kPass) {
             ModelState<D> s{};
-            std::array<D, kPushes> push{};
+            std::array<D, kExternals> external{};
             const auto seeded = [&](int i) {
                 D value(x[i]);
                 if (i >= first && i < first + kPass)
@@ -119,10 +119,10 @@ class RunSystem {
             };
             for (int i = 0; i < kMotionStates; ++i) {
                 s[static_cast<std::size_t>(i)] = seeded(i);
-                push[static_cast<std::size_t>(i)] = seeded(kMotionStates + i);
+                external[static_cast<std::size_t>(i)] = seeded(kMotionStates + i);
             }
             for (std::size_t i = 0; i < own_.count; ++i) s[place(i)] = seeded(packed(i));
-            use(s, push, [&](const D& value, int row, auto& values, auto& slopes) {
+            use(s, external, [&](const D& value, int row, auto& values, auto& slopes) {
                 values[row] = value.v;
                 for (int j = 0; j < kPass; ++j)
                     slopes(row, first + j) = value.d[static_cast<std::size_t>(j)];
@@ -139,7 +139,7 @@ class RunSystem {
     ActiveStates own_;
     ModelState<double> start_;
     double forget_ = 0.0;
-    Vec<kMotionStates> wander_variance_;
+    Vec<kMotionStates> disturbance_variance_;
     Mat<NX, NX> process_;
     Mat<kChannels, kChannels> sensors_;
 };

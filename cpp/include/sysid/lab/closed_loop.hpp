@@ -81,7 +81,8 @@ struct Reckoning {
     }
 };
 
-/// One run of the loop; `normal` holds kSensorCount, `push` three numbers (F_x, F_y, M_z) a sample.
+/// One run of the loop; `normal` holds kSensorCount, `external` three numbers (F_x, F_y, M_z) a
+/// sample.
 template <class Observer>
 class ClosedLoop {
   public:
@@ -93,7 +94,8 @@ class ClosedLoop {
           sensors_(data.sensors, data.dt),
           driver_(data.track) {}
 
-    LoopRecord run(const std::vector<Wanted>& wanted, const double* normal, const double* push) {
+    LoopRecord run(const std::vector<Wanted>& wanted, const double* normal,
+                   const double* external) {
         PlantState x = plant_.at_rest(data_.first_speed_mps);
         x[kPlaceX] = data_.first_x_m;
         x[kPlaceY] = data_.first_y_m;
@@ -104,8 +106,8 @@ class ClosedLoop {
         out.lost_at = wanted.size();
         for (std::size_t k = 0; k < wanted.size(); ++k) {
             poll_interrupt(k);
-            Plant::Pushes outside{};
-            std::copy(push + 3 * k, push + 3 * k + 3, outside.begin());
+            Plant::Externals outside{};
+            std::copy(external + 3 * k, external + 3 * k + 3, outside.begin());
             perfect_.push_back(readings(x, outside));
             if (data_.late_feedback) {
                 place_.correct(sensors_.read(perfect_, normal + k * kSensorCount), 1.0);
@@ -177,9 +179,9 @@ class ClosedLoop {
                                   kSteerLimits, d.limits);
     }
 
-    void measure(const PlantState& x, const Plant::Pushes& push, const double* normal,
+    void measure(const PlantState& x, const Plant::Externals& external, const double* normal,
                  std::size_t k, LoopRecord& out) {
-        perfect_.back() = readings(x, push);  // now with the input that acts
+        perfect_.back() = readings(x, external);  // now with the input that acts
         const Readings y = sensors_.read(perfect_, normal);
         if (!std::isnan(y[kSenseForce])) known_.longitudinal = y[kSenseForce];
         if (!std::isnan(y[kSenseSteer])) known_.steer_rad = y[kSenseSteer];
@@ -191,7 +193,7 @@ class ClosedLoop {
         } else {
             place_.correct(y, k > 0 ? data_.pose_gain : 1.0);
         }
-        record(x, push, y, out);
+        record(x, external, y, out);
     }
 
     void next_loads(const Readings& y) {
@@ -203,20 +205,20 @@ class ClosedLoop {
         if (!std::isnan(y[kSenseLoadRear])) loads_.rear_n = y[kSenseLoadRear];
     }
 
-    Readings readings(const PlantState& x, const Plant::Pushes& push) const {
+    Readings readings(const PlantState& x, const Plant::Externals& external) const {
         const Input& u = next_.acts;
-        const auto y = plant_.sensed(x, u, push);
-        const PlantTruth t = plant_.look(x, u, push);
+        const auto y = plant_.sensed(x, u, external);
+        const PlantTruth t = plant_.look(x, u, external);
         return {
             y[kVx],     y[kVy],     y[kYawRate],  y[kAx],      y[kAy],         x[kHeading],
             x[kPlaceX], x[kPlaceY], t.load_front, t.load_rear, u.longitudinal, u.steer_rad,
         };
     }
 
-    void record(const PlantState& x, const Plant::Pushes& push, const Readings& y,
+    void record(const PlantState& x, const Plant::Externals& external, const Readings& y,
                 LoopRecord& out) const {
         const Decision& d = next_;
-        const PlantTruth t = plant_.look(x, d.acts, push);
+        const PlantTruth t = plant_.look(x, d.acts, external);
         const auto add = [](std::vector<double>& to, std::initializer_list<double> values) {
             to.insert(to.end(), values);
         };
@@ -257,6 +259,6 @@ class ClosedLoop {
 /// The loop around the extended-state observer.
 LoopRecord run_closed_loop(const LoopData& data, const Plant& plant,
                            const LoopObserverData& observer, const std::vector<Wanted>& wanted,
-                           const double* normal, const double* push);
+                           const double* normal, const double* external);
 
 }  // namespace sysid::lab

@@ -7,7 +7,7 @@
 //                                  + C_f l_f d
 //   a_y    = (Y + xi_y) / m               s = max(v_x, 1)
 //
-// The xi wander freely: they are what the sensors say and the model does not, a virtual force
+// The xi are random walks: what the sensors say and the model does not, a virtual force
 // sensor (Han, IEEE Trans. Ind. Electron. 2009).
 #pragma once
 
@@ -29,7 +29,8 @@ using ObserverMat = Mat<kObserverStates, kObserverStates>;
 using ObserverReading = Vec<kObserverMeasurements>;  // v_x, v_y, r, a_y; NaN where missing
 using ObserverRow = Mat<kObserverMeasurements, kObserverStates>;
 
-/// Which model of the two the filter uses, feature by feature; the default has all of them mended.
+/// Which model of the two the filter uses, feature by feature; the default has all of them
+/// corrected.
 struct ObserverForm {
     bool feed_through = true;     // the steering angle enters a_y at once
     bool input_before = true;     // x(k) follows from the inputs of k-1, not of k
@@ -37,7 +38,7 @@ struct ObserverForm {
     bool coupling = true;         // v_y r in the v_x equation and the full Jacobian
     bool speed_predicted = true;  // a_y with the predicted speed, not the estimate before it
 
-    static ObserverForm mended() { return {}; }
+    static ObserverForm corrected() { return {}; }
     static ObserverForm published() { return {false, false, false, false, false}; }
 };
 
@@ -79,8 +80,8 @@ class ObserverModel {
     ObserverModel with_form(const ObserverForm& form) const { return {car_, form, dt_}; }
 
     /// State one sample after `x`, and the first three rows of the Jacobian `A` that leads there;
-    /// the others are the unit matrix's, as the forces only wander. Without any reading at the new
-    /// sample (`unread`) nothing holds Euler's rule where it grows, at low speed: estimate and
+    /// the others are the unit matrix's, as the forces are random walks. Without any reading at the
+    /// new sample (`unread`) nothing holds Euler's rule where it grows, at low speed: estimate and
     /// covariance would overflow within seconds. The rates are sampled exactly there in any form.
     ObserverVec predict(const ObserverVec& x, const ObserverInput& before, const ObserverInput& now,
                         ObserverMat& A, bool unread = false) const {

@@ -45,7 +45,7 @@ struct PlantTruth {
 class Plant {
   public:
     using Parameters = std::array<double, kParameterCount>;
-    using Pushes = std::array<double, kPushes>;
+    using Externals = std::array<double, kExternals>;
 
     Plant(SingleTrack model, const double* p, const PlantOptions& options)
         : model_(std::move(model)), options_(options) {
@@ -56,7 +56,7 @@ class Plant {
         if (options.late_loads) {
             const PlantState origin{};
             const Input still;
-            const Pushes calm{};
+            const Externals calm{};
             const Workings<double> w = workings(origin, still, calm);
             model_.held = {true, w.fz0_f, w.fz0_r};
         }
@@ -69,7 +69,7 @@ class Plant {
     PlantState at_rest(double speed_mps) const {
         ModelState<double> motion{};
         motion[0] = speed_mps;
-        const Pushes calm{};
+        const Externals calm{};
         const Input still;
         settle_auxiliary(model_, motion, calm.data(), still, parameters_.data());
         PlantState x{};
@@ -77,8 +77,8 @@ class Plant {
         return x;
     }
 
-    PlantTruth look(const PlantState& x, const Input& u, const Pushes& push) const {
-        const Workings<double> w = workings(x, u, push);
+    PlantTruth look(const PlantState& x, const Input& u, const Externals& external) const {
+        const Workings<double> w = workings(x, u, external);
         const double share = options_.load_share;
         return {
             w.a_x,  w.a_y,  w.r_dot,        w.alpha_f,      w.alpha_r,
@@ -88,26 +88,29 @@ class Plant {
 
     /// What perfect sensors read: v_x, v_y, r, a_x, a_y with the effects that act on sensors.
     std::array<double, kChannels> sensed(const PlantState& x, const Input& u,
-                                         const Pushes& push) const {
+                                         const Externals& external) const {
         std::array<double, kChannels> y;
-        model_.sense(workings(x, u, push), parameters_.data(), x.data() + kMotionStates, y.data());
+        model_.sense(workings(x, u, external), parameters_.data(), x.data() + kMotionStates,
+                     y.data());
         return y;
     }
 
     /// Moves `x` over one sample, the inputs going evenly from `from` to `to`.
-    void advance(PlantState& x, const Input& from, const Input& to, const Pushes& push, double dt) {
+    void advance(PlantState& x, const Input& from, const Input& to, const Externals& external,
+                 double dt) {
         HeldLoads next = model_.held;
         if (options_.late_loads) {
-            const Workings<double> w = workings(x, from, push);
+            const Workings<double> w = workings(x, from, external);
             next = {true, w.fz_f, w.fz_r};
         }
         const auto rate = [&](double part, const PlantState& at) {
-            return derivative(at, between(from, to, part), push);
+            return derivative(at, between(from, to, part), external);
         };
         if (options_.tolerance > 0.0) {
             dormand_prince(x, dt, options_.tolerance, rate);
         } else {
-            runge_kutta(x, dt, options_.steps > 0 ? options_.steps : steps_for(x, from, push, dt),
+            runge_kutta(x, dt,
+                        options_.steps > 0 ? options_.steps : steps_for(x, from, external, dt),
                         rate);
         }
         model_.held = next;
@@ -115,13 +118,13 @@ class Plant {
 
   private:
     /// As many as keep motion and lags at a fifth of their rates: a car has no step error.
-    int steps_for(const PlantState& x, const Input& u, const Pushes& push, double dt) const {
+    int steps_for(const PlantState& x, const Input& u, const Externals& external, double dt) const {
         const double speed = std::max(std::abs(x[0]), kLowestSpeed);
         double fastest = model_.fastest_rate(parameters_.data(), speed);
         PlantState rate{};
         LagStep<double> step;
         step.fastest = &fastest;
-        model_.evaluate(x.data(), push.data(),
+        model_.evaluate(x.data(), external.data(),
                         Lags<double>(LagStage::kRates, x.data() + kMotionStates,
                                      rate.data() + kMotionStates, step),
                         u, parameters_.data(), rate.data());
@@ -129,19 +132,19 @@ class Plant {
                        std::clamp(std::ceil(dt * fastest / 0.8), 1.0, 1.0 * kMostSubsteps));
     }
 
-    Workings<double> workings(const PlantState& x, const Input& u, Pushes push) const {
+    Workings<double> workings(const PlantState& x, const Input& u, Externals external) const {
         PlantState ignored;
-        return evaluate(x, u, push, ignored);
+        return evaluate(x, u, external, ignored);
     }
 
-    Workings<double> evaluate(const PlantState& x, const Input& u, Pushes push,
+    Workings<double> evaluate(const PlantState& x, const Input& u, Externals external,
                               PlantState& rate) const {
         const double sideways =
             options_.air_speed_of_both ? 0.5 * model_.car.air_density_kgpm3 * x[1] * x[1] : 0.0;
-        push[kForceX] -= sideways * model_.car.drag_area_m2;
+        external[kForceX] -= sideways * model_.car.drag_area_m2;
         Workings<double> w =
-            model_.evaluate(x.data(), push.data(), x.data() + kMotionStates, u, parameters_.data(),
-                            rate.data(), rate.data() + kMotionStates);
+            model_.evaluate(x.data(), external.data(), x.data() + kMotionStates, u,
+                            parameters_.data(), rate.data(), rate.data() + kMotionStates);
         for_each_active(model_.effects, parameters_.data() + kBaseParameterCount,
                         [&](auto effect, const double* own, std::size_t /*state*/) {
                             if constexpr (std::is_same_v<decltype(effect), AeroDownforce>) {
@@ -152,9 +155,9 @@ class Plant {
         return w;
     }
 
-    PlantState derivative(const PlantState& x, const Input& u, const Pushes& push) const {
+    PlantState derivative(const PlantState& x, const Input& u, const Externals& external) const {
         PlantState rate;
-        evaluate(x, u, push, rate);
+        evaluate(x, u, external, rate);
         const double c = std::cos(x[kHeading]);
         const double s = std::sin(x[kHeading]);
         rate[kPlaceX] = c * x[0] - s * x[1];

@@ -74,35 +74,36 @@ inline SideslipEstimate rolling_without_slip(double lf_m, double lr_m, const Sen
     return out;
 }
 
-/// Standard deviations; those of things that wander are per root second. The defaults were chosen
+/// Standard deviations; those of things that walk are per root second. The defaults were chosen
 /// on random cars in three simulators (benchmarks/online/choose_noise.py).
 struct ObserverSettings {
     // white noise of the sensors
     double vx_mps = 0.05, yaw_rate_radps = 0.005, ax_mps2 = 0.1, ay_mps2 = 0.1;
     // lateral acceleration that moves the car but that no accelerometer feels (road bank), and the
-    // share of it that it feels too much, by gravity in body roll: expected, doubt, delay
+    // share of it that it feels too much, by gravity in body roll: expected, standard deviation,
+    // delay
     double road_mps2 = 0.02, road_time_s = 10.0;
     double roll_expected = 0.03, roll_share = 0.05, roll_time_s = 0.1;
     // lateral axle forces as observer A lets them change, as a share of the load
-    double force_wander = 1.0;
+    double force_walk = 1.0;
     // error of the tyre model, as a share of load, lateral force, and grip lost to braking
     double error_load = 0.003, error_lateral = 0.05, error_braking = 0.15, error_time_s = 0.25;
     // yaw moment by drive and brakes: share of their force, at half the wheelbase
     double error_drive = 0.05;
     // what neither tyres nor road explain of yaw rate and sideslip
-    double yaw_wander_radps = 0.02, sideslip_wander_rad = 0.0003;
-    // logarithm of the tyre's numbers: stiffness is doubtful at first and wanders in hard driving,
+    double yaw_walk_radps = 0.02, sideslip_walk_rad = 0.0003;
+    // logarithm of the tyre's numbers: stiffness is uncertain at first and changes in hard driving,
     // friction changes with the road and comes back
-    double stiffness_prior = 0.4, stiffness_wander = 0.0003;
+    double stiffness_prior = 0.4, stiffness_walk = 0.0003;
     double friction_prior = 0.05, friction_time_s = 50.0;
-    double relaxation_m = 0.5, relaxation_doubt = 0.3;  // of both axles, and of its logarithm
+    double relaxation_m = 0.5, relaxation_std = 0.3;  // of both axles, and of its logarithm
     // gate, frozen sensors, low speed
     double gate_probability = 1e-6, gate_patience_s = 3.0, frozen_after_s = 0.2;
     double stop_below_mps = 3.0, go_above_mps = 4.0;
     // longitudinal force as the observers let it change, as a share of the weight
-    double fx_wander = 0.3;
+    double fx_walk = 0.3;
     // the three-state observer: errors of the sideslip rate and of the lateral acceleration
-    double beta_wander_radps = 0.004, model_ay_mps2 = 0.3;
+    double beta_walk_radps = 0.004, model_ay_mps2 = 0.3;
 };
 
 }  // namespace sysid

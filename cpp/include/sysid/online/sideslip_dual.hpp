@@ -1,8 +1,8 @@
 // Dual unscented observer for sideslip and tyres.
 //
 // Observer A turns the sensors into forces: state (v_x, r, F_yf, F_yr, F_x), measured
-// (v_x, r, a_x, a_y); the forces wander freely, no tyre is assumed. Observer B knows tyres: state
-// beta, r, both slip angles behind their relaxation length, and what is doubtful of the tyres:
+// (v_x, r, a_x, a_y); the forces walk freely, no tyre is assumed. Observer B knows tyres: state
+// beta, r, both slip angles behind their relaxation length, and what is uncertain of the tyres:
 // stiffness, grip, an error of the force for each axle, and the relaxation length; of the road, of
 // body roll, and of the yaw moment by drive and brakes (a locking differential makes one as large
 // as a tenth of the tyres'). It reads r and a_y. Both run beside each other: A gives B the speed
@@ -73,8 +73,8 @@ struct TyreModel {  // observer B
         AxleLoads loads{};
         double error_f_n = 0.0, error_r_n = 0.0;  // standard deviation of the tyre model's error
         double drive_nm = 0.0;                    // standard deviation of that yaw moment
-        double stiffness_wander_f = 0.0, stiffness_wander_r = 0.0;  // [1/sqrt(s)]
-        double slip_f_wander = 0.0;  // of an unknown steering angle [rad/sqrt(s)]
+        double stiffness_walk_f = 0.0, stiffness_walk_r = 0.0;  // [1/sqrt(s)]
+        double slip_f_walk = 0.0;  // of an unknown steering angle [rad/sqrt(s)]
     };
 
     ObservedCar car;

@@ -21,10 +21,10 @@ struct BatchParameter {
     int parameter = kMass;
     double step = 1.0;    // between the twins
     double spread = 1.0;  // standard deviation of the first guess
-    double walk = 0.0;    // per root of a second: how far the truth may wander
+    double walk = 0.0;    // per root of a second: how far the truth may change
     double lower = 0.0, upper = 0.0;
     // Not estimated but considered: the first guess stays, the others are estimated as if it were
-    // exact, and their spreads hold what its doubt does to them. At most one.
+    // exact, and their spreads hold what its uncertainty does to them. At most one.
     bool considered = false;
 };
 
@@ -66,9 +66,9 @@ class BatchEstimator {
 
     /// Standard deviations in parts of the first spread: of least squares, or, where more, those
     /// that the sums of slope times residual over blocks show (White's and Huber's sandwich
-    /// P B P). Residuals that are not white, or that go with the slopes, widen them. The doubt of
-    /// what is considered comes on top: how the estimates lean on it goes along with them (Bierman,
-    /// Factorization Methods for Discrete Sequential Estimation (1977), ch. VIII).
+    /// P B P). Residuals that are not white, or that go with the slopes, widen them. The
+    /// uncertainty of what is considered comes on top: how the estimates lean on it goes along with
+    /// them (Bierman, Factorization Methods for Discrete Sequential Estimation (1977), ch. VIII).
     Eigen::VectorXd spread() const;
 
     /// How many readings a row must have.

@@ -53,7 +53,7 @@ inline Load to_load(const LoadVector& v) {
     };
 }
 
-/// What an observer estimates: a load, and a factor of those inputs whose size is doubted.
+/// What an observer estimates: a load, and a factor of those inputs whose size is uncertain.
 constexpr int kInputScale = kLoadParameters;
 constexpr std::size_t kEstimates = kLoadParameters + 1;
 using Estimates = std::array<double, kEstimates>;

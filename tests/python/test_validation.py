@@ -6,7 +6,7 @@ import pytest
 from sysid_vehicle import Log
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.estimate import Driving
-from sysid_vehicle.study.held_out import _with_error, hold_out
+from sysid_vehicle.study.validation import _with_error, set_aside
 
 
 @pytest.mark.parametrize("length_s", [60.0, 3.0])
@@ -56,7 +56,7 @@ def test_what_lasts_for_seconds_is_not_taken_for_many_pieces_of_evidence(
 
 def test_the_end_of_the_only_log_is_held_out(lap: Log) -> None:
     with pytest.warns(SysidWarning, match="'lap' is fitted up to 28.0 s and the rest is held out"):
-        train, test = hold_out(lap, None)
+        train, test = set_aside(lap, None)
     assert train.logs[0]["time_s"][-1] == pytest.approx(28.0)
     assert test.logs[0]["time_s"][-1] == lap["time_s"][-1]
     assert abs(train.samples + test.samples - lap.n) <= 1
@@ -64,13 +64,13 @@ def test_the_end_of_the_only_log_is_held_out(lap: Log) -> None:
 
 def test_the_last_of_several_logs_is_held_out(lap: Log, course: Log) -> None:
     with pytest.warns(SysidWarning, match="'handling_course' is held out"):
-        train, test = hold_out([lap, course], None)
+        train, test = set_aside([lap, course], None)
     assert train.logs == (lap,)
     assert test.logs == (course,)
 
 
 def test_logs_given_are_taken_as_they_are(lap: Log, course: Log) -> None:
-    train, test = hold_out([lap], course)
+    train, test = set_aside([lap], course)
     assert (train.logs, test.logs) == ((lap,), (course,))
     with pytest.raises(InvalidInput, match="no log was given"):
-        hold_out([], None)
+        set_aside([], None)

@@ -23,7 +23,7 @@ from sysid_vehicle import (
 )
 from sysid_vehicle.compare import out_of_time, unrelated
 from sysid_vehicle.diagnose import Omnibus
-from sysid_vehicle.diagnose.doubt import confirmed, doubt
+from sysid_vehicle.diagnose.reservation import confirmed, reservation
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import MEASURED, Driving
 
@@ -96,7 +96,9 @@ def test_a_late_yaw_rate_is_told_and_no_inertia_is_named(
     dx = diagnose(fit, candidates=few)
     assert dx.significant[0].id == "yaw_inertia"
     assert dx.named is None
-    told = re.search(r"yaw_rate_radps: lags behind ay_mps2 by (\S+) s \(\+- (\S+)\)", dx.doubt)
+    told = re.search(
+        r"yaw_rate_radps: lags behind ay_mps2 by (\S+) s \(\+- (\S+)\)", dx.reservation
+    )
     assert told is not None
     assert float(told[1]) == pytest.approx(0.1, abs=2.0 * float(told[2]))
     assert float(told[2]) < 0.02
@@ -146,7 +148,7 @@ def test_a_missing_effect_is_named_and_others_stay_open(
     truth: Model, hidden_fit: Callable[[str, float], Fit]
 ) -> None:
     dx = diagnose(hidden_fit("steer_offset.offset_rad", 0.002))
-    assert dx.doubt == ""
+    assert dx.reservation == ""
     assert dx.named is not None
     assert dx.named.id == dx.best.id == "steer_offset"
     assert str(dx).startswith("most likely missing: ")
@@ -204,13 +206,13 @@ def test_what_stays_as_it_was_is_doubted(fit: Fit) -> None:
             self.board = type("Board", (), {"family_p_values": lambda _: dict(enumerate(others))})()
 
     before = Omnibus(450.0, 50, 1e-60, "F_y")
-    assert doubt(Left(60.0, 0.2), before, 3.0, 1.0) == ""  # type: ignore[arg-type]
-    stays = doubt(Left(430.0, 1e-50, 0.001), before, 3.0, 2.95)  # type: ignore[arg-type]
+    assert reservation(Left(60.0, 0.2), before, 3.0, 1.0) == ""  # type: ignore[arg-type]
+    stays = reservation(Left(430.0, 1e-50, 0.001), before, 3.0, 2.95)  # type: ignore[arg-type]
     assert "95 % of the evidence" in stays
     assert "ay_mps2" in stays
     # Beside another effect that is missing too much is left.
-    assert doubt(Left(430.0, 1e-50, 0.001), before, 3.0, 2.0) == ""  # type: ignore[arg-type]
-    alone = doubt(Left(150.0, 1e-9, 0.5), before, 3.0, 1.5)  # type: ignore[arg-type]
+    assert reservation(Left(430.0, 1e-50, 0.001), before, 3.0, 2.0) == ""  # type: ignore[arg-type]
+    alone = reservation(Left(150.0, 1e-9, 0.5), before, 3.0, 1.5)  # type: ignore[arg-type]
     assert "no other effect of the catalogue explains that" in alone
 
 

@@ -1,4 +1,4 @@
-"""Driving the fit never sees: how it is set aside, and what it says of two models."""
+"""validation data: how it is set aside, and what it says of two models."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ __all__ = [
     "error_falls",
     "fall_in_error",
     "gain_in_log_likelihood",
-    "hold_out",
     "serving",
+    "set_aside",
 ]
 
 _SHARE = 0.3
@@ -35,7 +35,7 @@ _AHEAD = (1.0, 2.0, 5.0)
 _NONE = Gain(-np.inf, 0.0, -np.inf, 0.0)
 
 
-def hold_out(
+def set_aside(
     train: Log | Sequence[Log], test: Log | Sequence[Log] | None
 ) -> tuple[Driving, Driving]:
     """Training and validation data; without `test`: the last log, or 30 % of the only one."""

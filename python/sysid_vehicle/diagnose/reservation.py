@@ -21,7 +21,7 @@ from .evidence import Evidence
 from .omnibus import Omnibus, omnibus_of
 from .score import ScoreBoard, score_board_of
 
-__all__ = ["Beside", "beside", "confirmed", "doubt"]
+__all__ = ["Beside", "beside", "confirmed", "reservation"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def confirmed(statistic: float, effect: Effect, rules: Rules = USUAL) -> bool:
     return float(scipy.stats.chi2.sf(statistic, len(effect.parameters))) < rules.level
 
 
-def doubt(
+def reservation(
     left: Beside,
     before: Omnibus,
     error_before: float,
