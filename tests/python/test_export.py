@@ -1,7 +1,9 @@
 """Exported models drive like the compiled one."""
 
+import io
 import shutil
 import subprocess
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +12,10 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle.errors import InvalidInput, SysidWarning
-from sysid_vehicle.export import cpp_text, identified_vehicle, python_text, tir_text
+from sysid_vehicle.export import cpp_text, fmu_bytes, identified_vehicle, python_text, tir_text
 from sysid_vehicle.export._equations import _ACTS
 from sysid_vehicle.simulate import drive_truth
+from sysid_vehicle.twin import FMUTwin, FMUVariables
 
 SENSORS = {
     *("accelerometer_bias", "accelerometer_scale", "body_attitude", "gyro_bias", "gyro_scale"),
@@ -157,6 +160,85 @@ def test_casadi(truth: sv.Model, rng: np.random.Generator) -> None:
         found = function(state, given)
         np.testing.assert_allclose(found[0].full().ravel(), rate, rtol=1e-10, atol=1e-10)
         np.testing.assert_allclose(found[1].full().ravel(), [a_x, a_y], rtol=1e-10)
+
+
+@pytest.fixture(scope="module")
+def unit(lap_model: sv.Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("fmpy")
+    if shutil.which("c++") is None:
+        pytest.skip("there is no C++ compiler")
+    (path,) = sv.export(lap_model, tmp_path_factory.mktemp("fmu") / "car.fmu")
+    return path
+
+
+class TestFMU:
+    def test_it_is_valid_and_the_same_each_time(self, unit: Path, lap_model: sv.Model) -> None:
+        from fmpy.validation import validate_fmu
+
+        assert validate_fmu(str(unit)) == []
+        with zipfile.ZipFile(unit) as archive:
+            names = archive.namelist()
+            assert {"sources/identified_car.cpp", "sources/buildDescription.xml"} <= set(names)
+            assert sum(name.startswith("binaries/") for name in names) == 1
+            again = zipfile.ZipFile(io.BytesIO(fmu_bytes(lap_model)))
+            for name in names[:3]:
+                assert archive.read(name) == again.read(name)
+
+    @pytest.mark.parametrize("kind", ["model_exchange", "co_simulation"])
+    def test_over_a_lap(self, unit: Path, driven: Any, lap_model: sv.Model, kind: Any) -> None:
+        """A master holds inputs over its steps: ten to a sample follow what is linear between."""
+        rates = ("v_x", "v_y", "r")
+        variables = FMUVariables(
+            {"steer": "steer", "force": "force"},
+            {n: n for n in ("v_x", "v_y", "r", "a_x", "a_y", "sideslip")},
+            start=dict(zip(rates, map(float, driven.states[0, :3]), strict=True)),
+            states=rates if kind == "model_exchange" else (),
+        )
+        parts, count = 10, 400
+        exported = module_of(lap_model)
+        with FMUTwin(unit, variables, dt_s=0.01 / parts, kind=kind) as twin:
+            state = np.array(driven.states[0, :3])
+            for k in range(count):
+                before, after = driven.inputs[k], driven.inputs[k + 1]
+                for n in range(parts):
+                    held = before + (after - before) * ((n + 0.5) / parts)
+                    twin.step(held)
+                    state = exported["step"](state, held, held, 0.01 / parts, substeps=1)
+                told = twin.outputs(held)
+                np.testing.assert_allclose(told[:3], state, rtol=0.0, atol=1e-8)
+            assert told[5] == pytest.approx(np.arctan2(state[1], state[0]), abs=1e-9)
+            np.testing.assert_allclose(told[:3], driven.states[count, :3], rtol=0.0, atol=1e-4)
+
+    def test_its_parameters_can_be_tuned(self, unit: Path) -> None:
+        variables = FMUVariables(
+            {"steer": "steer", "force": "force"}, {"v_x": "v_x"}, {"mass_kg": "mass"}
+        )
+        speeds = []
+        for factor in (1.0, 2.0):
+            with FMUTwin(unit, variables, dt_s=0.01) as twin:
+                twin.set_parameters({"mass_kg": factor * twin.get_parameters()["mass_kg"]})
+                drive = np.array([0.0, 3000.0])
+                twin.step(drive)
+                speeds.append(float(twin.outputs(drive)[0]) - 20.0)
+        assert speeds[0] / speeds[1] == pytest.approx(2.0, rel=0.2)
+
+    def test_without_a_compiler_it_holds_its_source(
+        self, monkeypatch: pytest.MonkeyPatch, lap_model: sv.Model, tmp_path: Path
+    ) -> None:
+        monkeypatch.setattr(shutil, "which", lambda name: None)
+        monkeypatch.delenv("CXX", raising=False)
+        with pytest.warns(SysidWarning, match="no C\\+\\+ compiler was found"):
+            sv.export(lap_model, tmp_path / "car.fmu")
+        with zipfile.ZipFile(tmp_path / "car.fmu") as archive:
+            assert not [n for n in archive.namelist() if n.startswith("binaries/")]
+
+    def test_a_compiler_that_fails_is_told(
+        self, monkeypatch: pytest.MonkeyPatch, lap_model: sv.Model, tmp_path: Path
+    ) -> None:
+        monkeypatch.setenv("CXX", "false")
+        with pytest.raises(InvalidInput, match="false failed"):
+            sv.export(lap_model, tmp_path / "car.fmu")
+        assert not (tmp_path / "car.fmu").exists()
 
 
 def magic_52(text: str, alpha: np.ndarray, load: float) -> np.ndarray:

@@ -1,20 +1,29 @@
-"""Identified models for use elsewhere: Python, C++, CasADi, property files of tyres, TOML."""
+"""Identified models for use elsewhere: Python, C++, CasADi, FMU, property files of tyres, TOML."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from .._files import as_path, write_text
+from .._files import as_path, write_bytes, write_text
 from ..errors import InvalidInput, warn
 from ..identify import Fit
 from ..model import Model
 from ..vehicle import Tyre, Vehicle
+from ._fmu import fmu_bytes
 from ._languages import casadi_function, cpp_text, python_text
 from ._tyres import tir_text
 
-__all__ = ["casadi_function", "cpp_text", "export", "identified_vehicle", "python_text", "tir_text"]
+__all__ = [
+    "casadi_function",
+    "cpp_text",
+    "export",
+    "fmu_bytes",
+    "identified_vehicle",
+    "python_text",
+    "tir_text",
+]
 
-_SUFFIXES = ".py, .hpp, .h, .tir or .toml"
+_SUFFIXES = ".py, .hpp, .h, .fmu, .tir or .toml"
 
 
 def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
@@ -25,9 +34,10 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
     what : Model or Fit
     path : str or Path
         ``.py``: a module of Python that needs NumPy alone. ``.hpp`` or ``.h``: a header of C++ that
-        needs the standard library alone. ``.tir``: property files of MF 5.2, one for each axle,
-        ``_front`` and ``_rear`` added to the name. ``.toml``: a vehicle file with the tyres and the
-        yaw inertia of the model.
+        needs the standard library alone. ``.fmu``: a Functional Mock-up Unit of FMI 3.0 for model
+        exchange and co-simulation, compiled for this platform, with its source. ``.tir``: property
+        files of MF 5.2, one for each axle, ``_front`` and ``_rear`` added to the name. ``.toml``: a
+        vehicle file with the tyres and the yaw inertia of the model.
 
     Returns
     -------
@@ -43,6 +53,9 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
     model = what.model if isinstance(what, Fit) else what
     path = as_path(path)
     suffix = path.suffix.lower()
+    if suffix == ".fmu":
+        write_bytes(path, fmu_bytes(model))
+        return (path,)
     if suffix == ".tir":
         files = {path.with_stem(f"{path.stem}_{a}"): tir_text(model, a) for a in ("front", "rear")}
     elif suffix == ".py":

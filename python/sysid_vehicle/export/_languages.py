@@ -15,7 +15,8 @@ _ABOUT = (
 )
 
 
-def _title(model: Model, e: Equations) -> list[str]:
+def title(model: Model, e: Equations) -> list[str]:
+    """Say in lines what the equations are of."""
     acting = [p.id for p in model.parts if p.id not in e.left_out]
     name = " ".join(model.vehicle.name.split())  # one line, whatever it holds
     what = ", ".join(acting) or "baseline"
@@ -39,10 +40,10 @@ def python_text(model: Model) -> str:
     """
     e = equations(model)
     names = [name for name, _ in e.states]
-    title = "\n".join(_title(model, e)).replace("\\", "").replace('"""', "'''")
+    about = "\n".join(title(model, e)).replace("\\", "").replace('"""', "'''")
     constants = "\n".join(f"{name} = {value!r}  # {told}" for name, value, told in e.constants)
     body = "\n".join(f"    {line}" for line in e.lines)
-    return f'''"""{title}
+    return f'''"""{about}
 """
 
 from numpy import arctan as atan
@@ -77,23 +78,28 @@ def step(state, before, after, dt, substeps=4):
 '''
 
 
+def cpp_assignments(e: Equations) -> list[str]:
+    """Statements of C++ in the order of the equations; each name is declared where it is new."""
+    statements, known = [], set()
+    for line in e.lines:
+        name, _, expression = line.partition(" = ")
+        statements.append(f"{'' if name in known else 'double '}{name} = {expression};")
+        known.add(name)
+    return statements
+
+
 def cpp_text(model: Model) -> str:
     """Return a header of C++11 that needs the standard library alone."""
     e = equations(model)
     names = [name for name, _ in e.states]
-    title = "\n".join(f"// {line}" for line in _title(model, e)).replace("\\", "")
+    about = "\n".join(f"// {line}" for line in title(model, e)).replace("\\", "")
     constants = "\n".join(
         f"constexpr double {name} = {value!r};  // {told}" for name, value, told in e.constants
     )
     read = "\n".join(f"    const double {name} = state[{k}];" for k, name in enumerate(names))
-    body, known = [], set()
-    for line in e.lines:
-        name, _, expression = line.partition(" = ")
-        body.append(f"    {'' if name in known else 'double '}{name} = {expression};")
-        known.add(name)
     written = "\n".join(f"    rate[{k}] = {name}_rate;" for k, name in enumerate(names))
-    text = "\n".join(body)
-    return f"""{title}
+    text = "\n".join(f"    {line}" for line in cpp_assignments(e))
+    return f"""{about}
 #pragma once
 
 #include <array>
