@@ -74,9 +74,25 @@ def test_nothing_is_claimed_of_a_complete_model(complete_fits: tuple[Fit, ...]) 
 
 def test_scores_alone_need_no_refit(hidden_fit: Hidden, found: Diagnosis) -> None:
     quick = diagnose(hidden_fit(*OFFSET), refits=0)
-    assert quick.best.id == "steer_offset"
+    assert quick.ranking[0].id == "steer_offset"
     assert all(c.fit is None for c in quick.ranking)
+    assert quick.named is None
+    with pytest.raises(InvalidInput, match="steer_offset is likeliest by its score alone"):
+        _ = quick.best
     assert quick.ranking[0].value[0] == pytest.approx(found.ranking[0].value[0], rel=0.2)
+
+
+def test_a_refit_that_failed_names_nothing(found: Diagnosis) -> None:
+    """Nor does an effect beside it that was never refitted, whatever it scores."""
+    first, second = found.ranking[:2]
+    unfitted = replace(first, fit=None, statistic=0.0)
+    assert replace(found, ranking=(unfitted,)).named is None
+    strong = replace(second, fit=None, p_value=0.0, statistic=2.0 * first.statistic)
+    for ranking in ((strong, unfitted), (unfitted, strong)):
+        dx = replace(found, ranking=ranking)
+        assert dx.named is None
+        assert "no refit confirms it" in str(dx)
+    assert replace(found, ranking=(first, strong)).named is first
 
 
 def test_only_the_candidates_asked_for_are_considered(hidden_fit: Hidden) -> None:

@@ -63,7 +63,7 @@ def diagnose(
     rules : Rules
         By which effects are claimed.
     refits : int
-        How many of the best to refit; 0 ranks by score alone.
+        How many of the best to refit; 0 ranks by score alone, and then none is named.
     """
     rules = rules.at(alpha)
     driving = fit.driving if logs is None else Driving.of(logs)

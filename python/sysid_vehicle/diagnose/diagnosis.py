@@ -156,7 +156,7 @@ class Diagnosis:
         """The candidate that may be called missing, if there is one.
 
         The likeliest that a refit confirms, with a value that a car can have, or one that is nearly
-        as likely.
+        as likely. A score alone names nothing.
         """
         return None if self.reservation else self._likeliest
 
@@ -192,7 +192,8 @@ class Diagnosis:
     def beside(self) -> Beside:
         """What is left with the likeliest effect in the model, or without any."""
         first = self._likeliest
-        fit = self.fit if first is None or first.fit is None else first.fit
+        fit = self.fit if first is None else first.fit
+        assert fit is not None  # the likeliest is refitted
         lacked = {e.id for e in self.fit.model.candidates}
         return beside(fit, self.driving, lacked, self.rules)
 
@@ -205,13 +206,16 @@ class Diagnosis:
                 for c in few
                 if c.statistic >= self.rules.near * few[0].statistic
                 and possible(c.effect, c.value, c.std, self.rules)
-                and (c.fit is None or confirmed(c.statistic, c.effect, self.rules))
+                and c.fit is not None
+                and confirmed(c.statistic, c.effect, self.rules)
             ),
             None,
         )
 
     def _refused(self, c: Candidate) -> str:
-        if c.fit is not None and not confirmed(c.statistic, c.effect, self.rules):
+        if c.fit is None:
+            told = f"{c.id} is likeliest by its score alone: no refit confirms it"
+        elif not confirmed(c.statistic, c.effect, self.rules):
             told = f"{c.id} is likeliest by its score, but refitted the model predicts no better"
         else:
             told = f"{c.id} fits best, but its value is physically implausible ({c.size})"

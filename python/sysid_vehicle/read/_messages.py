@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from operator import attrgetter, itemgetter
 from typing import Any
@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidInput
-from ._recording import Signal
+from ._recording import Entry, Recording, Signal
 
 _MOST_ELEMENTS = 64  # of an array that are listed one by one: more are an image or a scan
 _DEPTH = 8
 _SAME_CLOCK_S = 1.0  # stamps that are farther from the recorder's time are of another clock
 
 Getter = Callable[[Any], Any]
+Taken = tuple[str, Any, int]  # topic, message, time of the recorder [ns]
 
 
 def numbers(message: Any, depth: int = _DEPTH) -> Iterator[tuple[str, Getter]]:
@@ -85,7 +86,37 @@ class Topic:
             self.values.setdefault(path, []).append(value)
 
 
-def signals_of(topics: dict[str, Topic], notes: list[str]) -> dict[str, Signal]:
+def recording_of(
+    firsts: Iterable[tuple[str, Any]], messages: Callable[[list[str]], Iterator[Taken]]
+) -> Recording:
+    """Return the numbers in the first message of each topic as channels.
+
+    Parameters
+    ----------
+    firsts : iterable of tuple
+        Topic and first message.
+    messages : callable
+        Yields all messages of some topics, with the times at which they were recorded.
+    """
+    places = {
+        f"{topic}/{path}": (topic, path, get)
+        for topic, message in firsts
+        for path, get in numbers(message)
+    }
+
+    def fetch(names: list[str], notes: list[str]) -> dict[str, Signal]:
+        topics: dict[str, Topic] = {}
+        for name in names:
+            topic, path, get = places[name]
+            topics.setdefault(topic, Topic({})).getters[path] = get
+        for topic, message, recorded_ns in messages(list(topics)):
+            topics[topic].take(message, recorded_ns)
+        return _signals_of(topics, notes)
+
+    return Recording({name: Entry("", topic) for name, (topic, _, _) in places.items()}, fetch)
+
+
+def _signals_of(topics: dict[str, Topic], notes: list[str]) -> dict[str, Signal]:
     """Return the collected signals by ``topic/path``, times from the first stamp of all on.
 
     Raises

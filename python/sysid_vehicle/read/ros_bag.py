@@ -2,47 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from ..errors import InvalidInput
-from ._messages import Getter, Topic, numbers, signals_of
-from ._recording import Entry, Recording, Signal
+from ._messages import Taken, recording_of
+from ._recording import Recording
 
 
 def read(path: Path, dbc: Path | None) -> Recording:
     """List the numbers in the first message of each topic whose type is known."""
-    entries: dict[str, Entry] = {}
-    places: dict[str, tuple[str, str, Getter]] = {}
+    firsts: list[tuple[str, Any]] = []
     with _opened(path) as reader:
         for connection in reader.connections:
-            if connection.msgtype not in reader.typestore.types:
-                continue
-            for _, _, raw in reader.messages(connections=[connection]):
-                topic, message = connection.topic, reader.deserialize(raw, connection.msgtype)
-                for field, get in numbers(message):
-                    entries[f"{topic}/{field}"] = Entry("", topic)
-                    places[f"{topic}/{field}"] = topic, field, get
-                break
-    if not entries:
+            if connection.msgtype in reader.typestore.types:
+                first = next(_messages(reader, [connection]), None)
+                firsts += [] if first is None else [first[:2]]
+
+    def messages(topics: list[str]) -> Iterator[Taken]:
+        with _opened(path) as reader:
+            yield from _messages(reader, [c for c in reader.connections if c.topic in topics])
+
+    recording = recording_of(firsts, messages)
+    if not recording.entries:
         raise InvalidInput(
             f"{path}: holds no message of a known type; record it with the definitions of its "
             f"messages (MCAP does)"
         )
+    return recording
 
-    def fetch(names: list[str], notes: list[str]) -> dict[str, Signal]:
-        topics: dict[str, Topic] = {}
-        for name in names:
-            topic, field, get = places[name]
-            topics.setdefault(topic, Topic({})).getters[field] = get
-        with _opened(path) as reader:
-            wanted = [c for c in reader.connections if c.topic in topics]
-            for connection, recorded_ns, raw in reader.messages(connections=wanted):
-                message = reader.deserialize(raw, connection.msgtype)
-                topics[connection.topic].take(message, recorded_ns)
-        return signals_of(topics, notes)
 
-    return Recording(entries, fetch)
+def _messages(reader: Any, connections: list[Any]) -> Iterator[Taken]:
+    for connection, recorded_ns, raw in reader.messages(connections=connections):
+        yield connection.topic, reader.deserialize(raw, connection.msgtype), recorded_ns
 
 
 def _opened(path: Path) -> Any:
