@@ -1,5 +1,8 @@
 """What drives can tell: separation of rivals, the next drive."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -16,10 +19,11 @@ from sysid_vehicle import (
     manoeuvres,
     suggest_manoeuvre,
 )
+from sysid_vehicle.cli import main
 from sysid_vehicle.diagnose import NextDrive, separations
 from sysid_vehicle.diagnose.information import information_of
-from sysid_vehicle.diagnose.next_drive import extent_m
 from sysid_vehicle.diagnose.score import score_board
+from sysid_vehicle.diagnose.suggestion import Suggestion, ground_m, path_m
 from sysid_vehicle.simulate import drive_truth
 
 LAG, RELAXATION = effect("steer_lag"), effect("tyre_relaxation")
@@ -88,7 +92,11 @@ def test_limits_are_kept(gentle: Fit) -> None:
     assert found.refused > 5
     for s in found.suggestions:
         made = drive_truth(gentle.model, s.manoeuvre, seed=0)
-        assert max(extent_m(made)) <= 66.0
+        assert max(ground_m(made)) <= 66.0
+        assert max(s.ground_m) <= 60.0
+        assert min(s.ground_m) <= 40.0
+        assert s.speed_mps[1] <= 1.02 * small.speed_mps
+        assert s.lateral_mps2 <= 1.05 * small.lateral_mps2
     nowhere = suggest_manoeuvre(
         gentle, LAG, RELAXATION, limits=DriveLimits(20.0, 6.0, area_m=(2.0, 1.0))
     )
@@ -108,3 +116,66 @@ def test_an_effect_the_model_has_is_refused(gentle: Fit) -> None:
     has = identify(gentle.model.add("steer_offset"), gentle.driving, starts=1)
     with pytest.raises(InvalidInput, match="has 'steer_offset' already"):
         suggest_manoeuvre(has, "steer_offset", "road_bank")
+
+
+@pytest.mark.parametrize(
+    ("manoeuvre", "hz"),
+    [
+        (manoeuvres.sine_sweep(speed_mps=20.0, lateral_mps2=3.0), (0.2, 4.0)),
+        (manoeuvres.constant_radius(50.0, 5.0, 60.0), None),
+    ],
+    ids=["sine sweep", "constant radius"],
+)
+def test_a_suggestion_says_how_it_is_driven(
+    truth: Model, manoeuvre: manoeuvres.Manoeuvre, hz: tuple[float, float] | None
+) -> None:
+    drive = drive_truth(truth, manoeuvre, seed=0)
+    told = Suggestion(manoeuvre, drive.log.duration_s, 7.0, drive)
+    if hz is None:
+        assert told.steer_hz is None
+        # A circle to the left and one to the right, each 100 m wide.
+        length, width = told.ground_m
+        assert width == pytest.approx(100.0, rel=0.03)
+        assert 200.0 <= length <= 240.0  # with what leads from one to the other
+    else:
+        assert told.steer_hz is not None
+        assert hz[0] <= told.steer_hz[0] < told.steer_hz[1] <= hz[1]
+        assert told.speed_mps == pytest.approx((20.0, 20.0), abs=0.5)
+    assert f"{told.lateral_mps2:.1f} m/s2" in str(told)
+    assert "Hz" in str(told) or hz is None
+
+
+def test_a_suggestion_as_a_table_and_pictures(truth: Model, tmp_path: Path) -> None:
+    manoeuvre = manoeuvres.step_steer((15.0,), (3.0,))
+    told = Suggestion(manoeuvre, 10.0, 7.0, drive_truth(truth, manoeuvre, seed=0))
+    told.to_csv(tmp_path / "next.csv")
+    read = np.genfromtxt(tmp_path / "next.csv", delimiter=",", names=True)
+    for name, column in told.columns().items():
+        np.testing.assert_allclose(read[name], column, rtol=1e-5, atol=1e-12)
+    # The path has the length that the speed gives it.
+    length = np.hypot(*np.diff(path_m(told.drive), axis=0).T).sum()
+    speed = np.hypot(*told.drive.states[:, :2].T)
+    assert length == pytest.approx(speed[1:].sum() / told.drive.log.rate_hz, rel=1e-9)
+    assert told.plot().get_title() == manoeuvre.name
+    assert [ax.get_title() for ax in told.picture().axes[:2]] == [manoeuvre.name, "steering"]
+
+
+def test_the_next_drive_from_the_command_line(
+    truth: Model, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive(truth, manoeuvres.constant_radius(60.0, 5.0, 30.0), seed=3).to_csv(tmp_path / "log.csv")
+    truth.vehicle.to_toml(tmp_path / "car.toml")
+    base = ["next-drive", str(tmp_path / "log.csv"), "--vehicle", str(tmp_path / "car.toml")]
+    out = {n: tmp_path / f"next.{n}" for n in ("csv", "svg", "json")}
+    wanted = ["--csv", str(out["csv"]), "--picture", str(out["svg"]), "--json", str(out["json"])]
+    limits = ["--top-speed", "15", "--lateral", "6", "--duration", "30"]
+    assert main([*base, "--between", "steer_lag,tyre_relaxation", *limits, *wanted]) == 0
+    printed = capsys.readouterr().out
+    first = json.loads(out["json"].read_text("utf-8"))["suggestions"][0]
+    assert first["manoeuvre"] in printed
+    assert first["speed_mps"][1] <= 15.3
+    assert first["duration_s"] <= 30.0
+    assert out["svg"].read_bytes().startswith(b"<?xml")
+    assert len(out["csv"].read_text("utf-8").splitlines()) > 100
+    assert main([*base, "--between", "steer_lag"]) == 2
+    assert "give two effects" in capsys.readouterr().err

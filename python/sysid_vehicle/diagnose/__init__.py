@@ -11,11 +11,12 @@ from .diagnosis import Candidate, Diagnosis
 from .evidence import Evidence
 from .force_map import ForceMap
 from .hiding import Bias, BiasReport, bias_report
-from .next_drive import DriveLimits, NextDrive, Suggestion, separations, suggest_manoeuvre
+from .next_drive import DriveLimits, NextDrive, separations, suggest_manoeuvre
 from .omnibus import Omnibus, omnibus
 from .possible import Size, possible
 from .proposals import Proposal
 from .shape import Curve, Surface
+from .suggestion import Suggestion
 from .unknown import Unknown, unknown
 from .verdicts import EffectVerdict, Verdicts, judge, verdicts
 from .where import Where, where

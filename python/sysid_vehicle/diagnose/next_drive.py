@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from ..manoeuvres import Manoeuvre
 from ..model import Model
 from ..simulate import Drive, SensorNoise, drive_truth
 from .information import Information, information_of
+from .suggestion import Suggestion, ground_m
 
 __all__ = ["DriveLimits", "NextDrive", "Suggestion", "separations", "suggest_manoeuvre"]
 
@@ -70,28 +72,8 @@ class DriveLimits:
         )
         if self.area_m is None or not inside:
             return bool(inside)
-        long, short = sorted(extent_m(drive), reverse=True)
+        long, short = ground_m(drive)
         return long <= max(self.area_m) and short <= min(self.area_m)
-
-
-@dataclass(frozen=True)
-class Suggestion:
-    """One manoeuvre and what it would tell.
-
-    Attributes
-    ----------
-    manoeuvre : Manoeuvre
-    duration_s : float
-    sigmas : float
-        Standard errors between the rivals after it, together with the driving at hand.
-    """
-
-    manoeuvre: Manoeuvre
-    duration_s: float
-    sigmas: float
-
-    def __str__(self) -> str:
-        return f"{self.manoeuvre.name}, {self.duration_s:.0f} s: {self.sigmas:.1f} standard errors"
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,11 +110,18 @@ class NextDrive:
             raise InvalidInput("no manoeuvre of the library is within the limits; widen them")
         return self.suggestions[0]
 
-    _HEAD = ("manoeuvre", "duration [s]", "standard errors")
+    _HEAD = ("manoeuvre", "standard errors", "time [s]", "m/s", "a_y [m/s2]", "ground [m]")
 
     def _rows(self) -> list[list[str]]:
         return [
-            [s.manoeuvre.name, f"{s.duration_s:.0f}", f"{s.sigmas:.1f}"]
+            [
+                s.manoeuvre.name,
+                f"{s.sigmas:.1f}",
+                f"{s.duration_s:.0f}",
+                "{:.0f} to {:.0f}".format(*s.speed_mps),
+                f"{s.lateral_mps2:.1f}",
+                "{:.0f} x {:.0f}".format(*s.ground_m),
+            ]
             for s in self.suggestions[:8]
         ]
 
@@ -143,10 +132,22 @@ class NextDrive:
     __repr__ = brief
 
     def __str__(self) -> str:
-        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
+        table = f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
+        return f"{table}\nThe first: {self.best.instructions()}" if self.suggestions else table
 
     def _repr_html_(self) -> str:
-        return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
+        best = f"The first: {self.best.instructions()}" if self.suggestions else ""
+        table = html_table(self._HEAD, self._rows())
+        return html_paragraph(self._headline()) + table + html_paragraph(best)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything for a JSON file."""
+        return {
+            "between": [self.first.id, self.second.id],
+            "standard_errors_now": self.now,
+            "refused": self.refused,
+            "suggestions": [s.to_dict() for s in self.suggestions],
+        }
 
 
 def separations(
@@ -219,27 +220,16 @@ def suggest_manoeuvre(
     truth = fit.model.add(a).with_values(_values(a, psi))
     found, refused = [], 0
     for manoeuvre in with_progress(menu, "manoeuvres", shown=progress):
-        log = _driven(truth, manoeuvre, fit, bounds, seed)
-        if log is None:
+        drive = _driven(truth, manoeuvre, fit, bounds, seed)
+        if drive is None:
             refused += 1
             continue
+        log = _as_logged(drive, fit)
         there = information_of(fit, Driving.of(log), (a, b))
-        found.append(Suggestion(manoeuvre, log.duration_s, _apart(here + there, a, b, psi)))
+        apart = _apart(here + there, a, b, psi)
+        found.append(Suggestion(manoeuvre, log.duration_s, apart, drive))
     found.sort(key=lambda s: (s.sigmas < enough, s.duration_s if s.sigmas >= enough else -s.sigmas))
     return NextDrive(a, b, now, tuple(found), refused)
-
-
-def extent_m(drive: Drive) -> tuple[float, float]:
-    """Length and width of the ground that a drive takes, along its main directions."""
-    dt = 1.0 / drive.log.rate_hz
-    vx, vy, r = drive.states.T
-    heading = np.cumsum(r) * dt
-    east = np.cumsum(vx * np.cos(heading) - vy * np.sin(heading)) * dt
-    north = np.cumsum(vx * np.sin(heading) + vy * np.cos(heading)) * dt
-    path = np.column_stack([east, north])
-    turned = path @ np.linalg.svd(path - path.mean(axis=0), full_matrices=False)[2].T
-    size = np.ptp(turned, axis=0)
-    return float(size[0]), float(size[1])
 
 
 def _apart(
@@ -298,8 +288,8 @@ def _menu(limits: DriveLimits) -> list[Manoeuvre]:
 
 def _driven(
     truth: Model, manoeuvre: Manoeuvre, fit: Fit, limits: DriveLimits, seed: int
-) -> Log | None:
-    """What the user's own sensors would write; None where the limits or the car do not hold."""
+) -> Drive | None:
+    """The drive with the user's own sensors; None where the limits or the car do not hold."""
     sensor = dict(zip(MEASURED, fit.noise.sensor, strict=True))
     steer = max(white_noise_std(log["steer_rad"]) for log in fit.driving.logs)
     noise = SensorNoise(**{n: float(s) for n, s in sensor.items()}, steer_rad=steer)
@@ -308,8 +298,11 @@ def _driven(
         drive = drive_truth(truth, manoeuvre, seed=seed, noise=noise, rate_hz=rate)
     except (NumericalError, InvalidInput):
         return None
-    if not limits.hold(drive):
-        return None
+    return drive if limits.hold(drive) else None
+
+
+def _as_logged(drive: Drive, fit: Fit) -> Log:
+    """What the user's logger would write of it."""
     there = {c for log in fit.driving.logs for c in log.channels}
     columns = {c: drive.log[c] for c in drive.log.channels if c in there or c == "time_s"}
-    return Log.from_arrays(columns, name=manoeuvre.name, check=False)
+    return Log.from_arrays(columns, name=drive.log.name, check=False)
