@@ -122,11 +122,11 @@ def hash_of(text: str) -> int:
     return int.from_bytes(text.encode(), "big") % 2**31
 
 
-def coloured(data: Columns, rng: np.random.Generator) -> None:
+def coloured(data: Columns, rng: np.random.Generator, rate_hz: float = RATE_HZ) -> None:
     n = data["time_s"].size
     for channel, deviation in (("ay_mps2", 0.12), ("yaw_rate_radps", 0.003)):
         wander = sv.RoadDisturbance(fx_n=deviation, correlation_time_s=0.05)
-        data[channel] = data[channel] + wander.sample(n, RATE_HZ, rng)[:, 0]
+        data[channel] = data[channel] + wander.sample(n, rate_hz, rng)[:, 0]
 
 
 def heard(data: Columns) -> list[str]:

@@ -21,7 +21,7 @@ from sysid_vehicle import (
     manoeuvres,
     verdicts,
 )
-from sysid_vehicle.compare import out_of_time, unrelated
+from sysid_vehicle.compare import incoherent, unrelated
 from sysid_vehicle.diagnose import Omnibus
 from sysid_vehicle.diagnose.reservation import confirmed, reservation
 from sysid_vehicle.effects import effect
@@ -61,8 +61,8 @@ def test_a_shuffled_channel_is_named_and_no_effect_is(of_shuffled: Diagnosis) ->
 def test_a_comparison_tells_of_a_shuffled_channel(of_shuffled: Diagnosis, shuffled: Log) -> None:
     found = compare(of_shuffled.fit, shuffled)
     assert set(found.unrelated) == {"ay_mps2"}
-    assert "Something else is wrong: ay_mps2: the other channels predict it worse" in str(found)
-    assert "ay_mps2: the other channels" in found._repr_html_()
+    assert "Something else is wrong: ay_mps2: does not follow vx_mps" in str(found)
+    assert "ay_mps2: does not follow" in found._repr_html_()
 
 
 def test_a_study_of_a_shuffled_channel_knows_nothing(truth: Model, shuffled: Log) -> None:
@@ -109,6 +109,37 @@ def test_a_late_yaw_rate_is_told_and_no_inertia_is_named(
     assert "yaw_rate_radps: lags behind" in str(found)
 
 
+@pytest.mark.parametrize(("channel", "factor"), [("fx_n", 1e-3), ("steer_rad", 16.0)])
+def test_inputs_in_a_wrong_unit_name_no_effect(
+    hidden_fit: Callable[[str, float], Fit],
+    altered: Callable[..., Log],
+    channel: str,
+    factor: float,
+) -> None:
+    """No innovation is that of an input; the laws of motion tell its unit."""
+    fit = hidden_fit("steer_offset.offset_rad", 0.002)
+    dx = diagnose(fit, candidates=["steer_offset"])
+    assert dx.named is not None
+    log = fit.driving.logs[0]
+    wrong = replace(dx, driving=Driving.of(altered(log, **{channel: factor * log[channel]})))
+    assert wrong.named is None
+    assert wrong.reservation.startswith(f"{channel}: ")
+    assert "put factor = " in wrong.reservation
+
+
+def test_a_slope_explains_a_car_that_brakes_all_the_time(truth: Model) -> None:
+    downhill = truth.add("road_grade").with_values({"road_grade.grade_rad": -0.06})
+    log = drive(downhill, manoeuvres.slalom(), seed=5, rate_hz=25.0)
+    columns = {name: log[name] for name in log.channels if name != "ax_mps2"}
+    log = Log.from_arrays(columns, check=False)
+    assert [c.channel for c in log.contradictions] == ["fx_n"]
+    driving = Driving.of(log)
+    assert set(incoherent(driving, ())) == set(incoherent(driving, ("mass",))) == {"fx_n"}
+    assert incoherent(driving, ("road_grade",)) == {}
+    dx = diagnose(identify(truth, log, starts=1), candidates=["road_grade", "gyro_scale"])
+    assert dx.best.id == "road_grade"
+
+
 def test_without_evidence_what_is_wrong_is_told_all_the_same(
     truth: Model, fit: Fit, course: Log, altered: Callable[..., Log]
 ) -> None:
@@ -133,9 +164,9 @@ def test_what_the_model_delays_itself_is_no_contradiction(
 
     def late(name: str, by_s: float, *effects: str) -> dict[str, str]:
         log = altered(clean, **{name: np.interp(time_s - by_s, time_s, clean[name])})
-        return out_of_time(Driving.of(log), effects)
+        return incoherent(Driving.of(log), effects)
 
-    assert out_of_time(Driving.of(clean), ()) == {}
+    assert incoherent(Driving.of(clean), ()) == {}
     assert set(late("yaw_rate_radps", 0.1)) == {"yaw_rate_radps"}
     assert late("yaw_rate_radps", 0.1, "sensor_delay") == {}
     assert set(late("yaw_rate_radps", 0.1, "steer_delay")) == {"yaw_rate_radps"}

@@ -1,7 +1,7 @@
 """Comparison of a fitted model with driving."""
 
 from .compare import ChannelScore, Comparison, compare
-from .unrelated import out_of_time, unrelated
+from .unrelated import incoherent, unrelated
 from .where import FailureMap, Region
 
 __all__ = [
@@ -10,6 +10,6 @@ __all__ = [
     "FailureMap",
     "Region",
     "compare",
-    "out_of_time",
+    "incoherent",
     "unrelated",
 ]

@@ -13,7 +13,7 @@ from .._text import brief, html_list, html_paragraph, html_table, number, text_t
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..identify import Fit, explaining
 from ..log import Log
-from .unrelated import out_of_time, unrelated
+from .unrelated import incoherent, unrelated
 from .where import FailureMap, Region
 
 if TYPE_CHECKING:
@@ -191,6 +191,6 @@ def compare(
         driving.log_number,
         normalised,
         float(own["log_likelihood"]),
-        unrelated(driving, own["innovation"], own["spread"])
-        or out_of_time(driving, fit.model.effects),
+        incoherent(driving, fit.model.effects)
+        or unrelated(driving, own["innovation"], own["spread"]),
     )

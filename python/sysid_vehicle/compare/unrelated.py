@@ -3,8 +3,8 @@
 A noise model learns whatever spread the prediction errors have, so that normalised errors never
 look gross. What tells is the channel's own variance: readings that the other channels predict
 worse than their own mean does have nothing to do with them, and readings that follow the
-prediction at another scale are in another unit, or turned round. And the laws of motion tell which
-channel comes late.
+prediction at another scale are in another unit, or turned round. And the laws of motion, which need
+no model of the car, tell what no model can be fitted to.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .._text import number
 from ..estimate import MEASURED, Driving
 from ..estimate.inputs import white_noise_std
 
-__all__ = ["out_of_time", "unrelated"]
+__all__ = ["incoherent", "unrelated"]
 
 _IGNORANT = 2.0  # times the usual spread
 _WORSE = 1.1  # of the channel's variance: a prediction that errs more is worse than the mean
@@ -28,6 +28,7 @@ _ALIKE = 0.5  # square of the correlation, beyond which readings follow their pr
 _SCALES = (0.5, 2.0)
 _DELAYS_SENSORS = {"sensor_delay"}
 _DELAYS_STEERING = {"steer_delay", "steer_lag", "steer_compliance", "tyre_relaxation"}
+_PULLS = {"road_grade"}
 
 
 def unrelated(driving: Driving, innovation: FloatArray, spread: FloatArray) -> dict[str, str]:
@@ -73,8 +74,8 @@ def unrelated(driving: Driving, innovation: FloatArray, spread: FloatArray) -> d
     return {name: text for _, name, text in sorted(found, reverse=True)}
 
 
-def out_of_time(driving: Driving, effects: Collection[str]) -> dict[str, str]:
-    """Find the channels that come later or earlier than the laws of motion allow.
+def incoherent(driving: Driving, effects: Collection[str]) -> dict[str, str]:
+    """Find the channels that break the laws of motion: wrong unit, sign, order or time.
 
     Effects that move forces seem to explain such readings: a yaw rate that is late looks like a
     larger yaw inertia.
@@ -83,20 +84,23 @@ def out_of_time(driving: Driving, effects: Collection[str]) -> dict[str, str]:
     ----------
     driving : Driving
     effects : collection of str
-        Of the model; what it delays itself is no contradiction.
+        Of the model; what they do themselves is no contradiction.
 
     Returns
     -------
     dict of str to str
-        A sentence for each such channel, with the lag and its interval.
+        A sentence for each such channel.
     """
     delayed = set(MEASURED) | {"steer_rad"} if _DELAYS_SENSORS & set(effects) else set()
-    answers_late = bool(_DELAYS_STEERING & set(effects))
+    answers_late, slope = bool(_DELAYS_STEERING & set(effects)), bool(_PULLS & set(effects))
     found: dict[str, str] = {}
     for log in driving.logs:
-        for name, told in log.out_of_time.items():
+        for c in log.contradictions:
             # A car that answers late makes its steering early. None makes it late.
-            early = name == "steer_rad" and not ("lags behind" in told or " late " in told)
-            if name not in delayed and not (answers_late and early):
-                found.setdefault(name, f"{log.name}: {told}" if len(driving.logs) > 1 else told)
+            early = answers_late and c.channel == "steer_rad" and c.late_s < 0.0
+            if (c.late_s and (early or c.channel in delayed)) or (c.on_the_level and slope):
+                continue
+            found.setdefault(
+                c.channel, f"{log.name}: {c.text}" if len(driving.logs) > 1 else c.text
+            )
     return found

@@ -4,12 +4,14 @@ from ._against_car import check_car
 from ._channels import CHANNELS, Channel
 from ._columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
 from ._held import held_rows
+from ._laws import Contradiction
 from ._log import Log, check_excitation
 
 __all__ = [
     "CHANNELS",
     "Channel",
     "Columns",
+    "Contradiction",
     "Log",
     "as_floats",
     "as_seconds",

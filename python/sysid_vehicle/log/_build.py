@@ -137,7 +137,7 @@ def _check(channels: dict[str, FloatArray], rate_hz: float, notes: list[str]) ->
             f"known); at least {_MIN_USABLE_S:g} s are needed, 30 s with corners are good"
         )
     with np.errstate(over="ignore"):
-        notes += check_coherence(channels, rate_hz)
+        notes += [doubtful.text for doubtful in check_coherence(channels, rate_hz)]
     dull = _checks.excitation_note(channels, rate_hz)
     notes += _checks.low_rate_note(rate_hz)
     notes += _checks.frozen_notes(channels, rate_hz, excited=not dull)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InvalidInput
 from ._channels import FloatArray
+from ._laws import Contradiction
 from ._motion import Motion
 from ._steering import several_frequencies
 
@@ -27,13 +28,13 @@ _CLEAR = 6.0  # deviations of single lags
 _UNDERSTEER_MPS2 = 1400.0  # square of the speed at which a usual car steers twice as much
 
 
-def clock_notes(motion: Motion) -> list[str]:
+def clock_notes(motion: Motion) -> list[Contradiction]:
     """Compare steering angle and yaw rate window by window, up to 5 s apart.
 
     Returns
     -------
-    list of str
-        One note where the steering is early or late by more than 0.3 s throughout.
+    list of Contradiction
+        One where the steering is early or late by more than 0.3 s throughout.
 
     Raises
     ------
@@ -62,7 +63,7 @@ def clock_notes(motion: Motion) -> list[str]:
         f"steer_rad: {_off(lag)} against yaw_rate_radps over the whole log; put "
         f"delay_s = {lag:.2g} for steer_rad in the channel map, or set the clocks right"
     )
-    return [note] if abs(lag) > _APART_S else []
+    return [Contradiction("steer_rad", note, lag)] if abs(lag) > _APART_S else []
 
 
 def _off(lag: float) -> str:

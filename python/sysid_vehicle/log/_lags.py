@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._channels import FloatArray
+from ._laws import Contradiction
 from ._motion import Motion
 from ._regression import Lag, Sides, find_lag, regress
 from ._steering import several_frequencies, steering_lag
@@ -37,8 +38,8 @@ _MIN_EVIDENCE = 30.0
 _EXCITED_MPS2 = 0.4
 
 
-def lag_notes(motion: Motion) -> list[str]:
-    """Return one note per channel that is not on the time of the others.
+def lag_notes(motion: Motion) -> list[Contradiction]:
+    """Return what is told of each channel that is not on the time of the others.
 
     The lateral channels must obey ``d(vy)/dt = ay - vx yaw_rate``, the longitudinal ones
     ``d(vx)/dt = ax + vy yaw_rate``; the force on the wheels follows the acceleration, and the
@@ -51,7 +52,7 @@ def lag_notes(motion: Motion) -> list[str]:
     usable &= (inside > motion.time_s[0] + 0.6) & (inside < motion.time_s[-1] - 0.6)
     if motion.rate_hz < _MIN_RATE_HZ or np.count_nonzero(usable) < _MIN_WINDOWS:
         return []
-    notes: list[str] = []
+    notes: list[Contradiction] = []
     if "vy_mps" in c and _spread(motion.mean(c["ay_mps2"]), usable) > _EXCITED_MPS2:
         notes += _lateral(motion, usable)
     if "ax_mps2" in c and _spread(motion.mean(c["ax_mps2"]), usable) > _EXCITED_MPS2:
@@ -68,7 +69,7 @@ def _spread(values: FloatArray, usable: np.ndarray) -> float:
     return float(np.std(values[usable]))
 
 
-def _lateral(m: Motion, usable: np.ndarray) -> list[str]:
+def _lateral(m: Motion, usable: np.ndarray) -> list[Contradiction]:
     c, one = m.channels, np.ones(m.count)
     vx = c["vx_mps"]
 
@@ -100,7 +101,7 @@ def _lateral(m: Motion, usable: np.ndarray) -> list[str]:
     return [_note(name, others[name], lags[name])]
 
 
-def _speed(m: Motion, usable: np.ndarray) -> list[str]:
+def _speed(m: Motion, usable: np.ndarray) -> list[Contradiction]:
     c, one = m.channels, np.ones(m.count)
     if "vy_mps" in c:
         across = [m.mean(c["vy_mps"] * c["yaw_rate_radps"])]
@@ -127,7 +128,7 @@ def sideways(m: Motion) -> list[FloatArray]:
     return [m.mean(r * r), m.mean(r * c["vx_mps"] * c["ay_mps2"])]
 
 
-def _force(m: Motion, usable: np.ndarray) -> list[str]:
+def _force(m: Motion, usable: np.ndarray) -> list[Contradiction]:
     c, one = m.channels, np.ones(m.count)
 
     def sides(lag: float) -> tuple[FloatArray, FloatArray]:
@@ -148,7 +149,7 @@ def _force(m: Motion, usable: np.ndarray) -> list[str]:
     )
 
 
-def _steer(motion: Motion, usable: np.ndarray) -> list[str]:
+def _steer(motion: Motion, usable: np.ndarray) -> list[Contradiction]:
     if not several_frequencies(motion):
         return []
     lag = steering_lag(motion, usable)
@@ -162,11 +163,12 @@ def _told(lag: Lag, late_s: float, early_s: float, least: float = _MIN_GAIN_ELSE
     return enough and lag.beyond(late_s, early_s)
 
 
-def _note(name: str, other: str, lag: Lag) -> str:
+def _note(name: str, other: str, lag: Lag) -> Contradiction:
     verb = "lags behind" if lag.seconds > 0.0 else "runs ahead of"
     deviation = max(2.0 * lag.deviation, 0.001)
-    return (
+    text = (
         f"{name}: {verb} {other} by {abs(lag.seconds):.2g} s (+- {deviation:.1g}) over the whole "
         f"log; a shift in time looks like a lag of the car: put delay_s = {lag.seconds:.2g} for "
         f"{name} in the channel map, or set the clocks right"
     )
+    return Contradiction(name, text, lag.seconds)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InvalidInput
-from ._channels import FloatArray
+from ._channels import CHANNELS, FloatArray
 from ._motion import Motion
 from ._regression import Regression, regress
 
@@ -44,6 +45,35 @@ class Drive:
         """Return where the driver is largest, for messages."""
         where = self.motion.times_s[self.rows][int(np.argmax(np.abs(driver)))]
         return f"most clearly around t = {where:.6g} s"
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """What a channel says against the others.
+
+    Attributes
+    ----------
+    channel : str
+        The first that `text` names.
+    text : str
+        What is wrong, where, and the likely remedy.
+    late_s : float
+        By how much the channel comes late; negative where it comes early, zero where the time is
+        not what is wrong.
+    on_the_level : bool
+        Whether a road that climbs or falls would explain it.
+    """
+
+    channel: str
+    text: str
+    late_s: float = 0.0
+    on_the_level: bool = False
+
+    @classmethod
+    def said(cls, text: str) -> Contradiction:
+        """Take the channel from a sentence."""
+        names = re.findall("|".join(CHANNELS), text)
+        return cls(names[0] if names else "time_s", text)
 
 
 class KnownUnit(InvalidInput):

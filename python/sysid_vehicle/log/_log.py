@@ -17,7 +17,8 @@ from ._build import build
 from ._channels import CHANNELS, FloatArray
 from ._checks import excitation_note
 from ._columns import Columns
-from ._plausibility import channels_out_of_time
+from ._laws import Contradiction
+from ._plausibility import contradictions
 from ._signals import filled, runs
 
 if TYPE_CHECKING:
@@ -115,13 +116,14 @@ class Log:
         return tuple(name for name in self._data if name not in CHANNELS)
 
     @cached_property
-    def out_of_time(self) -> dict[str, str]:
-        """Channels that come later or earlier than the laws of motion allow, and by how much.
+    def contradictions(self) -> tuple[Contradiction, ...]:
+        """What is wrong with the channels by the laws of motion: unit, sign, order, time.
 
-        Empty where the driving does not show it.
+        The same that reading refuses or warns of; a log that was read with ``check=False`` may have
+        some. Empty where the driving does not show it.
         """
         with np.errstate(over="ignore"):
-            return channels_out_of_time(self._data, self.rate_hz)
+            return contradictions(self._data, self.rate_hz)
 
     def has(self, channel: str) -> bool:
         """Tell whether the channel is present."""

@@ -10,6 +10,7 @@ from ._lags import sideways
 from ._laws import (
     EXCITED,
     SCALE_STD,
+    Contradiction,
     Drive,
     Slips,
     check_scale,
@@ -123,8 +124,8 @@ def check_force(drive: Drive) -> None:
         )
 
 
-def held_speed_note(drive: Drive) -> list[str]:
-    """Return a note if the speed is held by a force that brakes."""
+def held_speed_note(drive: Drive) -> list[Contradiction]:
+    """Tell if the speed is held by a force that brakes."""
     c = drive.motion.channels
     force = drive.mean(c["fx_n"])
     if "ax_mps2" in c:
@@ -142,4 +143,4 @@ def held_speed_note(drive: Drive) -> list[str]:
         f"{drive.place(force)}: unless the road leads downhill the sign is wrong; put factor = -1 "
         f"for fx_n in the channel map"
     )
-    return [text]
+    return [Contradiction("fx_n", text, on_the_level=True)]

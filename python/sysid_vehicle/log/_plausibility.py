@@ -21,6 +21,7 @@ from ._laws import (
     EXCITED,
     SCALE_STD,
     WINDOW_S,
+    Contradiction,
     Drive,
     KnownUnit,
     Slips,
@@ -75,7 +76,7 @@ _LATERAL_SLIPS: Slips = (
 _SLIDING_SLIPS: Slips = ((3.6, (_VY_KMH,)), (1.0 / 0.44704, (_VY_MPH,)))
 
 
-def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[str]:
+def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[Contradiction]:
     """Refuse channels in a wrong unit, with a wrong sign, or that belong to another drive.
 
     Parameters
@@ -87,8 +88,8 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[s
 
     Returns
     -------
-    list of str
-        What looks implausible, in words.
+    list of Contradiction
+        What looks implausible.
 
     Raises
     ------
@@ -96,13 +97,13 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[s
         For the first channel that cannot be right; the message names channel, time and remedy.
     """
     notes: list[str] = []
-    clock: list[str] = []
+    clock: list[Contradiction] = []
     motion = Motion(columns, rate_hz)
     motion.windows(WINDOW_S)
     speed = motion.mean(motion.channels["vx_mps"])
     rows = motion.usable & (np.abs(speed) > _MOVING)
     if np.count_nonzero(rows) < _MIN_WINDOWS:
-        return check_ranges(columns, rate_hz)
+        return [Contradiction.said(text) for text in check_ranges(columns, rate_hz)]
     drive = Drive(motion, rows)
     problem: InvalidInput | None = None
     try:
@@ -117,28 +118,21 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[s
         raise problem or error from None
     if problem is not None:
         raise problem
+    implausible = [Contradiction.said(text) for text in notes]
     if "fx_n" in columns:
-        notes += held_speed_note(drive)
-    return notes + (clock or lag_notes(motion))
+        implausible += held_speed_note(drive)
+    return implausible + (clock or lag_notes(motion))
 
 
-def channels_out_of_time(columns: Mapping[str, FloatArray], rate_hz: float) -> dict[str, str]:
-    """Return the channels that are late or early, each with the sentence that tells by how much.
-
-    Parameters
-    ----------
-    columns, rate_hz
-        As in :func:`check_coherence`.
-    """
-    motion = Motion(columns, rate_hz)
+def contradictions(columns: Mapping[str, FloatArray], rate_hz: float) -> tuple[Contradiction, ...]:
+    """Return what :func:`check_coherence` refuses or doubts."""
     try:
-        notes = clock_notes(motion) or lag_notes(motion)
-    except InvalidInput as drift:
-        notes = [str(drift)]
-    return {note.split(":")[0]: note for note in notes}
+        return tuple(check_coherence(columns, rate_hz))
+    except InvalidInput as error:
+        return (Contradiction.said(str(error)),)
 
 
-def _check_laws(drive: Drive) -> list[str]:
+def _check_laws(drive: Drive) -> list[Contradiction]:
     channels = drive.motion.channels
     speed = drive.mean(channels["vx_mps"])
     if np.median(speed) < 0.0:
