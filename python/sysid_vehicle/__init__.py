@@ -22,6 +22,7 @@ from .effects import Effect, catalogue, effect
 from .errors import InvalidInput, NumericalError, SysidError, SysidWarning
 from .estimate import Driving, NoiseModel
 from .export import casadi_function, export
+from .fleet import Fleet, improve_many
 from .identify import Fit, identify
 from .log import Log, check_excitation
 from .model import Model
@@ -42,6 +43,7 @@ __all__ = [
     "Driving",
     "Effect",
     "Fit",
+    "Fleet",
     "InvalidInput",
     "Log",
     "Model",
@@ -73,6 +75,7 @@ __all__ = [
     "forget_effect",
     "identify",
     "improve",
+    "improve_many",
     "load",
     "load_effects",
     "manoeuvres",

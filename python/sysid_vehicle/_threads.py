@@ -1,10 +1,43 @@
 """Threads that do not outlast the call that started them."""
 
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from types import TracebackType
+from typing import TypeVar
 
 from . import _core
 from ._arguments import whole
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+_here = threading.local()
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def usual_count() -> int:
+    """Threads of a pool that is told no number: all cores, or one where others share them."""
+    return 1 if getattr(_here, "shared", False) else cores()
+
+
+@contextmanager
+def shared_cores() -> Iterator[None]:
+    """Pools that this thread opens inside have one thread: the cores are busy with others."""
+    before = getattr(_here, "shared", False)
+    _here.shared = True
+    try:
+        yield
+    finally:
+        _here.shared = before
 
 
 class Workers(ThreadPoolExecutor):
@@ -15,8 +48,8 @@ class Workers(ThreadPoolExecutor):
 
     Parameters
     ----------
-    count : int
-        How many threads.
+    count : int, optional
+        How many threads; all cores if left out, but one inside a thread of another pool.
 
     Raises
     ------
@@ -24,9 +57,14 @@ class Workers(ThreadPoolExecutor):
         `count` is no whole number above zero; the message calls it ``workers``.
     """
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int | None = None) -> None:
         self._stop = _core.Stop()
-        super().__init__(whole(count, "workers", 1), initializer=self._stop.follow)
+        threads = usual_count() if count is None else whole(count, "workers", 1)
+        super().__init__(threads, initializer=self._begin)
+
+    def _begin(self) -> None:
+        _here.shared = True
+        self._stop.follow()
 
     def __exit__(
         self,
@@ -39,3 +77,22 @@ class Workers(ThreadPoolExecutor):
             self._stop.set()
             self.shutdown(wait=True, cancel_futures=True)
         return super().__exit__(kind, error, traceback)
+
+
+def in_parallel(
+    function: Callable[[T], R], items: Iterable[T], workers: int | None = None
+) -> list[R]:
+    """Results of a function for each item, in the order of the items.
+
+    Useful where the function spends its time in kernels, which release the interpreter lock. The
+    results are those of a loop; the first error in the order of the items is raised.
+
+    Parameters
+    ----------
+    function : callable
+    items : iterable
+    workers : int, optional
+        Threads; all cores if left out, but one inside a thread of another pool.
+    """
+    with Workers(workers) as pool:
+        return list(pool.map(function, items))

@@ -8,6 +8,7 @@ constructors, which check what they are given.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import importlib
 import io
 import json
@@ -23,7 +24,7 @@ from ._files import as_path, write_bytes
 from .effects import Effect, effect
 from .errors import InvalidInput
 
-__all__ = ["VERSION", "load", "save"]
+__all__ = ["VERSION", "fingerprint", "load", "packed", "save"]
 
 VERSION = 1
 _NAME = "sysid_vehicle result"
@@ -65,19 +66,39 @@ def save(result: object, path: str | Path) -> None:
     InvalidInput
         If it holds something that no file can hold, or the file cannot be written.
     """
+    write_bytes(path, packed(result))
+
+
+def packed(result: object) -> bytes:
+    """Return what :func:`save` writes to a file.
+
+    Raises
+    ------
+    InvalidInput
+        If the result holds something that no file can hold.
+    """
     writer = _Writer()
-    content = {
-        "format": _NAME,
-        "version": VERSION,
-        "package": __version__,
-        "root": writer.value(result),
-        "objects": writer.objects,
-    }
-    text = json.dumps(content, allow_nan=False, separators=(",", ":")).encode()
+    text = writer.text(result)
     held = io.BytesIO()
     arrays = {f"a{k}": array for k, array in enumerate(writer.arrays)}
     np.savez_compressed(held, **{_CONTENT: np.frombuffer(text, dtype=np.uint8)}, **arrays)  # type: ignore[arg-type]
-    write_bytes(path, held.getvalue())
+    return held.getvalue()
+
+
+def fingerprint(result: object) -> str:
+    """A text that differs where what a file would hold differs, or the package's version.
+
+    Raises
+    ------
+    InvalidInput
+        If the result holds something that no file can hold.
+    """
+    writer = _Writer()
+    held = hashlib.sha256(writer.text(result))
+    for array in writer.arrays:
+        held.update(np.ascontiguousarray(array).tobytes())
+        held.update(f"{array.dtype}{array.shape}".encode())
+    return held.hexdigest()
 
 
 def load(path: str | Path) -> Any:
@@ -135,6 +156,16 @@ class _Writer:
         self.arrays: list[Any] = []
         self._places: dict[int, dict[str, int]] = {}
         self._kept: list[object] = []  # as long as ids count
+
+    def text(self, result: object) -> bytes:
+        content = {
+            "format": _NAME,
+            "version": VERSION,
+            "package": __version__,
+            "root": self.value(result),
+            "objects": self.objects,
+        }
+        return json.dumps(content, allow_nan=False, separators=(",", ":")).encode()
 
     def value(self, x: Any) -> Any:
         if x is None or isinstance(x, bool | str) or type(x) is int:

@@ -32,6 +32,7 @@ PYTHON_LAYERS = [
     {"twin"},
     {"plot"},
     {"report"},
+    {"fleet"},
     {"demo"},
     {"cli"},
     {"__main__"},

@@ -7,6 +7,7 @@ import pickle
 import sys
 import types
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import pytest
 import sysid_vehicle as sv
 from sysid_vehicle import Fit, Log, Model
 from sysid_vehicle import lab as laboratory
+from sysid_vehicle.fleet import Row
 
 
 def same(a: object, b: object, where: str = "") -> None:
@@ -74,6 +76,7 @@ def results(fit: Fit, lap: Log, course: Log, truth: Model) -> dict[str, object]:
         "excitation": wanted,
         "closed loop": run,
         "laboratory log": run.to_log(),
+        "Fleet": sv.Fleet(Path("results"), (Row("a/b", "a", verdict="adequate"),)),
         "NumericalError": sv.NumericalError("lap: no"),
     }
 
@@ -83,7 +86,7 @@ NAMES = (
     *("Driving", "NoiseModel", "SensorNoise", "RoadDisturbance", "DriveLimits", "Fit"),
     *("Comparison", "Diagnosis", "verdicts", "where", "bias_report", "manoeuvre", "drive"),
     *("excitation", "closed loop", "laboratory log", "NumericalError", "Rules"),
-    "SensorCheck",
+    *("SensorCheck", "Fleet"),
 )
 
 

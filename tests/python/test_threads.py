@@ -9,6 +9,7 @@ import pytest
 
 from sysid_vehicle import Fit, Log, Model, Vehicle, compare, diagnose, drive, identify
 from sysid_vehicle import manoeuvres as drives
+from sysid_vehicle._threads import Workers, cores, in_parallel, shared_cores
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.online import SideslipObserver, estimate_sideslip
 
@@ -32,9 +33,38 @@ def short(truth: Model) -> Log:
     return drive(truth, drives.lap(15.0), seed=3)
 
 
-def _identified(start: Model, log: Log) -> list[float]:
-    fit = identify(start, log, starts=2, workers=2)
+def _identified(start: Model, log: Log, workers: int | None = 2) -> list[float]:
+    fit = identify(start, log, starts=2, workers=workers)
     return [fit.log_likelihood, *(e.value for e in fit.estimates)]
+
+
+def test_a_pool_has_all_cores_or_one_where_others_share_them() -> None:
+    def inside(workers: int | None) -> int:
+        with Workers(workers) as pool:
+            return pool._max_workers
+
+    assert inside(None) == cores() >= 1
+    assert in_parallel(inside, [None, 3], workers=2) == [1, 3]
+    with shared_cores():
+        assert inside(None) == 1
+    assert inside(None) == cores()
+
+
+def test_parallel_results_stand_in_order_and_the_first_error_is_raised() -> None:
+    assert in_parallel(lambda x: x * x, range(50), workers=4) == [x * x for x in range(50)]
+    with pytest.raises(ZeroDivisionError):
+        in_parallel(lambda x: 1 / x, [1, 0, 2], workers=2)
+
+
+def test_any_number_of_threads_gives_the_same(start: Model, short: Log, fit: Fit) -> None:
+    def found(workers: int | None) -> list[object]:
+        ranking = diagnose(fit, short, candidates=["mass", "steer_lag"], workers=workers).ranking
+        scored = [(c.id, c.statistic, c.value, c.std) for c in ranking]
+        return [*_identified(start, short, workers), *scored]
+
+    alone = found(1)
+    assert found(None) == alone
+    assert found(3) == alone
 
 
 def test_identify(start: Model, short: Log) -> None:

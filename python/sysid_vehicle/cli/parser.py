@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .. import _core
 from ..demo import DEFAULT, RANDOM
-from . import lab, mu_slip, next_drive, sensors, sideslip, twin
+from . import fleet, lab, mu_slip, next_drive, sensors, sideslip, twin
 from .log_arguments import LOG_HELP, add_reading
 
 __all__ = ["parse"]
@@ -70,6 +70,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     )
     _json(improve)
 
+    fleet.add_parser(commands)
     next_drive.add_parser(commands)
     sensors.add_parser(commands)
     mapping = commands.add_parser("map", help="propose the channel map of a log, to be edited")

@@ -42,7 +42,7 @@ def diagnose(
     alpha: float | None = None,
     rules: Rules = USUAL,
     refits: int = _REFITS,
-    workers: int = 2,
+    workers: int | None = None,
     seed: int = 0,
     progress: bool = False,
 ) -> Diagnosis:
@@ -64,6 +64,8 @@ def diagnose(
         By which effects are claimed.
     refits : int
         How many of the best to refit; 0 ranks by score alone, and then none is named.
+    workers : int, optional
+        Threads; by default as many as there are cores. The result is the same for any number.
     """
     rules = rules.at(alpha)
     driving = fit.driving if logs is None else Driving.of(logs)

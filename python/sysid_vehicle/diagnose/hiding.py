@@ -128,7 +128,7 @@ def bias_report(
     *,
     most_samples: int = 3000,
     seed: int = 0,
-    workers: int = 2,
+    workers: int | None = None,
     progress: bool = False,
 ) -> BiasReport:
     """Say what each effect of a typical size would do unnoticed to the fit's parameters.
@@ -144,8 +144,8 @@ def bias_report(
         Of driving that has more at 25 Hz, windows are done again, evenly spread.
     seed : int
         Of the simulated noise.
-    workers : int
-        Threads.
+    workers : int, optional
+        Threads; by default as many as there are cores. The result is the same for any number.
     progress : bool
         Show a progress bar.
 

@@ -41,7 +41,7 @@ def identify(
     priors: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     intervals: str = "information",
     seed: int = 0,
-    workers: int = 2,
+    workers: int | None = None,
     progress: bool = False,
 ) -> Fit:
     """Estimate a model's free parameters, and the noise, by maximum likelihood.
@@ -70,8 +70,8 @@ def identify(
         likelihood, which follows bent valleys and takes some tens of searches.
     seed : int
         Of the start points.
-    workers : int
-        Threads.
+    workers : int, optional
+        Threads; by default as many as there are cores. The result is the same for any number.
     progress : bool
         Show a progress bar.
 
@@ -181,7 +181,7 @@ def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3)
     return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True)
 
 
-def profile_fit(fit: Fit, *, workers: int = 2, progress: bool = False) -> Fit:
+def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool = False) -> Fit:
     """The same fit at the very bottom of its valley, with intervals of the profile likelihood.
 
     Where a profile comes upon a better optimum the fit goes on from there.

@@ -102,7 +102,7 @@ def profile_all(
     covariance: FloatArray,
     wanted: Sequence[Quantity],
     *,
-    workers: int,
+    workers: int | None,
     progress: bool,
 ) -> tuple[tuple[Profile, ...], FloatArray | None]:
     """Profile many quantities side by side.

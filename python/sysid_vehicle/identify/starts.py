@@ -155,7 +155,7 @@ class Runner:
     """Runs searches side by side; starts that have met share the rest of their way."""
 
     box: Box
-    workers: int
+    workers: int | None
     progress: bool
 
     def all_of(self, search: Search, points: FloatArray) -> tuple[FloatArray, FloatArray]:

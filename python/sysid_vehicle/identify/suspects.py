@@ -70,7 +70,7 @@ def explaining(function: Callable[_P, _T]) -> Callable[_P, _T]:
         if wanted is not None:
             expect(by_name[first.name], wanted, function.__name__)
         for name, least in (("seed", 0), ("starts", 1), ("workers", 1)):
-            if name in by_name:
+            if name in by_name and not (name == "workers" and by_name[name] is None):
                 whole(by_name[name], name, least)
         given = (*args, *kwargs.values())
         with explained(

@@ -198,7 +198,7 @@ def design_excitation(
     uncertainty: float = 0.1,
     trials: int = 32,
     seed: int = 0,
-    workers: int = 2,
+    workers: int | None = None,
     progress: bool = False,
 ) -> Design:
     """Choose amplitude, frequencies and speeds so that the least-known coefficient is known best.
@@ -225,8 +225,8 @@ def design_excitation(
         Number of excitations tried: half spread evenly, half around the best of them.
     seed : int
         Of the spread, and of the sensors' randomness.
-    workers : int
-        Threads.
+    workers : int, optional
+        Threads; by default as many as there are cores. The result is the same for any number.
     progress : bool
         Show a progress bar.
 

@@ -28,7 +28,7 @@ def multistart(
     loose: FloatArray,
     *,
     method: str,
-    workers: int,
+    workers: int | None,
     progress: bool,
 ) -> tuple[FloatArray, FloatArray, Starts, list[FloatArray]]:
     """Search from every start, in three rounds, each from where the one before ended.

@@ -41,7 +41,7 @@ def identify_tyres(
     profiles: bool = True,
     method: str = "gauss-newton",
     seed: int = 0,
-    workers: int = 2,
+    workers: int | None = None,
     progress: bool = False,
 ) -> TyreFit:
     """Identify B, C, D, E of both axles, and the noise, from driving.
@@ -68,8 +68,8 @@ def identify_tyres(
         Local optimiser: `gauss-newton`, `nlopt` or `scipy`.
     seed : int
         Of the start points.
-    workers : int
-        Threads.
+    workers : int, optional
+        Threads; by default as many as there are cores. The result is the same for any number.
     progress : bool
         Show a progress bar.
 

@@ -1,0 +1,51 @@
+"""`sysid-vehicle improve-many`: a study for each log of a fleet."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from ..fleet import manifest_jobs
+from ..fleet.improve_many import run as improve_all
+
+__all__ = ["add_parser", "run"]
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the program's."""
+    parser = commands.add_parser(
+        "improve-many", help="improve a fleet: a study for each log, causes over all cars"
+    )
+    parser.add_argument("manifest", type=Path, metavar="TOML", help="cars, logs and options")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="FOLDER",
+        help="folder for the results; what it holds already is not done again",
+    )
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help="processes (default: one for each core)"
+    )
+    parser.add_argument(
+        "--retry", action="store_true", help="try again what failed in an earlier run"
+    )
+
+
+def run(args: argparse.Namespace, heard: list[str]) -> None:
+    """Do the studies that the folder does not hold yet, and tell the causes."""
+    jobs = manifest_jobs(args.manifest)
+    for path in dict.fromkeys(p for job in jobs for p in job.define):
+        text = f"sysid-vehicle: runs {path} as a Python program, with all your rights"
+        print(text, file=sys.stderr, flush=True)
+    fleet = improve_all(
+        jobs,
+        args.out,
+        workers=args.workers,
+        retry=args.retry,
+        progress=sys.stderr.isatty(),
+        tell=lambda text: print(text, file=sys.stderr, flush=True),
+    )
+    print(fleet)
+    print(f"Report: {args.out / 'report.html'}")

@@ -1,0 +1,188 @@
+"""What is to be studied: a car, its logs, and how to study them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from inspect import signature
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from .._files import as_path, refuse_unknown
+from ..errors import InvalidInput
+from ..log import Log
+from ..model import Model
+from ..read import ChannelMap
+from ..saved import fingerprint
+from ..study import improve
+from ..vehicle import Vehicle
+
+__all__ = ["Car", "Drive", "Job", "Options", "check_options", "jobs_of", "model_of"]
+
+Car = Vehicle | Model | str | Path
+Drive = Log | str | Path
+Options = Mapping[str, Any]
+
+_OURS = ("model", "train", "test", "sensors", "progress", "tell")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One study to be done; it can be sent to another process.
+
+    Attributes
+    ----------
+    name : str
+        ``run``, or ``car/run``.
+    model : Model
+        The baseline.
+    train, validation : tuple of Log or Path
+        Paths are read where the study is done. Without validation data some of the driving is kept
+        for them.
+    channels : ChannelMap or None
+    dbc : Path or None
+    define : tuple of Path
+        Python files that define effects.
+    options : mapping
+        Further arguments of `improve`.
+    """
+
+    name: str
+    model: Model
+    train: tuple[Log | Path, ...]
+    validation: tuple[Log | Path, ...] = ()
+    channels: ChannelMap | None = None
+    dbc: Path | None = None
+    define: tuple[Path, ...] = ()
+    options: Options = field(default_factory=dict)
+
+    @property
+    def car(self) -> str:
+        """The car, as far as the name tells."""
+        return self.name.partition("/")[0]
+
+    def digest(self) -> str:
+        """A text that differs where the study may come out differently.
+
+        Raises
+        ------
+        InvalidInput
+            If an option is something that no file can hold.
+        """
+        channels = None if self.channels is None else repr(self.channels)
+        files = [None if self.dbc is None else _content(self.dbc), *map(_content, self.define)]
+        logs = [[_content(x) for x in drives] for drives in (self.train, self.validation)]
+        options = {name: self.options[name] for name in sorted(self.options)}
+        return fingerprint([self.model, channels, files, logs, options])
+
+
+def _content(source: Log | Path) -> Log | str:
+    """What tells one log from another: the samples, or what stands in the file or folder."""
+    if isinstance(source, Log):
+        return source
+    held = hashlib.sha256()
+    try:
+        inside = sorted(p for p in source.rglob("*") if p.is_file()) if source.is_dir() else []
+        for path in inside or [source]:
+            with path.open("rb") as stream:
+                while piece := stream.read(1 << 20):
+                    held.update(piece)
+    except OSError as error:  # the study will tell
+        return f"{error.strerror}"
+    return held.hexdigest()
+
+
+def jobs_of(
+    cars: Car | Mapping[str, Car],
+    logs: Mapping[str, Drive | Sequence[Drive]] | Sequence[Drive | Sequence[Drive]],
+    validation: Mapping[str, Drive | Sequence[Drive]] | None = None,
+    **shared: Any,
+) -> list[Job]:
+    """Make the jobs of one car, or of a car for each name, and of logs.
+
+    Raises
+    ------
+    InvalidInput
+        A name that no file can have or that comes twice, a car without logs or logs without car.
+    """
+    named = logs if isinstance(logs, Mapping) else _named(logs)
+    if not named:
+        raise InvalidInput("improve_many: there are no logs; give one or more")
+    held_out = dict(validation or {})
+    refuse_unknown(held_out, named, "validation")
+    models = {n: model_of(c) for n, c in cars.items()} if isinstance(cars, Mapping) else {}
+    one = None if isinstance(cars, Mapping) else model_of(cars)
+    jobs = []
+    for name, drives in named.items():
+        check_name(name)
+        model = one or models.get(name) or models.get(name.partition("/")[0])
+        if model is None:
+            raise InvalidInput(
+                f"{name}: no car is given for it; name '{name}' or '{name.partition('/')[0]}' "
+                "among the cars"
+            )
+        kept = _drives(held_out.get(name, ()), name)
+        jobs.append(Job(name, model, _drives(drives, name), kept, **shared))
+    return jobs
+
+
+def model_of(car: Car) -> Model:
+    """The baseline of a car: the model itself, or that of a vehicle or of a vehicle's file."""
+    if isinstance(car, Model):
+        return car
+    return Model(car if isinstance(car, Vehicle) else Vehicle.from_toml(as_path(car)))
+
+
+def check_name(name: object) -> None:
+    """Refuse what cannot be the name of a file below the folder of results.
+
+    Raises
+    ------
+    InvalidInput
+        As it says.
+    """
+    parts = PurePosixPath(name).parts if isinstance(name, str) else ()
+    plain = "/".join(parts) == name and len(parts) in (1, 2)
+    if not plain or any(p in (".", "..") or set(p) & set('\\:*?"<>|\0\n') for p in parts):
+        raise InvalidInput(
+            f"{name!r} is no name of a study; give one such as 'monday' or 'car 17/monday'"
+        )
+
+
+def check_options(options: Options, where: str) -> None:
+    """Refuse what is no argument of `improve` that can be chosen here.
+
+    Raises
+    ------
+    InvalidInput
+        An unknown argument, or one that is given otherwise.
+    """
+    known = [p for p in signature(improve).parameters if p not in _OURS]
+    refuse_unknown(options, known, where)
+
+
+def _named(logs: Sequence[Drive | Sequence[Drive]]) -> dict[str, Drive | Sequence[Drive]]:
+    """Logs by the names of the first of each study."""
+    if isinstance(logs, str | Path | Log):
+        logs = [logs]
+    named: dict[str, Drive | Sequence[Drive]] = {}
+    for entry in logs:
+        first = entry if isinstance(entry, str | Path | Log) else next(iter(entry), None)
+        if first is None:
+            raise InvalidInput("improve_many: a study has no logs; give one or more")
+        name = first.name if isinstance(first, Log) else as_path(first).stem
+        if name in named:
+            raise InvalidInput(
+                f"two studies are called '{name}'; give a mapping from names to logs"
+            )
+        named[name] = entry
+    return named
+
+
+def _drives(entry: Drive | Sequence[Drive], name: str) -> tuple[Log | Path, ...]:
+    drives = [entry] if isinstance(entry, str | Path | Log) else list(entry)
+    for x in drives:
+        if not isinstance(x, str | Path | Log):
+            raise InvalidInput(f"{name}: {x!r} is no log; give a Log or the path of a file")
+    return tuple(x if isinstance(x, Log) else as_path(x).absolute() for x in drives)

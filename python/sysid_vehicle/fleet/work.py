@@ -1,0 +1,99 @@
+"""Doing one study, in whichever process or on whichever machine it was sent to."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from .._threads import shared_cores
+from ..errors import SysidError
+from ..log import Log
+from ..read import read_log
+from ..saved import packed
+from ..study import AddedEffect, Study, horizons, improve
+from ..user_effects import load_effects
+from .jobs import Job
+from .results import AHEAD_S, Effect, Row
+
+__all__ = ["Outcome", "do", "failed"]
+
+_defined: set[Path] = set()
+_defining = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What comes back: the row, and the study as it stands in a file; None where it failed."""
+
+    row: Row
+    study: bytes | None
+
+
+def do(job: Job) -> Outcome:
+    """Do a study. One that cannot be done is an outcome, too."""
+    began = time.perf_counter()
+    try:
+        _define(job.define)
+        # Other studies have the other cores.
+        with shared_cores():
+            train, validation = (_logs(job, drives) for drives in (job.train, job.validation))
+            study = improve(job.model, train, validation or None, **job.options)
+            row = _row(job, study, time.perf_counter() - began)
+        return Outcome(row, packed(study))
+    except SysidError as error:
+        return failed(job, str(error), time.perf_counter() - began)
+    except Exception as error:  # one study that fails, however it does, leaves the others alone
+        return failed(job, f"{type(error).__name__}: {error}", time.perf_counter() - began)
+
+
+def failed(job: Job, because: str, seconds: float = 0.0) -> Outcome:
+    """The outcome of a study that cannot be done."""
+    return Outcome(Row(job.name, job.car, failure=because or "unknown", seconds=seconds), None)
+
+
+def _define(files: tuple[Path, ...]) -> None:
+    with _defining:
+        for path in files:
+            if path not in _defined:
+                load_effects(path)
+                _defined.add(path)
+
+
+def _logs(job: Job, drives: tuple[Log | Path, ...]) -> list[Log]:
+    return [x if isinstance(x, Log) else read_log(x, job.channels, dbc=job.dbc) for x in drives]
+
+
+def _row(job: Job, study: Study, seconds: float) -> Row:
+    ahead = horizons(study.fits, study.steps, study.held_out, horizons_s=(AHEAD_S,))
+    told = study.explained
+    return Row(
+        job.name,
+        job.car,
+        verdict=study.verdict,
+        effects=tuple(
+            _effect(a, {c: g[0] for c, g in ahead.gains(i + 1).items()})
+            for i, a in enumerate(study.added)
+        ),
+        error_before=study.test[0].error,
+        error_after=study.test[-1].error,
+        explained=None if told is None else (told.share, told.low, told.high),
+        usable_s=study.fit.driving.usable_s,
+        validation_s=study.held_out.usable_s,
+        warnings=study.warnings,
+        seconds=seconds,
+    )
+
+
+def _effect(added: AddedEffect, gains: dict[str, float | None]) -> Effect:
+    return Effect(
+        added.id,
+        added.grade,
+        added.confounded_with,
+        added.stands_in,
+        {e.name.split(".")[1]: (e.value, e.std, e.unit) for e in added.parameters},
+        added.error_before,
+        added.error_after,
+        gains,
+    )

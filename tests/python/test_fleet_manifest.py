@@ -1,0 +1,85 @@
+"""Which studies are asked for: arguments and manifests that make sense, and that make none."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle.fleet import manifest_jobs
+
+
+@pytest.fixture(scope="module")
+def garage(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A car, logs in folders of two cars that nobody reads, and a manifest."""
+    folder = tmp_path_factory.mktemp("garage")
+    sv.example_vehicle().to_toml(folder / "car.toml")
+    for name in ("a/one", "a/two", "b/bad", "b/one"):
+        (folder / "logs" / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / "logs" / f"{name}.csv").touch()
+    (folder / "fleet.toml").write_text(
+        'vehicle = "car.toml"\nlogs = "logs/*/*.csv"\n[improve]\ncandidates = []\nstarts = 1\n'
+    )
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"logs": []}, "there are no logs"),
+        ({"logs": ["x.csv", "y/x.csv"]}, "two studies are called 'x'"),
+        ({"logs": {"../x": "x.csv"}}, "is no name of a study"),
+        ({"logs": {"a/b/c": "x.csv"}}, "is no name of a study"),
+        ({"logs": {"x": 3}}, "x: 3 is no log|not iterable"),
+        ({"logs": ["x.csv"], "start": 1}, r"unknown key 'start' \(did you mean 'starts'"),
+        ({"logs": ["x.csv"], "sensors": None}, "unknown key 'sensors'"),
+        ({"logs": {"x": "x.csv"}, "validation": {"y": "y.csv"}}, "unknown key 'y'"),
+        ({"logs": {"x": "x.csv"}, "cars": {"y": sv.example_vehicle()}}, "no car is given"),
+        ({"logs": ["x.csv"], "workers": 0}, "workers = 0"),
+    ],
+)
+def test_arguments_are_checked_first(
+    arguments: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    given = {"cars": sv.example_vehicle(), "out": tmp_path / "out", **arguments}
+    with pytest.raises((sv.InvalidInput, TypeError), match=message):
+        sv.improve_many(**given)
+
+
+def test_a_manifest_names_its_studies(garage: Path, tmp_path: Path) -> None:
+    jobs = manifest_jobs(garage / "fleet.toml")
+    assert [job.name for job in jobs] == ["a/one", "a/two", "b/bad", "b/one"]
+    assert jobs[0].options == {"candidates": [], "starts": 1}
+    assert jobs[0].train == (garage / "logs/a/one.csv",)
+    (garage / "two.toml").write_text(
+        'vehicle = "car.toml"\nlogs = ["logs/a/one.csv"]\n'
+        '[[study]]\nname = "c/both"\nlogs = ["logs/a/one.csv", "logs/a/two.csv"]\n'
+        'validation = "logs/b/one.csv"\n'
+    )
+    one, both = manifest_jobs(garage / "two.toml")
+    assert (one.name, both.name, both.car) == ("one", "c/both", "c")
+    assert len(both.train) == 2
+    assert both.validation == (garage / "logs/b/one.csv",)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "it names no log"),
+        ('vehicle = "car.toml"\nlogs = "none/*.csv"', r"no file matches logs = 'none/\*.csv'"),
+        ('logs = "logs/a/*.csv"', r"study 1 \(one\): it has no car"),
+        ('vehicle = "no.toml"\nlogs = "logs/a/*.csv"', "no.toml: cannot be read"),
+        ('vehicle = "car.toml"\nlog = "logs/a/*.csv"', r"unknown key 'log' \(did you mean 'logs'"),
+        ('vehicle = "car.toml"\nlogs = 3', "logs = 3; give a path in quotes"),
+        ('vehicle = "car.toml"\nlogs = "logs/*/one.csv"\n[improve]\nx = 1', "unknown key 'x'"),
+        ('vehicle = "car.toml"\nlogs = ["logs/a/one.csv", "logs/b/one.csv"]', "called 'one'"),
+        ('vehicle = "car.toml"\n[[study]]\nname = "x"', r"study 1 \(x\): it has no logs"),
+        ('vehicle = 1\nlogs = "logs/a/*.csv"', "vehicle = 1 is no path"),
+        ("study = 1", "is no list of tables"),
+        ("improve = 1", "improve is no table"),
+    ],
+)
+def test_a_manifest_that_makes_no_sense(garage: Path, text: str, message: str) -> None:
+    (garage / "wrong.toml").write_text(text)
+    with pytest.raises(sv.InvalidInput, match=message):
+        manifest_jobs(garage / "wrong.toml")
