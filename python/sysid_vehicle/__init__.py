@@ -23,6 +23,7 @@ from .errors import InvalidInput, NumericalError, SysidError, SysidWarning
 from .estimate import Driving, NoiseModel
 from .export import casadi_function, export
 from .fleet import Fleet, improve_many
+from .forces import AxleForces, axle_forces
 from .identify import Fit, identify
 from .log import Log, check_excitation
 from .model import Model
@@ -36,6 +37,7 @@ from .user_effects import define_effect, forget_effect, load_effects, parameter
 from .vehicle import Tyre, Vehicle
 
 __all__ = [
+    "AxleForces",
     "ChannelMap",
     "Comparison",
     "Diagnosis",
@@ -59,6 +61,7 @@ __all__ = [
     "Tyre",
     "Vehicle",
     "__version__",
+    "axle_forces",
     "bias_report",
     "casadi_function",
     "catalogue",

@@ -21,6 +21,7 @@ PYTHON_LAYERS = [
     {"manoeuvres"},
     {"simulate"},
     {"sensors"},
+    {"forces"},
     {"estimate"},
     {"identify"},
     {"compare"},

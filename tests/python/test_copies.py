@@ -49,6 +49,7 @@ def results(fit: Fit, lap: Log, course: Log, truth: Model) -> dict[str, object]:
     drive = sv.simulate.drive_truth(truth, sv.manoeuvres.step_steer(), seed=0)
     wanted = laboratory.excitation.Oval()
     run = laboratory.run_closed_loop(wanted, seed=0)
+    checked = sv.check(lap)
     return {
         "Vehicle": truth.vehicle,
         "Tyre": truth.vehicle.tyre_front,
@@ -64,7 +65,8 @@ def results(fit: Fit, lap: Log, course: Log, truth: Model) -> dict[str, object]:
         "RoadDisturbance": sv.RoadDisturbance(),
         "DriveLimits": sv.DriveLimits(),
         "Rules": sv.Rules(),
-        "SensorCheck": sv.check(lap),
+        "SensorCheck": checked,
+        "AxleForces": sv.axle_forces(lap, truth.vehicle, sensors=checked, count=2),
         "Fit": fit,
         "Comparison": sv.compare(fit, course),
         "Diagnosis": found,
@@ -86,7 +88,7 @@ NAMES = (
     *("Driving", "NoiseModel", "SensorNoise", "RoadDisturbance", "DriveLimits", "Fit"),
     *("Comparison", "Diagnosis", "verdicts", "where", "bias_report", "manoeuvre", "drive"),
     *("excitation", "closed loop", "laboratory log", "NumericalError", "Rules"),
-    *("SensorCheck", "Fleet"),
+    *("SensorCheck", "AxleForces", "Fleet"),
 )
 
 

@@ -24,7 +24,7 @@ from ..report import RANKING_HEAD, ranking_rows, ranking_title, summary, write_r
 from ..study import Study, improve
 from ..user_effects import load_effects
 from ..vehicle import Vehicle
-from . import fleet, lab, mu_slip, next_drive, sensors, sideslip, twin
+from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
 from .outputs import refuse_unwritable
 
 __all__ = ["COMMANDS"]
@@ -139,6 +139,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
     "effects": _effects,
     "next-drive": next_drive.run,
     "check": sensors.run,
+    "forces": forces.run,
     "map": _map,
     "lab": lab.run,
     "mu-slip": mu_slip.run,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .. import _core
 from ..demo import DEFAULT, RANDOM
-from . import fleet, lab, mu_slip, next_drive, sensors, sideslip, twin
+from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
 from .log_arguments import LOG_HELP, add_reading
 
 __all__ = ["parse"]
@@ -73,6 +73,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     fleet.add_parser(commands)
     next_drive.add_parser(commands)
     sensors.add_parser(commands)
+    forces.add_parser(commands)
     mapping = commands.add_parser("map", help="propose the channel map of a log, to be edited")
     mapping.add_argument("log", type=Path, metavar="LOG", help=LOG_HELP)
     mapping.add_argument("-o", "--output", type=Path, metavar="TOML", help="file to write it to")

@@ -68,6 +68,10 @@ class Estimate:
         Rounds until nothing moved any more.
     settled : bool
         Whether that was reached.
+    factor : ndarray, shape (width, grid.size)
+        Banded Cholesky factor of the motion's information, the faults held.
+    across : ndarray, shape (grid.size, n)
+        How the motion moves against the faults.
     """
 
     faults: dict[str, float]
@@ -81,6 +85,32 @@ class Estimate:
     grid: Grid
     rounds: int
     settled: bool
+    factor: FloatArray
+    across: FloatArray
+
+    def draw(self, count: int, seed: int = 0) -> tuple[FloatArray, FloatArray]:
+        """Motions and faults as likely as the estimate leaves them.
+
+        Parameters
+        ----------
+        count : int
+            How many.
+        seed : int
+
+        Returns
+        -------
+        x : ndarray, shape (grid.size, count)
+            Coefficients of the motion.
+        faults : ndarray, shape (n, count)
+            In the order of `faults`.
+        """
+        rng = np.random.default_rng(seed)
+        numbers = rng.standard_normal((self.x.size, count))
+        values = np.array(list(self.faults.values()))
+        root = np.linalg.cholesky(self.covariance)
+        apart = root @ rng.standard_normal((values.size, count))
+        x = self.x[:, None] + _drawn(self.factor, numbers) - self.across @ apart
+        return as_float64(x), as_float64(values[:, None] + apart)
 
 
 class _Band:
@@ -105,11 +135,15 @@ class _Band:
 
     def draw(self, z: FloatArray) -> FloatArray:
         """Solve with the transposed factor: normal numbers become draws of the posterior."""
-        x, info = scipy.linalg.lapack.dtbtrs(self.factor, z, uplo="L", trans="T")
-        if info:
-            raise NumericalError("the posterior of the motion is singular")
-        drawn: FloatArray = x
-        return drawn
+        return _drawn(self.factor, z)
+
+
+def _drawn(factor: FloatArray, z: FloatArray) -> FloatArray:
+    x, info = scipy.linalg.lapack.dtbtrs(factor, z, uplo="L", trans="T")
+    if info:
+        raise NumericalError("the posterior of the motion is singular")
+    drawn: FloatArray = x
+    return drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,6 +263,8 @@ def estimate(
         grid,
         count,
         settled,
+        band.factor,
+        across,
     )
 
 

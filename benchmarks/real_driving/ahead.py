@@ -1,0 +1,103 @@
+"""How well a model predicts lateral speed and yaw rate some seconds ahead.
+
+Each window starts from the smoothed motion (`sysid_vehicle.check`, no tyre in it) and knows the
+steering angle and the longitudinal acceleration of the same motion, so that its speed is the
+measured one. Its error is that of v_y and yaw rate over the window, each over its standard
+deviation in all the driving; the figure is the median over windows of the root of the sum of both
+squares.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import sysid_vehicle as sv
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.forces._motion import Places, smoothed
+
+_BEGIN_S = 0.5  # between windows
+_STEPS = 20  # in a window
+_LOST = 3.0  # standard deviations of lateral speed or yaw rate, beyond which the car is lost
+# The filter that starts the windows follows the smoothed motion.
+_CERTAIN = sv.NoiseModel(
+    (0.01, 0.005, 0.0005, 1e3, 1e3), (0.05, 0.05, 0.02), (100.0, 100.0, 100.0), 0.3
+)
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """Median over windows of the relative error of v_y, of the yaw rate, of both, and the lost."""
+
+    vy: float
+    yaw_rate: float
+    both: float
+    lost: float
+    windows: int
+
+    def __str__(self) -> str:
+        return (
+            f"v_y {self.vy:.4f}, yaw rate {self.yaw_rate:.4f}, both {self.both:.4f} of their "
+            f"standard deviations; {100 * self.lost:.0f} % of {self.windows} windows lost"
+        )
+
+
+def motion_logs(check: sv.SensorCheck, logs: list[sv.Log]) -> list[sv.Log]:
+    """The smoothed motion at the samples of some of the checked logs, one log per stretch."""
+    places = Places.of(check)
+    motion = smoothed(check, places)
+    steer = places.values(check, "steer_rad")
+    along = np.zeros_like(steer)
+    for number in np.unique(places.stretch):
+        own = places.stretch == number
+        along[own] = np.gradient(motion.vx[own], places.time_s[own])
+    along -= motion.vy * motion.yaw
+    out = []
+    for number, stretch in enumerate(check.stretches):
+        if not any(check.logs[stretch.log] is log for log in logs):
+            continue
+        own = places.stretch == number
+        columns = {
+            "time_s": places.time_s[own],
+            "vx_mps": motion.vx[own],
+            "vy_mps": motion.vy[own],
+            "yaw_rate_radps": motion.yaw[own],
+            "ax_mps2": along[own],
+            "ay_mps2": motion.ay[own],
+            "steer_rad": steer[own],
+        }
+        name = f"{check.logs[stretch.log].name}, stretch {number}"
+        out.append(sv.Log.from_arrays(columns, name=name, check=False))
+    return out
+
+
+def ahead(model: sv.Model, logs: list[sv.Log], seconds: float = 2.0) -> Ahead:
+    """Predict windows of so many seconds of the logs that `motion_logs` gave."""
+    driving = Driving.of(logs)
+    problem = driving.problem(model)
+    rate = driving.mean_rate_hz
+    every = round(_BEGIN_S * rate)
+    squares = []
+    starts = _starts(driving, round(seconds * rate), every)
+    for lead in np.unique(np.round(np.linspace(0.0, seconds * rate, _STEPS + 1)[1:]).astype(int)):
+        found = problem.look_ahead(model.vector(), _CERTAIN.vector(), int(lead), every)
+        squares.append(found[starts + lead][:, 1:3] ** 2)
+    spread = np.nanstd(driving.measured[:, 1:3], axis=0)
+    with np.errstate(invalid="ignore"):
+        last = np.sqrt(squares[-1]) / spread
+        relative = np.sqrt(np.mean(squares, axis=0)) / spread
+    relative = np.where(np.isfinite(relative), relative, np.inf)
+    lost = ~(last < _LOST).all(axis=1)
+    both = np.sqrt(np.sum(relative**2, axis=1))
+    vy, yaw = np.median(relative, axis=0)
+    return Ahead(float(vy), float(yaw), float(np.median(both)), float(lost.mean()), len(starts))
+
+
+def _starts(driving: Driving, length: int, every: int) -> np.ndarray:
+    """Samples at which whole windows begin."""
+    out = []
+    for s in driving.stretches:
+        first, last = s.where.start, s.where.stop
+        out.append(np.arange(first, max(last - length, first), every))
+    return np.concatenate(out)

@@ -1,0 +1,150 @@
+"""Axle forces from motion, against the forces of simulated cars."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle.cli.main import main
+from sysid_vehicle.forces import COLOURS
+from sysid_vehicle.simulate import Drive, drive_truth
+
+mpl.use("Agg")
+# Columns of the core's evaluation.
+SLIP, LOAD, SIDE = slice(5, 7), slice(7, 9), slice(9, 11)
+
+
+@pytest.fixture(scope="module")
+def truth() -> Drive:
+    model = sv.Model(sv.example_vehicle())
+    return drive_truth(model, sv.manoeuvres.handling_course(), seed=3)
+
+
+@pytest.fixture(scope="module")
+def found(truth: Drive) -> sv.AxleForces:
+    return sv.axle_forces(truth.log.between(9.0, 18.0), truth.model.vehicle)
+
+
+@pytest.fixture(scope="module")
+def core(truth: Drive, found: sv.AxleForces) -> np.ndarray:
+    """What the simulated car's equations say at the samples."""
+    track, p = truth.model.core(), truth.model.vector()
+    rows = np.searchsorted(truth.log["time_s"], found.time_s - 1e-6)
+    return np.array(
+        [
+            track.evaluate(p, np.ascontiguousarray(truth.states[k]), *truth.inputs[k].tolist())[0]
+            for k in rows
+        ]
+    )
+
+
+def test_the_true_forces_lie_in_the_band(found: sv.AxleForces, core: np.ndarray) -> None:
+    for value, std, true in (
+        (found.lateral_n, found.lateral_std_n, core[:, SIDE]),
+        (found.slip_rad, found.slip_std_rad, core[:, SLIP]),
+    ):
+        inside = np.abs(value - true) < 1.96 * std
+        assert (inside.mean(axis=0) > 0.93).all()
+    # A band that holds everything says nothing: 60 N of 5 kN, and 0.15 deg.
+    assert float(np.median(found.lateral_std_n)) < 60.0
+    assert float(np.median(found.slip_std_rad)) < np.radians(0.15)
+    assert float(np.abs(core[:, SIDE]).max()) > 3000.0
+    np.testing.assert_allclose(found.load_n, core[:, LOAD], atol=100.0)
+
+
+def test_wheel_force_is_that_of_the_log(truth: Drive, found: sv.AxleForces) -> None:
+    rows = np.searchsorted(truth.log["time_s"], found.time_s - 1e-6)
+    error = found.longitudinal_n - truth.inputs[rows, 1]
+    # Steps of the accelerator are smoothed over.
+    assert float(np.median(np.abs(error))) < 60.0
+
+
+def test_a_wrong_inertia_tilts_the_split(found: sv.AxleForces) -> None:
+    car = found.vehicle
+    heavy = car.replace(yaw_inertia_kgm2=1.2 * found.yaw_inertia_kgm2)
+    (log,) = found.sensors.logs
+    other = sv.axle_forces(log, heavy, sensors=found.sensors, count=2)
+    tilt = 0.2 * found.yaw_inertia_kgm2 * found.yaw_acceleration_radps2 / car.wheelbase_m
+    cos = np.cos(found.steer_rad)
+    front, rear = (other.lateral_n - found.lateral_n).T
+    # The front force of the axle is that along the car, over the cosine of the steering angle.
+    np.testing.assert_allclose(front * cos, tilt, rtol=0.02, atol=1.0)
+    np.testing.assert_allclose(rear, -tilt, rtol=1e-9, atol=1e-9)
+    assert float(np.abs(tilt).max()) > 30.0
+
+
+def test_an_unknown_inertia_is_said(found: sv.AxleForces) -> None:
+    (log,) = found.sensors.logs
+    car = found.vehicle.replace(yaw_inertia_kgm2=None)
+    other = sv.axle_forces(log, car, sensors=found.sensors, count=2)
+    assert other.yaw_inertia_kgm2 == car.mass_kg * car.lf_m * car.lr_m
+    assert "gives no yaw inertia" in str(other)
+
+
+def test_mass_scales_and_the_centre_of_gravity_moves(found: sv.AxleForces) -> None:
+    (log,) = found.sensors.logs
+    car = found.vehicle
+    heavy = car.replace(mass_kg=1.1 * car.mass_kg, yaw_inertia_kgm2=1.1 * found.yaw_inertia_kgm2)
+    other = sv.axle_forces(log, heavy, sensors=found.sensors, count=2)
+    np.testing.assert_allclose(other.lateral_n[:, 1], 1.1 * found.lateral_n[:, 1])
+    # Speeds of a place 0.5 m behind the centre of gravity: the same car, described from there.
+    moved = sv.axle_forces(log, car, sensors=found.sensors, cg_ahead_m=0.5, count=2)
+    behind = car.replace(lf_m=car.lf_m + 0.5, lr_m=car.lr_m - 0.5)
+    same = sv.axle_forces(log, behind, sensors=found.sensors, count=2)
+    np.testing.assert_allclose(moved.slip_rad, same.slip_rad, atol=1e-12)
+    gain = moved.lateral_n - found.lateral_n
+    side = car.mass_kg * 0.5 * found.yaw_acceleration_radps2
+    np.testing.assert_allclose(gain[:, 1], car.lf_m / car.wheelbase_m * side, atol=1e-6)
+
+
+def test_a_mean_slope_of_the_road_is_told(truth: Drive) -> None:
+    log = truth.log.between(12.0, 18.0)
+    columns = {c: np.array(log[c]) for c in log.channels}
+    columns["ay_mps2"] = columns["ay_mps2"] + 0.5
+    found = sv.axle_forces(sv.Log.from_arrays(columns, name="tilted"), truth.model.vehicle, count=2)
+    assert "too much on average" in str(found)
+    assert float(np.abs(found.sensors.offsets["ay_mps2"][0] - 0.5)) < 0.1
+
+
+def test_it_prints_and_draws(found: sv.AxleForces) -> None:
+    text = str(found)
+    assert "front" in text
+    assert "kN/rad" in text
+    assert "axle forces of" in repr(found)
+    assert "<table>" in found._repr_html_()
+    assert json.loads(json.dumps(found.to_dict()))["axles"] == ["front", "rear"]
+    slopes = found.slope_npr
+    assert 6e4 < min(slopes) < max(slopes) < 1.6e5
+    for colour in (COLOURS[0], COLOURS[3]):
+        front, rear = found.plot(colour=colour)
+        assert front.get_ylabel() == rear.get_ylabel() == "side force [kN]"
+    with pytest.raises(sv.InvalidInput, match="did you mean 'load'"):
+        found.plot(colour="lod")
+    with pytest.raises(sv.InvalidInput, match="two axes"):
+        found.plot(ax=front)  # type: ignore[arg-type]
+
+
+def test_wrong_arguments_are_refused(truth: Drive, found: sv.AxleForces) -> None:
+    with pytest.raises(sv.InvalidInput, match="check of other logs"):
+        sv.axle_forces(truth.log, found.vehicle, sensors=found.sensors)
+    (log,) = found.sensors.logs
+    with pytest.raises(sv.InvalidInput, match="cg_ahead_m"):
+        sv.axle_forces(log, found.vehicle, sensors=found.sensors, cg_ahead_m=float("nan"))
+    with pytest.raises(AttributeError):
+        found.vehicle = replace(found.vehicle)  # type: ignore[misc]
+
+
+def test_the_command(truth: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, car = tmp_path / "drive.csv", tmp_path / "car.toml"
+    truth.log.between(12.0, 18.0).to_csv(log)
+    truth.model.vehicle.to_toml(car)
+    plot, figures = tmp_path / "forces.svg", tmp_path / "forces.json"
+    options = ["--vehicle", str(car), "--colour", "a_x"]
+    assert main(["forces", str(log), *options, "--plot", str(plot), "--json", str(figures)]) == 0
+    assert "slip angle" in capsys.readouterr().out
+    assert plot.read_text().startswith("<?xml")
+    assert len(json.loads(figures.read_text())["lateral_n"]) > 300
