@@ -66,7 +66,7 @@ def _logs(job: Job, drives: tuple[Log | Path, ...]) -> list[Log]:
 
 
 def _row(job: Job, study: Study, seconds: float) -> Row:
-    ahead = horizons(study.fits, study.steps, study.held_out, horizons_s=(AHEAD_S,))
+    ahead = horizons(study.fits, study.steps, study.validation, horizons_s=(AHEAD_S,))
     told = study.explained
     return Row(
         job.name,
@@ -80,7 +80,7 @@ def _row(job: Job, study: Study, seconds: float) -> Row:
         error_after=study.test[-1].error,
         explained=None if told is None else (told.share, told.low, told.high),
         usable_s=study.fit.driving.usable_s,
-        validation_s=study.held_out.usable_s,
+        validation_s=study.validation.usable_s,
         warnings=study.warnings,
         seconds=seconds,
     )
