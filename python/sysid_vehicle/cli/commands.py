@@ -39,7 +39,6 @@ def _demo(args: argparse.Namespace, heard: Warnings) -> None:
         seed=args.seed,
         report=args.report,
         tell=lambda text: print(text, end="\n\n", flush=True),
-        progress=_on_terminal(),
     )
     if args.json is not None:
         content = _with_warnings(shown.study, heard).to_dict()
@@ -57,7 +56,7 @@ def _compare(args: argparse.Namespace, heard: Warnings) -> None:
     _define(args)
     model = Model(Vehicle.from_toml(args.vehicle), args.effects)
     logs = _read(args.logs, args)
-    fit = identify(model, logs, progress=_on_terminal())
+    fit = identify(model, logs)
     comparison = compare(fit, logs)
     failing = where(fit)
     print(comparison)
@@ -174,7 +173,6 @@ def _study(args: argparse.Namespace, heard: Warnings) -> Study:
         time_limit_s=args.time_limit,
         matters=args.matters,
         tell=lambda text: print(text, file=sys.stderr, flush=True),
-        progress=_on_terminal(),
     )
     return _with_warnings(study, heard)
 
@@ -202,10 +200,6 @@ def _inputs(args: argparse.Namespace) -> list[Path]:
         *args.define,
     ]
     return [path for path in given if path is not None]
-
-
-def _on_terminal() -> bool:
-    return sys.stderr.isatty()
 
 
 def _comparison(c: Comparison, fit: Fit, heard: Warnings) -> dict[str, Any]:

@@ -44,7 +44,6 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
         args.out,
         workers=args.workers,
         retry=args.retry,
-        progress=sys.stderr.isatty(),
         tell=lambda text: print(text, file=sys.stderr, flush=True),
     )
     print(fleet)

@@ -6,7 +6,6 @@ A subcommand is a `Subcommand` in `SUBCOMMANDS`.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -105,7 +104,7 @@ def _run(args: argparse.Namespace, heard: list[str]) -> None:
     seen: Preview | None = None
     if args.excitation == _DESIGNED:
         length = {} if args.duration is None else {"duration_s": args.duration}
-        design = design_excitation(setup, seed=args.seed, progress=sys.stderr.isatty(), **length)
+        design = design_excitation(setup, seed=args.seed, **length)
         print(design, end="\n\n")
         driven: excitation.Excitation = design.excitation
         setup, seen = design.setup, design.preview

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from .._files import write_json, write_text
@@ -63,7 +62,6 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
         method=args.method,
         profiles=not args.fast,
         seed=args.seed,
-        progress=sys.stderr.isatty(),
     )
     print(fit)
     if args.plot is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from .._files import write_bytes, write_json
@@ -65,9 +64,8 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     logs = [read_log(path, mapping, dbc=args.dbc) for path in args.logs]
     area = None if args.area is None else (args.area[0], args.area[1])
     limits = DriveLimits(args.top_speed, args.lateral, area, args.duration)
-    shown = sys.stderr.isatty()
-    fit = identify(Model(Vehicle.from_toml(args.vehicle)), logs, progress=shown)
-    found = suggest_manoeuvre(fit, *pair, limits=limits, progress=shown)
+    fit = identify(Model(Vehicle.from_toml(args.vehicle)), logs)
+    found = suggest_manoeuvre(fit, *pair, limits=limits)
     print(found)
     if args.json is not None:
         write_json(args.json, {**found.to_dict(), "warnings": list(heard)})

@@ -54,7 +54,7 @@ def run_demo(
     seed: int = 0,
     report: str | Path | None = None,
     tell: Callable[[str], None] = print,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Demonstration:
     """Drive a simulated car on which an unknown effect acts, find the effect, tell the story.
 
@@ -68,8 +68,8 @@ def run_demo(
         HTML file to write.
     tell : callable
         Called with each paragraph of the story.
-    progress : bool
-        Show progress bars.
+    progress : bool, optional
+        Show progress bars; by default in a terminal or a notebook.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def run_demo(
     train, test = drive_both(truth, rng)
     model = Model(vehicle_file(truth.vehicle))
     tell(story.opening(model, train, test))
-    study = improve(model, train, test, seed=seed, progress=progress)
+    study = improve(model, train, test, seed=seed, progress=progress, tell=lambda _: None)
     for paragraph in story.findings(study):
         tell(paragraph)
     if report is not None:

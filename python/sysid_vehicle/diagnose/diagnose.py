@@ -44,7 +44,7 @@ def diagnose(
     refits: int = _REFITS,
     workers: int | None = None,
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Diagnosis:
     """Rank the effects a fitted model may lack.
 

@@ -129,7 +129,7 @@ def bias_report(
     most_samples: int = 3000,
     seed: int = 0,
     workers: int | None = None,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> BiasReport:
     """Say what each effect of a typical size would do unnoticed to the fit's parameters.
 
@@ -146,8 +146,8 @@ def bias_report(
         Of the simulated noise.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
-    progress : bool
-        Show a progress bar.
+    progress : bool, optional
+        Show a progress bar; by default in a terminal or a notebook, after two seconds.
 
     Returns
     -------

@@ -178,7 +178,7 @@ def suggest_manoeuvre(
     limits: DriveLimits | None = None,
     enough: float = _ENOUGH,
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> NextDrive:
     """Suggest the cheapest drive that tells two effects apart.
 
@@ -196,8 +196,8 @@ def suggest_manoeuvre(
         Standard errors that are wanted.
     seed : int
         Of the simulated drives.
-    progress : bool
-        Show a progress bar.
+    progress : bool, optional
+        Show a progress bar; by default in a terminal or a notebook, after two seconds.
 
     Returns
     -------

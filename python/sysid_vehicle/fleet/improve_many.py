@@ -40,7 +40,7 @@ def improve_many(
     dbc: str | Path | None = None,
     define: Sequence[str | Path] = (),
     retry: bool = False,
-    progress: bool = False,
+    progress: bool | None = None,
     tell: Callable[[str], None] | None = None,
     **options: Any,
 ) -> Fleet:
@@ -110,7 +110,7 @@ def run(
     *,
     workers: int | None = None,
     retry: bool = False,
-    progress: bool = False,
+    progress: bool | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> Fleet:
     """Do the jobs that `out` does not hold yet; the arguments are those of `improve_many`."""

@@ -39,7 +39,7 @@ def do(job: Job) -> Outcome:
         # Other studies have the other cores.
         with shared_cores():
             train, validation = (_logs(job, drives) for drives in (job.train, job.validation))
-            study = improve(job.model, train, validation or None, **job.options)
+            study = improve(job.model, train, validation or None, progress=False, **job.options)
             row = _row(job, study, time.perf_counter() - began)
         return Outcome(row, packed(study))
     except SysidError as error:

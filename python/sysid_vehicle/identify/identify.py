@@ -42,7 +42,7 @@ def identify(
     intervals: str = "information",
     seed: int = 0,
     workers: int | None = None,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Fit:
     """Estimate a model's free parameters, and the noise, by maximum likelihood.
 
@@ -72,8 +72,8 @@ def identify(
         Of the start points.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
-    progress : bool
-        Show a progress bar.
+    progress : bool, optional
+        Show a progress bar; by default in a terminal or a notebook, after two seconds.
 
     Returns
     -------
@@ -181,7 +181,7 @@ def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3)
     return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True)
 
 
-def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool = False) -> Fit:
+def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool | None = None) -> Fit:
     """The same fit at the very bottom of its valley, with intervals of the profile likelihood.
 
     Where a profile comes upon a better optimum the fit goes on from there.

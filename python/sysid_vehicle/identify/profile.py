@@ -103,7 +103,7 @@ def profile_all(
     wanted: Sequence[Quantity],
     *,
     workers: int | None,
-    progress: bool,
+    progress: bool | None,
 ) -> tuple[tuple[Profile, ...], FloatArray | None]:
     """Profile many quantities side by side.
 

@@ -156,7 +156,7 @@ class Runner:
 
     box: Box
     workers: int | None
-    progress: bool
+    progress: bool | None
 
     def all_of(self, search: Search, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Ends and their log-likelihoods, from points of shape (starts, parameters)."""

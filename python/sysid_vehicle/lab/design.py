@@ -199,7 +199,7 @@ def design_excitation(
     trials: int = 32,
     seed: int = 0,
     workers: int | None = None,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Design:
     """Choose amplitude, frequencies and speeds so that the least-known coefficient is known best.
 
@@ -227,8 +227,8 @@ def design_excitation(
         Of the spread, and of the sensors' randomness.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
-    progress : bool
-        Show a progress bar.
+    progress : bool, optional
+        Show a progress bar; by default in a terminal or a notebook, after two seconds.
 
     Returns
     -------

@@ -29,7 +29,7 @@ def multistart(
     *,
     method: str,
     workers: int | None,
-    progress: bool,
+    progress: bool | None,
 ) -> tuple[FloatArray, FloatArray, Starts, list[FloatArray]]:
     """Search from every start, in three rounds, each from where the one before ended.
 

@@ -42,7 +42,7 @@ def identify_tyres(
     method: str = "gauss-newton",
     seed: int = 0,
     workers: int | None = None,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> TyreFit:
     """Identify B, C, D, E of both axles, and the noise, from driving.
 
@@ -70,8 +70,8 @@ def identify_tyres(
         Of the start points.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
-    progress : bool
-        Show a progress bar.
+    progress : bool, optional
+        Show a progress bar; by default in a terminal or a notebook, after two seconds.
 
     Returns
     -------

@@ -9,6 +9,7 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 
 from .._arguments import real, whole
+from .._progress import teller
 from ..compare import Comparison, compare
 from ..diagnose import Verdicts, considered, judge, omnibus
 from ..effects import effect
@@ -49,7 +50,7 @@ def improve(
     matters: Mapping[str, float | str] | None = None,
     starts: int = 8,
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> Study:
     """Improve a model step by step until nothing more is missing that the driving can show.
@@ -86,8 +87,10 @@ def improve(
         Errors that matter, such as ``{"yaw_rate": "0.5deg/s"}`` (`sizes_that_matter`); those not
         given have usual sizes. A baseline whose errors 0.5 to 5 s ahead on validation data are all
         smaller is adequate, whatever is left. By default whatever is shown to be left counts.
+    progress : bool, optional
+        Show progress; by default in a terminal or a notebook.
     tell : callable, optional
-        Called with a sentence about each step.
+        Called with a sentence about each step, in place of printing it to the error stream.
 
     Returns
     -------
@@ -105,7 +108,7 @@ def improve(
     if exclude:
         left_out = {effect(e).id for e in exclude}
         candidates = [e.id for e in considered(model, candidates) if e.id not in left_out]
-    say = tell if tell is not None else _silent
+    say = tell if tell is not None else teller(progress)
     train_driving, test_driving = set_aside(train, test)
     baseline = identify(model, train_driving, starts=starts, seed=seed, progress=progress)
     say(f"Fitted the baseline to {train_driving}.")
@@ -187,10 +190,6 @@ def _limit(seconds: float | None) -> float:
     if value is None or not value > 0.0:
         raise InvalidInput(f"time_limit_s = {seconds!r}: give seconds, above 0")
     return value
-
-
-def _silent(_: str) -> None:
-    pass
 
 
 def _added(

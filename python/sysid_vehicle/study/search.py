@@ -81,7 +81,7 @@ class Search:
     ends: float
     rules: Rules
     seed: int
-    progress: bool
+    progress: bool | None
     say: Callable[[str], None]
 
     def from_baseline(self, baseline: Fit) -> Trail:

@@ -1,0 +1,75 @@
+"""Long calls tell where they are, where somebody watches."""
+
+import io
+import sys
+import types
+
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle._progress import teller, watched, with_progress
+
+
+class Terminal(io.StringIO):
+    """An error stream that somebody looks at."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """Look at the error stream; in the test itself, as pytest sets it anew after fixtures."""
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    return stream
+
+
+def test_nobody_watches_a_pipe(capsys: pytest.CaptureFixture[str]) -> None:
+    assert not watched()
+    assert list(with_progress(range(3), "things", shown=None)) == [0, 1, 2]
+    teller(None)("said")
+    assert capsys.readouterr().err == ""
+
+
+def test_a_terminal_sees_a_bar_that_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = terminal(monkeypatch)
+    assert list(with_progress(range(3), "things", shown=True)) == [0, 1, 2]
+    assert "things" in stream.getvalue()
+    assert "3/3" in stream.getvalue()
+
+
+def test_short_work_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = terminal(monkeypatch)
+    assert list(with_progress(range(3), "things", shown=None)) == [0, 1, 2]
+    assert stream.getvalue() == ""
+
+
+def test_long_work_is_shown_unasked(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = terminal(monkeypatch)
+    monkeypatch.setattr("sysid_vehicle._progress._SILENT_S", 0.0)
+    assert list(with_progress(range(3), "things", shown=None)) == [0, 1, 2]
+    assert "things" in stream.getvalue()
+
+
+def test_a_notebook_watches(monkeypatch: pytest.MonkeyPatch) -> None:
+    kernel = types.ModuleType("ipykernel.kernelapp")
+    kernel.IPKernelApp = types.SimpleNamespace(initialized=lambda: True)  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "ipykernel.kernelapp", kernel)
+    assert watched()
+
+
+def test_a_study_tells_its_steps(
+    monkeypatch: pytest.MonkeyPatch, truth: sv.Model, lap: sv.Log, course: sv.Log
+) -> None:
+    stream = terminal(monkeypatch)
+
+    def study(**options: object) -> str:
+        stream.truncate(0)
+        sv.improve(truth, lap, course, candidates=["steer_offset"], starts=1, **options)  # type: ignore[arg-type]
+        return stream.getvalue()
+
+    assert "Fitted the baseline to lap" in study()
+    assert "Fitted" not in study(progress=False)
+    told: list[str] = []
+    assert "Fitted" not in study(tell=told.append)
+    assert any("Fitted the baseline" in text for text in told)
