@@ -153,9 +153,10 @@ def test_a_car_with_an_effect_is_no_mistake(
     check_car(log, mass_kg=truth.vehicle.mass_kg, wheelbase_m=truth.vehicle.wheelbase_m)
 
 
-@pytest.mark.parametrize("manoeuvre", ["lap", "handling_course"])
+@pytest.mark.parametrize(
+    "manoeuvre", ["lap", "handling_course", "sine_sweep", "double_lane_change"]
+)
 def test_the_steering_ratio_is_told(truth: sv.Model, manoeuvre: str) -> None:
-    # Not from a sweep at one speed: there understeer can stand for any ratio.
     log = sv.drive(truth, getattr(sv.manoeuvres, manoeuvre)(), seed=4, rate_hz=50.0)
     data = {name: np.array(log[name]) for name in log.channels}
     data["steer_rad"] *= 16.0 / 5.0

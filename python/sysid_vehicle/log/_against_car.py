@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InvalidInput
 from ._channels import FloatArray
-from ._laws import EXCITED, WINDOW_S, Drive, fit, size_of, spread_of
+from ._laws import EXCITED, WINDOW_S, Drive, size_of, spread_of
 from ._log import Log
 from ._longitudinal import ramp_on
 from ._motion import Motion
@@ -25,13 +25,17 @@ _SURE = 3.0  # deviations
 _COHERENT = 0.6
 # What logs of good cars are off by: the commanded force by its gain and by slopes, the steering by
 # compliance and by tyres.
-_FORCE_STD, _FORCE_FACTOR = 0.15, 1.7
+_FORCE_STD, _FORCE_FACTOR = 0.45, 1.7
 _STEER_STD, _STEER_FACTOR = 0.2, 2.0
 _UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003  # rad of road wheels per m/s2
 _UNDERSTEER_MOST = 0.008  # rad per m/s2 either way: 4.5 deg/g, more than cars have
-_LEFT = 4.0  # times as much unexplained with this wheelbase as with another, that refuses it
-_UNEXPLAINED = 0.1  # share of the steering; less may be the curvature of tyres' curves
-_VARIES = 0.4  # standard deviation of the curvature over its root mean square
+_OFFSET = 0.3  # of the steering angle, as a share of its size
+_RATIOS = np.geomspace(1.0 / 128.0, 128.0, 281)
+_BLOCK, _FITTED = 6, 4  # windows that are taken as dependent; what is fitted to them
+# Squares left of the steering, as a multiple of the least and as a share of all, with which a ratio
+# is not excluded: that much may be the curvature of tyres' curves. With more no ratio is told.
+_LEFT, _UNEXPLAINED, _INCOHERENT = 4.0, 0.05, 0.7
+_TINY = 1e-12
 _NEAR = 0.2  # a unit is named where the factor is so near, as a logarithm
 
 _MASS_SLIPS = (
@@ -49,16 +53,25 @@ _LENGTH_SLIPS = (
 
 @dataclass(frozen=True)
 class _Told:
-    """A ratio that should be one, and its relative standard deviation were it one."""
+    """A ratio that should be one, and the interval that surely holds it."""
 
     ratio: float
-    deviation: float
+    low: float
+    high: float
     place: str
 
     def off(self, factor: float, usual: float) -> bool:
-        """Whether it is surely beyond a factor."""
-        size = max(self.ratio, 1.0 / self.ratio)
-        return size > factor and size - 1.0 > _SURE * math.hypot(usual, self.deviation)
+        """Whether it is surely beyond a factor, where good cars are off by `usual`."""
+        size = abs(math.log(self.ratio))
+        towards_one = math.log(
+            self.ratio / self.low if self.ratio > 1.0 else self.high / self.ratio
+        )
+        return size > math.log(factor) and size > math.hypot(math.log1p(usual), towards_one)
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of its logarithm."""
+        return math.log(self.high / self.low) / (2.0 * _SURE)
 
 
 def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
@@ -105,72 +118,77 @@ def _mass(drive: Drive, mass_kg: float) -> _Told | None:
     inverse = float(found.coefficients[0])
     if spread_of(ramp) < EXCITED or found.coherence < _COHERENT or inverse <= 0.0:
         return None
-    return _Told(mass_kg * inverse, float(found.deviations[0]) / inverse, drive.place(force))
+    ratio, deviation = mass_kg * inverse, _SURE * float(found.deviations[0]) / inverse
+    return _Told(ratio, ratio / (1.0 + deviation), ratio * (1.0 + deviation), drive.place(force))
 
 
 def _steer(drive: Drive, wheelbase_m: float) -> _Told | None:
-    """Steering angle over the one of a wheelbase, ``delta = L r / v + K a_y`` at low a_y.
-
-    At one speed nothing tells wheelbase from understeer but what understeer cars have.
-    """
+    """Steering angle over the one of a wheelbase, ``delta = L r / v + K a_y`` at low a_y."""
     c = drive.motion.channels
     ay = drive.mean(c["ay_mps2"])
-    curvature = drive.mean(c["yaw_rate_radps"] / np.clip(c["vx_mps"], 1.0, None))
     gentle = np.abs(ay) < _LINEAR_MPS2
-    if np.count_nonzero(gentle) < _MIN_WINDOWS or size_of(ay[gentle]) < EXCITED:
+    spare = float(np.count_nonzero(gentle)) / _BLOCK - _FITTED
+    if spare < 1.0 or size_of(ay[gentle]) < EXCITED:
         return None
     steer = drive.mean(c["steer_rad"])
+    curvature = drive.mean(c["yaw_rate_radps"] / np.clip(c["vx_mps"], 1.0, None))
     yaw = drive.change(c["yaw_rate_radps"])
-    scale = size_of(steer)
-    if scale <= 0.0:
+    columns = np.column_stack([steer, wheelbase_m * curvature, ay, np.ones(ay.size)])[gentle]
+    yaw = yaw[gentle, None]
+    columns -= yaw * (yaw.T @ columns / max(float(np.sum(yaw**2)), _TINY))
+    squares = columns.T @ columns
+    offset = _OFFSET * size_of(steer[gentle])
+    noise = float(_left(squares, offset, 0.0).min()) / spare
+    left = _left(squares, offset, noise)
+    best = int(np.argmin(left))
+    whole = float(squares[0, 0])
+    if best in (0, _RATIOS.size - 1) or left[best] > _INCOHERENT * whole:
         return None
-
-    def asked(s: float) -> tuple[float, float, float]:
-        # Everything the steering does has its scale, understeer too: the prior is scaled with it.
-        columns: list[FloatArray] = [wheelbase_m * curvature[gentle], ay[gentle], yaw[gentle]]
-        columns.append(np.ones(np.count_nonzero(gentle)))
-        spread = [np.inf, s * _UNDERSTEER_STD, s * 0.05, 0.3 * scale]
-        found = fit(steer[gentle], columns, spread, [0.0, s * _UNDERSTEER, 0.0, 0.0])
-        # What the prior leaves open of the first coefficient where the speed hardly varies.
-        x = columns[0]
-        shared = float(x @ ay[gentle] / max(float(x @ x), 1e-12))
-        rest = ay[gentle] - shared * x
-        open_ = float(np.sum(rest**2) / max(np.sum(ay[gentle] ** 2), 1e-12))
-        deviation = abs(shared) * s * _UNDERSTEER_STD * (1.0 if open_ < 0.05 else 0.3)
-        ratio = float(found.coefficients[0])
-        return ratio, math.hypot(float(found.deviations[0]), deviation), found.coherence
-
-    ratio, deviation, coherence = asked(1.0)
-    for _ in range(3):
-        if ratio <= 0.0:
-            return None
-        ratio, deviation, coherence = asked(ratio)
-    if ratio <= 0.0 or coherence < 0.3:
-        return None
-    columns = [wheelbase_m * curvature[gentle], ay[gentle], yaw[gentle]]
-    if not _excluded(steer[gentle], columns, ratio):
-        return None
-    return _Told(ratio, deviation / ratio, drive.place(steer))
+    most = max(_LEFT * left[best], left[best] + _SURE**2 * noise, _UNEXPLAINED * whole)
+    inside = _RATIOS[left <= most]
+    return _Told(
+        float(_RATIOS[best]), float(inside[0]), float(inside[-1]), drive.place(steer[gentle])
+    )
 
 
-def _excluded(steer: FloatArray, columns: list[FloatArray], ratio: float) -> bool:
-    """Whether no understeer that cars have explains the steering with this wheelbase.
+def _left(squares: FloatArray, offset: float, noise: float) -> FloatArray:
+    """Return the squares that each of `_RATIOS` leaves of the steering.
 
-    The columns are L r / v, a_y and dr/dt. Where the speed hardly varies the first two are one, and
-    understeer can stand for any wheelbase.
+    Beside the ratio stand an understeer gradient, which the ratio scales too, and an offset, both
+    within what cars have: at one speed understeer looks like another wheelbase, on one radius an
+    offset does. Between ratios that explain the steering alike the usual understeer decides, with
+    the weight of the noise.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (4, 4)
+        Products of the steering angle, the one of the wheelbase, a_y, and one.
+    offset : float
+        At most, either way [rad].
+    noise : float
+        Squares that one independent reading leaves [rad2]; zero leaves the usual understeer out.
     """
-    from scipy.optimize import lsq_linear
+    s = _RATIOS
+    weight = noise / (s * _UNDERSTEER_STD) ** 2
+    k, o = _UNDERSTEER_MOST * np.maximum(s, 1.0), np.full(s.size, offset)
+    aa, ao, oo = squares[2, 2] + weight, squares[2, 3], squares[3, 3]
+    ra = squares[0, 2] - s * squares[1, 2] + weight * s * _UNDERSTEER
+    ro = squares[0, 3] - s * squares[1, 3]
+    alone = squares[0, 0] - 2.0 * s * squares[0, 1] + s**2 * squares[1, 1]
+    alone += weight * (s * _UNDERSTEER) ** 2
 
-    def left(scale: float) -> float:
-        rest = steer - scale * columns[0]
-        x = np.column_stack([*columns[1:], np.ones(rest.size)])
-        most = np.array([_UNDERSTEER_MOST * max(scale, 1.0), np.inf, np.inf])
-        return float(2.0 * lsq_linear(x, rest, (-most, most)).cost)
+    def left(understeer: FloatArray, shift: FloatArray) -> FloatArray:
+        both = aa * understeer**2 + 2.0 * ao * understeer * shift + oo * shift**2
+        result: FloatArray = alone + both - 2.0 * (ra * understeer + ro * shift)
+        return result
 
-    varies = float(np.sum((steer - np.mean(steer)) ** 2))
-    if np.std(columns[0]) < _VARIES * np.sqrt(np.mean(columns[0] ** 2)):
-        return False  # an offset of the steering would look the same
-    return left(1.0) > max(_LEFT * left(ratio), _UNEXPLAINED * varies)
+    # A convex function over a rectangle is least at its minimum or on an edge.
+    free = np.maximum(aa * oo - ao**2, _TINY * aa * oo)
+    understeer, shift = (oo * ra - ao * ro) / free, (aa * ro - ao * ra) / free
+    inside = (np.abs(understeer) <= k) & (np.abs(shift) <= o)
+    edges = [left(e, np.clip((ro - ao * e) / oo, -o, o)) for e in (-k, k)]
+    edges += [left(np.clip((ra - ao * e) / aa, -k, k), e) for e in (-o, o)]
+    return np.where(inside, left(understeer, shift), np.min(edges, axis=0))
 
 
 def _likely(told: _Told, slips: tuple[tuple[float, str], ...]) -> str:
