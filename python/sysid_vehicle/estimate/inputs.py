@@ -29,12 +29,12 @@ _AGREES = 1.8  # standard deviations
 def white_noise_std(y: FloatArray, block: int | None = None) -> float:
     """White noise of a signal from its third differences, which smooth driving hardly enters.
 
-    NaN stands for missing samples; 0 where there are too few to tell. Noise that pauses is a
+    NaN stands for missing samples, whose neighbours count as such; 0 where there are too few to
+    tell. Noise that pauses is a
     mixture whose median tells little: with `block`, the root mean variance of stretches of so many
     samples is returned.
     """
-    d = np.diff(y, n=3)
-    d = d[np.isfinite(d)]
+    d = np.diff(y[np.isfinite(y)], n=3)
     parts = [d] if block is None else np.array_split(d, max(len(d) // block, 1))
     # 20 = 1 + 9 + 9 + 1; the median stands a few corners in the signal.
     variances = [

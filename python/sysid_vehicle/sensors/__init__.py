@@ -2,6 +2,7 @@
 
 from ._check import check
 from ._faults import SensorFault
+from ._ready import made_ready
 from ._result import SensorCheck, put_right
 
-__all__ = ["SensorCheck", "SensorFault", "check", "put_right"]
+__all__ = ["SensorCheck", "SensorFault", "check", "made_ready", "put_right"]

@@ -10,9 +10,11 @@ import scipy
 from .._arrays import FloatArray
 from ..log import Log
 
-__all__ = ["corrected"]
+__all__ = ["corrected", "shifted"]
 
 _SMOOTH_S = 0.2  # yaw acceleration is that of a parabola over this time
+_HALF_TAPS = 8  # of the interpolation, on either side
+_KAISER = 6.0  # its window's shape
 
 
 def corrected(log: Log, found: Mapping[str, float]) -> tuple[dict[str, FloatArray], list[str]]:
@@ -37,7 +39,7 @@ def corrected(log: Log, found: Mapping[str, float]) -> tuple[dict[str, FloatArra
         ("ay_mps2", "delay_ay_s"),
     ):
         if name in found and log.has(channel):
-            now[channel] = _earlier(log["time_s"], values(channel), found[name])
+            now[channel] = shifted(log["time_s"], values(channel), found[name])
             what.append(f"{channel}: taken {1000.0 * found[name]:.3g} ms later in the file")
     for channel, bias, gain in (
         ("yaw_rate_radps", "bias_yaw_rate_radps", "gain_yaw_rate"),
@@ -101,12 +103,31 @@ def _filled(values: FloatArray) -> FloatArray:
     return np.interp(np.arange(values.size), known, values[known])
 
 
-def _earlier(time_s: FloatArray, values: FloatArray, delay_s: float) -> FloatArray:
-    """Values that were written `delay_s` later; a hole stays one, beyond the ends is nothing."""
-    known = np.isfinite(values)
-    if np.count_nonzero(known) < 2:
+def shifted(time_s: FloatArray, values: FloatArray, delay_s: float) -> FloatArray:
+    """Values that were written `delay_s` later; a hole stays one, beyond the ends is nothing.
+
+    Between two samples stands what a signal of their bandwidth has there: a straight line would
+    average the noise of the two, and noise that was white would be so no more.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size < 2:
         return values
-    shifted = np.interp(time_s + delay_s, time_s[known], values[known], np.nan, np.nan)
-    nearest = np.clip(np.searchsorted(time_s, time_s + delay_s - 1e-9), 0, time_s.size - 1)
-    result: FloatArray = np.where(known[nearest], shifted, np.nan)
-    return result
+    shifted_to = time_s + delay_s
+    result: FloatArray = np.interp(shifted_to, time_s[known], values[known], np.nan, np.nan)
+    every = int(np.median(np.diff(known)))
+    period = every * (time_s[-1] - time_s[0]) / (time_s.size - 1)
+    rows, part = divmod(delay_s / period, 1.0)
+    lags = np.arange(-_HALF_TAPS + 1, _HALF_TAPS + 1)
+    place = part - lags
+    inside = np.sqrt(np.maximum(1.0 - (place / (_HALF_TAPS + 0.5)) ** 2, 0.0))
+    taps = np.sinc(place) * np.i0(_KAISER * inside)
+    taps /= taps.sum()
+    from_rows = every * (int(rows) + lags)
+    at = known[(known + from_rows[0] >= 0) & (known + from_rows[-1] < values.size)]
+    sharp = values[at[:, None] + from_rows] @ taps
+    whole = np.isfinite(sharp)
+    result[at[whole]] = sharp[whole]
+    nearest = np.clip(np.searchsorted(time_s, shifted_to - 1e-9), 0, time_s.size - 1)
+    there = np.isfinite(values) if every > 1 else np.isfinite(values[nearest])
+    kept: FloatArray = np.where(there, result, np.nan)
+    return kept

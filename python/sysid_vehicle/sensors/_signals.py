@@ -14,9 +14,18 @@ from ..errors import InvalidInput
 from ..log import CHANNELS, Log, held_rows
 from ._colour import neighbours
 from ._equations import Readings
-from ._motion import Stretch
+from ._motion import IntArray, Stretch
 
-__all__ = ["MOVING", "Signal", "averaged", "pieces", "readings_of", "refuse_mixed_up", "signals"]
+__all__ = [
+    "MOVING",
+    "Signal",
+    "averaged",
+    "own_samples",
+    "pieces",
+    "readings_of",
+    "refuse_mixed_up",
+    "signals",
+]
 
 MOVING = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 _SLOWEST_MPS = 3.0
@@ -60,10 +69,9 @@ def signals(log: Log) -> list[Signal]:
         if channel == "time_s" or not log.has(channel):
             continue
         values = log[channel]
-        known = np.flatnonzero(np.isfinite(values))
+        known, every = own_samples(values)
         if known.size < 2:
             continue
-        every = max(1.0, float(np.median(np.diff(known))))
         held = held_rows(values)
         lost = 1.0 - known.size * every / max(1, known[-1] - known[0] + every)
         found.append(
@@ -77,6 +85,12 @@ def signals(log: Log) -> list[Signal]:
             )
         )
     return found
+
+
+def own_samples(values: FloatArray) -> tuple[IntArray, int]:
+    """Rows at which a channel has a value, and how many rows lie between two as a rule."""
+    known = np.flatnonzero(np.isfinite(values))
+    return known, max(1, int(np.median(np.diff(known)))) if known.size > 1 else 1
 
 
 def _quantum(values: FloatArray) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from typing import Literal
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
@@ -14,12 +15,12 @@ from ..compare import Comparison, compare
 from ..diagnose import Verdicts, considered, judge, omnibus
 from ..effects import effect
 from ..errors import InvalidInput, SysidWarning, warn
-from ..estimate import Driving
+from ..estimate import Driving, several_logs
 from ..identify import Fit, explaining, identify
 from ..log import Log, check_excitation
 from ..model import Model
 from ..rules import USUAL, Rules, grade, verdict
-from ..sensors import SensorCheck, put_right
+from ..sensors import SensorCheck, made_ready, put_right
 from .added import AddedEffect
 from .horizons import horizons
 from .matters import sizes_that_matter, within
@@ -45,7 +46,7 @@ def improve(
     rules: Rules = USUAL,
     candidates: Sequence[str] | None = None,
     exclude: Sequence[str] = (),
-    sensors: SensorCheck | None = None,
+    sensors: SensorCheck | Literal[False] | None = None,
     time_limit_s: float | None = None,
     matters: Mapping[str, float | str] | None = None,
     starts: int = 8,
@@ -77,9 +78,10 @@ def improve(
         Effects to consider; by default all that the model lacks.
     exclude : sequence of str, optional
         Effects not to consider.
-    sensors : SensorCheck, optional
+    sensors : SensorCheck or False, optional
         Check of the sensors: all logs are put right by it, and what kinematics settled is not
-        considered.
+        considered. Without one only what the likelihood cannot hold is taken out: delays of one
+        channel against another, low-passes of sensors, and vibration; with False not even that.
     time_limit_s : float, optional
         After so many seconds no further step begins; what was found until then is judged, and a
         warning tells.
@@ -101,10 +103,8 @@ def improve(
     began = time.perf_counter()
     ends = began + _limit(time_limit_s)
     sizes = None if matters is None else sizes_that_matter(matters)
-    if sensors is not None:
-        train = [sensors.apply(log) for log in ([train] if isinstance(train, Log) else train)]
-        test = put_right(sensors, test)
-        exclude = (*exclude, *sensors.settles)
+    train, test, settled = _ready(train, test, sensors)
+    exclude = (*exclude, *settled)
     if exclude:
         left_out = {effect(e).id for e in exclude}
         candidates = [e.id for e in considered(model, candidates) if e.id not in left_out]
@@ -181,6 +181,21 @@ def _excited(driving: Driving) -> bool:
     with catch_warnings():
         simplefilter("ignore", SysidWarning)  # reading the logs has warned of it
         return check_excitation(driving.logs)
+
+
+def _ready(
+    train: Log | Sequence[Log],
+    test: Log | Sequence[Log] | None,
+    sensors: SensorCheck | Literal[False] | None,
+) -> tuple[Sequence[Log], Log | Sequence[Log] | None, tuple[str, ...]]:
+    """The logs with what their sensors do wrong taken out, and the effects that this settles."""
+    logs, others = several_logs(train), () if test is None else several_logs(test)
+    if sensors is False:
+        return logs, test, ()
+    if sensors is not None:
+        return [sensors.apply(log) for log in logs], put_right(sensors, test), sensors.settles
+    own, rest, delayed = made_ready(logs, others)
+    return own, None if test is None else rest, ("sensor_delay",) if delayed else ()
 
 
 def _limit(seconds: float | None) -> float:

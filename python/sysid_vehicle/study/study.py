@@ -261,10 +261,18 @@ class Study:
     def __str__(self) -> str:
         lines = [f"Verdict: {self.verdict} - {self.meaning}."]
         lines += [f"  {a}" for a in self.added]
+        lines += [f"  {text}" for text in self.sensors]
         lines.append(text_table(self._HEAD, self._rows()))
         lines.append(self.in_the_end)
         lines += [f"Warning: {w}" for w in self.warnings]
         return "\n".join(lines)
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """What the channels had to be corrected for before any fit, in sentences."""
+        logs = (*self.fits[0].driving.logs, *self.validation.logs)
+        said = dict.fromkeys(text for log in logs for text in log.corrections)
+        return tuple(f"Sensor of {text}" for text in said)
 
     @property
     def in_the_end(self) -> str:
@@ -298,7 +306,7 @@ class Study:
     def _repr_html_(self) -> str:
         return (
             f"<p><b>{escape(self.verdict)}</b>: {escape(self.meaning)}.</p>"
-            + html_list(self.added)
+            + html_list([*self.added, *self.sensors])
             + html_table(self._HEAD, self._rows())
             + html_paragraph(self.in_the_end)
         )

@@ -1,0 +1,113 @@
+"""Logs whose noise is coloured, or whose channels are late, are made ready for the likelihood."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import signal
+
+import sysid_vehicle as sv
+from sysid_vehicle.sensors import made_ready
+from sysid_vehicle.sensors._apply import shifted
+from sysid_vehicle.sensors._condition import conditioned
+from sysid_vehicle.sensors._spectrum import noise_spectrum
+
+MOTION = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+
+
+@pytest.fixture(scope="module")
+def log() -> sv.Log:
+    return sv.drive(sv.Model(sv.example_vehicle()), sv.manoeuvres.lap(), seed=61)
+
+
+def _with(log: sv.Log, **channels: np.ndarray) -> sv.Log:
+    return log.corrected(channels, [])
+
+
+def _low_pass(values: np.ndarray) -> np.ndarray:
+    b, a = signal.butter(2, 15.0, fs=100.0)
+    return signal.lfilter(b, a, values, zi=signal.lfilter_zi(b, a) * values[0])[0]
+
+
+def _delay(values: np.ndarray, true: np.ndarray) -> float:
+    """By regression on the slope of the true signal [s]."""
+    slow = signal.savgol_filter(true, 41, 3)
+    slope = signal.savgol_filter(true, 41, 3, deriv=1, delta=0.01)
+    there = np.isfinite(values)
+    return float(-(slope[there] @ (values - slow)[there]) / (slope[there] @ slope[there]))
+
+
+def test_white_noise_is_left_as_it_is(log: sv.Log) -> None:
+    assert conditioned([log])[0] is log
+    own, others, delayed = made_ready([log], [log])
+    assert own[0] is log
+    assert others[0] is log
+    assert not delayed
+
+
+def test_a_low_pass_is_told_from_the_noise_it_leaves(log: sv.Log) -> None:
+    found = noise_spectrum(_low_pass(log["vy_mps"]), 100.0)
+    assert found is not None
+    # Of the bilinear transform of Butterworth's filter at 100 Hz.
+    true = np.sqrt(2.0) / (200.0 * np.tan(np.pi * 0.15))
+    assert found.delay_s == pytest.approx(true, abs=0.002)
+    assert found.corner_hz == pytest.approx(15.9, rel=0.1)
+    assert found.every == 3
+    assert not found.vibration_hz
+
+
+def test_bumps_of_the_road_are_no_low_pass() -> None:
+    rng = np.random.default_rng(4)
+    keep = np.exp(-0.01 / 0.03)
+    bumps = signal.lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(6000))
+    found = noise_spectrum(0.15 * bumps + 0.06 * rng.standard_normal(6000), 100.0)
+    assert found is not None
+    assert found.delay_s == 0.0
+    assert found.every == 1
+
+
+def test_filtered_channels_are_put_in_time_with_independent_readings(log: sv.Log) -> None:
+    late = _with(log, **{c: _low_pass(log[c]) for c in MOTION})
+    (ready,) = conditioned([late])
+    for channel in MOTION:
+        assert 0.3 < np.mean(np.isfinite(ready[channel])) < 0.36
+    for channel in ("yaw_rate_radps", "ay_mps2"):
+        assert _delay(late[channel], log[channel]) == pytest.approx(0.014, abs=0.002)
+        assert _delay(ready[channel], log[channel]) == pytest.approx(0.0, abs=0.002)
+    assert len(ready.corrections) == 5
+    assert "low-pass of 1" in ready.corrections[0]
+
+
+def test_vibration_is_taken_out_and_nothing_else(log: sv.Log) -> None:
+    rng = np.random.default_rng(5)
+    phase = np.cumsum(0.05 * rng.standard_normal(log.n))
+    shaken = log["ay_mps2"] + 0.5 * np.sin(2.0 * np.pi * 12.0 * log["time_s"] + phase)
+    (ready,) = conditioned([_with(log, ay_mps2=shaken)])
+    left = ready["ay_mps2"] - log["ay_mps2"]
+    assert np.std(left) < 0.04  # of noise of 0.06 m/s2 and vibration of 0.35 m/s2 rms
+    b, a = signal.butter(4, 3.0, fs=100.0)
+    assert np.std(signal.filtfilt(b, a, ready["ay_mps2"] - shaken)[100:-100]) < 0.002
+    assert ready.corrections == ("ay_mps2: vibration at 12 Hz taken out",)
+
+
+@pytest.mark.parametrize("delay_s", [0.005, 0.0123, -0.004])
+def test_a_shift_by_parts_of_a_sample_leaves_white_noise_white(delay_s: float) -> None:
+    time_s = np.arange(6000) / 100.0
+    noise = shifted(time_s, np.random.default_rng(6).standard_normal(6000), delay_s)[20:-20]
+    assert np.std(noise) == pytest.approx(1.0, abs=0.07)
+    assert abs(np.corrcoef(noise[1:], noise[:-1])[0, 1]) < 0.12
+    wave = shifted(time_s, np.sin(2.0 * np.pi * 4.0 * time_s), delay_s)[20:-20]
+    true = np.sin(2.0 * np.pi * 4.0 * (time_s[20:-20] + delay_s))
+    np.testing.assert_allclose(wave, true, atol=3e-3)
+
+
+def test_late_speeds_are_read_earlier_in_all_logs(log: sv.Log) -> None:
+    late = {c: np.interp(log["time_s"] - 0.02, log["time_s"], log[c]) for c in MOTION[:2]}
+    own, others, delayed = made_ready([_with(log, **late)], [_with(log, **late)])
+    assert delayed
+    for ready in (*own, *others):
+        inner = slice(10, -10)
+        for channel in MOTION[:2]:
+            off = ready[channel][inner] - log[channel][inner]
+            assert abs(np.mean(np.gradient(log[channel])[inner] * off)) < 2e-4
+        assert sum("later in the file" in text for text in ready.corrections) == 2
