@@ -68,6 +68,7 @@ NUMERICAL = {
         "_KNOTS", "_KNOTS_OF_PAIR", "_SIZES", "_SIZES_OF_PAIR", "_SMOOTH", "_FINE", "_DRAWS",
         "_LEVEL", "_FEWEST",
     },
+    "diagnose/suggestion.py": {"_BAND", "_SLOWEST_HZ"},
     "diagnose/where.py": {"_TELLS"},
 }  # fmt: skip
 _NO_LIMIT = (0, 1, -1, 2, 0.5)  # of which halves, squares and signs are made

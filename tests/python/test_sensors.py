@@ -74,6 +74,17 @@ def test_good_sensors_are_called_good(perfect: Channels) -> None:
     assert found.noise["vx_mps"][0].std == pytest.approx(NOISE.vx_mps, rel=0.1)
 
 
+def test_a_sweep_at_one_speed_claims_no_delay() -> None:
+    """There a delay of all but the yaw rate acts as the IMU's place, up to its square."""
+    for seed in (3, 4):
+        log = sv.drive(sv.Model(sv.example_vehicle()), sv.manoeuvres.sine_sweep(), seed=seed)
+        check = sv.check(log)
+        for name in ("delay_vy_s", "delay_ay_s", "imu_forward_m"):
+            fault = check[name]
+            assert not fault.found
+            assert abs(fault.value) < 3.0 * fault.std
+
+
 def test_faults_are_named_with_their_size(faulty: sv.SensorCheck) -> None:
     assert {fault.name for fault in faulty.found} == set(TRUTH)
     for name, true in TRUTH.items():

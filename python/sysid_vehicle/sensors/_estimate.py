@@ -11,16 +11,16 @@ basis functions, ICRA 2012, which let every reading enter at its own time.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 
 from .._arrays import FloatArray, as_float64
-from ..errors import NumericalError
 from ._colour import Colour, fit_colour, neighbours
 from ._equations import FAULTS, Readings, predict
 from ._motion import QUICK, SLOW, Grid, IntArray
+from ._system import Band, Linearised, Normal, drawn, linearise, normal_equations
 
 __all__ = ["Estimate", "estimate", "noise_of"]
 
@@ -30,7 +30,6 @@ _DRAWS = 2
 _ORDER = 4  # of the colour of the noise, within the bandwidth of the splines
 _STEP_S = 0.06  # largest change of a delay in one round
 _LARGEST_DELAY_S = 0.28  # the splines reach no farther
-_OUTLIER = 4.0  # whitened errors beyond count less (Huber)
 _SETTLED = 0.03  # of a standard deviation
 # Second derivatives of speeds and yaw rate: so large that they matter only without readings.
 _ROUGH = {"vx": 300.0, "vy": 300.0, "yaw": 100.0}
@@ -52,6 +51,8 @@ class Estimate:
         Of the faults, with the errors' dependence over time allowed for.
     information : ndarray, shape (n, n)
         Fisher information of the faults, prior included.
+    null_covariance : ndarray, shape (n, n)
+        The covariance were there no fault.
     prior : ndarray, shape (n,)
         The prior's part in its diagonal.
     colours : dict of Colour
@@ -77,6 +78,7 @@ class Estimate:
     faults: dict[str, float]
     covariance: FloatArray
     information: FloatArray
+    null_covariance: FloatArray
     prior: FloatArray
     colours: dict[str, Colour]
     offsets: dict[str, tuple[float, float]]
@@ -109,54 +111,8 @@ class Estimate:
         values = np.array(list(self.faults.values()))
         root = np.linalg.cholesky(self.covariance)
         apart = root @ rng.standard_normal((values.size, count))
-        x = self.x[:, None] + _drawn(self.factor, numbers) - self.across @ apart
+        x = self.x[:, None] + drawn(self.factor, numbers) - self.across @ apart
         return as_float64(x), as_float64(values[:, None] + apart)
-
-
-class _Band:
-    """Cholesky factor of a banded information matrix."""
-
-    def __init__(self, h: scipy.sparse.csr_matrix) -> None:
-        coo = scipy.sparse.tril(h, format="coo")
-        self.width = int((coo.row - coo.col).max())
-        self.ab = np.zeros((self.width + 1, h.shape[0]))
-        self.ab[coo.row - coo.col, coo.col] = coo.data
-        try:
-            self.factor = scipy.linalg.cholesky_banded(self.ab, lower=True, check_finite=False)
-        except scipy.linalg.LinAlgError as error:
-            raise NumericalError(
-                "the motion cannot be told from these channels; check that vx_mps, "
-                "yaw_rate_radps and ay_mps2 hold values"
-            ) from error
-
-    def solve(self, b: FloatArray) -> FloatArray:
-        x: FloatArray = scipy.linalg.cho_solve_banded((self.factor, True), b, check_finite=False)
-        return x
-
-    def draw(self, z: FloatArray) -> FloatArray:
-        """Solve with the transposed factor: normal numbers become draws of the posterior."""
-        return _drawn(self.factor, z)
-
-
-def _drawn(factor: FloatArray, z: FloatArray) -> FloatArray:
-    x, info = scipy.linalg.lapack.dtbtrs(factor, z, uplo="L", trans="T")
-    if info:
-        raise NumericalError("the posterior of the motion is singular")
-    drawn: FloatArray = x
-    return drawn
-
-
-@dataclass(frozen=True, eq=False)
-class _System:
-    """Whitened linearised equations of all channels, and what is drawn from them."""
-
-    errors: dict[str, FloatArray]
-    raw_motion: dict[str, scipy.sparse.csr_matrix]
-    raw_faults: dict[str, FloatArray]
-    motion: dict[str, scipy.sparse.csr_matrix]
-    by_faults: dict[str, FloatArray]
-    white: dict[str, FloatArray]
-    weights: dict[str, FloatArray]
 
 
 def estimate(
@@ -198,7 +154,7 @@ def estimate(
     bends = {signal: grid.bends(signal) for signal in QUICK}
     settled = False
     for count in range(1, _ROUNDS + 1):
-        system = _linearise(readings, grid, x, faults, colours, runs)
+        system = linearise(readings, grid, x, faults, colours, runs)
         rows = scipy.sparse.vstack(
             [
                 grid.levels,
@@ -207,27 +163,13 @@ def estimate(
             ],
             format="csr",
         )
-        h, b = (rows.T @ rows), -(rows.T @ (rows @ x))
         now = np.array([faults[name] for name in names])
         # Cauchy's prior at its present curvature.
         prior = np.diag(2.0 / (typical**2 + now**2) + most**-2.0)
-        hxt, htt, bt = np.zeros((grid.size, len(names))), prior.copy(), -prior @ now
-        for c, j in system.motion.items():
-            w = scipy.sparse.diags(system.weights[c])
-            wj = (w @ j).T.tocsr()
-            h = h + wj @ j
-            b = b + wj @ system.white[c]
-            hxt += wj @ system.by_faults[c]
-            wt = system.weights[c][:, None] * system.by_faults[c]
-            htt += wt.T @ system.by_faults[c]
-            bt += wt.T @ system.white[c]
-        band = _Band(h)
-        across = band.solve(hxt)
-        schur = htt - hxt.T @ across
-        std = np.sqrt(np.diag(np.linalg.inv(schur)))
-        step = np.linalg.solve(schur, bt - across.T @ b)
-        step = _bounded(step, names, faults)
-        dx = band.solve(b - hxt @ step)
+        normal = normal_equations(system, rows, x, prior, now)
+        std = np.sqrt(np.diag(np.linalg.inv(normal.information)))
+        step = _bounded(normal.step, names, faults)
+        dx = normal.motion_step - normal.across @ step
         x = x + dx
         for name, change in zip(names, step, strict=True):
             faults[name] += float(change)
@@ -236,35 +178,39 @@ def estimate(
         if settled:
             break
         # The same numbers in each round: then the rounds converge.
-        drawn = band.draw(numbers)
+        varied = normal.band.draw(numbers)
         if count > 1:
             for r in readings:
                 c = r.channel
                 left = system.errors[c] - system.raw_motion[c] @ dx - system.raw_faults[c] @ step
-                errors = left[None, :] - (system.raw_motion[c] @ drawn).T
+                errors = left[None, :] - (system.raw_motion[c] @ varied).T
                 colours[c] = fit_colour(errors, runs[c], floors[c], _ORDER)
             if count % _ROAD_ROUNDS == 0:
                 for signal in SLOW:
-                    road[signal] = _road(steps[signal], x, band, road[signal])
-    inverse = as_float64(np.linalg.inv(schur))
-    robust = [
-        np.diag(inverse @ _meat(readings, system, across, block) @ inverse) for block in _BLOCKS_S
-    ]
-    covariance = _inflated(inverse, np.max(robust, axis=0))
+                    road[signal] = _road(steps[signal], x, normal.band, road[signal])
+    # Faults that act alike where there are none look told apart where the estimate has left zero,
+    # and where the motion has followed the noise, whose derivatives are large: a delay at constant
+    # speed is the place of the IMU, up to the square of the delay.
+    calm = grid.smoothed(x)
+    healthy = linearise(readings, grid, calm, dict.fromkeys(names, 0.0), colours, runs)
+    at_null = normal_equations(healthy, rows, calm, prior, np.zeros(len(names)))
+    healthy = replace(healthy, white=system.white, weights=system.weights)
+    inverse = as_float64(np.linalg.inv(normal.information))
     return Estimate(
         faults,
-        covariance,
-        schur,
+        _covariance(readings, system, normal),
+        normal.information,
+        _covariance(readings, healthy, at_null),
         np.diag(prior),
         colours,
-        _offsets(grid, x, band, across, inverse),
+        _offsets(grid, x, normal.band, normal.across, inverse),
         road,
         x,
         grid,
         count,
         settled,
-        band.factor,
-        across,
+        normal.band.factor,
+        normal.across,
     )
 
 
@@ -303,30 +249,7 @@ def _begin(
             rows.append(j / std)
             values.append(r.values / std)
     j = scipy.sparse.vstack(rows, format="csr")
-    return _Band(j.T @ j).solve(j.T @ np.concatenate(values)), colours
-
-
-def _linearise(
-    readings: Sequence[Readings],
-    grid: Grid,
-    x: FloatArray,
-    faults: dict[str, float],
-    colours: dict[str, Colour],
-    runs: dict[str, IntArray],
-) -> _System:
-    names = list(faults)
-    system = _System({}, {}, {}, {}, {}, {}, {})
-    for r in readings:
-        c = r.channel
-        expected, j, by = predict(r, grid, x, faults)
-        jt = np.column_stack([by.get(name, np.zeros(expected.size)) for name in names])
-        a = colours[c].whitener(runs[c])
-        error = r.values - expected
-        white = a @ error
-        system.errors[c], system.raw_motion[c], system.raw_faults[c] = error, j, jt
-        system.motion[c], system.by_faults[c], system.white[c] = a @ j, a @ jt, white
-        system.weights[c] = np.minimum(1.0, _OUTLIER / np.maximum(np.abs(white), 1e-12))
-    return system
+    return Band(j.T @ j).solve(j.T @ np.concatenate(values)), colours
 
 
 def _bounded(step: FloatArray, names: Sequence[str], faults: dict[str, float]) -> FloatArray:
@@ -342,7 +265,7 @@ def _bounded(step: FloatArray, names: Sequence[str], faults: dict[str, float]) -
     return result
 
 
-def _road(rows: scipy.sparse.csr_matrix, x: FloatArray, band: _Band, now: float) -> float:
+def _road(rows: scipy.sparse.csr_matrix, x: FloatArray, band: Band, now: float) -> float:
     """New standard deviation of the change within a second (EM, exact)."""
     inverse = band.solve(np.asarray(rows.T.todense()))
     spread = np.asarray((rows @ inverse).diagonal()) if rows.shape[0] else np.zeros(1)
@@ -356,7 +279,7 @@ def _road(rows: scipy.sparse.csr_matrix, x: FloatArray, band: _Band, now: float)
 
 
 def _meat(
-    readings: Sequence[Readings], system: _System, across: FloatArray, block_s: float
+    readings: Sequence[Readings], system: Linearised, across: FloatArray, block_s: float
 ) -> FloatArray:
     """Sum over blocks of time of the squared scores of the faults, free of the motion."""
     k = across.shape[1]
@@ -376,6 +299,16 @@ def _meat(
     return result
 
 
+def _covariance(readings: Sequence[Readings], system: Linearised, normal: Normal) -> FloatArray:
+    """Covariance of the faults, with the errors' dependence over time allowed for."""
+    inverse = as_float64(np.linalg.inv(normal.information))
+    robust = [
+        np.diag(inverse @ _meat(readings, system, normal.across, block) @ inverse)
+        for block in _BLOCKS_S
+    ]
+    return _inflated(inverse, np.max(robust, axis=0))
+
+
 def _inflated(naive: FloatArray, robust: FloatArray) -> FloatArray:
     """Covariance whose variances are the larger of two; few blocks make the second one noisy."""
     ratio = np.clip(robust / np.diag(naive), 1.0, None)
@@ -385,7 +318,7 @@ def _inflated(naive: FloatArray, robust: FloatArray) -> FloatArray:
 
 
 def _offsets(
-    grid: Grid, x: FloatArray, band: _Band, across: FloatArray, inverse: FloatArray
+    grid: Grid, x: FloatArray, band: Band, across: FloatArray, inverse: FloatArray
 ) -> dict[str, tuple[float, float]]:
     found = {}
     for signal in SLOW:

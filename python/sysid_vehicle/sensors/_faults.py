@@ -125,9 +125,16 @@ def faults_of(found: Estimate, absent: Sequence[str]) -> tuple[SensorFault, ...]
         pick = np.array([1.0 if name in told.of else 0.0 for name in names])
         value = float(pick @ np.array([found.faults[name] for name in names]))
         std = float(np.sqrt(pick @ found.covariance @ pick))
+        at_null = float(np.sqrt(pick @ found.null_covariance @ pick))
+        widest = max(std, at_null)
         prior = 1.0 / float(np.sum(1.0 / found.prior[pick > 0.0]))
-        learned = 1.0 - float(pick @ naive @ pick) * prior
-        claimed = abs(value) > max(critical * std, told.negligible) and learned > 0.0
+        claimed = abs(value) > max(critical * widest, told.negligible)
+        variance = float(pick @ naive @ pick)
+        if not claimed:
+            # No fault is as likely: its interval is that of no fault, if that is wider.
+            std, variance = widest, max(variance, at_null**2)
+        learned = 1.0 - variance * prior
+        claimed = claimed and learned > 0.0
         well = learned > _LEARNED and _Z95 * std < told.enough
         reason = "" if claimed or well else _confounded(told, pick, found, naive, names)
         result.append(

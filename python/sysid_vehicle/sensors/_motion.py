@@ -19,6 +19,7 @@ __all__ = ["QUICK", "SLOW", "Basis", "Grid", "IntArray", "Stretch"]
 QUICK = ("vx", "vy", "yaw")
 SLOW = ("grade", "bank")
 SLOW_S = 1.0  # knots of what gravity adds on a road that is not level
+_SMOOTH = np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 16.0  # of neighbouring knots
 # What they may reach: gravity along and across, and the lateral speed where none is measured.
 _LEVEL = {"grade": 2.0, "bank": 2.0, "vy": 3.0}
 
@@ -130,6 +131,15 @@ class Grid:
         """Places of the unknowns that act, shape (n, k)."""
         at: IntArray = self.index[signal][basis.first[:, None] + np.arange(basis.weights.shape[2])]
         return at
+
+    def smoothed(self, x: FloatArray) -> FloatArray:
+        """Coefficients of the motion without what lies near the Nyquist frequency of the knots."""
+        calm = x.copy()
+        for signal in QUICK:
+            for at in np.split(self.index[signal], np.cumsum(self._counts[0])[:-1]):
+                padded = np.pad(x[at], _SMOOTH.size // 2, mode="edge")
+                calm[at] = np.convolve(padded, _SMOOTH, mode="valid")
+        return calm
 
     @cached_property
     def levels(self) -> scipy.sparse.csr_matrix:
