@@ -33,13 +33,15 @@ class Ahead:
     vy: float
     yaw_rate: float
     both: float
+    vy_mps: float
     lost: float
     windows: int
 
     def __str__(self) -> str:
         return (
-            f"v_y {self.vy:.4f}, yaw rate {self.yaw_rate:.4f}, both {self.both:.4f} of their "
-            f"standard deviations; {100 * self.lost:.0f} % of {self.windows} windows lost"
+            f"v_y {self.vy:.4f} ({self.vy_mps:.4f} m/s), yaw rate {self.yaw_rate:.4f}, "
+            f"both {self.both:.4f} of their standard deviations; {100 * self.lost:.0f} % of "
+            f"{self.windows} windows lost"
         )
 
 
@@ -53,6 +55,10 @@ def motion_logs(check: sv.SensorCheck, logs: list[sv.Log]) -> list[sv.Log]:
         own = places.stretch == number
         along[own] = np.gradient(motion.vx[own], places.time_s[own])
     along -= motion.vy * motion.yaw
+    # What is not found stays in the logs that are put right, and in what is predicted of them.
+    left = {f.name: 0.0 if f.found else f.value for f in check.faults if np.isfinite(f.std)}
+    vy = motion.vy + left.get("bias_vy_mps", 0.0)
+    yaw = (1.0 + left.get("gain_yaw_rate", 0.0)) * motion.yaw + left.get("bias_yaw_rate_radps", 0.0)
     out = []
     for number, stretch in enumerate(check.stretches):
         if not any(check.logs[stretch.log] is log for log in logs):
@@ -61,8 +67,8 @@ def motion_logs(check: sv.SensorCheck, logs: list[sv.Log]) -> list[sv.Log]:
         columns = {
             "time_s": places.time_s[own],
             "vx_mps": motion.vx[own],
-            "vy_mps": motion.vy[own],
-            "yaw_rate_radps": motion.yaw[own],
+            "vy_mps": vy[own],
+            "yaw_rate_radps": yaw[own],
             "ax_mps2": along[own],
             "ay_mps2": motion.ay[own],
             "steer_rad": steer[own],
@@ -80,6 +86,8 @@ def ahead(model: sv.Model, logs: list[sv.Log], seconds: float = 2.0) -> Ahead:
     every = round(_BEGIN_S * rate)
     squares = []
     starts = _starts(driving, round(seconds * rate), every)
+    if not len(starts):
+        return Ahead(*(float("nan"),) * 5, 0)
     for lead in np.unique(np.round(np.linspace(0.0, seconds * rate, _STEPS + 1)[1:]).astype(int)):
         found = problem.look_ahead(model.vector(), _CERTAIN.vector(), int(lead), every)
         squares.append(found[starts + lead][:, 1:3] ** 2)
@@ -90,8 +98,9 @@ def ahead(model: sv.Model, logs: list[sv.Log], seconds: float = 2.0) -> Ahead:
     relative = np.where(np.isfinite(relative), relative, np.inf)
     lost = ~(last < _LOST).all(axis=1)
     both = np.sqrt(np.sum(relative**2, axis=1))
-    vy, yaw = np.median(relative, axis=0)
-    return Ahead(float(vy), float(yaw), float(np.median(both)), float(lost.mean()), len(starts))
+    vy, yaw = map(float, np.median(relative, axis=0))
+    share = float(lost.mean())
+    return Ahead(vy, yaw, float(np.median(both)), vy * float(spread[0]), share, len(starts))
 
 
 def _starts(driving: Driving, length: int, every: int) -> np.ndarray:

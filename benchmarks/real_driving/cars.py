@@ -10,6 +10,7 @@ import sysid_vehicle as sv
 
 HERE = Path(__file__).resolve().parent
 WHOLE = (0.0, 1e9)
+LARGEST_RAD = 0.8
 # Logs and their parts [s] for training, and for validation.
 PARTS: dict[str, tuple[tuple[tuple[str, float, float], ...], ...]] = {
     "revs_250lm": (
@@ -51,12 +52,22 @@ def logs(name: str, data: Path, fetched: Path | None) -> tuple[list[sv.Log], lis
     folder = fetched / name if name in FETCHED and fetched is not None else data / name
     train, validation = (
         [
-            without_force(sv.read_log(folder / file, channels)).between(begin, end)
+            without_force(read(folder / file, channels)).between(begin, end)
             for file, begin, end in parts
         ]
         for parts in PARTS[name]
     )
     return train, validation
+
+
+def read(path: Path, channels: sv.ChannelMap) -> sv.Log:
+    """A log; angles that no road wheel has are made missing: the V40's bus writes 600 deg."""
+    table = np.genfromtxt(path, delimiter=",", names=True, deletechars="", comments="#")
+    columns = {name: np.array(table[name]) for name in table.dtype.names}
+    source = channels.sources["steer_rad"]
+    steer = columns[source.column]
+    steer[np.abs(source.factor * steer) > LARGEST_RAD] = np.nan
+    return sv.read_log(columns, channels, name=path.stem)
 
 
 def without_force(log: sv.Log) -> sv.Log:

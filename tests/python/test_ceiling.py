@@ -7,7 +7,7 @@ import pytest
 
 from sysid_vehicle import Fit, Log, Model, RoadDisturbance, ceiling, drive, manoeuvres
 from sysid_vehicle.diagnose import Ceiling, Explainable
-from sysid_vehicle.diagnose.ceiling import _ago, _features, _penalty, _ridge, _share
+from sysid_vehicle.diagnose.ceiling import _ago, _features, _share, ridge
 from sysid_vehicle.estimate import Driving
 
 
@@ -66,8 +66,9 @@ def test_noise_is_shrunk_and_a_law_is_found(rng: np.random.Generator) -> None:
     law = X[:, 0] - 0.5 * X[:, 3]
     for y, expected in ((law + 0.5 * rng.standard_normal(600), 0.83), (X @ np.zeros(40), 0.0)):
         y = y + 1e-3 * rng.standard_normal(600)
-        size = _ridge(X[:300], y[:300], _penalty(X[:300], y[:300], fold[:300]))
-        found = _share("F_y", y[300:], y[300:] - X[300:] @ size, piece[300:] - 10, rng)
+        found_law = ridge(X[:300], y[:300, None], fold[:300])
+        error = y[300:] - found_law.mean[0] - X[300:] @ found_law.size[:, 0]
+        found = _share("F_y", y[300:], error, piece[300:] - 10, rng)
         assert found.share == pytest.approx(expected, abs=0.1)
         assert found.low < expected + 0.05
         assert found.high > expected - 0.05

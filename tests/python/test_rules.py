@@ -46,6 +46,10 @@ NUMERICAL = {
     "study/validation.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED", "_AHEAD"},
     "study/horizons.py": {"_BLOCK_S", "_FEWEST", "_DRAWS", "_APART", "_NORMAL", "_LOST"},
     "study/improve.py": {"_SHORT_S"},
+    "study/shares.py": {
+        "_LEAST_APART_S", "_APART", "_BLOCK_S", "_FEWEST", "_DRAWS", "_LONG_S", "_FEW",
+        "_VISIBLE", "_LOST", "_LEAST", "_QUANTILES",
+    },
     "study/steps.py": {"_ALTERNATIVES"},
     # Descriptions of the unknown, of biases, and of the next drive.
     "diagnose/ceiling.py": {

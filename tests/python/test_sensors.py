@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,21 @@ def test_a_log_put_right_holds_no_fault_any_more(faulty: sv.SensorCheck, perfect
     # What was not found to be wrong stays as it was.
     assert right["steer_rad"] is faulty.logs[0]["steer_rad"]
     assert np.array_equal(right["vx_mps"], faulty.logs[0]["vx_mps"])
+
+
+def test_the_mean_of_a_driving_acceleration_is_taken_out(faulty: sv.SensorCheck) -> None:
+    """Bias or slope: without wheel force either would drive the model away."""
+    offsets = {"grade": (-0.21, 0.01), "bank": (0.3, 0.01)}
+    found = replace(faulty, estimate=replace(faulty.estimate, offsets=offsets))
+    (log,) = faulty.logs
+    columns = {c: log[c] for c in log.channels if c != "fx_n"}
+    coasting = sv.Log.from_arrays(columns, name="no force", check=False)
+    one, other = (check.apply(coasting) for check in (faulty, found))
+    np.testing.assert_allclose(other["ax_mps2"], one["ax_mps2"] + 0.21)
+    np.testing.assert_array_equal(other["ay_mps2"], one["ay_mps2"])
+    assert any("-0.21 m/s2 on average" in text for text in other.corrections)
+    # With wheel force logged a study tells them apart.
+    np.testing.assert_array_equal(found.apply(log)["ax_mps2"], faulty.apply(log)["ax_mps2"])
 
 
 def test_a_slow_channel_enters_at_its_own_times(perfect: Channels) -> None:

@@ -95,7 +95,7 @@ def _improve(args: argparse.Namespace, heard: Warnings) -> None:
     study = _study(args, heard)
     # The warnings have gone to the error stream.
     print(study.with_warnings(()))
-    print(study.horizons)
+    print(study.shares)
     print(f"Of what the final model lacks, {study.ceiling}.")
     _print_where(study)
     if study.unknown is not None:

@@ -26,7 +26,7 @@ from ..rules import USUAL, Rules
 from .coordinates import begins, blocks
 from .force_map import UNITS, missing_forces
 
-__all__ = ["Ceiling", "Explainable", "ceiling"]
+__all__ = ["Ceiling", "Explainable", "Inputs", "Law", "ceiling", "folds", "ridge"]
 
 Whole = npt.NDArray[np.intp]
 
@@ -142,25 +142,95 @@ def ceiling(
     """
     train, other = fit.driving if logs is None else Driving.of(logs), Driving.of(test)
     rng = generator(seed)
-    features = [_features(fit, d) for d in (train, other)]
-    centre, spread = features[0].mean(axis=0), features[0].std(axis=0)
-    used = spread > 1e-9 * np.maximum(np.abs(centre), 1e-9)
-    X, Z = (np.clip((f[:, used] - centre[used]) / spread[used], -_REACH, _REACH) for f in features)
-    known, hidden = (missing_forces(fit, d) for d in (train, other))
     few, there = _thinned(train), _thinned(other)
-    fold = _block_numbers(train)[few] % _FOLDS
+    inputs = Inputs.of(fit, train, other)
+    known, hidden = (missing_forces(fit, d) for d in (train, other))
     piece = np.unique(_block_numbers(other)[there], return_inverse=True)[1]
-    found = []
-    for i, target in enumerate(known.targets):
-        if target == "F_x":
+    targets = [i for i, t in enumerate(known.targets) if t != "F_x"]
+    y = known.force[few][:, targets]
+    law = ridge(inputs.train[few], y, folds(train)[few])
+    missing = hidden.force[there][:, targets] - law.mean
+    error = missing - inputs.other[there] @ law.size
+    return Ceiling(
+        tuple(
+            _share(known.targets[i], missing[:, k], error[:, k], piece, rng)
+            for k, i in enumerate(targets)
+        ),
+        rules,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """Regressors of two drives, centred and scaled by the first; shape (samples, n)."""
+
+    train: FloatArray
+    other: FloatArray
+
+    @classmethod
+    def of(cls, fit: Fit, train: Driving, other: Driving) -> Inputs:
+        """Histories of steering, speed and longitudinal acceleration."""
+        features = [_features(fit, d) for d in (train, other)]
+        centre, spread = features[0].mean(axis=0), features[0].std(axis=0)
+        used = spread > 1e-9 * np.maximum(np.abs(centre), 1e-9)
+        X, Z = (
+            np.clip((f[:, used] - centre[used]) / spread[used], -_REACH, _REACH) for f in features
+        )
+        return cls(as_float64(X), as_float64(Z))
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A linear regression: ``mean + X @ size``.
+
+    Attributes
+    ----------
+    mean : array, shape (m,)
+    size : array, shape (n, m)
+    """
+
+    mean: FloatArray
+    size: FloatArray
+
+
+def ridge(X: FloatArray, Y: FloatArray, fold: Whole) -> Law:
+    """Regress each column of `Y` with the penalty that predicts left-out folds best.
+
+    Parameters
+    ----------
+    X : array, shape (samples, n)
+    Y : array, shape (samples, m)
+    fold : array of int, shape (samples,)
+    """
+    errors = np.zeros((len(_PENALTIES), Y.shape[1]))
+    for k in np.unique(fold):
+        out = fold == k
+        if out.all():
             continue
-        y = known.force[few, i]
-        mean = float(y.mean())
-        size = _ridge(X[few], y - mean, _penalty(X[few], y, fold))
-        missing = hidden.force[there, i] - mean
-        error = missing - Z[there] @ size
-        found.append(_share(target, missing, error, piece, rng))
-    return Ceiling(tuple(found), rules)
+        mean = Y[~out].mean(axis=0)
+        for i, size in enumerate(_sizes(X[~out], Y[~out] - mean)):
+            errors[i] += np.sum((Y[out] - mean - X[out] @ size) ** 2, axis=0)
+    best = np.argmin(errors, axis=0)
+    mean = Y.mean(axis=0)
+    sizes = _sizes(X, Y - mean)
+    return Law(
+        as_float64(mean), as_float64(np.stack([sizes[i][:, k] for k, i in enumerate(best)], axis=1))
+    )
+
+
+def _sizes(X: FloatArray, Y: FloatArray) -> list[FloatArray]:
+    """Coefficients at each penalty, from one eigendecomposition."""
+    value, vector = np.linalg.eigh(X.T @ X)
+    across = vector.T @ (X.T @ Y)
+    return [
+        as_float64(vector @ (across / (value + penalty * len(X))[:, None]))
+        for penalty in _PENALTIES
+    ]
+
+
+def folds(driving: Driving) -> Whole:
+    """To which fold of cross-validation each sample belongs."""
+    return _block_numbers(driving) % _FOLDS
 
 
 def _thinned(driving: Driving) -> Whole:
@@ -196,23 +266,6 @@ def _ago(driving: Driving, x: FloatArray, seconds: float) -> FloatArray:
     first = begins(driving)
     own = first[np.searchsorted(first, np.arange(len(x)), side="right") - 1]
     return as_float64(x[np.maximum(np.arange(len(x)) - lag, own)])
-
-
-def _ridge(X: FloatArray, y: FloatArray, penalty: float) -> FloatArray:
-    gram = X.T @ X + penalty * len(X) * np.eye(X.shape[1])
-    return as_float64(np.linalg.solve(gram, X.T @ y))
-
-
-def _penalty(X: FloatArray, y: FloatArray, fold: Whole) -> float:
-    """That which predicts left-out blocks best."""
-    errors = np.zeros(len(_PENALTIES))
-    for k in np.unique(fold):
-        out = fold == k
-        mean = y[~out].mean()
-        for i, penalty in enumerate(_PENALTIES):
-            size = _ridge(X[~out], y[~out] - mean, penalty)
-            errors[i] += float(np.sum((y[out] - mean - X[out] @ size) ** 2))
-    return float(_PENALTIES[int(np.argmin(errors))])
 
 
 def _share(

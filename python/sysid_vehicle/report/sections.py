@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .._style import new_figure
-from .._text import number
+from .._text import html_table, number
 from ..diagnose import EffectVerdict, bias_report
 from ..estimate import UNITS
 from ..model import Model
@@ -165,8 +165,11 @@ def _ahead(study: Study, truth: Model | None) -> list[str]:
     falls = study.waterfall()
     figure = new_figure(6.0, 3.4)
     falls.plot(figure.add_subplot())
+    ahead = study.shares
     return [
         heading("Further ahead"),
+        paragraph(ahead.sentence),
+        html_table(ahead.HEAD, ahead.rows()),
         picture(
             figure,
             "validation error over how far ahead was predicted, from what was known then and the "

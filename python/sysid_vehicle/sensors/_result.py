@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SensorCheck", "put_right"]
 
+_SURE = 3.0  # standard errors of a mean offset
 _HEAD = ("fault", "channel", "value", "95 % interval", "verdict")
 _SIGNAL_HEAD = ("channel", "rate", "held", "quantum", "missing", "noise", "colour")
 # Effects of the catalogue that are not to be looked for any more once their faults are told.
@@ -145,10 +146,16 @@ class SensorCheck:
 
         Time offsets, biases and scales (gravity by roll and pitch is one) are taken out; the
         accelerations are those of the speed sensor's place, in its direction. Faults that were not
-        found are left alone; so is the steering angle.
+        found are left alone; so is the steering angle. Where no wheel force is logged the measured
+        a_x is what drives the car, and its mean beyond the motion is taken out: bias of the sensor
+        and slope of the road are one there. That of a_y is left to the tyres, which can tell them.
         """
         values = {fault.name: fault.value for fault in self.found}
         channels, what = corrected(log, values)
+        bias, std = self.offsets["ax_mps2"]
+        if log.has("ax_mps2") and not log.has("fx_n") and abs(bias) > _SURE * std:
+            channels["ax_mps2"] = channels.get("ax_mps2", log["ax_mps2"]) - bias
+            what.append(f"ax_mps2: {bias:.3g} m/s2 on average beyond the motion taken out")
         return log.corrected(channels, what)
 
     @property

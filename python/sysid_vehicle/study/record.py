@@ -27,6 +27,7 @@ def record(study: Study) -> dict[str, Any]:
             {**a.to_dict(), "gains": study.horizons.gains(i + 1)} for i, a in enumerate(study.added)
         ],
         "horizons": study.horizons.to_dict(),
+        "shares": study.shares.to_dict(),
         "explained": None if study.explained is None else study.explained.to_dict(),
         "ranking": [
             _candidate(c, study.verdicts[c.id], *errors.get(c.id, (None, None)))

@@ -35,6 +35,7 @@ from ..saved import save
 from .added import AddedEffect
 from .horizons import Beyond, Horizons, horizons
 from .record import record
+from .shares import Shares, shares
 from .waterfall import Waterfall, waterfall
 
 __all__ = ["AddedEffect", "Study", "Verdict"]
@@ -120,6 +121,11 @@ class Study:
     @property
     def meaning(self) -> str:
         """The verdict in words."""
+        if self.verdict == "unknown" and self.added and self.explained is not None:
+            return (
+                f"something is missing; what was added takes up {self.explained} of the error 1 to "
+                "5 s ahead, and is no sure name beside what is left"
+            )
         return _MEANING[self.verdict]
 
     @property
@@ -211,6 +217,12 @@ class Study:
         """How much of what the final model lacks any function of the driving could explain."""
         return ceiling(self.fit, self.validation, rules=self.rules)
 
+    @cached_property
+    def shares(self) -> Shares:
+        """Errors ahead by channel: baseline, with the effects, ceiling, noise; some seconds."""
+        named = [a.name for a in self.added]
+        return shares(self.fits[0], self.fit, self.held_out, named=named)
+
     def with_warnings(self, warnings: Sequence[str]) -> Study:
         """The same study with these warnings; what it has worked out so far it keeps."""
         other = replace(self, warnings=tuple(warnings))
@@ -222,6 +234,7 @@ class Study:
             "unknown",
             "horizons",
             "ceiling",
+            "shares",
         ):
             if slow in self.__dict__:
                 other.__dict__[slow] = self.__dict__[slow]
@@ -298,7 +311,7 @@ class Study:
         stand_ins = [a.id for a in self.added if a.stands_in]
         if stand_ins:
             said += f" What is missing was taken up by stand-ins: {', '.join(stand_ins)}."
-        elif not self.added and self.diagnoses[-1].significant:
+        elif self.diagnoses[-1].significant:
             some = ", ".join(c.id for c in self.diagnoses[-1].significant[:3])
             said += f" There is evidence for {some}, which predict validation data no better."
         return said

@@ -1,0 +1,118 @@
+"""Is a fault that was put into a measured log named by the check of the sensors, with its size?
+
+    python benchmarks/injected/check.py DATA [SET ...] [--fetched FOLDER] [--json JSON]
+
+For each measured drive (`benchmarks/real_driving/cars.py`) a piece is checked as it is, then once
+for each injection. Named: the fault is found (an offset: it moved by more than it can be wrong).
+Size: the difference to the log as it was lies in the 95 % interval. Wrong name: a fault is found
+that was not before. Where the check says that the fault cannot be told the case is not testable.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "real_driving"))
+
+from cars import NAMES, logs
+from falsify import KINEMATIC, Injection, falsified
+
+import sysid_vehicle as sv
+
+PIECE_S = 30.0
+_SIDES = 1.959964
+
+
+def piece(name: str, data: Path, fetched: Path | None) -> sv.Log:
+    """The liveliest half minute of the first training log."""
+    log = logs(name, data, fetched)[0][0]
+    time_s = log["time_s"]
+    if log.duration_s <= PIECE_S:
+        return log
+    begins = np.arange(time_s[0], time_s[-1] - PIECE_S, 2.0)
+    lively = [
+        float(np.nanstd(log["ay_mps2"][(time_s >= b) & (time_s < b + PIECE_S)])) for b in begins
+    ]
+    begin = float(begins[int(np.argmax(lively))])
+    return log.between(begin, begin + PIECE_S)
+
+
+def told(check: sv.SensorCheck, fault: str) -> tuple[float, float, bool]:
+    """Value, standard deviation, and whether the log can tell it."""
+    if fault in check.offsets:
+        return (*check.offsets[fault], True)
+    found = check[fault]
+    return found.value, found.std, found.told or found.found
+
+
+def judged(
+    injection: Injection, before: sv.SensorCheck, after: sv.SensorCheck
+) -> dict[str, object]:
+    was, _, could = told(before, injection.fault)
+    now, std, can = told(after, injection.fault)
+    offset = injection.fault in before.offsets
+    named = abs(now - was) > _SIDES * std if offset else after[injection.fault].found
+    mine = {injection.fault}
+    new = {f.name for f in after.found} - {f.name for f in before.found} - mine
+    wanted = injection.size * (
+        1.0 if offset or not injection.fault.startswith("gain") else 1.0 + was
+    )
+    return {
+        "difference": now - was,
+        "wanted": wanted,
+        "std": std,
+        "testable": bool(np.isfinite(std)) and (could or can or named),
+        "named": bool(named),
+        "inside": bool(abs(now - was - wanted) < _SIDES * std),
+        "wrong": sorted(new),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("data", type=Path)
+    parser.add_argument("sets", nargs="*", metavar="SET", help=", ".join(NAMES))
+    parser.add_argument("--fetched", type=Path, metavar="FOLDER", help="logs without a licence")
+    parser.add_argument("--json", type=Path, metavar="JSON", help="file for the figures")
+    args = parser.parse_args()
+    warnings.simplefilter("ignore", sv.SysidWarning)
+    rows: dict[str, dict[str, dict[str, object]]] = {}
+    for name in args.sets or NAMES:
+        began = time.perf_counter()
+        log = piece(name, args.data, args.fetched)
+        before = sv.check(log)
+        print(f"== {log.name}: {', '.join(f.name for f in before.found) or 'no fault'}", flush=True)
+        rows[name] = {}
+        for injection in KINEMATIC:
+            row = judged(injection, before, sv.check(falsified(log, injection.act)))
+            rows[name][injection.what] = row
+            print(
+                f"  {injection.what:28s} {row['difference']:+8.4f} of {row['wanted']:+8.4f} "
+                f"+- {row['std']:.2g}"
+                f"{'' if row['testable'] else '  not testable'}"
+                f"{'  named' if row['named'] else ''}{'  inside' if row['inside'] else ''}"
+                f"{'  WRONG: ' + ', '.join(row['wrong']) if row['wrong'] else ''}",
+                flush=True,
+            )
+        print(f"  {time.perf_counter() - began:.0f} s", flush=True)
+        if args.json is not None:
+            args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    cases = [row for of in rows.values() for row in of.values()]
+    testable = [row for row in cases if row["testable"]]
+    named, inside = (sum(bool(row[k]) for row in testable) for k in ("named", "inside"))
+    wrong = sum(bool(row["wrong"]) for row in cases)
+    print(
+        f"{len(testable)} of {len(cases)} testable: {named} named, {inside} with the size inside "
+        f"the interval; a wrong name in {wrong} of {len(cases)}"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,337 @@
+"""How much of the error ahead could be explained, and how much of that is.
+
+For each channel and horizon four errors on validation data, in physical units: of the baseline, of
+the final model, of the ceiling, and of the sensors. The ceiling is what is left beside any function
+of the driving: the errors of a model are regressed on the histories of steering, speed and
+longitudinal acceleration (`sysid_vehicle.diagnose.ceiling`), on training data, and what that
+regression predicts of validation data is taken off. A regression finds only a part: the true
+ceiling is no higher than this one, and the shares are no larger than these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+from warnings import catch_warnings, simplefilter
+
+import numpy as np
+import numpy.typing as npt
+
+from .._arguments import generator
+from .._arrays import FloatArray, as_float64
+from .._text import html_paragraph, html_table, number, text_table
+from ..diagnose import blocks
+from ..diagnose.ceiling import Inputs, folds, ridge
+from ..errors import NumericalError
+from ..estimate import MEASURED, UNITS, Driving, NoiseModel
+from ..identify import Fit
+from ..rules import Share, share_between
+
+__all__ = ["CHANNELS", "Shares", "shares"]
+
+CHANNELS = ("vy_mps", "yaw_rate_radps", "ay_mps2", "path_m")
+AHEAD = (0.0, 0.5, 1.0, 2.0, 5.0)
+_UNITS = {**UNITS, "path_m": "m"}
+_WORDS = {"vy_mps": "v_y", "yaw_rate_radps": "yaw rate", "ay_mps2": "a_y", "path_m": "path"}
+_LEAST_APART_S, _APART = 0.1, 0.1  # between predictions; the latter of the horizon
+_BLOCK_S, _FEWEST = 5.0, 6
+_DRAWS = 300
+_LONG_S = 1.0  # horizons of which the share of all is
+_FEW = 30  # predictions that a regression needs
+_VISIBLE = 0.01  # of an error: what is explained beyond shows in three digits
+_LOST = 1e3  # standard deviations of the channel: what a model that loses the car errs
+_LEAST = 1.0 - (1.0 - _VISIBLE) ** 2  # of its square
+_QUANTILES = (0.1, 0.5, 0.9)
+
+
+@dataclass(frozen=True, eq=False)
+class Shares:
+    """Errors ahead on validation data, what could be explained of them, and what is.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Those that were measured, and `path_m`: how far the car is beside the predicted path.
+    horizons_s : tuple of float
+        0 is one sample.
+    baseline, final, ceiling : array, shape (3, horizons, channels)
+        First decile, median and last decile over blocks of driving; NaN where the driving is too
+        short.
+    noise : array, shape (channels,)
+        Standard deviation of the sensors; NaN of the path.
+    share : tuple of tuple of Share
+        For each horizon and channel: of what could be explained, what the effects explain.
+    whole : Share
+        Over all channels, 1 s ahead and further.
+    named : tuple of str
+        The effects.
+    """
+
+    channels: tuple[str, ...]
+    horizons_s: tuple[float, ...]
+    baseline: FloatArray
+    final: FloatArray
+    ceiling: FloatArray
+    noise: FloatArray
+    share: tuple[tuple[Share, ...], ...]
+    whole: Share
+    named: tuple[str, ...] = ()
+
+    HEAD = (
+        *("ahead by", "channel", "baseline", "with effects", "ceiling", "sensor noise", "unit"),
+        "explained",
+    )
+
+    def rows(self) -> list[list[str]]:
+        """Cells of the printed table, under `HEAD`."""
+        return [
+            [
+                f"{h:g} s" if h > 0.0 else "one step",
+                _WORDS[c],
+                _spread(self.baseline[:, i, j]),
+                _spread(self.final[:, i, j]),
+                _spread(self.ceiling[:, i, j]),
+                number(float(self.noise[j]), 2) if np.isfinite(self.noise[j]) else "",
+                _UNITS[c],
+                str(self.share[i][j]),
+            ]
+            for i, h in enumerate(self.horizons_s)
+            for j, c in enumerate(self.channels)
+        ]
+
+    @property
+    def sentence(self) -> str:
+        """What the effects explain of what could be explained."""
+        if not self.whole.known:
+            return (
+                "No function of the driving is found that predicts the errors 1 to 5 s ahead "
+                "better than the baseline: as far as it tells they are disturbance and noise."
+            )
+        if not self.named:
+            return (
+                "A function of the driving predicts a part of the errors 1 to 5 s ahead, and no "
+                "effect was added that explains it."
+            )
+        return (
+            f"The effects added explain {self.whole} of what is seen to be explainable of the "
+            "errors 1 to 5 s ahead."
+        )
+
+    def __str__(self) -> str:
+        return f"{text_table(self.HEAD, self.rows())}\n{self.sentence}"
+
+    def _repr_html_(self) -> str:
+        return html_table(self.HEAD, self.rows()) + html_paragraph(self.sentence)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, ready for JSON; None where there are none."""
+        return {
+            "horizons_s": list(self.horizons_s),
+            "quantiles": list(_QUANTILES),
+            "whole": self.whole.to_dict(),
+            "channels": {
+                c: {
+                    "unit": _UNITS[c],
+                    "sensor_noise": _finite(self.noise[j : j + 1])[0],
+                    "baseline": [_finite(q) for q in self.baseline[:, :, j]],
+                    "with_effects": [_finite(q) for q in self.final[:, :, j]],
+                    "ceiling": [_finite(q) for q in self.ceiling[:, :, j]],
+                    "share": [row[j].to_dict() for row in self.share],
+                }
+                for j, c in enumerate(self.channels)
+            },
+        }
+
+
+def _spread(deciles: FloatArray) -> str:
+    low, middle, high = map(float, deciles)
+    if not np.isfinite(middle):
+        return "" if np.isnan(middle) else "lost"
+    return f"{number(middle, 3)} ({number(low, 2)} to {number(high, 2)})"
+
+
+def _finite(figures: FloatArray) -> list[float | None]:
+    return [float(v) if np.isfinite(v) else None for v in figures]
+
+
+def shares(
+    baseline: Fit,
+    final: Fit,
+    test: Driving,
+    *,
+    named: Sequence[str] = (),
+    horizons_s: Sequence[float] = AHEAD,
+    seed: int = 0,
+) -> Shares:
+    """Work out errors of two models ahead, and the ceiling.
+
+    Parameters
+    ----------
+    baseline, final : Fit
+        The latter's noise starts every prediction; its driving teaches the ceiling.
+    test : Driving
+        Validation data.
+    named : sequence of str
+        The effects that the final model has more.
+    horizons_s : sequence of float
+        0 is one sample.
+    seed : int
+        Of the draws of blocks that make the intervals.
+    """
+    noise = final.noise.floor()
+    channels = tuple(c for c in CHANNELS if c == "path_m" or c in test.present)
+    columns = [CHANNELS.index(c) for c in channels]
+    inputs = Inputs.of(final, final.driving, test)
+    models = (baseline,) if final is baseline else (baseline, final)
+    # Shape (models and ceilings, blocks, horizons, channels).
+    squares = np.stack(
+        [_squares(models, noise, final.driving, test, inputs, h)[..., columns] for h in horizons_s],
+        axis=2,
+    )
+    n = len(models)
+    deciles = _deciles(np.sqrt(squares))
+    # The best regression, and no worse than the final model: it is a function of the driving too.
+    order = np.argmin(_filled(deciles[1, n - 1 :]), axis=0)
+    best = np.take_along_axis(squares[n - 1 :], order[None, None], axis=0)[0]
+    ceiling = _deciles(np.sqrt(best)[None])[:, 0]
+    stack = np.stack([squares[0], squares[n - 1], best])
+    drawn = generator(seed).integers(0, squares.shape[1], (_DRAWS, squares.shape[1]))
+    middle = np.stack([_middle(stack[:, d]) for d in (slice(None), *drawn)])
+    long = np.array(horizons_s) >= _LONG_S
+    scale = middle[0, 0][long]
+    whole = np.nansum(middle[:, :, long] / np.where(scale > 0.0, scale, np.nan), axis=(2, 3))
+    sensor = np.array([*(noise.sensor[MEASURED.index(c)] for c in channels[:-1]), np.nan])
+    return Shares(
+        channels,
+        tuple(map(float, horizons_s)),
+        deciles[:, 0],
+        deciles[:, n - 1],
+        as_float64(ceiling),
+        as_float64(sensor),
+        tuple(
+            tuple(share_between(middle[:, :, i, j], _LEAST) for j in range(len(channels)))
+            for i in range(len(horizons_s))
+        ),
+        share_between(whole, _LEAST),
+        tuple(named),
+    )
+
+
+def _filled(x: FloatArray) -> FloatArray:
+    return as_float64(np.where(np.isnan(x), np.inf, x))
+
+
+def _deciles(errors: FloatArray) -> FloatArray:
+    """Over the second axis; of the sorted blocks themselves, as some may be infinite."""
+    out = np.full((3, errors.shape[0], *errors.shape[2:]), np.nan)
+    for at in np.ndindex(out.shape[1:]):
+        few = errors[(at[0], slice(None), *at[1:])]
+        few = np.sort(few[~np.isnan(few)])
+        if len(few):
+            for k, q in enumerate(_QUANTILES):
+                out[(k, *at)] = few[round(q * (len(few) - 1))]
+    return as_float64(out)
+
+
+def _middle(squares: FloatArray) -> FloatArray:
+    with catch_warnings():
+        simplefilter("ignore", RuntimeWarning)  # channels without a prediction this far ahead
+        return as_float64(np.nanmedian(squares, axis=1))
+
+
+def _squares(
+    models: Sequence[Fit],
+    noise: NoiseModel,
+    train: Driving,
+    test: Driving,
+    inputs: Inputs,
+    horizon_s: float,
+) -> FloatArray:
+    """Mean squares by block: of each model, then of each beside its regression; (2n, blocks, 4)."""
+    plain, beside = [], []
+    fold = folds(train)
+    for fit in models:
+        found = []
+        for driving in (train, test):
+            ends, errors = _errors(fit, noise, driving, horizon_s)
+            found.append((ends, errors))
+        (few, known), (there, hidden) = found
+        left = hidden.copy()
+        for k in range(len(CHANNELS)):
+            usable = np.isfinite(known[:, k])
+            if np.count_nonzero(usable) < _FEW:
+                continue
+            rows = few[usable]
+            law = ridge(inputs.train[rows], known[usable, k : k + 1], fold[rows])
+            left[:, k] -= law.mean[0] + inputs.other[there] @ law.size[:, 0]
+        plain.append(_by_block(test, there, hidden))
+        beside.append(_by_block(test, there, left))
+    return as_float64(np.stack([*plain, *beside]))
+
+
+def _by_block(driving: Driving, at: npt.NDArray[np.intp], errors: FloatArray) -> FloatArray:
+    count = max(round(driving.usable_s / _BLOCK_S), _FEWEST)
+    starts = blocks(driving, driving.usable_s / count)
+    block = np.searchsorted(starts, at, side="right") - 1
+    out = np.full((len(starts), errors.shape[1]), np.nan)
+    for k in range(errors.shape[1]):
+        known = np.isfinite(errors[:, k])
+        number_of = np.bincount(block[known], minlength=len(starts))
+        total = np.bincount(block[known], errors[known, k] ** 2, minlength=len(starts))
+        out[number_of > 0, k] = (total / np.maximum(number_of, 1))[number_of > 0]
+    return as_float64(out)
+
+
+def _errors(
+    fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float
+) -> tuple[npt.NDArray[np.intp], FloatArray]:
+    """Samples at which predictions end, and the errors there, shape (predictions, 4)."""
+    problem, p, w = driving.problem(fit.model), fit.model.vector(), noise.vector()
+    lateral = [MEASURED.index(c) for c in CHANNELS[:-1]]
+    spread = np.nanstd(driving.measured[:, lateral], axis=0)
+    ends, errors = [], []
+    for rate in np.unique(driving.sample_rate_hz):
+        ahead = max(round(horizon_s * rate), 1)
+        every = max(round(max(_LEAST_APART_S, _APART * horizon_s) * rate), 1)
+        half_way = max(ahead // 2, 1)  # for the path
+        first = _starts(driving, float(rate), ahead, every)
+        try:
+            middle, last = (problem.look_ahead(p, w, k, every) for k in (half_way, ahead))
+        except NumericalError:
+            lost = np.broadcast_to(_LOST * spread, (len(first), 3))
+            errors.append(np.column_stack([lost, np.full(len(first), np.nan)]))
+            ends.append(first + ahead)
+            continue
+        half, whole = middle[first + half_way], last[first + ahead]
+        v = driving.channel("vx_mps")[first]
+        errors.append(np.column_stack([whole[:, lateral], _path(half, whole, v, ahead / rate)]))
+        ends.append(first + ahead)
+    at = np.concatenate(ends)
+    order = np.argsort(at)
+    found = np.concatenate(errors)[order]
+    measured = np.isfinite(driving.measured[at[order]][:, lateral])
+    found[:, :-1][~measured] = np.nan
+    return at[order], as_float64(found)
+
+
+def _path(half: FloatArray, whole: FloatArray, v: FloatArray, seconds: float) -> FloatArray:
+    """Distance beside the predicted path: errors of v_y and yaw rate integrated by Simpson's rule.
+
+    The yaw rate's error is a parabola over the time; its integral is the error of the course.
+    """
+    side = [half[:, 1], whole[:, 1]]
+    turn = [half[:, 2], whole[:, 2]]
+    course_half = seconds * (8.0 * turn[0] - turn[1]) / 24.0
+    course_whole = seconds * (4.0 * turn[0] + turn[1]) / 6.0
+    slip = [side[0] + v * course_half, side[1] + v * course_whole]
+    return as_float64(seconds * (4.0 * slip[0] + slip[1]) / 6.0)
+
+
+def _starts(driving: Driving, rate_hz: float, ahead: int, every: int) -> npt.NDArray[np.intp]:
+    """Samples at which whole predictions begin, in the stretches of this rate."""
+    out = [np.empty(0, dtype=np.intp)]
+    for s in driving.stretches:
+        if driving.sample_rate_hz[s.where.start] == rate_hz:
+            out.append(np.arange(s.where.start, s.where.stop - ahead, every, dtype=np.intp))
+    return np.concatenate(out)
