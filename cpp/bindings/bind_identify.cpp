@@ -38,7 +38,9 @@ Noise to_noise(const Array& values) {
     for (auto& s : noise.sensor) s = *v++;
     for (auto& s : noise.motion) s = *v++;
     for (auto& s : noise.disturbance) s = *v++;
-    noise.correlation_time_s = *v;
+    for (auto& s : noise.correlation_time_s) s = *v++;
+    for (auto& s : noise.road) s = *v++;
+    noise.road_time_s = *v;
     return noise;
 }
 

@@ -130,7 +130,16 @@ inline Noise ordinary_noise() {
     noise.sensor = {0.05, 0.03, 0.003, 0.1, 0.1};
     noise.motion = {0.05, 0.05, 0.01};
     noise.disturbance = {150.0, 150.0, 100.0};
-    noise.correlation_time_s = 0.5;
+    noise.correlation_time_s = {0.5, 0.5, 0.5};
+    return noise;
+}
+
+/// The same on a road that wanders.
+inline Noise sloping_noise() {
+    Noise noise = ordinary_noise();
+    noise.correlation_time_s = {0.2, 0.5, 1.0};
+    noise.road = {0.3, 0.2};
+    noise.road_time_s = 3.0;
     return noise;
 }
 

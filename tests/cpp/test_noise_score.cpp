@@ -14,7 +14,9 @@ Noise scaled(const Noise& noise, const Values& logs) {
     for (double& s : out.sensor) s *= std::exp(logs[i++]);
     for (double& s : out.motion) s *= std::exp(logs[i++]);
     for (double& s : out.disturbance) s *= std::exp(logs[i++]);
-    out.correlation_time_s *= std::exp(logs[i]);
+    for (double& s : out.correlation_time_s) s *= std::exp(logs[i++]);
+    for (double& s : out.road) s *= std::exp(logs[i++]);
+    out.road_time_s *= std::exp(logs[i]);
     return out;
 }
 
@@ -59,8 +61,9 @@ TEST_P(NoiseScore, IsTheGradientOfTheLogLikelihood) {
     const Parameters p = typical_parameters();
     // Away from the optimum, so that every derivative is of a size.
     Values off;
-    off << 0.3, -0.2, 0.3, -0.3, 0.2, 0.5, -0.5, 0.5, 0.4, -0.4, 0.4, 0.5;
-    const Noise noise = scaled(ordinary_noise(), off);
+    off << 0.3, -0.2, 0.3, -0.3, 0.2, 0.5, -0.5, 0.5, 0.4, -0.4, 0.4, 0.5, -0.2, 0.3, 0.2, -0.3,
+        0.4;
+    const Noise noise = scaled(sloping_noise(), off);
     const Score s = score(problem, p, noise);
     EXPECT_NEAR(s.value, freeze(problem, p.data(), noise).log_likelihood, 1e-9);
     for (int i = 0; i < kNoiseParameters; ++i) {
@@ -78,11 +81,27 @@ TEST_P(NoiseScore, IsTheGradientOfTheLogLikelihood) {
 }
 
 TEST_P(NoiseScore, InformationIsSymmetricAndPositive) {
-    const Score s = score(mild(effects(), 37), typical_parameters(), ordinary_noise());
+    const Score s = score(mild(effects(), 37), typical_parameters(), sloping_noise());
     EXPECT_EQ((s.information - s.information.transpose()).norm(), 0.0);
     const Eigen::SelfAdjointEigenSolver<Table> solver(s.information);
     EXPECT_GT(solver.eigenvalues().minCoeff(), -1e-9 * solver.eigenvalues().maxCoeff());
     EXPECT_GT(s.information.diagonal().minCoeff(), 0.0);
+}
+
+TEST_P(NoiseScore, ALevelRoadIsTheLimitOfOneThatHardlyWanders) {
+    const Problem problem = mild(effects(), 39);
+    const Parameters p = typical_parameters();
+    const Score level = score(problem, p, ordinary_noise());
+    Noise hardly = ordinary_noise();
+    hardly.road = {1e-7, 1e-7};
+    const Score limit = score(problem, p, hardly);
+    EXPECT_NEAR(level.value, limit.value, 1e-6);
+    const int plain = kPlainNoiseParameters;
+    const double size = level.gradient.norm();
+    EXPECT_LT((level.gradient - limit.gradient).head(plain).norm(), 1e-6 * size);
+    EXPECT_EQ(level.gradient.tail(kNoiseParameters - plain).norm(), 0.0);
+    EXPECT_EQ(level.information.rightCols(kNoiseParameters - plain).norm(), 0.0);
+    EXPECT_EQ(level.information.bottomRows(kNoiseParameters - plain).norm(), 0.0);
 }
 
 TEST_P(NoiseScore, InformationIsOfTheOrderOfTheCurvature) {

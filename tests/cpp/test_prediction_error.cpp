@@ -67,10 +67,11 @@ int column_of(const std::string& effect, std::size_t which = 0) {
 }
 
 TEST(PredictionError, ResidualsAreTheFiltersWhitenedInnovations) {
-    for (EffectMask effects : {kPlain, kLagging}) {
+    for (const auto& [effects, noise] :
+         {std::pair{kPlain, ordinary_noise()}, std::pair{kLagging, ordinary_noise()},
+          std::pair{kPlain, sloping_noise()}, std::pair{kLagging, sloping_noise()}}) {
         const Problem problem = two_runs(effects);
         const Parameters p = typical_parameters();
-        const Noise noise = ordinary_noise();
         const FrozenFilter filter = freeze(problem, p.data(), noise);
         const Eigen::VectorXd e = residuals_of(problem, p, filter);
         const Trace t = trace(problem, p.data(), noise, false);

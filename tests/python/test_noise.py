@@ -1,18 +1,45 @@
 """The noise model: its order, its floor, and that it is learned."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, Model, NoiseModel, RoadDisturbance, SensorNoise, drive, manoeuvres
-from sysid_vehicle.estimate import Driving, first_guess, learn_noise
+from sysid_vehicle import (
+    Fit,
+    Log,
+    Model,
+    NoiseModel,
+    RoadDisturbance,
+    SensorNoise,
+    drive,
+    manoeuvres,
+)
+from sysid_vehicle.estimate import Driving, first_guess, learn_noise, noise_range
+from sysid_vehicle.simulate import drive_truth
 
-SOME = NoiseModel((0.1, 0.2, 0.3, 0.4, 0.5), (0.6, 0.7, 0.8), (900.0, 1000.0, 1100.0), 0.25)
+SOME = NoiseModel(
+    (0.1, 0.2, 0.3, 0.4, 0.5), (0.6, 0.7, 0.8), (900.0, 1000.0, 1100.0), (0.25, 0.5, 0.75)
+)
 
 
 def test_the_core_vector_keeps_every_number() -> None:
     v = SOME.vector()
-    assert v.tolist() == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 900.0, 1000.0, 1100.0, 0.25]
+    assert v.tolist()[:11] == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 900.0, 1000.0, 1100.0]
+    assert v.tolist()[11:] == [0.25, 0.5, 0.75, 0.0, 0.0, 5.0]
     assert NoiseModel.from_vector(v) == SOME
+    sloping = replace(SOME, road=(0.1, 0.2), road_time_s=7.0)
+    assert NoiseModel.from_vector(sloping.vector()) == sloping
+    assert "deg across" in str(sloping)
+    assert "deg across" not in str(SOME)
+
+
+def test_one_correlation_time_stands_for_three() -> None:
+    assert NoiseModel(SOME.sensor, SOME.motion, SOME.disturbance, 0.3).correlation_time_s == (
+        0.3,
+        0.3,
+        0.3,
+    )
 
 
 def test_the_floor_has_no_disturbances() -> None:
@@ -61,7 +88,60 @@ def test_a_restless_road_is_learned(truth: Model) -> None:
     noise, _ = learn_noise(driving.problem(truth), truth.vector(), guess, truth.vehicle, rounds=20)
     # 40 s hold about 65 independent values of each: 9 % of standard error.
     np.testing.assert_allclose(noise.disturbance, [road.fx_n, road.fy_n, road.mz_nm], rtol=0.3)
-    assert noise.correlation_time_s == pytest.approx(road.correlation_time_s, rel=0.3)
+    np.testing.assert_allclose(noise.correlation_time_s, road.correlation_time_s, rtol=0.35)
+
+
+def test_bumps_do_not_become_noise_of_the_sensors(truth: Model) -> None:
+    road = RoadDisturbance(fx_n=150.0, fy_n=200.0, mz_nm=100.0, correlation_time_s=0.03)
+    driving = Driving.of(drive(truth, manoeuvres.lap(30.0), seed=5, disturbance=road))
+    guess = first_guess(driving, truth.vehicle)
+    noise, _ = learn_noise(driving.problem(truth), truth.vector(), guess, truth.vehicle, rounds=20)
+    assert noise.sensor[3] == pytest.approx(SensorNoise().ax_mps2, rel=0.15)
+    np.testing.assert_allclose(noise.correlation_time_s[:2], 0.03, rtol=0.35)
+
+
+def test_a_road_that_wanders_is_learned_and_a_level_one_is_not_there(truth: Model) -> None:
+    mass, slope = truth.vehicle.mass_kg, 0.25
+    road = RoadDisturbance(mass * slope, mass * slope, 0.0, 5.0)
+    driven = drive_truth(truth, manoeuvres.lap(40.0), seed=6, disturbance=road)
+    # Gravity is no force that an accelerometer feels.
+    gravity = driven.disturbance / mass
+    felt = {c: driven.log[c] - gravity[:, i] for i, c in enumerate(("ax_mps2", "ay_mps2"))}
+    driving = Driving.of(driven.log.corrected(felt, []))
+    problem, p = driving.problem(truth), truth.vector()
+    level, below = learn_noise(
+        problem, p, first_guess(driving, truth.vehicle), truth.vehicle, rounds=8
+    )
+    assert level.road == (0.0, 0.0)
+    noise, value = learn_noise(
+        problem, p, replace(level, road=(0.1, 0.1)), truth.vehicle, rounds=20
+    )
+    assert value > below + 100.0
+    # 40 s hold eight independent values of each.
+    np.testing.assert_allclose(noise.road, slope, rtol=0.5)
+    assert noise.floor().road == noise.road
+    # Seen from one second before, the slope is known.
+    ahead = {
+        name: np.nanstd(problem.look_ahead(p, n.floor().vector(), 100, 10)[:, 0])
+        for name, n in (("level", level), ("sloping", noise))
+    }
+    assert ahead["sloping"] < 0.7 * ahead["level"]
+
+
+def test_without_the_wheel_force_none_is_learned_along_the_car(truth: Model) -> None:
+    log = drive(truth, manoeuvres.lap(20.0), seed=7)
+    blind = Driving.of(Log.from_arrays({c: log[c] for c in log.channels if c != "fx_n"}))
+    most = noise_range(truth.vehicle, blind)[1][8]
+    assert most < 1e-3 * truth.vehicle.mass_kg * 9.81
+    assert noise_range(truth.vehicle, Driving.of(log))[1][8] > 1e3
+
+
+def test_no_sensor_is_surer_than_its_quanta(truth: Model) -> None:
+    log = drive(truth, manoeuvres.lap(20.0), seed=8, noise=SensorNoise.none())
+    coarse = log.corrected({"vx_mps": 0.1 * np.round(log["vx_mps"] / 0.1)}, [])
+    low = noise_range(truth.vehicle, Driving.of(coarse))[0]
+    assert low[0] == pytest.approx(0.1 / np.sqrt(12.0))
+    assert low[1] == noise_range(truth.vehicle)[0][1]
 
 
 def test_elsewhere_no_model_is_sure_to_less_than_a_thousandth_of_the_weight(truth: Model) -> None:

@@ -10,12 +10,6 @@ namespace sysid {
 
 namespace {
 
-/// One number for each noise parameter, the sensors first: what follows is done for all of them at
-/// once.
-using Lanes = Eigen::Array<double, kNoiseParameters, 1>;
-using Table = Mat<kNoiseParameters, kNoiseParameters>;
-constexpr int kTimeLane = kNoiseParameters - 1;
-
 /// Of the states that take part: square, one column for each channel, one row for each.
 using Square = Eigen::MatrixXd;
 using Block = Eigen::Ref<const Square>;
@@ -23,30 +17,49 @@ using Gain = Eigen::Matrix<double, Eigen::Dynamic, kChannels>;
 using Row = Eigen::Matrix<double, kChannels, Eigen::Dynamic>;
 
 constexpr int motion_lane(int i) { return kChannels + i; }
-constexpr int disturbance_lane(int i) { return kChannels + kMotionStates + i; }
+constexpr int deviation_lane(std::size_t i) {
+    return kChannels +
+           static_cast<int>(i < kMotionStates ? kMotionStates + i : 2 * kMotionStates + i);
+}
+constexpr int time_lane(std::size_t i) {
+    return i < kMotionStates ? kChannels + 2 * kMotionStates + static_cast<int>(i)
+                             : kNoiseParameters - 1;
+}
 
 /// Derivatives of the filter's mean and covariance by the logarithms of the noise parameters, along
-/// a run. Only the first `n` states take part; the others stand still and are certain.
+/// a run. Only the first `n` states take part; the others stand still and are certain. `L` noise
+/// parameters do: those of the road only where there is one.
+template <int L>
 class Answer {
   public:
-    Answer(int n, double forget, const Run& run, const Noise& noise)
-        : n_(n),
-          mean_(place(n), Lanes::Zero()),
+    /// One number for each noise parameter, the sensors first: what follows is done for all of them
+    /// at once.
+    using Lanes = Eigen::Array<double, L, 1>;
+    using Table = Mat<L, L>;
+
+    template <int NX>
+    Answer(const RunSystem<NX>& system, const Run& run, const Noise& noise)
+        : n_(system.taking_part()),
+          mean_(place(n_), Lanes::Zero()),
           moved_(mean_.size()),
-          covariance_(place(n * n), Lanes::Zero()),
+          covariance_(place(n_ * n_), Lanes::Zero()),
           half_(covariance_.size()),
-          cross_(place(n * kChannels)),
-          process_(Mat<kStatesPlain, kNoiseParameters>::Zero()) {
-        // d exp(-dt/tau) / d log(tau)
-        slope_ = forget * run.dt / noise.correlation_time_s;
+          cross_(place(n_ * kChannels)),
+          process_(place(n_), Lanes::Zero()),
+          disturbances_(system.disturbances()) {
         for (int i = 0; i < kMotionStates; ++i) {
             const auto m = static_cast<std::size_t>(i);
-            const int w = kMotionStates + i;
-            const double variance = noise.disturbance[m] * noise.disturbance[m];
-            process_(i, motion_lane(i)) = 2.0 * noise.motion[m] * noise.motion[m] * run.dt;
-            process_(w, disturbance_lane(i)) = 2.0 * variance * (1.0 - forget * forget);
-            process_(w, kTimeLane) = -2.0 * variance * forget * slope_;
-            at(w, w)[disturbance_lane(i)] = 2.0 * variance;  // of the stationary start
+            process_[m][motion_lane(i)] = 2.0 * noise.motion[m] * noise.motion[m] * run.dt;
+        }
+        for (std::size_t i = 0; i < disturbances_; ++i) {
+            const int w = where_[i] = system.disturbing(i);
+            const double forget = system.forget(i);
+            const double variance = noise.deviation_of(i) * noise.deviation_of(i);
+            // d exp(-dt/tau) / d log(tau)
+            slope_[i] = forget * run.dt / noise.time_of(i);
+            process_[place(w)][deviation_lane(i)] = 2.0 * variance * (1.0 - forget * forget);
+            process_[place(w)][time_lane(i)] = -2.0 * variance * forget * slope_[i];
+            at(w, w)[deviation_lane(i)] = 2.0 * variance;  // of the stationary start
         }
         for (int i = 0; i < kChannels; ++i) {
             const double s = noise.sensor[static_cast<std::size_t>(i)];
@@ -64,16 +77,15 @@ class Answer {
                 Lanes& d = at(i, j);
                 for (int c = 0; c < kChannels; ++c) d[c] += seen_[c] * gain(i, c) * gain(j, c);
             }
-        // The transition's own diagonal for the disturbance states depends on the correlation time.
-        const Eigen::Matrix<double, kMotionStates, Eigen::Dynamic> cross =
-            slope_ * covariance_after_.middleRows<kMotionStates>(kMotionStates)
-                         .lazyProduct(transition.transpose());
-        for (int i = 0; i < kMotionStates; ++i) {
-            const int w = kMotionStates + i;
+        // The transition's own diagonal for the disturbance states depends on their times.
+        for (std::size_t i = 0; i < disturbances_; ++i) {
+            const int w = where_[i];
+            const Eigen::VectorXd cross =
+                slope_[i] * transition.lazyProduct(covariance_after_.col(w));
             for (int j = 0; j < n_; ++j)
-                at(std::max(w, j), std::min(w, j))[kTimeLane] += (j == w ? 2.0 : 1.0) * cross(i, j);
+                at(std::max(w, j), std::min(w, j))[time_lane(i)] += (j == w ? 2.0 : 1.0) * cross[j];
         }
-        for (int i = 0; i < kStatesPlain; ++i) at(i, i) += process_.row(i).transpose().array();
+        for (int i = 0; i < n_; ++i) at(i, i) += process_[place(i)];
         for (int i = 0; i < n_; ++i)
             for (int j = 0; j < i; ++j) at(j, i) = at(i, j);
         for (int i = 0; i < n_; ++i) {
@@ -81,10 +93,8 @@ class Answer {
             for (int j = 0; j < n_; ++j) sum += transition(i, j) * mean_[place(j)];
             moved_[place(i)] = sum;
         }
-        for (int i = 0; i < kMotionStates; ++i) {
-            const int w = kMotionStates + i;
-            moved_[place(w)][kTimeLane] += slope_ * mean_after_[w];
-        }
+        for (std::size_t i = 0; i < disturbances_; ++i)
+            moved_[place(where_[i])][time_lane(i)] += slope_[i] * mean_after_[where_[i]];
         mean_.swap(moved_);
     }
 
@@ -166,7 +176,8 @@ class Answer {
     template <class Crossed>
     void innovate(const Seen& u, const Row& H, const Crossed& crossed) {
         const Mat<kChannels, kChannels> inverse =
-            u.lower.triangularView<Eigen::Lower>().solve(Mat<kChannels, kChannels>::Identity());
+            u.lower.template triangularView<Eigen::Lower>().solve(
+                Mat<kChannels, kChannels>::Identity());
         const Vec<kChannels> white = inverse * u.innovation;
         std::array<std::array<Lanes, kChannels>, kChannels> change;  // H dP H^T + dR
         std::array<Lanes, kChannels> shift;                          // -H dx
@@ -183,7 +194,7 @@ class Answer {
         }
         // Rows that make the information as a sum of squares: one for each element of L^-1 dS L^-T,
         // and one for each of L^-1 d(innovation).
-        Eigen::Matrix<double, kNoiseParameters, kPairs + kChannels> rows;
+        Eigen::Matrix<double, L, kPairs + kChannels> rows;
         Lanes score = Lanes::Zero();
         std::array<std::array<Lanes, kChannels>, kChannels> left;
         int row = 0;
@@ -213,28 +224,45 @@ class Answer {
     Lanes score_ = Lanes::Zero();
     Table information_ = Table::Zero();
     int n_;
-    std::vector<Lanes> mean_, moved_, covariance_, half_, cross_;
-    Mat<kStatesPlain, kNoiseParameters> process_;
+    std::vector<Lanes> mean_, moved_, covariance_, half_, cross_, process_;
+    std::size_t disturbances_;
+    std::array<int, kDisturbances> where_{};
+    std::array<double, kDisturbances> slope_{};
     Vec<kChannels> sensor_, seen_;
-    double slope_ = 0.0;
     Square keep_, covariance_after_;
     Gain gain_;
     Eigen::VectorXd mean_after_;
 };
 
-template <int NX>
-double score_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
-                 Lanes& score, Table& information) {
-    const RunSystem<NX> system(problem.model, run, p, noise);
-    const int n = kStatesPlain + static_cast<int>(system.own().count);
-    Answer answer(n, system.forget(), run, noise);
-    const double log_likelihood =
-        filter_run<NX>(system, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
-            if (k > 0) answer.predict(s.transition.topLeftCorner(n, n));
-            answer.update(s, run.measurements[k]);
-        });
-    score += answer.score();
-    information += answer.information();
+template <int L>
+double score_all(const Problem& problem, const double* p, const Noise& noise, double* gradient,
+                 double* information) {
+    typename Answer<L>::Lanes score = Answer<L>::Lanes::Zero();
+    typename Answer<L>::Table info = Answer<L>::Table::Zero();
+    double log_likelihood = 0.0;
+    with_state_size(problem.model.effects, noise, [&](auto nx) {
+        constexpr int NX = decltype(nx)::value;
+        for (const Run& run : problem.runs) {
+            const RunSystem<NX> system(problem.model, run, p, noise);
+            const int n = system.taking_part();
+            Answer<L> answer(system, run, noise);
+            log_likelihood +=
+                filter_run<NX>(system, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
+                    if (k > 0) answer.predict(s.transition.topLeftCorner(n, n));
+                    answer.update(s, run.measurements[k]);
+                });
+            score += answer.score();
+            info += answer.information();
+        }
+    });
+    symmetrise(info);
+    using All = Mat<kNoiseParameters, kNoiseParameters>;
+    Eigen::Map<Vec<kNoiseParameters>> to{gradient};
+    Eigen::Map<All> table{information};
+    to.setZero();
+    table.setZero();
+    to.template head<L>() = score.matrix();
+    table.template topLeftCorner<L, L>() = info;
     return log_likelihood;
 }
 
@@ -242,16 +270,9 @@ double score_run(const Problem& problem, const Run& run, const double* p, const 
 
 double noise_score(const Problem& problem, const double* p, const Noise& noise, double* gradient,
                    double* information) {
-    Lanes score = Lanes::Zero();
-    Table info = Table::Zero();
-    double log_likelihood = 0.0;
-    with_state_size(problem.model.effects, [&](auto nx) {
-        for (const Run& run : problem.runs)
-            log_likelihood += score_run<decltype(nx)::value>(problem, run, p, noise, score, info);
-    });
-    Eigen::Map<Lanes>{gradient} = score;
-    Eigen::Map<Table>{information} = info;
-    return log_likelihood;
+    return noise.sloping()
+               ? score_all<kNoiseParameters>(problem, p, noise, gradient, information)
+               : score_all<kPlainNoiseParameters>(problem, p, noise, gradient, information);
 }
 
 }  // namespace sysid

@@ -12,6 +12,9 @@ namespace {
 constexpr double kTurn = 1.6;  // of the fastest rate in a part of an interval, see `substeps_for`
 using Wide = Dual<kParameterPass>;
 
+/// Where the gains of disturbance `i`, one of the road, stand.
+constexpr int road_row(std::size_t i) { return kStatesFull + static_cast<int>(i) - kMotionStates; }
+
 template <int NX>
 void freeze_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
                 std::vector<FrozenStep>& steps, FrozenFilter& filter) {
@@ -25,6 +28,8 @@ void freeze_run(const Problem& problem, const Run& run, const double* p, const N
             for (std::size_t i = 0; i < system.own().count; ++i)
                 steps[k].gain.row(kMotionStates + static_cast<int>(system.place(i))) =
                     s.update.gain.row(system.packed(i));
+            for (std::size_t i = kMotionStates; i < system.disturbances(); ++i)
+                steps[k].gain.row(road_row(i)) = s.update.gain.row(system.disturbing(i));
             Mat<kChannels, kChannels> present = Mat<kChannels, kChannels>::Identity();
             for (int i = 0; i < kChannels; ++i)
                 if (std::isnan(run.measurements[k][i])) present(i, i) = 0.0;
@@ -41,19 +46,21 @@ void freeze_run(const Problem& problem, const Run& run, const double* p, const N
 /// whitened errors.
 template <class S, class T, class Disturb, class Shift, class Keep>
 void run_frozen(const SingleTrack& model, const Run& run, const double* p_values, const T* p,
-                const std::vector<FrozenStep>& steps, double correlation_time, Disturb&& disturb,
+                const std::vector<FrozenStep>& steps, const Noise& noise, Disturb&& disturb,
                 Shift&& shift, Keep&& keep) {
     const ActiveStates own = active_states(model.effects);
     ModelState<S> x = initial_state<S>(model, run, p);
-    std::array<S, kMotionStates> disturbance;
+    const std::size_t disturbances = noise.sloping() ? kDisturbances : kMotionStates;
+    std::array<S, kDisturbances> disturbance;
     disturbance.fill(S(0.0));
-    const double forget = std::exp(-run.dt / correlation_time);
+    std::array<double, kDisturbances> forget;
+    for (std::size_t i = 0; i < kDisturbances; ++i) forget[i] = noise.forget(i, run.dt);
     std::array<S, kExternals> external;
     std::array<S, kChannels> error;
     std::array<S, kChannels> white;
     const auto fill_push = [&](std::size_t k) {
         external.fill(S(0.0));
-        for (std::size_t i = 0; i < kMotionStates; ++i) external[i] = disturbance[i];
+        for (std::size_t i = 0; i < disturbances; ++i) external[i] = disturbance[i];
         disturb(k, external);
     };
     for (std::size_t k = 0; k < run.size(); ++k) {
@@ -65,7 +72,8 @@ void run_frozen(const SingleTrack& model, const Run& run, const double* p_values
                 steps[k].substeps, substeps_for(model, p_values, value_of(x[0]), run.dt, kTurn));
             advance(model, x, external.data(), run.inputs[k - 1], run.inputs[k], p, run.dt,
                     substeps);
-            for (S& w : disturbance) w = forget * w;
+            for (std::size_t i = 0; i < disturbances; ++i)
+                disturbance[i] = forget[i] * disturbance[i];
             fill_push(k);
         }
         auto y = sense(model, x, external.data(), run.inputs[k], p);
@@ -93,6 +101,8 @@ void run_frozen(const SingleTrack& model, const Run& run, const double* p_values
             correct(i, x[static_cast<std::size_t>(i)]);
             correct(kMotionStates + i, disturbance[static_cast<std::size_t>(i)]);
         }
+        for (std::size_t i = kMotionStates; i < disturbances; ++i)
+            correct(road_row(i), disturbance[i]);
         for (std::size_t i : own) correct(kStatesPlain + static_cast<int>(i), x[kMotionStates + i]);
     }
 }
@@ -116,7 +126,7 @@ void differentiate(const Problem& problem, const double* p, const FrozenFilter& 
     const std::vector<Dual<N>> wide = seeded<N>(p, columns, first, count);
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         run_frozen<Dual<N>>(problem.model, problem.runs[i], p, wide.data(), filter.runs[i],
-                            filter.correlation_time_s, kNothing, kNothing, keep);
+                            filter.noise, kNothing, kNothing, keep);
     }
 }
 
@@ -146,9 +156,9 @@ void passes(const Problem& problem, const double* p, const FrozenFilter& filter,
 
 FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise) {
     FrozenFilter filter;
-    filter.correlation_time_s = noise.correlation_time_s;
+    filter.noise = noise;
     filter.runs.resize(problem.runs.size());
-    with_state_size(problem.model.effects, [&](auto nx) {
+    with_state_size(problem.model.effects, noise, [&](auto nx) {
         for (std::size_t i = 0; i < problem.runs.size(); ++i)
             freeze_run<decltype(nx)::value>(problem, problem.runs[i], p, noise, filter.runs[i],
                                             filter);
@@ -158,9 +168,8 @@ FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise)
 
 void residuals(const Problem& problem, const double* p, const FrozenFilter& filter, double* out) {
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
-        run_frozen<double>(problem.model, problem.runs[i], p, p, filter.runs[i],
-                           filter.correlation_time_s, kNothing, kNothing,
-                           [&](std::size_t, const auto& white) {
+        run_frozen<double>(problem.model, problem.runs[i], p, p, filter.runs[i], filter.noise,
+                           kNothing, kNothing, [&](std::size_t, const auto& white) {
                                for (double value : white) *out++ = value;
                            });
     }
@@ -169,9 +178,8 @@ void residuals(const Problem& problem, const double* p, const FrozenFilter& filt
 double half_sum_of_squares(const Problem& problem, const double* p, const FrozenFilter& filter) {
     double sum = 0.0;
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
-        run_frozen<double>(problem.model, problem.runs[i], p, p, filter.runs[i],
-                           filter.correlation_time_s, kNothing, kNothing,
-                           [&](std::size_t, const auto& white) {
+        run_frozen<double>(problem.model, problem.runs[i], p, p, filter.runs[i], filter.noise,
+                           kNothing, kNothing, [&](std::size_t, const auto& white) {
                                for (double value : white) sum += value * value;
                            });
     }
@@ -214,7 +222,7 @@ void signal_sensitivities(const Problem& problem, const double* p, const FrozenF
                 }
             };
             run_frozen<Wide>(
-                problem.model, problem.runs[i], p, p, filter.runs[i], filter.correlation_time_s,
+                problem.model, problem.runs[i], p, p, filter.runs[i], filter.noise,
                 [&](std::size_t k, auto& external) { add(k, external, 0); },
                 [&](std::size_t k, auto& y) { add(k, y, kExternals); },
                 [&](std::size_t, const auto& white) {

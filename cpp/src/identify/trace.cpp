@@ -59,20 +59,26 @@ void look_ahead_run(const Problem& problem, const Run& run, const double* p, con
     filter_run<NX>(system,
                    [&](std::size_t k, const FilterStep<NX, kChannels>& s) { means[k] = s.mean; });
     std::fill(errors, errors + run.size() * kChannels, std::nan(""));
-    const std::array<double, kExternals> calm{};
+    // Forces are not foreseen; the slope of the road fades from where it is known.
+    std::array<double, kExternals> external{};
+    static_assert(kGravityX == kMotionStates && kExternals == kDisturbances);
     for (std::size_t k = 0; k + ahead < run.size(); k += every) {
         poll_interrupt();
         ModelState<double> x = system.start();
         for (int i = 0; i < kMotionStates; ++i) x[static_cast<std::size_t>(i)] = means[k][i];
         for (std::size_t i = 0; i < system.own().count; ++i)
             x[system.place(i)] = means[k][system.packed(i)];
+        for (std::size_t i = kMotionStates; i < system.disturbances(); ++i)
+            external[i] = means[k][system.disturbing(i)];
         for (std::size_t n = k + 1; n <= k + ahead; ++n) {
             const int substeps = substeps_for(problem.model, p, x[0], run.dt);
-            advance(problem.model, x, calm.data(), run.inputs[n - 1], run.inputs[n], p, run.dt,
+            advance(problem.model, x, external.data(), run.inputs[n - 1], run.inputs[n], p, run.dt,
                     substeps);
+            for (std::size_t i = kMotionStates; i < system.disturbances(); ++i)
+                external[i] *= system.forget(i);
         }
         const std::size_t at = k + ahead;
-        const auto y = sense(problem.model, x, calm.data(), run.inputs[at], p);
+        const auto y = sense(problem.model, x, external.data(), run.inputs[at], p);
         for (int i = 0; i < kChannels; ++i)
             errors[at * kChannels + static_cast<std::size_t>(i)] =
                 run.measurements[at][i] - y[static_cast<std::size_t>(i)];
@@ -83,7 +89,7 @@ void look_ahead_run(const Problem& problem, const Run& run, const double* p, con
 
 Trace trace(const Problem& problem, const double* p, const Noise& noise, bool smoothed) {
     Trace out;
-    with_state_size(problem.model.effects, [&](auto nx) {
+    with_state_size(problem.model.effects, noise, [&](auto nx) {
         for (const Run& run : problem.runs)
             trace_run<decltype(nx)::value>(problem, run, p, noise, smoothed, out);
     });
@@ -93,7 +99,7 @@ Trace trace(const Problem& problem, const double* p, const Noise& noise, bool sm
 void look_ahead(const Problem& problem, const double* p, const Noise& noise, std::size_t ahead,
                 std::size_t every, double* errors) {
     if (every == 0) throw std::invalid_argument("every = 0: give one or more");
-    with_state_size(problem.model.effects, [&](auto nx) {
+    with_state_size(problem.model.effects, noise, [&](auto nx) {
         for (const Run& run : problem.runs) {
             look_ahead_run<decltype(nx)::value>(problem, run, p, noise, ahead, every, errors);
             errors += run.size() * kChannels;

@@ -124,7 +124,7 @@ class Replay:
         p = model.vector()
         frozen = problem.freeze(p, noise.vector())
         _, p = min(self._ends(problem, (p, *self._bent(p)), frozen, box), key=_cost)
-        objective, told = objective_of(model, problem), noise.vector()
+        objective, told = objective_of(model, problem, self.fit.driving), noise.vector()
         best = -np.inf
         for _ in range(_LOOKS):
             end, told, converged = settle(objective, p, told, box, rounds=_ROUNDS)
@@ -286,8 +286,11 @@ class Replay:
         """The disturbances that the fit's noise stands for: Ornstein-Uhlenbeck and white forces."""
         noise, model = self.fit.noise, self.fit.model
         x, y, moment = noise.disturbance
-        disturbance = RoadDisturbance(x, y, moment, noise.correlation_time_s).sample(
-            n, 1.0 / dt, rng
+        times = noise.correlation_time_s
+        single = ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, moment))
+        disturbance = sum(
+            RoadDisturbance(*size, time_s).sample(n, 1.0 / dt, rng)
+            for size, time_s in zip(single, times, strict=True)
         )
         mass = model.vehicle.mass_kg
         inertia = np.array([mass, mass, model.value("yaw_inertia_kgm2")])

@@ -16,6 +16,7 @@ from .._text import brief
 from ..errors import InvalidInput
 from ..log import Log
 from ..model import Model
+from ..sensors import quantum
 from .inputs import quiet
 
 __all__ = ["MEASURED", "UNITS", "Driving"]
@@ -117,6 +118,18 @@ class Driving:
         if not self.force_known:
             y[:, MEASURED.index("ax_mps2")] = np.nan
         return y
+
+    @cached_property
+    def rounding(self) -> FloatArray:
+        """Standard deviation of what counting in quanta leaves of each measurement, shape (5,)."""
+        quanta = [
+            min(
+                (quantum(log[c][np.isfinite(log[c])]) for log in self.logs if log.has(c)),
+                default=0.0,
+            )
+            for c in MEASURED
+        ]
+        return as_float64(np.array(quanta) / np.sqrt(12.0))
 
     @cached_property
     def sample_rate_hz(self) -> FloatArray:

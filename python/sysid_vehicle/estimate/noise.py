@@ -21,7 +21,9 @@ __all__ = ["NoiseModel", "first_guess", "generous", "learn_noise", "maximise_noi
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
 _DISTURBANCE = slice(8, 11)
-_TIME = 11
+_TIMES = slice(11, 14)
+_ROAD = slice(14, 16)
+_ROAD_TIME = 16
 
 
 @dataclass(frozen=True)
@@ -37,18 +39,36 @@ class NoiseModel:
     disturbance : tuple of 3 floats
         Disturbance force x, y [N] and yaw moment [N m] (Ornstein-Uhlenbeck). Takes up what
         the model does not explain.
-    correlation_time_s : float
-        Correlation time of the disturbances.
+    correlation_time_s : tuple of 3 floats
+        Correlation times of the disturbances; one number stands for all three.
+    road : tuple of 2 floats
+        Gravity along and across, where the road wanders [m/s2] (Ornstein-Uhlenbeck): it moves the
+        car and no accelerometer feels it. Zeros: a level road, which costs nothing.
+    road_time_s : float
+        Correlation time of both.
     """
 
     sensor: tuple[float, ...]
     motion: tuple[float, ...]
     disturbance: tuple[float, ...]
-    correlation_time_s: float
+    correlation_time_s: tuple[float, ...]
+    road: tuple[float, ...] = (0.0, 0.0)
+    road_time_s: float = 5.0
+
+    def __post_init__(self) -> None:
+        given: object = self.correlation_time_s
+        if isinstance(given, int | float):  # as in files of earlier versions
+            object.__setattr__(self, "correlation_time_s", (float(given),) * 3)
+
+    @property
+    def sloping(self) -> bool:
+        """Whether the road wanders."""
+        return any(self.road)
 
     def vector(self) -> FloatArray:
         """In the core's order."""
-        return as_float64([*self.sensor, *self.motion, *self.disturbance, self.correlation_time_s])
+        times = (*self.correlation_time_s, *self.road, self.road_time_s)
+        return as_float64([*self.sensor, *self.motion, *self.disturbance, *times])
 
     @classmethod
     def from_vector(cls, v: FloatArray) -> NoiseModel:
@@ -57,11 +77,15 @@ class NoiseModel:
             tuple(map(float, v[_SENSORS])),
             tuple(map(float, v[_MOTION])),
             tuple(map(float, v[_DISTURBANCE])),
-            float(v[_TIME]),
+            tuple(map(float, v[_TIMES])),
+            tuple(map(float, v[_ROAD])),
+            float(v[_ROAD_TIME]),
         )
 
     def floor(self) -> NoiseModel:
         """The same noise without the disturbances: what remains if the model explains everything.
+
+        A road that wanders stays: no model of a car knows it.
 
         The motion keeps a least noise of its own. No log can tell how far below that it lies, yet
         the less there is, the longer the filter trusts its model, and the larger the same fault of
@@ -87,9 +111,21 @@ class NoiseModel:
         force_x, force_y, moment = self.disturbance
         lines.append(
             f"  unexplained force {force_x:.3g} N forward, {force_y:.3g} N sideways, yaw moment "
-            f"{moment:.3g} N m, correlation time {self.correlation_time_s:.2g} s"
+            f"{moment:.3g} N m, correlation times {self.times}"
         )
+        if self.sloping:
+            along, across = (np.degrees(g / 9.81) for g in self.road)
+            lines.append(
+                f"  road of {along:.2g} deg along and {across:.2g} deg across (standard "
+                f"deviations), correlation time {self.road_time_s:.2g} s"
+            )
         return "\n".join(lines)
+
+    @property
+    def times(self) -> str:
+        """The correlation times of the disturbances, in words."""
+        x, y, moment = (f"{t:.2g}" for t in self.correlation_time_s)
+        return f"{x}, {y} and {moment} s"
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(str(self))}</pre>"
@@ -98,6 +134,8 @@ class NoiseModel:
 # Per square root of a second: over one, 5 mm/s and 1 mrad/s.
 _LEAST_MOTION = (5e-3, 5e-3, 1e-3)
 _LEAST_DISTURBANCE = 1e-3  # of the weight
+_TIMES_S = (0.01, 20.0)
+_ROAD_TIMES_S = (1.0, 20.0)
 _SMALLEST = np.array([1e-3, 1e-3, 1e-4, 5e-3, 5e-3])
 
 
@@ -107,14 +145,35 @@ def _weight_and_moment(vehicle: Vehicle) -> tuple[float, float]:
     return weight, weight * vehicle.wheelbase_m / 4.0
 
 
-def noise_range(vehicle: Vehicle) -> tuple[FloatArray, FloatArray]:
-    """Smallest and largest noise that is learned, in the core's order."""
+def noise_range(vehicle: Vehicle, driving: Driving | None = None) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest noise that is learned, in the core's order.
+
+    No sensor is better than the quanta in which it counts. Where the wheel force is not known the
+    measured acceleration takes its place, and no force along the car is left to learn: it would
+    act through the steering angle alone, as something that it is not.
+    """
     weight, arm = _weight_and_moment(vehicle)
+    sensor, along = _SMALLEST, 0.6
+    if driving is not None:
+        sensor = np.maximum(sensor, driving.rounding)
+        along = 0.6 if driving.force_known else 1e-4
     low = np.concatenate(
-        [_SMALLEST, [1e-4, 1e-4, 1e-5], 1e-4 * np.array([weight, weight, arm]), [0.05]]
+        [
+            sensor,
+            [1e-4, 1e-4, 1e-5],
+            1e-4 * np.array([weight, weight, arm]),
+            np.full(3, _TIMES_S[0]),
+            [1e-3, 1e-3, _ROAD_TIMES_S[0]],
+        ]
     )
     high = np.concatenate(
-        [[5.0, 5.0, 1.0, 20.0, 20.0], [2.0, 2.0, 1.0], 0.6 * np.array([weight, weight, arm]), [1.0]]
+        [
+            [5.0, 5.0, 1.0, 20.0, 20.0],
+            [2.0, 2.0, 1.0],
+            np.array([along * weight, 0.6 * weight, 0.6 * arm]),
+            np.full(3, _TIMES_S[1]),
+            [2.0, 2.0, _ROAD_TIMES_S[1]],
+        ]
     )
     return as_float64(low), as_float64(high)
 
@@ -122,7 +181,8 @@ def noise_range(vehicle: Vehicle) -> tuple[FloatArray, FloatArray]:
 def first_guess(driving: Driving, vehicle: Vehicle) -> NoiseModel:
     """A generous start: sensors from their fast scatter, the motion free to follow them."""
     sensors = [
-        max(white_noise_std(y), s) for y, s in zip(driving.measured.T, _SMALLEST, strict=True)
+        max(white_noise_std(y), s)
+        for y, s in zip(driving.measured.T, noise_range(vehicle, driving)[0], strict=False)
     ]
     return generous(sensors, vehicle)
 
@@ -131,7 +191,7 @@ def generous(sensor: Sequence[float], vehicle: Vehicle) -> NoiseModel:
     """These sensors, and a motion that is disturbed so much that it follows whatever they say."""
     weight = vehicle.mass_kg * 9.81
     disturbance = (0.02 * weight, 0.04 * weight, 0.02 * weight * vehicle.wheelbase_m / 2.0)
-    return NoiseModel(tuple(map(float, sensor)), (0.02, 0.02, 0.01), disturbance, 0.3)
+    return NoiseModel(tuple(map(float, sensor)), (0.02, 0.02, 0.01), disturbance, (0.3, 0.3, 0.3))
 
 
 def learn_noise(
@@ -172,19 +232,28 @@ def maximise_noise(
     rounds : int
         Most steps.
 
+    Notes
+    -----
+    What is zero at the start is not there, and stays so.
+
     Returns
     -------
     noise : array, shape (noises,)
     log_likelihood : float
     """
     low, high = np.log(lowest), np.log(highest)
+    there_is = start > 0.0
     eta = np.clip(np.log(np.maximum(start, 1e-12)), low, high)
-    value, gradient, information = problem.noise_score(p, as_float64(np.exp(eta)))
+
+    def noise_of(logarithms: FloatArray) -> FloatArray:
+        return as_float64(np.where(there_is, np.exp(logarithms), 0.0))
+
+    value, gradient, information = problem.noise_score(p, noise_of(eta))
     damping = 1e-2
     for _ in range(rounds):
         # At a bound, only steps back inside count.
         free = ~(((eta <= low) & (gradient < 0)) | ((eta >= high) & (gradient > 0)))
-        free &= np.diag(information) > 1e-9
+        free &= (np.diag(information) > 1e-9) & there_is
         if not free.any():
             break
         gained = 0.0
@@ -195,7 +264,7 @@ def maximise_noise(
             step[free] = np.clip(np.linalg.solve(system, gradient[free]), -1.5, 1.5)
             trial = np.clip(eta + step, low, high)
             try:
-                there = problem.noise_score(p, as_float64(np.exp(trial)))
+                there = problem.noise_score(p, noise_of(trial))
             except NumericalError:
                 there = (-np.inf, gradient, information)
             if there[0] > value:
@@ -206,4 +275,4 @@ def maximise_noise(
             damping *= 8.0
         if gained < 0.05:
             break
-    return as_float64(np.exp(eta)), float(value)
+    return noise_of(eta), float(value)

@@ -25,6 +25,8 @@ from .suspects import explaining
 
 __all__ = ["free_box", "identify", "objective_of", "profile_fit", "refine", "refit"]
 
+_SLOPES_MPS2 = (0.05, 0.2)  # of a road that wanders, to begin with
+_HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts
 _BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 
@@ -102,7 +104,7 @@ def identify(
     box = free_box(model)
     p = model.vector()
     noise = first_guess(driving, model.vehicle)
-    thin = objective_of(model, driving.problem(model, most_samples=_THINNED))
+    thin = objective_of(model, driving.problem(model, most_samples=_THINNED), driving)
     frozen = thin.freeze(p, noise.vector())
     # Up to this the log-likelihood is minus half the sum of squares.
     level = frozen.log_likelihood + thin.problem.half_sum_of_squares(p, frozen)
@@ -123,7 +125,7 @@ def identify(
     table = Starts(
         names, as_float64(begins[:, box.columns]), as_float64(ends[:, box.columns]), values
     )
-    fit = _polish(model, driving, ends[int(np.argmax(values))], noise, table)
+    fit = _on_its_road(_polish(model, driving, ends[int(np.argmax(values))], noise, table))
     if intervals == "profile":
         return profile_fit(fit, workers=workers, progress=progress)
     return fit
@@ -141,12 +143,12 @@ def _told(
     return model
 
 
-def objective_of(model: Model, problem: _core.Problem) -> Objective:
+def objective_of(model: Model, problem: _core.Problem, driving: Driving) -> Objective:
     """The likelihood of a problem with the priors of a model's free parameters."""
     known = model.parameters
     stated = {known[n].column: prior for n, prior in model.priors.items()}
     prior = gaussian_prior(_core.PARAMETERS, stated)
-    return Objective(problem, prior, *noise_range(model.vehicle))
+    return Objective(problem, prior, *noise_range(model.vehicle, driving))
 
 
 def refine(
@@ -168,7 +170,7 @@ def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3)
     The likelihood is never lower than that of the values it starts from.
     """
     box = free_box(model)
-    objective = objective_of(model, driving.problem(model))
+    objective = objective_of(model, driving.problem(model), driving)
     p = model.vector()
     p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
     gains = objective.freeze(p, noise.vector())
@@ -186,7 +188,7 @@ def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool | None =
 
     Where a profile comes upon a better optimum the fit goes on from there.
     """
-    objective = objective_of(fit.model, fit.driving.problem(fit.model))
+    objective = objective_of(fit.model, fit.driving.problem(fit.model), fit.driving)
     box = free_box(fit.model)
     p, noise = fit.model.vector(), fit.noise.vector()
     for _ in range(_BETTER_FOUND):
@@ -256,7 +258,7 @@ def _polish(
     inputs: FloatArray | None = None,
 ) -> Fit:
     """Noise and parameters of maximum likelihood, from values that are already near."""
-    objective = objective_of(model, driving.problem(model, other_inputs=inputs))
+    objective = objective_of(model, driving.problem(model, other_inputs=inputs), driving)
     # Noise needs fewer samples than parameters do; the last word has all of them.
     thin = driving.problem(model, most_samples=_THINNED, other_inputs=inputs)
     p, found, converged = settle(
@@ -265,6 +267,29 @@ def _polish(
     found, _ = objective.learn_noise(p, found, rounds=1)
     told = NoiseModel.from_vector(found)
     return _summary(model, driving, objective, p, told, starts, converged)
+
+
+def _on_its_road(fit: Fit) -> Fit:
+    """The same fit where the road is level, another where it wanders."""
+    model, driving, p = fit.model, fit.driving, fit.model.vector()
+    objective = objective_of(model, driving.problem(model), driving)
+
+    def log_likelihood(noise: NoiseModel) -> float:
+        try:
+            return float(objective.freeze(p, noise.vector()).log_likelihood)
+        except NumericalError:
+            return -np.inf
+
+    best = max(
+        (replace(fit.noise, road=(slope, slope)) for slope in _SLOPES_MPS2), key=log_likelihood
+    )
+    if log_likelihood(best) < fit.log_likelihood + _HINT:
+        return fit
+    learned, value = objective.learn_noise(p, best.vector(), rounds=6)
+    if value < fit.log_likelihood + _SHOWN:
+        return fit
+    found = _polish(model, driving, p, NoiseModel.from_vector(learned), fit.starts)
+    return found if found.log_likelihood > fit.log_likelihood else fit
 
 
 def _summary(

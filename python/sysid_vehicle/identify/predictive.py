@@ -146,7 +146,7 @@ def _remembered(fit: Fit) -> _Remembered:
     """What the fitted driving told; of what it did not show, what the parameters' bounds tell."""
     box = free_box(fit.model)
     p = fit.model.vector()
-    objective = objective_of(fit.model, fit.driving.problem(fit.model))
+    objective = objective_of(fit.model, fit.driving.problem(fit.model), fit.driving)
     _, _, information = objective.normal_equations(
         p, objective.freeze(p, fit.noise.vector()), box.columns
     )

@@ -129,7 +129,12 @@ def settle(
     for round_ in range(rounds):
         learned, _ = (thin or objective).learn_noise(p, noise, rounds=6 if round_ == 0 else 3)
         there = objective.freeze(p, learned)
-        if there.log_likelihood >= gains.log_likelihood:  # which `thin` does not warrant
+        if thin is not None and there.log_likelihood < gains.log_likelihood + _STANDS:
+            # Few samples do not tell slow disturbances; where they lead nowhere, all have to.
+            thin = None
+            learned, _ = objective.learn_noise(p, noise, rounds=3)
+            there = objective.freeze(p, learned)
+        if there.log_likelihood >= gains.log_likelihood:
             noise, gains = learned, there
         value = gains.log_likelihood - objective.prior_cost(p)
         if value < best + _STANDS:

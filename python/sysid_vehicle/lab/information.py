@@ -78,7 +78,7 @@ def sensor_noise(drive: ClosedLoop, motion: tuple[float, float, float]) -> Noise
     """The noise that the sensors of a drive are known to have, and no disturbance force."""
     sensors = drive.setup.sensors
     std = [max(float(getattr(sensors, name).noise_std), _LEAST_STD) for name in MEASURED]
-    return NoiseModel(tuple(std), motion, (0.0, 0.0, 0.0), 0.3)
+    return NoiseModel(tuple(std), motion, (0.0, 0.0, 0.0), (0.3, 0.3, 0.3))
 
 
 def parameters_of(drive: ClosedLoop, model: Model) -> FloatArray:

@@ -263,8 +263,8 @@ def _remains(study: Study, truth: Model | None) -> list[str]:
         paragraph(
             "Beyond its equations the final model still needs a disturbance force of "
             f"{number(x, 2)} N forward and {number(y, 2)} N sideways and a yaw moment of "
-            f"{number(moment, 2)} N m (standard deviations; correlation time "
-            f"{number(noise.correlation_time_s, 2)} s)."
+            f"{number(moment, 2)} N m (standard deviations; correlation times "
+            f"{noise.times})."
         ),
     ]
     if study.warnings:

@@ -4,5 +4,6 @@ from ._check import check
 from ._faults import SensorFault
 from ._ready import made_ready
 from ._result import SensorCheck, put_right
+from ._signals import quantum
 
-__all__ = ["SensorCheck", "SensorFault", "check", "made_ready", "put_right"]
+__all__ = ["SensorCheck", "SensorFault", "check", "made_ready", "put_right", "quantum"]

@@ -22,6 +22,7 @@ __all__ = [
     "averaged",
     "own_samples",
     "pieces",
+    "quantum",
     "readings_of",
     "refuse_mixed_up",
     "signals",
@@ -80,7 +81,7 @@ def signals(log: Log) -> list[Signal]:
                 channel,
                 log.rate_hz / max(every, held),
                 held,
-                _quantum(values[known]),
+                quantum(values[known]),
                 max(0.0, float(lost)),
             )
         )
@@ -93,7 +94,7 @@ def own_samples(values: FloatArray) -> tuple[IntArray, int]:
     return known, max(1, int(np.median(np.diff(known)))) if known.size > 1 else 1
 
 
-def _quantum(values: FloatArray) -> float:
+def quantum(values: FloatArray) -> float:
     """Step of which all values are multiples, where they are; else 0."""
     levels = np.unique(values)
     if levels.size < 3 or levels.size > 0.5 * values.size:

@@ -12,20 +12,21 @@
 
 namespace sysid {
 
-/// Filter gains of every sample: the correction of (v_x, v_y, r, F_x, F_y, M_z, auxiliary states)
+/// Filter gains of every sample: the correction of (v_x, v_y, r, F_x, F_y, M_z, auxiliary states,
+/// gravity along and across)
 /// and the inverse Cholesky factor that whitens the innovation. Zero where a measurement is
 /// missing. The parts into which the interval before the sample is cut are kept as well: were they
 /// counted anew, residuals would jump where a parameter makes it one more.
 struct FrozenStep {
     int substeps = 1;
-    Mat<kStatesFull, kChannels> gain;
+    Mat<kStatesFull + kRoadStates, kChannels> gain;
     Mat<kChannels, kChannels> whitener;
 };
 
 /// Belongs to problems with the runs it was made from, whatever their model.
 struct FrozenFilter {
     std::vector<std::vector<FrozenStep>> runs;
-    double correlation_time_s = 0.5;
+    Noise noise;
     double log_likelihood = 0.0;
     std::size_t observed = 0;  // measured elements that count
 };
@@ -55,7 +56,8 @@ void signal_sensitivities(const Problem& problem, const double* p, const FrozenF
                           const double* signals, const std::vector<int>& targets, double* out);
 
 /// Derivatives of the log-likelihood with respect to the logarithms of the noise parameters
-/// (sensor, motion, disturbance, correlation time), and their expected information (row-major).
+/// (sensor, motion, disturbance, correlation times, road and its time; without a road the last
+/// three are zero), and their expected information (row-major).
 double noise_score(const Problem& problem, const double* p, const Noise& noise, double* gradient,
                    double* information);
 
@@ -72,8 +74,8 @@ struct Trace {
 
 Trace trace(const Problem& problem, const double* p, const Noise& noise, bool smoothed);
 
-/// Prediction errors `ahead` samples ahead, from the filtered state: samples x kChannels. Only
-/// one sample in `every` starts a prediction; where none ends, errors are NaN.
+/// Prediction errors `ahead` samples ahead, from the filtered state and slope of the road: samples
+/// x kChannels. Only one sample in `every` starts a prediction; where none ends, errors are NaN.
 void look_ahead(const Problem& problem, const double* p, const Noise& noise, std::size_t ahead,
                 std::size_t every, double* errors);
 

@@ -21,18 +21,38 @@ struct Run {
     std::size_t size() const { return inputs.size(); }
 };
 
+/// Gravity along and across, where the road wanders.
+constexpr int kRoadStates = 2;
+
 /// The noise model that fitting, comparing, diagnosing and validating share.
 ///
 /// Sensors are white. The motion is disturbed by white accelerations, and by forces and a moment
-/// with one correlation time (Ornstein-Uhlenbeck): they take up what the model cannot
-/// explain, so that the innovations stay white and the uncertainty honest.
+/// with correlation times of their own (Ornstein-Uhlenbeck): they take up what the model cannot
+/// explain, so that the innovations stay white and the uncertainty honest. A road that is not
+/// level pulls along and across, slowly, with a force that no accelerometer feels.
 struct Noise {
     std::array<double, kChannels> sensor{};           // standard deviations, in the channels' units
     std::array<double, kMotionStates> motion{};       // per square root of a second
     std::array<double, kMotionStates> disturbance{};  // F_x, F_y [N], M_z [N m]
-    double correlation_time_s = 0.5;
+    std::array<double, kMotionStates> correlation_time_s{0.5, 0.5, 0.5};
+    std::array<double, kRoadStates> road{};  // gravity along and across [m/s2]
+    double road_time_s = 5.0;
+
+    /// Whether the road wanders; without, its states do not exist.
+    bool sloping() const { return road[0] > 0.0 || road[1] > 0.0; }
+
+    /// Correlation time and standard deviation of F_x, F_y, M_z, gravity along and across.
+    double time_of(std::size_t i) const {
+        return i < kMotionStates ? correlation_time_s[i] : road_time_s;
+    }
+    double deviation_of(std::size_t i) const {
+        return i < kMotionStates ? disturbance[i] : road[i - kMotionStates];
+    }
+    double forget(std::size_t i, double dt) const { return std::exp(-dt / time_of(i)); }
 };
-constexpr int kNoiseParameters = kChannels + 2 * kMotionStates + 1;
+constexpr int kPlainNoiseParameters = kChannels + 3 * kMotionStates;
+constexpr int kDisturbances = kMotionStates + kRoadStates;
+constexpr int kNoiseParameters = kPlainNoiseParameters + kRoadStates + 1;
 
 /// Motion and disturbance; with the auxiliary states where an effect has states of its
 /// own.

@@ -8,8 +8,9 @@
 
 namespace sysid {
 
-/// State: v_x, v_y, r, disturbing F_x, F_y, M_z, then the states of the model's own effects; what
-/// is left of NX stands still at zero and is certain.
+/// State: v_x, v_y, r, disturbing F_x, F_y, M_z, then the states of the model's own effects,
+/// gravity along and across where the road wanders; what is left of NX stands still at zero and is
+/// certain.
 template <int NX>
 class RunSystem {
   public:
@@ -18,15 +19,18 @@ class RunSystem {
           run_(run),
           p_(p),
           own_(active_states(model.effects)),
-          start_(initial_state(model, run, p)) {
-        forget_ = std::exp(-run.dt / noise.correlation_time_s);
+          start_(initial_state(model, run, p)),
+          disturbances_(noise.sloping() ? kDisturbances : kMotionStates) {
         process_.setZero();
         for (int i = 0; i < kMotionStates; ++i) {
             const auto n = static_cast<std::size_t>(i);
             process_(i, i) = noise.motion[n] * noise.motion[n] * run.dt;
-            disturbance_variance_[i] = noise.disturbance[n] * noise.disturbance[n];
-            process_(kMotionStates + i, kMotionStates + i) =
-                disturbance_variance_[i] * (1.0 - forget_ * forget_);
+        }
+        for (std::size_t i = 0; i < disturbances_; ++i) {
+            const int at = disturbing(i);
+            forget_[i] = noise.forget(i, run.dt);
+            variance_[i] = noise.deviation_of(i) * noise.deviation_of(i);
+            process_(at, at) = variance_[i] * (1.0 - forget_[i] * forget_[i]);
         }
         sensors_.setZero();
         for (int i = 0; i < kChannels; ++i) {
@@ -36,7 +40,6 @@ class RunSystem {
     }
 
     const Run& run() const { return run_; }
-    double forget() const { return forget_; }
     const ModelState<double>& start() const { return start_; }
 
     Vec<NX> initial_mean() const {
@@ -52,7 +55,7 @@ class RunSystem {
         variance[0] = 1.0;
         variance[1] = 1.0;
         variance[2] = 0.04;
-        variance.template segment<kMotionStates>(kMotionStates) = disturbance_variance_;
+        for (std::size_t i = 0; i < disturbances_; ++i) variance[disturbing(i)] = variance_[i];
         constexpr auto spreads = effect_state_spreads();
         for (std::size_t i = 0; i < own_.count; ++i)
             variance[packed(i)] = spreads[own_.place[i]] * spreads[own_.place[i]];
@@ -64,9 +67,10 @@ class RunSystem {
     Vec<NX> predict(std::size_t k, const Vec<NX>& x, Mat<NX, NX>& A, Mat<NX, NX>& Q) const {
         A.setZero();
         Vec<NX> next = Vec<NX>::Zero();
-        for (int i = kMotionStates; i < kStatesPlain; ++i) {
-            next[i] = forget_ * x[i];
-            A(i, i) = forget_;
+        for (std::size_t i = 0; i < disturbances_; ++i) {
+            const int at = disturbing(i);
+            next[at] = forget_[i] * x[at];
+            A(at, at) = forget_[i];
         }
         const int substeps = substeps_for(model_, p_, x[0], run_.dt);
         in_passes(x, [&](ModelState<D>& s, const auto& external, auto&& keep) {
@@ -95,6 +99,16 @@ class RunSystem {
     std::size_t place(std::size_t i) const { return kMotionStates + own_.place[i]; }
     const ActiveStates& own() const { return own_; }
 
+    /// How many disturbances there are, and where number `i` stands: F_x, F_y, M_z, gravity.
+    std::size_t disturbances() const { return disturbances_; }
+    int disturbing(std::size_t i) const {
+        return i < kMotionStates ? kMotionStates + static_cast<int>(i)
+                                 : packed(own_.count + i - kMotionStates);
+    }
+    /// States that take part.
+    int taking_part() const { return kMotionStates + static_cast<int>(disturbances_ + own_.count); }
+    double forget(std::size_t i) const { return forget_[i]; }
+
     const Vec<kChannels>& measurement(std::size_t k) const { return run_.measurements[k]; }
     const Mat<kChannels, kChannels>& measurement_noise(std::size_t /*k*/) const { return sensors_; }
 
@@ -107,7 +121,7 @@ class RunSystem {
     /// Calls `use` with every state in turn as a direction; `keep` stores a row of what results.
     template <class Use>
     void in_passes(const Vec<NX>& x, Use&& use) const {
-        const int wanted = kStatesPlain + static_cast<int>(own_.count);
+        const int wanted = taking_part();
         for (int first = 0; first < NX; first += kPass) {
             ModelState<D> s{};
             std::array<D, kExternals> external{};
@@ -117,10 +131,8 @@ class RunSystem {
                     value.d[static_cast<std::size_t>(i - first)] = 1.0;
                 return value;
             };
-            for (int i = 0; i < kMotionStates; ++i) {
-                s[static_cast<std::size_t>(i)] = seeded(i);
-                external[static_cast<std::size_t>(i)] = seeded(kMotionStates + i);
-            }
+            for (int i = 0; i < kMotionStates; ++i) s[static_cast<std::size_t>(i)] = seeded(i);
+            for (std::size_t i = 0; i < disturbances_; ++i) external[i] = seeded(disturbing(i));
             for (std::size_t i = 0; i < own_.count; ++i) s[place(i)] = seeded(packed(i));
             use(s, external, [&](const D& value, int row, auto& values, auto& slopes) {
                 values[row] = value.v;
@@ -138,8 +150,8 @@ class RunSystem {
     const double* p_;
     ActiveStates own_;
     ModelState<double> start_;
-    double forget_ = 0.0;
-    Vec<kMotionStates> disturbance_variance_;
+    std::size_t disturbances_;
+    std::array<double, kDisturbances> forget_{}, variance_{};
     Mat<NX, NX> process_;
     Mat<kChannels, kChannels> sensors_;
 };
@@ -147,12 +159,14 @@ class RunSystem {
 /// State sizes for models without states of the effects' own, with a few, with some, and with all.
 constexpr int kStatesFew = kStatesPlain + 3;
 constexpr int kStatesSome = kStatesPlain + 6;
-constexpr int kStatesMost = (kStatesFull + kWideStatePass - 1) / kWideStatePass * kWideStatePass;
+constexpr int kStatesMost =
+    (kStatesFull + kRoadStates + kWideStatePass - 1) / kWideStatePass * kWideStatePass;
 
-/// Calls `use(std::integral_constant<int, NX>)` with a state size that holds the effects' states.
+/// Calls `use(std::integral_constant<int, NX>)` with a state size that holds the effects' states
+/// and those of the road.
 template <class Use>
-auto with_state_size(EffectMask effects, Use&& use) {
-    const std::size_t own = active_states(effects).count;
+auto with_state_size(EffectMask effects, const Noise& noise, Use&& use) {
+    const std::size_t own = active_states(effects).count + (noise.sloping() ? kRoadStates : 0);
     if (own == 0) return use(std::integral_constant<int, kStatesPlain>{});
     if (own <= 3) return use(std::integral_constant<int, kStatesFew>{});
     if (own <= 6) return use(std::integral_constant<int, kStatesSome>{});
