@@ -32,6 +32,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "sysid_vehicle"
 # Constants of numerical methods and of effort: how finely, how long, how often. They decide no
 # claim. Those of the last group shape how what no name fits is described; no effect is claimed.
 NUMERICAL = {
+    "diagnose/causes.py": {"_KEPT"},
     "diagnose/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
     "diagnose/diagnose.py": {"_REFITS", "_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS", "_BEYOND"},
     "diagnose/evidence.py": {"_AT_ONCE"},
@@ -43,6 +44,7 @@ NUMERICAL = {
     },
     "diagnose/score.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
     "diagnose/sensitivity.py": {"_AT_ONCE"},
+    "diagnose/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},
     "study/validation.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED", "_AHEAD"},
     "study/horizons.py": {"_BLOCK_S", "_FEWEST", "_DRAWS", "_APART", "_NORMAL", "_LOST"},
     "study/improve.py": {"_SHORT_S"},

@@ -1,5 +1,6 @@
 """Diagnosis: which physical effect a model is missing, or that none explains what is left."""
 
+from .causes import Causes, CredibleSet
 from .ceiling import Ceiling, Explainable, ceiling
 from .change_points import ChangePoint
 from .coherence import INPUTS, Coherence, coherence
@@ -26,10 +27,12 @@ __all__ = [
     "Bias",
     "BiasReport",
     "Candidate",
+    "Causes",
     "Ceiling",
     "ChangePoint",
     "Coherence",
     "Constancy",
+    "CredibleSet",
     "Curve",
     "Delay",
     "Diagnosis",

@@ -17,6 +17,7 @@ from ..identify import Fit, explaining, refine, refit
 from ..log import Log
 from ..model import Model
 from ..rules import USUAL, Rules, bic
+from .causes import causes_of
 from .diagnosis import Candidate, Diagnosis
 from .evidence import Evidence
 from .omnibus import omnibus_of
@@ -73,6 +74,7 @@ def diagnose(
     evidence = Evidence(fit, driving)
     board = score_board_of(evidence, possible, rules)
     left = omnibus_of(evidence, rules)
+    causes = causes_of(board, evidence, rules)
     family = board.family_p_values(seed=seed)
     ranked = [
         Candidate(
@@ -117,7 +119,9 @@ def diagnose(
         far = sorted((c for c in tried if c.id not in done), key=lambda c: -c.statistic)
         done |= {c.id for c in far}
         ranked = finished + far + [c for c in ranked if c.id not in done]
-    return _with_errors(Diagnosis(fit, driving, tuple(ranked), left, rules, board.scores, family))
+    return _with_errors(
+        Diagnosis(fit, driving, tuple(ranked), left, rules, board.scores, family, causes=causes)
+    )
 
 
 def _with_errors(dx: Diagnosis) -> Diagnosis:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving, NoiseModel
 from ..identify import Fit
 from ..rules import Rules
+from .causes import Causes
 from .omnibus import Omnibus
 from .possible import Size, possible
 from .reservation import Beside, beside, confirmed, reservation
@@ -96,6 +97,8 @@ class Diagnosis:
         Their p-values by effect, corrected for testing all of them.
     error : float
         One-step-ahead error on the driving without any of the effects, in units of `floor`.
+    causes : Causes
+        Posterior of a sum of single effects: inclusion probabilities, credible sets.
     """
 
     fit: Fit
@@ -106,6 +109,7 @@ class Diagnosis:
     scores: tuple[Score, ...]
     family: dict[str, float]
     error: float = float("nan")
+    causes: Causes = field(default_factory=lambda: Causes({}, (), {}))
 
     @property
     def alpha(self) -> float:

@@ -19,9 +19,9 @@ from ..identify import Fit
 from ..rules import USUAL, Rules
 from .coordinates import begins, late
 from .evidence import Evidence
-from .projection import pseudo_inverse, variance_ratio
+from .projection import orthonormal_basis, pseudo_inverse, variance_ratio
 
-__all__ = ["Omnibus", "omnibus", "omnibus_of"]
+__all__ = ["Omnibus", "omnibus", "omnibus_of", "unknown_directions"]
 
 # Targets in the core's order: external F_x, F_y, M_z, then accelerations, then sensor readings.
 _TARGETS = {"F_x": 0, "F_y": 1, "M_z": 2, "dv_x/dt": 3, "dv_y/dt": 4}
@@ -81,12 +81,7 @@ def omnibus(fit: Fit, driving: Driving, rules: Rules = USUAL) -> Omnibus:
 
 def omnibus_of(evidence: Evidence, rules: Rules = USUAL) -> Omnibus:
     """The same of residuals that may be known already."""
-    names, signals, targets = _virtual(evidence)
-    p = evidence.fit.model.vector()
-    G = evidence.problem.signal_sensitivities(p, evidence.frozen, signals, targets)
-    R = evidence.project(G)
-    kept = np.linalg.norm(R, axis=0) > 1e-3 * np.maximum(np.linalg.norm(G, axis=0), 1e-300)
-    R, names = R[:, kept], [n for n, k in zip(names, kept, strict=True) if k]
+    names, R = _directions(evidence)
     e = evidence.left
     information, S = R.T @ R, R.T @ e
 
@@ -106,6 +101,23 @@ def omnibus_of(evidence: Evidence, rules: Rules = USUAL) -> Omnibus:
         max(by_target, key=lambda t: by_target[t]),
         rules,
     )
+
+
+def unknown_directions(evidence: Evidence) -> list[tuple[str, FloatArray]]:
+    """Orthonormal directions of each unknown force, moment or reading, by its name."""
+    names, R = _directions(evidence)
+    of = np.array(names)
+    return [(t, orthonormal_basis(R[:, of == t])) for t in dict.fromkeys(names)]
+
+
+def _directions(evidence: Evidence) -> tuple[list[str], FloatArray]:
+    """Targets and sensitivities of the virtual signals that the free parameters cannot copy."""
+    names, signals, targets = _virtual(evidence)
+    p = evidence.fit.model.vector()
+    G = evidence.problem.signal_sensitivities(p, evidence.frozen, signals, targets)
+    R = evidence.project(G)
+    kept = np.linalg.norm(R, axis=0) > 1e-3 * np.maximum(np.linalg.norm(G, axis=0), 1e-300)
+    return [n for n, k in zip(names, kept, strict=True) if k], R[:, kept]
 
 
 def _virtual(evidence: Evidence) -> tuple[list[str], FloatArray, list[int]]:

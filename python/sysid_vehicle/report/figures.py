@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, tidy
-from ..diagnose import Diagnosis
+from ..diagnose import Causes
 from ..model import Model
 from ..study import Study
 from .excerpt import Excerpt
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
+    "causes",
     "errors_by_step",
-    "evidence",
     "failure_maps",
     "overlay",
     "residuals",
@@ -77,15 +77,11 @@ def failure_maps(study: Study, axes: Sequence[Axes]) -> None:
         ax.set_ylabel("")
 
 
-def evidence(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
-    """Draw the evidence for each effect as bars."""
-    ax = diagnosis.plot(axes_or_new(ax, 7.0, 3.4))
-    top = max((c.statistic for c in diagnosis.ranking), default=0.0)
-    ax.set_xlim(0.1, max(2.0 * top, 100.0))
-    ax.plot([], [], "s", color="tab:red", label=f"significant (p < {diagnosis.alpha:g})")
-    ax.plot([], [], "s", color="0.7", label="not significant")
-    ax.legend(frameon=False, loc="lower right", fontsize="small")
-    return tidy(ax)
+def causes(
+    found: Causes, grades: Mapping[str, str], ax: Axes | None = None, most: int = 10
+) -> Axes:
+    """Draw inclusion probabilities by credible set, with the grades of what was added."""
+    return tidy(found.plot(axes_or_new(ax, 7.0, 3.4), most, grades))
 
 
 def sizes(study: Study, ax: Axes | None = None, truth: Model | None = None) -> Axes:

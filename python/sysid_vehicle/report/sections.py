@@ -88,14 +88,17 @@ def _which(study: Study, truth: Model | None) -> list[str]:
         if shown == 0:
             parts.append(paragraph("There was no candidate to test."))
             continue
-        figure = new_figure(7.0, 0.9 + 0.25 * shown)
-        figures.evidence(dx, figure.add_subplot())
+        figure = new_figure(7.0, 0.9 + 0.28 * min(len(dx.causes.inclusion), shown))
+        grades = {a.id: a.grade for a in study.added}
+        figures.causes(dx.causes, grades, figure.add_subplot(), most=shown)
         n = len(dx.significant)
         parts += [
             picture(
                 figure,
-                f"Evidence for each effect; {n} of {len(dx.ranking)} significant at {dx.alpha:g} "
-                "over all of them together.",
+                "Probability that each effect is missing, by credible set: effects of one set are "
+                "confounded, and one of them acts. Beside a bar stands the grade of what the study "
+                f"added. {n} of {len(dx.ranking)} effects are significant at {dx.alpha:g} over all "
+                "of them together.",
             ),
             table(RANKING_HEAD, _with_minus_signs(ranking_rows(study, i)), "ranking"),
         ]

@@ -85,6 +85,12 @@ class Rules:
     grown: float = _limit(
         3.0, "standard errors", "by which an error 1 to 5 s ahead is shown to grow", _EFFECTS
     )
+    nothing: float = _limit(
+        0.5, "probability", "before any data, that one of a sum of effects is none", _NULLS
+    )
+    credible: float = _limit(
+        0.95, "probability", "that a credible set holds a missing effect", _CONVENTION
+    )
     insignificant: float = _limit(
         2.6, "standard errors", "from nothing, within which an effect may be needless", _EFFECTS
     )

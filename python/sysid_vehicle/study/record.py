@@ -33,6 +33,7 @@ def record(study: Study) -> dict[str, Any]:
             _candidate(c, study.verdicts[c.id], *errors.get(c.id, (None, None)))
             for c in study.diagnoses[0].ranking
         ],
+        "causes": study.diagnoses[0].causes.to_dict(),
         "verdicts": study.verdicts.to_dict(),
         "channels": {
             "before": {"train": _channels(study.train[0]), "test": _channels(study.test[0])},

@@ -1,0 +1,308 @@
+"""What is probably missing: inclusion probabilities, and credible sets of confounded effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._arrays import FloatArray
+from .._text import brief, html_paragraph, html_table, text_table, with_error
+from ..effects import Effect
+from ..rules import USUAL, Rules
+from .evidence import Evidence
+from .omnibus import unknown_directions
+from .possible import Size
+from .projection import variance_ratio
+from .score import ScoreBoard
+from .single_effects import Hypothesis, Posterior, ScoreModel, Subset
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["Causes", "CredibleSet", "causes_of"]
+
+_UNKNOWN = "unknown "
+_KEPT = 40  # of the leading subsets
+
+
+@dataclass(frozen=True)
+class CredibleSet:
+    """Effects of which one is missing, with 95 % probability usually.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        The likeliest first; several are confounded by this driving. A name that begins with
+        `unknown` is a force, moment or reading that no effect of the catalogue explains.
+    probabilities : tuple of float
+        Of each being the one that acts.
+    """
+
+    effects: tuple[str, ...]
+    probabilities: tuple[float, ...]
+
+    def __str__(self) -> str:
+        pairs = zip(self.effects, self.probabilities, strict=True)
+        return " or ".join(f"{e} ({100 * p:.0f} %)" for e, p in pairs)
+
+
+@dataclass(frozen=True, eq=False)
+class Causes:
+    """The posterior of a sum of single effects (`single_effects.py`).
+
+    Attributes
+    ----------
+    inclusion : dict of str to float
+        Posterior probability that an effect is missing, the likeliest first.
+    sets : tuple of CredibleSet
+        One for each effect of the sum that is not nothing.
+    sizes : dict of str to tuple
+        Parameters and standard errors of each effect were it the one that acts beside the other
+        sets; linearised at the fit.
+    subsets : tuple of Subset
+        Leading subsets of up to three effects.
+    units : dict of str to tuple of (str, str)
+        Names and units of the parameters.
+    """
+
+    inclusion: dict[str, float]
+    sets: tuple[CredibleSet, ...]
+    sizes: dict[str, Size]
+    subsets: tuple[Subset, ...] = ()
+    units: dict[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
+
+    def of(self, effect: str) -> CredibleSet | None:
+        """The credible set an effect is in."""
+        return next((s for s in self.sets if effect in s.effects), None)
+
+    _HEAD = ("effect", "probability", "credible set", "size")
+
+    def _rows(self, most: int = 12) -> list[list[str]]:
+        return [[e, f"{p:.3f}", self._place(e), self._size(e)] for e, p in self._shown(most)]
+
+    def _shown(self, most: int) -> list[tuple[str, float]]:
+        """Effects by set, then the likeliest of the others."""
+        grouped = list(dict.fromkeys(e for s in self.sets for e in s.effects))
+        others = [e for e in self.inclusion if e not in grouped]
+        return [(e, self.inclusion[e]) for e in (*grouped, *others)[:most]]
+
+    def _place(self, effect: str) -> str:
+        places = [str(i + 1) for i, s in enumerate(self.sets) if effect in s.effects]
+        return ", ".join(places) or "-"
+
+    def _size(self, effect: str) -> str:
+        if effect not in self.sizes:
+            return "-"
+        told = zip(self.units[effect], *self.sizes[effect], strict=True)
+        return ", ".join(f"{n} {with_error(v, s)} {u}".removesuffix(" 1") for (n, u), v, s in told)
+
+    def _headline(self) -> str:
+        if not self.sets:
+            return "no effect is shown to be missing: no credible set"
+        kind = "effect" if len(self.sets) == 1 else "effects together"
+        return f"{len(self.sets)} {kind}: " + "; ".join(map(str, self.sets))
+
+    __repr__ = brief
+
+    def __str__(self) -> str:
+        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
+
+    def _repr_html_(self) -> str:
+        return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, ready for JSON."""
+        return {
+            "inclusion": dict(self.inclusion),
+            "sets": [
+                {"effects": list(s.effects), "probabilities": list(s.probabilities)}
+                for s in self.sets
+            ],
+            "sizes": {
+                e: {
+                    n: {"value": v, "std": s, "unit": u}
+                    for (n, u), v, s in zip(self.units[e], *size, strict=True)
+                }
+                for e, size in self.sizes.items()
+            },
+            "subsets": [
+                {"effects": list(s.effects), "log_odds": s.log_odds} for s in self.subsets[:10]
+            ],
+        }
+
+    def plot(
+        self, ax: Axes | None = None, most: int = 12, grades: Mapping[str, str] | None = None
+    ) -> Axes:
+        """Bars of inclusion probability, grouped by credible set.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+        most : int
+            Bars.
+        grades : mapping, optional
+            By effect, a word to print beside its bar.
+        """
+        import matplotlib.pyplot as plt
+
+        shown = self._shown(most)[::-1]
+        if ax is None:
+            ax = plt.subplots(figsize=(6.0, 0.9 + 0.28 * max(len(shown), 1)))[1]
+        for i, s in enumerate(self.sets):
+            rows = [k for k, (e, _) in enumerate(shown) if self.of(e) is s]
+            widths = [shown[k][1] for k in rows]
+            ax.barh(rows, widths, color=f"C{i % 10}", label=f"credible set {i + 1}")
+        rest = [k for k, (e, _) in enumerate(shown) if self.of(e) is None]
+        ax.barh(rest, [shown[k][1] for k in rest], color="0.7", label="in no set")
+        for k, (e, p) in enumerate(shown):
+            word = (grades or {}).get(e, "")
+            ax.text(p + 0.01, k, f"{p:.2f}  {word}".rstrip(), va="center", fontsize="small")
+        ax.set_yticks(range(len(shown)), [e for e, _ in shown])
+        ax.set(xlim=(0.0, 1.25), xlabel="probability of being missing")
+        ax.legend(frameon=False, loc="lower right", fontsize="small")
+        return ax
+
+
+def causes_of(
+    board: ScoreBoard, evidence: Evidence, rules: Rules = USUAL, *, most: int = 6
+) -> Causes:
+    """The posterior of what is missing beside a fit.
+
+    Parameters
+    ----------
+    board : ScoreBoard
+        Scores of all candidates.
+    evidence : Evidence
+        The same residuals.
+    rules : Rules
+    most : int
+        Effects of the sum.
+    """
+    if not board.scores:
+        return Causes({}, (), {})
+    scale, hypotheses, ratio = _candidates(board)
+    directions, named, more = _unknown(evidence)
+    across = np.hstack(list(board.directions.values())).T @ directions
+    n, m = across.shape
+    information = np.block([[board.information, across], [across.T, directions.T @ directions]])
+    scale = np.concatenate([scale, np.full(m, np.sqrt(evidence.driving.samples))])
+    score = np.concatenate([board.gradient, directions.T @ evidence.left])
+    start = n
+    for name, width in named:
+        columns = tuple(range(start, start + width))
+        hypotheses.append(Hypothesis(_UNKNOWN + name, columns, (0.0,) * width, 1.0))
+        start += width
+    model = ScoreModel(
+        tuple(hypotheses),
+        score * scale,
+        information * np.outer(scale, scale),
+        np.concatenate([ratio, more]),
+        rules.nothing,
+    )
+    subsets = model.subsets()
+    posterior = model.posterior(most, subsets[0])
+    return _told(model, posterior, subsets, board, scale, rules)
+
+
+def _candidates(board: ScoreBoard) -> tuple[FloatArray, list[Hypothesis], FloatArray]:
+    """Prior standard deviations and variance ratios by column, and the hypotheses."""
+    scored = {s.effect.id: s for s in board.scores}
+    scale, ratio = np.empty(len(board.gradient)), np.empty(len(board.gradient))
+    hypotheses: list[Hypothesis] = []
+    ends = np.cumsum([0, *(R.shape[1] for R in board.directions.values())])
+    for name, (a, b) in zip(board.directions, pairwise(ends), strict=True):
+        effect = scored[name].effect
+        ratio[a:b] = max(scored[name].variance_ratio, 1.0)
+        first = effect.parameters[0]
+        if effect.scanned is not None:
+            scale[a:b] = abs(first.typical - first.null_value)
+            hypotheses += [
+                Hypothesis(name, (c,), (_side(effect, 0),), 1.0 / (b - a)) for c in range(a, b)
+            ]
+            continue
+        scale[a:b] = [abs(p.typical - p.null_value) for p in effect.parameters]
+        forms = _forms(effect)
+        hypotheses += [
+            Hypothesis(
+                name,
+                tuple(int(a) + i for i in form),
+                tuple(_side(effect, i) for i in form),
+                1.0 / len(forms),
+            )
+            for form in forms
+        ]
+    return scale, hypotheses, ratio
+
+
+def _forms(effect: Effect) -> list[tuple[int, ...]]:
+    """Parameters that act: of some that have one sign any may be nothing."""
+    every = tuple(range(len(effect.parameters)))
+    if len(every) == 2 and any(p.one_sided for p in effect.parameters):
+        return [(0,), (1,), every]
+    return [every]
+
+
+def _side(effect: Effect, i: int) -> float:
+    p = effect.parameters[i]
+    return float(np.sign(p.typical - p.null_value)) if p.one_sided else 0.0
+
+
+def _unknown(evidence: Evidence) -> tuple[FloatArray, list[tuple[str, int]], FloatArray]:
+    """Orthonormal directions of unknown forces and readings, their targets, variance ratios."""
+    e = evidence.left
+    bases, named, ratios = [], [], []
+    for target, basis in unknown_directions(evidence):
+        along = basis @ (basis.T @ e)
+        bases.append(basis)
+        named.append((target, basis.shape[1]))
+        ratios.append(np.full(basis.shape[1], variance_ratio(along, e - along)))
+    return np.hstack(bases), named, np.concatenate(ratios)
+
+
+def _told(
+    model: ScoreModel,
+    posterior: Posterior,
+    subsets: Sequence[Subset],
+    board: ScoreBoard,
+    scale: FloatArray,
+    rules: Rules,
+) -> Causes:
+    """Effects in place of hypotheses, physical units in place of prior standard deviations."""
+    names = [h.name for h in model.hypotheses]
+    by_effect = np.array(
+        [[w[[n == e for n in names]].sum() for e in model.effects] for w in posterior.weights]
+    )
+    included = 1.0 - np.prod(1.0 - by_effect, axis=0)
+    order = np.argsort(-included, kind="stable")
+    sets: list[CredibleSet] = []
+    for weights in by_effect:
+        likeliest = np.argsort(-weights, kind="stable")
+        reached = np.cumsum(weights[likeliest])
+        if reached[-1] < rules.credible:
+            continue  # it may be nothing
+        few = likeliest[: int(np.argmax(reached >= rules.credible)) + 1]
+        effects = tuple(model.effects[i] for i in few)
+        if not any(effects[0] == s.effects[0] for s in sets):
+            sets.append(CredibleSet(effects, tuple(float(weights[i]) for i in few)))
+    scored = {s.effect.id: s.effect for s in board.scores}
+    sizes: dict[str, Size] = {}
+    for h, weights in zip(model.hypotheses, posterior.weights.T, strict=True):
+        effect = scored.get(h.name)
+        if effect is None or len(h.columns) != len(effect.parameters):
+            continue
+        at = int(np.argmax(weights))
+        own = list(h.columns)
+        null = np.array([p.null_value for p in effect.parameters])
+        mean, std = (x[at, own] * scale[own] for x in (posterior.means, posterior.stds))
+        sizes[h.name] = tuple(map(float, null + mean)), tuple(map(float, std))
+    return Causes(
+        {model.effects[i]: float(included[i]) for i in order},
+        tuple(sets),
+        sizes,
+        tuple(subsets[:_KEPT]),
+        {e: tuple((p.name, p.unit) for p in scored[e].parameters) for e in sizes},
+    )

@@ -1,0 +1,125 @@
+"""The posterior of what is missing: right sums of evidence, confounded effects in one set."""
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from matplotlib import pyplot
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from sysid_vehicle import Fit, diagnose
+from sysid_vehicle.diagnose import Causes, Diagnosis
+from sysid_vehicle.diagnose.single_effects import Hypothesis, ScoreModel
+
+Hidden = Callable[[str, float], Fit]
+
+
+def model(
+    information: np.ndarray, score: np.ndarray, ratio: float = 1.0, sides: tuple[float, ...] = ()
+) -> ScoreModel:
+    """One effect for each column."""
+    n = len(score)
+    signs = sides or (0.0,) * n
+    few = tuple(Hypothesis(f"e{i}", (i,), (signs[i],), 1.0) for i in range(n))
+    return ScoreModel(few, score, information, np.full(n, ratio), 0.5)
+
+
+@pytest.mark.parametrize("side", [0.0, 1.0, -1.0])
+@pytest.mark.parametrize("ratio", [1.0, 3.0])
+def test_evidence_is_the_integral_of_likelihood_times_prior(side: float, ratio: float) -> None:
+    score, information = 4.0, 9.0
+    m = model(np.array([[information]]), np.array([score]), ratio, (side,))
+
+    def density(x: float) -> float:
+        prior = norm.pdf(x) * (1.0 if side == 0.0 else 2.0 * (side * x > 0.0))
+        return float(np.exp((score * x - 0.5 * information * x**2) / ratio) * prior)
+
+    odds = quad(density, -8.0, 8.0, points=[0.0])[0]
+    assert m.subsets()[0].log_odds == pytest.approx(np.log(odds), abs=1e-6)
+    found = m.posterior(1)
+    assert found.weights[0, 0] == pytest.approx(odds / (1.0 + odds), abs=1e-6)
+    mean = quad(lambda x: x * density(x), -8.0, 8.0, points=[0.0])[0] / odds
+    second = quad(lambda x: x**2 * density(x), -8.0, 8.0, points=[0.0])[0] / odds
+    assert found.means[0, 0] == pytest.approx(mean, abs=1e-5)
+    assert found.stds[0, 0] == pytest.approx(np.sqrt(second - mean**2), abs=1e-5)
+
+
+def test_two_that_hold_only_together_are_found() -> None:
+    """Almost the same direction with opposite sizes: each alone explains next to nothing."""
+    alike = 0.98
+    information = 4000.0 * np.array([[1.0, alike, 0.0], [alike, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    m = model(information, information @ np.array([1.0, -1.0, 0.0]))
+    leading = m.subsets()[0]
+    assert leading.effects == ("e0", "e1")
+    alone = {s.effects: s.log_odds for s in m.subsets()}
+    assert leading.log_odds > 50.0 > 4.0 > max(alone["e0",], alone["e1",])
+    found = m.posterior(3, leading)
+    assert found.weights.sum(axis=0) == pytest.approx([1.0, 1.0, 0.0], abs=0.1)
+
+
+def test_a_complete_model_has_no_cause(rng: np.random.Generator) -> None:
+    """Twenty correlated candidates; a set by chance in fewer than one of thirty draws."""
+    shared = rng.standard_normal((60, 20)) + 0.7 * rng.standard_normal((60, 1))
+    information = 1e4 * shared.T @ shared / 60.0
+    root = np.linalg.cholesky(information + 1e-6 * np.eye(20))
+    claimed = 0
+    for _ in range(60):
+        m = model(information, root @ rng.standard_normal(20))
+        found = m.posterior(4, m.subsets(2)[0])
+        claimed += found.weights.sum(axis=1).max() > 0.95
+    assert claimed <= 2
+
+
+@pytest.fixture(scope="module")
+def found(hidden_fit: Hidden) -> Diagnosis:
+    return diagnose(hidden_fit("steer_offset.offset_rad", 0.002), refits=0)
+
+
+def test_the_hidden_effect_is_the_cause(found: Diagnosis) -> None:
+    causes = found.causes
+    assert next(iter(causes.inclusion)) == "steer_offset"
+    assert causes.inclusion["steer_offset"] > 0.99
+    assert [s.effects for s in causes.sets] == [("steer_offset",)]
+    (value,), (std,) = causes.sizes["steer_offset"]
+    assert abs(value - 0.002) < 4.0 * std
+    assert causes.subsets[0].effects[:1] == ("steer_offset",)
+
+
+def test_what_no_candidate_explains_is_unknown(hidden_fit: Hidden) -> None:
+    """Mass and drag cannot imitate a biased gyro; a shift of the yaw rate can."""
+    fit = hidden_fit("gyro_bias.bias_radps", 0.006)
+    causes = diagnose(fit, candidates=["mass", "aero_drag"], refits=0).causes
+    assert causes.sets
+    assert all(s.effects[0].startswith("unknown ") for s in causes.sets)
+    assert max(causes.inclusion["mass"], causes.inclusion["aero_drag"]) < 0.5
+
+
+def test_confounded_effects_share_a_set(hidden_fit: Hidden) -> None:
+    """On one lap a head wind is a drag; together they are as probable as one can be."""
+    fit = hidden_fit("aero_drag.drag_area_m2", 0.3)
+    causes = diagnose(fit, candidates=["aero_drag", "head_wind", "yaw_inertia"], refits=0).causes
+    (only,) = causes.sets
+    assert causes.of("aero_drag") is only
+    assert sum(only.probabilities) >= 0.95
+    assert causes.of("yaw_inertia") is None
+
+
+def test_it_prints_and_draws(found: Diagnosis) -> None:
+    causes = found.causes
+    assert str(causes).startswith("1 effect: steer_offset (100 %)")
+    for text in (str(causes), causes._repr_html_()):
+        assert "offset_rad 0.00" in text
+    told = json.loads(json.dumps(causes.to_dict()))
+    assert told["sets"][0]["effects"] == ["steer_offset"]
+    assert told["sizes"]["steer_offset"]["offset_rad"]["unit"] == "rad"
+    ax = pyplot.subplots()[1]
+    assert causes.plot(ax, most=5, grades={"steer_offset": "confirmed"}) is ax
+    assert [bar.get_width() for bar in ax.patches] == [
+        p for _, p in sorted(causes.inclusion.items(), key=lambda k: -k[1])[:1]
+    ] + [bar.get_width() for bar in ax.patches[1:]]
+    assert len(ax.patches) == 5
+    assert any("confirmed" in t.get_text() for t in ax.texts)
+    assert causes.plot() is not ax
+    assert str(Causes({}, (), {})).startswith("no effect is shown to be missing")
