@@ -1,7 +1,7 @@
 """Reports: a study as one HTML file."""
 
 from .check import check_page
-from .figures import errors_by_step, evidence, failure_maps, overlay, residuals, sizes, tyre_curve
+from .figures import failure_maps, overlay, residuals, sizes, tyre_curve
 from .tyres import TyreCurve, identified_curves, model_curves
 from .words import RANKING_HEAD, ranking_rows, ranking_title, summary
 from .write import write_report
@@ -10,8 +10,6 @@ __all__ = [
     "RANKING_HEAD",
     "TyreCurve",
     "check_page",
-    "errors_by_step",
-    "evidence",
     "failure_maps",
     "identified_curves",
     "model_curves",
