@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -16,6 +17,8 @@ __all__ = [
     "MEASURED",
     "TRUTH",
     "axes_or_new",
+    "framed",
+    "inline_svg",
     "new_figure",
     "svg",
     "tidy",
@@ -36,6 +39,37 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
     figure = Figure(figsize=(width_in, height_in), layout="constrained")
     FigureCanvasAgg(figure)
+    return figure
+
+
+def framed(
+    width_in: float,
+    height_in: float,
+    *,
+    left: float = 0.7,
+    right: float = 0.15,
+    bottom: float = 0.5,
+    top: float = 0.3,
+    wspace: float = 0.3,
+    hspace: float = 0.12,
+) -> Figure:
+    """Make a figure with given margins [in] and gaps between axes (shares of their size).
+
+    It is drawn in a third of the time that one takes whose margins are worked out.
+    """
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width_in, height_in))
+    FigureCanvasSVG(figure)
+    figure.subplots_adjust(
+        left / width_in,
+        bottom / height_in,
+        1.0 - right / width_in,
+        1.0 - top / height_in,
+        wspace,
+        hspace,
+    )
     return figure
 
 
@@ -65,3 +99,44 @@ def svg(figure: Figure) -> bytes:
     with matplotlib.rc_context({"svg.hashsalt": "sysid-vehicle", "svg.fonttype": "path"}):
         figure.savefig(stream, format="svg", dpi=200, metadata={"Date": None})
     return stream.getvalue()
+
+
+# Colours of figures, and names under which a page's style sheet has them for light and dark.
+_THEMED = {
+    MEASURED: "ink",
+    "#ffffff": "paper",
+    FLOOR: "mute",
+    BEFORE: "before",
+    AFTER: "after",
+    TRUTH: "truth",
+    "#b0b0b0": "grid",
+    **dict.fromkeys(("#d9d9d9", "#e0e0e0", "#cccccc"), "unseen"),
+    **dict.fromkeys(("#333333", "#4d4d4d", "#808080", "#7f7f7f"), "mute"),
+}
+
+
+def inline_svg(figure: Figure, name: str) -> str:
+    """Render a figure as an element of a page, whose style sheet chooses the colours.
+
+    Parameters
+    ----------
+    figure : matplotlib Figure
+    name : str
+        No other figure of the page has it: names inside the element are made of it.
+    """
+    import matplotlib
+
+    stream = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
+        figure.savefig(stream, format="svg", dpi=110, metadata={"Date": None}, facecolor="none")
+    text = stream.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, count=1, flags=re.DOTALL)
+    text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", text, count=1)
+    text = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
+    text = re.sub(r'<style type="text/css">.*?</style>', "", text, count=1)
+    return re.sub(
+        r"(?<=: )#[0-9a-f]{6}(?=[;\"])",
+        lambda m: f"var(--{_THEMED[m[0]]})" if m[0] in _THEMED else m[0],
+        text,
+    )

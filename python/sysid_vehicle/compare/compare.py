@@ -111,19 +111,29 @@ class Comparison:
         return self.failure_map.plot(ax)
 
     def plot_residuals(self, ax: Axes | None = None) -> Axes:
-        """Normalised residuals of each channel over the samples, averaged over a second."""
+        """Normalised residuals of each channel over the seconds driven, averaged over half one."""
         import matplotlib.pyplot as plt
 
         if ax is None:
             ax = plt.subplots(figsize=(8.0, 3.5))[1]
+        driven, step = self._driven_s()
         for i, c in enumerate(MEASURED):
             if c in self.channels:
-                smooth = _running_rms(self.residual[:, i], self.log_number, 50)
-                ax.plot(np.arange(len(smooth)), smooth, label=c, lw=1.0)
+                width = max(round(0.5 / step), 1)
+                smooth = _running_rms(self.residual[:, i], self.log_number, width)
+                ax.plot(driven, smooth, label=c, lw=1.0)
         ax.axhline(1.0, color="0.3", lw=0.8, ls="--")
-        ax.set(xlabel="usable sample", ylabel="residual / noise floor (running rms)")
+        ax.set(xlabel="seconds driven", ylabel="residual / noise floor (running rms)")
         ax.legend(fontsize="small", ncols=3)
         return ax
+
+    def _driven_s(self) -> tuple[FloatArray, float]:
+        """Seconds driven until each sample, without what lies between stretches; the usual step."""
+        steps = np.diff(self.time_s)
+        inside = (np.diff(self.log_number) == 0) & (steps > 0.0)
+        usual = float(np.median(steps[inside])) if inside.any() else 1.0
+        steps = np.where(inside & (steps < 2.0 * usual), steps, usual)
+        return np.concatenate([[0.0], np.cumsum(steps)]), usual
 
 
 def _running_rms(e: FloatArray, log_number: FloatArray, width: int) -> FloatArray:

@@ -19,7 +19,7 @@ from ..model import Model
 from ..sensors import quantum
 from .inputs import quiet
 
-__all__ = ["MEASURED", "UNITS", "Driving"]
+__all__ = ["MEASURED", "UNITS", "Driving", "Stretch"]
 
 MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 """Measured channels, in the core's order."""
@@ -94,6 +94,12 @@ class Driving:
         return tuple(
             Stretch(i, where) for i, log in enumerate(self.logs) for where in log.stretches()
         )
+
+    def only(self, stretch: Stretch) -> Driving:
+        """One stretch, or a part of one, alone."""
+        alone = Driving(self.logs, self.force_known)
+        vars(alone)["stretches"] = (stretch,)
+        return alone
 
     def channel(self, name: str) -> FloatArray:
         """A channel over all stretches; NaN throughout where a log lacks it."""

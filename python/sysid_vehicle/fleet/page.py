@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .._style import AFTER, new_figure, tidy
+from .._style import AFTER, framed, tidy
 from ..report.page import bullets, heading, page, paragraph, picture, table
 from .results import Fleet, Row
 
@@ -31,7 +31,7 @@ def _causes(fleet: Fleet) -> list[str]:
     shown = [c for c in fleet.causes if c.cars][:_SHOWN]
     parts = [heading("Causes")]
     if shown:
-        figure = new_figure(8.0, 0.9 + 0.3 * len(shown))
+        figure = framed(8.0, 0.9 + 0.3 * len(shown), left=2.4, wspace=0.1)
         left, right = figure.subplots(1, 2, sharey=True)
         places = range(len(shown))[::-1]
         left.barh(places, [100.0 * c.share for c in shown], color=AFTER, height=0.6)

@@ -1,7 +1,7 @@
 """Reports: a study as one HTML file."""
 
 from .check import check_page
-from .figures import causes, errors_by_step, failure_maps, overlay, residuals, sizes, tyre_curve
+from .figures import causes, failure_maps, overlay, residuals, sizes, tyre_curve
 from .tyres import TyreCurve, identified_curves, model_curves
 from .words import RANKING_HEAD, ranking_rows, ranking_title, summary
 from .write import write_report
@@ -11,7 +11,6 @@ __all__ = [
     "TyreCurve",
     "causes",
     "check_page",
-    "errors_by_step",
     "failure_maps",
     "identified_curves",
     "model_curves",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .._style import new_figure
+from .._style import framed
 from ..sensors import SensorCheck
 from .page import bullets, heading, page, picture
 
@@ -18,7 +18,7 @@ def check_page(found: SensorCheck, warnings: Sequence[str] = ()) -> str:
         parts += [heading("Warnings"), bullets(warnings, "warning")]
     parts.append(heading("What each channel read, and what it should have read"))
     for readings in found.readings:
-        figure = new_figure(9.0, 2.4)
+        figure = framed(9.0, 2.4)
         found.plot(readings.channel, figure.add_subplot())
         std = found.noise[readings.channel][0].std
         caption = f"{readings.channel}; what is left has a standard deviation of {std:.3g}"

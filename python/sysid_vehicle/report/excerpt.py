@@ -8,12 +8,14 @@ import numpy as np
 
 from .._arrays import FloatArray
 from ..estimate import MEASURED
+from ..estimate.driving import Stretch
 from ..study import Study, look_ahead
 from .words import stages
 
 __all__ = ["Excerpt", "worst_excerpt"]
 
 _SHOWN = ("yaw_rate_radps", "ay_mps2")
+_FORGETS_S = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +29,8 @@ class Excerpt:
     horizon_s : float
         How far ahead was predicted, from what the filter knew by then and the inputs since.
     channels : tuple of str
+    where : slice
+        Of the samples of the validation data.
     time_s : array, shape (n,)
     measured : array, shape (n, channels)
     errors : dict of array, shape (n, channels)
@@ -36,6 +40,7 @@ class Excerpt:
     log: str
     horizon_s: float
     channels: tuple[str, ...]
+    where: slice
     time_s: FloatArray
     measured: FloatArray
     errors: dict[str, FloatArray]
@@ -49,35 +54,49 @@ def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5)
     driving = study.validation
     channels = tuple(c for c in _SHOWN if c in driving.present)
     columns = [MEASURED.index(c) for c in channels]
-    errors = {
-        title: look_ahead(study.fits[i], study.fit.noise.floor(), driving, horizon_s)[:, columns]
-        for title, i in stages(study)
-    }
     measured = driving.measured[:, columns]
+    noise = study.fit.noise.floor()
+    if not channels:
+        return None
+    # To find the place predictions that begin a tenth of their length apart will do.
+    rough = look_ahead(study.fits[0], noise, driving, horizon_s, apart=0.1)[:, columns]
     scale = np.nanstd(measured, axis=0)
-    badness = np.nansum((errors["baseline"] / np.where(scale > 0.0, scale, 1.0)) ** 2, axis=1)
-    best: tuple[float, slice, str] | None = None
+    badness = np.nansum((rough / np.where(scale > 0.0, scale, 1.0)) ** 2, axis=1)
+    best: tuple[float, int, int, Stretch, int] | None = None
     begin = 0
     for s in driving.stretches:
-        log = driving.logs[s.log]
+        rate = driving.logs[s.log].rate_hz
         n = s.where.stop - s.where.start
-        first = begin + round(horizon_s * log.rate_hz)
-        end, begin = begin + n, begin + n
-        width = min(int(seconds * log.rate_hz), end - first)
-        if width < 2:
-            continue
-        total = np.convolve(badness[first:end], np.ones(width), "valid")
-        at = first + int(np.argmax(total))
-        if best is None or total.max() / width > best[0]:
-            best = (float(total.max()) / width, slice(at, at + width), log.name)
-    if best is None or not channels:
+        first = begin + round(horizon_s * rate)
+        width = min(int(seconds * rate), begin + n - first)
+        if width >= 2:
+            total = np.convolve(badness[first : begin + n], np.ones(width), "valid")
+            at = first + int(np.argmax(total))
+            if best is None or total.max() / width > best[0]:
+                best = (float(total.max()) / width, at, width, s, begin)
+        begin += n
+    if best is None:
         return None
-    _, where, name = best
+    _, at, width, stretch, begin = best
+    log, where = driving.logs[stretch.log], slice(at, at + width)
+    # The filter forgets where it began within a few seconds.
+    start = stretch.where.start + at - begin
+    before = start - round((_FORGETS_S + horizon_s) * log.rate_hz)
+    first = max(before, stretch.where.start)
+    # Some samples more: noise is taken out of inputs by what comes before and after.
+    part = slice(first, min(start + width + round(log.rate_hz), stretch.where.stop))
+    near = driving.only(Stretch(stretch.log, part))
+    shown = slice(start - first, start - first + width)
+    errors = {
+        title: look_ahead(study.fits[i], noise, near, horizon_s)[shown, columns]
+        for title, i in stages(study)
+    }
     return Excerpt(
-        name,
+        log.name,
         horizon_s,
         channels,
+        where,
         driving.channel("time_s")[where],
         measured[where],
-        {title: e[where] for title, e in errors.items()},
+        errors,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .._style import new_figure
+from .._style import framed
 from ..model import Model
 from ..study import Study
 from .page import bullets, heading, paragraph, picture
@@ -13,13 +13,13 @@ __all__ = ["unknown", "where_and_when"]
 def where_and_when(study: Study, truth: Model | None) -> list[str]:
     """Where the baseline fails, and where, when and at which frequencies the final model does."""
     final, baseline = study.where, study.where_baseline
-    figure = new_figure(9.0, 6.4)
+    figure = framed(9.0, 6.4, hspace=0.3)
     axes = figure.subplots(2, 2)
     baseline.plot(axes[0, 0])
     final.plot_time(axes[0, 1])
     baseline.coherence[0].plot(axes[1, 0])
     final.coherence[0].plot_phase(axes[1, 1])
-    parts = [heading("Where, when and how fast the model fails")]
+    parts = []
     for title, lines in study.where_lines:
         parts += [heading(title, 3), bullets(f"{line[0].upper()}{line[1:]}." for line in lines)]
     whose = "the final model" if study.added else "the baseline"
@@ -43,13 +43,12 @@ def unknown(study: Study, truth: Model | None) -> list[str]:
     if found is None:
         return []
     drawn = found.curves[:2]
-    figure = new_figure(4.0 * (len(drawn) + 1), 3.3)
+    figure = framed(4.0 * (len(drawn) + 1), 3.3)
     axes = figure.subplots(1, len(drawn) + 1)
     for ax, curve in zip(axes, drawn, strict=False):
         curve.plot(ax)
     found.surface.plot(axes[-1])
     parts = [
-        heading("The shape of what is missing"),
         picture(
             figure,
             "The missing force beyond all that the fitted parameters can do, over the coordinates "

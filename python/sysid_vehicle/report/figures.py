@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,54 +13,24 @@ from ..model import Model
 from ..study import Study
 from .excerpt import Excerpt
 from .tyres import TyreCurve
-from .words import stages
+from .words import shown_in, stages
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
+    "ahead",
     "causes",
-    "errors_by_step",
     "failure_maps",
     "overlay",
+    "place",
     "residuals",
     "sizes",
     "tyre_curve",
 ]
 
-_WIDE_RANGE = 8.0  # largest over smallest error that still reads well on a linear axis
-
-
-def errors_by_step(study: Study, ax: Axes | None = None) -> Axes:
-    """Draw validation errors by step as bars, training errors as marks, and the noise floor."""
-    ax = axes_or_new(ax, 7.0, 3.0)
-    labels = list(study.steps)
-    validation = [c.error for c in study.test]
-    train = [c.error for c in study.train]
-    at = np.arange(len(validation))
-    colours = [BEFORE, *([AFTER] * (len(validation) - 1))]
-    ax.bar(at, validation, width=0.55, color=colours, alpha=0.85, label="validation data")
-    ax.plot(at, train, "D", color=MEASURED, markersize=6, label="training driving")
-    ax.axhline(1.0, color=FLOOR, linestyle="--", linewidth=1.2, label="noise floor")
-    for i, e in enumerate(validation):
-        ax.annotate(
-            f"{e:.2f}",
-            (i - 0.25, e),
-            (0, -12),
-            textcoords="offset points",
-            color="white",
-            fontweight="bold",
-        )
-    top = max(*validation, *train)
-    if top > _WIDE_RANGE:
-        ax.set_yscale("log")
-        ax.set_ylim(0.8, 2.0 * top)
-    else:
-        ax.set_ylim(0.0, 1.18 * top)
-    ax.set_xticks(at, labels)
-    ax.set_xlim(-0.6, max(len(at) - 0.4, 1.6))
-    ax.legend(frameon=False, loc="upper right", fontsize="small")
-    return tidy(ax, ylabel="error / noise floor")
+_OVAL = 0.15  # a track's smaller extent over its larger one, above which its map is worth a look
+_POINTS = 1200
 
 
 def failure_maps(study: Study, axes: Sequence[Axes]) -> None:
@@ -141,20 +111,88 @@ def overlay(excerpt: Excerpt, axes: Sequence[Axes]) -> None:
     """
     t = excerpt.time_s
     for i, channel in enumerate(excerpt.channels):
-        signal, error = axes[2 * i], axes[2 * i + 1]
-        measured = excerpt.measured[:, i]
+        signal, error, shown = axes[2 * i], axes[2 * i + 1], shown_in(channel)
+        measured = shown.factor * excerpt.measured[:, i]
         signal.plot(t, measured, color=MEASURED, linewidth=1.4, label="measured")
-        for (label, errors), colour in zip(excerpt.errors.items(), (BEFORE, AFTER), strict=False):
-            left = errors[:, i]
-            signal.plot(t, measured - left, color=colour, linewidth=1.0, label=label)
-            error.plot(t, left, color=colour, linewidth=0.9)
+        styles = ((BEFORE, "--"), (AFTER, "-"))
+        for (label, errors), (colour, line) in zip(excerpt.errors.items(), styles, strict=False):
+            left = shown.factor * errors[:, i]
+            look: dict[str, Any] = {"color": colour, "linestyle": line}
+            signal.plot(t, measured - left, linewidth=1.1, label=label, **look)
+            error.plot(t, left, linewidth=1.0, **look)
         error.axhline(0.0, color=FLOOR, linewidth=0.8)
-        tidy(signal, ylabel=channel)
+        signal.set_title(f"{shown.name} [{shown.unit}]", loc="left", fontsize="medium")
+        tidy(signal)
         tidy(error, ylabel="error")
-    axes[0].legend(
-        frameon=False, ncols=3, fontsize="small", loc="lower right", bbox_to_anchor=(1.0, 1.0)
+    _legend_above(axes[0])
+    axes[-1].set_xlabel("time [s]")
+
+
+def place(study: Study, excerpt: Excerpt, ax: Axes) -> str:
+    """Draw where the baseline fails: on a map of the track, or over both accelerations.
+
+    Returns what was drawn, in words. The map is that of the stretch of the excerpt, from speed and
+    yaw rate; a track that is hardly wider than its road is not worth a map.
+    """
+    driving = study.validation
+    begin = 0
+    for s in driving.stretches:
+        end = begin + s.where.stop - s.where.start
+        if begin <= excerpt.where.start < end:
+            break
+        begin = end
+    stretch = slice(begin, end)
+    rate = driving.logs[s.log].rate_hz
+    residual = study.test[0].residual[stretch]
+    box = np.ones(max(round(0.5 * rate), 1))
+    squares, count = (
+        np.convolve(x, box, "same")
+        for x in (np.nansum(residual**2, axis=1), np.isfinite(residual).sum(axis=1))
     )
-    axes[-1].set_xlabel("time_s")
+    error = np.sqrt(squares / np.maximum(count, 1.0))
+    v, r, ax_, ay = (
+        np.nan_to_num(driving.channel(c)[stretch])
+        for c in ("vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+    )
+    heading = np.cumsum(r) / rate
+    track = np.cumsum(v[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
+    extent = np.sort(np.ptp(track, axis=0))
+    on_track = bool(extent[0] > _OVAL * extent[1])
+    points = track / rate if on_track else np.column_stack([ay, ax_])
+    if on_track and np.ptp(points[:, 1]) > np.ptp(points[:, 0]):
+        points = np.column_stack([-points[:, 1], points[:, 0]])  # the longer side lies
+    every = max(len(points) // _POINTS, 1)
+    inside = slice(excerpt.where.start - begin, excerpt.where.stop - begin, max(every, 1))
+    around: dict[str, Any] = {"markersize": 9, "markerfacecolor": "none", "markeredgewidth": 0.8}
+    (ring,) = ax.plot(points[inside, 0], points[inside, 1], "o", color=MEASURED, **around)
+    ring.set_rasterized(True)
+    shown = points[::every]
+    drawn = ax.scatter(shown[:, 0], shown[:, 1], s=14, c=error[::every], cmap="cividis", zorder=3)
+    drawn.set_clim(1.0, max(float(np.percentile(error, 99.0)), 1.5))
+    drawn.set_rasterized(True)
+    ax.figure.colorbar(drawn, ax=ax, label="error / noise floor", pad=0.02, fraction=0.06)
+    if on_track:
+        ax.set_aspect("equal", adjustable="datalim")
+        tidy(ax, xlabel="[m]", ylabel="[m]")
+        return "Track from speed and yaw rate"
+    tidy(ax, xlabel="lateral acceleration [m/s\u00b2]", ylabel="longitudinal [m/s\u00b2]")
+    return "Both accelerations"
+
+
+def ahead(study: Study, channels: Sequence[str], axes: Sequence[Axes]) -> None:
+    """Draw the validation error of each stage over the horizon, a channel on each axes."""
+    found = study.horizons
+    looks = ((BEFORE, "--o"), (AFTER, "-o"))
+    for ax, channel in zip(axes, channels, strict=True):
+        j, shown = found.channels.index(channel), shown_in(channel)
+        for (title, i), (colour, line) in zip(stages(study), looks, strict=False):
+            error = shown.factor * np.where(np.isfinite(found.error), found.error, np.nan)[i, :, j]
+            ax.plot(found.horizons_s, error, line, color=colour, markersize=4, label=title)
+        noise = shown.factor * float(found.noise[j])
+        ax.axhline(noise, color=FLOOR, linestyle=":", linewidth=1.2)
+        ax.set_ylim(bottom=0.0)
+        tidy(ax, xlabel="predicted ahead [s]", ylabel=f"{shown.name} [{shown.unit}]")
+    _legend_above(axes[0])
 
 
 def residuals(study: Study, axes: Sequence[Axes]) -> None:
@@ -169,8 +207,18 @@ def residuals(study: Study, axes: Sequence[Axes]) -> None:
             legend.remove()
     for ax in axes[:-1]:
         ax.set_xlabel("")
-    axes[0].legend(
-        frameon=False, ncols=5, fontsize="small", loc="lower right", bbox_to_anchor=(1.0, 1.0)
+    _legend_above(axes[0])
+
+
+def _legend_above(ax: Axes) -> None:
+    """A legend beside the title, where it covers no curve."""
+    ax.legend(
+        frameon=False,
+        ncols=5,
+        fontsize="small",
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.1,
     )
 
 

@@ -7,33 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from .._style import new_figure
+from .._style import framed, new_figure
 from .._text import html_table, number
 from ..diagnose import EffectVerdict, bias_report
 from ..estimate import UNITS
 from ..model import Model
-from ..study import Study
+from ..study import LATERAL, Study
 from . import figures
-from .excerpt import worst_excerpt
 from .failure import unknown, where_and_when
-from .page import bullets, heading, paragraph, picture, table
+from .page import bullets, fold, heading, paragraph, picture, table
 from .tyres import AXLES, identified_curves, model_curves
 from .words import RANKING_HEAD, interval, quantity, ranking_rows, stages, summary, unit
 
 __all__ = ["SECTIONS"]
-
-
-def _verdict(study: Study, truth: Model | None) -> list[str]:
-    figure = new_figure(7.0, 3.0)
-    figures.errors_by_step(study, figure.add_subplot())
-    return [
-        paragraph(" ".join(summary(study)), "lead"),
-        picture(
-            figure,
-            "One-step-ahead error of each model, all channels together. 1 is the noise floor: what "
-            "sensors and an uneven road alone would leave.",
-        ),
-    ]
 
 
 def _where(study: Study, truth: Model | None) -> list[str]:
@@ -55,11 +41,10 @@ def _where(study: Study, truth: Model | None) -> list[str]:
                 *(f"{s.r2:.4f}" for s in scores),
             ]
         )
-    figure = new_figure(4.5 * len(shown), 3.4)
+    figure = framed(4.5 * len(shown), 3.2, wspace=0.1)
     axes = figure.subplots(1, len(shown), sharey=True, squeeze=False)
     figures.failure_maps(study, list(axes[0]))
     parts = [
-        heading("Errors on validation data"),
         table(head, rows),
         paragraph(
             "One step ahead. Normalised errors are in units of the spread that the noise model "
@@ -79,16 +64,16 @@ def _where(study: Study, truth: Model | None) -> list[str]:
 
 def _which(study: Study, truth: Model | None) -> list[str]:
     whose = "final" if study.added else "fitted"
-    parts = [heading("Which effect is missing")]
+    parts = []
     for i, dx in enumerate(study.diagnoses):
         if len(study.diagnoses) > 1:
             have = ", ".join(dx.fit.model.effects)
             parts.append(heading(f"With {have}" if i else "To the baseline", 3))
-        shown = min(len(dx.ranking), 10)
-        if shown == 0:
+        if not dx.ranking:
             parts.append(paragraph("There was no candidate to test."))
             continue
-        figure = new_figure(7.0, 0.9 + 0.28 * min(len(dx.causes.inclusion), shown))
+        shown = min(len(dx.causes.inclusion), 10)
+        figure = new_figure(7.0, 0.9 + 0.28 * shown)
         grades = {a.id: a.grade for a in study.added}
         figures.causes(dx.causes, grades, figure.add_subplot(), most=shown)
         n = len(dx.significant)
@@ -115,19 +100,28 @@ def _which(study: Study, truth: Model | None) -> list[str]:
     return parts
 
 
+_UNTOUCHED = ("absent", "negligible")
+
+
 def _verdicts(study: Study, truth: Model | None) -> list[str]:
-    rows = [[v.effect.id, v.finding, v.sentence] for v in study.verdicts.all]
-    parts = [
-        heading("A verdict for every effect"),
-        table(("effect", "verdict", "in words"), rows, "verdicts"),
+    told = {v.effect.id: [v.effect.id, v.finding, v.sentence] for v in study.verdicts.all}
+    rows = [row for row in told.values() if row[1] not in _UNTOUCHED]
+    rest = [row for row in told.values() if row[1] in _UNTOUCHED]
+    head = ("effect", "verdict", "in words")
+    parts = [table(head, rows, "text")] if rows else []
+    if rest:
+        parts.append(
+            fold(f"{len(rest)} effects are absent or negligible", [table(head, rest, "text")])
+        )
+    parts.append(
         paragraph(
             "Each is judged beside the effects that were added. 'one of a group': it or another of "
             "the group is missing, and this driving cannot tell which. 'proxy': it acts like "
             "something that is missing, but is not that itself, for the reason stated. 'absent': "
             "it can be no larger than stated. 'not testable': this driving could hide one large "
             "enough to matter."
-        ),
-    ]
+        )
+    )
     return parts + _hidden(study)
 
 
@@ -165,18 +159,19 @@ def _hidden(study: Study) -> list[str]:
 
 
 def _ahead(study: Study, truth: Model | None) -> list[str]:
-    falls = study.waterfall()
-    figure = new_figure(6.0, 3.4)
-    falls.plot(figure.add_subplot())
-    ahead = study.shares
+    channels = [c for c in study.horizons.channels if c in LATERAL] or study.horizons.channels[:1]
+    figure = framed(3.4 * len(channels) + 0.6, 2.9, wspace=0.35)
+    axes = figure.subplots(1, len(channels), squeeze=False)
+    figures.ahead(study, channels, list(axes[0]))
+    shares = study.shares
     return [
-        heading("Further ahead"),
-        paragraph(ahead.sentence),
-        html_table(ahead.HEAD, ahead.rows()),
+        paragraph(shares.sentence),
+        html_table(shares.HEAD, shares.rows()),
         picture(
             figure,
-            "validation error over how far ahead was predicted, from what was known then and the "
-            "steering and force since; in units of the noise floor of one step.",
+            "Error on validation data over how far ahead was predicted, from what was known then "
+            "and the steering and force since: median over pieces of 5 s. Dashed: noise of the "
+            "sensor.",
         ),
     ]
 
@@ -196,13 +191,10 @@ def _parameters(study: Study, truth: Model | None) -> list[str]:
         row = [e.name, quantity(e.value), interval(e), unit(e.unit).strip(), e.note or "-"]
         rows.append(row if truth is None else [*row, real.get(e.name, "-")])
     head = ["parameter", "value", "95 % interval", "unit", "note"]
-    parts = [
-        heading("Parameters of the final model"),
-        table(head if truth is None else [*head, "truth"], rows),
-    ]
+    parts = [table(head if truth is None else [*head, "truth"], rows)]
     if study.added:
         count = sum(len(a.parameters) for a in study.added)
-        figure = new_figure(7.0, 1.0 + 0.35 * count)
+        figure = framed(7.0, 1.0 + 0.35 * count, left=2.6)
         figures.sizes(study, figure.add_subplot(), truth)
         text = "Size of the added effects with 95 % intervals"
         parts.append(picture(figure, f"{text}; green: the truth." if truth else f"{text}."))
@@ -214,7 +206,7 @@ def _tyres(study: Study, truth: Model | None) -> list[str]:
     slip = curves[0].slip_rad
     start = model_curves(Model(study.model.vehicle), slip)
     real = (None, None) if truth is None else model_curves(truth, slip)
-    figure = new_figure(8.0, 3.4)
+    figure = framed(8.0, 3.4, wspace=0.08)
     axes = figure.subplots(1, len(AXLES), sharey=True)
     for i, ax in enumerate(axes):
         figures.tyre_curve(curves[i], ax, start=start[i], truth=real[i])
@@ -227,28 +219,10 @@ def _tyres(study: Study, truth: Model | None) -> list[str]:
     return [picture(figure, caption)]
 
 
-def _excerpt(study: Study, truth: Model | None) -> list[str]:
-    excerpt = worst_excerpt(study)
-    if excerpt is None:
-        return []
-    n = len(excerpt.channels)
-    figure = new_figure(9.0, 2.6 * n)
-    axes = figure.subplots(2 * n, 1, sharex=True, height_ratios=[2.0, 1.0] * n)
-    figures.overlay(excerpt, list(axes))
-    return [
-        heading("Where the baseline failed most"),
-        picture(
-            figure,
-            f"{excerpt.log}, validation data, predicted {excerpt.horizon_s:g} s ahead from what "
-            "was known by then and the steering and force since.",
-        ),
-    ]
-
-
 def _remains(study: Study, truth: Model | None) -> list[str]:
     noise = study.fit.noise
     count = len(stages(study))
-    figure = new_figure(9.0, 2.1 * count + 0.2)
+    figure = framed(9.0, 2.1 * count + 0.4, hspace=0.25)
     axes = figure.subplots(count, 1, sharex=True, sharey=True, squeeze=False)
     figures.residuals(study, list(axes[:, 0]))
     sensors = [
@@ -258,7 +232,6 @@ def _remains(study: Study, truth: Model | None) -> list[str]:
     ]
     x, y, moment = noise.disturbance
     parts = [
-        heading("What remains"),
         paragraph(study.in_the_end),
         picture(figure, "Residuals on validation data, running root mean square per channel."),
         heading("Noise model", 3),
@@ -294,7 +267,7 @@ def _method(study: Study, truth: Model | None) -> list[str]:
     starts = study.fits[0].starts
     validation = study.test[0].title.split(" on ", 1)[1]
     parts = [
-        heading("How it was computed"),
+        paragraph(" ".join(summary(study))),
         paragraph(f"Fitted to {study.fit.driving}. Validation data: {validation}."),
         paragraph(_METHOD),
         paragraph(
@@ -308,17 +281,15 @@ def _method(study: Study, truth: Model | None) -> list[str]:
     return parts
 
 
-SECTIONS: tuple[Callable[[Study, Model | None], list[str]], ...] = (
-    _verdict,
-    _where,
-    where_and_when,
-    _which,
-    unknown,
-    _verdicts,
-    _ahead,
-    _parameters,
-    _excerpt,
-    _remains,
-    _method,
+SECTIONS: tuple[tuple[str, Callable[[Study, Model | None], list[str]]], ...] = (
+    ("Errors on validation data", _where),
+    ("Further ahead", _ahead),
+    ("Which effect is missing", _which),
+    ("A verdict for every effect", _verdicts),
+    ("Where, when and how fast the model fails", where_and_when),
+    ("The shape of what is missing", unknown),
+    ("Parameters of the final model", _parameters),
+    ("What remains", _remains),
+    ("How it was computed", _method),
 )
-"""In the order of the page."""
+"""What is folded below the first screen, in order; a section without parts is left out."""

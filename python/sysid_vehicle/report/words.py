@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .._text import number
@@ -16,6 +18,7 @@ __all__ = [
     "quantity",
     "ranking_rows",
     "ranking_title",
+    "shown_in",
     "stages",
     "summary",
     "unit",
@@ -27,6 +30,29 @@ RANKING_HEAD = ("effect", "statistic", "p", "validation error with it", "size", 
 def unit(name: str) -> str:
     """Print a unit: nothing for a pure number."""
     return "" if name == "1" else f" {name}"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How people are shown a channel: its name, the unit they use, and the factor to it."""
+
+    name: str
+    unit: str
+    factor: float
+
+
+_SHOWN = {
+    "vx_mps": Shown("speed", "m/s", 1.0),
+    "vy_mps": Shown("lateral speed", "m/s", 1.0),
+    "yaw_rate_radps": Shown("yaw rate", "deg/s", 180.0 / np.pi),
+    "ax_mps2": Shown("longitudinal acceleration", "m/s\u00b2", 1.0),
+    "ay_mps2": Shown("lateral acceleration", "m/s\u00b2", 1.0),
+}
+
+
+def shown_in(channel: str) -> Shown:
+    """How people are shown a channel."""
+    return _SHOWN[channel]
 
 
 def interval(e: Estimate) -> str:

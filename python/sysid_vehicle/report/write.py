@@ -7,7 +7,8 @@ from pathlib import Path
 from .._files import write_text
 from ..model import Model
 from ..study import Study
-from .page import page
+from .page import fold, page
+from .screen import first_screen
 from .sections import SECTIONS
 
 __all__ = ["write_report"]
@@ -30,4 +31,5 @@ def write_report(study: Study, path: str | Path, *, truth: Model | None = None) 
         If the folder does not exist or is not writable.
     """
     title = f"Study of {study.model.vehicle.name}"
-    write_text(path, page(title, [text for make in SECTIONS for text in make(study, truth)]))
+    folded = [fold(name, parts) for name, make in SECTIONS if (parts := make(study, truth))]
+    write_text(path, page(title, [*first_screen(study), *folded]))

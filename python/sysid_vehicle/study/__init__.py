@@ -1,12 +1,13 @@
 """Studies: the whole loop from a log to a better model."""
 
 from .added import AddedEffect
-from .horizons import PREDICTED, Horizons, horizons
+from .horizons import LATERAL, PREDICTED, Horizons, horizons
 from .improve import improve
 from .study import Study, Verdict
 from .waterfall import Waterfall, look_ahead
 
 __all__ = [
+    "LATERAL",
     "PREDICTED",
     "AddedEffect",
     "Horizons",

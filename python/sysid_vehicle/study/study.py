@@ -221,7 +221,7 @@ class Study:
     def shares(self) -> Shares:
         """Errors ahead by channel: baseline, with the effects, ceiling, noise; some seconds."""
         named = [a.name for a in self.added]
-        return shares(self.fits[0], self.fit, self.held_out, named=named)
+        return shares(self.fits[0], self.fit, self.validation, named=named)
 
     def with_warnings(self, warnings: Sequence[str]) -> Study:
         """The same study with these warnings; what it has worked out so far it keeps."""

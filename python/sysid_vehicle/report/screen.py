@@ -1,0 +1,144 @@
+"""The first screen of a report: compare, where, which, added, error falls."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._style import framed
+from .._text import number
+from ..study import AddedEffect, Study
+from . import figures
+from .excerpt import Excerpt, worst_excerpt
+from .page import bars, bullets, panel, paragraph, picture, table
+from .words import errors, interval, quantity, shown_in, summary, unit
+
+__all__ = ["first_screen"]
+
+_AHEAD_S = 1.0
+_CANDIDATES = 5
+
+
+def first_screen(study: Study) -> list[str]:
+    """Tell the whole story in five panels."""
+    verdict, _, _ = summary(study)
+    excerpt = worst_excerpt(study)
+    panels = [
+        *([] if excerpt is None else [_compare(excerpt), _where(study, excerpt)]),
+        _which(study),
+        _added(study),
+        _falls(study),
+    ]
+    return [
+        paragraph(verdict, "lead"),
+        '<section class="screen">',
+        *panels,
+        "</section>",
+    ]
+
+
+def _compare(excerpt: Excerpt) -> str:
+    n = len(excerpt.channels)
+    figure = framed(8.0, 0.6 + 1.7 * n, left=0.6, bottom=0.45, hspace=0.42)
+    axes = figure.subplots(2 * n, 1, sharex=True, height_ratios=[2.0, 1.0] * n)
+    figures.overlay(excerpt, list(axes))
+    figure.align_ylabels(list(axes))
+    caption = (
+        f"{excerpt.log}, validation data: the seconds in which the baseline is worst, predicted "
+        f"{excerpt.horizon_s:g} s ahead from what was known by then and the inputs since."
+    )
+    return panel("1 Compare", [picture(figure, caption)], 7)
+
+
+def _where(study: Study, excerpt: Excerpt) -> str:
+    figure = framed(5.6, 3.2, left=0.65, right=0.5, bottom=0.45)
+    kind = figures.place(study, excerpt, figure.add_subplot())
+    worst = study.test[0].regions[:1]
+    said = f" The largest share: {worst[0]}." if worst else ""
+    caption = (
+        f"{kind}, coloured by the error of the baseline over half a second; circles: the seconds "
+        f"shown beside it.{said}"
+    )
+    return panel("2 Where", [picture(figure, caption)], 5)
+
+
+def _which(study: Study) -> str:
+    """Of what the baseline leaves on validation data, what each effect takes away alone."""
+    before = study.test[0].error
+    beyond = before - 1.0
+    tried = {e: both[1] for e, both in study.errors_with[0].items()}
+    if not tried or beyond <= 0.0:
+        none = "No effect of the catalogue has evidence that called for a refit."
+        return panel("3 Which", [paragraph(none)], 4)
+    gone = {e: (before - after) / beyond for e, after in tried.items() if np.isfinite(after)}
+    order = sorted(gone, key=lambda e: -gone[e])[:_CANDIDATES]
+    own = {a.id for a in study.added}
+    rows = []
+    for e in order:
+        text = f"{100.0 * max(gone[e], 0.0):.0f} %"
+        if e in own:
+            rows.append((e, gone[e], text, ""))
+        else:
+            rows.append((e, gone[e], f"{text}, {study.verdicts[e].finding}", "mute"))
+    text = (
+        "Share of the baseline's one-step error beyond the noise floor on validation data that "
+        "each effect takes away if it alone is added. "
+        f"{len(study.diagnoses[0].ranking)} were scored, {len(tried)} refitted. Grey: not named, "
+        "whatever it takes away; the verdict is that beside the effects that were added."
+    )
+    return panel("3 Which", [bars(rows), paragraph(text)], 4)
+
+
+def _added(study: Study) -> str:
+    if not study.added:
+        return panel("4 Added", [paragraph(summary(study)[1])], 4)
+    told = [_effect(study, i, a) for i, a in enumerate(study.added)]
+    return panel("4 Added", [bullets(told)], 4)
+
+
+def _effect(study: Study, i: int, added: AddedEffect) -> str:
+    sizes = ", ".join(
+        f"{e.name.split('.')[1]} {quantity(e.value)}{unit(e.unit)} (95 %: {interval(e)})"
+        for e in added.parameters
+    )
+    at = study.horizons.horizons_s.index(_AHEAD_S)
+    gains = []
+    for channel, by_horizon in study.horizons.gains(i + 1).items():
+        gain, shown = by_horizon[at], shown_in(channel)
+        if gain is not None and channel in _SHOWN:
+            gains.append(f"{number(shown.factor * gain, 2)} {shown.unit} of {shown.name}")
+    takes = f"; takes off the error {_AHEAD_S:g} s ahead {', '.join(gains)}" if gains else ""
+    reserve = f"; {added.reserve}" if added.reserve else ""
+    return f"{added.id} ({added.grade}): {sizes}{takes}{reserve}"
+
+
+_SHOWN = ("vy_mps", "yaw_rate_radps", "ay_mps2")
+
+
+def _falls(study: Study) -> str:
+    """One step ahead in noise floors, and a second ahead in physical units."""
+    one_step = [c.error for c in study.test]
+    top = max(*one_step, 1.0) if np.isfinite(one_step).all() else 1.0
+    rows = [
+        (step, e / top, f"{e:.2f}", "before" if i == 0 else "")
+        for i, (step, e) in enumerate(zip(study.steps, one_step, strict=True))
+    ]
+    ahead = study.horizons
+    at = ahead.horizons_s.index(_AHEAD_S)
+    lines = []
+    for j, channel in enumerate(ahead.channels):
+        shown = shown_in(channel)
+        found = [shown.factor * float(ahead.error[i, at, j]) for i in (0, -1)]
+        noise = shown.factor * float(ahead.noise[j])
+        if channel in _SHOWN and np.isfinite(found).any():
+            figures_ = [number(x, 2) for x in (*found, noise)]
+            lines.append([f"{shown.name} [{shown.unit}]", *figures_])
+    parts = [
+        bars([*rows, ("noise floor", 1.0 / top, "1.00", "mute")]),
+        paragraph(f"On validation data the one-step error {errors(study)}."),
+    ]
+    if lines:
+        head = (f"error {_AHEAD_S:g} s ahead", "baseline", "final", "sensor noise")
+        parts.append(table(head, lines))
+    if study.explained is not None:
+        parts.append(paragraph(f"Of the error 1 to 5 s ahead, {study.explained} is gone."))
+    return panel("5 Error falls", parts, 4)
