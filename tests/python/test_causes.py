@@ -9,7 +9,7 @@ from matplotlib import pyplot
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from sysid_vehicle import Fit, diagnose
+from sysid_vehicle import Fit, Log, Model, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import Causes, Diagnosis
 from sysid_vehicle.diagnose.single_effects import Hypothesis, ScoreModel
 
@@ -104,6 +104,20 @@ def test_confounded_effects_share_a_set(hidden_fit: Hidden) -> None:
     assert causes.of("aero_drag") is only
     assert sum(only.probabilities) >= 0.95
     assert causes.of("yaw_inertia") is None
+
+
+def test_steering_that_is_logged_late_is_no_effect_of_the_car(start: Model, truth: Model) -> None:
+    """A delay of the steering has one sign in the catalogue; a clock may have the other."""
+    log = drive(truth, manoeuvres.step_steer((20.0,), (3.0, 5.0)), seed=5)
+    t = log["time_s"]
+    # The log tells 30 ms too late what the wheels do: the car answers before.
+    late = np.interp(t - 0.03, t, log["steer_rad"])
+    shifted = Log.from_arrays({**{c: log[c] for c in log.channels}, "steer_rad": late})
+    causes = diagnose(identify(start, shifted, starts=1), refits=0).causes
+    assert next(iter(causes.inclusion)) == "clock of steer_rad"
+    (value,), (std,) = causes.sizes["clock of steer_rad"]
+    assert abs(value + 0.03) < 0.006
+    assert std < 0.003
 
 
 def test_it_prints_and_draws(found: Diagnosis) -> None:

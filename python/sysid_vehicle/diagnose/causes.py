@@ -13,6 +13,7 @@ from .._arrays import FloatArray
 from .._text import brief, html_paragraph, html_table, text_table, with_error
 from ..effects import Effect
 from ..rules import USUAL, Rules
+from .delay import delayed, pieces_of
 from .evidence import Evidence
 from .omnibus import unknown_directions
 from .possible import Size
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 __all__ = ["Causes", "CredibleSet", "causes_of"]
 
 _UNKNOWN = "unknown "
+# Clocks of inputs that may be wrong though no effect of the catalogue is: the column of the input,
+# the typical delay [s], negative where the car acts before the log says so, whether either may be.
+_CLOCKS = {"clock of steer_rad": (0, -0.04, False), "clock of fx_n": (1, 0.1, True)}
 _KEPT = 40  # of the leading subsets
 
 
@@ -37,7 +41,9 @@ class CredibleSet:
     ----------
     effects : tuple of str
         The likeliest first; several are confounded by this driving. A name that begins with
-        `unknown` is a force, moment or reading that no effect of the catalogue explains.
+        `unknown` is a force, moment or reading that no effect of the catalogue explains;
+        `clock of` an input is a shift in time that no effect of the catalogue explains (negative:
+        the car acts before the log says so), to be mended in the log.
     probabilities : tuple of float
         Of each being the one that acts.
     """
@@ -186,16 +192,25 @@ def causes_of(
         return Causes({}, (), {})
     scale, hypotheses, ratio = _candidates(board)
     directions, named, more = _unknown(evidence)
+    clocks = _clocks(evidence, rules)
+    directions = np.hstack([directions, *(R for _, R, _ in clocks)])
     across = np.hstack(list(board.directions.values())).T @ directions
     n, m = across.shape
     information = np.block([[board.information, across], [across.T, directions.T @ directions]])
-    scale = np.concatenate([scale, np.full(m, np.sqrt(evidence.driving.samples))])
+    typical = [abs(_CLOCKS[name][1]) for name, *_ in clocks]
+    vague = np.full(m - len(clocks), np.sqrt(evidence.driving.samples))
+    scale = np.concatenate([scale, vague, typical])
+    more = np.concatenate([more, [r for *_, r in clocks]])
     score = np.concatenate([board.gradient, directions.T @ evidence.left])
     start = n
     for name, width in named:
         columns = tuple(range(start, start + width))
         hypotheses.append(Hypothesis(_UNKNOWN + name, columns, (0.0,) * width, 1.0))
         start += width
+    for i, (name, *_) in enumerate(clocks):
+        _, usual, either = _CLOCKS[name]
+        side = 0.0 if either else float(np.sign(usual))
+        hypotheses.append(Hypothesis(name, (start + i,), (side,), 1.0))
     model = ScoreModel(
         tuple(hypotheses),
         score * scale,
@@ -263,6 +278,28 @@ def _unknown(evidence: Evidence) -> tuple[FloatArray, list[tuple[str, int]], Flo
     return np.hstack(bases), named, np.concatenate(ratios)
 
 
+def _clocks(evidence: Evidence, rules: Rules) -> list[tuple[str, FloatArray, float]]:
+    """Directions of inputs that come later or earlier [s], by name, and their variance ratios."""
+    driving, e = evidence.driving, evidence.left
+    inputs = driving.inputs() if evidence.inputs is None else evidence.inputs
+    found = []
+    for name, (which, usual, _) in _CLOCKS.items():
+        if which == 1 and not driving.force_known:
+            continue
+        moved = inputs.copy()
+        for begin, end, rate in pieces_of(driving):
+            moved[begin:end, which] = delayed(inputs[begin:end, which], rate, usual)
+        problem = driving.problem(evidence.fit.model, other_inputs=moved)
+        after = problem.residuals(evidence.fit.model.vector(), evidence.frozen).ravel()
+        G = ((evidence.residual - after) / usual)[:, None]
+        R = evidence.project(G)
+        if np.linalg.norm(R) > rules.retained * np.linalg.norm(G):
+            along = R[:, 0]
+            size = float(along @ e) / float(along @ along)
+            found.append((name, R, variance_ratio(along, e - size * along)))
+    return found
+
+
 def _told(
     model: ScoreModel,
     posterior: Posterior,
@@ -291,12 +328,14 @@ def _told(
     scored = {s.effect.id: s.effect for s in board.scores}
     sizes: dict[str, Size] = {}
     for h, weights in zip(model.hypotheses, posterior.weights.T, strict=True):
-        effect = scored.get(h.name)
-        if effect is None or len(h.columns) != len(effect.parameters):
+        if h.name in _CLOCKS:
+            null = np.zeros(1)
+        elif h.name in scored and len(h.columns) == len(scored[h.name].parameters):
+            null = np.array([p.null_value for p in scored[h.name].parameters])
+        else:
             continue
         at = int(np.argmax(weights))
         own = list(h.columns)
-        null = np.array([p.null_value for p in effect.parameters])
         mean, std = (x[at, own] * scale[own] for x in (posterior.means, posterior.stds))
         sizes[h.name] = tuple(map(float, null + mean)), tuple(map(float, std))
     return Causes(
@@ -304,5 +343,10 @@ def _told(
         tuple(sets),
         sizes,
         tuple(subsets[:_KEPT]),
-        {e: tuple((p.name, p.unit) for p in scored[e].parameters) for e in sizes},
+        {
+            e: (("delay_s", "s"),)
+            if e in _CLOCKS
+            else tuple((p.name, p.unit) for p in scored[e].parameters)
+            for e in sizes
+        },
     )

@@ -31,7 +31,7 @@ from ..identify import refine
 from .evidence import Evidence, solve
 from .omnibus import omnibus_of
 
-__all__ = ["HIGHEST_HZ", "Delay", "Piece", "delay", "pieces_of"]
+__all__ = ["HIGHEST_HZ", "Delay", "Piece", "delay", "delayed", "pieces_of"]
 
 _BANDS = 6
 _LOWEST_HZ, HIGHEST_HZ = 0.15, 5.0
@@ -136,7 +136,7 @@ def delay(
             break  # the second order of so small a step is next to nothing
         late = inputs.copy()
         for begin, end, rate in pieces:
-            late[begin:end, which] = _delayed(inputs[begin:end, which], rate, total)
+            late[begin:end, which] = delayed(inputs[begin:end, which], rate, total)
         fit = refine(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
         evidence = Evidence(fit, evidence.driving, late)
     else:
@@ -242,7 +242,7 @@ def _spectrum(u: FloatArray, rate: float) -> tuple[FloatArray, npt.NDArray[np.co
     return as_float64(f), np.fft.rfft(np.concatenate([u, u[::-1]]))
 
 
-def _delayed(u: FloatArray, rate: float, by_s: float) -> FloatArray:
+def delayed(u: FloatArray, rate: float, by_s: float) -> FloatArray:
     """A signal that comes later, all its frequencies as large as before.
 
     Interpolating between samples would smooth their noise, and a model whose input is less noisy

@@ -6,11 +6,12 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from .._text import with_error
 from ..diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import Rules
-from .steps import alternatives, exchanged, first_that_holds, likeliest
+from .steps import alternatives, exchanged, first_that_holds, first_together, likeliest
 
 __all__ = ["Search", "Trail"]
 
@@ -49,6 +50,15 @@ class Trail:
     def fit(self) -> Fit:
         """Where it leads."""
         return self.fits[-1]
+
+    def note_several(self, dx: Diagnosis, chosen: Sequence[str]) -> None:
+        """Remember what was chosen together, and what is confounded with each of it."""
+        for name in chosen:
+            self.p_values[name] = dx.family[name]
+            shared = dx.causes.of(name)
+            others = () if shared is None else shared.effects
+            known = set(dx.family) - set(chosen)
+            self.rivals[name] = tuple(e for e in others if e in known)
 
     def note(self, dx: Diagnosis, chosen: Candidate) -> None:
         """Remember what was chosen, and what nearly was."""
@@ -94,12 +104,18 @@ class Search:
                 trail.stopped = tuple(c.id for c in dx.significant)
                 return trail
             step = first_that_holds(dx, trail.fit, self.test) if self.most_effects else None
-            if step is None:
+            single = None if step is None else step[1]
+            several = first_together(dx, self.test, single, self.most_effects)
+            if step is None and several is None:
                 step = self._beside_another(dx, trail)
-            if step is None:
+            if several is not None:
+                chosen, lean = several
+                trail.note_several(dx, chosen)
+            elif step is not None:
+                chosen, lean = (step[0].id,), step[1]
+                trail.note(dx, step[0])
+            else:
                 return trail
-            chosen, lean = step
-            trail.note(dx, chosen)
             found = exchanged(
                 lean, trail.nearly, self.test, most_effects=self.most_effects, rules=self.rules
             )
@@ -111,8 +127,8 @@ class Search:
                 return trail
             before = set(trail.fit.model.effects)
             trail.fits.append(found)
-            more = _more(found, before - effects, effects - before - {chosen.id})
-            self.say(f"Added {chosen.id}: {chosen.size}.{more}")
+            more = _more(found, before - effects, effects - before - set(chosen))
+            self.say(f"Added {' and '.join(chosen)}: {_sizes(found, chosen)}.{more}")
 
     def _beside_another(self, dx: Diagnosis, trail: Trail) -> tuple[Candidate, Fit] | None:
         """The likeliest candidate, where it holds only together with one that is missing too.
@@ -142,6 +158,16 @@ class Search:
             seed=self.seed,
             progress=self.progress,
         )
+
+
+def _sizes(fit: Fit, effects: Sequence[str]) -> str:
+    """Parameters of effects with standard errors, in words; those that a step dropped are not."""
+    found = [e for e in fit.estimates if e.name.split(".")[0] in effects]
+    several = len(effects) > 1
+    return ", ".join(
+        f"{e.name if several else e.name.split('.')[1]} {with_error(e.value, e.std)} {e.unit}"
+        for e in found
+    )
 
 
 def _more(fit: Fit, gone: set[str], beside: set[str]) -> str:

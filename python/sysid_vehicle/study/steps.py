@@ -20,6 +20,7 @@ __all__ = [
     "better",
     "exchanged",
     "first_that_holds",
+    "first_together",
     "lead",
     "likeliest",
     "way",
@@ -50,7 +51,7 @@ def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate,
         lean = without_insignificant(c.fit, rules)
         if c.id not in lean.model.effects:
             continue
-        found = _measures(fit, c, test, rules)
+        found = _measures(fit, c.fit, _can_be(c, rules), test)
         if accept(found, rules) and accept(
             replace(found, changes=changes_ahead(fit, c.fit, test)), rules
         ):
@@ -67,20 +68,82 @@ def likeliest(dx: Diagnosis) -> Candidate | None:
     return next((c for c in dx.significant if _sound(c, dx.rules) and _can_be(c, dx.rules)), None)
 
 
+def first_together(
+    dx: Diagnosis, test: Driving, single: Fit | None, most_effects: int
+) -> tuple[tuple[str, ...], Fit] | None:
+    """Effects that are added together: the posterior names them, refit and validation confirm them.
+
+    Of the leading subsets those with two effects or more are refitted with their exact dynamics,
+    the scores being linearised at a fit that lacks all of them. One is added in place of the best
+    single effect where it is `better` than that; where no single effect holds, where validation
+    data confirm it.
+
+    Parameters
+    ----------
+    dx : Diagnosis
+    test : Driving
+        Validation data.
+    single : Fit or None
+        With the single effect that holds.
+    most_effects : int
+        That the model may have.
+    """
+    rules, fit = dx.rules, dx.fit
+    for names in _leading_subsets(dx, most_effects - len(fit.model.effects)):
+        found = _with_subset(dx, names)
+        if found is None or not set(names) <= set(found.model.effects):
+            continue
+        if not all(_real(found, name, rules) for name in names):
+            continue
+        if single is not None:
+            if better(found, single, test, rules):
+                return names, found
+        elif _merit(found) > _merit(fit) + rules.apart and accept(
+            replace(_measures(fit, found, True, test), changes=changes_ahead(fit, found, test)),
+            rules,
+        ):
+            return names, found
+    return None
+
+
+def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:
+    """Subsets of two effects or more with more evidence than any single one, the best first."""
+    known = {c.id for c in dx.ranking}
+    named = [s for s in dx.causes.subsets if set(s.effects) <= known and len(s.effects) <= room]
+    alone = max((s.log_odds for s in named if len(s.effects) == 1), default=0.0)
+    least = max(alone, 0.0) + dx.rules.apart
+    several = [s for s in named if len(s.effects) > 1 and s.log_odds > least]
+    return [s.effects for s in several[:_ALTERNATIVES]]
+
+
+def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
+    """The model with several effects, refitted; None where the search fails."""
+    effects = {c.id: c.effect for c in dx.ranking}
+    values: dict[str, float] = {}
+    for name in names:
+        sizes = dx.causes.sizes.get(name, ((), ()))[0]
+        for p, v in zip(effects[name].parameters, sizes, strict=False):
+            values[f"{name}.{p.name}"] = float(np.clip(v, p.lower, p.upper))
+    model = dx.fit.model.add(*(effects[n] for n in names)).with_values(values)
+    try:
+        return without_insignificant(refine(model, dx.fit.driving, dx.fit.noise), dx.rules)
+    except (NumericalError, np.linalg.LinAlgError):
+        return None
+
+
 def _sound(c: Candidate, rules: Rules) -> bool:
     """Whether it was refitted, and gained more than its price could be by chance."""
     return c.fit is not None and c.statistic >= rules.price * np.log(c.fit.driving.samples)
 
 
-def _measures(fit: Fit, c: Candidate, test: Driving, rules: Rules) -> Measures:
-    """What a candidate changes on validation data."""
-    assert c.fit is not None
+def _measures(fit: Fit, found: Fit, plausible: bool, test: Driving) -> Measures:
+    """What a richer model changes on validation data."""
     return Measures(
-        gain_in_log_likelihood(fit, c.fit, test, same_noise=True),
-        gain_in_log_likelihood(fit, c.fit, test),
-        fall_in_error(fit, c.fit, test),
-        _can_be(c, rules),
-        as_sure(fit, c.fit, test),
+        gain_in_log_likelihood(fit, found, test, same_noise=True),
+        gain_in_log_likelihood(fit, found, test),
+        fall_in_error(fit, found, test),
+        plausible,
+        as_sure(fit, found, test),
     )
 
 
