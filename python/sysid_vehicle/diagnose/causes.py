@@ -13,7 +13,7 @@ from .._arrays import FloatArray
 from .._text import brief, html_paragraph, html_table, text_table, with_error
 from ..effects import Effect
 from ..rules import USUAL, Rules
-from .delay import delayed, pieces_of
+from .clocks import CLOCKS, clock_scores
 from .evidence import Evidence
 from .omnibus import unknown_directions
 from .possible import Size
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 __all__ = ["Causes", "CredibleSet", "causes_of"]
 
 _UNKNOWN = "unknown "
-# Clocks of inputs that may be wrong though no effect of the catalogue is: the column of the input,
-# the typical delay [s], negative where the car acts before the log says so, whether either may be.
-_CLOCKS = {"clock of steer_rad": (0, -0.04, False), "clock of fx_n": (1, 0.1, True)}
 _KEPT = 40  # of the leading subsets
 
 
@@ -192,25 +189,25 @@ def causes_of(
         return Causes({}, (), {})
     scale, hypotheses, ratio = _candidates(board)
     directions, named, more = _unknown(evidence)
-    clocks = _clocks(evidence, rules)
-    directions = np.hstack([directions, *(R for _, R, _ in clocks)])
+    clocks = clock_scores(evidence, rules)
+    directions = np.hstack([directions, *(c.direction for c in clocks)])
     across = np.hstack(list(board.directions.values())).T @ directions
     n, m = across.shape
     information = np.block([[board.information, across], [across.T, directions.T @ directions]])
-    typical = [abs(_CLOCKS[name][1]) for name, *_ in clocks]
+    typical = [abs(c.clock.typical_s) for c in clocks]
     vague = np.full(m - len(clocks), np.sqrt(evidence.driving.samples))
     scale = np.concatenate([scale, vague, typical])
-    more = np.concatenate([more, [r for *_, r in clocks]])
+    more = np.concatenate([more, [c.ratio for c in clocks]])
     score = np.concatenate([board.gradient, directions.T @ evidence.left])
     start = n
     for name, width in named:
         columns = tuple(range(start, start + width))
         hypotheses.append(Hypothesis(_UNKNOWN + name, columns, (0.0,) * width, 1.0))
         start += width
-    for i, (name, *_) in enumerate(clocks):
-        _, usual, either = _CLOCKS[name]
-        side = 0.0 if either else float(np.sign(usual))
-        hypotheses.append(Hypothesis(name, (start + i,), (side,), 1.0))
+    for c in clocks:
+        side = 0.0 if c.clock.either else float(np.sign(c.clock.typical_s))
+        hypotheses.append(Hypothesis(c.clock.name, (start,), (side,), 1.0))
+        start += 1
     model = ScoreModel(
         tuple(hypotheses),
         score * scale,
@@ -278,28 +275,6 @@ def _unknown(evidence: Evidence) -> tuple[FloatArray, list[tuple[str, int]], Flo
     return np.hstack(bases), named, np.concatenate(ratios)
 
 
-def _clocks(evidence: Evidence, rules: Rules) -> list[tuple[str, FloatArray, float]]:
-    """Directions of inputs that come later or earlier [s], by name, and their variance ratios."""
-    driving, e = evidence.driving, evidence.left
-    inputs = driving.inputs() if evidence.inputs is None else evidence.inputs
-    found = []
-    for name, (which, usual, _) in _CLOCKS.items():
-        if which == 1 and not driving.force_known:
-            continue
-        moved = inputs.copy()
-        for begin, end, rate in pieces_of(driving):
-            moved[begin:end, which] = delayed(inputs[begin:end, which], rate, usual)
-        problem = driving.problem(evidence.fit.model, other_inputs=moved)
-        after = problem.residuals(evidence.fit.model.vector(), evidence.frozen).ravel()
-        G = ((evidence.residual - after) / usual)[:, None]
-        R = evidence.project(G)
-        if np.linalg.norm(R) > rules.retained * np.linalg.norm(G):
-            along = R[:, 0]
-            size = float(along @ e) / float(along @ along)
-            found.append((name, R, variance_ratio(along, e - size * along)))
-    return found
-
-
 def _told(
     model: ScoreModel,
     posterior: Posterior,
@@ -326,9 +301,10 @@ def _told(
         if not any(effects[0] == s.effects[0] for s in sets):
             sets.append(CredibleSet(effects, tuple(float(weights[i]) for i in few)))
     scored = {s.effect.id: s.effect for s in board.scores}
+    clocks = {c.name for c in CLOCKS}
     sizes: dict[str, Size] = {}
     for h, weights in zip(model.hypotheses, posterior.weights.T, strict=True):
-        if h.name in _CLOCKS:
+        if h.name in clocks:
             null = np.zeros(1)
         elif h.name in scored and len(h.columns) == len(scored[h.name].parameters):
             null = np.array([p.null_value for p in scored[h.name].parameters])
@@ -345,7 +321,7 @@ def _told(
         tuple(subsets[:_KEPT]),
         {
             e: (("delay_s", "s"),)
-            if e in _CLOCKS
+            if e in clocks
             else tuple((p.name, p.unit) for p in scored[e].parameters)
             for e in sizes
         },
