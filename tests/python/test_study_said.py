@@ -43,7 +43,7 @@ def test_driving_without_corners_tests_nothing_lateral(start: Model, truth: Mode
             "explained, and something is left",
         ),
         (
-            "it takes up only 36 % of the error.\nOf the error 1 to 5 s ahead, 96 % (93 to 99) is gone.",
+            "takes up only 36 % of it; of the error 1 to 5 s ahead, 96 % (93 to 99) is gone",
             "takes up only 36 %",
         ),
     ],
