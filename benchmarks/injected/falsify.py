@@ -59,11 +59,11 @@ def _late(channel: str, seconds: float) -> Callable[[Channels], None]:
 
 
 def _yaw(c: Channels) -> tuple[np.ndarray, np.ndarray]:
-    """Yaw rate, and its derivative over a fifth of a second: noise must not become acceleration."""
+    """Yaw rate, and its derivative over a tenth of a second: noise must not become acceleration."""
     known = np.isfinite(c["yaw_rate_radps"])
     r = np.interp(c["time_s"], c["time_s"][known], c["yaw_rate_radps"][known])
     step = float(np.median(np.diff(c["time_s"])))
-    width = max(round(0.1 / step), 1)
+    width = max(round(0.05 / step), 1)
     kernel = np.hanning(2 * width + 1)
     smooth = np.convolve(np.pad(r, width, mode="edge"), kernel / kernel.sum(), mode="valid")
     return r, np.gradient(smooth, c["time_s"])
@@ -133,7 +133,7 @@ DYNAMIC = (
     Falsified("steering ratio 10 %", "steer_ratio.ratio_error", 1.0 / 1.1 - 1.0,
               _scale("steer_rad", 1.1)),
     Falsified("steering 60 ms early", "steer_delay.delay_s", 0.06, _late("steer_rad", -0.06)),
-    Falsified("yaw inertia 25 % low", "yaw_inertia.inertia_error", 1.0 / 0.75 - 1.0,
+    Falsified("yaw inertia 25 % low", "yaw_inertia.relative_error", 1.0 / 0.75 - 1.0,
               car=_low_inertia),
     Falsified("CG 0.12 m back", "cg_position.shift_rearward_m", -0.12, car=_cg_back),
 )  # fmt: skip

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import sysid_vehicle as sv
+from sysid_vehicle.diagnose.coordinates import begins
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.forces._motion import Places, smoothed
 
@@ -106,7 +107,7 @@ def ahead(model: sv.Model, logs: list[sv.Log], seconds: float = 2.0) -> Ahead:
 def _starts(driving: Driving, length: int, every: int) -> np.ndarray:
     """Samples at which whole windows begin."""
     out = []
-    for s in driving.stretches:
-        first, last = s.where.start, s.where.stop
+    firsts = begins(driving)
+    for first, last in zip(firsts, [*firsts[1:], driving.samples], strict=True):
         out.append(np.arange(first, max(last - length, first), every))
     return np.concatenate(out)

@@ -260,7 +260,7 @@ def test_a_stand_in_is_not_said_to_be_missing(study: sv.Study) -> None:
     """Nothing is left, and still something is missing: the text says how both can be."""
     stand_in = replace(study.added[0], stands_in="no car has such a value")
     unknown = replace(study, verdict="unknown", added=(stand_in,))
-    assert "nothing left" in unknown.in_the_end
+    assert "no sign of anything left" in unknown.in_the_end
     assert "taken up by stand-ins: tyre_load_sensitivity" in unknown.in_the_end
     assert "it only stands in for something else: no car has such a value" in str(unknown)
     assert "most likely missing" not in ranking_title(unknown)

@@ -145,7 +145,7 @@ def test_without_evidence_what_is_wrong_is_told_all_the_same(
 ) -> None:
     dx = diagnose(fit, candidates=["steer_offset"])
     assert not dx.significant
-    assert str(dx).startswith("no effect of the catalogue is missing; nothing left")
+    assert str(dx).startswith("no effect of the catalogue is missing; no sign of anything left")
     incomplete = replace(dx, omnibus=Omnibus(450.0, 50, 1e-60, "F_y"))
     assert str(incomplete).startswith(
         "no effect of the catalogue explains what is missing: something is left"
@@ -183,7 +183,7 @@ def test_a_missing_effect_is_named_and_others_stay_open(
     assert dx.named is not None
     assert dx.named.id == dx.best.id == "steer_offset"
     assert str(dx).startswith("most likely missing: ")
-    assert "with it nothing left" in str(dx)
+    assert "with it no sign of anything left" in str(dx)
     two = truth.add("mass", "gyro_scale").with_values(
         {"mass.relative_error": 0.1, "gyro_scale.scale_error": 0.05}
     )

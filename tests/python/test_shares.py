@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, Log
+from sysid_vehicle.diagnose.coordinates import begins
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import share_between
-from sysid_vehicle.study.shares import CHANNELS, Shares, _path, shares
+from sysid_vehicle.study.shares import CHANNELS, Shares, _errors, _path, shares
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +56,32 @@ def test_of_a_complete_model_nothing_is_left_to_explain(fit: Fit, course: Log) -
     assert not found.whole.known
     assert found.to_dict()["whole"]["value"] is None
     assert "disturbance" in found.sentence
+
+
+def test_what_no_effect_explains_is_told(found: Shares) -> None:
+    alone = replace(found, named=())
+    assert "no effect was added" in alone.sentence
+    assert "yaw rate" in alone.sentence
+    unsure = replace(found, whole=share_between(np.ones((9, 3))))
+    assert "no share is certain" in unsure.sentence
+
+
+def test_pieces_of_several_logs_count_alike(fit: Fit, course: Log) -> None:
+    """Predictions begin and end within a stretch, wherever in its log that lies."""
+    late = replace(
+        fit,
+        model=fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.16}),
+    )
+    apart = Driving.of([course.between(1.0, 12.0), course.between(13.0, 29.0)])
+    assert len(begins(apart)) == 2
+    ends, errors = _errors(late, fit.noise.floor(), apart, 0.5)
+    problem, p = apart.problem(late.model), late.model.vector()
+    rows = problem.look_ahead(p, fit.noise.floor().vector(), round(0.5 * course.rate_hz), 1)
+    np.testing.assert_allclose(errors[:, 1], rows[ends, 2])
+    assert np.isfinite(errors).all()
+    lengths = np.diff([*begins(apart), apart.samples])
+    second = np.count_nonzero(ends >= lengths[0])
+    assert second / len(ends) == pytest.approx(lengths[1] / apart.samples, abs=0.05)
 
 
 def test_a_model_that_loses_the_car_is_told_so(fit: Fit, course: Log) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from contradictions import contradictions
 
 from sysid_vehicle import (
     Fit,
@@ -97,6 +98,7 @@ def test_it_tells_what_it_does(study: Study, told: list[str]) -> None:
 
 
 def test_a_study_prints(study: Study) -> None:
+    assert contradictions(str(study)) == []
     for text in (str(study), study._repr_html_()):
         assert "explained" in text
         assert study.meaning in text
@@ -234,7 +236,8 @@ def test_a_complete_model_is_adequate(start: Model, truth: Model, drives: Drives
     assert found.to_dict()["effects"] == []
     assert len(found.fits) == 1
     assert found.test[0].error == pytest.approx(1.0, abs=0.04)
-    assert "nothing left" in str(found)
+    assert "no sign of anything left" in str(found)
+    assert contradictions(str(found)) == []
 
 
 def test_what_no_candidate_explains_is_not_explained(
@@ -245,6 +248,7 @@ def test_what_no_candidate_explains_is_not_explained(
     assert found.verdict in ("unknown", "partly_explained")
     assert not set(found.model.effects) & LOOKS_LIKE_LAG
     assert found.omnibus.p_value < 0.01 or found.train[-1].error > 1.1
+    assert contradictions(str(found)) == []
 
 
 @pytest.mark.slow
@@ -260,6 +264,7 @@ def test_one_effect_that_leaves_something_is_none(
     assert found.verdict == "unknown"
     assert found.verdicts["mass"].finding == "proxy"
     assert "of the error 1 to 5 s ahead" in found.verdicts["mass"].sentence
+    assert contradictions(str(found)) == []
     both = improve(start, *drives(car, 51), starts=1, candidates=["mass", "accelerometer_scale"])
     assert [a.id for a in both.added] == ["accelerometer_scale"]
     assert both.verdict == "explained"
@@ -279,6 +284,7 @@ def test_what_leaves_the_evidence_as_it_was_is_a_stand_in(
     assert found.omnibus.rejects
     assert found.verdict == "unknown"
     assert all(found.verdicts[a.id].finding == "proxy" for a in found.added)
+    assert contradictions(str(found)) == []
 
 
 def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: Drives) -> None:

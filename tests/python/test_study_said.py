@@ -1,6 +1,7 @@
 """What a study says of driving that tells little, and of effects that act alike."""
 
 import pytest
+from contradictions import contradictions
 
 from sysid_vehicle import Model, drive, improve, manoeuvres
 
@@ -18,6 +19,7 @@ def test_driving_without_corners_tests_nothing_lateral(start: Model, truth: Mode
     assert found.added == ()
     assert "drive corners" in str(found)
     assert found.verdicts["tyre_load_sensitivity"].finding == "not testable"
+    assert contradictions(str(found)) == []
     dragging = truth.add("aero_drag").with_values({"aero_drag.drag_area_m2": 0.45})
     straight = [
         drive(dragging, manoeuvres.straight_acceleration(), seed=s, rate_hz=50.0) for s in (1, 2)
@@ -25,6 +27,29 @@ def test_driving_without_corners_tests_nothing_lateral(start: Model, truth: Mode
     found = improve(start, *straight, starts=1, candidates=["aero_drag", "steer_lag"])
     assert [a.id for a in found.added] == ["aero_drag"]
     assert found.verdict == "explained"
+    assert contradictions(str(found)) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("the one-step-ahead error fell from 1.22 to 1.32", "fell from 1.22 to 1.32"),
+        (
+            "Verdict: unknown - it is.\nIn the end: no sign of anything left",
+            "no word of what is left",
+        ),
+        (
+            "Verdict: explained - all.\nIn the end: something is left that depends on the driving",
+            "explained, and something is left",
+        ),
+        (
+            "takes up only 36 % of it; of the error 1 to 5 s ahead, 96 % (93 to 99) is gone",
+            "takes up only 36 %",
+        ),
+    ],
+)
+def test_statements_that_contradict_each_other_are_seen(text: str, said: str) -> None:
+    assert said in " ".join(contradictions(text))
 
 
 def test_at_ten_hertz_what_cannot_be_told_apart_is_named_together(truth: Model) -> None:

@@ -23,6 +23,7 @@ from .._arrays import FloatArray, as_float64
 from .._text import html_paragraph, html_table, number, text_table
 from ..diagnose import blocks
 from ..diagnose.ceiling import Inputs, folds, ridge
+from ..diagnose.coordinates import begins
 from ..errors import NumericalError
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..identify import Fit
@@ -94,7 +95,7 @@ class Shares:
                 _spread(self.ceiling[:, i, j]),
                 number(float(self.noise[j]), 2) if np.isfinite(self.noise[j]) else "",
                 _UNITS[c],
-                str(self.share[i][j]),
+                str(self.share[i][j]) if self.named or not self.share[i][j].known else "0 %",
             ]
             for i, h in enumerate(self.horizons_s)
             for j, c in enumerate(self.channels)
@@ -103,15 +104,25 @@ class Shares:
     @property
     def sentence(self) -> str:
         """What the effects explain of what could be explained."""
-        if not self.whole.known:
+        some = [
+            _WORDS[c]
+            for j, c in enumerate(self.channels)
+            if any(row[j].known for row in self.share)
+        ]
+        if not some:
             return (
-                "No function of the driving is found that predicts the errors 1 to 5 s ahead "
-                "better than the baseline: as far as it tells they are disturbance and noise."
+                "No function of the driving is found that predicts the errors ahead better than "
+                "the baseline: as far as it tells they are disturbance and noise."
             )
         if not self.named:
             return (
-                "A function of the driving predicts a part of the errors 1 to 5 s ahead, and no "
-                "effect was added that explains it."
+                f"A function of the driving predicts a part of the errors ahead of "
+                f"{', '.join(some)}, and no effect was added that explains it."
+            )
+        if not self.whole.known:
+            return (
+                f"A function of the driving predicts a part of the errors ahead of "
+                f"{', '.join(some)}; of those 1 to 5 s ahead together no share is certain."
             )
         return (
             f"The effects added explain {self.whole} of what is seen to be explainable of the "
@@ -331,7 +342,8 @@ def _path(half: FloatArray, whole: FloatArray, v: FloatArray, seconds: float) ->
 def _starts(driving: Driving, rate_hz: float, ahead: int, every: int) -> npt.NDArray[np.intp]:
     """Samples at which whole predictions begin, in the stretches of this rate."""
     out = [np.empty(0, dtype=np.intp)]
-    for s in driving.stretches:
-        if driving.sample_rate_hz[s.where.start] == rate_hz:
-            out.append(np.arange(s.where.start, s.where.stop - ahead, every, dtype=np.intp))
+    firsts = begins(driving)
+    for first, last in zip(firsts, [*firsts[1:], driving.samples], strict=True):
+        if driving.sample_rate_hz[first] == rate_hz:
+            out.append(np.arange(first, last - ahead, every, dtype=np.intp))
     return np.concatenate(out)

@@ -126,6 +126,8 @@ class Study:
                 f"something is missing; what was added takes up {self.explained} of the error 1 to "
                 "5 s ahead, and is no sure name beside what is left"
             )
+        if self.verdict == "adequate" and (self.omnibus.rejects or self.diagnoses[-1].significant):
+            return "what is left is smaller, 0.5 to 5 s ahead, than the errors that matter"
         return _MEANING[self.verdict]
 
     @property

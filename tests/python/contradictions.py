@@ -1,0 +1,36 @@
+"""Finds statements in what a study prints that contradict each other."""
+
+import re
+
+_NONE = "no sign of anything left that depends on the driving"
+_SOME = "something is left that depends on the driving"
+_WHY = ("stand-ins", "There is evidence for", "Something else is wrong", _SOME)
+
+
+def contradictions(text: str) -> list[str]:
+    """Say which statements cannot both be true; empty where all can."""
+    found = []
+    verdict = text.partition("Verdict: ")[2].partition(" ")[0]
+    for word, before, after in re.findall(r"(fell|rose) from ([0-9.]+) to ([0-9.]+)", text):
+        if (float(after) < float(before)) != (word == "fell"):
+            found.append(f"error {word} from {before} to {after}")
+    gone = re.search(r"error 1 to 5 s ahead, (-?\d+) % \([^)]*\) is gone", text)
+    share = int(gone[1]) if gone else None
+    for told in re.findall(r"takes up only (\d+) %", text):
+        if share is not None and int(told) != max(share, 0):
+            found.append(f"takes up only {told} % of an error of which {share} % is gone")
+    if share is not None and share >= 50 and "no effect of the catalogue explains it" in text:
+        found.append(f"no effect explains it, and {share} % of it is gone")
+    if (
+        verdict in ("adequate", "explained")
+        and _SOME in text
+        and "than the errors that" not in text
+    ):
+        found.append(f"{verdict}, and something is left")
+    if verdict in ("unknown", "partly_explained") and not any(why in text for why in _WHY):
+        found.append(f"{verdict}, and no word of what is left")
+    if verdict == "unknown" and "; confirmed" in text:
+        found.append("unknown, and an effect is confirmed")
+    if _NONE in text and "a function of steering, speed and acceleration history explains" in text:
+        found.append("nothing depends on the driving, and a function of it explains a part")
+    return found
