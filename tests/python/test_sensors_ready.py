@@ -83,10 +83,14 @@ def test_vibration_is_taken_out_and_nothing_else(log: sv.Log) -> None:
     phase = np.cumsum(0.05 * rng.standard_normal(log.n))
     shaken = log["ay_mps2"] + 0.5 * np.sin(2.0 * np.pi * 12.0 * log["time_s"] + phase)
     (ready,) = conditioned([_with(log, ay_mps2=shaken)])
-    left = ready["ay_mps2"] - log["ay_mps2"]
+    inner = slice(50, -50)
+    left = (ready["ay_mps2"] - log["ay_mps2"])[inner]
+    assert np.isnan(ready["ay_mps2"]).sum() == 100
+    # Anywhere: a few readings at the ends, wrong by little, would outweigh the score of a lag.
+    assert np.max(np.abs(left)) < 0.2
     assert np.std(left) < 0.04  # of noise of 0.06 m/s2 and vibration of 0.35 m/s2 rms
     b, a = signal.butter(4, 3.0, fs=100.0)
-    assert np.std(signal.filtfilt(b, a, ready["ay_mps2"] - shaken)[100:-100]) < 0.002
+    assert np.std(signal.filtfilt(b, a, (ready["ay_mps2"] - shaken)[inner])[100:-100]) < 0.002
     assert ready.corrections == ("ay_mps2: vibration at 12 Hz taken out",)
 
 
