@@ -11,6 +11,7 @@ from sysid_vehicle.sensors import made_ready
 from sysid_vehicle.sensors._apply import shifted
 from sysid_vehicle.sensors._condition import conditioned
 from sysid_vehicle.sensors._spectrum import noise_spectrum
+from sysid_vehicle.simulate import drive_truth
 
 MOTION = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 
@@ -115,3 +116,19 @@ def test_late_speeds_are_read_earlier_in_all_logs(log: sv.Log) -> None:
             off = ready[channel][inner] - log[channel][inner]
             assert abs(np.mean(np.gradient(log[channel])[inner] * off)) < 2e-4
         assert sum("later in the file" in text for text in ready.corrections) == 2
+
+
+def test_on_a_road_that_wanders_kinematics_tells_no_delays() -> None:
+    model = sv.Model(sv.example_vehicle())
+    mass = model.vehicle.mass_kg
+    road = sv.RoadDisturbance(0.26 * mass, 0.26 * mass, 0.0, 5.0)
+    driven = drive_truth(model, sv.manoeuvres.lap(), seed=2, disturbance=road)
+    felt = {
+        c: driven.log[c] - driven.disturbance[:, i] / mass
+        for i, c in enumerate(("ax_mps2", "ay_mps2"))
+    }
+    log = _with(driven.log, **felt)
+    assert sv.check(log)["delay_ay_s"].found  # the driver steers against the road
+    own, _, delayed = made_ready([log], [])
+    assert not delayed
+    assert own[0] is log
