@@ -22,6 +22,7 @@ from ._spectrum import NoiseSpectrum, noise_spectrum
 __all__ = ["conditioned"]
 
 _ONE_FILTER = 0.15  # corner frequencies that differ by no more are of one kind of filter
+_EDGE_S = 0.5
 
 
 def conditioned(logs: Sequence[Log]) -> list[Log]:
@@ -116,6 +117,9 @@ def _without(values: FloatArray, spectrum: NoiseSpectrum) -> FloatArray:
     half = width // 2
     padded = np.pad(whole, half, mode="reflect", reflect_type="odd")
     smooth = scipy.signal.fftconvolve(padded, answer, mode="valid")
+    # At the ends vibration cannot be told from what it adds to.
+    edge = round(_EDGE_S * spectrum.rate_hz)
+    smooth[:edge] = smooth[len(smooth) - edge :] = np.nan
     result = values.copy()
     result[at] = np.interp(at, grid, smooth)
     return result

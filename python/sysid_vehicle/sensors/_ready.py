@@ -14,7 +14,7 @@ __all__ = ["made_ready"]
 
 _OF_THE_SPEEDS = ("delay_vx_s", "delay_vy_s")  # of one device as a rule
 _DELAYS = (*_OF_THE_SPEEDS, "delay_ay_s")
-_LEVEL_MPS2 = 0.05  # change of gravity across within a second, on a road that counts as level
+_LEVEL_MPS2 = 0.05  # change of gravity within a second, on a road that counts as level
 
 
 def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], list[Log], bool]:
@@ -41,9 +41,11 @@ def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], l
         checked = check(own)
     except SysidError:
         return own, rest, False
-    # A driver who steers against a road that leans makes a_y seem to come at another time.
-    leans = checked.estimate.road_mps2["bank"] > _LEVEL_MPS2
-    late = {name: checked[name] for name in (_OF_THE_SPEEDS if leans else _DELAYS)}
+    # A driver who steers, brakes and drives against a road that is not level makes speeds and
+    # accelerations seem to come at other times.
+    if max(checked.estimate.road_mps2.values()) > _LEVEL_MPS2:
+        return own, rest, False
+    late = {name: checked[name] for name in _DELAYS}
     if not any(fault.found for fault in late.values()):
         return own, rest, False
     together = any(late[name].found for name in _OF_THE_SPEEDS)

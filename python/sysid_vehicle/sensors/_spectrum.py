@@ -28,7 +28,8 @@ _FALL: Final = 4.0  # of the power, from which noise is not white any more
 _PLATEAU: Final = 1.5  # a low-pass is seen where it begins so far above the lowest frequency
 _MISFIT: Final = 0.35  # mean |log| of power to the fitted one
 _PEAK: Final = 6.0  # power above its neighbours that is vibration
-_SIDES: Final = 1.7  # what of its sides is still vibration
+_SIDES: Final = 1.1  # what of its sides is still vibration
+_EVEN: Final = 5  # frequencies over which skirts are smoothed
 _LINE: Final = 8.0  # power above that of its surroundings that is a line
 _SKIRT_HZ: Final = 2.5
 _FEWEST_BESIDE: Final = 0.6  # share of the frequencies, free of lines, that shows a filter
@@ -70,8 +71,11 @@ class NoiseSpectrum:
         over = (ratio > _PEAK) & (self.frequency_hz > _LOWEST_HZ)
         if not over.any():
             return np.ones(ratio.size)
-        # From each peak on to both sides as far as the power stands out.
-        near = scipy.ndimage.uniform_filter1d(ratio, 3, mode="nearest") > _SIDES
+        # From each peak on to both sides as far as the power stands out: what is left of its skirts
+        # would be noise of a colour.
+        even = np.exp(scipy.ndimage.uniform_filter1d(np.log(ratio), _EVEN, mode="nearest"))
+        ratio = np.where(ratio > _PEAK, ratio, even)
+        near = even > _SIDES
         labels, _ = scipy.ndimage.label(near | over)
         part = np.isin(labels, np.unique(labels[over])) & (self.frequency_hz > _LOWEST_HZ)
         return np.where(part, np.minimum(1.0, np.sqrt(1.0 / np.maximum(ratio, 1e-12))), 1.0)
@@ -110,8 +114,8 @@ def noise_spectrum(values: FloatArray, rate_hz: float, floor: float = 0.0) -> No
     power = np.maximum(power, 2.0 * max(floor, 1e-9 * float(np.std(values))) ** 2 / rate_hz * 0.1)
     inside = (f >= _LOWEST_HZ) & (f <= _HIGHEST * rate_hz)
     log_power = np.log(power[inside])
-    found = _white(log_power)
     beside = ~_near_lines(f[inside], log_power)
+    found = _white(log_power, beside)
     if np.mean(beside) > _FEWEST_BESIDE and _falls(log_power[beside]):
         found = _filtered(f[inside], log_power, beside, rate_hz)
     smooth = np.full(f.size, np.exp(found.level))
@@ -130,8 +134,8 @@ class _Form:
     delay_s: float = 0.0
 
 
-def _white(log_power: FloatArray) -> _Form:
-    level = float(np.median(log_power))
+def _white(log_power: FloatArray, beside: npt.NDArray[np.bool_]) -> _Form:
+    level = float(np.median(log_power[beside] if beside.any() else log_power))
     return _Form(_misfit(log_power - level), level, np.zeros(log_power.size))
 
 
@@ -162,7 +166,7 @@ def _filtered(
     Noise of the road falls as well, but only as far as the noise of the sensor allows; a filter
     takes its own sensor's noise down with everything else.
     """
-    best = _white(log_power)
+    best = _white(log_power, beside)
     # A digital filter made by the bilinear transform sees the second instead of the frequency.
     for seen in (f, rate_hz / np.pi * np.tan(np.pi * f / rate_hz)):
 

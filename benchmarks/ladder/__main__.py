@@ -1,0 +1,91 @@
+"""What a study says of the same car as its road and sensors become more real.
+
+    python benchmarks/ladder [--seeds 2] [--first 3000] [--truth relaxation] [RUNG ...]
+
+Laps are fitted, handling courses judge. One imperfection at a time: forces of the road over 0.3 s
+(`pushes`) and over 0.03 s (`bumps`), a road that leans by 1.5 deg rms over 5 s (`road`), a causal
+low-pass of 15 Hz in every sensor (`filtered`), speeds 20 ms and everything else 10 ms late
+(`late`), quanta of a bus with every value held for two samples (`coarse`), vibration at 12 Hz, and
+all of them. Printed for each drive: what was claimed with its interval, whether that is the truth
+(`right`: it alone, inside its 95 % interval), the verdict, and the median errors of v_y and yaw
+rate 2 and 5 s ahead on validation data, before and after.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+import warnings
+
+from rungs import SENSORS, TRUTHS, ride
+
+import sysid_vehicle as sv
+
+_HEAD = "rung       seed  right  claimed; verdict; error of v_y [m/s] and yaw rate [rad/s] ahead"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("rungs", nargs="*", metavar="RUNG", help=f"of {', '.join(SENSORS)}")
+    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--first", type=int, default=3000)
+    parser.add_argument("--truth", choices=list(TRUTHS), default="relaxation")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of each drive")
+    parser.add_argument("--raw", action="store_true", help="take the logs as they are")
+    args = parser.parse_args()
+    print(_HEAD)
+    total = right = 0
+    for rung in args.rungs or SENSORS:
+        for seed in range(args.first, args.first + args.seeds):
+            good, line = _trial(rung, seed, args)
+            total, right = total + 1, right + good
+            print(line, flush=True)
+    print(f"right in {right} of {total}")
+
+
+def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[bool, str]:
+    train, test = (
+        ride(rung, args.truth, manoeuvre, seed).between(0.0, args.seconds)
+        for manoeuvre in ("lap", "handling_course")
+    )
+    began = time.process_time()
+    head = f"{rung:10s} {seed:4d}"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sv.SysidWarning)
+        try:
+            study = sv.improve(
+                sv.Model(sv.example_vehicle()),
+                train,
+                test,
+                starts=3,
+                sensors=False if args.raw else None,
+            )
+        except sv.SysidError as error:
+            return False, f"{head}  no     {type(error).__name__}: {error}"
+        ahead = study.horizons
+    effect, values = TRUTHS[args.truth]
+    found = [a.id for a in study.added]
+    good = found == ([effect] if effect else [])
+    for name, true in values.items():
+        good = good and abs(study.fit[name].value - true) <= 1.96 * study.fit[name].std
+    said = ", ".join(
+        str(study.fit[n]) for n in study.fit.model.free_names if n.split(".")[0] in found
+    )
+    errors = "; ".join(
+        f"{h:g} s: "
+        + ", ".join(
+            f"{ahead.error[0, ahead.horizons_s.index(h), ahead.channels.index(c)]:.3g} -> "
+            f"{ahead.error[-1, ahead.horizons_s.index(h), ahead.channels.index(c)]:.3g}"
+            for c in ("vy_mps", "yaw_rate_radps")
+        )
+        for h in (2.0, 5.0)
+    )
+    took = time.process_time() - began
+    return good, (
+        f"{head}  {'yes' if good else 'no ':4s}  {said or 'nothing'}; {study.verdict}; {errors}; "
+        f"{took:.0f} s"
+    )
+
+
+if __name__ == "__main__":
+    main()
