@@ -19,6 +19,7 @@ __all__ = [
     "axes_or_new",
     "framed",
     "inline_svg",
+    "legend_above",
     "new_figure",
     "svg",
     "tidy",
@@ -89,6 +90,18 @@ def tidy(ax: Axes, **labels: Any) -> Axes:
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
     return ax
+
+
+def legend_above(ax: Axes) -> None:
+    """Put the legend beside the title, where it covers no curve."""
+    ax.legend(
+        frameon=False,
+        ncols=5,
+        fontsize="small",
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.1,
+    )
 
 
 def svg(figure: Figure) -> bytes:

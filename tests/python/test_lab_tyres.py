@@ -271,6 +271,7 @@ def test_result_prints_and_draws() -> None:
     ax = fit.plot()
     assert ax.get_xlabel() == "slip angle [rad]"
     assert fit.plot(ax) is ax
+    assert len(fit.plot(axles=["rear"]).collections) == 1
     assert fit.starts.plot("B_front").get_ylabel() == "B_front"
     assert fit.profile("BCD_front").plot().get_xlabel() == "BCD_front"
     with pytest.raises(KeyError, match="there are"):

@@ -65,8 +65,10 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     )
     print(fit)
     if args.plot is not None:
-        figure = new_figure(6.0, 3.8)
-        fit.plot(figure.add_subplot())
+        figure = new_figure(9.0, 3.8)  # two axes: curves that agree would cover each other
+        axes = figure.subplots(1, 2, sharey=True)
+        for ax, axle in zip(axes, ("front", "rear"), strict=True):
+            fit.plot(ax, [axle]).label_outer()
         write_text(args.plot, svg(figure).decode())
         print(f"Picture: {args.plot}")
     if args.json is not None:

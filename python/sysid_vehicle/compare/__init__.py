@@ -1,6 +1,6 @@
 """Comparison of a fitted model with driving."""
 
-from .compare import ChannelScore, Comparison, compare
+from .compare import ChannelScore, Comparison, compare, one_step_error
 from .unrelated import incoherent, unrelated
 from .where import FailureMap, Region
 
@@ -11,5 +11,6 @@ __all__ = [
     "Region",
     "compare",
     "incoherent",
+    "one_step_error",
     "unrelated",
 ]

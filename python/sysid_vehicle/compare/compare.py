@@ -19,7 +19,7 @@ from .where import FailureMap, Region
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["ChannelScore", "Comparison", "compare"]
+__all__ = ["ChannelScore", "Comparison", "compare", "one_step_error"]
 
 
 @dataclass(frozen=True)
@@ -146,6 +146,14 @@ def _running_rms(e: FloatArray, log_number: FloatArray, width: int) -> FloatArra
         )
     out[np.flatnonzero(np.diff(log_number))] = np.nan  # breaks the line between logs
     return out
+
+
+def one_step_error(fit: Fit, driving: Driving, noise: NoiseModel) -> float:
+    """The `error` of a comparison alone; the arguments are those of `compare`."""
+    p = fit.model.vector()
+    trace = driving.problem(fit.model).trace(p, noise.floor().vector(), False)
+    white = np.where(np.isfinite(driving.measured), trace["whitened"], np.nan)
+    return float(np.sqrt(np.nanmean(white**2)))
 
 
 @explaining

@@ -7,7 +7,9 @@ where it acts (`delay.py`).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from threading import Lock
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,9 +19,11 @@ from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._style import axes_or_new, tidy
 from .._text import brief, html_text
+from .._threads import in_parallel
 from ..estimate import MEASURED
 from .delay import HIGHEST_HZ, Delay, delay, pieces_of
 from .evidence import Evidence
+from .omnibus import omnibus_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -125,14 +129,31 @@ def coherence(evidence: Evidence, *, delays: bool = True, seed: int = 0) -> tupl
     seed : int
         Of the draws of noise of the inputs, which widens the intervals of delays.
     """
-    rng = generator(seed) if delays else None
     names = ("steer", "force") if evidence.driving.force_known else ("steer",)
     inputs = evidence.driving.inputs()
-    return tuple(_with(evidence, inputs, i, name, rng) for i, name in enumerate(names))
+    asking = Lock()
+    known: list[bool] = []
+
+    def complete() -> bool:
+        with asking:
+            if not known:
+                known.append(not omnibus_of(evidence).rejects)
+            return known[0]
+
+    def one(i: int) -> Coherence:
+        rng = generator(seed) if delays else None
+        return _with(evidence, inputs, i, names[i], rng, complete)
+
+    return tuple(in_parallel(one, range(len(names))))
 
 
 def _with(
-    evidence: Evidence, inputs: FloatArray, which: int, name: str, rng: np.random.Generator | None
+    evidence: Evidence,
+    inputs: FloatArray,
+    which: int,
+    name: str,
+    rng: np.random.Generator | None,
+    complete: Callable[[], bool],
 ) -> Coherence:
     driving = evidence.driving
     e = evidence.residual.reshape(driving.samples, -1)
@@ -163,5 +184,5 @@ def _with(
     effective = max(1.0 + (windows - 1) * 11.0 / 18.0, 2.0)
     tests = len(there) * band
     threshold = 1.0 - (_LEVEL / tests) ** (1.0 / (effective - 1.0))
-    late = None if rng is None else delay(evidence, inputs, which, pieces, rng)
+    late = None if rng is None else delay(evidence, inputs, which, pieces, rng, complete)
     return Coherence(name, as_float64(f), there, float(threshold), late)

@@ -17,6 +17,7 @@ go through the model in place of u, for all bands together. A delay shows as phi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -37,6 +38,7 @@ _BANDS = 6
 _LOWEST_HZ, HIGHEST_HZ = 0.15, 5.0
 _SMALL = 1e-3  # of an input, to differentiate by
 _ROUNDS = 4
+_TINY_RAD, _NOTABLE = 0.1, 2.0  # phase, standard errors; a delay is claimed beyond three
 _DRAWS = 16  # of noise of the inputs
 
 Piece = tuple[int, int, float]
@@ -121,18 +123,21 @@ def delay(
     which: int,
     pieces: list[Piece],
     rng: np.random.Generator,
+    complete: Callable[[], bool],
 ) -> Delay | None:
     """Find how much later than the model the car follows input number `which`.
 
-    None where the input hardly moved.
+    None where the input hardly moved. `complete` tells whether the model without a delay leaves
+    nothing that depends on the driving.
     """
     if float(np.std(inputs[:, which])) <= 0.0:
         return None
-    total, late = 0.0, inputs
+    total, late, first = 0.0, inputs, evidence
     for _ in range(_ROUNDS):
         direction, step, std = _later(evidence, late, which, pieces)
         total += step
-        if abs(step) < std:
+        tiny = 2.0 * np.pi * HIGHEST_HZ * abs(step) < _TINY_RAD and abs(step) < _NOTABLE * std
+        if abs(step) < std or tiny:
             break  # the second order of so small a step is next to nothing
         late = inputs.copy()
         for begin, end, rate in pieces:
@@ -148,7 +153,7 @@ def delay(
         return None
     f, phase, phase_std, linear = found
     put_in = 2.0 * np.pi * f * (total - step)
-    alone = not omnibus_of(evidence).rejects
+    alone = complete() if evidence is first else not omnibus_of(evidence).rejects
     return Delay(total, std, f, as_float64(phase + put_in), phase_std, linear, alone)
 
 
@@ -181,13 +186,16 @@ def _by_input_noise(
     pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
     measured = np.column_stack([driving.channel("steer_rad"), pull])
     p = evidence.fit.model.vector()
+    parts = [
+        (slice(begin, end), i, u, quiet(u), white_noise_std(u))
+        for begin, end, _ in pieces
+        for i, u in enumerate(measured[begin:end].T)
+    ]
     scores = []
     for _ in range(_DRAWS):
         noisy = inputs.copy()
-        for begin, end, _rate in pieces:
-            for i, u in enumerate(measured[begin:end].T):
-                more = u + white_noise_std(u) * rng.standard_normal(len(u))
-                noisy[begin:end, i] += quiet(more) - quiet(u)
+        for where, i, u, quieted, std in parts:
+            noisy[where, i] += quiet(u + std * rng.standard_normal(len(u))) - quieted
         problem = driving.problem(evidence.fit.model, other_inputs=noisy)
         change = evidence.residual - problem.residuals(p, evidence.frozen).ravel()
         scores.append(float(direction @ change))

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._text import brief, html_paragraph, html_table, text_table, with_error
-from ..compare import compare
+from .._threads import in_parallel
+from ..compare import one_step_error
 from ..effects import Effect
 from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving, NoiseModel
@@ -136,14 +137,15 @@ class Diagnosis:
         dict of str to float
             By effect. Infinite where the model fails.
         """
-        found = {}
-        for c in self.ranking:
-            if c.fit is not None:
-                try:
-                    found[c.id] = compare(c.fit, driving, noise=floor).error
-                except NumericalError:
-                    found[c.id] = float("inf")
-        return found
+        refitted = {c.id: c.fit for c in self.ranking if c.fit is not None}
+
+        def error(fit: Fit) -> float:
+            try:
+                return one_step_error(fit, driving, floor)
+            except NumericalError:
+                return float("inf")
+
+        return dict(zip(refitted, in_parallel(error, refitted.values()), strict=True))
 
     @property
     def sizes(self) -> dict[str, Size]:

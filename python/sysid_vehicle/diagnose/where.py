@@ -8,6 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from .._text import brief
+from .._threads import Workers
 from ..estimate import Driving
 from ..identify import Fit, explaining
 from ..log import Log
@@ -177,12 +178,16 @@ def where(
     """
     driving = fit.driving if logs is None else Driving.of(logs)
     evidence = Evidence(fit, driving)
-    maps, steady = force_maps(fit, driving)
+    with Workers() as pool:
+        mapped = pool.submit(force_maps, fit, driving)
+        changes = pool.submit(change_points, evidence, alpha=alpha, seed=seed) if causes else None
+        coherent = coherence(evidence, delays=causes, seed=seed)
+        maps, steady = mapped.result()
     return Where(
         maps,
         steady,
-        change_points(evidence, alpha=alpha, seed=seed) if causes else None,
+        None if changes is None else changes.result(),
         alpha,
-        coherence(evidence, delays=causes, seed=seed),
+        coherent,
         name,
     )

@@ -177,8 +177,18 @@ class Driving:
         return as_float64(np.vstack([self._inputs(log, where) for log, where in whole]))
 
     def _inputs(self, log: Log, where: slice) -> FloatArray:
-        pull = "fx_n" if self.force_known else "ax_mps2"
-        return np.column_stack([quiet(log["steer_rad"][where]), quiet(log[pull][where])])
+        """The inputs of some samples; every problem of this driving needs them."""
+        key = self.logs.index(log), where.start, where.stop
+        if key not in self._quiet:
+            pull = "fx_n" if self.force_known else "ax_mps2"
+            both = np.column_stack([quiet(log["steer_rad"][where]), quiet(log[pull][where])])
+            both.flags.writeable = False
+            self._quiet[key] = both
+        return self._quiet[key]
+
+    @cached_property
+    def _quiet(self) -> dict[tuple[int, int, int], FloatArray]:
+        return {}
 
     def problem(
         self,

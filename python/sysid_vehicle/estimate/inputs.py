@@ -14,10 +14,12 @@ than it can notice in one place, but everywhere alike, and a test over the whole
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, as_float64
 
 __all__ = ["quiet", "white_noise_std"]
 
@@ -56,7 +58,7 @@ def quiet(y: FloatArray) -> FloatArray:
     for half in _HALF_WIDTHS:
         if len(y) <= 2 * half:
             break
-        weights = scipy.signal.savgol_coeffs(2 * half + 1, _DEGREE)
+        weights = _weights(half)
         local = np.convolve(y, weights, "valid")
         spread = _AGREES * noise * float(np.linalg.norm(weights))
         inner = slice(half, len(y) - half)
@@ -66,3 +68,8 @@ def quiet(y: FloatArray) -> FloatArray:
         growing[:half] = growing[len(y) - half :] = False
         out[inner] = np.where(growing[inner], local, out[inner])
     return out
+
+
+@lru_cache
+def _weights(half: int) -> FloatArray:
+    return as_float64(scipy.signal.savgol_coeffs(2 * half + 1, _DEGREE))

@@ -13,6 +13,7 @@ from ..log import Log
 from ..read import read_log
 from ..saved import packed
 from ..study import AddedEffect, Study, horizons, improve
+from ..study.horizons import block_errors
 from ..user_effects import load_effects
 from .jobs import Job
 from .results import AHEAD_S, Effect, Row
@@ -46,6 +47,8 @@ def do(job: Job) -> Outcome:
         return failed(job, str(error), time.perf_counter() - began)
     except Exception as error:  # one study that fails, however it does, leaves the others alone
         return failed(job, f"{type(error).__name__}: {error}", time.perf_counter() - began)
+    finally:
+        block_errors.cache_clear()  # the next study is of another log
 
 
 def failed(job: Job, because: str, seconds: float = 0.0) -> Outcome:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .._style import AFTER, BEFORE, TRUTH, new_figure, tidy
+from .._style import AFTER, BEFORE, TRUTH, legend_above, new_figure, tidy
 from .loop import ClosedLoop
 
 if TYPE_CHECKING:
@@ -41,12 +41,13 @@ def overview(drive: ClosedLoop) -> Figure:
     for row, met in enumerate(drive.saturation):
         on = (drive.limits & met.bit) != 0
         limits.plot(drive.time_s[on], [row] * int(on.sum()), "|", color=BEFORE)
-    tidy(limits, title="limits met", xlabel="time_s")
+    tidy(limits, xlabel="time_s")
     names = [met.what for met in drive.saturation]
+    limits.set_title("limits met", loc="left", fontsize="medium")
     limits.set_yticks(range(len(names)), names, fontsize="small")
-    for ax in (forces, slips):
-        ax.legend(frameon=False, fontsize="small", loc="upper right")
-    axes[0].set_title(f"{drive.excitation.name} in '{drive.setup.name}'")
+    for ax in axes[:-1]:
+        legend_above(ax)
+    axes[0].set_title(f"{drive.excitation.name} in '{drive.setup.name}'", loc="left")
     for ax in axes[:-1]:
         ax.set_xlabel("")
     return figure

@@ -281,20 +281,22 @@ class TyreFit:
         std = np.sqrt(np.maximum(variance, 0.0))
         return TyreBand(axle, slip_rad, friction(slip_rad, bcde), std, self.driven_rad[i])
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw both tyre curves with 95 % bands; dotted beyond the driven slip.
+    def plot(self, ax: Axes | None = None, axles: Sequence[str] = AXLES) -> Axes:
+        """Draw tyre curves with 95 % bands; dotted beyond the driven slip.
 
         Parameters
         ----------
         ax : matplotlib Axes, optional
+        axles : sequence of str
+            ``front``, ``rear``, or both.
 
         Returns
         -------
         matplotlib Axes
         """
         ax = axes_or_new(ax, 6.0, 3.8)
-        for axle, colour in zip(AXLES, (AFTER, BEFORE), strict=True):
-            band = self.curve(axle)
+        for axle in axles:
+            band, colour = self.curve(axle), (AFTER, BEFORE)[AXLES.index(axle)]
             seen = band.slip_rad <= band.driven_rad
             ax.plot(band.slip_rad[seen], band.friction[seen], color=colour, label=axle)
             ax.plot(band.slip_rad[~seen], band.friction[~seen], ":", color=colour)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, tidy
+from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, legend_above, tidy
 from ..diagnose import Causes
 from ..model import Model
 from ..study import Study
@@ -124,7 +124,7 @@ def overlay(excerpt: Excerpt, axes: Sequence[Axes]) -> None:
         signal.set_title(f"{shown.name} [{shown.unit}]", loc="left", fontsize="medium")
         tidy(signal)
         tidy(error, ylabel="error")
-    _legend_above(axes[0])
+    legend_above(axes[0])
     axes[-1].set_xlabel("time [s]")
 
 
@@ -161,6 +161,7 @@ def place(study: Study, excerpt: Excerpt, ax: Axes) -> str:
     points = track / rate if on_track else np.column_stack([ay, ax_])
     if on_track and np.ptp(points[:, 1]) > np.ptp(points[:, 0]):
         points = np.column_stack([-points[:, 1], points[:, 0]])  # the longer side lies
+    ax.set_facecolor("#f2f2f2")  # in the dark, too: the colours of the error begin dark
     every = max(len(points) // _POINTS, 1)
     inside = slice(excerpt.where.start - begin, excerpt.where.stop - begin, max(every, 1))
     around: dict[str, Any] = {"markersize": 9, "markerfacecolor": "none", "markeredgewidth": 0.8}
@@ -192,7 +193,7 @@ def ahead(study: Study, channels: Sequence[str], axes: Sequence[Axes]) -> None:
         ax.axhline(noise, color=FLOOR, linestyle=":", linewidth=1.2)
         ax.set_ylim(bottom=0.0)
         tidy(ax, xlabel="predicted ahead [s]", ylabel=f"{shown.name} [{shown.unit}]")
-    _legend_above(axes[0])
+    legend_above(axes[0])
 
 
 def residuals(study: Study, axes: Sequence[Axes]) -> None:
@@ -207,19 +208,7 @@ def residuals(study: Study, axes: Sequence[Axes]) -> None:
             legend.remove()
     for ax in axes[:-1]:
         ax.set_xlabel("")
-    _legend_above(axes[0])
-
-
-def _legend_above(ax: Axes) -> None:
-    """A legend beside the title, where it covers no curve."""
-    ax.legend(
-        frameon=False,
-        ncols=5,
-        fontsize="small",
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        borderaxespad=0.1,
-    )
+    legend_above(axes[0])
 
 
 def _as_pixels(ax: Axes) -> None:

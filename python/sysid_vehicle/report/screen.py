@@ -10,7 +10,7 @@ from ..study import AddedEffect, Study
 from . import figures
 from .excerpt import Excerpt, worst_excerpt
 from .page import bars, bullets, panel, paragraph, picture, table
-from .words import errors, interval, quantity, shown_in, summary, unit
+from .words import errors, interval, quantity, shown_in, stages, summary, unit
 
 __all__ = ["first_screen"]
 
@@ -75,16 +75,17 @@ def _which(study: Study) -> str:
     rows = []
     for e in order:
         text = f"{100.0 * max(gone[e], 0.0):.0f} %"
-        if e in own:
-            rows.append((e, gone[e], text, ""))
+        if e in own or not own:
+            rows.append((e, gone[e], text, "" if own else "mute"))
         else:
             rows.append((e, gone[e], f"{text}, {study.verdicts[e].finding}", "mute"))
     text = (
         "Share of the baseline's one-step error beyond the noise floor on validation data that "
         "each effect takes away if it alone is added. "
-        f"{len(study.diagnoses[0].ranking)} were scored, {len(tried)} refitted. Grey: not named, "
-        "whatever it takes away; the verdict is that beside the effects that were added."
+        f"{len(study.diagnoses[0].ranking)} were scored, {len(tried)} refitted."
     )
+    if own:
+        text += " Grey: acts alike, with its verdict beside the effects that were added."
     return panel("3 Which", [bars(rows), paragraph(text)], 4)
 
 
@@ -127,7 +128,7 @@ def _falls(study: Study) -> str:
     lines = []
     for j, channel in enumerate(ahead.channels):
         shown = shown_in(channel)
-        found = [shown.factor * float(ahead.error[i, at, j]) for i in (0, -1)]
+        found = [shown.factor * float(ahead.error[i, at, j]) for _, i in stages(study)]
         noise = shown.factor * float(ahead.noise[j])
         if channel in _SHOWN and np.isfinite(found).any():
             figures_ = [number(x, 2) for x in (*found, noise)]
@@ -137,8 +138,8 @@ def _falls(study: Study) -> str:
         paragraph(f"On validation data the one-step error {errors(study)}."),
     ]
     if lines:
-        head = (f"error {_AHEAD_S:g} s ahead", "baseline", "final", "sensor noise")
-        parts.append(table(head, lines))
-    if study.explained is not None:
+        models = [title.removesuffix(" model") for title, _ in stages(study)]
+        parts.append(table([f"error {_AHEAD_S:g} s ahead", *models, "sensor noise"], lines))
+    if study.added and study.explained is not None:
         parts.append(paragraph(f"Of the error 1 to 5 s ahead, {study.explained} is gone."))
-    return panel("5 Error falls", parts, 4)
+    return panel("5 Error falls" if study.added else "5 Error", parts, 4)

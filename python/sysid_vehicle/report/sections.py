@@ -170,7 +170,7 @@ def _ahead(study: Study, truth: Model | None) -> list[str]:
         picture(
             figure,
             "Error on validation data over how far ahead was predicted, from what was known then "
-            "and the steering and force since: median over pieces of 5 s. Dashed: noise of the "
+            "and the steering and force since: median over pieces of 5 s. Dotted: noise of the "
             "sensor.",
         ),
     ]
