@@ -125,6 +125,9 @@ class NextDrive:
             for s in self.suggestions[:8]
         ]
 
+    def _first(self) -> list[str]:
+        return [f"The first: {s.instructions()}" for s in self.suggestions[:1]]
+
     def _headline(self) -> str:
         pair = f"{self.first.id} and {self.second.id}"
         return f"{pair} are {self.now:.1f} standard errors apart; after"
@@ -132,13 +135,13 @@ class NextDrive:
     __repr__ = brief
 
     def __str__(self) -> str:
-        table = f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
-        return f"{table}\nThe first: {self.best.instructions()}" if self.suggestions else table
+        table = text_table(self._HEAD, self._rows())
+        return "\n".join([self._headline(), table, *self._first()])
 
     def _repr_html_(self) -> str:
-        best = f"The first: {self.best.instructions()}" if self.suggestions else ""
         table = html_table(self._HEAD, self._rows())
-        return html_paragraph(self._headline()) + table + html_paragraph(best)
+        told = "".join(html_paragraph(text) for text in self._first())
+        return html_paragraph(self._headline()) + table + told
 
     def to_dict(self) -> dict[str, Any]:
         """Everything for a JSON file."""

@@ -134,7 +134,8 @@ class NoiseModel:
 # Per square root of a second: over one, 5 mm/s and 1 mrad/s.
 _LEAST_MOTION = (5e-3, 5e-3, 1e-3)
 _LEAST_DISTURBANCE = 1e-3  # of the weight
-_TIMES_S = (0.01, 20.0)
+# Slower forces are what effects are: drag, wind, slopes. A road that wanders has states of its own.
+_TIMES_S = (0.01, 1.0)
 _ROAD_TIMES_S = (1.0, 20.0)
 _SMALLEST = np.array([1e-3, 1e-3, 1e-4, 5e-3, 5e-3])
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from .._arrays import FloatArray
 from .._style import MEASURED, tidy
-from .._text import brief, html_list, html_table, number, text_table
+from .._text import brief, html_list, html_paragraph, html_table, number, text_table
 from ..errors import InvalidInput, near_names
 from ..sensors import SensorCheck
 from ..vehicle import Vehicle
@@ -175,7 +175,11 @@ class AxleForces:
         return "\n".join([self.headline, text_table(_HEAD, self._rows()), *self._said()])
 
     def _repr_html_(self) -> str:
-        return f"<p>{self.headline}</p>" + html_table(_HEAD, self._rows()) + html_list(self._said())
+        return (
+            html_paragraph(self.headline)
+            + html_table(_HEAD, self._rows())
+            + html_list(self._said())
+        )
 
     def plot(self, ax: Sequence[Axes] | None = None, colour: str = "load") -> tuple[Axes, Axes]:
         """Draw the side force over the slip angle, one axle beside the other, with 95 % bands.
