@@ -7,6 +7,7 @@
 #include <pybind11/stl.h>
 
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -35,6 +36,13 @@ inline const double* vector(const Array& a, std::size_t size, const char* name) 
                                     " values, got " + std::to_string(a.size()));
     }
     return a.data();
+}
+
+/// A time from one sample to the next.
+inline double step_of(double dt) {
+    const bool usable = dt > 0.0 && std::isfinite(dt);
+    if (!usable) throw std::invalid_argument("dt: the step must be positive and finite");
+    return dt;
 }
 
 inline Array empty(std::size_t rows, std::size_t columns) {

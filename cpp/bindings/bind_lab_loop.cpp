@@ -18,6 +18,8 @@ struct LabLoop {
 void set_sensors(LabLoop& s, const Array& values) {
     const double* row = matrix(values, lab::kSensorCount, 4, "sensors");
     for (lab::SensorData& sensor : s.loop.sensors) {
+        const bool late = row[2] >= 0.0 && std::isfinite(row[2]);
+        if (!late) throw std::invalid_argument("sensors: a delay is negative or no number");
         sensor = {row[0], row[1], row[2], row[3]};
         row += 4;
     }
@@ -38,6 +40,7 @@ void set_track(LabLoop& s, const Array& points, double metres, double seconds) {
 }
 
 void set_actuator(lab::Actuator& actuator, const std::array<double, 4>& v) {
+    if (!(v[0] <= v[1])) throw std::invalid_argument("actuator: limits are not in their order");
     actuator = {v[0], v[1], v[2], v[3]};
 }
 
@@ -49,6 +52,7 @@ py::dict run(const LabLoop& settings, const SingleTrack& model, const Array& par
     const double* values = vector(parameters, kParameterCount, "parameters");
     const double* noise = matrix(normal, n, lab::kSensorCount, "normal");
     const double* outside = matrix(external, n, 3, "external");
+    step_of(settings.loop.dt);
     if (settings.loop.steer_by == lab::SteerBy::kTrack && settings.loop.track.points.size() < 3)
         throw std::invalid_argument("track: expected three points or more");
     std::vector<lab::Wanted> references(static_cast<std::size_t>(n));

@@ -154,7 +154,10 @@ void register_lab_observer(py::module_& m) {
             if (several.empty()) throw std::invalid_argument("logs: expected one or more");
             std::vector<ObserverLog> logs;
             logs.reserve(several.size());
-            for (const auto* log : several) logs.push_back(*log);
+            for (const auto* log : several) {
+                if (log == nullptr) throw std::invalid_argument("logs: expected no None");
+                logs.push_back(*log);
+            }
             const ObserverNoise start = to_noise(process, sensors);
             const auto q = to_structure<6>(process_scale, process_block, process_floor);
             const auto r = to_structure<4>(sensor_scale, sensor_block, sensor_floor);

@@ -4,6 +4,14 @@
 
 namespace sysid::bindings {
 
+void check_driver(const Driver& d, double dt) {
+    for (const double limit : {d.steer_limit_rad, d.steer_rate_limit_radps, d.drive_limit_n,
+                               d.brake_limit_n, d.power_limit_w, d.force_rate_limit_nps})
+        if (!(limit >= 0.0)) throw std::invalid_argument("driver: no limit may be negative");
+    const bool possible = d.reaction_s >= 0.0 && d.reaction_s < dt * 1e9;
+    if (!possible) throw std::invalid_argument("driver: reaction_s must not be negative");
+}
+
 void register_simulate(py::module_& m) {
     py::class_<Driver>(m, "Driver")
         .def(py::init<>())
@@ -34,6 +42,7 @@ void register_simulate(py::module_& m) {
                 w = {r[0], r[1], r[2]};
                 r += 3;
             }
+            check_driver(driver, step_of(dt));
             const Beginning beginning{
                 initial_speed, initial_vy, initial_yaw_rate, initial_steer, start,
             };

@@ -11,9 +11,6 @@ namespace sysid::bindings {
 
 namespace {
 
-// Of any simulator's row of readings; the arrays are checked again where rows come in.
-constexpr std::size_t kMostReadings = 1'000'000;
-
 const Input14* inputs_of(const Array& a) {
     return reinterpret_cast<const Input14*>(
         matrix(a, a.ndim() == 2 ? a.shape(0) : 0, kTwinInputs, "inputs"));
@@ -32,12 +29,6 @@ std::size_t place(double value, std::size_t size, const std::string& what) {
         throw std::invalid_argument(what + " " + std::to_string(value) +
                                     " is not a whole number from 0 to " + std::to_string(size - 1));
     return static_cast<std::size_t>(value);
-}
-
-double step_of(double dt) {
-    const bool usable = dt > 0.0 && std::isfinite(dt);
-    if (!usable) throw std::invalid_argument("dt: the step must be positive and finite");
-    return dt;
 }
 
 /// Readings of car and twin for laws that need so many.
@@ -168,10 +159,7 @@ void register_vehicle(py::module_& m) {
                 const double* r = matrix(references, n, 3, "references");
                 const Input14* u = inputs_of(base);
                 if (base.shape(0) != n) throw std::invalid_argument("base: as long as references");
-                const bool possible =
-                    driver.reaction_s >= 0.0 && driver.reaction_s < step_of(dt) * 1e9;
-                if (!possible)
-                    throw std::invalid_argument("driver: reaction_s must not be negative");
+                check_driver(driver, step_of(dt));
                 std::vector<Reference> wanted;
                 wanted.reserve(static_cast<std::size_t>(n));
                 for (py::ssize_t k = 0; k < n; ++k)
@@ -319,6 +307,8 @@ void register_observers(py::module_& m) {
             const DoubleTrackGains k{
                 gains[0], gains[1], gains[2], gains[3], gains[4], literal_sign, gains[5], gains[6],
             };
+            if (!(k.lowest_mass_kg <= k.highest_mass_kg))
+                throw std::invalid_argument("gains: limits of the mass are not in their order");
             const Input14* u = inputs_of(inputs);
             const auto n = inputs.shape(0);
             const double* y = matrix(measured, n, kReadings, "measured");

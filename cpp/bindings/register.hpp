@@ -2,7 +2,14 @@
 
 #include <pybind11/pybind11.h>
 
+namespace sysid {
+struct Driver;
+}
+
 namespace sysid::bindings {
+
+/// Throws std::invalid_argument unless a driver can be simulated in steps of `dt`.
+void check_driver(const Driver& driver, double dt);
 
 void register_interrupts(pybind11::module_& m);
 void register_model(pybind11::module_& m);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <stdexcept>
 
 #include "sysid/estimate/smoother.hpp"
@@ -59,10 +60,12 @@ void look_ahead_run(const Problem& problem, const Run& run, const double* p, con
     filter_run<NX>(system,
                    [&](std::size_t k, const FilterStep<NX, kChannels>& s) { means[k] = s.mean; });
     std::fill(errors, errors + run.size() * kChannels, std::nan(""));
+    if (ahead >= run.size()) return;
+    const std::size_t step = std::min(every, run.size());
     // Forces are not foreseen; the slope of the road fades from where it is known.
     std::array<double, kExternals> external{};
     static_assert(kGravityX == kMotionStates && kExternals == kDisturbances);
-    for (std::size_t k = 0; k + ahead < run.size(); k += every) {
+    for (std::size_t k = 0; k < run.size() - ahead; k += step) {
         poll_interrupt();
         ModelState<double> x = system.start();
         for (int i = 0; i < kMotionStates; ++i) x[static_cast<std::size_t>(i)] = means[k][i];

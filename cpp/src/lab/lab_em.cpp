@@ -53,14 +53,18 @@ class PublishedExpectation {
             steps.resize(log.size());
             const ObserverSystem system(log.model, log.inputs, log.readings, noise_);
             ObserverMat before;
-            sum += extended_kalman_filter<NX, NY>(
-                system, log.start.mean, log.start.covariance,
-                [&](std::size_t k, const Step& step) {
-                    steps[k] = step;
-                    if (k > 0) steps[k].transition = before;
-                    before = step.transition;
-                },
-                log.start.one_before);
+            const auto pass = [&](const auto& form) {
+                return extended_kalman_filter<NX, NY, std::decay_t<decltype(form)>>(
+                    system, log.start.mean, log.start.covariance,
+                    [&](std::size_t k, const auto& step) {
+                        steps[k] = step;
+                        if (k > 0) steps[k].transition = before;
+                        before = step.transition;
+                    },
+                    log.start.one_before);
+            };
+            sum += noise.sensors.isDiagonal(0.0) ? pass(SequentialUpdate<NX, NY>())
+                                                 : pass(Update<NX, NY>());
         }
         return sum;
     }

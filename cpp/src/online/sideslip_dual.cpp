@@ -262,7 +262,7 @@ void SideslipDual::start(double dt, const SensorSample& s) {
     P(TyreModel::kSlipF, TyreModel::kSlipR) = P(TyreModel::kSlipR, TyreModel::kSlipF) = shared;
     tyres_.restart(b, P);
     tyres_.set_gate(Gate<2>(settings_.gate_probability,
-                            std::max(1, static_cast<int>(settings_.gate_patience_s / dt))));
+                            whole_within(settings_.gate_patience_s / dt, 1, kMostPieces)));
     started_ = true;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 
 namespace sysid {
 
@@ -26,10 +27,19 @@ ParameterLaws::ParameterLaws(std::vector<ParameterLaw> laws, double dt,
     if (!positive)
         throw std::invalid_argument("laws: the step and the derivative's corner must be positive");
     stage_ = std::numeric_limits<int>::max();
+    const auto check = [](std::size_t channel) {
+        if (channel >= kMostReadings)
+            throw std::invalid_argument("laws: channel " + std::to_string(channel) +
+                                        " is none of readings");
+    };
+    check(yaw_rate_channel);
     for (const ParameterLaw& law : laws_) {
+        check(law.channel);
         if (law.parameter < 0 || law.parameter >= kLoadParameters)
             throw std::invalid_argument("laws: parameter " + std::to_string(law.parameter) +
                                         " is not one of " + std::to_string(kLoadParameters));
+        if (!(law.lower <= law.upper))
+            throw std::invalid_argument("laws: limits of a parameter are not in their order");
         working_.push_back({Derivative(derivative_hz, dt), Derivative(derivative_hz, dt)});
         stage_ = std::min(stage_, law.stage);
         last_stage_ = std::max(last_stage_, law.stage);

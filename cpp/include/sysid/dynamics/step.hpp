@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "sysid/dynamics/single_track.hpp"
+#include "sysid/math/whole.hpp"
 
 namespace sysid {
 
@@ -38,7 +39,7 @@ constexpr int kMostSubsteps = 250;
 inline int substeps_for(const SingleTrack& model, const double* p, double v_x, double dt,
                         double turn = 0.8) {
     const double rate = model.fastest_rate(p, std::max(v_x, kLowestSpeed));
-    return static_cast<int>(std::clamp(std::ceil(dt * rate / turn), 1.0, 1.0 * kMostSubsteps));
+    return whole_within(std::ceil(dt * rate / turn), 1, kMostSubsteps);
 }
 
 /// What the lags of one model need to remember within a step.

@@ -21,6 +21,7 @@
 #include <cstddef>
 
 #include "sysid/math/dual.hpp"
+#include "sysid/math/whole.hpp"
 #include "sysid/model/tyre.hpp"
 #include "sysid/model/vehicle.hpp"
 
@@ -169,7 +170,7 @@ inline int grey_box_substeps(const GreyBoxCar& car, const GreyBoxInput& u, const
         std::max((front + rear) / mass,
                  (front * car.lf_m * car.lf_m + rear * car.lr_m * car.lr_m) / inertia) /
         std::max(v_x, car.slowest_mps);
-    return static_cast<int>(std::clamp(std::ceil(dt * rate / 0.25), 1.0, 144.0));
+    return whole_within(std::ceil(dt * rate / 0.25), 1, 144);
 }
 
 /// Classical Runge-Kutta over `dt`; force and steering are held, as a digital controller does.

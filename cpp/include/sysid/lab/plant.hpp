@@ -128,8 +128,7 @@ class Plant {
                         Lags<double>(LagStage::kRates, x.data() + kMotionStates,
                                      rate.data() + kMotionStates, step),
                         u, parameters_.data(), rate.data());
-        return 4 * static_cast<int>(
-                       std::clamp(std::ceil(dt * fastest / 0.8), 1.0, 1.0 * kMostSubsteps));
+        return 4 * whole_within(std::ceil(dt * fastest / 0.8), 1, kMostSubsteps);
     }
 
     Workings<double> workings(const PlantState& x, const Input& u, Externals external) const {

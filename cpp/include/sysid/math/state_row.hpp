@@ -6,8 +6,11 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -24,12 +27,29 @@ template <class T, class Row>
 struct Remembers<T, Row, std::void_t<decltype(std::declval<T&>().remember(std::declval<Row&>()))>>
     : std::true_type {};
 
+/// Whether a whole number or an enumeration can be cast from this; nothing that is no number is.
+template <class T>
+bool holds(double number) {
+    if constexpr (std::is_enum_v<T>) {
+        return holds<std::underlying_type_t<T>>(number);
+    } else {
+        using Limits = std::numeric_limits<T>;
+        return number >= static_cast<double>(Limits::lowest()) &&
+               number < std::ldexp(1.0, Limits::digits);
+    }
+}
+
 /// Walks over one member; `row.number(double&)` is called for every number in it.
 template <class Row, class T>
 void walk(Row& row, T& item) {
-    if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
+    if constexpr (std::is_same_v<T, double>) {
+        row.number(item);
+    } else if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
         auto number = static_cast<double>(item);
         row.number(number);
+        if (!holds<T>(number))
+            throw std::invalid_argument("the stored state holds " + std::to_string(number) +
+                                        " in place of a whole number");
         item = static_cast<T>(number);
     } else if constexpr (Remembers<T, Row>::value) {
         item.remember(row);

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "sysid/math/errors.hpp"
+#include "sysid/math/whole.hpp"
 #include "sysid/online/observer.hpp"
 
 namespace sysid {
@@ -131,11 +132,13 @@ class SensorWatch {
     bool running_ = false, refused_ = false;
 };
 
+constexpr int kMostPieces = 1'000'000;
+
 /// Runs `part(dt, share)` over the pieces of a long step; `share` is how much of it has passed at
 /// the end of the piece.
 template <class Part>
 void in_short_steps(double dt, Part&& part) {
-    const int pieces = std::max(1, static_cast<int>(std::ceil(dt / kLongestStepS - 1e-9)));
+    const int pieces = whole_within(std::ceil(dt / kLongestStepS - 1e-9), 1, kMostPieces);
     for (int i = 1; i <= pieces; ++i) part(dt / pieces, static_cast<double>(i) / pieces);
 }
 

@@ -21,6 +21,9 @@ namespace sysid {
 enum class LawKind : int { kSign, kGradient };
 enum class SignSource : int { kTwin, kMeasured };
 
+// Of any simulator's row of readings; the arrays are checked again where rows come in.
+constexpr std::size_t kMostReadings = 1'000'000;
+
 struct ParameterLaw {
     int parameter = kMass;
     std::size_t channel = 0;     // of the readings
