@@ -20,7 +20,7 @@ _CANDIDATES = 5
 
 def first_screen(study: Study) -> list[str]:
     """Tell the whole story in five panels."""
-    verdict, _, _ = summary(study)
+    verdict = summary(study)[0]
     excerpt = worst_excerpt(study)
     panels = [
         *([] if excerpt is None else [_compare(excerpt), _where(study, excerpt)]),
@@ -66,34 +66,40 @@ def _which(study: Study) -> str:
     before = study.test[0].error
     beyond = before - 1.0
     tried = {e: both[1] for e, both in study.errors_with[0].items()}
-    if not tried or beyond <= 0.0:
+    if not tried:
         none = "No effect of the catalogue has evidence that called for a refit."
+        return panel("3 Which", [paragraph(none)], 4)
+    if beyond <= 0.0:
+        none = "On validation data the baseline leaves nothing beyond the noise floor."
         return panel("3 Which", [paragraph(none)], 4)
     gone = {e: (before - after) / beyond for e, after in tried.items() if np.isfinite(after)}
     order = sorted(gone, key=lambda e: -gone[e])[:_CANDIDATES]
     own = {a.id for a in study.added}
+    probable = study.diagnoses[0].causes.inclusion
     rows = []
     for e in order:
         text = f"{100.0 * max(gone[e], 0.0):.0f} %"
-        if e in own or not own:
-            rows.append((e, gone[e], text, "" if own else "mute"))
-        else:
-            rows.append((e, gone[e], f"{text}, {study.verdicts[e].finding}", "mute"))
+        if e in probable:
+            text += f", probability {probable[e]:.2f}"
+        rows.append((e, gone[e], text, "" if e in own else "mute"))
     text = (
         "Share of the baseline's one-step error beyond the noise floor on validation data that "
         "each effect takes away if it alone is added. "
         f"{len(study.diagnoses[0].ranking)} were scored, {len(tried)} refitted."
+        + (" Probability: that it is missing, by the training data." if probable else "")
     )
     if own:
-        text += " Grey: acts alike, with its verdict beside the effects that were added."
+        text += " Grey: acts alike, and was not added."
     return panel("3 Which", [bars(rows), paragraph(text)], 4)
 
 
 def _added(study: Study) -> str:
-    if not study.added:
-        return panel("4 Added", [paragraph(summary(study)[1])], 4)
     told = [_effect(study, i, a) for i, a in enumerate(study.added)]
-    return panel("4 Added", [bullets(told)], 4)
+    parts = [bullets(told)] if told else [paragraph(summary(study)[1])]
+    sets = study.diagnoses[0].causes.sets
+    if sets:
+        parts.append(paragraph(f"Credible sets: {'; '.join(map(str, sets))}."))
+    return panel("4 Added", [*parts, paragraph(study.in_the_end)], 4)
 
 
 def _effect(study: Study, i: int, added: AddedEffect) -> str:
@@ -140,6 +146,4 @@ def _falls(study: Study) -> str:
     if lines:
         models = [title.removesuffix(" model") for title, _ in stages(study)]
         parts.append(table([f"error {_AHEAD_S:g} s ahead", *models, "sensor noise"], lines))
-    if study.added and study.explained is not None:
-        parts.append(paragraph(f"Of the error 1 to 5 s ahead, {study.explained} is gone."))
     return panel("5 Error falls" if study.added else "5 Error", parts, 4)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .._style import framed, new_figure
+from .._style import framed
 from .._text import html_table, number
 from ..diagnose import EffectVerdict, bias_report
 from ..estimate import UNITS
@@ -73,7 +73,7 @@ def _which(study: Study, truth: Model | None) -> list[str]:
             parts.append(paragraph("There was no candidate to test."))
             continue
         shown = min(len(dx.causes.inclusion), 10)
-        figure = new_figure(7.0, 0.9 + 0.28 * shown)
+        figure = framed(7.0, 0.9 + 0.28 * shown, left=2.2)
         grades = {a.id: a.grade for a in study.added}
         figures.causes(dx.causes, grades, figure.add_subplot(), most=shown)
         n = len(dx.significant)
