@@ -70,6 +70,8 @@ def std_of(what: Quantity, p: FloatArray, columns: list[int], covariance: FloatA
     covariance : array, shape (free, free)
     """
     slope = what.slope(p)[columns]
+    if not np.all(np.isfinite(slope)):
+        return float(np.inf)
     variance = float(slope @ covariance @ slope)
     if not (np.isfinite(what.of(p)) and np.isfinite(variance)):
         return float("inf")
