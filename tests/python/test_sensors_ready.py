@@ -68,6 +68,13 @@ def test_bumps_of_the_road_are_no_low_pass() -> None:
     assert found.every == 1
 
 
+def test_motion_that_no_noise_covers_is_no_noise(log: sv.Log) -> None:
+    # Without noise all that is seen above 5 Hz comes from the driving.
+    model = sv.Model(sv.example_vehicle())
+    clean = sv.drive(model, sv.manoeuvres.lap(), seed=1, noise=sv.SensorNoise.none())
+    assert conditioned([clean])[0] is clean
+
+
 def test_filtered_channels_are_put_in_time_with_independent_readings(log: sv.Log) -> None:
     late = _with(log, **{c: _low_pass(log[c]) for c in MOTION})
     (ready,) = conditioned([late])
