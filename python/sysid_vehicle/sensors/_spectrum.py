@@ -29,6 +29,7 @@ _PLATEAU: Final = 1.5  # a low-pass is seen where it begins so far above the low
 _MISFIT: Final = 0.35  # mean |log| of power to the fitted one
 _PEAK: Final = 6.0  # power above its neighbours that is vibration
 _SIDES: Final = 1.1  # what of its sides is still vibration
+_STEADY: Final = 2.0  # upper over lower quartile of the power over time; motion has ten and more
 _EVEN: Final = 5  # frequencies over which skirts are smoothed
 _LINE: Final = 8.0  # power above that of its surroundings that is a line
 _SKIRT_HZ: Final = 2.5
@@ -93,7 +94,10 @@ class NoiseSpectrum:
 
 
 def noise_spectrum(values: FloatArray, rate_hz: float, floor: float = 0.0) -> NoiseSpectrum | None:
-    """Spectrum of a channel's noise; None where the channel is too short or too slow to tell.
+    """Spectrum of a channel's noise; None where the channel cannot tell it.
+
+    It may be too short or too slow, or hold no noise: what comes and goes with the driving is
+    motion.
 
     Parameters
     ----------
@@ -115,6 +119,8 @@ def noise_spectrum(values: FloatArray, rate_hz: float, floor: float = 0.0) -> No
     inside = (f >= _LOWEST_HZ) & (f <= _HIGHEST * rate_hz)
     log_power = np.log(power[inside])
     beside = ~_near_lines(f[inside], log_power)
+    if not _steady(values, rate_hz, width, np.flatnonzero(inside)[beside]):
+        return None
     found = _white(log_power, beside)
     if np.mean(beside) > _FEWEST_BESIDE and _falls(log_power[beside]):
         found = _filtered(f[inside], log_power, beside, rate_hz)
@@ -123,6 +129,17 @@ def noise_spectrum(values: FloatArray, rate_hz: float, floor: float = 0.0) -> No
     smooth[f > _HIGHEST * rate_hz] = np.exp(found.level + found.shape[-1])
     every = _independent(smooth) if found.delay_s else 1
     return NoiseSpectrum(rate_hz, f, power, smooth, found.corner_hz, found.delay_s, every)
+
+
+def _steady(values: FloatArray, rate_hz: float, width: int, at: npt.NDArray[np.intp]) -> bool:
+    """Whether there is about as much power at all times."""
+    _, _, power = scipy.signal.spectrogram(
+        values, rate_hz, window="hann", nperseg=width, noverlap=width // 2, detrend="linear"
+    )
+    if not at.size:
+        return False
+    low, high = np.percentile(power[at].sum(axis=0), (25, 75))
+    return bool(high < _STEADY * low)
 
 
 @dataclass(frozen=True, eq=False)
