@@ -10,7 +10,7 @@ import sysid_vehicle as sv
 
 HERE = Path(__file__).resolve().parent
 WHOLE = (0.0, 1e9)
-LARGEST_RAD = 0.8
+LARGEST_RAD = 0.5
 # Logs and their parts [s] for training, and for validation.
 PARTS: dict[str, tuple[tuple[tuple[str, float, float], ...], ...]] = {
     "revs_250lm": (

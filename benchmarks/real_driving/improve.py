@@ -44,9 +44,13 @@ def one(name: str, args: argparse.Namespace) -> dict[str, object]:
     for v in study.verdicts.all:
         if v.finding in ("missing", "one of a group", "proxy"):
             print(f"  {v}")
-    raw = sv.identify(sv.Model(car), train)
     told: dict[str, object] = {"verdict": study.verdict, "added": [a.name for a in study.added]}
-    for word, fit in (("as logged", raw), ("before", study.fits[0]), ("after", study.fit)):
+    fits = {"before": study.fits[0], "after": study.fit}
+    try:
+        fits = {"as logged": sv.identify(sv.Model(car), train), **fits}
+    except sv.InvalidInput as error:
+        print(f"  as logged: {error}")
+    for word, fit in fits.items():
         for seconds in (2.0, 4.0):
             error = ahead(fit.model, motion, seconds)
             told[f"{word} {seconds:g} s"] = vars(error)
