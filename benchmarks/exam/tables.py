@@ -53,6 +53,11 @@ def in_group(o: Outcome) -> bool:
     return bool({o["leader"], *o["leader_group"]} & set(o["trial"]["truth"]))
 
 
+def in_set(o: Outcome) -> bool:
+    """Whether a credible set of the first posterior holds what was hidden."""
+    return any(set(s) & set(o["trial"]["truth"]) for s in o["sets"])
+
+
 def remainder(o: Outcome) -> bool:
     """Whether something else was added or is left."""
     return o["verdict"] != "explained" or any(a not in o["trial"]["truth"] for a in o["added"])
@@ -84,6 +89,8 @@ def _null(outcomes: Sequence[Outcome]) -> list[Row]:
     rows.append(
         ("verdict not adequate", str(Rate.over(o["verdict"] not in QUIET for o in found)), "6 %")
     )
+    with_sets = [o for o in found if "sets" in o]  # older outcomes have none
+    rows.append(("any credible set", str(Rate.over(bool(o["sets"]) for o in with_sets)), "1 %"))
     return rows
 
 
@@ -103,6 +110,11 @@ def _naming(outcomes: Sequence[Outcome]) -> list[Row]:
         ("  where all manoeuvres were driven", str(_rate(named_first, _with_all(found))), ""),
         ("true one in the named group", str(_rate(in_group, found)), ">= 99 %"),
         ("mean size of the group", _mean(1 + len(o["leader_group"]) for o in found), "<= 1.3"),
+        (
+            "true one in a credible set of the baseline",
+            str(_rate(in_set, [o for o in found if "sets" in o])),
+            ">= 95 %",
+        ),
     ]
     return rows
 

@@ -85,6 +85,7 @@ def _told(study: sv.Study) -> Outcome:
         "evidence": [c.id for c in first.significant],
         "leader": leader,
         "leader_group": list(group),
+        "sets": [list(s.effects) for s in first.causes.sets],
         "findings": {v.effect.id: v.finding for v in study.verdicts.all if v.finding != "absent"},
         "constancy": {e: [c.p_value, c.spread, c.degrees] for e, c in constancy(study.fit).items()},
         "left": [c.id for c in last.significant],
