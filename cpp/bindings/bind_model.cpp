@@ -187,6 +187,7 @@ void register_model(py::module_& m) {
     m.def("base_parameters", &base_parameters);
     m.def("effects", &effects);
     m.def("formula_parts", &formula_parts);
+    m.attr("GRAVITY_MPS2") = kGravity;
     m.attr("USER_OFFSET") = kBaseParameterCount + user_offset(0);
     m.attr("USER_EFFECTS") = kUserEffects;
     m.attr("USER_PARAMETERS") = kUserParameters;

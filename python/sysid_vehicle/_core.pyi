@@ -42,6 +42,7 @@ _Step = tuple[int, tuple[int, int, int], float]  # operation, operands, constant
 
 __version__: str
 CHANNELS: int
+GRAVITY_MPS2: float
 NOISE_PARAMETERS: int
 PARAMETERS: int
 USER_EFFECTS: int

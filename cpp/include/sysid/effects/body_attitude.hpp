@@ -1,7 +1,7 @@
 #pragma once
 
 #include "sysid/effects/effect.hpp"
-#include "sysid/model/vehicle.hpp"
+#include "sysid/model/kinematics.hpp"
 
 namespace sysid {
 

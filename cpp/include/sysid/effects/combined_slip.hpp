@@ -1,6 +1,7 @@
 #pragma once
 
 #include "sysid/effects/effect.hpp"
+#include "sysid/model/kinematics.hpp"
 
 namespace sysid {
 
@@ -22,18 +23,8 @@ struct CombinedSlip : Effect {
 
     template <class T, class S>
     static void grip(const T* p, Workings<S>& w, const S* /*state*/) {
-        w.grip_f *= left_over(p[0], w.fx_f / (w.mu_peak_f * w.fz_f));
-        w.grip_r *= left_over(p[0], w.fx_r / (w.mu_peak_r * w.fz_r));
-    }
-
-    // Beyond 98 % of the ellipse the root is continued by its tangent's floor: a locked wheel keeps
-    // a little lateral force, and the derivative stays finite.
-    template <class T, class S>
-    static S left_over(const T& p, const S& used) {
-        using std::sqrt;
-        const S rest = 1.0 - p * (used * used);
-        if (value_of(rest) < 0.04) return S(0.2);
-        return sqrt(rest);
+        w.grip_f *= ellipse_left(p[0], w.fx_f / (w.mu_peak_f * w.fz_f));
+        w.grip_r *= ellipse_left(p[0], w.fx_r / (w.mu_peak_r * w.fz_r));
     }
 };
 
