@@ -22,8 +22,7 @@ struct Axles {
 /// alpha = delta - atan2(v_across, v_along): the force has the sign of its slip angle [rad].
 template <class S, class D>
 S slip_angle(const S& along, const S& across, const D& steer) {
-    using std::atan2;
-    return steer - atan2(across, along);
+    return steer - direction(across, along);
 }
 
 /// Of a car that moves at v_x, v_y with yaw rate r, its centre of gravity l_f behind the front axle
@@ -31,8 +30,7 @@ S slip_angle(const S& along, const S& across, const D& steer) {
 template <class S, class L, class D>
 Axles<S> slip_angles(const S& v_x, const S& v_y, const S& r, const L& l_f, const L& l_r,
                      const D& steer) {
-    using std::atan2;
-    return {slip_angle(v_x, S(v_y + l_f * r), steer), -atan2(S(v_y - l_r * r), v_x)};
+    return {slip_angle(v_x, S(v_y + l_f * r), steer), -direction(S(v_y - l_r * r), v_x)};
 }
 
 /// The same for small angles, as linear observers have them.
@@ -44,8 +42,8 @@ inline Axles<double> small_slip_angles(double beta, double r_per_speed, double l
 /// Axle loads at rest on a level road [N].
 template <class S, class L>
 Axles<S> static_loads(const S& weight, const L& l_f, const L& l_r) {
-    const L wheelbase = l_f + l_r;
-    return {weight * l_r / wheelbase, weight * l_f / wheelbase};
+    const S per_metre = weight / (l_f + l_r);
+    return {per_metre * l_r, per_metre * l_f};
 }
 
 /// With what the force `pull` = m a_x at the height h moves from the front axle to the rear one. No
