@@ -1,5 +1,5 @@
 // The interpreter of formulas against random programs. With Clang libFuzzer drives it:
-//   clang++ -std=c++17 -O1 -g1 -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all
+//   clang++ -std=c++20 -O1 -g1 -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all
 //     -Icpp/include -isystem EIGEN benchmarks/fuzz/formula.cpp -o formula_fuzz
 //   ./formula_fuzz -max_total_time=600
 // With -DSYSID_FUZZ_ALONE it makes its own bytes and stops after a number of them, so that any

@@ -6,6 +6,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <Eigen/Dense>
 #include <atomic>
 #include <cmath>
 #include <memory>
@@ -55,6 +56,21 @@ inline Array copy_of(const std::vector<double>& values, std::size_t columns) {
     return out;
 }
 
+template <int R, int C>
+Array to_array(const Eigen::Matrix<double, R, C>& m) {
+    Array out = C == 1 ? Array(R) : empty(R, C);
+    Eigen::Map<Eigen::Matrix<double, C, R>>(out.mutable_data()) = m.transpose();
+    return out;
+}
+
+/// The elements of a vector or an array.
+template <class Values>
+Array row_of(const Values& values) {
+    Array out(static_cast<py::ssize_t>(values.size()));
+    std::copy(values.data(), values.data() + values.size(), out.mutable_data());
+    return out;
+}
+
 /// Ends the work of the threads that follow it, in the middle of a kernel. Where the thread that
 /// makes it follows another one, it is set together with that.
 class Stop {
@@ -87,6 +103,26 @@ auto unlocked(Kernel&& kernel) {
     const InterruptGuard guard(&answer_interrupts);
     poll_interrupt();  // for rows of kernels that are too short to ask
     return kernel();
+}
+
+/// What a kernel writes.
+template <class Kernel>
+Array filled(std::size_t rows, std::size_t columns, Kernel&& kernel) {
+    Array out = empty(rows, columns);
+    double* to = out.mutable_data();
+    unlocked([&] { kernel(to); });
+    return out;
+}
+
+/// The value a kernel returns, with the gradient and the matrix of `n` parameters that it writes.
+template <class Kernel>
+py::tuple with_derivatives(std::size_t n, Kernel&& kernel) {
+    Array gradient(static_cast<py::ssize_t>(n));
+    Array information = empty(n, n);
+    double* g = gradient.mutable_data();
+    double* h = information.mutable_data();
+    const double value = unlocked([&] { return kernel(g, h); });
+    return py::make_tuple(value, gradient, information);
 }
 
 }  // namespace sysid::bindings

@@ -1,5 +1,5 @@
 // The prediction errors of a problem, their derivatives, the noise score, filter and smoother.
-#include "arrays.hpp"
+#include "least_squares.hpp"
 #include "register.hpp"
 #include "sysid/identify/prediction_error.hpp"
 
@@ -46,23 +46,6 @@ Noise to_noise(const Array& values) {
 
 const double* values_of(const Array& p) { return vector(p, kParameterCount, "parameters"); }
 
-void check(const std::vector<int>& numbers, int count, const char* name) {
-    for (int c : numbers)
-        if (c < 0 || c >= count)
-            throw std::invalid_argument(std::string(name) + ": there is no " + std::to_string(c));
-}
-
-void check_columns(const std::vector<int>& columns) {
-    check(columns, static_cast<int>(kParameterCount), "columns");
-}
-
-void check(const Problem& problem, const FrozenFilter& filter) {
-    bool fits = filter.runs.size() == problem.runs.size();
-    for (std::size_t i = 0; fits && i < filter.runs.size(); ++i)
-        fits = filter.runs[i].size() == problem.runs[i].size();
-    if (!fits) throw std::invalid_argument("filter: was made from other runs");
-}
-
 }  // namespace
 
 void register_identify(py::module_& m) {
@@ -70,10 +53,11 @@ void register_identify(py::module_& m) {
     m.attr("PARAMETERS") = kParameterCount;
     m.attr("CHANNELS") = static_cast<int>(kChannels);
     m.attr("EXTERNALS") = static_cast<int>(kExternals);
-    py::class_<FrozenFilter>(m, "FrozenFilter")
-        .def_readonly("log_likelihood", &FrozenFilter::log_likelihood)
-        .def_readonly("observed", &FrozenFilter::observed);
-    py::class_<Problem>(m, "Problem")
+    py::class_<Problem> bound(m, "Problem");
+    bind_filter<FrozenFilter>(m, "FrozenFilter", bound, kParameterCount, kNoiseParameters,
+                              &to_noise);
+    bind_least_squares<FrozenFilter>(bound, kParameterCount, kChannels);
+    bound
         .def(py::init([](const SingleTrack& model) { return Problem{model, {}}; }),
              py::arg("model"))
         .def("add_run", &add_run, py::arg("dt"), py::arg("inputs"), py::arg("measurements"),
@@ -82,91 +66,20 @@ void register_identify(py::module_& m) {
             "with_model",
             [](const Problem& self, const SingleTrack& model) { return Problem{model, self.runs}; },
             py::arg("model"))
-        .def_property_readonly("samples", &Problem::samples)
-        .def(
-            "freeze",
-            [](const Problem& self, const Array& p, const Array& noise) {
-                const double* values = values_of(p);
-                const Noise n = to_noise(noise);
-                return unlocked([&] { return freeze(self, values, n); });
-            },
-            py::arg("parameters"), py::arg("noise"))
-        .def(
-            "residuals",
-            [](const Problem& self, const Array& p, const FrozenFilter& filter) {
-                check(self, filter);
-                const double* values = values_of(p);
-                Array out = empty(self.samples(), kChannels);
-                double* to = out.mutable_data();
-                unlocked([&] { residuals(self, values, filter, to); });
-                return out;
-            },
-            py::arg("parameters"), py::arg("filter"))
-        .def(
-            "half_sum_of_squares",
-            [](const Problem& self, const Array& p, const FrozenFilter& filter) {
-                check(self, filter);
-                const double* values = values_of(p);
-                return unlocked([&] { return half_sum_of_squares(self, values, filter); });
-            },
-            py::arg("parameters"), py::arg("filter"))
-        .def(
-            "sensitivities",
-            [](const Problem& self, const Array& p, const FrozenFilter& filter,
-               const std::vector<int>& columns) {
-                check_columns(columns);
-                check(self, filter);
-                const double* values = values_of(p);
-                Array out = empty(self.samples() * kChannels, columns.size());
-                double* to = out.mutable_data();
-                unlocked([&] { sensitivities(self, values, filter, columns, to); });
-                return out;
-            },
-            py::arg("parameters"), py::arg("filter"), py::arg("columns"))
-        .def(
-            "normal_equations",
-            [](const Problem& self, const Array& p, const FrozenFilter& filter,
-               const std::vector<int>& columns) {
-                check_columns(columns);
-                check(self, filter);
-                const double* values = values_of(p);
-                Array gradient(static_cast<py::ssize_t>(columns.size()));
-                Array information = empty(columns.size(), columns.size());
-                double* g = gradient.mutable_data();
-                double* h = information.mutable_data();
-                const double cost =
-                    unlocked([&] { return normal_equations(self, values, filter, columns, g, h); });
-                return py::make_tuple(cost, gradient, information);
-            },
-            py::arg("parameters"), py::arg("filter"), py::arg("columns"))
         .def(
             "signal_sensitivities",
             [](const Problem& self, const Array& p, const FrozenFilter& filter,
                const Array& signals, const std::vector<int>& targets) {
-                check(self, filter);
-                check(targets, kExternals + kChannels, "targets");
+                check_runs(self, filter);
+                check_numbers(targets, kExternals + kChannels, "targets");
                 const double* values = values_of(p);
                 const double* s = matrix(signals, static_cast<py::ssize_t>(self.samples()),
                                          static_cast<py::ssize_t>(targets.size()), "signals");
-                Array out = empty(self.samples() * kChannels, targets.size());
-                double* to = out.mutable_data();
-                unlocked([&] { signal_sensitivities(self, values, filter, s, targets, to); });
-                return out;
+                return filled(self.samples() * kChannels, targets.size(), [&](double* to) {
+                    signal_sensitivities(self, values, filter, s, targets, to);
+                });
             },
             py::arg("parameters"), py::arg("filter"), py::arg("signals"), py::arg("targets"))
-        .def(
-            "noise_score",
-            [](const Problem& self, const Array& p, const Array& noise) {
-                const double* values = values_of(p);
-                const Noise n = to_noise(noise);
-                Array gradient(kNoiseParameters);
-                Array information = empty(kNoiseParameters, kNoiseParameters);
-                double* g = gradient.mutable_data();
-                double* h = information.mutable_data();
-                const double value = unlocked([&] { return noise_score(self, values, n, g, h); });
-                return py::make_tuple(value, gradient, information);
-            },
-            py::arg("parameters"), py::arg("noise"))
         .def(
             "trace",
             [](const Problem& self, const Array& p, const Array& noise, bool smoothed) {
@@ -179,10 +92,7 @@ void register_identify(py::module_& m) {
                 out["whitened"] = copy_of(t.whitened, kChannels);
                 out["state"] = copy_of(t.state, kStatesFull);
                 out["state_std"] = copy_of(t.state_std, kStatesFull);
-                const auto n_samples = static_cast<py::ssize_t>(t.log_density.size());
-                Array density(n_samples);
-                std::copy(t.log_density.begin(), t.log_density.end(), density.mutable_data());
-                out["log_density"] = density;
+                out["log_density"] = row_of(t.log_density);
                 out["log_likelihood"] = t.log_likelihood;
                 return out;
             },
@@ -193,10 +103,8 @@ void register_identify(py::module_& m) {
                std::size_t every) {
                 const double* values = values_of(p);
                 const Noise n = to_noise(noise);
-                Array out = empty(self.samples(), kChannels);
-                double* to = out.mutable_data();
-                unlocked([&] { look_ahead(self, values, n, ahead, every, to); });
-                return out;
+                return filled(self.samples(), kChannels,
+                              [&](double* to) { look_ahead(self, values, n, ahead, every, to); });
             },
             py::arg("parameters"), py::arg("noise"), py::arg("ahead"), py::arg("every") = 1);
 }

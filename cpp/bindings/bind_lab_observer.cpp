@@ -20,13 +20,6 @@ Vec<N> to_vector(const Array& a, const char* name) {
     return Eigen::Map<const Vec<N>>(vector(a, N, name));
 }
 
-template <int R, int C>
-Array to_array(const Mat<R, C>& m) {
-    Array out = C == 1 ? Array(R) : empty(R, C);
-    Eigen::Map<Eigen::Matrix<double, C, R>>(out.mutable_data()) = m.transpose();
-    return out;
-}
-
 ObserverModel to_model(const Array& car, const std::array<bool, 5>& form, double dt) {
     const double* c = vector(car, 5, "car");
     const ObserverCar believed{c[0], c[1], c[2], c[3], c[4]};

@@ -1,4 +1,4 @@
-#include "arrays.hpp"
+#include "least_squares.hpp"
 #include "register.hpp"
 #include "sysid/lab/tyre_fit.hpp"
 #include "sysid/lab/tyre_likelihood.hpp"
@@ -8,21 +8,6 @@ namespace sysid::bindings {
 namespace {
 
 using namespace sysid::lab;
-
-const double* parameters(const Array& p) { return vector(p, kTyreParameters, "parameters"); }
-
-void check(const std::vector<int>& columns) {
-    for (int c : columns)
-        if (c < 0 || c >= kTyreParameters)
-            throw std::invalid_argument("columns: no parameter has number " + std::to_string(c));
-}
-
-void refuse_others(const TyreProblem& problem, const FrozenGains& gains) {
-    bool same = problem.runs().size() == gains.runs.size();
-    for (std::size_t i = 0; same && i < gains.runs.size(); ++i)
-        same = problem.runs()[i].size() == gains.runs[i].size();
-    if (!same) throw std::invalid_argument("gains: they belong to other runs");
-}
 
 TyreRun tyre_run(double dt, const Array& inputs, const Array& measurements) {
     const auto n = inputs.ndim() == 2 ? inputs.shape(0) : 0;
@@ -36,7 +21,7 @@ TyreRun tyre_run(double dt, const Array& inputs, const Array& measurements) {
     run.measurements.resize(static_cast<std::size_t>(n));
     for (auto& reading : run.measurements) {
         run.inputs.push_back({u[0], u[1], std::sin(u[1]), std::cos(u[1]), u[2], u[3]});
-        std::copy(y, y + kGreyChannels, reading.begin());
+        reading = Eigen::Map<const Vec<kGreyChannels>>(y);
         u += 4;
         y += kGreyChannels;
     }
@@ -44,114 +29,44 @@ TyreRun tyre_run(double dt, const Array& inputs, const Array& measurements) {
 }
 
 void register_problem(py::module_& m) {
-    py::class_<FrozenGains>(m, "FrozenGains")
-        .def_readonly("log_likelihood", &FrozenGains::log_likelihood)
-        .def_readonly("observed", &FrozenGains::observed);
-    py::class_<TyreProblem>(m, "TyreProblem")
-        .def(py::init<const GreyBoxCar&>(), py::arg("car"))
-        .def_property_readonly("samples", &TyreProblem::samples)
+    py::class_<TyreProblem> bound(m, "TyreProblem");
+    bind_filter<FrozenGains>(
+        m, "FrozenGains", bound, kTyreParameters, kGreyNoises,
+        [](const Array& noise) { return vector(noise, kGreyNoises, "noise"); });
+    bind_least_squares<FrozenGains>(bound, kTyreParameters, kGreyChannels);
+    const auto parameters = [](const Array& p) { return vector(p, kTyreParameters, "parameters"); };
+    bound.def(py::init([](const GreyBoxCar& car) { return TyreProblem{car, {}}; }), py::arg("car"))
         .def(
             "add_run",
             [](TyreProblem& self, double dt, const Array& inputs, const Array& measurements) {
-                self.add_run(tyre_run(dt, inputs, measurements));
+                self.runs.push_back(tyre_run(dt, inputs, measurements));
             },
             py::arg("dt"), py::arg("inputs"), py::arg("measurements"))
         .def(
-            "freeze",
-            [](const TyreProblem& self, const Array& p, const Array& noise) {
-                const double* values = parameters(p);
-                const double* n = vector(noise, kGreyNoises, "noise");
-                return unlocked([&] { return self.freeze(values, n); });
-            },
-            py::arg("parameters"), py::arg("noise"))
-        .def(
-            "residuals",
-            [](const TyreProblem& self, const Array& p, const FrozenGains& gains) {
-                const double* values = parameters(p);
-                refuse_others(self, gains);
-                Array out = empty(self.samples(), kGreyChannels);
-                double* o = out.mutable_data();
-                unlocked([&] { self.residuals(values, gains, o); });
-                return out;
-            },
-            py::arg("parameters"), py::arg("filter"))
-        .def(
-            "half_sum_of_squares",
-            [](const TyreProblem& self, const Array& p, const FrozenGains& gains) {
-                const double* values = parameters(p);
-                refuse_others(self, gains);
-                return unlocked([&] { return self.half_sum_of_squares(values, gains); });
-            },
-            py::arg("parameters"), py::arg("filter"))
-        .def(
-            "sensitivities",
-            [](const TyreProblem& self, const Array& p, const FrozenGains& gains,
-               const std::vector<int>& columns) {
-                const double* values = parameters(p);
-                refuse_others(self, gains);
-                check(columns);
-                Array out = empty(self.samples() * kGreyChannels, columns.size());
-                double* o = out.mutable_data();
-                unlocked([&] { self.sensitivities(values, gains, columns, o); });
-                return out;
-            },
-            py::arg("parameters"), py::arg("filter"), py::arg("columns"))
-        .def(
-            "normal_equations",
-            [](const TyreProblem& self, const Array& p, const FrozenGains& gains,
-               const std::vector<int>& columns) {
-                const double* values = parameters(p);
-                refuse_others(self, gains);
-                check(columns);
-                Array g(static_cast<py::ssize_t>(columns.size()));
-                Array n = empty(columns.size(), columns.size());
-                double* go = g.mutable_data();
-                double* no = n.mutable_data();
-                const double cost =
-                    unlocked([&] { return self.normal_equations(values, gains, columns, go, no); });
-                return py::make_tuple(cost, g, n);
-            },
-            py::arg("parameters"), py::arg("filter"), py::arg("columns"))
-        .def(
-            "noise_score",
-            [](const TyreProblem& self, const Array& p, const Array& noise) {
-                const double* values = parameters(p);
-                const double* n = vector(noise, kGreyNoises, "noise");
-                Array g(static_cast<py::ssize_t>(kGreyNoises));
-                Array info = empty(kGreyNoises, kGreyNoises);
-                double* go = g.mutable_data();
-                double* io = info.mutable_data();
-                const double value = unlocked([&] { return self.noise_score(values, n, go, io); });
-                return py::make_tuple(value, g, info);
-            },
-            py::arg("parameters"), py::arg("noise"))
-        .def(
             "states",
-            [](const TyreProblem& self, const Array& p, const FrozenGains& gains) {
+            [=](const TyreProblem& self, const Array& p, const FrozenGains& gains) {
                 const double* values = parameters(p);
-                refuse_others(self, gains);
-                Array out = empty(self.samples(), kGreyStates);
-                double* o = out.mutable_data();
-                unlocked([&] { self.states(values, gains, o); });
-                return out;
+                check_runs(self, gains);
+                return filled(self.samples(), kGreyStates,
+                              [&](double* to) { states(self, values, gains, to); });
             },
             py::arg("parameters"), py::arg("filter"))
         .def(
             "look_ahead",
-            [](const TyreProblem& self, const Array& p, const FrozenGains& gains,
-               std::size_t ahead) {
+            [=](const TyreProblem& self, const Array& p, const FrozenGains& gains,
+                std::size_t ahead) {
                 const double* values = parameters(p);
-                refuse_others(self, gains);
-                Array out = empty(self.samples(), kGreyChannels);
-                double* o = out.mutable_data();
-                unlocked([&] { self.look_ahead(values, gains, ahead, o); });
-                return out;
+                check_runs(self, gains);
+                return filled(self.samples(), kGreyChannels,
+                              [&](double* to) { look_ahead(self, values, gains, ahead, to); });
             },
             py::arg("parameters"), py::arg("filter"), py::arg("ahead"));
 }
 
 void register_loss(py::module_& m) {
-    py::class_<TyreLoss>(m, "TyreLoss")
+    py::class_<TyreLoss> bound(m, "TyreLoss");
+    bind_least_squares<std::nullptr_t>(bound, kTyreParameters, 2);
+    bound
         .def(py::init([](const GreyBoxCar& car, bool projects_steer, const Array& motion,
                          const Array& targets, const Array& weights) {
                  const auto n = motion.ndim() == 2 ? motion.shape(0) : 0;
@@ -165,49 +80,7 @@ void register_loss(py::module_& m) {
              }),
              py::arg("car"), py::arg("projects_steer"), py::arg("motion"), py::arg("targets"),
              py::arg("weights"))
-        .def_property_readonly("samples", &TyreLoss::samples)
-        .def(
-            "residuals",
-            [](const TyreLoss& self, const Array& p) {
-                const double* values = parameters(p);
-                Array out = empty(self.samples(), 2);
-                double* o = out.mutable_data();
-                unlocked([&] { self.residuals(values, o); });
-                return out;
-            },
-            py::arg("parameters"))
-        .def(
-            "half_sum_of_squares",
-            [](const TyreLoss& self, const Array& p) {
-                const double* values = parameters(p);
-                return unlocked([&] { return self.half_sum_of_squares(values); });
-            },
-            py::arg("parameters"))
-        .def(
-            "sensitivities",
-            [](const TyreLoss& self, const Array& p, const std::vector<int>& columns) {
-                const double* values = parameters(p);
-                check(columns);
-                Array out = empty(2 * self.samples(), columns.size());
-                double* o = out.mutable_data();
-                unlocked([&] { self.sensitivities(values, columns, o); });
-                return out;
-            },
-            py::arg("parameters"), py::arg("columns"))
-        .def(
-            "normal_equations",
-            [](const TyreLoss& self, const Array& p, const std::vector<int>& columns) {
-                const double* values = parameters(p);
-                check(columns);
-                Array g(static_cast<py::ssize_t>(columns.size()));
-                Array n = empty(columns.size(), columns.size());
-                double* go = g.mutable_data();
-                double* no = n.mutable_data();
-                const double cost =
-                    unlocked([&] { return self.normal_equations(values, columns, go, no); });
-                return py::make_tuple(cost, g, n);
-            },
-            py::arg("parameters"), py::arg("columns"));
+        .def_property_readonly("samples", &TyreLoss::samples);
 }
 
 }  // namespace

@@ -19,10 +19,10 @@ py::dict describe(const ParameterInfo& info) {
     d["null_value"] = info.null_value;
     d["typical"] = info.typical;
     d["matters"] = info.matters;
-    d["lower"] = info.lower;
-    d["upper"] = info.upper;
-    d["typical_low"] = info.typical_low;
-    d["typical_high"] = info.typical_high;
+    d["lower"] = info.bounds.low;
+    d["upper"] = info.bounds.high;
+    d["typical_low"] = info.usual.low;
+    d["typical_high"] = info.usual.high;
     d["mirrored"] = info.mirrored;
     d["scan"] = scan_name(info.scan);
     return d;
@@ -58,14 +58,14 @@ py::list effects() {
         d["excited_by"] = info.excited_by;
         d["moves"] = info.moves;
         d["needs"] = names(info.needs);
-        d["twins"] = names(info.twins);
+        d["twins"] = names(info.confounded_with);
         d["through"] = info.through;
         d["states"] = detail::kEffectStateCounts[i];
         d["scored_at_typical"] = info.scored_at_typical;
         d["needs_force"] = info.needs_force;
         d["offset"] = kBaseParameterCount + effect_offset(i);
         py::list parameters;
-        for (std::size_t j = 0; j < info.parameter_count; ++j)
+        for (std::size_t j = 0; j < info.parameter_count(); ++j)
             parameters.append(describe(info.parameters[j]));
         d["parameters"] = parameters;
         all.append(d);
@@ -85,14 +85,11 @@ Array evaluate(const SingleTrack& model, const Array& p, const Array& motion, do
     ModelState<double> rate;
     const auto w = model.evaluate(state.data(), calm.data(), state.data() + kMotionStates, u,
                                   values, rate.data(), rate.data() + kMotionStates);
-    Array out = empty(1, 11);
-    double* o = out.mutable_data();
-    const std::array<double, 11> all{
+    const std::vector<double> all{
         rate[0],   rate[1], rate[2], w.a_x,  w.a_y,  w.alpha_f,
         w.alpha_r, w.fz_f,  w.fz_r,  w.fy_f, w.fy_r,
     };
-    std::copy(all.begin(), all.end(), o);
-    return out;
+    return copy_of(all, all.size());
 }
 
 /// As Python hands a formula over: what is added to, and steps (operation, operands, constant).
@@ -187,6 +184,7 @@ void register_model(py::module_& m) {
     m.def("base_parameters", &base_parameters);
     m.def("effects", &effects);
     m.def("formula_parts", &formula_parts);
+    m.attr("GRAVITY_MPS2") = kGravity;
     m.attr("USER_OFFSET") = kBaseParameterCount + user_offset(0);
     m.attr("USER_EFFECTS") = kUserEffects;
     m.attr("USER_PARAMETERS") = kUserParameters;

@@ -8,20 +8,6 @@ namespace sysid::bindings {
 
 namespace {
 
-template <int N>
-Array to_array(const Vec<N>& v) {
-    Array out(N);
-    std::copy(v.data(), v.data() + N, out.mutable_data());
-    return out;
-}
-
-template <int N>
-Array to_array(const Mat<N, N>& m) {  // symmetric: the order of storage does not matter
-    Array out = empty(N, N);
-    std::copy(m.data(), m.data() + m.size(), out.mutable_data());
-    return out;
-}
-
 /// Column of values, one per item.
 template <class Items, class Get>
 Array column(const Items& items, Get&& get) {

@@ -46,13 +46,6 @@ State14 state_of(const Array& a) {
     return state;
 }
 
-template <std::size_t N>
-Array row(const std::array<double, N>& values) {
-    Array out(static_cast<py::ssize_t>(N));
-    std::copy(values.begin(), values.end(), out.mutable_data());
-    return out;
-}
-
 void register_data(py::module_& m) {
     const auto fields = [](auto& bound, auto... pairs) {
         (bound.def_readwrite(pairs.first, pairs.second), ...);
@@ -113,14 +106,14 @@ void register_vehicle(py::module_& m) {
             "load", [](const Vehicle14& v) { return to_vector(v.load()); },
             [](Vehicle14& v, const LoadVector& load) { v.set_load(to_load(load)); })
         .def(
-            "rest", [](const Vehicle14& v, double vx) { return row(v.rest(vx)); }, py::arg("vx"))
+            "rest", [](const Vehicle14& v, double vx) { return row_of(v.rest(vx)); }, py::arg("vx"))
         .def(
             "evaluate",
             [](const Vehicle14& v, const Array& x, const Array& u) {
                 State14 rate;
                 Output14 out;
                 v.evaluate(state_of(x), input_of(u), rate, &out);
-                return py::make_tuple(row(rate), row(out));
+                return py::make_tuple(row_of(rate), row_of(out));
             },
             py::arg("state"), py::arg("input"))
         .def(
@@ -128,7 +121,7 @@ void register_vehicle(py::module_& m) {
             [](const Vehicle14& v, const Array& x, const Array& u, double dt) {
                 State14 state = state_of(x);
                 v.step(state, input_of(u), step_of(dt));
-                return row(state);
+                return row_of(state);
             },
             py::arg("state"), py::arg("input"), py::arg("dt"))
         .def(
@@ -147,7 +140,7 @@ void register_vehicle(py::module_& m) {
                 Array states = empty(n, kTwinStates), outputs = empty(n, kTwinOutputs);
                 double *to_states = states.mutable_data(), *to_outputs = outputs.mutable_data();
                 unlocked([&] { simulate14(v, x, u, n, dt, to_states, to_outputs); });
-                return py::make_tuple(states, outputs, row(x));
+                return py::make_tuple(states, outputs, row_of(x));
             },
             py::arg("start"), py::arg("inputs"), py::arg("dt"))
         .def(
@@ -250,17 +243,11 @@ void register_laws(py::module_& m) {
                 const double* y = matrix(twins, static_cast<py::ssize_t>(batch.twins()),
                                          static_cast<py::ssize_t>(n), "twins");
                 const Eigen::VectorXd moved = batch.update(vector(car, n, "car"), y, n, estimate);
-                Array steps(moved.size());
-                std::copy(moved.data(), moved.data() + moved.size(), steps.mutable_data());
-                return py::make_tuple(estimate, steps);
+                return py::make_tuple(estimate, row_of(moved));
             },
             py::arg("car"), py::arg("twins"), py::arg("estimate"))
-        .def_property_readonly("spread", [](const BatchEstimator& batch) {
-            const Eigen::VectorXd spread = batch.spread();
-            Array out(spread.size());
-            std::copy(spread.data(), spread.data() + spread.size(), out.mutable_data());
-            return out;
-        });
+        .def_property_readonly("spread",
+                               [](const BatchEstimator& batch) { return row_of(batch.spread()); });
 }
 
 void register_observers(py::module_& m) {

@@ -41,18 +41,13 @@ template <class T, class Blank>
 void add_state(py::class_<Guarded<T>>& bound, Blank&& blank) {
     using Held = Guarded<T>;
     bound.def("copy", [](Held& self) { return std::make_unique<Held>(self.snapshot()); })
-        .def(py::pickle(
-            [](Held& self) {
-                const std::vector<double> row = StateWriter::row_of(self.snapshot());
-                Array out(static_cast<py::ssize_t>(row.size()));
-                std::copy(row.begin(), row.end(), out.mutable_data());
-                return out;
-            },
-            [blank](const Array& stored) {
-                T object = blank();
-                StateReader::restore(object, {stored.data(), stored.data() + stored.size()});
-                return std::make_unique<Held>(std::move(object));
-            }));
+        .def(py::pickle([](Held& self) { return row_of(StateWriter::row_of(self.snapshot())); },
+                        [blank](const Array& stored) {
+                            T object = blank();
+                            StateReader::restore(object,
+                                                 {stored.data(), stored.data() + stored.size()});
+                            return std::make_unique<Held>(std::move(object));
+                        }));
 }
 
 }  // namespace sysid::bindings

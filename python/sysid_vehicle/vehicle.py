@@ -13,12 +13,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from . import _core
 from ._arguments import real
 from ._arrays import FloatArray
 from ._files import as_path, read_toml, refuse_unknown, write_text
 from .errors import InvalidInput, warn
 
-__all__ = ["Tyre", "Vehicle"]
+__all__ = ["GRAVITY_MPS2", "Tyre", "Vehicle"]
+
+GRAVITY_MPS2: float = _core.GRAVITY_MPS2
+"""Standard gravity, the same in the core."""
 
 
 @dataclass(frozen=True)

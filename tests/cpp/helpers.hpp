@@ -37,7 +37,7 @@ inline Parameters plain_parameters() {
                                                        1.4,  1.1, 0.2, 2200.0};
     std::copy(base.begin(), base.end(), p.begin());
     for (std::size_t i = 0; i < kEffectCount; ++i)
-        for (std::size_t j = 0; j < kEffectInfos[i].parameter_count; ++j)
+        for (std::size_t j = 0; j < kEffectInfos[i].parameter_count(); ++j)
             p[kBaseParameterCount + effect_offset(i) + j] =
                 kEffectInfos[i].parameters[j].null_value;
     return p;
@@ -66,7 +66,7 @@ inline std::size_t parameter_of(const std::string& effect, std::size_t which = 0
 inline Parameters typical_parameters() {
     Parameters p = plain_parameters();
     for (std::size_t i = 0; i < kEffectCount; ++i)
-        for (std::size_t j = 0; j < kEffectInfos[i].parameter_count; ++j)
+        for (std::size_t j = 0; j < kEffectInfos[i].parameter_count(); ++j)
             p[kBaseParameterCount + effect_offset(i) + j] = kEffectInfos[i].parameters[j].typical;
     return p;
 }

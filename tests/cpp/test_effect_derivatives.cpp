@@ -40,13 +40,13 @@ Place random_place(std::mt19937& generator, std::size_t effect) {
     at.p = at.others != 0 ? typical_parameters() : plain_parameters();
     for (std::size_t j = 0; j < kBaseParameterCount; ++j) at.p[j] *= 1.0 + 0.3 * part(generator);
     const EffectInfo& info = kEffectInfos[effect];
-    for (std::size_t j = 0; j < info.parameter_count; ++j) {
+    for (std::size_t j = 0; j < info.parameter_count(); ++j) {
         const ParameterInfo& q = info.parameters[j];
         // In the first half of the draws around typical sizes, else anywhere between the bounds.
         const double where = share(generator);
         at.p[kBaseParameterCount + effect_offset(effect) + j] =
-            part(generator) > 0.0 ? q.typical_low + where * (q.typical_high - q.typical_low)
-                                  : q.lower + where * (q.upper - q.lower);
+            part(generator) > 0.0 ? q.usual.low + where * (q.usual.high - q.usual.low)
+                                  : q.bounds.low + where * (q.bounds.high - q.bounds.low);
     }
     at.x = {25.0 + 20.0 * part(generator), 2.0 * part(generator), 0.7 * part(generator)};
     for (std::size_t i = kMotionStates; i < kModelStates; ++i) at.x[i] = 0.1 * part(generator);
@@ -74,9 +74,9 @@ TEST_P(Derivatives, AgreeWithDifferencesAnywhere) {
         const Place at = random_place(generator, effect);
         const SingleTrack model{saloon(), at.others | EffectMask{1} << effect, at.force_known};
         std::vector<D> wide(at.p.begin(), at.p.end());
-        for (std::size_t j = 0; j < info.parameter_count; ++j) wide[first + j].d[j] = 1.0;
+        for (std::size_t j = 0; j < info.parameter_count(); ++j) wide[first + j].d[j] = 1.0;
         const auto exact = outputs<D>(model, at, wide.data());
-        for (std::size_t j = 0; j < info.parameter_count; ++j) {
+        for (std::size_t j = 0; j < info.parameter_count(); ++j) {
             const auto f = [&](double value) {
                 Parameters p = at.p;
                 p[first + j] = value;

@@ -27,7 +27,7 @@ TEST_P(AnyEffect, AtItsNullValueIsNotThere) {
     // Alone and among all others: to the last bit.
     const Parameters p = plain_parameters();
     Parameters others = typical_parameters();
-    for (std::size_t j = 0; j < info().parameter_count; ++j) others[first() + j] = p[first() + j];
+    for (std::size_t j = 0; j < info().parameter_count(); ++j) others[first() + j] = p[first() + j];
     std::mt19937 generator(11);
     std::uniform_real_distribution<double> part(-1.0, 1.0);
     for (bool force_known : {true, false}) {
@@ -69,10 +69,10 @@ TEST_P(AnyEffect, MovesTheChannelsItNames) {
     };
     Parameters values = info().scored_at_typical ? typical_parameters() : plain_parameters();
     if (by != 0) values[parameter_of(info().through)] = 1.0;
-    for (std::size_t j = 0; j < info().parameter_count; ++j)
+    for (std::size_t j = 0; j < info().parameter_count(); ++j)
         if (scanned(j)) values[first() + j] = 0.3;  // within this short drive
     const Parameters bare = values;
-    for (std::size_t j = 0; j < info().parameter_count; ++j) {
+    for (std::size_t j = 0; j < info().parameter_count(); ++j) {
         if (scanned(j)) continue;
         std::vector<D> p(values.begin(), values.end());
         p[first() + j].d[j] = 1.0;
@@ -101,7 +101,7 @@ TEST_P(AnyEffect, MovesTheChannelsItNames) {
         ASSERT_NE(found, kChannelNames.end()) << channel;
         const auto i = static_cast<std::size_t>(found - kChannelNames.begin());
         double most = 0.0;
-        for (std::size_t j = 0; j < info().parameter_count; ++j) {
+        for (std::size_t j = 0; j < info().parameter_count(); ++j) {
             if (scanned(j)) continue;
             Parameters p = values;
             p[first() + j] = info().parameters[j].typical;
@@ -120,22 +120,22 @@ TEST_P(AnyEffect, MovesTheChannelsItNames) {
 }
 
 TEST_P(AnyEffect, BoundsHoldNullAndTypical) {
-    ASSERT_GE(info().parameter_count, 1U);
-    ASSERT_LE(info().parameter_count, kMaxEffectParameters);
-    for (std::size_t j = 0; j < info().parameter_count; ++j) {
+    ASSERT_GE(info().parameter_count(), 1U);
+    ASSERT_LE(info().parameter_count(), kMaxEffectParameters);
+    for (std::size_t j = 0; j < info().parameter_count(); ++j) {
         const ParameterInfo& q = info().parameters[j];
-        EXPECT_LT(q.lower, q.upper) << q.name;
-        EXPECT_GE(q.null_value, q.lower) << q.name;
-        EXPECT_LT(q.null_value, q.upper) << q.name;
-        EXPECT_GT(q.typical, q.lower) << q.name;
-        EXPECT_LT(q.typical, q.upper) << q.name;
+        EXPECT_LT(q.bounds.low, q.bounds.high) << q.name;
+        EXPECT_GE(q.null_value, q.bounds.low) << q.name;
+        EXPECT_LT(q.null_value, q.bounds.high) << q.name;
+        EXPECT_GT(q.typical, q.bounds.low) << q.name;
+        EXPECT_LT(q.typical, q.bounds.high) << q.name;
         EXPECT_GT(q.matters, 0.0) << q.name;
         EXPECT_TRUE(scanned(j) || std::abs(q.typical - q.null_value) > q.matters) << q.name;
-        EXPECT_LT(q.typical_low, q.typical_high) << q.name;
-        EXPECT_GE(q.typical_low, q.lower) << q.name;
-        EXPECT_LE(q.typical_high, q.upper) << q.name;
-        EXPECT_GE(q.typical, q.typical_low) << q.name;
-        EXPECT_LE(q.typical, q.typical_high) << q.name;
+        EXPECT_LT(q.usual.low, q.usual.high) << q.name;
+        EXPECT_GE(q.usual.low, q.bounds.low) << q.name;
+        EXPECT_LE(q.usual.high, q.bounds.high) << q.name;
+        EXPECT_GE(q.typical, q.usual.low) << q.name;
+        EXPECT_LE(q.typical, q.usual.high) << q.name;
     }
 }
 
@@ -143,7 +143,7 @@ TEST_P(AnyEffect, DescribesItself) {
     for (const char* text : {info().id, info().title, info().equation, info().source,
                              info().excited_by, info().moves, info().needs})
         EXPECT_FALSE(std::string(text).empty());
-    for (std::size_t j = 0; j < info().parameter_count; ++j) {
+    for (std::size_t j = 0; j < info().parameter_count(); ++j) {
         EXPECT_FALSE(std::string(info().parameters[j].name).empty());
         EXPECT_FALSE(std::string(info().parameters[j].unit).empty());
     }
@@ -178,7 +178,7 @@ TEST(Catalogue, NamesAreUnique) {
     std::set<std::string> parameters;
     for (const EffectInfo& info : kEffectInfos) {
         EXPECT_TRUE(ids.insert(info.id).second) << info.id;
-        for (std::size_t j = 0; j < info.parameter_count; ++j)
+        for (std::size_t j = 0; j < info.parameter_count(); ++j)
             EXPECT_TRUE(
                 parameters.insert(std::string(info.id) + "." + info.parameters[j].name).second);
     }
@@ -194,9 +194,9 @@ TEST(Catalogue, TwinsNameEachOther) {
         return all;
     };
     for (const EffectInfo& info : kEffectInfos) {
-        for (const std::string& twin : names(info.twins)) {
+        for (const std::string& twin : names(info.confounded_with)) {
             EXPECT_NE(twin, info.id);
-            EXPECT_EQ(names(kEffectInfos[effect_index(twin)].twins).count(info.id), 1U)
+            EXPECT_EQ(names(kEffectInfos[effect_index(twin)].confounded_with).count(info.id), 1U)
                 << info.id << " and " << twin;
         }
         EXPECT_TRUE(*info.through == 0 || effect_index(info.through) < kEffectCount);
@@ -205,10 +205,10 @@ TEST(Catalogue, TwinsNameEachOther) {
 
 TEST_P(AnyEffect, InAMirrorOnlyMirroredParametersChangeTheirSign) {
     Parameters p = plain_parameters();
-    for (std::size_t j = 0; j < info().parameter_count; ++j)
+    for (std::size_t j = 0; j < info().parameter_count(); ++j)
         p[first() + j] = info().parameters[j].typical;
     Parameters q = p;
-    for (std::size_t j = 0; j < info().parameter_count; ++j)
+    for (std::size_t j = 0; j < info().parameter_count(); ++j)
         if (info().parameters[j].mirrored) q[first() + j] = -p[first() + j];
     const double dt = 0.01;
     std::vector<Input> left;
@@ -226,7 +226,7 @@ TEST_P(AnyEffect, InAMirrorOnlyMirroredParametersChangeTheirSign) {
 
 TEST(Catalogue, OffsetsFollowEachOther) {
     for (std::size_t i = 0; i + 1 < kEffectCount; ++i)
-        EXPECT_EQ(effect_offset(i + 1), effect_offset(i) + kEffectInfos[i].parameter_count);
+        EXPECT_EQ(effect_offset(i + 1), effect_offset(i) + kEffectInfos[i].parameter_count());
     EXPECT_EQ(effect_offset(0), 0U);
     EXPECT_EQ(kParameterCount,
               kBaseParameterCount + kEffectParameterCount + kUserEffects * kUserParameters);

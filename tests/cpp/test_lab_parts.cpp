@@ -86,11 +86,11 @@ NominalCar nominal() {
 
 TEST(LabController, LoadsMoveWithTheForce) {
     const NominalCar car = nominal();
-    const AxleLoads still = car.loads(0.0), brakes = car.loads(-6000.0);
-    EXPECT_NEAR(still.front_n + still.rear_n, 800.0 * 9.80665, 1e-9);
-    EXPECT_NEAR(brakes.front_n - still.front_n, 600.0, 1e-9);
-    EXPECT_NEAR(brakes.rear_n - still.rear_n, -600.0, 1e-9);
-    EXPECT_GT(car.loads(1e6).front_n, 0.0);
+    const Axles<double> still = car.loads(0.0), brakes = car.loads(-6000.0);
+    EXPECT_NEAR(still.front + still.rear, 800.0 * 9.80665, 1e-9);
+    EXPECT_NEAR(brakes.front - still.front, 600.0, 1e-9);
+    EXPECT_NEAR(brakes.rear - still.rear, -600.0, 1e-9);
+    EXPECT_GT(car.loads(1e6).front, 0.0);
 }
 
 TEST(LabController, CancelsTheLinearCarExactly) {
@@ -99,11 +99,11 @@ TEST(LabController, CancelsTheLinearCarExactly) {
     const Adrc adrc({}, car);
     Estimate x;
     x << 20.0, 0.4, 0.1, 150.0, -300.0, 200.0;
-    const AxleLoads loads = car.loads(0.0);
+    const Axles<double> loads = car.loads(0.0);
     std::uint32_t limits = 0;
     const double delta = adrc.steer(0.13, x, loads, limits);
-    const double cf = car.stiffness_front * loads.front_n;
-    const double cr = car.stiffness_rear * loads.rear_n;
+    const double cf = car.stiffness_front * loads.front;
+    const double cr = car.stiffness_rear * loads.rear;
     const double front = cf * (delta - (x[1] + car.lf_m * x[2]) / x[0]);
     const double rear = -cr * (x[1] - car.lr_m * x[2]) / x[0];
     const double r_dot = (car.lf_m * front - car.lr_m * rear + x[5]) / car.yaw_inertia_kgm2;
@@ -148,7 +148,7 @@ TEST(LabController, TheRearTyreComesNoNearerToItsLimitThanTheBarrierLets) {
     data.rear_slip_limit_rad = 0.1;
     data.rear_slip_gain_ps = 10.0;
     const Adrc adrc(data, nominal());
-    const AxleLoads loads{4000.0, 4000.0};
+    const Axles<double> loads{4000.0, 4000.0};
     Estimate x = Estimate::Zero();
     x[kEstVx] = 20.0;
     std::uint32_t limits = 0;

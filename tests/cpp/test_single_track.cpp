@@ -9,7 +9,7 @@ namespace {
 Parameters mirror_symmetric_parameters() {
     Parameters p = typical_parameters();
     for (std::size_t i = 0; i < kEffectCount; ++i)
-        for (std::size_t j = 0; j < kEffectInfos[i].parameter_count; ++j)
+        for (std::size_t j = 0; j < kEffectInfos[i].parameter_count(); ++j)
             if (kEffectInfos[i].parameters[j].mirrored)
                 p[kBaseParameterCount + effect_offset(i) + j] = 0.0;
     return p;

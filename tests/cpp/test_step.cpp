@@ -58,7 +58,7 @@ TEST(Step, LagsOfAnySizeNeedNoShorterSteps) {
         for (double size : {0.0005, 0.002, 0.005, 0.01, 0.03, 0.1}) {
             Parameters p = plain_parameters();
             const bool length = std::string(id) == "tyre_relaxation";
-            for (std::size_t j = 0; j < kEffectInfos[effect_index(id)].parameter_count; ++j)
+            for (std::size_t j = 0; j < kEffectInfos[effect_index(id)].parameter_count(); ++j)
                 p[parameter_of(id, j)] = length ? 20.0 * size : size;
             ModelState<double> x{25.0};
             settle_auxiliary(model, x, kCalm.data(), lively(0.0), p.data());

@@ -32,14 +32,14 @@ TEST(TwinVehicle, OnStiffTyresOnlyTheSprungMassRollsAndEveryMassLoadsTheOuterWhe
         (data.design.mass_kg * data.design.cg_z_m - 4.0 * a.unsprung_kg * a.radius_m) / sprung;
     const double lever = height - a.roll_centre_m;
     const double stiffness = 2.0 * a.track_m * a.track_m * (a.spring_npm / 2.0 + a.anti_roll_npm);
-    const double angle = sprung * lever * ay / (stiffness - sprung * kTwinGravity * lever);
+    const double angle = sprung * lever * ay / (stiffness - sprung * kGravity * lever);
     EXPECT_NEAR(x[Roll] / angle, 1.0, 0.005);
     // Of the whole car about the ground: the mass at its height and the body's weight beside.
     double transfer = 0.0;
     for (std::size_t i = 0; i < kWheels; ++i)
         transfer -= (i % 2 == 0 ? 0.5 : -0.5) * a.track_m * y[output14::kFz + i];
     const double expected =
-        data.design.mass_kg * data.design.cg_z_m * ay + sprung * kTwinGravity * lever * x[Roll];
+        data.design.mass_kg * data.design.cg_z_m * ay + sprung * kGravity * lever * x[Roll];
     EXPECT_NEAR(transfer / expected, 1.0, 0.002);
 }
 

@@ -67,13 +67,13 @@ TEST(TwinVehicle, AnotherLoadSagsAndTheWheelsCarryIt) {
     const State14 x = car.rest(0.0);
     EXPECT_LT(x[Z], -0.015);
     const Output14 y = car.output(x, {});
-    const double wheels = 2.0 * car.car().rear.unsprung_kg * kTwinGravity;
+    const double wheels = 2.0 * car.car().rear.unsprung_kg * kGravity;
     const double rear = y[output14::kFz + 2] + y[output14::kFz + 3] - wheels;
     const double all = rear + y[output14::kFz] + y[output14::kFz + 1] - wheels;
-    EXPECT_NEAR(all, heavy.mass_kg * kTwinGravity - 2.0 * wheels, 1e-3);
+    EXPECT_NEAR(all, heavy.mass_kg * kGravity - 2.0 * wheels, 1e-3);
     // The lever of weight over a pitched body is small beside the wheelbase.
     EXPECT_NEAR(rear / all, -heavy.cg_x_m / car.car().wheelbase_m, 0.003);
-    EXPECT_NEAR(y[output14::Az], kTwinGravity, 1e-6);
+    EXPECT_NEAR(y[output14::Az], kGravity, 1e-6);
 }
 
 TEST(TwinVehicle, WithoutLossesEnergyStays) {
@@ -136,7 +136,7 @@ TEST(TwinVehicle, EigenfrequenciesAreThoseOfQuarterCars) {
     // Weight over a tilted body works against the springs.
     const double height =
         (data.design.mass_kg * data.design.cg_z_m - 4.0 * a.unsprung_kg * a.radius_m) / sprung;
-    const double tip = sprung * kTwinGravity * (height - a.roll_centre_m) / 4.0;
+    const double tip = sprung * kGravity * (height - a.roll_centre_m) / 4.0;
     std::vector<double> expected;
     const auto add = [&](std::array<double, 2> pair) {
         expected.insert(expected.end(), pair.begin(), pair.end());
@@ -175,7 +175,7 @@ TEST(TwinVehicle, RollGradientIsThatOfSpringsBarsAndTyres) {
     const double stiff = (a.spring_npm + 2.0 * a.anti_roll_npm) * t / 2.0;
     const double series = 1.0 + 2.0 * stiff / (a.tyre_npm * t);
     const double gradient = (h * m * series - a.roll_centre_m * sprung - unsprung) /
-                            (2.0 * t * stiff - series * sprung * kTwinGravity * lever);
+                            (2.0 * t * stiff - series * sprung * kGravity * lever);
     EXPECT_NEAR(x[Roll] / ay, gradient, 0.005 * gradient);
 }
 
@@ -195,8 +195,8 @@ TEST(TwinVehicle, YawRateIsThatOfTheLinearBicycle) {
             x[Vx] = speed;
         }
         const double base = data.wheelbase_m, lf = -data.design.cg_x_m, lr = base - lf;
-        const double wheels = 2.0 * data.front.unsprung_kg * kTwinGravity;
-        const double weight = data.design.mass_kg * kTwinGravity - 2.0 * wheels;
+        const double wheels = 2.0 * data.front.unsprung_kg * kGravity;
+        const double weight = data.design.mass_kg * kGravity - 2.0 * wheels;
         const auto stiffness = [](const TyreData& t, double load) {
             return t.cornering_stiffness * t.nominal_load_n *
                    std::sin(2.0 * std::atan(load / (t.load_at_peak_stiffness * t.nominal_load_n)));

@@ -338,7 +338,7 @@ def test_too_little_to_learn_from(driven: dict, observer: Observer, record: Obse
 def test_car_from_a_vehicle(car: Vehicle) -> None:
     same = ObserverCar.of(car)
     assert same.mass_kg == car.mass_kg
-    assert sum(same.static_loads_n()) == pytest.approx(car.mass_kg * 9.81)
+    assert sum(same.static_loads_n()) == pytest.approx(car.mass_kg * 9.80665)
     with pytest.raises(InvalidInput, match="yaw_inertia_kgm2"):
         ObserverCar.of(car.replace(yaw_inertia_kgm2=None))
     with pytest.raises(InvalidInput, match="mass_kg"):

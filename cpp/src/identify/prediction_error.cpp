@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sysid/estimate/frozen.hpp"
+#include "sysid/identify/least_squares.hpp"
 #include "sysid/identify/run_system.hpp"
 #include "sysid/math/interrupt.hpp"
 
@@ -30,11 +32,7 @@ void freeze_run(const Problem& problem, const Run& run, const double* p, const N
                     s.update.gain.row(system.packed(i));
             for (std::size_t i = kMotionStates; i < system.disturbances(); ++i)
                 steps[k].gain.row(road_row(i)) = s.update.gain.row(system.disturbing(i));
-            Mat<kChannels, kChannels> present = Mat<kChannels, kChannels>::Identity();
-            for (int i = 0; i < kChannels; ++i)
-                if (std::isnan(run.measurements[k][i])) present(i, i) = 0.0;
-            steps[k].whitener =
-                s.update.lower.template triangularView<Eigen::Lower>().solve(present);
+            steps[k].whitener = whitener_of<kChannels>(s.update, run.measurements[k]);
             filter.observed += static_cast<std::size_t>(s.update.observed);
             if (k + 1 < run.size())
                 steps[k + 1].substeps = substeps_for(problem.model, p, s.mean[0], run.dt);
@@ -56,8 +54,6 @@ void run_frozen(const SingleTrack& model, const Run& run, const double* p_values
     std::array<double, kDisturbances> forget;
     for (std::size_t i = 0; i < kDisturbances; ++i) forget[i] = noise.forget(i, run.dt);
     std::array<S, kExternals> external;
-    std::array<S, kChannels> error;
-    std::array<S, kChannels> white;
     const auto fill_push = [&](std::size_t k) {
         external.fill(S(0.0));
         for (std::size_t i = 0; i < disturbances; ++i) external[i] = disturbance[i];
@@ -79,77 +75,31 @@ void run_frozen(const SingleTrack& model, const Run& run, const double* p_values
         auto y = sense(model, x, external.data(), run.inputs[k], p);
         shift(k, y);
         const FrozenStep& step = steps[k];
-        for (int i = 0; i < kChannels; ++i) {
-            const double measured = run.measurements[k][i];
-            const auto n = static_cast<std::size_t>(i);
-            error[n] = std::isnan(measured) ? S(0.0) : measured - y[n];
-        }
-        for (int i = 0; i < kChannels; ++i) {
-            S sum(0.0);
-            for (int j = 0; j <= i; ++j)
-                sum += step.whitener(i, j) * error[static_cast<std::size_t>(j)];
-            white[static_cast<std::size_t>(i)] = sum;
-        }
-        keep(k, white);
-        const auto correct = [&](int row, S& state) {
-            S correction(0.0);
-            for (int j = 0; j < kChannels; ++j)
-                correction += step.gain(row, j) * error[static_cast<std::size_t>(j)];
-            state += correction;
-        };
+        const std::array<S, kChannels> error = errors_of(run.measurements[k], y);
+        keep(k, whitened(step.whitener, error));
+        const auto mend = [&](int row, S& state) { correct(step.gain, row, error, state); };
         for (int i = 0; i < kMotionStates; ++i) {
-            correct(i, x[static_cast<std::size_t>(i)]);
-            correct(kMotionStates + i, disturbance[static_cast<std::size_t>(i)]);
+            mend(i, x[static_cast<std::size_t>(i)]);
+            mend(kMotionStates + i, disturbance[static_cast<std::size_t>(i)]);
         }
         for (std::size_t i = kMotionStates; i < disturbances; ++i)
-            correct(road_row(i), disturbance[i]);
-        for (std::size_t i : own) correct(kStatesPlain + static_cast<int>(i), x[kMotionStates + i]);
+            mend(road_row(i), disturbance[i]);
+        for (std::size_t i : own) mend(kStatesPlain + static_cast<int>(i), x[kMotionStates + i]);
     }
 }
 
 const auto kNothing = [](std::size_t, auto&) {};
 
-/// The parameter vector with `count` of `columns`, from `first` on, as directions.
-template <int N>
-std::vector<Dual<N>> seeded(const double* p, const std::vector<int>& columns, std::size_t first,
-                            std::size_t count) {
-    std::vector<Dual<N>> wide(p, p + kParameterCount);
-    for (std::size_t i = 0; i < count; ++i)
-        wide[static_cast<std::size_t>(columns[first + i])].d[i] = 1.0;
-    return wide;
-}
+constexpr Passes<kShortParameterPass, kParameterPass> kPasses{kParameterCount};
 
-template <int N, class Keep>
-void differentiate(const Problem& problem, const double* p, const FrozenFilter& filter,
-                   const std::vector<int>& columns, std::size_t first, std::size_t count,
-                   Keep&& keep) {
-    const std::vector<Dual<N>> wide = seeded<N>(p, columns, first, count);
-    for (std::size_t i = 0; i < problem.runs.size(); ++i) {
-        run_frozen<Dual<N>>(problem.model, problem.runs[i], p, wide.data(), filter.runs[i],
-                            filter.noise, kNothing, kNothing, keep);
-    }
-}
-
-/// Sensitivities to the parameters `columns`, row-major, and where `values` is given the residuals
-/// themselves, which the first pass has along the way.
-void passes(const Problem& problem, const double* p, const FrozenFilter& filter,
-            const std::vector<int>& columns, double* out, double* values) {
-    const std::size_t width = columns.size();
-    for (std::size_t first = 0; first < width; first += kParameterPass) {
-        const std::size_t count = std::min<std::size_t>(kParameterPass, width - first);
-        double* row = out + first;
-        const auto keep = [&](std::size_t, const auto& white) {
-            for (const auto& e : white) {
-                for (std::size_t j = 0; j < count; ++j) row[j] = -e.d[j];
-                row += width;
-                if (first == 0 && values != nullptr) *values++ = e.v;
-            }
-        };
-        if (count <= kShortParameterPass)
-            differentiate<kShortParameterPass>(problem, p, filter, columns, first, count, keep);
-        else
-            differentiate<kParameterPass>(problem, p, filter, columns, first, count, keep);
-    }
+/// As `least_squares.hpp` takes it.
+auto walk_of(const Problem& problem, const double* values, const FrozenFilter& filter) {
+    return [&problem, values, &filter](const auto* p, auto&& keep) {
+        using S = std::decay_t<decltype(*p)>;
+        for (std::size_t i = 0; i < problem.runs.size(); ++i)
+            run_frozen<S>(problem.model, problem.runs[i], values, p, filter.runs[i], filter.noise,
+                          kNothing, kNothing, [&](std::size_t, const auto& white) { keep(white); });
+    };
 }
 
 }  // namespace
@@ -167,42 +117,22 @@ FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise)
 }
 
 void residuals(const Problem& problem, const double* p, const FrozenFilter& filter, double* out) {
-    for (std::size_t i = 0; i < problem.runs.size(); ++i) {
-        run_frozen<double>(problem.model, problem.runs[i], p, p, filter.runs[i], filter.noise,
-                           kNothing, kNothing, [&](std::size_t, const auto& white) {
-                               for (double value : white) *out++ = value;
-                           });
-    }
+    residuals_of(walk_of(problem, p, filter), p, out);
 }
 
 double half_sum_of_squares(const Problem& problem, const double* p, const FrozenFilter& filter) {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < problem.runs.size(); ++i) {
-        run_frozen<double>(problem.model, problem.runs[i], p, p, filter.runs[i], filter.noise,
-                           kNothing, kNothing, [&](std::size_t, const auto& white) {
-                               for (double value : white) sum += value * value;
-                           });
-    }
-    return 0.5 * sum;
+    return half_sum_of(walk_of(problem, p, filter), p);
 }
 
 void sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,
                    const std::vector<int>& columns, double* out) {
-    passes(problem, p, filter, columns, out, nullptr);
+    kPasses.sensitivities(walk_of(problem, p, filter), p, columns, out);
 }
 
 double normal_equations(const Problem& problem, const double* p, const FrozenFilter& filter,
                         const std::vector<int>& columns, double* gradient, double* information) {
-    const auto width = static_cast<Eigen::Index>(columns.size());
-    const auto rows = static_cast<Eigen::Index>(problem.samples() * kChannels);
-    using Wholes = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    Wholes G(rows, width);
-    Eigen::VectorXd e(rows);
-    if (columns.empty()) residuals(problem, p, filter, e.data());
-    passes(problem, p, filter, columns, G.data(), e.data());
-    Eigen::Map<Eigen::VectorXd>(gradient, width).noalias() = G.transpose() * e;
-    Eigen::Map<Wholes>(information, width, width).noalias() = G.transpose() * G;
-    return 0.5 * e.squaredNorm();
+    return kPasses.normal_equations(walk_of(problem, p, filter), p, problem.samples() * kChannels,
+                                    columns, gradient, information);
 }
 
 void signal_sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,

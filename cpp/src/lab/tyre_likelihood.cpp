@@ -2,83 +2,27 @@
 
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
-#include "sysid/math/errors.hpp"
+#include "sysid/estimate/frozen.hpp"
+#include "sysid/estimate/noise_score.hpp"
+#include "sysid/identify/least_squares.hpp"
 #include "sysid/math/interrupt.hpp"
-#include "sysid/math/linear.hpp"
 
 namespace sysid::lab {
 
 namespace {
 
-using State = std::array<double, kGreyStates>;
-template <std::size_t W>
-using Tangent = std::array<std::array<double, W>, kGreyStates>;
-using Noisy = Dual<kGreyNoises>;
+template <class S>
+using State = std::array<S, kGreyStates>;
+template <class S>
+using Reading = std::array<S, kGreyChannels>;
+using Step = FilterStep<kGreyStates, kGreyChannels>;
 
-constexpr double kLogTwoPi = 1.8378770664093453;
+// Both tyres and the drag; factors of mass and inertia as well.
+constexpr Passes<9, 11> kPasses{kTyreParameters};
 
-/// `grey_box_step` that carries derivatives along: by the first state if W is 3, by all parameters
-/// otherwise.
-template <std::size_t W>
-void step_with_tangent(const GreyBoxCar& car, State& x, Tangent<W>& tangent, const GreyBoxInput& u,
-                       const double* p, double dt) {
-    constexpr bool kParameters = W == kTyreParameters;
-    const int substeps = grey_box_substeps(car, u, p, x[0], dt);
-    const double h = dt / substeps;
-    constexpr std::array<double, 4> kReach{0.0, 0.5, 0.5, 1.0};
-    constexpr std::array<double, 4> kWeight{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
-    GreyBoxSlope slope;
-    LoadsSince<double> since;
-    std::array<double, W> drawn_by{};
-    std::array<double, W> squared_by{};
-    for (int n = 0; n < substeps; ++n) {
-        State k{};
-        State moved = x;
-        Tangent<W> rate{};
-        Tangent<W> next = tangent;
-        for (std::size_t stage = 0; stage < 4; ++stage) {
-            const double reach = kReach[stage] * h;
-            State at;
-            for (std::size_t i = 0; i < kGreyStates; ++i) at[i] = x[i] + reach * k[i];
-            grey_box_slope(car, at, u, p, kParameters, slope, since);
-            Tangent<W> here;
-            for (std::size_t i = 0; i < kGreyStates; ++i)
-                for (std::size_t w = 0; w < W; ++w) here[i][w] = tangent[i][w] + reach * rate[i][w];
-            const bool begins = stage == 0 && n == 0 && car.cg_height_m > 0.0;
-            if (begins) since = loads_from(car, at, u, p, slope.value);
-            for (std::size_t i = 0; i < kGreyStates; ++i) {
-                const auto& a = slope.by_state[i];
-                for (std::size_t w = 0; w < W; ++w) {
-                    rate[i][w] = a[0] * here[0][w] + a[1] * here[1][w] + a[2] * here[2][w];
-                    if constexpr (kParameters) rate[i][w] += slope.by_parameter[i][w];
-                    // In the first stage nothing has moved yet, whatever it moves from.
-                    if (!begins)
-                        rate[i][w] += slope.by_drawn[i] * drawn_by[w] +
-                                      slope.by_first_squared[i] * squared_by[w];
-                    next[i][w] += h * kWeight[stage] * rate[i][w];
-                }
-                k[i] = slope.value[i];
-                moved[i] += h * kWeight[stage] * k[i];
-            }
-            if (!begins) continue;
-            const double mass = car.mass_kg * p[kMassFactor];
-            for (std::size_t w = 0; w < W; ++w) {
-                drawn_by[w] = mass * (at[2] * here[1][w] + at[1] * here[2][w] - rate[0][w]);
-                squared_by[w] = 2.0 * at[0] * here[0][w];
-            }
-            // T is a force: the mass has no part in it but through the motion.
-            if constexpr (kParameters)
-                drawn_by[kMassFactor] += mass * slope.by_parameter[0][kMassFactor];
-        }
-        x = moved;
-        tangent = next;
-    }
-}
-
-State first_state(const TyreRun& run) {
-    const auto first = [&](std::size_t channel, double otherwise) {
+State<double> first_state(const TyreRun& run) {
+    const auto first = [&](int channel, double otherwise) {
         for (std::size_t k = 0; k < run.size() && k < 50; ++k)
             if (!std::isnan(run.measurements[k][channel])) return run.measurements[k][channel];
         return otherwise;
@@ -86,307 +30,194 @@ State first_state(const TyreRun& run) {
     return {first(0, 10.0), first(1, 0.0), first(2, 0.0)};
 }
 
-/// The filter, on a scalar that may carry derivatives by the noise. `visit(k, channel, error,
-/// variance, gain)` is called for every reading there is.
-template <class S, class Visit>
-void run_filter(const GreyBoxCar& car, const TyreRun& run, const double* p,
-                const std::array<S, kGreyNoises>& noise, Visit&& visit) {
-    const State begin = first_state(run);
-    std::array<S, kGreyStates> x{S(begin[0]), S(begin[1]), S(begin[2])};
-    std::array<std::array<S, kGreyStates>, kGreyStates> cov{};
-    for (auto& row : cov) row.fill(S(0.0));
-    // Wide enough that the first readings, not the guess, decide.
-    cov[0][0] = cov[1][1] = S(1.0);
-    cov[2][2] = S(0.04);
-    GreyBoxSlope slope;
-    for (std::size_t k = 0; k < run.size(); ++k) {
-        poll_interrupt(k);
-        State at{value_of(x[0]), value_of(x[1]), value_of(x[2])};
-        if (k > 0) {
-            Tangent<kGreyStates> phi{{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
-            const State before = at;
-            step_with_tangent(car, at, phi, run.inputs[k - 1], p, run.dt);
-            std::array<S, kGreyStates> moved;
-            std::array<std::array<S, kGreyStates>, kGreyStates> half;
-            for (std::size_t i = 0; i < kGreyStates; ++i) {
-                moved[i] = S(at[i]);
-                for (std::size_t j = 0; j < kGreyStates; ++j) {
-                    moved[i] += phi[i][j] * (x[j] - before[j]);
-                    half[i][j] =
-                        phi[i][0] * cov[0][j] + phi[i][1] * cov[1][j] + phi[i][2] * cov[2][j];
-                }
-            }
-            x = moved;
-            for (std::size_t i = 0; i < kGreyStates; ++i) {
-                for (std::size_t j = 0; j <= i; ++j)
-                    cov[i][j] = cov[j][i] =
-                        half[i][0] * phi[j][0] + half[i][1] * phi[j][1] + half[i][2] * phi[j][2];
-                cov[i][i] += run.dt * (noise[kGreyChannels + i] * noise[kGreyChannels + i]);
-            }
-        }
-        for (std::size_t c = 0; c < kGreyChannels; ++c) {
-            const double reading = run.measurements[k][c];
-            if (std::isnan(reading)) continue;
-            std::array<S, kGreyStates> seen;  // covariance of the state with the reading
-            S variance;
-            S error;
-            if (c < kGreyStates) {
-                for (std::size_t i = 0; i < kGreyStates; ++i) seen[i] = cov[i][c];
-                variance = seen[c];
-                error = reading - x[c];
-            } else {
-                at = {value_of(x[0]), value_of(x[1]), value_of(x[2])};
-                grey_box_slope(car, at, run.inputs[k], p, false, slope);
-                const auto& row = slope.by_state[3];
-                error = S(reading - slope.value[3]);
-                variance = S(0.0);
-                for (std::size_t i = 0; i < kGreyStates; ++i) {
-                    seen[i] = cov[i][0] * row[0] + cov[i][1] * row[1] + cov[i][2] * row[2];
-                    error += -row[i] * (x[i] - at[i]);
-                }
-                for (std::size_t i = 0; i < kGreyStates; ++i) variance += row[i] * seen[i];
-            }
-            variance += noise[c] * noise[c];
-            std::array<S, kGreyStates> gain;
-            for (std::size_t i = 0; i < kGreyStates; ++i) gain[i] = seen[i] / variance;
-            // Of a reading surer than this the difference below leaves what rounding makes of it;
-            // each variance then keeps a share that is larger.
-            const bool sure = value_of(noise[c] * noise[c]) < kSurest * value_of(variance);
-            for (std::size_t i = 0; i < kGreyStates; ++i) {
-                x[i] += gain[i] * error;
-                const double kept = sure ? 0.1 * kSurest * value_of(cov[i][i]) : 0.0;
-                for (std::size_t j = 0; j <= i; ++j)
-                    cov[i][j] = cov[j][i] = cov[i][j] - gain[i] * seen[j];
-                cov[i][i] += kept;
-            }
-            visit(k, c, error, variance, gain);
-        }
-        if (!std::isfinite(value_of(x[0]) + value_of(x[1]) + value_of(x[2])))
-            throw NumericalFailure("tyre filter: the state left the range of numbers", k);
-    }
+/// Moves on from sample `k`; `values` are those of the parameters `p`.
+template <class S, class T>
+void go_on(const GreyBoxCar& car, const TyreRun& run, std::size_t k, const double* values,
+           const T* p, State<S>& x) {
+    const GreyBoxInput& u = run.inputs[k];
+    grey_box_step(car, x, u, p, run.dt, grey_box_substeps(car, u, values, value_of(x[0]), run.dt));
 }
 
-/// The mean of the filter with frozen gains. `keep(k, channel, error over its size)`.
-template <class Keep>
-void run_mean(const GreyBoxCar& car, const TyreRun& run, const double* p,
-              const std::vector<FrozenGain>& gains, Keep&& keep) {
-    State x = first_state(run);
-    for (std::size_t k = 0; k < run.size(); ++k) {
-        poll_interrupt(k);
-        if (k > 0) {
-            const auto& u = run.inputs[k - 1];
-            grey_box_step(car, x, u, p, run.dt, grey_box_substeps(car, u, p, x[0], run.dt));
+template <class S, class T>
+Reading<S> expected(const GreyBoxCar& car, const State<S>& x, const GreyBoxInput& u, const T* p) {
+    return {x[0], x[1], x[2], grey_box(car, x, u, p)[kGreyStates]};
+}
+
+/// A run as the `System` of `extended_kalman_filter`.
+class GreySystem {
+  public:
+    static constexpr int kDirectReadings = kGreyStates;
+    static constexpr bool kSteadyNoise = true;
+    using StateVec = Vec<kGreyStates>;
+    using StateMat = Mat<kGreyStates, kGreyStates>;
+    using Sensors = Mat<kGreyChannels, kGreyChannels>;
+
+    GreySystem(const GreyBoxCar& car, const TyreRun& run, const double* p, const double* noise)
+        : car_(car), run_(run), p_(p) {
+        const Eigen::Map<const Vec<kGreyNoises>> std(noise);
+        sensors_ = std.head<kGreyChannels>().cwiseAbs2().asDiagonal();
+        process_ = (run.dt * std.tail<kGreyStates>().cwiseAbs2()).asDiagonal();
+    }
+
+    /// Wide enough that the first readings, not the guess, decide.
+    template <class Keep>
+    double filter(Keep&& keep) const {
+        const State<double> x = first_state(run_);
+        return extended_kalman_filter<kGreyStates, kGreyChannels>(
+            *this, StateVec(x[0], x[1], x[2]), StateMat(StateVec(1.0, 1.0, 0.04).asDiagonal()),
+            keep);
+    }
+
+    std::size_t size() const { return run_.size(); }
+    const StateMat& process_noise() const { return process_; }
+    StateVec predict(std::size_t k, const StateVec& x, StateMat& A, StateMat& /*steady*/) const {
+        State<D> moved = seeded(x);
+        go_on(car_, run_, k - 1, p_, p_, moved);
+        return taken(moved, A);
+    }
+    Vec<kGreyChannels> observe(std::size_t k, const StateVec& x,
+                               Mat<kGreyChannels, kGreyStates>& H) const {
+        return taken(expected(car_, seeded(x), run_.inputs[k], p_), H);
+    }
+    const Vec<kGreyChannels>& measurement(std::size_t k) const { return run_.measurements[k]; }
+    const Sensors& measurement_noise(std::size_t /*k*/) const { return sensors_; }
+
+  private:
+    using D = Dual<kGreyStates>;
+    static State<D> seeded(const StateVec& x) {
+        return {D::seeded(x[0], 0), D::seeded(x[1], 1), D::seeded(x[2], 2)};
+    }
+    template <std::size_t N>
+    static Vec<static_cast<int>(N)> taken(const std::array<D, N>& from,
+                                          Mat<static_cast<int>(N), kGreyStates>& slopes) {
+        Vec<static_cast<int>(N)> values;
+        for (std::size_t i = 0; i < N; ++i) {
+            const auto row = static_cast<int>(i);
+            values[row] = from[i].v;
+            slopes.row(row) = Eigen::Map<const StateVec>(from[i].d.data());
         }
-        for (std::size_t c = 0; c < kGreyChannels; ++c) {
-            double error = 0.0;
-            if (gains[k].per_std[c] > 0.0) {
-                const double expected =
-                    c < kGreyStates ? x[c] : grey_box(car, x, run.inputs[k], p)[3];
-                error = run.measurements[k][c] - expected;
-                for (std::size_t i = 0; i < kGreyStates; ++i) x[i] += gains[k].gain[c][i] * error;
-            }
-            keep(k, c, error * gains[k].per_std[c], x);
+        return values;
+    }
+
+    const GreyBoxCar& car_;
+    const TyreRun& run_;
+    const double* p_;
+    StateMat process_;
+    Sensors sensors_;
+};
+
+/// The mean of the filter with frozen gains; `keep(e, x)` gets whitened errors and the state that
+/// has seen them.
+template <class T, class Keep>
+void run_frozen(const TyreProblem& problem, const FrozenGains& gains, const double* values,
+                const T* p, Keep&& keep) {
+    for (std::size_t i = 0; i < problem.runs.size(); ++i) {
+        const TyreRun& run = problem.runs[i];
+        const State<double> start = first_state(run);
+        State<T> x{T(start[0]), T(start[1]), T(start[2])};
+        for (std::size_t k = 0; k < run.size(); ++k) {
+            poll_interrupt(k);
+            if (k > 0) go_on(problem.car, run, k - 1, values, p, x);
+            const FrozenGain& step = gains.runs[i][k];
+            const Reading<T> error =
+                errors_of(run.measurements[k], expected(problem.car, x, run.inputs[k], p));
+            for (std::size_t n = 0; n < kGreyStates; ++n)
+                correct(step.gain, static_cast<int>(n), error, x[n]);
+            keep(whitened(step.whitener, error), x);
         }
     }
 }
 
-/// The same with the derivatives by all parameters; `keep` receives both, whitened.
-template <class Keep>
-void run_tangent(const GreyBoxCar& car, const TyreRun& run, const double* p,
-                 const std::vector<FrozenGain>& gains, Keep&& keep) {
-    State x = first_state(run);
-    Tangent<kTyreParameters> tangent{};
-    GreyBoxSlope slope;
-    std::array<double, kTyreParameters> by;
-    for (std::size_t k = 0; k < run.size(); ++k) {
-        poll_interrupt(k);
-        if (k > 0) step_with_tangent(car, x, tangent, run.inputs[k - 1], p, run.dt);
-        for (std::size_t c = 0; c < kGreyChannels; ++c) {
-            const double per_std = gains[k].per_std[c];
-            if (per_std == 0.0) continue;
-            double expected = 0.0;
-            if (c < kGreyStates) {
-                expected = x[c];
-                by = tangent[c];
-            } else {
-                grey_box_slope(car, x, run.inputs[k], p, true, slope);
-                expected = slope.value[3];
-                const auto& row = slope.by_state[3];
-                for (std::size_t w = 0; w < kTyreParameters; ++w)
-                    by[w] = slope.by_parameter[3][w] + row[0] * tangent[0][w] +
-                            row[1] * tangent[1][w] + row[2] * tangent[2][w];
-            }
-            const double error = run.measurements[k][c] - expected;
-            for (std::size_t i = 0; i < kGreyStates; ++i) {
-                const double gain = gains[k].gain[c][i];
-                x[i] += gain * error;
-                for (std::size_t w = 0; w < kTyreParameters; ++w) tangent[i][w] -= gain * by[w];
-            }
-            for (double& b : by) b *= per_std;
-            keep(k, c, error * per_std, by);
-        }
-    }
+/// As `identify/least_squares.hpp` takes it.
+auto walk_of(const TyreProblem& problem, const double* values, const FrozenGains& gains) {
+    return [&problem, values, &gains](const auto* p, auto&& keep) {
+        run_frozen(problem, gains, values, p, [&](const auto& white, const auto&) { keep(white); });
+    };
 }
 
 }  // namespace
 
-std::size_t TyreProblem::samples() const {
-    std::size_t n = 0;
-    for (const TyreRun& run : runs_) n += run.size();
-    return n;
-}
-
-FrozenGains TyreProblem::freeze(const double* p, const double* noise) const {
+FrozenGains freeze(const TyreProblem& problem, const double* p, const double* noise) {
     FrozenGains out;
-    std::array<double, kGreyNoises> values;
-    std::copy(noise, noise + kGreyNoises, values.begin());
-    for (const TyreRun& run : runs_) {
-        out.runs.emplace_back(run.size(), FrozenGain{});
-        auto& kept = out.runs.back();
-        run_filter<double>(
-            car_, run, p, values,
-            [&](std::size_t k, std::size_t c, double error, double variance, const State& gain) {
-                kept[k].gain[c] = gain;
-                kept[k].per_std[c] = 1.0 / std::sqrt(variance);
-                out.log_likelihood -=
-                    0.5 * (error * error / variance + std::log(variance) + kLogTwoPi);
-                ++out.observed;
+    for (const TyreRun& run : problem.runs) {
+        auto& kept = out.runs.emplace_back(run.size());
+        out.log_likelihood +=
+            GreySystem(problem.car, run, p, noise).filter([&](std::size_t k, const Step& s) {
+                kept[k] = {s.update.gain,
+                           whitener_of<kGreyChannels>(s.update, run.measurements[k])};
+                out.observed += static_cast<std::size_t>(s.update.observed);
             });
     }
     return out;
 }
 
-void TyreProblem::residuals(const double* p, const FrozenGains& gains, double* out) const {
-    for (std::size_t i = 0; i < runs_.size(); ++i)
-        run_mean(car_, runs_[i], p, gains.runs[i],
-                 [&](std::size_t, std::size_t, double e, const State&) { *out++ = e; });
+void residuals(const TyreProblem& problem, const double* p, const FrozenGains& gains, double* out) {
+    residuals_of(walk_of(problem, p, gains), p, out);
 }
 
-double TyreProblem::half_sum_of_squares(const double* p, const FrozenGains& gains) const {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < runs_.size(); ++i)
-        run_mean(car_, runs_[i], p, gains.runs[i],
-                 [&](std::size_t, std::size_t, double e, const State&) { sum += e * e; });
-    return 0.5 * sum;
+double half_sum_of_squares(const TyreProblem& problem, const double* p, const FrozenGains& gains) {
+    return half_sum_of(walk_of(problem, p, gains), p);
 }
 
-void TyreProblem::sensitivities(const double* p, const FrozenGains& gains,
-                                const std::vector<int>& columns, double* out) const {
-    const std::size_t width = columns.size();
-    std::fill(out, out + samples() * kGreyChannels * width, 0.0);
-    for (std::size_t i = 0; i < runs_.size(); ++i) {
-        run_tangent(car_, runs_[i], p, gains.runs[i],
-                    [&](std::size_t k, std::size_t c, double, const auto& by) {
-                        double* row = out + (k * kGreyChannels + c) * width;
-                        for (std::size_t j = 0; j < width; ++j)
-                            row[j] = by[static_cast<std::size_t>(columns[j])];
-                    });
-        out += runs_[i].size() * kGreyChannels * width;
-    }
+void sensitivities(const TyreProblem& problem, const double* p, const FrozenGains& gains,
+                   const std::vector<int>& columns, double* out) {
+    kPasses.sensitivities(walk_of(problem, p, gains), p, columns, out);
 }
 
-double TyreProblem::normal_equations(const double* p, const FrozenGains& gains,
-                                     const std::vector<int>& columns, double* gradient,
-                                     double* information) const {
-    constexpr std::size_t kAll = kTyreParameters;
-    std::array<double, kAll> g{};
-    std::array<std::array<double, kAll>, kAll> n{};
-    double sum = 0.0;
-    for (std::size_t i = 0; i < runs_.size(); ++i)
-        run_tangent(car_, runs_[i], p, gains.runs[i],
-                    [&](std::size_t, std::size_t, double e, const auto& by) {
-                        sum += e * e;
-                        for (std::size_t a = 0; a < kAll; ++a) {
-                            g[a] += by[a] * e;
-                            for (std::size_t b = 0; b <= a; ++b) n[a][b] += by[a] * by[b];
-                        }
-                    });
-    const std::size_t width = columns.size();
-    for (std::size_t i = 0; i < width; ++i) {
-        const auto a = static_cast<std::size_t>(columns[i]);
-        gradient[i] = g[a];
-        for (std::size_t j = 0; j < width; ++j) {
-            const auto b = static_cast<std::size_t>(columns[j]);
-            information[i * width + j] = a >= b ? n[a][b] : n[b][a];
-        }
-    }
-    return 0.5 * sum;
+double normal_equations(const TyreProblem& problem, const double* p, const FrozenGains& gains,
+                        const std::vector<int>& columns, double* gradient, double* information) {
+    return kPasses.normal_equations(walk_of(problem, p, gains), p,
+                                    problem.samples() * kGreyChannels, columns, gradient,
+                                    information);
 }
 
-double TyreProblem::noise_score(const double* p, const double* noise, double* gradient,
-                                double* information) const {
-    std::array<Noisy, kGreyNoises> values;
-    for (int i = 0; i < kGreyNoises; ++i) {
-        const auto n = static_cast<std::size_t>(i);
-        values[n] = Noisy(noise[n]);
-        values[n].d[n] = noise[n];  // derivative by the logarithm
-    }
-    std::fill_n(gradient, kGreyNoises, 0.0);
-    std::fill_n(information, static_cast<std::size_t>(kGreyNoises) * kGreyNoises, 0.0);
+double noise_score(const TyreProblem& problem, const double* p, const double* noise,
+                   double* gradient, double* information) {
+    using Score = NoiseScore<kGreyChannels, kGreyNoises>;
+    Score::Lanes slope = Score::Lanes::Zero();
+    Score::Table info = Score::Table::Zero();
+    const Vec<kGreyNoises> by = 2.0 * Eigen::Map<const Vec<kGreyNoises>>(noise).cwiseAbs2();
     double value = 0.0;
-    for (const TyreRun& run : runs_) {
-        run_filter<Noisy>(
-            car_, run, p, values,
-            [&](std::size_t, std::size_t, const Noisy& error, const Noisy& variance, const auto&) {
-                const double per = 1.0 / variance.v;
-                const double squared = error.v * error.v * per;
-                value -= 0.5 * (squared + std::log(variance.v) + kLogTwoPi);
-                for (std::size_t i = 0; i < kGreyNoises; ++i) {
-                    const double log_i = variance.d[i] * per;
-                    gradient[i] -= 0.5 * log_i * (1.0 - squared) + error.v * error.d[i] * per;
-                    for (std::size_t j = 0; j <= i; ++j)
-                        information[i * kGreyNoises + j] +=
-                            0.5 * log_i * variance.d[j] * per + error.d[i] * error.d[j] * per;
-                }
-            });
+    for (const TyreRun& run : problem.runs) {
+        Score score(kGreyStates, by.head<kGreyChannels>());
+        for (int i = 0; i < kGreyStates; ++i)
+            score.white(i, kGreyChannels + i, by[kGreyChannels + i] * run.dt);
+        const GreySystem system(problem.car, run, p, noise);
+        value += system.filter([&](std::size_t k, const Step& s) {
+            if (k > 0) score.predict(s.transition);
+            score.update(s, run.measurements[k]);
+        });
+        slope += score.score();
+        info += score.information();
     }
-    for (std::size_t i = 0; i < kGreyNoises; ++i)
-        for (std::size_t j = 0; j < i; ++j)
-            information[j * kGreyNoises + i] = information[i * kGreyNoises + j];
+    Eigen::Map<Score::Lanes>{gradient} = slope;
+    Eigen::Map<Score::Table>{information} = info;
     return value;
 }
 
-void TyreProblem::states(const double* p, const FrozenGains& gains, double* out) const {
-    for (std::size_t i = 0; i < runs_.size(); ++i)
-        run_mean(car_, runs_[i], p, gains.runs[i],
-                 [&](std::size_t, std::size_t c, double, const State& x) {
-                     if (c + 1 == kGreyChannels) out = std::copy(x.begin(), x.end(), out);
-                 });
+void states(const TyreProblem& problem, const double* p, const FrozenGains& gains, double* out) {
+    run_frozen(problem, gains, p, p, [&](const auto& /*white*/, const State<double>& x) {
+        out = std::copy(x.begin(), x.end(), out);
+    });
 }
 
-void TyreProblem::look_ahead(const double* p, const FrozenGains& gains, std::size_t ahead,
-                             double* out) const {
-    std::vector<double> all(samples() * kGreyStates);
-    states(p, gains, all.data());
+void look_ahead(const TyreProblem& problem, const double* p, const FrozenGains& gains,
+                std::size_t ahead, double* out) {
+    std::vector<double> all(problem.samples() * kGreyStates);
+    states(problem, p, gains, all.data());
     const double* filtered = all.data();
-    const auto read = [&](const State& x, const GreyBoxInput& u, double* row) {
-        std::copy(x.begin(), x.end(), row);
-        row[3] = grey_box(car_, x, u, p)[3];
-    };
-    for (const TyreRun& run : runs_) {
+    for (const TyreRun& run : problem.runs) {
         const std::size_t n = run.size();
-        const auto go_on = [&](State& x, std::size_t k) {
-            const auto& u = run.inputs[k];
-            grey_box_step(car_, x, u, p, run.dt, grey_box_substeps(car_, u, p, x[0], run.dt));
-        };
         std::fill(out, out + n * kGreyChannels, std::numeric_limits<double>::quiet_NaN());
-        const auto filtered_at = [&](std::size_t k) {
-            const double* at = filtered + k * kGreyStates;
-            return State{at[0], at[1], at[2]};
-        };
-        if (ahead == 0) {
-            State x = filtered_at(0);
-            for (std::size_t k = 0; k < n; ++k) {
-                if (k > 0) go_on(x, k - 1);
-                read(x, run.inputs[k], out + k * kGreyChannels);
-            }
-        } else {
-            for (std::size_t k = ahead; k < n; ++k) {
-                poll_interrupt();
-                State x = filtered_at(k - ahead);
-                for (std::size_t j = k - ahead; j < k; ++j) go_on(x, j);
-                read(x, run.inputs[k], out + k * kGreyChannels);
-            }
+        State<double> x{};
+        for (std::size_t k = ahead; k < n; ++k) {
+            poll_interrupt();
+            const std::size_t from = ahead == 0 && k > 0 ? k - 1 : k - ahead;
+            if (ahead > 0 || k == 0)
+                std::copy_n(filtered + from * kGreyStates, kGreyStates, x.begin());
+            for (std::size_t j = from; j < k; ++j) go_on(problem.car, run, j, p, p, x);
+            const Reading<double> read = expected(problem.car, x, run.inputs[k], p);
+            std::copy(read.begin(), read.end(), out + k * kGreyChannels);
         }
         out += n * kGreyChannels;
         filtered += n * kGreyStates;

@@ -67,19 +67,22 @@ const SideslipEstimate& PublishedDual::step(double dt, const SensorSample& s) {
         return drawn_about[4] + PublishedUkf<5, 4>::deviation(drawn, spread, column)[4];
     };
     const double r = s.yaw_rate_radps, vx = s.vx_mps;
-    const auto slip_f = [&](const Vec<3>& x) { return d - x[0] - c.lf_m * r / vx; };
-    const auto slip_r = [&](const Vec<3>& x) { return -x[0] + c.lr_m * r / vx; };
+    const auto slip = [&](const Vec<3>& x) {
+        return small_slip_angles(x[0], r / vx, c.lf_m, c.lr_m, d);
+    };
     tyres_.step(
         [&](const Vec<3>& x, int column) {
             Vec<3> next = x;
+            const Axles<double> alpha = slip(x);
             const double across = fx(column) * std::sin(d - x[0]) +
-                                  (cf_ + x[1]) * slip_f(x) * std::cos(d - x[0]) +
-                                  (cr_ + x[2]) * slip_r(x) * std::cos(x[0]);
+                                  (cf_ + x[1]) * alpha.front * std::cos(d - x[0]) +
+                                  (cr_ + x[2]) * alpha.rear * std::cos(x[0]);
             next[0] += dt * (across / (m * vx) - r);
             return next;
         },
         [&](const Vec<3>& x, int column) {
-            const double front = (cf_ + x[1]) * slip_f(x), rear = (cr_ + x[2]) * slip_r(x);
+            const Axles<double> alpha = slip(x);
+            const double front = (cf_ + x[1]) * alpha.front, rear = (cr_ + x[2]) * alpha.rear;
             return Vec<3>(front, rear, (front * std::cos(d) + fx(column) * std::sin(d)) / m);
         },
         Vec<3>(1e-13, 1e-10, 1e-10).asDiagonal(), Vec<3>(forces_.x[2], forces_.x[3], s.ay_mps2),

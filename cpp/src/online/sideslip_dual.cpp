@@ -80,7 +80,6 @@ void TyreModel::forces(const Input& u, const S* x, S& front, S& rear) const {
 
 template <class S>
 void TyreModel::predict(const Input& u, const S* x, S* next) const {
-    using std::atan;
     using std::cos;
     using std::exp;
     using std::sin;
@@ -103,10 +102,10 @@ void TyreModel::predict(const Input& u, const S* x, S* next) const {
     const S keep = exp((-vx * u.dt / settings.relaxation_m) * exp(-1.0 * x[kRelax]));
     const auto relax = [&](const S& beta, const S& r, S* to) {
         const S tangent = sin(beta) / cos(beta);
-        const S slip_f = steer - atan(tangent + (c.lf_m / vx) * r);
-        const S slip_r = -1.0 * atan(tangent - (c.lr_m / vx) * r);
-        to[kSlipF] = slip_f + keep * (x[kSlipF] - slip_f);
-        to[kSlipR] = slip_r + keep * (x[kSlipR] - slip_r);
+        const Axles<S> slip =
+            slip_angles(S(1.0), tangent, S((1.0 / vx) * r), c.lf_m, c.lr_m, steer);
+        to[kSlipF] = slip.front + keep * (x[kSlipF] - slip.front);
+        to[kSlipR] = slip.rear + keep * (x[kSlipR] - slip.rear);
     };
     for (int i = 0; i < kStates; ++i) next[i] = x[i];
     next[kGripF] = x[kGripF] * share_of(u.dt, settings.friction_time_s);
@@ -225,7 +224,7 @@ void SideslipDual::start(double dt, const SensorSample& s) {
     forces_.restart(a, a_doubt.cwiseAbs2().asDiagonal());
 
     input_ = {};
-    input_.loads = axle_loads(car_, ax, speed);
+    input_.loads = axle_forces(car_, ax, speed);
     input_.steer = s.steer_rad;
     input_.vx = speed;
     input_.ax = ax;
@@ -278,7 +277,7 @@ void SideslipDual::run_tyres(double dt, const SensorSample& s) {
     // Not the raw reading: its vibration would take grip, and always take it.
     u.ax = (a[ForceModel::kFx] - std::sin(u.steer) * a[ForceModel::kFyf]) / car_.data.mass_kg;
     u.vx = std::max(std::isnan(s.vx_mps) ? u.vx_before + dt * u.ax : s.vx_mps, kSlowestMps);
-    u.loads = axle_loads(car_, u.ax, u.vx);
+    u.loads = axle_forces(car_, u.ax, u.vx);
     double front = 0.0, rear = 0.0;
     tyres_.model().forces(u, b.data(), front, rear);
     const auto error = [&](double fz, double fx, double force, double mu) {

@@ -15,20 +15,20 @@ double slope(const TyreCoefficients<double>& t) { return t.B * t.C * t.D; }
 template <class S>
 void SideslipModel::lateral(double steer, double vx, double r, const Input& u, const S* x, S& front,
                             S& rear) const {
-    using std::atan;
+    const VehicleData& c = car.data;
     using std::sin;
+    using std::sqrt;
     const S tangent = sin(x[0]) / sqrt(1.0 - sin(x[0]) * sin(x[0]));
-    const S alpha_f = steer - atan(tangent + car.data.lf_m * r / vx);
-    const S alpha_r = -1.0 * atan(tangent - car.data.lr_m * r / vx);
+    const Axles<S> alpha = slip_angles(S(1.0), tangent, S(r / vx), c.lf_m, c.lr_m, steer);
     if (linear) {
-        const double weight = car.data.mass_kg * kGravity / car.wheelbase_m();
-        front = slope(car.front) * weight * car.data.lr_m * alpha_f;
-        rear = slope(car.rear) * weight * car.data.lf_m * alpha_r;
+        const Axles<double> rest = static_loads(c.mass_kg * kGravity, c.lf_m, c.lr_m);
+        front = slope(car.front) * rest.front * alpha.front;
+        rear = slope(car.rear) * rest.rear * alpha.rear;
         return;
     }
     const S one = S(1.0);
-    front = axle_force<S>(alpha_f, u.fz_f, value_of(x[1]), car.front, one, one);
-    rear = axle_force<S>(alpha_r, u.fz_r, value_of(x[2]), car.rear, one, one);
+    front = axle_force<S>(alpha.front, u.fz_f, value_of(x[1]), car.front, one, one);
+    rear = axle_force<S>(alpha.rear, u.fz_r, value_of(x[2]), car.rear, one, one);
 }
 
 template <class S>
@@ -76,9 +76,9 @@ Mat<3, 3> SideslipModel::process_noise(const Input& u) const {
 }
 
 Mat<2, 2> SideslipModel::measurement_noise(const Input& u) const {
-    const double weight = kGravity / car.wheelbase_m();
-    const double c_f = slope(car.front) * weight * car.data.lr_m;  // per mass
-    const double c_r = slope(car.rear) * weight * car.data.lf_m;
+    const Axles<double> rest = static_loads(kGravity, car.data.lf_m, car.data.lr_m);  // per mass
+    const double c_f = slope(car.front) * rest.front;
+    const double c_r = slope(car.rear) * rest.rear;
     const double by_rate = (c_f * car.data.lf_m - c_r * car.data.lr_m) / u.vx * u.yaw_rate_std;
     const double by_steer = c_f * u.steer_std;
     const double ay = settings.ay_mps2, model = settings.model_ay_mps2;
@@ -157,7 +157,7 @@ void SideslipUkf<method>::run(double dt, const SensorSample& s) {
     const double by_speed = u.yaw_rate * std::min(kBlindBraking_mps2 * speed_gap_s_ / u.vx, 1.0);
     u.yaw_rate_std = std::hypot(sensor, by_speed);
     const Vec<3>& x = filter_.state().mean;
-    const AxleLoads loads = axle_loads(car_, (x[1] + x[2]) / car_.data.mass_kg, 0.0);
+    const AxleForces loads = axle_forces(car_, (x[1] + x[2]) / car_.data.mass_kg, 0.0);
     u.fz_f = loads.fz_f;
     u.fz_r = loads.fz_r;
     filter_.step(u, Vec<2>(s.ax_mps2, s.ay_mps2));
@@ -168,7 +168,7 @@ void SideslipUkf<method>::start(const SensorSample& s) {
     const double vx = std::max(std::isnan(s.vx_mps) ? kSlowestMps : s.vx_mps, kSlowestMps);
     const double r = std::isnan(s.yaw_rate_radps) ? 0.0 : s.yaw_rate_radps;
     const double ax = std::isnan(s.ax_mps2) ? 0.0 : s.ax_mps2;
-    const AxleLoads loads = axle_loads(car_, ax, 0.0);
+    const AxleForces loads = axle_forces(car_, ax, 0.0);
     const double slip_r = vx * r / (kGravity * slope(car_.rear));
     const double beta = std::clamp(car_.data.lr_m * r / vx - slip_r, -0.5, 0.5);
     const double doubt =
@@ -187,21 +187,20 @@ template <Method method>
 void SideslipUkf<method>::report(const SensorSample& s) {
     const auto& now = filter_.state();
     const VehicleData& c = car_.data;
-    const double weight = c.mass_kg * kGravity / car_.wheelbase_m();
+    const Axles<double> rest = static_loads(c.mass_kg * kGravity, c.lf_m, c.lr_m);
     out_ = {};
     out_.beta_rad = now.mean[0];
     out_.beta_std_rad = std::sqrt(now.covariance(0, 0));
     out_.vx_mps = input_.vx;
     out_.yaw_rate_radps = input_.yaw_rate;
     out_.fx_n = now.mean[1] + now.mean[2];
-    const double beta_at = now.mean[0];
-    const double tangent = std::tan(beta_at);
-    const double alpha_f = input_.steer - std::atan(tangent + c.lf_m * input_.yaw_rate / input_.vx);
-    const double alpha_r = -std::atan(tangent - c.lr_m * input_.yaw_rate / input_.vx);
-    out_.fyf_n = axle_force<double>(alpha_f, input_.fz_f, now.mean[1], car_.front, 1.0, 1.0);
-    out_.fyr_n = axle_force<double>(alpha_r, input_.fz_r, now.mean[2], car_.rear, 1.0, 1.0);
-    out_.cf_npr = slope(car_.front) * weight * c.lr_m;
-    out_.cr_npr = slope(car_.rear) * weight * c.lf_m;
+    const double tangent = std::tan(out_.beta_rad);
+    const Axles<double> alpha =
+        slip_angles(1.0, tangent, input_.yaw_rate / input_.vx, c.lf_m, c.lr_m, input_.steer);
+    out_.fyf_n = axle_force<double>(alpha.front, input_.fz_f, now.mean[1], car_.front, 1.0, 1.0);
+    out_.fyr_n = axle_force<double>(alpha.rear, input_.fz_r, now.mean[2], car_.rear, 1.0, 1.0);
+    out_.cf_npr = slope(car_.front) * rest.front;
+    out_.cr_npr = slope(car_.rear) * rest.rear;
     out_.mu_f = car_.front.D;
     out_.mu_r = car_.rear.D;
     out_.nis = filter_.nis();

@@ -12,65 +12,6 @@ namespace {
 constexpr int kSubsteps = 4, kSubstepsWithLags = 8;
 constexpr double kLostSideslip = 0.7;  // [rad]
 
-double towards(double from, double to, double step) {
-    return from + std::clamp(to - from, -step, step);
-}
-
-/// What the driver saw, `reaction_s` ago.
-struct Seen {
-    double speed_mps;
-    double yaw_rate_radps;
-    Reference reference;
-};
-
-/// Decides the next steering angle and force: what the path ahead needs, mended by what was seen.
-class Hands {
-  public:
-    Hands(const SingleTrack& model, const Driver& driver, double dt)
-        : model_(model), driver_(driver), dt_(dt) {}
-
-    Input next(const Input& now, const Reference& ahead, double acceleration, const Seen& seen) {
-        return {
-            towards(now.steer_rad, steer(now, ahead, seen), driver_.steer_rate_limit_radps * dt_),
-            towards(now.longitudinal, force(ahead, acceleration, seen),
-                    driver_.force_rate_limit_nps * dt_),
-        };
-    }
-
-  private:
-    double steer(const Input& now, const Reference& ahead, const Seen& seen) {
-        double angle = ahead.steer_rad;
-        if (driver_.tracks_path) {
-            const double wheelbase = model_.car.lf_m + model_.car.lr_m;
-            const double v = std::max(seen.speed_mps, kLowestSpeed);
-            const double steer_per_curvature = wheelbase + driver_.understeer_radps2pm * v * v;
-            const double error = seen.reference.curvature_radpm * v - seen.yaw_rate_radps;
-            // Steering that has reached its stop must not wind up the integral.
-            const double stop = std::copysign(driver_.steer_limit_rad, error);
-            if (std::abs(now.steer_rad - stop) > 1e-9) integral_ += error * dt_;
-            const double mending =
-                driver_.yaw_rate_gain * error + driver_.yaw_rate_integral_ps * integral_;
-            angle += steer_per_curvature * (ahead.curvature_radpm + mending / v);
-        }
-        return std::clamp(angle, -driver_.steer_limit_rad, driver_.steer_limit_rad);
-    }
-
-    double force(const Reference& ahead, double acceleration, const Seen& seen) const {
-        const double v = std::max(seen.speed_mps, kLowestSpeed);
-        const double drag = 0.5 * model_.car.air_density_kgpm3 * model_.car.drag_area_m2;
-        const double error = seen.reference.speed_mps - seen.speed_mps;
-        const double pull = model_.car.mass_kg * (acceleration + driver_.speed_gain_ps * error) +
-                            drag * ahead.speed_mps * ahead.speed_mps;
-        const double most = std::min(driver_.drive_limit_n, driver_.power_limit_w / v);
-        return std::clamp(pull, -driver_.brake_limit_n, most);
-    }
-
-    const SingleTrack& model_;
-    const Driver& driver_;
-    double dt_;
-    double integral_ = 0.0;
-};
-
 }  // namespace
 
 Drive simulate(const SingleTrack& model, const double* p, double dt,
@@ -78,7 +19,10 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
                const double* disturbance, const Beginning& beginning) {
     Drive out;
     out.lost_at = references.size();
-    Hands hands(model, driver, dt);
+    const VehicleData& car = model.car;
+    const DrivenCar known{car.mass_kg, car.lf_m + car.lr_m, car.air_density_kgpm3,
+                          car.drag_area_m2};
+    Hands hands(known, driver, dt);
     ModelState<double> x{};
     x[0] = beginning.v_x;
     x[1] = beginning.v_y;
@@ -86,15 +30,13 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
     Input u{
         std::clamp(references.front().steer_rad + beginning.steer_rad, -driver.steer_limit_rad,
                    driver.steer_limit_rad),
-        0.5 * model.car.air_density_kgpm3 * model.car.drag_area_m2 * beginning.v_x * beginning.v_x,
+        known.resistance(beginning.v_x),
         beginning.time_s,
     };
     std::array<double, kExternals> external{};
     settle_auxiliary(model, x, external.data(), u, p);
     const std::size_t last = references.size() - 1;
-    const auto delay = static_cast<std::size_t>(std::lround(driver.reaction_s / dt));
-    // Half of the reaction time is made up for by looking ahead; open-loop steering keeps its time.
-    const std::size_t preview = driver.tracks_path ? 1 + delay / 2 : 1;
+    const std::size_t delay = hands.delay(), preview = hands.preview();
     const int fewest = active_states(model.effects).count > 0 ? kSubstepsWithLags : kSubsteps;
     for (std::size_t k = 0; k < references.size(); ++k) {
         poll_interrupt(k);

@@ -23,6 +23,7 @@ Forces forces(const DoubleTrackData& c, const std::array<double, 4>& s, double s
     const double wheelbase = c.lf_m + c.lr_m;
     const double mass = c.mass_kg + s[3];
     const double half = 0.5 * c.track_m;
+    const Axles<double> rest = static_loads(mass * kGravity, c.lf_m, c.lr_m);
     const double pitch = mass * ax * c.height_m / (2.0 * wheelbase);
     const double roll = mass * ay * c.height_m / c.track_m;
     std::array<double, 4> fx, fy;
@@ -30,22 +31,21 @@ Forces forces(const DoubleTrackData& c, const std::array<double, 4>& s, double s
         const bool front = i < 2;
         const double side = i % 2 == 0 ? 1.0 : -1.0;
         const double share = front ? c.roll_share_front : 1.0 - c.roll_share_front;
-        const double load =
-            std::max(0.0, mass * kTwinGravity * (front ? c.lr_m : c.lf_m) / (2.0 * wheelbase) +
-                              (front ? -pitch : pitch) - side * share * roll);
+        const double load = std::max(0.0, 0.5 * (front ? rest.front : rest.rear) +
+                                              (front ? -pitch : pitch) - side * share * roll);
         const double along = s[0] - side * half * s[2];
         const double across = s[1] + (front ? c.lf_m : -c.lr_m) * s[2];
         const double angle = front ? steer : 0.0;
         const double v_l = std::cos(angle) * along + std::sin(angle) * across;
         const double rolling = c.radius_m * wheel_speed[i];
         const double slip = (rolling - v_l) / std::max({rolling, v_l, kSlowest});
-        const double alpha = angle - std::atan2(across, std::max(along, kSlowest));
+        const double alpha = slip_angle(std::max(along, kSlowest), across, angle);
         const PacejkaPair& t = front ? c.front : c.rear;
         fx[i] = load * magic_formula(slip, TyreCoefficients<double>{t.bx, t.cx, t.dx, t.ex});
         fy[i] = load * magic_formula(alpha, TyreCoefficients<double>{t.by, t.cy, t.dy, t.ey});
     }
     const double cs = std::cos(steer), sn = std::sin(steer);
-    const double drag = 0.5 * c.air_density_kgpm3 * c.drag_area_m2 * s[0] * std::abs(s[0]);
+    const double drag = drag_force(c.air_density_kgpm3, c.drag_area_m2, s[0]);
     return {
         (fx[0] + fx[1]) * cs - (fy[0] + fy[1]) * sn + fx[2] + fx[3] - drag,
         (fx[0] + fx[1]) * sn + (fy[0] + fy[1]) * cs + fy[2] + fy[3],

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "sysid/math/integrate.hpp"
 #include "sysid/math/interrupt.hpp"
 #include "sysid/math/linear.hpp"
 #include "sysid/twin/vehicle14.hpp"
@@ -52,38 +53,23 @@ void Vehicle14::travel_along(State14& x, const Input14& u, const Steered& steere
                              const State14* first) const {
     const int n = parts(x, u, dt);
     const double part = dt / n;
-    State14 k1, k2, k3, k4, at;
     for (int m = 0; m < n; ++m) {
-        const auto shifted = [&](const State14& k, double by) {
-            for (std::size_t i = 0; i < states_; ++i) at[i] = x[i] + by * k[i];
-        };
         // Within one step the heading hardly turns, so the series of its change is exact.
         const double yaw = x[Yaw], c0 = std::cos(yaw), s0 = std::sin(yaw);
-        const auto move = [&](const State14& from, State14& k) {
-            const double d = from[Yaw] - yaw;
+        const auto stage = [&](std::size_t number, const State14& at, State14& k) {
+            if (number == 0 && m == 0 && first != nullptr)
+                k = *first;
+            else
+                rates(at, u, steered, k, nullptr);
+            const double d = at[Yaw] - yaw;
             const double cd = 1.0 - 0.5 * d * d, sd = d * (1.0 - d * d / 6.0);
             const double c = c0 * cd - s0 * sd, s = s0 * cd + c0 * sd;
-            k[X] = c * from[Vx] - s * from[Vy];
-            k[Y] = s * from[Vx] + c * from[Vy];
+            k[X] = c * at[Vx] - s * at[Vy];
+            k[Y] = s * at[Vx] + c * at[Vy];
         };
-        const auto stage = [&](const State14& from, State14& k) {
-            rates(from, u, steered, k, nullptr);
-            move(from, k);
-        };
-        if (m == 0 && first != nullptr) {
-            k1 = *first;
-            move(x, k1);
-        } else {
-            stage(x, k1);
-        }
-        shifted(k1, 0.5 * part);
-        stage(at, k2);
-        shifted(k2, 0.5 * part);
-        stage(at, k3);
-        shifted(k3, part);
-        stage(at, k4);
-        for (std::size_t i = 0; i < states_; ++i)
-            x[i] += part / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+        runge_kutta_step(x, part, stage, [&](auto&& use) {
+            for (std::size_t i = 0; i < states_; ++i) use(i);
+        });
     }
 }
 

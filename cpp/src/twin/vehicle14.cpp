@@ -56,7 +56,7 @@ Vehicle14::OfWheels::OfWheels(const CarData& car) : tyre(car.front.tyre, car.rea
     anti_slope = take(&AxleData::anti_slope);
     unsprung = take(&AxleData::unsprung_kg);
     per_unsprung = Wheels(1.0) / unsprung;
-    weight = unsprung * kTwinGravity;
+    weight = unsprung * kGravity;
     unsprung_all = sum(unsprung);
     tyre_spring = take(&AxleData::tyre_npm);
     tyre_damping = take(&AxleData::tyre_damping_nspm);
@@ -78,7 +78,7 @@ Vehicle14::Vehicle14(const CarData& car, const Load& load) : car_(car), w_(car),
     const double body = design.mass_kg - sum(w_.unsprung);
     const Wheels share = Wheels(to_rear, to_front) / car.wheelbase_m *
                          (Wheels(0.5) + Wheels(0.5 * design.cg_y_m) / w_.half_track);
-    design_load_ = Wheels(kTwinGravity * body) * share + w_.weight;
+    design_load_ = Wheels(kGravity * body) * share + w_.weight;
     for (std::size_t i = 0; i < 2; ++i) {
         const AxleData& a = i == 0 ? car.front : car.rear;
         const double mean = 0.5 * (design_load_[2 * i] + design_load_[2 * i + 1]);
@@ -163,8 +163,7 @@ void Vehicle14::rates(const State14& x, const Input14& u, const Steered& steered
     const Wheels against = Wheels::at(u.brake_nm.data()) + w_.rolling * load;
     const Wheels turning = spin / root(spin * spin + kStandingWheel * kStandingWheel);
     wheel_rate.put(&rate[kWheelHeight]);
-    ((load - on_body + w_.lean * own) * w_.per_unsprung - kTwinGravity)
-        .put(&rate[kWheelHeightRate]);
+    ((load - on_body + w_.lean * own) * w_.per_unsprung - kGravity).put(&rate[kWheelHeightRate]);
     spin.put(&rate[kWheelAngle]);
     ((Wheels::at(u.drive_nm.data()) - turning * against - w_.radius * tyre.fx) * w_.per_inertia)
         .put(&rate[kWheelSpeed]);
@@ -172,7 +171,7 @@ void Vehicle14::rates(const State14& x, const Input14& u, const Steered& steered
     const double lift_front = car_.front.lift_area_m2 * pressure;
     const double lift_rear = car_.rear.lift_area_m2 * pressure;
     const double force_z =
-        u.force_n[2] - sprung_ * kTwinGravity + sum(on_body) + lift_front + lift_rear;
+        u.force_n[2] - sprung_ * kGravity + sum(on_body) + lift_front + lift_rear;
     const double moment_x =
         u.moment_nm[0] + sum(arm_y * on_body) + h_s * sum(carried) + (h_s - h) * u.force_n[1];
     const double moment_y = u.moment_nm[1] - sum(arm_x * on_body) - h * ground_x -
@@ -200,7 +199,7 @@ void Vehicle14::rates(const State14& x, const Input14& u, const Steered& steered
     if (out == nullptr) return;
     Output14& o = *out;
     // An accelerometer feels all but gravity, in the axes of the tilted body.
-    const double felt_z = az + kTwinGravity;
+    const double felt_z = az + kGravity;
     o[output14::Ax] = plane_ax - felt_z * x[Pitch];
     o[output14::Ay] = plane_ay + felt_z * x[Roll];
     o[output14::Az] = felt_z;
@@ -249,7 +248,7 @@ double Vehicle14::energy(const State14& x, const Input14& u) const {
                load_.jzz_kgm2 * x[R] * x[R] -
                2.0 * (load_.jxy_kgm2 * x[P] * x[Q] + load_.jxz_kgm2 * x[P] * x[R] +
                       load_.jyz_kgm2 * x[Q] * x[R]);
-    e = 0.5 * e + sprung_ * kTwinGravity * x[Z];
+    e = 0.5 * e + sprung_ * kGravity * x[Z];
     const double tilted = 0.5 * (x[Roll] * x[Roll] + x[Pitch] * x[Pitch]);
     const Wheels height = Wheels::at(&x[kWheelHeight]), spin = Wheels::at(&x[kWheelSpeed]);
     const Wheels rate = Wheels::at(&x[kWheelHeightRate]);

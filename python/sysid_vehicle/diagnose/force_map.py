@@ -20,6 +20,7 @@ from .._style import axes_or_new, tidy
 from .._text import brief, html_text
 from ..estimate import Driving
 from ..identify import Fit
+from ..vehicle import GRAVITY_MPS2
 from .coordinates import COORDINATES, coordinates
 from .evidence import FORCES
 
@@ -173,7 +174,7 @@ def missing_forces(fit: Fit, driving: Driving) -> MissingForces:
     driving : Driving
     """
     car = fit.model.vehicle
-    weight = 9.81 * car.mass_kg
+    weight = GRAVITY_MPS2 * car.mass_kg
     # A disturbance that was learned small would shrink the forces that are looked for.
     least = 0.02 * weight * np.array([1.0, 1.0, 0.5 * car.wheelbase_m])
     disturbance = np.maximum(fit.noise.disturbance, least)

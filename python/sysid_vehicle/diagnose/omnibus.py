@@ -17,6 +17,7 @@ from .._arrays import FloatArray
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import USUAL, Rules
+from ..vehicle import GRAVITY_MPS2
 from .coordinates import begins, late
 from .evidence import Evidence
 from .projection import orthonormal_basis, pseudo_inverse, variance_ratio
@@ -126,7 +127,7 @@ def _virtual(evidence: Evidence) -> tuple[list[str], FloatArray, list[int]]:
     trace = evidence.problem.trace(fit.model.vector(), fit.noise.vector(), False)
     state = trace["state"]
     v, r = state[:, 0], state[:, 2]
-    a = v * r / 9.81
+    a = v * r / GRAVITY_MPS2
     steer = driving.channel("steer_rad")
     pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
     pull = pull / max(float(np.nanstd(pull)), 1e-9)

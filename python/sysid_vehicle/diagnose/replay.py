@@ -22,13 +22,13 @@ from ..identify.search import Box, minimise
 from ..log import Log
 from ..model import Model
 from ..simulate import RoadDisturbance
+from ..vehicle import GRAVITY_MPS2
 
 __all__ = ["Replay"]
 
 # Slow enough to be quick; what tyres do to the motion is slower still.
 _RATE_HZ = 25.0
 _WINDOW_S = 10.0
-_GRAVITY_MPS2 = 9.80665
 _LOOKS, _ROUNDS = 3, 25
 _BENDS = ((0.6, 1.6, 0.3), (1.3, 0.6, -3.0), (1.6, 1.0, 0.3))  # C, D, E
 _AS_GOOD = 2.0  # nats
@@ -245,7 +245,7 @@ class Replay:
         """Steering angle per lateral acceleration of the fitted tyres [rad s2/m], none below 0."""
         model = self.fit.model
         front, rear = (np.prod([model.value(f"{x}_{a}") for x in "BCD"]) for a in ("front", "rear"))
-        return max(float(1.0 / front - 1.0 / rear) / _GRAVITY_MPS2, 0.0)
+        return max(float(1.0 / front - 1.0 / rear) / GRAVITY_MPS2, 0.0)
 
     def _references(self, s: _Stretch) -> FloatArray:
         """Speed, curvature, and what of the steering the driver does not add for the curvature."""

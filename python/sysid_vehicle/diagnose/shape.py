@@ -27,6 +27,7 @@ from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, axes_or_new, tidy
 from .._text import brief
+from ..vehicle import GRAVITY_MPS2
 from .coordinates import COORDINATES, Coordinate, coordinates, late
 from .evidence import FORCES, Evidence
 from .force_map import UNITS
@@ -234,7 +235,7 @@ def _posterior(
     ratio = variance_ratio(R @ size, evidence.left - R @ size)
     A, b = A / ratio, b / ratio
     car = evidence.fit.model.vehicle
-    weight = 9.81 * car.mass_kg
+    weight = GRAVITY_MPS2 * car.mass_kg
     units = np.array([weight * (0.5 * car.wheelbase_m if t == "M_z" else 1.0) for t in targets])
     C = np.exp(-0.5 * square / _SMOOTH**2) + 1e-4 * np.eye(width)
     root = np.kron(np.eye(len(targets)), np.linalg.cholesky(C))

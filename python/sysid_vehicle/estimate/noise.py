@@ -12,7 +12,7 @@ import numpy as np
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import NumericalError
-from ..vehicle import Vehicle
+from ..vehicle import GRAVITY_MPS2, Vehicle
 from .driving import MEASURED, UNITS, Driving
 from .inputs import white_noise_std
 
@@ -142,7 +142,7 @@ _SMALLEST = np.array([1e-3, 1e-3, 1e-4, 5e-3, 5e-3])
 
 def _weight_and_moment(vehicle: Vehicle) -> tuple[float, float]:
     """The weight [N], and the yaw moment of half of it at half the wheelbase [N m]."""
-    weight = vehicle.mass_kg * 9.81
+    weight = vehicle.mass_kg * GRAVITY_MPS2
     return weight, weight * vehicle.wheelbase_m / 4.0
 
 
@@ -190,7 +190,7 @@ def first_guess(driving: Driving, vehicle: Vehicle) -> NoiseModel:
 
 def generous(sensor: Sequence[float], vehicle: Vehicle) -> NoiseModel:
     """These sensors, and a motion that is disturbed so much that it follows whatever they say."""
-    weight = vehicle.mass_kg * 9.81
+    weight = vehicle.mass_kg * GRAVITY_MPS2
     disturbance = (0.02 * weight, 0.04 * weight, 0.02 * weight * vehicle.wheelbase_m / 2.0)
     return NoiseModel(tuple(map(float, sensor)), (0.02, 0.02, 0.01), disturbance, (0.3, 0.3, 0.3))
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from ..effects import Effect
 from ..errors import InvalidInput
 from ..model import Model
+from ..vehicle import GRAVITY_MPS2
 
-_GRAVITY = 9.80665
 _SHORTEST_LAG = 1e-6  # s, as in `lags.hpp`
 
 Stages = dict[str, list[str]]
@@ -177,7 +177,7 @@ def _full(e: Effect, k: int) -> str:
 def _of_car(model: Model) -> list[tuple[str, float, str]]:
     car = model.vehicle
     given = [
-        ("gravity", _GRAVITY, "m/s2"),
+        ("gravity", GRAVITY_MPS2, "m/s2"),
         ("mass", car.mass_kg, "kg"),
         ("yaw_inertia", model.value("yaw_inertia_kgm2"), "kg m2"),
         ("front_arm", car.lf_m, "m, centre of gravity to front axle"),

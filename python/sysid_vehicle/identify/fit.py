@@ -12,6 +12,7 @@ from .._text import brief, html_paragraph, html_table, number, text_table
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
+from ..vehicle import GRAVITY_MPS2
 from .estimates import Estimate, profiled
 from .profile import Profile
 from .quantities import Quantity, parameter, std_of, tyre_quantity
@@ -20,7 +21,6 @@ from .tyre_shape import COMBINATIONS
 
 __all__ = ["Fit"]
 
-GRAVITY = 9.80665
 
 _MEANINGS = {"BCD": "cornering stiffness", "peak": "peak friction", "peak_slip": "slip at the peak"}
 _UNITS = {"cornering stiffness": "N/rad", "peak friction": "1", "slip at the peak": "rad"}
@@ -114,7 +114,7 @@ class Fit:
         found = [parameter(e.name, known[e.name].column) for e in self.estimates]
         v = self.model.vehicle
         for axle, arm in (("front", v.lr_m), ("rear", v.lf_m)):
-            load = v.mass_kg * GRAVITY * arm / v.wheelbase_m
+            load = v.mass_kg * GRAVITY_MPS2 * arm / v.wheelbase_m
             columns = [known[f"{letter}_{axle}"].column for letter in "BCDE"]
             for short, (function, _) in COMBINATIONS.items():
                 factor = load if short == "BCD" else 1.0

@@ -18,36 +18,6 @@ __all__ = ["TyreMotion"]
 _COLUMNS = ("vx_mps", "vy_mps", "yaw_rate_radps", "steer_rad", "fz_front_n", "fz_rear_n")
 
 
-@dataclass(frozen=True)
-class MotionErrors:
-    """Errors of the accelerations, as a problem for local searches; no filter has a part in it."""
-
-    loss: _core.TyreLoss
-
-    @property
-    def samples(self) -> int:
-        """Number of samples."""
-        return self.loss.samples
-
-    def residuals(self, p: FloatArray, gains: None = None) -> FloatArray:
-        """Weighted errors of a_y and of the yaw acceleration, two per sample."""
-        return self.loss.residuals(p)
-
-    def half_sum_of_squares(self, p: FloatArray, gains: None = None) -> float:
-        """Half the sum of their squares."""
-        return self.loss.half_sum_of_squares(p)
-
-    def sensitivities(self, p: FloatArray, gains: None, columns: list[int]) -> FloatArray:
-        """Minus the derivatives of the errors."""
-        return self.loss.sensitivities(p, columns)
-
-    def normal_equations(
-        self, p: FloatArray, gains: None, columns: list[int]
-    ) -> tuple[float, FloatArray, FloatArray]:
-        """Half the sum of squares, direction of descent, Gauss-Newton matrix."""
-        return self.loss.normal_equations(p, columns)
-
-
 @dataclass(frozen=True, eq=False)
 class TyreMotion:
     """What the tyres did and what they had to explain, as a smoother or the truth gives it.
@@ -141,17 +111,15 @@ class TyreMotion:
         yaw_weight: FloatArray,
         *,
         projects_steer: bool,
-    ) -> MotionErrors:
-        """Weighted errors; weights are one over standard deviations."""
+    ) -> _core.TyreLoss:
+        """Weighted errors, as a problem for searches; weights are one over standard deviations."""
         rate = self.yaw_acc_radps2 if self.yaw_acc_radps2 is not None else np.zeros(self.n)
-        return MotionErrors(
-            _core.TyreLoss(
-                vehicle.core(),
-                projects_steer,
-                self.motion,
-                as_float64(np.column_stack([self.ay_mps2, rate])),
-                as_float64(np.column_stack([ay_weight, yaw_weight])),
-            )
+        return _core.TyreLoss(
+            vehicle.core(),
+            projects_steer,
+            self.motion,
+            as_float64(np.column_stack([self.ay_mps2, rate])),
+            as_float64(np.column_stack([ay_weight, yaw_weight])),
         )
 
 

@@ -18,8 +18,9 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
 from ..estimate.inputs import white_noise_std
+from ..vehicle import GRAVITY_MPS2
 from .observed import READINGS, STATES, StateEstimate
-from .record import GRAVITY, ObserverCar, ObserverRecord
+from .record import ObserverCar, ObserverRecord
 
 __all__ = ["Observer", "ObserverForm", "ObserverNoise"]
 
@@ -102,7 +103,7 @@ class ObserverNoise:
         scatter = np.array([white_noise_std(y) for y in record.readings.T])
         sensors = np.maximum(scatter, smallest) ** 2
         dt = 1.0 / record.rate_hz
-        force = 0.02 * car.mass_kg * GRAVITY
+        force = 0.02 * car.mass_kg * GRAVITY_MPS2
         disturbance = np.array([force, force, 0.5 * force * (car.lf_m + car.lr_m)])
         motion = np.array([0.05, 0.05, 0.05])
         return cls.from_variances(dt * np.concatenate([motion, disturbance]) ** 2, sensors)

@@ -8,7 +8,7 @@ import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
-from ..vehicle import Vehicle
+from ..vehicle import GRAVITY_MPS2, Vehicle
 
 __all__ = ["Actuator", "Controller", "Nominal", "Online", "Sensor", "Sensors", "Simulator"]
 
@@ -164,7 +164,7 @@ class Nominal:
     stiffness_front: float = 50.0
     stiffness_rear: float = 50.0
     drag_nspm: float = 0.3
-    gravity_mps2: float = 9.80665
+    gravity_mps2: float = GRAVITY_MPS2
 
     def __post_init__(self) -> None:
         _refuse_negative(self)
@@ -303,7 +303,7 @@ class Simulator:
     air_speed_of_both: bool = False
     steps: int = 0
     tolerance: float = 0.0
-    gravity_mps2: float = 9.80665
+    gravity_mps2: float = GRAVITY_MPS2
     late_feedback: bool = False
     first_late_load_n: float = 0.0
     load_sensors: bool = False
@@ -324,4 +324,5 @@ class Simulator:
     @classmethod
     def published(cls) -> Simulator:
         """Return the published way: half load, one-sample delays, one step a sample."""
+        # The published programs take 9.81 m/s2 for gravity.
         return cls(0.5, True, True, 1, 0.0, 9.81, True, 5.0, True)

@@ -11,12 +11,10 @@ import numpy.typing as npt
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..log import Log
-from ..vehicle import Vehicle
+from ..vehicle import GRAVITY_MPS2, Vehicle
 from .observed import READINGS
 
 __all__ = ["ObserverCar", "ObserverRecord"]
-
-GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ class ObserverCar:
 
     def static_loads_n(self) -> tuple[float, float]:
         """Axle loads at rest, front and rear [N]."""
-        per_metre = self.mass_kg * GRAVITY / (self.lf_m + self.lr_m)
+        per_metre = self.mass_kg * GRAVITY_MPS2 / (self.lf_m + self.lr_m)
         return per_metre * self.lr_m, per_metre * self.lf_m
 
 

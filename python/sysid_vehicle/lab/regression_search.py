@@ -166,7 +166,7 @@ class RegressionTask:
     def _sizes(self, p: FloatArray) -> FloatArray:
         """Root mean square errors of a_y and of the yaw acceleration."""
         one = np.ones(self.motion.n)
-        errors = self.motion.errors(self.vehicle, one, one, projects_steer=True).residuals(p)
+        errors = self.motion.errors(self.vehicle, one, one, projects_steer=True).residuals(p, None)
         return as_float64(np.sqrt(np.mean(errors**2, axis=0)) + 1e-9)
 
     def _first_weights(self) -> tuple[FloatArray, FloatArray]:

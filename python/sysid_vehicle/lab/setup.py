@@ -116,7 +116,8 @@ class Setup:
     def published(cls) -> Setup:
         """Return the published experiment: half load, one-sample delays, exact knowledge."""
         plant = _published_plant()
-        nominal = replace(Nominal.of(plant.vehicle, 63.0), gravity_mps2=9.81)
+        simulator = Simulator.published()
+        nominal = replace(Nominal.of(plant.vehicle, 63.0), gravity_mps2=simulator.gravity_mps2)
         return cls(
             plant,
             nominal,
@@ -125,7 +126,7 @@ class Setup:
             Actuator(-0.262, 0.262),
             Controller.published(),
             Online.published(),
-            Simulator.published(),
+            simulator,
             5.0,
             100.0,
             "published",

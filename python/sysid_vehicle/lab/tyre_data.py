@@ -13,7 +13,7 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..log import Log
-from ..vehicle import Vehicle
+from ..vehicle import GRAVITY_MPS2, Vehicle
 
 __all__ = ["READINGS", "GreyBoxVehicle", "TyreLog", "tyre_problem"]
 
@@ -23,7 +23,6 @@ READINGS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2")
 _INPUTS = ("fx_n", "steer_rad", "fz_front_n", "fz_rear_n")
 _SHORTEST = 100
 _SETTLES_S = 1.0
-_GRAVITY = 9.80665
 
 
 @dataclass(frozen=True)
@@ -220,7 +219,7 @@ class TyreLog:
         else:
             base = vehicle.lf_m + vehicle.lr_m
             shift = vehicle.mass_kg * np.nan_to_num(a_x) * vehicle.cg_height_m / base
-            weight = vehicle.mass_kg * _GRAVITY / base
+            weight = vehicle.mass_kg * GRAVITY_MPS2 / base
             loads = [
                 np.maximum(weight * vehicle.lr_m - shift, 0.0),
                 np.maximum(weight * vehicle.lf_m + shift, 0.0),

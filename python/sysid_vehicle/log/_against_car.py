@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InvalidInput
+from ..vehicle import GRAVITY_MPS2
 from ._channels import FloatArray
 from ._laws import EXCITED, WINDOW_S, Drive, size_of, spread_of
 from ._log import Log
@@ -42,7 +43,7 @@ _MASS_SLIPS = (
     (1.0 / 0.45359237, "mass_kg seems to be in pounds: multiply it by 0.4536"),
     (1e-3, "mass_kg seems to be in tonnes: multiply it by 1000"),
     (4.4482216, "fx_n seems to be in pounds: put factor = 4.448222 for it in the channel map"),
-    (9.80665, "fx_n seems to be in kilograms: put factor = 9.80665 for it in the channel map"),
+    (GRAVITY_MPS2, "fx_n seems to be in kilograms: put factor = 9.80665 for it in the channel map"),
     (0.1, "fx_n seems to be ten times too large: put factor = 0.1 for it in the channel map"),
 )
 _LENGTH_SLIPS = (

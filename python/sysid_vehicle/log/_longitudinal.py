@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InvalidInput
+from ..vehicle import GRAVITY_MPS2
 from ._channels import FloatArray
 from ._lags import sideways
 from ._laws import (
@@ -23,7 +24,6 @@ from ._laws import (
 )
 from ._regression import Regression
 
-_G = 9.80665
 _CLEARLY_RAMP, _CLEARLY_DRIVEN, _CLEARLY_FELT = (
     0.8,
     1.0,
@@ -38,10 +38,10 @@ _AX_G = ("ax_mps2", "g", "factor = 9.80665")
 _VX_KMH = ("vx_mps", "km/h", "factor = 0.2777778")
 _VX_MPH = ("vx_mps", "miles per hour", "factor = 0.44704")
 _LONGITUDINAL_SLIPS: Slips = (
-    (_G, (_AX_G,)),
+    (GRAVITY_MPS2, (_AX_G,)),
     (3.6, (_VX_KMH,)),
     (1.0 / 0.44704, (_VX_MPH,)),
-    (3.6 * _G, (_AX_G, _VX_KMH)),
+    (3.6 * GRAVITY_MPS2, (_AX_G, _VX_KMH)),
 )
 
 

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..errors import InvalidInput
+from ..vehicle import GRAVITY_MPS2
 from ._channels import DEG, FloatArray
 from ._clock import clock_notes
 from ._lags import lag_notes
@@ -61,7 +62,7 @@ _VX_KMH = ("vx_mps", "km/h", "factor = 0.2777778")
 _VX_MPH = ("vx_mps", "miles per hour", "factor = 0.44704")
 _VY_KMH = ("vy_mps", "km/h", "factor = 0.2777778")
 _VY_MPH = ("vy_mps", "miles per hour", "factor = 0.44704")
-_RAD, _G = math.pi / 180.0, 9.80665
+_RAD, _G = math.pi / 180.0, GRAVITY_MPS2
 
 _LATERAL_SLIPS: Slips = (
     (_RAD, (_YAW_DEG,)),

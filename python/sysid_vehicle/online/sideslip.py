@@ -12,7 +12,7 @@ from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, warn
 from ..log import Log
 from ..model import vehicle_data
-from ..vehicle import Tyre, Vehicle
+from ..vehicle import GRAVITY_MPS2, Tyre, Vehicle
 from .sideslip_results import SideslipRun
 from .sideslip_settings import SideslipSettings
 
@@ -206,7 +206,7 @@ def estimate_sideslip(
 
 def static_stiffness(vehicle: Vehicle) -> tuple[float, float]:
     """Cornering stiffness of both axles [N/rad] at the static load, from the vehicle file."""
-    weight = vehicle.mass_kg * 9.80665 / vehicle.wheelbase_m
+    weight = vehicle.mass_kg * GRAVITY_MPS2 / vehicle.wheelbase_m
     return (
         vehicle.tyre_front.cornering_stiffness_per_load * weight * vehicle.lr_m,
         vehicle.tyre_rear.cornering_stiffness_per_load * weight * vehicle.lf_m,

@@ -15,9 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ..vehicle import GRAVITY_MPS2
+
 FloatArray = npt.NDArray[np.float64]
 
-_DEG, _G = math.pi / 180.0, 9.80665
+_DEG, _G = math.pi / 180.0, GRAVITY_MPS2
 _WINDOW_S = 1.0
 _MOVING = 0.15  # of the usual speed
 # Factors that are tried where no unit is stated.

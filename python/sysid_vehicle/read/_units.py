@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 
-_G = 9.80665
+from ..vehicle import GRAVITY_MPS2
+
 _DEG = math.pi / 180.0
 _POUND = 0.45359237
 
@@ -40,8 +41,8 @@ FACTORS: dict[str, dict[str, float]] = {
     },
     "m/s2": {
         **dict.fromkeys(("m/s2", "mps2", "m/s/s", "m/ss", "ms2", "m/sec2"), 1.0),
-        **dict.fromkeys(("g", "gn", "gee"), _G),
-        "mg": 1e-3 * _G,
+        **dict.fromkeys(("g", "gn", "gee"), GRAVITY_MPS2),
+        "mg": 1e-3 * GRAVITY_MPS2,
         **dict.fromkeys(("km/h/s", "kmh/s"), 1.0 / 3.6),
         "ft/s2": 0.3048,
         "cm/s2": 1e-2,
@@ -60,9 +61,9 @@ FACTORS: dict[str, dict[str, float]] = {
         "kn": 1e3,
         "mn": 1e6,
         "dan": 10.0,
-        **dict.fromkeys(("lbf", "lb", "lbs"), _POUND * _G),
-        **dict.fromkeys(("klbf", "kip"), 1e3 * _POUND * _G),
-        **dict.fromkeys(("kgf", "kp", "kg"), _G),
+        **dict.fromkeys(("lbf", "lb", "lbs"), _POUND * GRAVITY_MPS2),
+        **dict.fromkeys(("klbf", "kip"), 1e3 * _POUND * GRAVITY_MPS2),
+        **dict.fromkeys(("kgf", "kp", "kg"), GRAVITY_MPS2),
     },
     "kg": {
         **dict.fromkeys(("kg", "kilogram"), 1.0),

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from .._arrays import FloatArray
 from ..errors import InvalidInput
 from ..log import CHANNELS, Log, held_rows
+from ..vehicle import GRAVITY_MPS2
 from ._colour import neighbours
 from ._equations import Readings
 from ._motion import IntArray, Stretch
@@ -231,7 +232,7 @@ def refuse_mixed_up(logs: Sequence[Log], readings: Sequence[Readings]) -> None:
             f"yaw_rate_radps is positive to the right; put factor = -1 for it in the channel map"
         )
     for factor, words in (
-        (1 / 9.80665, "ay_mps2 is in g: put factor = 9.80665 for ay_mps2"),
+        (1 / GRAVITY_MPS2, "ay_mps2 is in g: put factor = 9.80665 for ay_mps2"),
         (1 / 57.29578, "yaw_rate_radps is in deg/s: put factor = 0.01745329 for yaw_rate_radps"),
         (1 / 3.6, "vx_mps is in km/h: put factor = 0.2777778 for vx_mps"),
         (1 / 2.236936, "vx_mps is in mph: put factor = 0.44704 for vx_mps"),

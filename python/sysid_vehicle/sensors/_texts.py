@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-__all__ = ["DEG", "GRAVITY_MPS2", "ON_CORRECTION", "gradient", "map_line", "why_not"]
+__all__ = ["DEG", "ON_CORRECTION", "gradient", "map_line", "why_not"]
 
 DEG = math.pi / 180.0
-GRAVITY_MPS2 = 9.80665
 
 _NEEDS_EXCITATION = {
     "delay_vx_s": "the car hardly accelerates or brakes",

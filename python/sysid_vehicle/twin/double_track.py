@@ -13,6 +13,7 @@ import numpy as np
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
+from ..vehicle import GRAVITY_MPS2
 from .car import TwinCar
 from .readings import Readings
 
@@ -125,7 +126,7 @@ class DoubleTrackObserver:
             *(n["drag_area_m2"], n["air_density_kgpm3"]),
             stiff["front"] / (stiff["front"] + stiff["rear"]),
         ]
-        weight = 0.5 * load.mass_kg * 9.81 / base
+        weight = 0.5 * load.mass_kg * GRAVITY_MPS2 / base
         return data, _tyre(n, "front", weight * (base - lf)), _tyre(n, "rear", weight * lf)
 
 

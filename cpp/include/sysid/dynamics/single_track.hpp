@@ -97,7 +97,9 @@ struct SingleTrack {
         settle_outside_forces(w, external);
         each([&](auto e, const T* own, At) { return e.body(own, w); });
         user_body(user, q, w);
-        slip_angles(w);
+        const Axles<S> alpha = slip_angles(w.v_x, w.v_y, w.r, w.l_f, w.l_r, w.delta);
+        w.alpha_f = alpha.front;
+        w.alpha_r = alpha.rear;
         each([&](auto e, const T* own, At at) { return e.slip(own, w, lags.from(at)); });
         const S mu_f = magic_formula(w.alpha_f, front_tyre(p));
         const S mu_r = magic_formula(w.alpha_r, rear_tyre(p));
@@ -139,25 +141,11 @@ struct SingleTrack {
 
     template <class S>
     static void settle_outside_forces(Workings<S>& w, const S* external) {
-        const S speed_squared = w.v_x * abs_of(w.v_x);
-        w.force_x = external[kForceX] - 0.5 * w.rho * (w.drag_area * speed_squared);
+        w.force_x = external[kForceX] - drag_force(w.rho, w.drag_area, w.v_x);
         w.force_y = external[kForceY];
         w.moment_z = external[kMomentZ];
         w.gravity_x = external[kGravityX];
         w.gravity_y = external[kGravityY];
-    }
-
-    template <class S>
-    static S abs_of(const S& x) {
-        using std::abs;
-        return abs(x);
-    }
-
-    template <class S>
-    static void slip_angles(Workings<S>& w) {
-        using std::atan2;
-        w.alpha_f = w.delta - atan2(w.v_y + w.l_f * w.r, w.v_x);
-        w.alpha_r = -atan2(w.v_y - w.l_r * w.r, w.v_x);
     }
 
     // The front load depends on a_x, which depends on the front lateral force, which is
@@ -168,18 +156,19 @@ struct SingleTrack {
         using std::sin;
         const S wheelbase = w.l_f + w.l_r;
         const S weight = w.m * car.gravity_mps2;
-        w.fz0_f = weight * w.l_r / wheelbase;
-        w.fz0_r = weight * w.l_f / wheelbase;
+        const Axles<S> rest = static_loads(weight, w.l_f, w.l_r);
+        w.fz0_f = rest.front;
+        w.fz0_r = rest.rear;
         const S c = cos(w.delta);
         const S s = sin(w.delta);
         const S lever = w.h / wheelbase;
         S pull;  // m a_x
         if (force_known) {
             split_force(w);
-            const S rest = w.fx_f * c + w.fx_r + w.force_x;
+            const S known = w.fx_f * c + w.fx_r + w.force_x;
             const S front =
-                held.on ? S(held.front_n) : (w.fz0_f - lever * rest) / (1.0 - lever * (mu_f * s));
-            pull = rest - front * (mu_f * s);
+                held.on ? S(held.front_n) : (w.fz0_f - lever * known) / (1.0 - lever * (mu_f * s));
+            pull = known - front * (mu_f * s);
         } else {
             pull = w.m * w.ax_input;
             const S front = w.fz0_f - lever * pull;

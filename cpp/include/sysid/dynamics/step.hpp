@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "sysid/dynamics/single_track.hpp"
+#include "sysid/math/integrate.hpp"
 #include "sysid/math/whole.hpp"
 
 namespace sysid {
@@ -77,39 +78,28 @@ struct NoLags {
     S after(std::size_t /*i*/) const { return S(0.0); }
 };
 
-/// One classical Runge-Kutta step of the motion. Lags move by their exact solution between the
-/// targets of its stages, slow states with the motion.
+/// One Runge-Kutta step of the motion. Lags move by their exact solution between the targets of its
+/// stages, slow states with the motion.
 template <class S, class T, class Memory>
-void runge_kutta_step(const SingleTrack& model, ModelState<S>& x, const S* external,
-                      const Input& from, const Input& to, const T* p, double h,
-                      const ActiveStates& own, Memory& memory) {
+void model_step(const SingleTrack& model, ModelState<S>& x, const S* external, const Input& from,
+                const Input& to, const T* p, double h, const ActiveStates& own, Memory& memory) {
     const LagStep<S> lags = memory.begin(x, h);
-    const auto rate = [&](LagStage stage, const ModelState<S>& at, const Input& u) {
-        ModelState<S> k{};
+    const std::array<Input, 3> input{from, between(from, to, 0.5), to};
+    const auto rate = [&](std::size_t stage, const ModelState<S>& at, ModelState<S>& k) {
         S* own_rate = k.data() + kMotionStates;
         model.evaluate(at.data(), external,
-                       Lags<S>(stage, at.data() + kMotionStates, own_rate, lags), u, p, k.data());
-        return k;
+                       Lags<S>(kLagStages[stage], at.data() + kMotionStates, own_rate, lags),
+                       input[(stage + 1) / 2], p, k.data());
     };
-    const auto for_moved = [&](auto&& use) {
+    runge_kutta_step(x, h, rate, [&](auto&& use) {
         for (std::size_t i = 0; i < kMotionStates; ++i) use(i);
         for (std::size_t i : own)
             if (!memory.exact(i)) use(kMotionStates + i);
-    };
-    const auto moved = [&](const ModelState<S>& k, double by) {
-        ModelState<S> at;
-        for_moved([&](std::size_t i) { at[i] = x[i] + by * k[i]; });
-        return at;
-    };
-    const Input half = between(from, to, 0.5);
-    const auto k1 = rate(LagStage::kStart, x, from);
-    const auto k2 = rate(LagStage::kMiddle, moved(k1, 0.5 * h), half);
-    const auto k3 = rate(LagStage::kMiddleAgain, moved(k2, 0.5 * h), half);
-    const auto k4 = rate(LagStage::kEnd, moved(k3, h), to);
-    for_moved([&](std::size_t i) { x[i] += (h / 6.0) * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]); });
+    });
     if (own.count == 0) return;
     // What stiff lags end at is their target at the end, of which the last stage has a guess.
-    rate(LagStage::kEnd, x, to);
+    ModelState<S> ignored;
+    rate(3, x, ignored);
     for (std::size_t i : own)
         if (memory.exact(i)) x[kMotionStates + i] = memory.after(i);
 }
@@ -121,9 +111,8 @@ void advance(const SingleTrack& model, ModelState<S>& x, const S* external, cons
     const ActiveStates own = active_states(model.effects);
     const auto steps = [&](auto&& memory) {
         for (int n = 0; n < substeps; ++n)
-            runge_kutta_step(
-                model, x, external, between(from, to, static_cast<double>(n) / substeps),
-                between(from, to, (n + 1.0) / substeps), p, dt / substeps, own, memory);
+            model_step(model, x, external, between(from, to, static_cast<double>(n) / substeps),
+                       between(from, to, (n + 1.0) / substeps), p, dt / substeps, own, memory);
     };
     if (own.count == 0)
         steps(NoLags<S>{});

@@ -1,4 +1,5 @@
-// Every effect the software knows. A new one is added here, and nowhere else.
+// Every effect the software knows. A new one is written in the file of its station of the car and
+// entered in the list here, and nowhere else.
 #pragma once
 
 #include <array>
@@ -7,45 +8,13 @@
 #include <type_traits>
 #include <utility>
 
-#include "sysid/effects/accelerometer_bias.hpp"
-#include "sysid/effects/accelerometer_scale.hpp"
-#include "sysid/effects/aero_downforce.hpp"
-#include "sysid/effects/aero_drag.hpp"
-#include "sysid/effects/aligning_moment.hpp"
-#include "sysid/effects/body_attitude.hpp"
-#include "sysid/effects/cg_position.hpp"
-#include "sysid/effects/combined_slip.hpp"
-#include "sysid/effects/drive_yaw_moment.hpp"
-#include "sysid/effects/force_gain.hpp"
-#include "sysid/effects/force_split.hpp"
-#include "sysid/effects/friction_change.hpp"
-#include "sysid/effects/gyro_bias.hpp"
-#include "sysid/effects/gyro_scale.hpp"
-#include "sysid/effects/head_wind.hpp"
-#include "sysid/effects/imu_lever_arm.hpp"
-#include "sysid/effects/lateral_load_transfer.hpp"
-#include "sysid/effects/limited_slip_differential.hpp"
-#include "sysid/effects/locked_differential.hpp"
-#include "sysid/effects/longitudinal_load_transfer.hpp"
+#include "sysid/effects/aero.hpp"
+#include "sysid/effects/driveline.hpp"
 #include "sysid/effects/mass.hpp"
-#include "sysid/effects/rear_toe.hpp"
-#include "sysid/effects/road_bank.hpp"
-#include "sysid/effects/road_grade.hpp"
-#include "sysid/effects/rolling_resistance.hpp"
-#include "sysid/effects/sensor_delay.hpp"
-#include "sysid/effects/side_wind.hpp"
-#include "sysid/effects/speed_sensor_lever_arm.hpp"
-#include "sysid/effects/speed_sensor_misalignment.hpp"
-#include "sysid/effects/steer_compliance.hpp"
-#include "sysid/effects/steer_delay.hpp"
-#include "sysid/effects/steer_lag.hpp"
-#include "sysid/effects/steer_nonlinearity.hpp"
-#include "sysid/effects/steer_offset.hpp"
-#include "sysid/effects/steer_ratio.hpp"
-#include "sysid/effects/tyre_load_sensitivity.hpp"
-#include "sysid/effects/tyre_relaxation.hpp"
-#include "sysid/effects/tyre_temperature.hpp"
-#include "sysid/effects/yaw_inertia.hpp"
+#include "sysid/effects/road.hpp"
+#include "sysid/effects/sensors.hpp"
+#include "sysid/effects/steering.hpp"
+#include "sysid/effects/tyre.hpp"
 
 namespace sysid {
 
@@ -83,7 +52,7 @@ constexpr std::array<EffectInfo, kEffectCount> kEffectInfos =
 /// Where the parameters of effect `index` begin in the concatenation of all effects' parameters.
 constexpr std::size_t effect_offset(std::size_t index) {
     std::size_t offset = 0;
-    for (std::size_t i = 0; i < index; ++i) offset += kEffectInfos[i].parameter_count;
+    for (std::size_t i = 0; i < index; ++i) offset += kEffectInfos[i].parameter_count();
     return offset;
 }
 constexpr std::size_t kEffectParameterCount = effect_offset(kEffectCount);

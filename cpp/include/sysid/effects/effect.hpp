@@ -19,37 +19,46 @@ namespace sysid {
 /// over the time of the log, or over its typical range.
 enum class Scan { kNone, kTime, kRange };
 
+struct Range {
+    double low = 0.0, high = 0.0;
+};
+
 struct ParameterInfo {
-    const char* name;
-    const char* unit;
-    double null_value;  // exactly the model without the effect
-    double typical;     // a size one meets in practice
-    double matters;     // smallest size worth acting on
-    double lower, upper;
-    double typical_low, typical_high;  // where most cars lie that have the effect
-    bool mirrored = false;             // changes its sign in a mirror that swaps left and right
+    const char* name = nullptr;
+    const char* unit = nullptr;
+    double null_value = 0.0;  // exactly the model without the effect
+    double typical = 0.0;     // a size one meets in practice
+    double matters = 0.0;     // smallest size worth acting on
+    Range bounds{};           // of any search
+    Range usual{};            // where most cars lie that have the effect
+    bool mirrored = false;    // changes its sign in a mirror that swaps left and right
     Scan scan = Scan::kNone;
 };
 
 constexpr std::size_t kMaxEffectParameters = 2;
 
 struct EffectInfo {
-    const char* id;
-    const char* title;
-    const char* equation;
-    const char* source;
-    const char* excited_by;  // which driving shows it
-    const char* moves;       // which measured channels it moves first
-    const char* needs;       // channels a log must have for the effect to be told at all
-    const char* twins;       // effects that act alike in most driving; said by both
-    std::size_t parameter_count;
-    ParameterInfo parameters[kMaxEffectParameters];
+    const char* id = nullptr;
+    const char* title = nullptr;
+    const char* equation = nullptr;
+    const char* source = nullptr;
+    const char* excited_by = nullptr;       // which driving shows it
+    const char* moves = nullptr;            // which measured channels it moves first
+    const char* needs = nullptr;            // channels a log must have for it to be told at all
+    const char* confounded_with = nullptr;  // effects alike in most driving; said by both
+    ParameterInfo parameters[kMaxEffectParameters] = {};
     // Derivative at the null value does not exist (a lag of zero): scored at a finite size instead.
     bool scored_at_typical = false;
     // Visible only through a known longitudinal force.
     bool needs_force = false;
     // Effect through which it chiefly acts; weak in a model without that.
     const char* through = "";
+
+    constexpr std::size_t parameter_count() const {
+        std::size_t n = 0;
+        while (n < kMaxEffectParameters && parameters[n].name != nullptr) ++n;
+        return n;
+    }
 };
 
 /// What a stage returns at which an effect does not act: it is left out when compiling.

@@ -1,27 +1,145 @@
+// Mass, inertia, where the centre of gravity lies, and the load that moves with it.
 #pragma once
 
 #include "sysid/effects/effect.hpp"
+#include "sysid/model/kinematics.hpp"
 
 namespace sysid {
 
 /// The car is heavier than the vehicle file says.
 struct Mass : Effect {
     static constexpr EffectInfo info{
-        "mass",
-        "mass differs from the vehicle file",
-        "m *= 1 + e",
-        "Rajamani, Vehicle Dynamics and Control, ch. 14",
-        "a longitudinal force known in newtons",
-        "ax_mps2, vx_mps",
-        "fx_n, vx_mps, steer_rad, yaw_rate_radps",
-        "force_gain, yaw_inertia",
-        1,
-        {{"relative_error", "1", 0.0, 0.12, 0.02, -0.6, 1.5, -0.1, 0.15}},
+        .id = "mass",
+        .title = "mass differs from the vehicle file",
+        .equation = "m *= 1 + e",
+        .source = "Rajamani, Vehicle Dynamics and Control, ch. 14",
+        .excited_by = "a longitudinal force known in newtons",
+        .moves = "ax_mps2, vx_mps",
+        .needs = "fx_n, vx_mps, steer_rad, yaw_rate_radps",
+        .confounded_with = "force_gain, yaw_inertia",
+        .parameters = {{.name = "relative_error",
+                        .unit = "1",
+                        .typical = 0.12,
+                        .matters = 0.02,
+                        .bounds = {-0.6, 1.5},
+                        .usual = {-0.1, 0.15}}},
     };
 
     template <class T, class S>
     static void vehicle(const T* p, Workings<S>& w) {
         w.m *= 1.0 + p[0];
+    }
+};
+
+/// The yaw inertia differs from the vehicle file.
+struct YawInertia : Effect {
+    static constexpr EffectInfo info{
+        .id = "yaw_inertia",
+        .title = "yaw inertia differs from the vehicle file",
+        .equation = "I_z *= 1 + e",
+        .source = "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 5",
+        .excited_by = "steering sweeps at 2 Hz and faster, steps",
+        .moves = "yaw_rate_radps",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "mass, tyre_relaxation, locked_differential",
+        .parameters = {{.name = "relative_error",
+                        .unit = "1",
+                        .typical = 0.25,
+                        .matters = 0.05,
+                        .bounds = {-0.8, 3.0},
+                        .usual = {-0.2, 0.3}}},
+    };
+
+    template <class T, class S>
+    static void vehicle(const T* p, Workings<S>& w) {
+        w.I_z *= 1.0 + p[0];
+    }
+};
+
+/// The centre of gravity lies further back than the vehicle file says.
+struct CgPosition : Effect {
+    static constexpr EffectInfo info{
+        .id = "cg_position",
+        .title = "centre of gravity further back than in the vehicle file",
+        .equation = "l_f += d, l_r -= d",
+        .source = "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 5",
+        .excited_by = "a ramp to the limit and a sweep; axle scales settle it",
+        .moves = "yaw_rate_radps, vy_mps",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "aligning_moment, imu_lever_arm, speed_sensor_lever_arm",
+        .parameters = {{.name = "shift_rearward_m",
+                        .unit = "m",
+                        .typical = 0.08,
+                        .matters = 0.02,
+                        .bounds = {-0.8, 0.8},
+                        .usual = {-0.1, 0.1}}},
+    };
+
+    template <class T, class S>
+    static void vehicle(const T* p, Workings<S>& w) {
+        w.l_f += p[0];
+        w.l_r -= p[0];
+    }
+};
+
+/// Unequal loads left and right cost an axle grip, through the tyre's load sensitivity.
+struct LateralLoadTransfer : Effect {
+    static constexpr EffectInfo info{
+        .id = "lateral_load_transfer",
+        .title = "grip lost to lateral load transfer",
+        .equation = "F_y,i *= 1 - kappa_i (v_x r / g)^2",
+        .source = "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 18",
+        .excited_by = "a slow ramp to the limit of grip",
+        .moves = "ay_mps2, yaw_rate_radps",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "tyre_load_sensitivity, steer_compliance, tyre_temperature",
+        .parameters = {{.name = "loss_front",
+                        .unit = "1",
+                        .typical = 0.08,
+                        .matters = 0.02,
+                        .bounds = {-0.3, 0.6},
+                        .usual = {0.03, 0.15}},
+                       {.name = "loss_rear",
+                        .unit = "1",
+                        .typical = 0.08,
+                        .matters = 0.02,
+                        .bounds = {-0.3, 0.6},
+                        .usual = {0.03, 0.15}}},
+    };
+
+    template <class T, class S>
+    static void grip(const T* p, Workings<S>& w, const S* /*state*/) {
+        const S quasi_static = w.v_x * w.r / kGravity;
+        w.grip_f *= 1.0 - p[0] * (quasi_static * quasi_static);
+        w.grip_r *= 1.0 - p[1] * (quasi_static * quasi_static);
+    }
+};
+
+/// Braking and driving move more, or less, load between the axles than the height of the centre of
+/// gravity in the vehicle file says.
+struct LongitudinalLoadTransfer : Effect {
+    static constexpr EffectInfo info{
+        .id = "longitudinal_load_transfer",
+        .title = "longitudinal load transfer: height of the centre of gravity",
+        .equation = "h += d in Delta F_z = m a_x h/L",
+        .source =
+            "Rajamani, Vehicle Dynamics and Control, ch. 4; Milliken & Milliken, Race Car Vehicle "
+            "Dynamics, ch. 18",
+        .excited_by = "braking and accelerating in corners",
+        .moves = "yaw_rate_radps, ay_mps2",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "tyre_load_sensitivity, combined_slip, force_split",
+        .parameters = {{.name = "height_error_m",
+                        .unit = "m",
+                        .typical = 0.12,
+                        .matters = 0.03,
+                        .bounds = {-0.6, 1.5},
+                        .usual = {-0.15, 0.15}}},
+    };
+
+    template <class T, class S>
+    static void vehicle(const T* p, Workings<S>& w) {
+        w.h += p[0];
     }
 };
 

@@ -18,6 +18,7 @@
 
 #include "sysid/lab/actuators.hpp"
 #include "sysid/math/linear.hpp"
+#include "sysid/model/kinematics.hpp"
 
 namespace sysid::lab {
 
@@ -25,30 +26,20 @@ namespace sysid::lab {
 enum Estimated : int { kEstVx, kEstVy, kEstYawRate, kEstXiX, kEstXiY, kEstXiPsi, kEstimated };
 using Estimate = Vec<kEstimated>;
 
-struct AxleLoads {
-    double front_n = 0.0, rear_n = 0.0;
-};
-
 /// The car as controller and observer believe it to be.
 struct NominalCar {
     double mass_kg = 0.0;
     double yaw_inertia_kgm2 = 0.0;
     double lf_m = 0.0, lr_m = 0.0;
     double cg_height_m = 0.0;
-    double gravity_mps2 = 9.80665;
+    double gravity_mps2 = kGravity;
     double drag_nspm = 0.0;         // linear drag C_d
     double stiffness_front = 50.0;  // cornering stiffness per load [1/rad]
     double stiffness_rear = 50.0;
 
     /// Axle loads on a level road under a total wheel force.
-    AxleLoads loads(double force_n) const {
-        const double wheelbase = lf_m + lr_m;
-        const double weight = mass_kg * gravity_mps2;
-        const double moved = force_n * cg_height_m / wheelbase;
-        const double least = 0.05 * weight;
-        const double front = weight * lr_m / wheelbase - moved;
-        const double rear = weight * lf_m / wheelbase + moved;
-        return {std::max(least, front), std::max(least, rear)};
+    Axles<double> loads(double force_n) const {
+        return axle_loads(mass_kg * gravity_mps2, force_n, cg_height_m, lf_m, lr_m);
     }
 };
 
@@ -111,14 +102,14 @@ class Adrc {
     }
 
     /// Equation (5); `steer_rad` is the angle that acts on the state `x`.
-    double guarded(double yaw_rate, const Estimate& x, double steer_rad, const AxleLoads& loads,
+    double guarded(double yaw_rate, const Estimate& x, double steer_rad, const Axles<double>& loads,
                    std::uint32_t& limits) const {
         const double v = std::max(x[kEstVx], 1.0);
-        const double slip = -std::atan2(x[kEstVy] - car_.lr_m * x[kEstYawRate], v);
-        const double front = steer_rad - (x[kEstVy] + car_.lf_m * x[kEstYawRate]) / v;
-        const double rear = -(x[kEstVy] - car_.lr_m * x[kEstYawRate]) / v;
-        const double force = car_.stiffness_front * loads.front_n * front +
-                             car_.stiffness_rear * loads.rear_n * rear + x[kEstXiY];
+        const double slip = slips(x, v, steer_rad).rear;
+        const Axles<double> small =
+            small_slip_angles(x[kEstVy] / v, x[kEstYawRate] / v, car_.lf_m, car_.lr_m, steer_rad);
+        const double force = car_.stiffness_front * loads.front * small.front +
+                             car_.stiffness_rear * loads.rear * small.rear + x[kEstXiY];
         const double middle = force / (car_.mass_kg * v) - data_.rear_slip_gain_ps * slip;
         const double room = data_.rear_slip_gain_ps * data_.rear_slip_limit_rad;
         const double kept = std::clamp(yaw_rate, middle - room, middle + room);
@@ -127,10 +118,10 @@ class Adrc {
     }
 
     /// Equation (2).
-    double steer(double yaw_rate, const Estimate& x, const AxleLoads& loads,
+    double steer(double yaw_rate, const Estimate& x, const Axles<double>& loads,
                  std::uint32_t& limits) const {
-        const double front = car_.stiffness_front * loads.front_n;
-        const double rear = car_.stiffness_rear * loads.rear_n;
+        const double front = car_.stiffness_front * loads.front;
+        const double rear = car_.stiffness_rear * loads.rear;
         const double inertia = car_.yaw_inertia_kgm2;
         const double v = std::max(x[kEstVx], data_.lowest_speed_mps) + data_.added_speed_mps;
         const double n_v = -(front * car_.lf_m - rear * car_.lr_m) / (inertia * v);
@@ -140,7 +131,7 @@ class Adrc {
         const double wanted = data_.yaw_rate_gain_ps * (yaw_rate - r) - n_v * x[kEstVy] - n_r * r -
                               x[kEstXiPsi] / inertia;
         const double angle = wanted * inertia / (front * car_.lf_m);
-        const double straight = std::atan2(x[kEstVy] + car_.lf_m * r, v);
+        const double straight = -slips(x, v, 0.0).front;
         const double kept =
             std::clamp(angle, straight - data_.slip_limit_rad, straight + data_.slip_limit_rad);
         if (kept != angle) limits |= kSlipLimited;
@@ -148,6 +139,10 @@ class Adrc {
     }
 
   private:
+    Axles<double> slips(const Estimate& x, double v, double steer_rad) const {
+        return slip_angles(v, x[kEstVy], x[kEstYawRate], car_.lf_m, car_.lr_m, steer_rad);
+    }
+
     static constexpr double kPi = 3.14159265358979323846;
 
     AdrcData data_;

@@ -1,7 +1,7 @@
 // Plant, sensors, observer, controller and actuators in one loop.
 //
 // The observer is any type with
-//   void step(double force_n, double steer_rad, const AxleLoads&, const Vec<4>& y)
+//   void step(double force_n, double steer_rad, const Axles<double>&, const Vec<4>& y)
 //       moves on to the present sample and uses its reading, v_x, v_y, r, a_y or NaN
 //   const Estimate& state() const   after the last step, or at the start
 //   Estimate ahead() const          one sample later, if the inputs stay
@@ -100,8 +100,9 @@ class ClosedLoop {
         x[kPlaceX] = data_.first_x_m;
         x[kPlaceY] = data_.first_y_m;
         place_ = {data_.first_x_m, data_.first_y_m, 0.0};
-        loads_ = data_.late_feedback ? AxleLoads{data_.first_late_load_n, data_.first_late_load_n}
-                                     : data_.car.loads(0.0);
+        loads_ = data_.late_feedback
+                     ? Axles<double>{data_.first_late_load_n, data_.first_late_load_n}
+                     : data_.car.loads(0.0);
         LoopRecord out;
         out.lost_at = wanted.size();
         for (std::size_t k = 0; k < wanted.size(); ++k) {
@@ -201,8 +202,8 @@ class ClosedLoop {
             loads_ = data_.car.loads(known_.longitudinal);
             return;
         }
-        if (!std::isnan(y[kSenseLoadFront])) loads_.front_n = y[kSenseLoadFront];
-        if (!std::isnan(y[kSenseLoadRear])) loads_.rear_n = y[kSenseLoadRear];
+        if (!std::isnan(y[kSenseLoadFront])) loads_.front = y[kSenseLoadFront];
+        if (!std::isnan(y[kSenseLoadRear])) loads_.rear = y[kSenseLoadRear];
     }
 
     Readings readings(const PlantState& x, const Plant::Externals& external) const {
@@ -251,7 +252,7 @@ class ClosedLoop {
     std::vector<Readings> perfect_;
     Reckoning place_;
     Estimate believed_ = Estimate::Zero();
-    AxleLoads loads_;
+    Axles<double> loads_;
     Decision next_;
     Input known_;
 };

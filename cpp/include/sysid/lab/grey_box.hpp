@@ -10,9 +10,7 @@
 //   F_zr = F_zr(0) - h/L (T - T(0)) + A_r (v_x^2/v_x(0)^2 - 1),
 //   T = F_yf sin(delta) + 1/2 rho C_dA v_x^2,
 // where A is what is left of F_z(0) besides the weight and h/L m a_x: the air's part.
-// At 10 ms that is a thousandth of the force, which a drive beyond the peak resolves. Written once
-// for any scalar, and once more with its derivatives by hand, which is what the searches spend
-// their time in; tests hold the two together.
+// At 10 ms that is a thousandth of the force, which a drive beyond the peak resolves.
 #pragma once
 
 #include <algorithm>
@@ -21,6 +19,7 @@
 #include <cstddef>
 
 #include "sysid/math/dual.hpp"
+#include "sysid/math/integrate.hpp"
 #include "sysid/math/whole.hpp"
 #include "sysid/model/tyre.hpp"
 #include "sysid/model/vehicle.hpp"
@@ -81,26 +80,24 @@ template <class S, class T>
 std::array<S, kGreyStates + 1> grey_box(const GreyBoxCar& car, const std::array<S, kGreyStates>& x,
                                         const GreyBoxInput& u, const T* p,
                                         const LoadsSince<S>& since = {}) {
-    using std::atan;
     const S speed = value_of(x[0]) > car.slowest_mps ? x[0] : S(car.slowest_mps);
-    const S alpha_f = u.steer_rad - atan((x[1] + car.lf_m * x[2]) / speed);
-    const S alpha_r = -atan((x[1] - car.lr_m * x[2]) / speed);
+    const Axles<S> alpha = slip_angles(speed, x[1], x[2], car.lf_m, car.lr_m, u.steer_rad);
     const TyreCoefficients<T> front{p[kFront], p[kFront + 1], p[kFront + 2], p[kFront + 3]};
     const TyreCoefficients<T> rear{p[kRear], p[kRear + 1], p[kRear + 2], p[kRear + 3]};
     const T mass = car.mass_kg * p[kMassFactor];
     const T inertia = car.yaw_inertia_kgm2 * p[kInertiaFactor];
-    const S drag = 0.5 * car.air_density_kgpm3 * (p[kDragArea] * (x[0] * x[0]));
+    const S drag = drag_force(car.air_density_kgpm3, p[kDragArea], x[0]);
     const double lever = since.moves ? car.cg_height_m / (car.lf_m + car.lr_m) : 0.0;
-    const S mu_f = magic_formula(alpha_f, front);
+    const S mu_f = magic_formula(alpha.front, front);
     const S growth = air_growth(since, x[0]);
     const S shift = lever * (u.fx_n - since.drawn_n);
-    const T weight = mass * (kGravity / (car.lf_m + car.lr_m));
-    const S fz_f = u.fz_front_n + growth * (u.fz_front_n - weight * car.lr_m + shift);
-    const S fz_r = u.fz_rear_n + growth * (u.fz_rear_n - weight * car.lf_m - shift);
+    const Axles<T> rest = static_loads(T(mass * kGravity), car.lf_m, car.lr_m);
+    const S fz_f = u.fz_front_n + growth * (u.fz_front_n - rest.front + shift);
+    const S fz_r = u.fz_rear_n + growth * (u.fz_rear_n - rest.rear - shift);
     const S force_f =
         (fz_f + lever * (drag - since.drawn_n)) * mu_f / (1.0 - lever * u.sin_steer * mu_f);
     const S moved = lever * (u.sin_steer * force_f + drag - since.drawn_n);
-    const S force_r = (fz_r - moved) * magic_formula(alpha_r, rear);
+    const S force_r = (fz_r - moved) * magic_formula(alpha.rear, rear);
     const S a_y = (u.cos_steer * force_f + force_r) / mass + p[kP1] * (x[0] * x[0]) +
                   p[kP2] * x[1] + p[kP3] * x[2];
     return {
@@ -110,36 +107,6 @@ std::array<S, kGreyStates + 1> grey_box(const GreyBoxCar& car, const std::array<
         a_y,
     };
 }
-
-/// The Magic Formula and its derivatives by alpha, B, C, D, E.
-struct TyreSlope {
-    double value, by_alpha, by_b, by_c, by_d, by_e;
-};
-
-inline TyreSlope magic_formula_slope(double alpha, const double* bcde) {
-    const double x = bcde[0] * alpha;
-    const double lag = x - std::atan(x);
-    const double w = x - bcde[3] * lag;
-    const double angle = std::atan(w);
-    const double s = std::sin(bcde[1] * angle);
-    const double slope = bcde[2] * std::cos(bcde[1] * angle);
-    const double by_w = slope * bcde[1] / (1.0 + w * w);
-    const double by_x = by_w * (1.0 - bcde[3] * x * x / (1.0 + x * x));
-    return {bcde[2] * s, by_x * bcde[0], by_x * alpha, slope * angle, s, -by_w * lag};
-}
-
-/// `grey_box` with its derivatives by state and by parameter, row by row.
-struct GreyBoxSlope {
-    std::array<double, kGreyStates + 1> value;
-    std::array<std::array<double, kGreyStates>, kGreyStates + 1> by_state;
-    std::array<std::array<double, kTyreParameters>, kGreyStates + 1> by_parameter;
-    std::array<double, kGreyStates + 1> by_drawn;          // by T(0)
-    std::array<double, kGreyStates + 1> by_first_squared;  // by v_x(0)^2
-};
-
-void grey_box_slope(const GreyBoxCar& car, const std::array<double, kGreyStates>& x,
-                    const GreyBoxInput& u, const double* p, bool with_parameters, GreyBoxSlope& out,
-                    const LoadsSince<double>& since = {});
 
 /// T of (5) from the rates there.
 template <class S, class T>
@@ -173,25 +140,23 @@ inline int grey_box_substeps(const GreyBoxCar& car, const GreyBoxInput& u, const
     return whole_within(std::ceil(dt * rate / 0.25), 1, 144);
 }
 
-/// Classical Runge-Kutta over `dt`; force and steering are held, as a digital controller does.
+/// Moves `x` over `dt`; force and steering are held, as a digital controller does.
 template <class S, class T>
 void grey_box_step(const GreyBoxCar& car, std::array<S, kGreyStates>& x, const GreyBoxInput& u,
                    const T* p, double dt, int substeps) {
-    const double h = dt / substeps;
-    const auto moved = [](const std::array<S, kGreyStates>& a,
-                          const std::array<S, kGreyStates + 1>& k, double by) {
-        return std::array<S, kGreyStates>{a[0] + by * k[0], a[1] + by * k[1], a[2] + by * k[2]};
-    };
+    using State = std::array<S, kGreyStates>;
     LoadsSince<S> since;
-    for (int n = 0; n < substeps; ++n) {
-        const auto k1 = grey_box(car, x, u, p, since);
-        if (n == 0) since = loads_from(car, x, u, p, k1);
-        const auto k2 = grey_box(car, moved(x, k1, 0.5 * h), u, p, since);
-        const auto k3 = grey_box(car, moved(x, k2, 0.5 * h), u, p, since);
-        const auto k4 = grey_box(car, moved(x, k3, h), u, p, since);
-        for (std::size_t i = 0; i < kGreyStates; ++i)
-            x[i] += (h / 6.0) * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
-    }
+    for (int n = 0; n < substeps; ++n)
+        runge_kutta_step(
+            x, dt / substeps,
+            [&](std::size_t stage, const State& at, State& k) {
+                const auto rates = grey_box(car, at, u, p, since);
+                if (n == 0 && stage == 0) since = loads_from(car, at, u, p, rates);
+                std::copy_n(rates.begin(), kGreyStates, k.begin());
+            },
+            [](auto&& use) {
+                for (std::size_t i = 0; i < kGreyStates; ++i) use(i);
+            });
 }
 
 }  // namespace sysid::lab

@@ -29,9 +29,9 @@ class LoopObserver {
         state_ = start.mean;
     }
 
-    void step(double force_n, double steer_rad, const AxleLoads& loads, const Vec<4>& y) {
-        const double front = car_.stiffness_front * loads.front_n;
-        last_ = {force_n, steer_rad, front, car_.stiffness_rear * loads.rear_n};
+    void step(double force_n, double steer_rad, const Axles<double>& loads, const Vec<4>& y) {
+        const double front = car_.stiffness_front * loads.front;
+        last_ = {force_n, steer_rad, front, car_.stiffness_rear * loads.rear};
         if (!observer_)
             observer_.emplace(model_, data_.noise,
                               ObserverStart::from_reading(y, data_.noise, believed_car_));

@@ -19,6 +19,7 @@
 
 #include "sysid/estimate/kalman.hpp"
 #include "sysid/math/exponential.hpp"
+#include "sysid/model/kinematics.hpp"
 
 namespace sysid::lab {
 
@@ -190,7 +191,6 @@ struct ObserverStart {
     /// From the first reading alone: what it lacks is widely uncertain, as are the forces.
     static ObserverStart from_reading(const ObserverReading& y, const ObserverNoise& noise,
                                       const ObserverCar& car) {
-        constexpr double kGravity = 9.81;
         const double weight = kGravity * car.mass_kg;
         ObserverStart start;
         const double wide[] = {10.0, 1.0, 0.5};  // m/s, m/s, rad/s

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "sysid/dynamics/step.hpp"
-#include "sysid/lab/integrate.hpp"
 
 namespace sysid::lab {
 
@@ -109,9 +108,16 @@ class Plant {
         if (options_.tolerance > 0.0) {
             dormand_prince(x, dt, options_.tolerance, rate);
         } else {
-            runge_kutta(x, dt,
-                        options_.steps > 0 ? options_.steps : steps_for(x, from, external, dt),
-                        rate);
+            const int n = options_.steps > 0 ? options_.steps : steps_for(x, from, external, dt);
+            for (int i = 0; i < n; ++i)
+                runge_kutta_step(
+                    x, dt / n,
+                    [&](std::size_t stage, const PlantState& at, PlantState& k) {
+                        k = rate((i + kStageAt[stage]) / n, at);
+                    },
+                    [](auto&& use) {
+                        for (std::size_t j = 0; j < kPlantStates; ++j) use(j);
+                    });
         }
         model_.held = next;
     }

@@ -34,49 +34,43 @@ class TyreLoss {
     void add(const TyreSample& sample);
     std::size_t samples() const { return rows_.size(); }
 
-    /// Weighted errors of a_y and of the yaw acceleration, two per sample.
-    void residuals(const double* p, double* out) const;
-
-    /// Minus the derivatives of the residuals by the parameters `columns`, row-major.
-    void sensitivities(const double* p, const std::vector<int>& columns, double* out) const;
-
-    double half_sum_of_squares(const double* p) const;
-
-    /// As in `TyreProblem`.
-    double normal_equations(const double* p, const std::vector<int>& columns, double* gradient,
-                            double* information) const;
+    /// Weighted errors of a_y and of the yaw acceleration of each sample, as
+    /// `identify/least_squares.hpp` takes them.
+    template <class S, class Keep>
+    void walk(const S* p, Keep&& keep) const {
+        const TyreCoefficients<S> front{p[0], p[1], p[2], p[3]};
+        const TyreCoefficients<S> rear{p[4], p[5], p[6], p[7]};
+        for (const Row& row : rows_) {
+            const S mu_f = magic_formula(row.alpha.front, front);
+            const S mu_r = magic_formula(row.alpha.rear, rear);
+            const S rest = row.rest[0] * p[kP1] + row.rest[1] * p[kP2] + row.rest[2] * p[kP3];
+            keep(std::array<S, 2>{
+                row.a_y - row.lateral.front * mu_f - row.lateral.rear * mu_r - rest,
+                row.yaw_acceleration - row.yaw.front * mu_f - row.yaw.rear * mu_r,
+            });
+        }
+    }
 
   private:
     struct Row {
-        double alpha_f, alpha_r;
-        double lateral_f, lateral_r;  // a_y per unit of friction, weighted
-        double yaw_f, yaw_r;          // yaw acceleration per unit of friction, weighted
-        std::array<double, 3> rest;   // factors of P_1, P_2, P_3, weighted
+        Axles<double> alpha;
+        Axles<double> lateral;       // a_y per unit of friction, weighted
+        Axles<double> yaw;           // yaw acceleration per unit of friction, weighted
+        std::array<double, 3> rest;  // factors of P_1, P_2, P_3, weighted
         double a_y, yaw_acceleration;
     };
-    struct Errors {
-        double lateral, yaw;
-    };
-    /// Errors of one sample, given the friction of both axles.
-    static Errors errors(const Row& row, double mu_f, double mu_r, const double* p) {
-        const double rest = row.rest[0] * p[kP1] + row.rest[1] * p[kP2] + row.rest[2] * p[kP3];
-        return {
-            row.a_y - row.lateral_f * mu_f - row.lateral_r * mu_r - rest,
-            row.yaw_acceleration - row.yaw_f * mu_f - row.yaw_r * mu_r,
-        };
-    }
-    template <class Keep>
-    void each(const double* p, Keep&& keep) const {
-        const TyreCoefficients<double> front{p[0], p[1], p[2], p[3]};
-        const TyreCoefficients<double> rear{p[4], p[5], p[6], p[7]};
-        for (const Row& row : rows_)
-            keep(errors(row, magic_formula(row.alpha_f, front), magic_formula(row.alpha_r, rear),
-                        p));
-    }
 
     GreyBoxCar car_;
     bool projects_steer_;
     std::vector<Row> rows_;
 };
+
+/// As in `tyre_likelihood.hpp`; no filter has a part in it, and nullptr stands for its gains.
+void residuals(const TyreLoss& loss, const double* p, std::nullptr_t, double* out);
+double half_sum_of_squares(const TyreLoss& loss, const double* p, std::nullptr_t);
+void sensitivities(const TyreLoss& loss, const double* p, std::nullptr_t,
+                   const std::vector<int>& columns, double* out);
+double normal_equations(const TyreLoss& loss, const double* p, std::nullptr_t,
+                        const std::vector<int>& columns, double* gradient, double* information);
 
 }  // namespace sysid::lab

@@ -1,10 +1,10 @@
 // Likelihood of tyre coefficients: one-step-ahead prediction errors of v_x, v_y, r and a_y.
 //
 // States that come out of a smoother are not exact regressors, and a regression on them is biased
-// and too sure of itself. Here the motion stays unknown: an extended Kalman filter predicts every
-// reading from the readings before it, and the errors of the predictions, each divided by its
-// expected size, are the residuals (Ljung, System Identification, 2nd ed., sec. 7.2). Sensor noise
-// is taken as independent from channel to channel, so that readings enter one at a time.
+// and too sure of itself. Here the motion stays unknown, and the residuals are those of the main
+// job: the whitened innovations of the same extended Kalman filter (`estimate/kalman.hpp`), its
+// gains frozen (`estimate/frozen.hpp`). The noise is that of four sensors and of white
+// disturbances of the motion.
 #pragma once
 
 #include <array>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "sysid/lab/grey_box.hpp"
+#include "sysid/math/linear.hpp"
 
 namespace sysid::lab {
 
@@ -22,15 +23,14 @@ constexpr int kGreyNoises = kGreyChannels + kGreyStates;  // sensors, then distu
 struct TyreRun {
     double dt = 0.01;
     std::vector<GreyBoxInput> inputs;  // of the interval that begins at each sample
-    std::vector<std::array<double, kGreyChannels>> measurements;
+    std::vector<Vec<kGreyChannels>> measurements;
     std::size_t size() const { return inputs.size(); }
 };
 
-/// Gains of every sample, channel after channel, and one over the expected size of each error;
-/// both zero where there is no reading.
+/// As `FrozenStep`.
 struct FrozenGain {
-    std::array<std::array<double, kGreyStates>, kGreyChannels> gain;
-    std::array<double, kGreyChannels> per_std;
+    Mat<kGreyStates, kGreyChannels> gain;
+    Mat<kGreyChannels, kGreyChannels> whitener;
 };
 
 struct FrozenGains {
@@ -39,49 +39,43 @@ struct FrozenGains {
     std::size_t observed = 0;
 };
 
-class TyreProblem {
-  public:
-    explicit TyreProblem(const GreyBoxCar& car) : car_(car) {}
+struct TyreProblem {
+    GreyBoxCar car;
+    std::vector<TyreRun> runs;
 
-    void add_run(TyreRun run) { runs_.push_back(std::move(run)); }
-    std::size_t samples() const;
-    const std::vector<TyreRun>& runs() const { return runs_; }
-
-    /// Runs the filter. `noise`: standard deviations of the four sensors, and of the white
-    /// disturbance of v_x, v_y, r per root second.
-    FrozenGains freeze(const double* p, const double* noise) const;
-
-    /// Errors over their expected size, kGreyChannels per sample, runs one after the other.
-    void residuals(const double* p, const FrozenGains& gains, double* out) const;
-
-    /// Minus the derivatives of the residuals by the parameters `columns`, row-major.
-    void sensitivities(const double* p, const FrozenGains& gains, const std::vector<int>& columns,
-                       double* out) const;
-
-    /// Half the sum of squared residuals, with G^T e and G^T G (row-major) of the sensitivities G.
-    double normal_equations(const double* p, const FrozenGains& gains,
-                            const std::vector<int>& columns, double* gradient,
-                            double* information) const;
-
-    double half_sum_of_squares(const double* p, const FrozenGains& gains) const;
-
-    /// Log-likelihood, its derivatives by the logarithms of the noise parameters, and their
-    /// expected information (row-major). Where the filter linearises is taken as given.
-    double noise_score(const double* p, const double* noise, double* gradient,
-                       double* information) const;
-
-    /// Filtered v_x, v_y, r of every sample.
-    void states(const double* p, const FrozenGains& gains, double* out) const;
-
-    /// Readings predicted `ahead` samples ahead from the filtered state, kGreyChannels per sample;
-    /// NaN where that would begin before a run does. `ahead` of 0 simulates each run freely from
-    /// its first state.
-    void look_ahead(const double* p, const FrozenGains& gains, std::size_t ahead,
-                    double* out) const;
-
-  private:
-    GreyBoxCar car_;
-    std::vector<TyreRun> runs_;
+    std::size_t samples() const {
+        std::size_t n = 0;
+        for (const TyreRun& run : runs) n += run.size();
+        return n;
+    }
 };
+
+/// Runs the filter. `noise`: standard deviations of the four sensors, and of the white disturbance
+/// of v_x, v_y, r per root second.
+FrozenGains freeze(const TyreProblem& problem, const double* p, const double* noise);
+
+/// Whitened errors, kGreyChannels per sample, runs one after the other; what follows is as in
+/// `identify/prediction_error.hpp`.
+void residuals(const TyreProblem& problem, const double* p, const FrozenGains& gains, double* out);
+
+double half_sum_of_squares(const TyreProblem& problem, const double* p, const FrozenGains& gains);
+
+void sensitivities(const TyreProblem& problem, const double* p, const FrozenGains& gains,
+                   const std::vector<int>& columns, double* out);
+
+double normal_equations(const TyreProblem& problem, const double* p, const FrozenGains& gains,
+                        const std::vector<int>& columns, double* gradient, double* information);
+
+double noise_score(const TyreProblem& problem, const double* p, const double* noise,
+                   double* gradient, double* information);
+
+/// Filtered v_x, v_y, r of every sample.
+void states(const TyreProblem& problem, const double* p, const FrozenGains& gains, double* out);
+
+/// Readings predicted `ahead` samples ahead from the filtered state, kGreyChannels per sample; NaN
+/// where that would begin before a run does. `ahead` of 0 simulates each run freely from its first
+/// state.
+void look_ahead(const TyreProblem& problem, const double* p, const FrozenGains& gains,
+                std::size_t ahead, double* out);
 
 }  // namespace sysid::lab

@@ -10,6 +10,11 @@
 
 namespace sysid {
 
+/// atan2(y, x); forwards, where it is nearly always asked for, in half the time.
+inline double direction(double y, double x) {
+    return x > 0.0 ? std::atan(y / x) : std::atan2(y, x);
+}
+
 template <int N>
 struct Dual {
     double v = 0.0;
@@ -71,10 +76,11 @@ struct Dual {
     friend Dual sin(const Dual& a) { return chain(a, std::sin(a.v), std::cos(a.v)); }
     friend Dual cos(const Dual& a) { return chain(a, std::cos(a.v), -std::sin(a.v)); }
     friend Dual atan(const Dual& a) { return chain(a, std::atan(a.v), 1.0 / (1.0 + a.v * a.v)); }
-    friend Dual atan2(const Dual& y, const Dual& x) {
-        const double squared = x.v * x.v + y.v * y.v;
-        return chain2(y, x, std::atan2(y.v, x.v), x.v / squared, -y.v / squared);
+    friend Dual direction(const Dual& y, const Dual& x) {
+        const double per_square = 1.0 / (x.v * x.v + y.v * y.v);
+        return chain2(y, x, direction(y.v, x.v), x.v * per_square, -y.v * per_square);
     }
+    friend Dual atan2(const Dual& y, const Dual& x) { return direction(y, x); }
     friend Dual sqrt(const Dual& a) {
         const double root = std::sqrt(a.v);
         return chain(a, root, 0.5 / root);

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -75,6 +76,8 @@ enum class LagStage {
     kMiddleAgain,
     kEnd,
 };
+constexpr std::array<LagStage, 4> kLagStages{LagStage::kStart, LagStage::kMiddle,
+                                             LagStage::kMiddleAgain, LagStage::kEnd};
 
 /// What the lags of a model have seen of a step; arrays with an element for each state.
 template <class S>

@@ -13,10 +13,10 @@ struct TyreCoefficients {
 /// Magic Formula, Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (4.6) without shifts:
 /// F_y / F_z = D sin(C atan(B alpha - E (B alpha - atan(B alpha)))).
 template <class S, class T>
-S magic_formula(const S& alpha, const TyreCoefficients<T>& tyre) {
+auto magic_formula(const S& alpha, const TyreCoefficients<T>& tyre) {
     using std::atan;
     using std::sin;
-    const S x = tyre.B * alpha;
+    const auto x = tyre.B * alpha;
     return tyre.D * sin(tyre.C * atan(x - tyre.E * (x - atan(x))));
 }
 

@@ -1,9 +1,9 @@
 // What is known of the car beforehand. ISO 8855 axes (x forward, y left, z up), SI units.
 #pragma once
 
-namespace sysid {
+#include "sysid/model/kinematics.hpp"
 
-constexpr double kGravity = 9.80665;  // m/s2
+namespace sysid {
 
 struct VehicleData {
     double mass_kg = 0.0;

@@ -2,15 +2,13 @@
 // from lateral and yaw acceleration where the slip angles are known:
 //   a_y   = (C_f alpha_f + C_r alpha_r) / m
 //   r_dot = (l_f C_f alpha_f - l_r C_r alpha_r) / I_z
-// Both rows are divided by the standard deviation of their noise.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "sysid/math/errors.hpp"
-#include "sysid/math/linear.hpp"
+#include "sysid/estimate/kalman.hpp"
 
 namespace sysid {
 
@@ -61,26 +59,14 @@ class CorneringRls {
         Mat<2, 2> A;
         A << alpha_f / s.mass_kg, alpha_r / s.mass_kg,  //
             s.lf_m * alpha_f / s.yaw_inertia_kgm2, -s.lr_m * alpha_r / s.yaw_inertia_kgm2;
-        Vec<2> y(ay, yaw_acceleration);
-        const Vec<2> weight(1.0 / s.ay_std_mps2, 1.0 / s.yaw_acceleration_std_radps2);
-        A = (weight.asDiagonal() * A).eval();
-        y = y.cwiseProduct(weight);
-        bool any = false;
-        for (int i = 0; i < 2; ++i) {
-            if (std::isnan(y[i])) {
-                y[i] = 0.0;
-                A.row(i).setZero();
-            } else {
-                any = true;
-            }
-        }
-        if (!any) return false;
-        const Mat<2, 2> S = s.forgetting * Mat<2, 2>::Identity() + A * P_ * A.transpose();
-        const Mat<2, 2> K = solved_by<2, 2>(S, A * P_).transpose();
-        theta_ += K * (y - A * theta_);
-        // Joseph's form of (P - K A P) / lambda keeps it positive definite.
-        const Mat<2, 2> I_KA = Mat<2, 2>::Identity() - K * A;
-        P_ = (I_KA * P_ * I_KA.transpose() / s.forgetting + K * K.transpose()).eval();
+        const Vec<2> y(ay, yaw_acceleration);
+        if (y.array().isNaN().all()) return false;
+        const Vec<2> std(s.ay_std_mps2, s.yaw_acceleration_std_radps2);
+        // Forgetting is a prior that is less sure; what follows is the update of every filter.
+        P_ /= s.forgetting;
+        Update<2, 2> update;
+        measurement_update<2, 2>(theta_, P_, y, A * theta_, A, std.cwiseAbs2().asDiagonal(), sample,
+                                 update);
         // What no sample tells anything about must not be forgotten beyond the prior (wind-up).
         const double ceiling = s.prior_std_npr * s.prior_std_npr;
         for (int i = 0; i < 2; ++i) {
@@ -89,7 +75,6 @@ class CorneringRls {
             P_.row(i) *= shrink;
             P_.col(i) *= shrink;
         }
-        symmetrise(P_);
         ++used_;
         return true;
     }

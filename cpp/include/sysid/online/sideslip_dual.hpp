@@ -70,7 +70,7 @@ struct TyreModel {  // observer B
         double steer = 0.0, steer_before = 0.0;  // now and at the sample before
         double vx = 1.0, vx_before = 1.0;
         double ax = 0.0, ax_before = 0.0;
-        AxleLoads loads{};
+        AxleForces loads{};
         double error_f_n = 0.0, error_r_n = 0.0;  // standard deviation of the tyre model's error
         double drive_nm = 0.0;                    // standard deviation of that yaw moment
         double stiffness_walk_f = 0.0, stiffness_walk_r = 0.0;  // [1/sqrt(s)]

@@ -2,9 +2,6 @@
 // with the longitudinal force, and whose stiffness and friction can be rescaled while driving.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-
 #include "sysid/math/dual.hpp"
 #include "sysid/model/tyre.hpp"
 #include "sysid/model/vehicle.hpp"
@@ -20,32 +17,24 @@ struct ObservedCar {
 };
 
 /// Vertical and longitudinal axle forces [N].
-struct AxleLoads {
+struct AxleForces {
     double fz_f, fz_r, fx_f, fx_r;
 };
 
 /// Quasi-static loads under the longitudinal acceleration `ax` (specific force), and the
 /// longitudinal force shared as brakes or drive do it.
-inline AxleLoads axle_loads(const ObservedCar& car, double ax, double speed) {
+inline AxleForces axle_forces(const ObservedCar& car, double ax, double speed) {
     const VehicleData& c = car.data;
-    const double shift = c.mass_kg * ax * c.cg_height_m / car.wheelbase_m();
-    const double drag = 0.5 * c.air_density_kgpm3 * c.drag_area_m2 * speed * speed;
-    const double fx = c.mass_kg * ax + drag;
+    const double pull = c.mass_kg * ax;
+    const Axles<double> fz = axle_loads(c.mass_kg * kGravity, pull, c.cg_height_m, c.lf_m, c.lr_m);
+    const double fx = pull + drag_force(c.air_density_kgpm3, c.drag_area_m2, speed);
     const double front = fx < 0.0 ? c.brake_front_share : c.drive_front_share;
-    const double weight = c.mass_kg * kGravity / car.wheelbase_m();
-    const double least = 0.05 * c.mass_kg * kGravity;  // a wheel in the air breaks every formula
-    return {
-        std::max(weight * c.lr_m - shift, least),
-        std::max(weight * c.lf_m + shift, least),
-        front * fx,
-        (1.0 - front) * fx,
-    };
+    return {fz.front, fz.rear, front * fx, (1.0 - front) * fx};
 }
 
-/// Share of the lateral grip that the longitudinal force leaves (friction ellipse).
+/// Share of the lateral grip that the longitudinal force leaves.
 inline double grip_left(double fx, double fz, double mu) {
-    const double used = fx / (mu * fz);
-    return std::sqrt(std::max(1.0 - used * used, 0.05));
+    return ellipse_left(1.0, fx / (mu * fz));
 }
 
 /// Axle force at slip angle `alpha` (positive gives a positive force), with the cornering stiffness

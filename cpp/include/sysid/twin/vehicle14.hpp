@@ -35,6 +35,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "sysid/model/kinematics.hpp"
 #include "sysid/twin/load.hpp"
 #include "sysid/twin/tyre14.hpp"
 #include "sysid/twin/wheels.hpp"
@@ -45,7 +46,6 @@ constexpr std::size_t kTwinStates = 28;
 constexpr std::size_t kTwinStatesWithTyres = kTwinStates + 2 * kWheels;
 constexpr std::size_t kTwinInputs = 24;
 constexpr std::size_t kTwinOutputs = 38;
-constexpr double kTwinGravity = 9.81;
 constexpr double kSlowest = 1.0;        // [m/s] below it slip is referred to this speed
 constexpr double kStandingWheel = 1.0;  // [rad/s] below it brakes and rolling resistance fade out
 

@@ -1,4 +1,5 @@
-// Fixed-step Runge-Kutta for driving, and Dormand-Prince with error control to check it by.
+// Classical Runge-Kutta, the one rule by which every car of the project moves, and Dormand-Prince
+// with error control to check it by.
 #pragma once
 
 #include <algorithm>
@@ -8,35 +9,27 @@
 
 #include "sysid/math/errors.hpp"
 
-namespace sysid::lab {
+namespace sysid {
 
-/// `x + sum(weight_i * k_i)`, for arrays.
-template <std::size_t N, std::size_t M>
-std::array<double, N> combined(const std::array<double, N>& x,
-                               const std::array<std::array<double, N>, M>& k,
-                               const std::array<double, M>& weight) {
-    std::array<double, N> y = x;
-    for (std::size_t j = 0; j < M; ++j) {
-        if (weight[j] == 0.0) continue;
-        for (std::size_t i = 0; i < N; ++i) y[i] += weight[j] * k[j][i];
-    }
-    return y;
+/// One step of length h. `rate(stage, at, k)` fills the derivatives k at the state `at`, at the
+/// start (stage 0), twice in the middle (1, 2) and at the end (3); `each(use)` calls `use(i)` for
+/// the elements that move.
+template <class X, class Rate, class Each>
+void runge_kutta_step(X& x, double h, Rate&& rate, Each&& each) {
+    X k1, k2, k3, k4, at;
+    const auto moved = [&](const X& k, double by) -> const X& {
+        each([&](std::size_t i) { at[i] = x[i] + by * k[i]; });
+        return at;
+    };
+    rate(0, x, k1);
+    rate(1, moved(k1, 0.5 * h), k2);
+    rate(2, moved(k2, 0.5 * h), k3);
+    rate(3, moved(k3, h), k4);
+    each([&](std::size_t i) { x[i] += (h / 6.0) * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]); });
 }
 
-/// Classical Runge-Kutta over `dt` in equal steps; `rate(part, x)` at the part 0 to 1 of `dt`.
-template <std::size_t N, class Rate>
-void runge_kutta(std::array<double, N>& x, double dt, int steps, Rate&& rate) {
-    const double h = dt / steps;
-    std::array<std::array<double, N>, 4> k;
-    for (int n = 0; n < steps; ++n) {
-        const auto at = [&](double within) { return (n + within) / steps; };
-        k[0] = rate(at(0.0), x);
-        k[1] = rate(at(0.5), combined<N, 4>(x, k, {h / 2, 0.0, 0.0, 0.0}));
-        k[2] = rate(at(0.5), combined<N, 4>(x, k, {0.0, h / 2, 0.0, 0.0}));
-        k[3] = rate(at(1.0), combined<N, 4>(x, k, {0.0, 0.0, h, 0.0}));
-        x = combined<N, 4>(x, k, {h / 6, h / 3, h / 3, h / 6});
-    }
-}
+/// The part of a step at which a stage stands.
+constexpr std::array<double, 4> kStageAt{0.0, 0.5, 0.5, 1.0};
 
 /// Dormand and Prince, J. Comp. Appl. Math. 6 (1980), 19-26: order 5 with an error estimate of
 /// order 4. Keeps the error of a step below `tolerance` times `1 + |x|`; returns the steps taken.
@@ -65,9 +58,9 @@ int dormand_prince(std::array<double, N>& x, double dt, double tolerance, Rate&&
         std::array<std::array<double, N>, 7> k{};
         std::array<double, N> next{};
         for (std::size_t s = 0; s < 7; ++s) {
-            std::array<double, 7> weight = a[s];
-            for (double& w : weight) w *= h;
-            next = combined<N, 7>(x, k, weight);
+            next = x;
+            for (std::size_t j = 0; j < s; ++j)
+                for (std::size_t i = 0; i < N; ++i) next[i] += h * a[s][j] * k[j][i];
             k[s] = rate((done + node[s] * h) / dt, next);
         }
         double worst = 0.0;
@@ -89,4 +82,4 @@ int dormand_prince(std::array<double, N>& x, double dt, double tolerance, Rate&&
     throw NumericalFailure("the integration needs too many steps", 0);
 }
 
-}  // namespace sysid::lab
+}  // namespace sysid

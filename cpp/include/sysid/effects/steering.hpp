@@ -1,0 +1,197 @@
+// From the logged angle to the road wheels: offsets, gains, delays, what gives way.
+#pragma once
+
+#include "sysid/effects/effect.hpp"
+
+namespace sysid {
+
+/// The logged steering angle is not zero when the wheels point straight ahead.
+struct SteerOffset : Effect {
+    static constexpr EffectInfo info{
+        .id = "steer_offset",
+        .title = "offset of the logged steering angle",
+        .equation = "delta += delta_0",
+        .source = "Gillespie, Fundamentals of Vehicle Dynamics, ch. 8",
+        .excited_by = "straight driving and corners in both directions",
+        .moves = "ay_mps2, yaw_rate_radps",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "rear_toe, speed_sensor_misalignment, side_wind, road_bank",
+        .parameters = {{.name = "offset_rad",
+                        .unit = "rad",
+                        .typical = 0.006,
+                        .matters = 0.001,
+                        .bounds = {-0.2, 0.2},
+                        .usual = {0.002, 0.01},
+                        .mirrored = true}},
+    };
+
+    template <class T, class S>
+    static void steering(const T* p, Workings<S>& w, Lags<S> /*lags*/) {
+        w.delta += p[0];
+    }
+};
+
+/// The steering ratio used to log the road-wheel angle is wrong.
+struct SteerRatio : Effect {
+    static constexpr EffectInfo info{
+        .id = "steer_ratio",
+        .title = "error of the steering ratio",
+        .equation = "delta *= 1 + s",
+        .source = "Gillespie, Fundamentals of Vehicle Dynamics, ch. 8",
+        .excited_by = "slow tight circles together with fast driving",
+        .moves = "yaw_rate_radps, ay_mps2",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "steer_compliance, steer_nonlinearity",
+        .parameters = {{.name = "ratio_error",
+                        .unit = "1",
+                        .typical = 0.08,
+                        .matters = 0.02,
+                        .bounds = {-0.6, 0.6},
+                        .usual = {-0.1, 0.1}}},
+    };
+
+    template <class T, class S>
+    static void steering(const T* p, Workings<S>& w, Lags<S> /*lags*/) {
+        w.delta *= 1.0 + p[0];
+    }
+};
+
+/// The ratio between the logged angle and the road wheels changes with the angle.
+struct SteerNonlinearity : Effect {
+    static constexpr EffectInfo info{
+        .id = "steer_nonlinearity",
+        .title = "steering ratio that changes with the angle",
+        .equation = "delta *= 1 + s_3 delta^2",
+        .source = "Gillespie, Fundamentals of Vehicle Dynamics, ch. 8",
+        .excited_by = "slow tight circles together with fast driving",
+        .moves = "yaw_rate_radps, ay_mps2",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "steer_ratio, steer_compliance",
+        .parameters = {{.name = "cubic_prad2",
+                        .unit = "1/rad2",
+                        .typical = 30.0,
+                        .matters = 5.0,
+                        .bounds = {-200.0, 200.0},
+                        .usual = {-40.0, 40.0}}},
+    };
+
+    template <class T, class S>
+    static void steering(const T* p, Workings<S>& w, Lags<S> /*lags*/) {
+        w.delta *= 1.0 + p[0] * (w.delta * w.delta);
+    }
+};
+
+/// The road wheels follow the logged steering angle after a dead time, here two all-pass lags in a
+/// row: the gain is one, and up to omega T = 1 the time is right to 2 %.
+struct SteerDelay : Effect {
+    static constexpr EffectInfo info{
+        .id = "steer_delay",
+        .title = "dead time between the logged and the acting steering angle",
+        .equation = "delta'(t) = delta(t - T), (1 - s T/4)^2 / (1 + s T/4)^2",
+        .source =
+            "Rajamani, Vehicle Dynamics and Control, ch. 2; Pade approximation of first order, "
+            "twice",
+        .excited_by = "fast sweeps and steps of the steering",
+        .moves = "yaw_rate_radps, ay_mps2",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "tyre_relaxation, steer_lag, sensor_delay",
+        .parameters = {{.name = "delay_s",
+                        .unit = "s",
+                        .typical = 0.04,
+                        .matters = 0.008,
+                        .bounds = {0.0, 0.5},
+                        .usual = {0.01, 0.06}}},
+        .scored_at_typical = true,
+    };
+    static constexpr std::size_t state_count = 2;
+
+    template <class T, class S>
+    static void steering(const T* p, Workings<S>& w, Lags<S> lags) {
+        if (!(value_of(p[0]) > 0.0)) return;
+        const S rate(lag_rate(T(0.25 * p[0])));
+        for (std::size_t i = 0; i < state_count; ++i)
+            w.delta = 2.0 * lags.follow(i, w.delta, rate) - w.delta;
+    }
+};
+
+/// The road wheels follow the logged steering angle with a first-order lag.
+struct SteerLag : Effect {
+    static constexpr EffectInfo info{
+        .id = "steer_lag",
+        .title = "steering lag between the logged and the acting angle",
+        .equation = "tau d(delta')/dt + delta' = delta",
+        .source = "Rajamani, Vehicle Dynamics and Control, ch. 2",
+        .excited_by = "fast sweeps and steps of the steering",
+        .moves = "yaw_rate_radps, ay_mps2",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "tyre_relaxation, steer_delay, sensor_delay",
+        .parameters = {{.name = "time_constant_s",
+                        .unit = "s",
+                        .typical = 0.06,
+                        .matters = 0.01,
+                        .bounds = {0.0, 0.5},
+                        .usual = {0.02, 0.08}}},
+        .scored_at_typical = true,
+    };
+    static constexpr std::size_t state_count = 1;
+
+    template <class T, class S>
+    static void steering(const T* p, Workings<S>& w, Lags<S> lags) {
+        if (value_of(p[0]) > 0.0) w.delta = lags.follow(0, w.delta, S(lag_rate(p[0])));
+    }
+};
+
+/// The front axle force twists the steering. The force is the quasi-static one, m l_r/L v_x r: the
+/// true one would make the steering angle depend on itself.
+struct SteerCompliance : Effect {
+    static constexpr EffectInfo info{
+        .id = "steer_compliance",
+        .title = "compliance of the steering under the front lateral force",
+        .equation = "delta -= c m l_r/(l_f + l_r) v_x r",
+        .source = "Gillespie, Fundamentals of Vehicle Dynamics, ch. 6",
+        .excited_by = "a ramp at constant speed together with slow tight circles",
+        .moves = "yaw_rate_radps, ay_mps2",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with =
+            "lateral_load_transfer, steer_ratio, steer_nonlinearity, aligning_moment",
+        .parameters = {{.name = "compliance_radpn",
+                        .unit = "rad/N",
+                        .typical = 1.5e-6,
+                        .matters = 3.0e-7,
+                        .bounds = {-1.0e-5, 2.0e-5},
+                        .usual = {5e-7, 2e-6}}},
+    };
+
+    template <class T, class S>
+    static void steering(const T* p, Workings<S>& w, Lags<S> /*lags*/) {
+        w.delta = w.delta - p[0] * (w.m * w.l_r / (w.l_f + w.l_r) * w.v_x * w.r);
+    }
+};
+
+/// The rear wheels do not point straight ahead.
+struct RearToe : Effect {
+    static constexpr EffectInfo info{
+        .id = "rear_toe",
+        .title = "toe of the rear axle: thrust angle",
+        .equation = "alpha_r += delta_r0",
+        .source = "Gillespie, Fundamentals of Vehicle Dynamics, ch. 8",
+        .excited_by = "straight driving in both directions, at several speeds",
+        .moves = "vy_mps, yaw_rate_radps",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "steer_offset, speed_sensor_misalignment, side_wind, road_bank",
+        .parameters = {{.name = "toe_rad",
+                        .unit = "rad",
+                        .typical = 0.004,
+                        .matters = 0.0008,
+                        .bounds = {-0.1, 0.1},
+                        .usual = {0.001, 0.005},
+                        .mirrored = true}},
+    };
+
+    template <class T, class S>
+    static void slip(const T* p, Workings<S>& w, Lags<S> /*lags*/) {
+        w.alpha_r += p[0];
+    }
+};
+
+}  // namespace sysid
