@@ -10,8 +10,8 @@ namespace sysid {
 namespace {
 
 constexpr int deviation_lane(std::size_t i) {
-    return kChannels +
-           static_cast<int>(i < kMotionStates ? kMotionStates + i : 2 * kMotionStates + i);
+    const int before = i < kMotionStates ? kMotionStates : 2 * kMotionStates;
+    return kChannels + before + static_cast<int>(i);
 }
 constexpr int time_lane(std::size_t i) {
     return i < kMotionStates ? kChannels + 2 * kMotionStates + static_cast<int>(i)
