@@ -202,7 +202,7 @@ def laboratory(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
 
     def loss(motion: Any, targets: Any, weights: Any, parameters: Any, columns: Any) -> Any:
         found = _core.TyreLoss(grey, True, motion, targets, weights)
-        return found.residuals(parameters), found.normal_equations(parameters, columns)
+        return found.residuals(parameters, None), found.normal_equations(parameters, None, columns)
 
     flat = {"motion": rows(6, 15.0), "targets": rows(2), "weights": np.ones((N, 2))}
     yield "TyreLoss", (loss, {**flat, "parameters": tyre, "columns": [0, 5]})
