@@ -217,3 +217,26 @@ def _any_car(rng: np.random.Generator) -> sv.Vehicle:
         tyre_front=sv.Tyre(B=rng.uniform(8.0, 16.0), C=rng.uniform(1.2, 1.6), D=1.0, E=0.0),
         tyre_rear=sv.Tyre(B=rng.uniform(10.0, 20.0), C=rng.uniform(1.2, 1.6), D=1.1, E=0.0),
     )
+
+
+def test_a_car_that_slides_has_no_wrong_ratio(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On the way into a slide and out of it the front is turned far, at low a_y too."""
+    time_s = np.arange(8000) / 100.0
+    slide_s, slide_radps = np.array([0.0, 0.8, 3.8, 4.6]), [0.0, 0.35, 0.35, 0.0]
+    yaw_rate = sum(np.interp(time_s, slide_s + t, slide_radps) for t in (5.0, 17.0, 29.0))
+    speed, wheelbase_m = 20.0, 2.6
+    sliding = sv.Log.from_arrays(
+        {
+            "time_s": time_s,
+            "vx_mps": np.full_like(time_s, speed),
+            "yaw_rate_radps": yaw_rate,
+            "ax_mps2": np.zeros_like(time_s),
+            "ay_mps2": speed * yaw_rate,
+            "steer_rad": 4.0 * wheelbase_m * yaw_rate / speed,
+        },
+        check=False,
+    )
+    check_car(sliding, mass_kg=1500.0, wheelbase_m=wheelbase_m)
+    monkeypatch.setattr("sysid_vehicle.log._against_car._SETTLING", 0)
+    with pytest.raises(sv.InvalidInput, match="steer_rad is"):
+        check_car(sliding, mass_kg=1500.0, wheelbase_m=wheelbase_m)

@@ -22,6 +22,7 @@ from ._motion import Motion
 _MOVING = 5.0  # m/s
 _MIN_WINDOWS = 12
 _LINEAR_MPS2 = 5.0
+_SETTLING = 1  # windows before and after harder driving
 _SURE = 3.0  # deviations
 _COHERENT = 0.6
 # What logs of good cars are off by: the commanded force by its gain and by slopes, the steering by
@@ -127,7 +128,9 @@ def _steer(drive: Drive, wheelbase_m: float) -> _Told | None:
     """Steering angle over the one of a wheelbase, ``delta = L r / v + K a_y`` at low a_y."""
     c = drive.motion.channels
     ay = drive.mean(c["ay_mps2"])
-    gentle = np.abs(ay) < _LINEAR_MPS2
+    hard = np.abs(ay) >= _LINEAR_MPS2
+    # A car that slides, or catches itself, does not steer by the wheelbase, whatever its a_y is.
+    gentle = np.convolve(hard, np.ones(2 * _SETTLING + 1), mode="same") < 0.5
     spare = float(np.count_nonzero(gentle)) / _BLOCK - _FITTED
     if spare < 1.0 or size_of(ay[gentle]) < EXCITED:
         return None
