@@ -132,7 +132,7 @@ def test_without_the_wheel_force_none_is_learned_along_the_car(truth: Model) -> 
     log = drive(truth, manoeuvres.lap(20.0), seed=7)
     blind = Driving.of(Log.from_arrays({c: log[c] for c in log.channels if c != "fx_n"}))
     most = noise_range(truth.vehicle, blind)[1][8]
-    assert most < 1e-3 * truth.vehicle.mass_kg * 9.81
+    assert most < 1e-3 * truth.vehicle.mass_kg * 9.80665
     assert noise_range(truth.vehicle, Driving.of(log))[1][8] > 1e3
 
 
@@ -145,7 +145,7 @@ def test_no_sensor_is_surer_than_its_quanta(truth: Model) -> None:
 
 
 def test_elsewhere_no_model_is_sure_to_less_than_a_thousandth_of_the_weight(truth: Model) -> None:
-    weight = truth.vehicle.mass_kg * 9.81
+    weight = truth.vehicle.mass_kg * 9.80665
     quiet = NoiseModel(SOME.sensor, SOME.motion, (0.1, 2.0 * weight, 0.1), 0.25)
     x, y, moment = quiet.elsewhere(truth.vehicle).disturbance
     assert x == pytest.approx(1e-3 * weight)

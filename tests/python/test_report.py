@@ -17,7 +17,7 @@ from sysid_vehicle.diagnose import EffectVerdict, Verdicts
 from sysid_vehicle.report import figures, sections, write_report
 from sysid_vehicle.report.words import interval, quantity, ranking_title, summary
 
-UNTESTED = ("aero_drag", "steer_ratio")
+UNTESTED = ("aero_drag", "speed_sensor_lever_arm")
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_what_the_driving_cannot_test_is_told_by_refits(study: sv.Study) -> None
     told = "".join(sections._hidden(replace(study, verdicts=open_)))
     assert "Of the 2 effects that are not testable" in told
     assert "0.45 m2 that is not modelled adds less than one percent to any parameter" in told
-    assert re.search(r"ratio_error 0\.08 that is not modelled adds \+\d", told)
+    assert re.search(r"0\.4 m that is not modelled adds \+\d", told)
 
 
 class Checker(HTMLParser):

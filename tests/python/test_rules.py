@@ -40,7 +40,7 @@ NUMERICAL = {
     "diagnose/possible.py": {"_AT_BOUND"},
     "diagnose/projection.py": {"_COPIED", "_SINGULAR", "_LAGS", "_ROWS"},
     "diagnose/replay.py": {
-        "_RATE_HZ", "_WINDOW_S", "_GRAVITY_MPS2", "_LOOKS", "_ROUNDS", "_BENDS", "_AS_GOOD",
+        "_RATE_HZ", "_WINDOW_S", "_LOOKS", "_ROUNDS", "_BENDS", "_AS_GOOD",
     },
     "diagnose/score.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
     "diagnose/sensitivity.py": {"_AT_ONCE"},
@@ -60,10 +60,12 @@ NUMERICAL = {
     "diagnose/change_directions.py": {"_BLEND_S", "_SMALL"},
     "diagnose/change_points.py": {
         "_STEP_S", "_MOST_STEPS", "_LEAST_S", "_INTERVAL", "_NEAR_S", "_FINE", "_MOST",
-        "_TOGETHER_S",
+        "_TOGETHER_S", "_FEWER", "_HOPELESS",
     },
     "diagnose/coherence.py": {"_WINDOW_S", "_LEVEL"},
-    "diagnose/delay.py": {"_BANDS", "_LOWEST_HZ", "_SMALL", "_ROUNDS", "_DRAWS"},
+    "diagnose/delay.py": {
+        "_BANDS", "_LOWEST_HZ", "_SMALL", "_ROUNDS", "_DRAWS", "_NOTABLE", "_TINY_RAD",
+    },
     "diagnose/force_map.py": {
         "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_BLOCK_S", "_LONGEST_S",
     },

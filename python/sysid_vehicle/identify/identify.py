@@ -28,6 +28,8 @@ __all__ = ["free_box", "identify", "objective_of", "profile_fit", "refine", "ref
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road that wanders, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts
+_POLISHED = 3  # ends of searches that are followed to the maximum
+_SAME = 1e-3  # of the box: ends no farther apart are one
 _BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 
 
@@ -125,10 +127,27 @@ def identify(
     table = Starts(
         names, as_float64(begins[:, box.columns]), as_float64(ends[:, box.columns]), values
     )
-    fit = _on_its_road(_polish(model, driving, ends[int(np.argmax(values))], noise, table))
+    # Which end is the best is told by the noise as it then is, not by that of the start.
+    polished = [_polish(model, driving, end, noise, table) for end in _apart(ends, values, box)]
+    fit = _on_its_road(max(polished, key=lambda f: f.log_likelihood))
     if intervals == "profile":
         return profile_fit(fit, workers=workers, progress=progress)
     return fit
+
+
+def _apart(ends: FloatArray, values: FloatArray, box: Box) -> list[FloatArray]:
+    """The best few ends of searches that are not at the same place."""
+    found: list[FloatArray] = []
+    for i in np.argsort(-values, kind="stable"):
+        x = ends[i][box.columns]
+        near = _SAME * (box.upper - box.lower)
+        if np.isfinite(values[i]) and not any(
+            np.all(np.abs(x - other[box.columns]) < near) for other in found
+        ):
+            found.append(ends[i])
+        if len(found) == _POLISHED:
+            break
+    return found
 
 
 def _told(
