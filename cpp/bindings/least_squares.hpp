@@ -77,8 +77,8 @@ void bind_least_squares(py::class_<P>& bound, std::size_t parameters, std::size_
 /// Of a problem whose residuals are those of a filter: its gains, as the class `name`, and the
 /// score of its noise parameters, which `to_noise` takes from an array.
 template <class Gains, class P, class ToNoise>
-void bind_filter(py::module_& m, const char* name, py::class_<P>& bound, std::size_t parameters,
-                 std::size_t noises, ToNoise to_noise) {
+void bind_filter(py::module_& m, const char* name, py::class_<P>& bound,
+                 std::size_t parameter_count, std::size_t noise_count, ToNoise to_noise) {
     py::class_<Gains>(m, name)
         .def_readonly("log_likelihood", &Gains::log_likelihood)
         .def_readonly("observed", &Gains::observed);
@@ -86,7 +86,7 @@ void bind_filter(py::module_& m, const char* name, py::class_<P>& bound, std::si
         .def(
             "freeze",
             [=](const P& self, const Array& p, const Array& noise) {
-                const double* values = vector(p, parameters, "parameters");
+                const double* values = vector(p, parameter_count, "parameters");
                 const auto n = to_noise(noise);
                 return unlocked([&] { return freeze(self, values, n); });
             },
@@ -94,9 +94,9 @@ void bind_filter(py::module_& m, const char* name, py::class_<P>& bound, std::si
         .def(
             "noise_score",
             [=](const P& self, const Array& p, const Array& noise) {
-                const double* values = vector(p, parameters, "parameters");
+                const double* values = vector(p, parameter_count, "parameters");
                 const auto n = to_noise(noise);
-                return with_derivatives(noises, [&](double* g, double* h) {
+                return with_derivatives(noise_count, [&](double* g, double* h) {
                     return noise_score(self, values, n, g, h);
                 });
             },
