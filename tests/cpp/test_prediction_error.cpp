@@ -186,7 +186,8 @@ TEST(PredictionError, ConstantSignalsAnswerLikeTheEffectsThatAreConstant) {
     const Problem problem = two_runs(kLagging);
     const Parameters p = typical_parameters();
     const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
-    const std::vector<int> targets{kForceY, kMomentZ, kGravityX, kExternals + static_cast<int>(kYawRate)};
+    const std::vector<int> targets{kForceY, kMomentZ, kGravityX,
+                                   kExternals + static_cast<int>(kYawRate)};
     const Table ones = Table::Ones(static_cast<int>(problem.samples()), 4);
     const Table answers = signals_of(problem, p, filter, ones, targets);
     const Table G = sensitivities_of(problem, p, filter,

@@ -63,13 +63,14 @@ def test_a_study_tells_its_steps(
 ) -> None:
     stream = terminal(monkeypatch)
 
-    def study(**options: object) -> str:
-        stream.truncate(0)
-        sv.improve(truth, lap, course, candidates=["steer_offset"], starts=1, **options)  # type: ignore[arg-type]
-        return stream.getvalue()
+    sv.improve(truth, lap, course, candidates=["steer_offset"], starts=1)
+    assert "Fitted the baseline to lap" in stream.getvalue()
 
-    assert "Fitted the baseline to lap" in study()
-    assert "Fitted" not in study(progress=False)
-    told: list[str] = []
-    assert "Fitted" not in study(tell=told.append)
-    assert any("Fitted the baseline" in text for text in told)
+
+def test_who_asks_for_silence_gets_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = terminal(monkeypatch)
+    teller(False)("said")
+    assert list(with_progress(range(3), "things", shown=False)) == [0, 1, 2]
+    assert stream.getvalue() == ""
+    teller(None)("said")
+    assert stream.getvalue() == "said\n"
