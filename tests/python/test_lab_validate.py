@@ -129,6 +129,7 @@ def test_a_file_without_tyres_is_named(tmp_path: Path) -> None:
         lab.IdentifiedCar.from_json(tmp_path / "other.json")
 
 
+@pytest.mark.slow
 def test_what_a_fit_writes_can_be_read(log: lab.TyreLog, tmp_path: Path) -> None:
     fit = lab.identify_tyres(CAR, log, start=TRUE, starts=1, profiles=False)
     (tmp_path / "tyres.json").write_text(json.dumps(fit.to_dict()))

@@ -121,6 +121,7 @@ def test_held_out_driving_has_a_say_between_what_the_fit_cannot_tell_apart(
         assert chosen[0].id == (other.id if told_apart else preferred.id)
 
 
+@pytest.mark.slow
 def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(
     start: Model, truth: Model
 ) -> None:
@@ -258,6 +259,7 @@ def test_a_search_that_ends_at_its_bound_wanted_more_than_any_car_has() -> None:
     assert not possible(rolling, (-0.02, 0.0), (0.001, 0.001))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("downforce", [1.3, 0.0])
 def test_two_that_may_hold_only_together_are_sought_together(
     truth: Model, start: Model, downforce: float
