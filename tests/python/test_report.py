@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from reported import TRUTH, reported_study
+from reported import TRUTH, ended_at_once, reported_study
 
 import sysid_vehicle as sv
 from sysid_vehicle.demo.story import findings
@@ -27,16 +27,7 @@ def study() -> sv.Study:
 
 @pytest.fixture(scope="module")
 def nothing_added(study: sv.Study) -> sv.Study:
-    """The same as if the search had ended at once."""
-    return replace(
-        study,
-        verdict="unknown",
-        fits=study.fits[:1],
-        diagnoses=study.diagnoses[:1],
-        train=study.train[:1],
-        test=study.test[:1],
-        added=(),
-    )
+    return ended_at_once(study)
 
 
 @pytest.fixture(scope="module")

@@ -114,7 +114,7 @@ class NoiseModel:
             f"{moment:.3g} N m, correlation times {self.times}"
         )
         if self.sloping:
-            along, across = (np.degrees(g / 9.81) for g in self.road)
+            along, across = (np.degrees(g / GRAVITY_MPS2) for g in self.road)
             lines.append(
                 f"  road of {along:.2g} deg along and {across:.2g} deg across (standard "
                 f"deviations), correlation time {self.road_time_s:.2g} s"

@@ -16,13 +16,11 @@ from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..log import Log
 from ..sensors import SensorCheck, check
-from ..vehicle import Vehicle
+from ..vehicle import GRAVITY_MPS2, Vehicle
 from ._motion import Motion, Places, draws, smoothed
 from ._result import AxleForces
 
 __all__ = ["axle_forces"]
-
-_GRAVITY_MPS2 = 9.81
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +153,7 @@ def _forces(
     share = np.where(along < 0.0, car.brake_front_share, car.drive_front_share)
     push = along / (share / c + 1.0 - share)
     shift = m * ax * car.cg_height_m / length
-    weight = m * _GRAVITY_MPS2
+    weight = m * GRAVITY_MPS2
     return _Forces(
         as_float64(
             np.stack([steer - np.arctan2(vy + lf * r, v), -np.arctan2(vy - lr * r, v)], axis=1)
