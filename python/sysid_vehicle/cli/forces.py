@@ -10,7 +10,7 @@ from .._style import new_figure, svg
 from ..forces import COLOURS, axle_forces
 from ..read import ChannelMap, read_log
 from ..vehicle import Vehicle
-from .log_arguments import LOG_HELP, add_reading
+from .log_arguments import add_driving
 from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_parser", "run"]
@@ -21,11 +21,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = commands.add_parser(
         "forces", help="find axle forces over slip angles from the motion, before any tyre"
     )
-    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help=LOG_HELP)
-    parser.add_argument(
-        "--vehicle", type=Path, required=True, metavar="TOML", help="the car's own numbers"
-    )
-    add_reading(parser)
+    add_driving(parser)
     parser.add_argument(
         "--cg-ahead",
         type=float,

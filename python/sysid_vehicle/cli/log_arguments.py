@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-__all__ = ["LOG_HELP", "add_reading"]
+__all__ = ["LOG_HELP", "add_driving", "add_reading"]
 
 LOG_HELP = "log of one run: CSV, MDF, MCAP, ROS bag, .mat, .vbo, CAN log, Parquet, ..."
 
@@ -16,3 +16,12 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         "--channels", type=Path, metavar="TOML", help="channel map, for other column names or units"
     )
     parser.add_argument("--dbc", type=Path, metavar="DBC", help="database of a log of CAN frames")
+
+
+def add_driving(parser: argparse.ArgumentParser) -> None:
+    """Ask for logs, how they are to be read, and the car."""
+    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help=LOG_HELP)
+    parser.add_argument(
+        "--vehicle", type=Path, required=True, metavar="TOML", help="the car's own numbers"
+    )
+    add_reading(parser)

@@ -13,7 +13,7 @@ from ..identify import identify
 from ..model import Model
 from ..read import ChannelMap, read_log
 from ..vehicle import Vehicle
-from .log_arguments import LOG_HELP, add_reading
+from .log_arguments import add_driving
 from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_parser", "run"]
@@ -26,11 +26,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = commands.add_parser(
         "next-drive", help="the manoeuvre that tells two effects apart, as something to drive"
     )
-    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help=LOG_HELP)
-    parser.add_argument(
-        "--vehicle", type=Path, required=True, metavar="TOML", help="the car's own numbers"
-    )
-    add_reading(parser)
+    add_driving(parser)
     parser.add_argument(
         "--between", required=True, metavar="A,B", help="the two effects, the likelier one first"
     )

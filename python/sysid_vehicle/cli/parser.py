@@ -8,7 +8,7 @@ from pathlib import Path
 from .. import _core
 from ..demo import DEFAULT, RANDOM
 from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
-from .log_arguments import LOG_HELP, add_reading
+from .log_arguments import LOG_HELP, add_driving
 
 __all__ = ["parse"]
 
@@ -88,11 +88,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
 
 
 def _driving(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help=LOG_HELP)
-    parser.add_argument(
-        "--vehicle", type=Path, required=True, metavar="TOML", help="the car's own numbers"
-    )
-    add_reading(parser)
+    add_driving(parser)
     _define(parser)
 
 
