@@ -24,7 +24,7 @@ from .estimate import Driving, NoiseModel
 from .export import casadi_function, export
 from .fleet import Fleet, improve_many
 from .forces import AxleForces, axle_forces
-from .identify import Fit, identify
+from .identify import Fit, RunsFit, identify, identify_runs
 from .log import Log, check_excitation
 from .model import Model
 from .read import ChannelMap, propose_channels, read_log
@@ -53,6 +53,7 @@ __all__ = [
     "NumericalError",
     "RoadDisturbance",
     "Rules",
+    "RunsFit",
     "SensorCheck",
     "SensorNoise",
     "Study",
@@ -77,6 +78,7 @@ __all__ = [
     "export",
     "forget_effect",
     "identify",
+    "identify_runs",
     "improve",
     "improve_many",
     "load",

@@ -68,6 +68,7 @@ def results(fit: Fit, lap: Log, course: Log, truth: Model) -> dict[str, object]:
         "SensorCheck": checked,
         "AxleForces": sv.axle_forces(lap, truth.vehicle, sensors=checked, count=2),
         "Fit": fit,
+        "RunsFit": sv.identify_runs(fit.model, {"a": lap}, starts=1),
         "Comparison": sv.compare(fit, course),
         "Diagnosis": found,
         "verdicts": sv.verdicts(found),
@@ -88,7 +89,7 @@ NAMES = (
     *("Driving", "NoiseModel", "SensorNoise", "RoadDisturbance", "DriveLimits", "Fit"),
     *("Comparison", "Diagnosis", "verdicts", "where", "bias_report", "manoeuvre", "drive"),
     *("excitation", "closed loop", "laboratory log", "NumericalError", "Rules"),
-    *("SensorCheck", "AxleForces", "Fleet"),
+    *("SensorCheck", "AxleForces", "Fleet", "RunsFit"),
 )
 
 

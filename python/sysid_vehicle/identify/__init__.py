@@ -5,6 +5,7 @@ from .fit import Fit
 from .identify import free_box, identify, objective_of, profile_fit, refine, refit
 from .predictive import Prediction, predict
 from .profile import Profile
+from .runs import Difference, RunsFit, identify_runs
 from .search import METHODS
 from .settle import settle
 from .starts import Start, Starts
@@ -12,15 +13,18 @@ from .suspects import explaining
 
 __all__ = [
     "METHODS",
+    "Difference",
     "Estimate",
     "Fit",
     "Prediction",
     "Profile",
+    "RunsFit",
     "Start",
     "Starts",
     "explaining",
     "free_box",
     "identify",
+    "identify_runs",
     "objective_of",
     "predict",
     "profile_fit",

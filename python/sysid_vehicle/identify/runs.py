@@ -1,0 +1,389 @@
+"""Identification of several runs at once: some parameters differ between runs, some are tied.
+
+One likelihood over all runs: what is common is learned from every run, and so is the noise. What
+differs (fuel load, tyre set, a spring) has a value for each run, with the covariance between them,
+so that differences have standard errors of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import scipy
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from .._text import brief, html_paragraph, html_table, number, text_table, with_error
+from ..errors import InvalidInput, near_names
+from ..estimate import Driving, NoiseModel, noise_range
+from ..log import Log
+from ..model import Model
+from .estimates import Estimate, wald
+from .fit import Fit
+from .identify import free_box, identify
+from .mapped import Copied, Mapped
+from .objective import Objective, gaussian_prior
+from .search import Box
+from .settle import settle
+from .starts import Starts
+from .suspects import explaining
+
+__all__ = ["Difference", "RunsFit", "identify_runs"]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How a parameter differs between runs.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+    values, stds : tuple of float
+        By run, in their order.
+    most : float
+        The largest less the smallest value.
+    most_std : float
+        Standard error of that difference.
+    p_value : float
+        Of runs that do not differ: chi-squared of all differences together (Wald).
+    """
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    stds: tuple[float, ...]
+    most: float
+    most_std: float
+    p_value: float
+
+    def __str__(self) -> str:
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return (
+            f"{self.name} differs by {with_error(self.most, self.most_std)}{unit} "
+            f"(p {_equals(self.p_value)})"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class RunsFit:
+    """One fit of several runs; `found["name of the run"]` is that run's :class:`Fit`.
+
+    Attributes
+    ----------
+    fits : dict of str to Fit
+        By run: the model with that run's values, the common noise, and the run's driving.
+    shared : tuple of Estimate
+        What is common to all runs.
+    differences : tuple of Difference
+        What may differ, each with its value in every run.
+    ties : dict of str to str
+        Parameters that follow another one.
+    covariance : array, shape (n, n)
+        Of `shared`, then of what differs: all runs of the first parameter, of the second, ...
+    log_likelihood : float
+    common : Fit
+        Of the same runs without a difference between them.
+    converged : bool
+    """
+
+    fits: dict[str, Fit]
+    shared: tuple[Estimate, ...]
+    differences: tuple[Difference, ...]
+    ties: dict[str, str]
+    covariance: FloatArray
+    log_likelihood: float
+    common: Fit
+    converged: bool
+
+    def __getitem__(self, run: str) -> Fit:
+        if run not in self.fits:
+            raise KeyError(f"'{run}'; there are {', '.join(self.fits)}")
+        return self.fits[run]
+
+    @property
+    def gain(self) -> float:
+        """Log-likelihood that the differences and ties gain over one model of all runs [nats]."""
+        return self.log_likelihood - self.common.log_likelihood
+
+    @property
+    def _head(self) -> tuple[str, ...]:
+        return ("parameter", *self.fits, "unit", "largest difference", "p")
+
+    def _rows(self) -> list[list[str]]:
+        rows = []
+        for d in self.differences:
+            told = [_with_std(v, s) for v, s in zip(d.values, d.stds, strict=True)]
+            most = _with_std(d.most, d.most_std)
+            rows.append([d.name, *told, d.unit, most, _equals(d.p_value).removeprefix("= ")])
+        for e in self.shared:
+            common = [_with_std(e.value, e.std), *[""] * (len(self.fits) - 1)]
+            rows.append([e.name, *common, e.unit, "common", ""])
+        return rows
+
+    def _headline(self) -> str:
+        tied = "".join(f"; {a} = {b}" for a, b in self.ties.items())
+        text = (
+            f"Fit of {len(self.fits)} runs; log-likelihood {self.log_likelihood:.1f}, "
+            f"{self.gain:+.1f} against one model of all{tied}"
+        )
+        return text if self.converged else f"{text}; NOT CONVERGED"
+
+    __repr__ = brief
+
+    def __str__(self) -> str:
+        return f"{self._headline()}\n{text_table(self._head, self._rows())}"
+
+    def _repr_html_(self) -> str:
+        return html_paragraph(self._headline()) + html_table(self._head, self._rows())
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, ready for JSON."""
+        return {
+            "log_likelihood": self.log_likelihood,
+            "gain": self.gain,
+            "shared": {e.name: e.to_dict() for e in self.shared},
+            "runs": {
+                run: {e.name: e.to_dict() for e in fit.estimates} for run, fit in self.fits.items()
+            },
+            "differences": {
+                d.name: {"most": d.most, "std": d.most_std, "p_value": d.p_value, "unit": d.unit}
+                for d in self.differences
+            },
+            "ties": dict(self.ties),
+        }
+
+
+def _equals(p_value: float) -> str:
+    return f"= {p_value:.2g}" if p_value > 0.0 else "< 1e-300"
+
+
+def _with_std(value: float, std: float) -> str:
+    return f"{number(value)} +- {number(std, 2)}" if np.isfinite(std) else number(value)
+
+
+@explaining
+def identify_runs(
+    model: Model,
+    runs: Mapping[str, Log | Sequence[Log]],
+    *,
+    vary: Iterable[str] = (),
+    tie: Mapping[str, str] = MappingProxyType({}),
+    starts: int = 12,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: bool | None = None,
+) -> RunsFit:
+    """Estimate a model from several runs, between which some parameters may differ.
+
+    Parameters
+    ----------
+    model : Model
+        Of all runs.
+    runs : mapping of str to Log or sequence of Log
+        The driving of each run, by the name it is to have.
+    vary : iterable of str
+        Free parameters that may differ between runs, such as `mass.relative_error` or `D_front`.
+    tie : mapping of str to str
+        Free parameters that are always equal to another one: ``{"D_rear": "D_front"}``.
+    starts, seed, workers, progress
+        As in :func:`sysid_vehicle.identify`, for the model without differences, from which the
+        search goes on.
+
+    Returns
+    -------
+    RunsFit
+
+    Raises
+    ------
+    InvalidInput
+        Fewer than two runs, or one, where something varies; a name that is no free parameter; a
+        parameter that is tied and varies, or tied to one that is tied itself.
+    NumericalError
+        No start led anywhere.
+    """
+    vary = tuple(dict.fromkeys(vary))
+    _check(model, runs, vary, tie)
+    together = {run: Driving.of(logs).logs for run, logs in runs.items()}
+    every = Driving.of([log for logs in together.values() for log in logs])
+    drivings = {run: Driving(logs, every.force_known) for run, logs in together.items()}
+    common = identify(model, every, starts=starts, seed=seed, workers=workers, progress=progress)
+    layout = _Layout.of(common.model, tuple(runs), vary, tie)
+    objective = layout.objective(drivings)
+    q, noise, converged = settle(
+        objective, layout.start(common.model.vector()), common.noise.vector(), layout.box
+    )
+    noise, _ = objective.learn_noise(q, noise, rounds=1)
+    return _summary(common, drivings, layout, objective, q, noise, converged)
+
+
+def _check(
+    model: Model, runs: Mapping[str, object], vary: Sequence[str], tie: Mapping[str, str]
+) -> None:
+    if not isinstance(runs, Mapping) or not runs or not all(isinstance(r, str) for r in runs):
+        raise InvalidInput(
+            'runs: give a mapping, {"name of the run": log, ...}; each may have several logs'
+        )
+    if vary and len(runs) < 2:
+        raise InvalidInput("runs: one run has no differences; give two or more, or vary nothing")
+    free = model.free_names
+    for name in (*vary, *tie, *tie.values()):
+        if name not in free:
+            raise InvalidInput(
+                f"'{name}' is no free parameter of the model{near_names(name, free)}"
+            )
+    for name, other in tie.items():
+        if name in vary:
+            raise InvalidInput(f"{name} is tied to {other} and cannot vary; vary {other}")
+        if other in tie or other == name:
+            raise InvalidInput(f"{name} is tied to {other}, which is tied itself")
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Places of all parameters: those of the core, then the values of all runs but the first."""
+
+    model: Model
+    runs: tuple[str, ...]
+    vary: tuple[str, ...]
+    tie: Mapping[str, str]
+    shared: tuple[str, ...]
+    box: Box
+
+    @classmethod
+    def of(
+        cls, model: Model, runs: tuple[str, ...], vary: tuple[str, ...], tie: Mapping[str, str]
+    ) -> _Layout:
+        shared = tuple(n for n in model.free_names if n not in vary and n not in tie)
+        whole, names = free_box(model), list(model.free_names)
+        place = {n: i for i, n in enumerate(names)}
+        order = [place[n] for n in shared] + [place[n] for n in vary for _ in runs]
+        core = [whole.columns[place[n]] for n in shared]
+        own = [
+            whole.columns[place[n]] if r == 0 else _core.PARAMETERS + (r - 1) * len(vary) + k
+            for k, n in enumerate(vary)
+            for r in range(len(runs))
+        ]
+        return cls(
+            model, runs, vary, dict(tie), shared,
+            Box(core + own, whole.lower[order], whole.upper[order]),
+        )  # fmt: skip
+
+    @property
+    def size(self) -> int:
+        return _core.PARAMETERS + (len(self.runs) - 1) * len(self.vary)
+
+    def column(self, name: str) -> int:
+        return self.model.parameters[name].column
+
+    def source(self, run: int) -> np.ndarray[Any, np.dtype[np.intp]]:
+        """Where a run's parameters stand."""
+        source = np.arange(_core.PARAMETERS, dtype=np.intp)
+        if run > 0:
+            for k, name in enumerate(self.vary):
+                source[self.column(name)] = _core.PARAMETERS + (run - 1) * len(self.vary) + k
+        for name, other in self.tie.items():
+            source[self.column(name)] = source[self.column(other)]
+        return source
+
+    def start(self, p: FloatArray) -> FloatArray:
+        own = [p[self.column(n)] for _ in self.runs[1:] for n in self.vary]
+        return as_float64([*p, *own])
+
+    def objective(self, drivings: Mapping[str, Driving]) -> Objective:
+        """The likelihood of all runs, with the model's priors for every run's own values."""
+        parts = tuple(
+            Copied(drivings[run].problem(self.model), self.source(i))
+            for i, run in enumerate(self.runs)
+        )
+        places = dict(zip(self._every, self.box.columns, strict=True))
+        stated = {c: self.model.priors[n] for (n, _), c in places.items() if n in self.model.priors}
+        every = next(iter(drivings.values()))
+        whole = Driving(tuple(log for d in drivings.values() for log in d.logs), every.force_known)
+        return Objective(
+            Mapped(parts),
+            gaussian_prior(self.size, stated),
+            *noise_range(self.model.vehicle, whole),
+        )
+
+    @property
+    def _every(self) -> list[tuple[str, str]]:
+        """Name and run of everything in the box; no run where it is common."""
+        return [(n, "") for n in self.shared] + [(n, r) for n in self.vary for r in self.runs]
+
+
+def _summary(
+    common: Fit,
+    drivings: Mapping[str, Driving],
+    layout: _Layout,
+    objective: Objective,
+    q: FloatArray,
+    noise: FloatArray,
+    converged: bool,
+) -> RunsFit:
+    frozen = objective.freeze(q, noise)
+    _, _, information = objective.normal_equations(q, frozen, layout.box.columns)
+    x = q[layout.box.columns]
+    parameters = common.model.parameters
+    labels = [f"{n} [{r}]" if r else n for n, r in layout._every]
+    units = {label: parameters[n].unit for label, (n, _) in zip(labels, layout._every, strict=True)}
+    estimates, covariance = wald(labels, units, x, information, layout.box)
+    told = NoiseModel.from_vector(noise)
+    at = len(layout.shared)
+    fits = {}
+    for i, (run, driving) in enumerate(drivings.items()):
+        own = {n: at + k * len(layout.runs) + i for k, n in enumerate(layout.vary)}
+        place = {n: j for j, n in enumerate(layout.shared)} | own
+        model = common.model.from_vector(q[layout.source(i)])
+        # What is tied is not free in the run's own fit.
+        model = model.with_fixed({n: model.value(n) for n in layout.tie})
+        which = [place[n] for n in model.free_names]
+        some = tuple(replace(estimates[place[n]], name=n) for n in model.free_names)
+        fits[run] = Fit(
+            model,
+            told,
+            some,
+            as_float64(covariance[np.ix_(which, which)]),
+            float(frozen.parts[i].log_likelihood),
+            driving,
+            Starts.none(tuple(e.name for e in some)),
+            converged,
+        )
+    return RunsFit(
+        fits,
+        tuple(estimates[:at]),
+        tuple(
+            _difference(n, parameters[n].unit, x, covariance, at + k * len(layout.runs), len(fits))
+            for k, n in enumerate(layout.vary)
+        ),
+        dict(layout.tie),
+        covariance,
+        float(frozen.log_likelihood),
+        common,
+        converged,
+    )
+
+
+def _difference(
+    name: str, unit: str, x: FloatArray, covariance: FloatArray, first: int, runs: int
+) -> Difference:
+    own = slice(first, first + runs)
+    values, of = x[own], covariance[own, own]
+    contrast = np.eye(runs)[1:] - np.eye(runs)[0]
+    apart = contrast @ values
+    chi2 = float(apart @ np.linalg.solve(contrast @ of @ contrast.T, apart))
+    low, high = int(np.argmin(values)), int(np.argmax(values))
+    variance = of[low, low] + of[high, high] - 2.0 * of[low, high]
+    return Difference(
+        name,
+        unit,
+        tuple(map(float, values)),
+        tuple(map(float, np.sqrt(np.diag(of)))),
+        float(values[high] - values[low]),
+        float(np.sqrt(max(variance, 0.0))),
+        float(scipy.stats.chi2.sf(chi2, runs - 1)),
+    )

@@ -1,0 +1,150 @@
+"""Runs of one car between which some parameters differ, and parameters that are tied."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import (
+    InvalidInput,
+    Log,
+    Model,
+    RunsFit,
+    Vehicle,
+    compare,
+    drive,
+    identify_runs,
+    manoeuvres,
+)
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.identify import objective_of
+from sysid_vehicle.identify.mapped import Copied, Mapped
+
+LOAD, GRIP = "mass.relative_error", "D_front"
+LOADS = {"full": 0.08, "empty": -0.03}
+
+
+@pytest.fixture(scope="module")
+def runs(car: Vehicle) -> dict[str, Log]:
+    """A lap with much and one with little fuel, on the same tyres."""
+    made = {}
+    for seed, (name, error) in enumerate(LOADS.items()):
+        truth = Model(car).add("mass").with_values({LOAD: error})
+        made[name] = drive(truth, manoeuvres.lap(20.0), seed=40 + seed)
+    return made
+
+
+@pytest.fixture(scope="module")
+def found(start: Model, runs: dict[str, Log]) -> RunsFit:
+    return identify_runs(start.add("mass"), runs, vary=[LOAD, GRIP], starts=1)
+
+
+def test_each_run_has_its_own_value(found: RunsFit, car: Vehicle) -> None:
+    assert found.converged
+    for run, true in LOADS.items():
+        own = found[run][LOAD]
+        assert abs(own.value - true) < 4.0 * own.std
+        assert found[run].model.value(LOAD) == own.value
+    load, grip = found.differences
+    assert abs(load.most - 0.11) < 4.0 * load.most_std
+    assert load.p_value < 1e-6
+    # The tyres are the same, and that is what is said of them.
+    assert grip.p_value > 0.01
+    assert found.gain > 100.0
+
+
+def test_what_is_common_is_the_same_in_every_run(found: RunsFit) -> None:
+    assert {e.name for e in found.shared}.isdisjoint({LOAD, GRIP})
+    full, empty = found.fits.values()
+    for e in found.shared:
+        assert full[e.name] == empty[e.name] == e
+    assert full.noise == empty.noise
+    assert full.log_likelihood + empty.log_likelihood == pytest.approx(found.log_likelihood)
+
+
+def test_the_fit_of_a_run_serves_like_any_other(found: RunsFit, runs: dict[str, Log]) -> None:
+    for run, log in runs.items():
+        assert found[run].covariance.shape == (len(found[run].model.free_names),) * 2
+        assert compare(found[run], log).error == pytest.approx(1.0, abs=0.05)
+    assert compare(found["full"], runs["empty"]).error > 1.2
+
+
+def test_it_prints_and_is_json(found: RunsFit) -> None:
+    for text in (str(found), found._repr_html_()):
+        for word in ("full", "empty", LOAD, "common"):
+            assert word in text
+    told = json.loads(json.dumps(found.to_dict()))
+    assert set(told["runs"]) == set(LOADS)
+    assert "differs by 0.1" in str(found.differences[0])
+    with pytest.raises(KeyError, match="there are full, empty"):
+        found["half"]
+
+
+def test_tied_parameters_stay_equal(start: Model, runs: dict[str, Log], found: RunsFit) -> None:
+    tie = {f"{x}_rear": f"{x}_front" for x in "BCDE"}
+    tied = identify_runs(start.add("mass"), runs, vary=[LOAD], tie=tie, starts=1)
+    for fit in tied.fits.values():
+        assert fit.model.value("B_rear") == fit.model.value("B_front")
+        assert "B_rear" not in fit.model.free_names
+    # The car's axles differ: tyres that are held equal explain less.
+    assert tied.log_likelihood < found.log_likelihood - 20.0
+    assert len(tied.shared) == 4
+    assert "B_rear = B_front" in str(tied)
+
+
+def test_derivatives_by_common_parameters_add_up(start: Model, runs: dict[str, Log]) -> None:
+    model = start.add("mass")
+    size = len(model.vector())
+    load, front, rear = (model.parameters[n].column for n in (LOAD, "D_front", "D_rear"))
+    parts = []
+    for i, log in enumerate(runs.values()):
+        source = np.arange(size)
+        source[rear] = front
+        source[load] = load if i == 0 else size
+        parts.append(Copied(Driving.of(log).problem(model), source))
+    both = objective_of(model, Mapped(tuple(parts)), Driving.of(list(runs.values())))
+    q = np.append(model.vector(), -0.02)
+    noise = np.array([0.03, 0.03, 0.0025, 0.06, 0.06, 0.01, 0.01, 0.01, 50, 50, 50, 0.3, 0.3, 0.3])
+    gains = both.freeze(q, np.append(noise, [0.0, 0.0, 5.0]))
+    columns = [front, load, size]
+    cost, descent, information = both.normal_equations(q, gains, columns)
+    assert cost == pytest.approx(both.half_sum_of_squares(q, gains))
+    e, g = both.residuals(q, gains), both.sensitivities(q, gains, columns)
+    assert g.T @ e == pytest.approx(descent, rel=1e-9)
+    assert g.T @ g == pytest.approx(information, rel=1e-9)
+    for k, c in enumerate(columns):
+        h = 1e-5
+        up, down = q.copy(), q.copy()
+        up[c] += h
+        down[c] -= h
+        slope = (both.residuals(down, gains) - both.residuals(up, gains)) / (2.0 * h)
+        assert g[:, k] == pytest.approx(slope, abs=1e-4 * np.abs(slope).max())
+    # Each run moves by its own load only.
+    assert information[1, 2] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"vary": ["mass.relative_eror"]}, "no free parameter.*mass.relative_error"),
+        ({"vary": ["B_front"], "tie": {"B_front": "B_rear"}}, "cannot vary; vary B_rear"),
+        ({"tie": {"B_front": "B_rear", "B_rear": "D_rear"}}, "which is tied itself"),
+        ({"runs": {}}, "give a mapping"),
+        ({"runs": "full", "vary": ["D_front"]}, "two or more"),
+    ],
+)
+def test_mistakes_are_told(
+    start: Model, runs: dict[str, Log], change: dict[str, object], message: str
+) -> None:
+    given = {"runs": runs, **change}
+    if given["runs"] == "full":
+        given["runs"] = {"full": runs["full"]}
+    with pytest.raises(InvalidInput, match=message):
+        identify_runs(start.add("mass"), **given)  # type: ignore[arg-type]
+
+
+def test_a_difference_without_evidence_is_called_that(found: RunsFit) -> None:
+    grip = found.differences[1]
+    assert grip.most < 4.0 * grip.most_std
+    assert str(replace(grip, p_value=0.0)).endswith("(p < 1e-300)")
