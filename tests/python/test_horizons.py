@@ -140,3 +140,14 @@ def test_errors_smaller_than_matters(fit: Fit, late: Fit, course: Log) -> None:
 def test_sizes_that_mean_nothing_are_refused(name: str, size: float | str, words: str) -> None:
     with pytest.raises(InvalidInput, match=words):
         sizes_that_matter({name: size})
+
+
+def test_the_speed_ahead_is_no_error_of_the_model_where_no_wheel_force_is_known(
+    fit: Fit, late: Fit, course: Log, altered: Callable[..., Log]
+) -> None:
+    biased = altered(course, without=("fx_n",), ax_mps2=course["ax_mps2"] + 0.3)
+    driving = Driving.of(biased)
+    assert horizons((fit,), ("right",), driving, (2.0,)).channels == LATERAL
+    found = beyond_noise((late, fit), driving, (1.0, 2.0))
+    # The bias makes the speed err by 0.6 m/s after 2 s, with the right model as with the other.
+    assert found.share > 0.8

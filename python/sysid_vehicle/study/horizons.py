@@ -123,6 +123,15 @@ class Horizons:
         }
 
 
+def _explainable(driving: Driving) -> tuple[str, ...]:
+    """Channels whose errors ahead effects can explain.
+
+    Where the wheel force is not known the speed ahead is the integral of the measured acceleration,
+    and errs by that sensor alone.
+    """
+    return PREDICTED if driving.force_known else LATERAL
+
+
 def _finite(figures: FloatArray) -> list[list[float | None]]:
     return [[float(v) if np.isfinite(v) else None for v in row] for row in figures]
 
@@ -145,7 +154,7 @@ def horizons(
     horizons_s : sequence of float
     """
     noise = fits[-1].noise.floor()
-    channels = tuple(c for c in PREDICTED if c in driving.present)
+    channels = tuple(c for c in _explainable(driving) if c in driving.present)
     columns = [PREDICTED.index(c) for c in channels]
     by_block = np.stack(
         [
@@ -223,6 +232,7 @@ def beyond_noise(
         ]
     )
     seen = np.isfinite(squares).any(axis=(0, 1))
+    seen &= np.isin(PREDICTED, _explainable(driving))
     if not seen.any():  # too short for any prediction
         return Beyond((0.0,) * len(fits), 1.0, 0.0, 1.0)
     # What a model loses is as wrong as anything that was seen, and much more.
