@@ -41,6 +41,7 @@ _MOVED: dict[str, str] = {"diagnose.doubt:Beside": "diagnose.reservation:Beside"
 _RENAMED: dict[str, dict[str, str]] = {
     "estimate.noise:NoiseModel": {"wander": "disturbance"},
     "rules.limits:Rules": {"idle": "insignificant"},
+    "diagnose.diagnosis:Diagnosis": {"causes": "proposed"},
     "diagnose.proposals:Proposal": {
         "held_out_gain": "validation_gain",
         "held_out_error": "validation_gain_std",

@@ -87,6 +87,30 @@ def test_the_hidden_effect_is_the_cause(found: Diagnosis) -> None:
     assert causes.subsets[0].effects[:1] == ("steer_offset",)
 
 
+def test_what_a_large_effect_does_beyond_first_order_is_no_further_cause(
+    start: Model, truth: Model
+) -> None:
+    """A mass that is 20 % wrong bends the fit: its scores ask for three effects."""
+    heavy = truth.add("mass").with_values({"mass.relative_error": 0.2})
+    log = drive(heavy, manoeuvres.lap(30.0), seed=1)
+    some = ["mass", "force_gain", "yaw_inertia", "aero_drag", "steer_lag"]
+    found = diagnose(identify(start, log, starts=1), candidates=some)
+    assert len(found.proposed.sets) > 1
+    assert [s.effects for s in found.causes.sets] == [("mass",)]
+    assert found.causes.inclusion["mass"] > 0.99
+    assert found.causes.inclusion["yaw_inertia"] < found.proposed.inclusion["yaw_inertia"]
+    assert found.causes.sizes["mass"] == found.sizes["mass"]
+
+
+def test_two_that_are_missing_both_stand(start: Model, truth: Model) -> None:
+    both = {"mass.relative_error": 0.15, "steer_offset.offset_rad": 0.006}
+    car = truth.add("mass", "steer_offset").with_values(both)
+    log = drive(car, manoeuvres.lap(30.0), seed=2)
+    some = ["mass", "steer_offset", "yaw_inertia", "force_gain"]
+    causes = diagnose(identify(start, log, starts=1), candidates=some).causes
+    assert {s.effects[0] for s in causes.sets} == {"mass", "steer_offset"}
+
+
 def test_what_no_candidate_explains_is_unknown(hidden_fit: Hidden) -> None:
     """Mass and drag cannot imitate a biased gyro; a shift of the yaw rate can."""
     fit = hidden_fit("gyro_bias.bias_radps", 0.006)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,16 +10,18 @@ import pytest
 from sysid_vehicle import Fit, InvalidInput, Log
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import worse
+from sysid_vehicle.study import validation
 from sysid_vehicle.study.horizons import (
     LATERAL,
     PREDICTED,
+    Beyond,
     beyond_noise,
     block_errors,
     changes,
     horizons,
 )
 from sysid_vehicle.study.matters import sizes_that_matter, within
-from sysid_vehicle.study.validation import changes_ahead
+from sysid_vehicle.study.validation import at_its_best, changes_ahead
 from sysid_vehicle.study.waterfall import look_ahead
 
 
@@ -151,3 +154,23 @@ def test_the_speed_ahead_is_no_error_of_the_model_where_no_wheel_force_is_known(
     found = beyond_noise((late, fit), driving, (1.0, 2.0))
     # The bias makes the speed err by 0.6 m/s after 2 s, with the right model as with the other.
     assert found.share > 0.8
+
+
+def test_parameters_that_serve_one_step_at_the_price_of_seconds_are_not_taken(
+    fit: Fit, course: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driving = Driving.of(course)
+
+    def served(fit: Fit, test: Driving, like: Fit) -> SimpleNamespace:
+        return SimpleNamespace(model=fit.model.with_values({"D_front": 0.3}))
+
+    monkeypatch.setattr(validation, "_prediction", served)
+    assert at_its_best(replace(fit), driving).model is fit.model
+    # And they are where they predict better.
+    blunt = replace(fit, model=fit.model.with_values({"D_front": 0.5}))
+    monkeypatch.setattr(validation, "_prediction", lambda *_: SimpleNamespace(model=fit.model))
+    assert at_its_best(blunt, driving).model is fit.model
+
+
+def test_an_error_that_grows_is_not_called_gone() -> None:
+    assert str(Beyond((1.0, 7.9), -6.9, -200.0, 0.03)) == "0 % (0 to 3)"

@@ -32,9 +32,9 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "sysid_vehicle"
 # Constants of numerical methods and of effort: how finely, how long, how often. They decide no
 # claim. Those of the last group shape how what no name fits is described; no effect is claimed.
 NUMERICAL = {
-    "diagnose/causes.py": {"_KEPT"},
+    "diagnose/causes.py": {"_KEPT", "_LEAST"},
     "diagnose/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
-    "diagnose/diagnose.py": {"_REFITS", "_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS", "_BEYOND"},
+    "diagnose/diagnose.py": {"_REFITS", "_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS"},
     "diagnose/evidence.py": {"_AT_ONCE"},
     "diagnose/information.py": {"_COPIED"},
     "diagnose/possible.py": {"_AT_BOUND"},
@@ -42,6 +42,7 @@ NUMERICAL = {
     "diagnose/replay.py": {
         "_RATE_HZ", "_WINDOW_S", "_LOOKS", "_ROUNDS", "_BENDS", "_AS_GOOD",
     },
+    "diagnose/refits.py": {"_BEYOND"},
     "diagnose/score.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
     "diagnose/sensitivity.py": {"_AT_ONCE"},
     "diagnose/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},

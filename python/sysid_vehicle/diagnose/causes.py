@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -28,9 +28,10 @@ __all__ = ["Causes", "CredibleSet", "causes_of"]
 
 _UNKNOWN = "unknown "
 _KEPT = 40  # of the leading subsets
+_LEAST = 1e-6  # probability that is remembered
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CredibleSet:
     """Effects of which one is missing, with 95 % probability usually.
 
@@ -43,10 +44,13 @@ class CredibleSet:
         the car acts before the log says so), to be mended in the log.
     probabilities : tuple of float
         Of each being the one that acts.
+    weights : dict of str to float
+        The same of all effects that are not next to impossible.
     """
 
     effects: tuple[str, ...]
     probabilities: tuple[float, ...]
+    weights: dict[str, float] = field(default_factory=dict, repr=False)
 
     def __str__(self) -> str:
         pairs = zip(self.effects, self.probabilities, strict=True)
@@ -70,6 +74,8 @@ class Causes:
         Leading subsets of up to three effects.
     units : dict of str to tuple of (str, str)
         Names and units of the parameters.
+    rest : dict of str to float
+        Probability of being missing by what is in no set.
     """
 
     inclusion: dict[str, float]
@@ -77,6 +83,24 @@ class Causes:
     sizes: dict[str, Size]
     subsets: tuple[Subset, ...] = ()
     units: dict[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
+    rest: dict[str, float] = field(default_factory=dict)
+
+    def only(self, sets: Sequence[CredibleSet], sizes: Mapping[str, Size]) -> Causes:
+        """The same with these sets alone, and some sizes known better."""
+        names = dict.fromkeys((*self.inclusion, *(e for s in sets for e in s.weights)))
+        absent = {
+            e: (1.0 - self.rest.get(e, 0.0)) * np.prod([1.0 - s.weights.get(e, 0.0) for s in sets])
+            for e in names
+        }
+        included = {e: float(1.0 - p) for e, p in absent.items()}
+        order = sorted(included, key=lambda e: -included[e])
+        better = {e: size for e, size in sizes.items() if e in self.units}
+        return replace(
+            self,
+            inclusion={e: included[e] for e in order},
+            sets=tuple(sets),
+            sizes=self.sizes | better,
+        )
 
     def of(self, effect: str) -> CredibleSet | None:
         """The credible set an effect is in."""
@@ -291,15 +315,19 @@ def _told(
     included = 1.0 - np.prod(1.0 - by_effect, axis=0)
     order = np.argsort(-included, kind="stable")
     sets: list[CredibleSet] = []
+    scattered = []
     for weights in by_effect:
         likeliest = np.argsort(-weights, kind="stable")
         reached = np.cumsum(weights[likeliest])
         if reached[-1] < rules.credible:
+            scattered.append(weights)
             continue  # it may be nothing
         few = likeliest[: int(np.argmax(reached >= rules.credible)) + 1]
         effects = tuple(model.effects[i] for i in few)
         if not any(effects[0] == s.effects[0] for s in sets):
-            sets.append(CredibleSet(effects, tuple(float(weights[i]) for i in few)))
+            likely = {model.effects[i]: float(weights[i]) for i in likeliest if weights[i] > _LEAST}
+            sets.append(CredibleSet(effects, tuple(float(weights[i]) for i in few), likely))
+    rest = 1.0 - np.prod(1.0 - np.reshape(scattered, (-1, len(model.effects))), axis=0)
     scored = {s.effect.id: s.effect for s in board.scores}
     clocks = {c.name for c in CLOCKS}
     sizes: dict[str, Size] = {}
@@ -325,4 +353,5 @@ def _told(
             else tuple((p.name, p.unit) for p in scored[e].parameters)
             for e in sizes
         },
+        {e: float(p) for e, p in zip(model.effects, rest, strict=True) if p > _LEAST},
     )

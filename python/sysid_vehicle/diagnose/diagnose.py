@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from .._progress import with_progress
 from .._threads import Workers
 from ..compare import compare
 from ..effects import Effect, effect
-from ..errors import NumericalError
 from ..estimate import Driving
-from ..identify import Fit, explaining, refine, refit
+from ..identify import Fit, explaining
 from ..log import Log
 from ..model import Model
 from ..rules import USUAL, Rules, bic
@@ -21,6 +18,8 @@ from .causes import causes_of
 from .diagnosis import Candidate, Diagnosis
 from .evidence import Evidence
 from .omnibus import omnibus_of
+from .refits import finished as finished_of
+from .refits import refitted
 from .score import Score, ScoreBoard, score_board_of
 
 __all__ = ["considered", "diagnose"]
@@ -31,7 +30,6 @@ _REFITS = 5
 _HOPELESS = 0.15
 _HOPELESS_WITH_STATES = 0.6
 _RIVALS = 0.3  # of the score of the best, with which one that acts like it may overtake it
-_BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
 
 
 @explaining
@@ -74,7 +72,7 @@ def diagnose(
     evidence = Evidence(fit, driving)
     board = score_board_of(evidence, possible, rules)
     left = omnibus_of(evidence, rules)
-    causes = causes_of(board, evidence, rules)
+    proposed = causes_of(board, evidence, rules)
     family = board.family_p_values(seed=seed)
     ranked = [
         Candidate(
@@ -92,7 +90,7 @@ def diagnose(
     few = _worth_refitting([c for c in ranked if c.p_value < rules.alpha], refits)
     if few:
         # What the best one gains tells which of the others cannot come near it.
-        first = _refitted(fit, driving, few[0])
+        first = refitted(fit, driving, few[0])
         best = max(first.statistic, few[0].statistic)
         others = [
             c
@@ -103,7 +101,7 @@ def diagnose(
             tried = [
                 first,
                 *with_progress(
-                    pool.map(lambda c: _refitted(fit, driving, c), others),
+                    pool.map(lambda c: refitted(fit, driving, c), others),
                     "refits",
                     total=len(others),
                     shown=progress,
@@ -112,7 +110,7 @@ def diagnose(
             # Under the noise of the poorer model they differ less than they really do.
             top = max(c.statistic for c in tried)
             near = [c for c in tried if c.statistic > 0.4 * top]
-            finished = list(pool.map(lambda c: _finished(fit, c), near))
+            finished = list(pool.map(lambda c: finished_of(fit, c), near))
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         finished = [_with_refit_rivals(c, finished, 2.0 * rules.apart) for c in finished]
         done = {c.id for c in finished}
@@ -120,7 +118,7 @@ def diagnose(
         done |= {c.id for c in far}
         ranked = finished + far + [c for c in ranked if c.id not in done]
     return _with_errors(
-        Diagnosis(fit, driving, tuple(ranked), left, rules, board.scores, family, causes=causes)
+        Diagnosis(fit, driving, tuple(ranked), left, rules, board.scores, family, proposed=proposed)
     )
 
 
@@ -188,55 +186,6 @@ def _score_rivals(board: ScoreBoard, score: Score, apart: float) -> tuple[str, .
         if both - theirs < apart and both - own < apart:
             twins.append(rival.effect.id)
     return tuple(twins)
-
-
-def _refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
-    """The candidate with its exact dynamics, under the noise of the model without it."""
-    best: Fit | None = None
-    for values in (*_starts(c), {}):
-        if not values and best is not None and best.log_likelihood >= fit.log_likelihood:
-            break  # else from the model that it contains, so that it cannot be a worse one
-        model = fit.model.add(c.effect).with_values(values)
-        try:
-            trial = refit(model, driving, fit.noise)
-        except (NumericalError, np.linalg.LinAlgError):
-            continue
-        if best is None or trial.log_likelihood > best.log_likelihood:
-            best = trial
-    return replace(c, statistic=0.0) if best is None else _with_fit(fit, c, best)
-
-
-def _finished(fit: Fit, c: Candidate) -> Candidate:
-    """The candidate with noise of its own."""
-    if c.fit is None:
-        return c
-    return _with_fit(fit, c, refine(c.fit.model, c.fit.driving, c.fit.noise))
-
-
-def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:
-    names = [f"{c.id}.{p.name}" for p in c.effect.parameters]
-    return replace(
-        c,
-        statistic=2.0 * (found.log_likelihood - fit.log_likelihood),
-        value=tuple(found[n].value for n in names),
-        std=tuple(found[n].std for n in names),
-        fit=found,
-    )
-
-
-def _starts(c: Candidate) -> list[dict[str, float]]:
-    predicted = {}
-    for p, v in zip(c.effect.parameters, c.value, strict=True):
-        reach = np.inf if p.scan else _BEYOND * p.typical
-        value = float(np.clip(v, p.null_value - reach, p.null_value + reach))
-        predicted[f"{c.id}.{p.name}"] = float(np.clip(value, p.lower, p.upper))
-    starts = [predicted]
-    first = c.effect.parameters[0]
-    near = 0.5 * first.typical <= predicted[f"{c.id}.{first.name}"] <= 2.0 * first.typical
-    if len(c.effect.parameters) == 1 and first.one_sided and not near:
-        # Far from its null value the dynamics of such an effect are not those of the score.
-        starts.append({f"{c.id}.{first.name}": first.typical})
-    return starts
 
 
 def _with_refit_rivals(c: Candidate, all_: list[Candidate], apart: float) -> Candidate:

@@ -98,8 +98,8 @@ class Diagnosis:
         Their p-values by effect, corrected for testing all of them.
     error : float
         One-step-ahead error on the driving without any of the effects, in units of `floor`.
-    causes : Causes
-        Posterior of a sum of single effects: inclusion probabilities, credible sets.
+    proposed : Causes
+        Posterior of a sum of single effects over the scores, linearised at the fit; see `causes`.
     """
 
     fit: Fit
@@ -110,7 +110,17 @@ class Diagnosis:
     scores: tuple[Score, ...]
     family: dict[str, float]
     error: float = float("nan")
-    causes: Causes = field(default_factory=lambda: Causes({}, (), {}))
+    proposed: Causes = field(default_factory=lambda: Causes({}, (), {}))
+
+    @cached_property
+    def causes(self) -> Causes:
+        """What is missing: inclusion probabilities and credible sets that exact refits confirm.
+
+        A second or two at first, where several sets are proposed.
+        """
+        from .confirm import confirmed  # it needs refits, which make candidates
+
+        return confirmed(self)
 
     @property
     def alpha(self) -> float:

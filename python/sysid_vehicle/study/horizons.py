@@ -35,6 +35,7 @@ __all__ = [
     "block_errors",
     "changes",
     "horizons",
+    "typical_error",
 ]
 
 LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2")
@@ -201,7 +202,9 @@ class Beyond:
     high: float
 
     def __str__(self) -> str:
-        return f"{100 * self.share:.0f} % ({100 * self.low:.0f} to {100 * self.high:.0f})"
+        # What grows is not taken away: how many times it grows is another figure.
+        share, low, high = (f"{100 * max(x, 0.0):.0f}" for x in (self.share, self.low, self.high))
+        return f"{share} % ({low} to {high})"
 
     def to_dict(self) -> dict[str, float]:
         """Share and interval, ready for JSON."""
@@ -288,6 +291,22 @@ def block_errors(fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float
     count = np.add.reduceat(there.astype(float), starts, axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         return as_float64(np.where(count > 0.0, np.sqrt(squares / count), np.nan))
+
+
+def typical_error(
+    fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: Sequence[float]
+) -> float:
+    """Mean logarithm of the median errors of the lateral channels, over all horizons.
+
+    Infinite where the model loses the car in most blocks.
+    """
+    columns = [PREDICTED.index(c) for c in LATERAL]
+    found = []
+    for h in horizons_s:
+        by_block = block_errors(fit, noise, driving, h)[:, columns]
+        known = ~np.isnan(by_block).all(axis=0)
+        found += list(np.nanmedian(by_block[:, known], axis=0))
+    return float(np.mean(np.log(found))) if found else np.inf
 
 
 def _number_of_blocks(driving: Driving) -> int:

@@ -55,7 +55,7 @@ class Trail:
         """Remember what was chosen together, and what is confounded with each of it."""
         for name in chosen:
             self.p_values[name] = dx.family[name]
-            shared = dx.causes.of(name)
+            shared = dx.proposed.of(name)
             others = () if shared is None else shared.effects
             known = set(dx.family) - set(chosen)
             self.rivals[name] = tuple(e for e in others if e in known)

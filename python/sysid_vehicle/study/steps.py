@@ -109,7 +109,7 @@ def first_together(
 def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:
     """Subsets of two effects or more with more evidence than any single one, the best first."""
     known = {c.id for c in dx.ranking}
-    named = [s for s in dx.causes.subsets if set(s.effects) <= known and len(s.effects) <= room]
+    named = [s for s in dx.proposed.subsets if set(s.effects) <= known and len(s.effects) <= room]
     alone = max((s.log_odds for s in named if len(s.effects) == 1), default=0.0)
     least = max(alone, 0.0) + dx.rules.apart
     several = [s for s in named if len(s.effects) > 1 and s.log_odds > least]
@@ -121,7 +121,7 @@ def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
     effects = {c.id: c.effect for c in dx.ranking}
     values: dict[str, float] = {}
     for name in names:
-        sizes = dx.causes.sizes.get(name, ((), ()))[0]
+        sizes = dx.proposed.sizes.get(name, ((), ()))[0]
         for p, v in zip(effects[name].parameters, sizes, strict=False):
             values[f"{name}.{p.name}"] = float(np.clip(v, p.lower, p.upper))
     model = dx.fit.model.add(*(effects[n] for n in names)).with_values(values)

@@ -294,7 +294,10 @@ class Study:
         """What is left on the driving of the fit, and on the other, in words."""
         said = f"In the end: {self.omnibus}."
         if self.explained is not None:
-            said = f"Of the error 1 to 5 s ahead, {self.explained} is gone. {said}"
+            gone = f"Of the error 1 to 5 s ahead, {self.explained} is gone."
+            if not self.explained.share > 0.0:
+                gone = "What was added takes nothing off the error 1 to 5 s ahead."
+            said = f"{gone} {said}"
         beyond = self.omnibus_validation
         more = beyond is not None and beyond.p_value < self.rules.elsewhere
         if beyond is not None and beyond.rejects and not more:

@@ -15,10 +15,11 @@ from ..estimate import Driving, several_logs
 from ..identify import Fit, Prediction, predict
 from ..log import Log
 from ..rules import Change, Gain
-from .horizons import Beyond, beyond_noise, changes
+from .horizons import Beyond, beyond_noise, changes, typical_error
 
 __all__ = [
     "as_sure",
+    "at_its_best",
     "beyond_noise_ahead",
     "changes_ahead",
     "error_falls",
@@ -148,23 +149,31 @@ def _with_error(difference: FloatArray, test: Driving) -> Gain:
 
 
 def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[Change, ...]:
-    """How errors 1 to 5 s ahead change, both models with parameters that serve validation data."""
-    one, other = (_serving_itself(fit, test) for fit in (poorer, richer))
+    """How errors 1 to 5 s ahead change, both models with the parameters of `at_its_best`."""
+    one, other = (at_its_best(fit, test) for fit in (poorer, richer))
     return changes(one, other, test, _AHEAD)
 
 
 def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
-    """Errors 1 to 5 s ahead beyond the noise, of models whose parameters serve validation data."""
-    return beyond_noise([_serving_itself(fit, test) for fit in fits], test, _AHEAD)
+    """Errors 1 to 5 s ahead beyond the noise, of models with the parameters of `at_its_best`."""
+    return beyond_noise([at_its_best(fit, test) for fit in fits], test, _AHEAD)
 
 
 # One object for each fit: errors ahead are remembered by it.
 @lru_cache(maxsize=16)
-def _serving_itself(fit: Fit, test: Driving) -> Fit:
+def at_its_best(fit: Fit, test: Driving) -> Fit:
+    """The fit, or the same model with parameters that serve validation data too (`serving`).
+
+    Which of them predicts better 1 to 5 s ahead. Tyres that the fit never saw at their peak err
+    there whatever effect is in the model; but parameters which the fit left open may serve the
+    errors of one step, which disturbances share, at the price of those some seconds ahead.
+    """
     try:
-        return replace(fit, model=_prediction(fit, test, fit).model)
+        served = replace(fit, model=_prediction(fit, test, fit).model)
     except (NumericalError, np.linalg.LinAlgError):
         return fit
+    noise = fit.noise.floor()
+    return min((fit, served), key=lambda f: typical_error(f, noise, test, _AHEAD))
 
 
 def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:

@@ -1,0 +1,85 @@
+"""Credible sets that exact refits confirm.
+
+The posterior of `causes.py` is that of scores, linearised at a fit which a large missing effect has
+bent: what that effect does beyond first order looks like further effects. The set of the effect
+that is refitted best stands; another one stands if its likeliest effect, refitted beside those
+before it, gains its price, and an unknown force or a clock if anything is left beside all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..identify import Fit
+from .causes import Causes, CredibleSet
+from .diagnosis import Candidate, Diagnosis
+from .omnibus import omnibus
+from .refits import refitted
+
+__all__ = ["confirmed"]
+
+
+def confirmed(dx: Diagnosis) -> Causes:
+    """The proposed causes, without sets that no exact refit confirms.
+
+    Where nothing was refitted, or nothing that was gains its price, they stay as proposed.
+    """
+    proposed, rules = dx.proposed, dx.rules
+    price = rules.price * float(np.log(dx.driving.samples))
+    best = next((c for c in dx.significant if c.fit is not None and c.statistic >= price), None)
+    if best is None or best.fit is None or not proposed.sets:
+        return proposed
+    first = next((s for s in proposed.sets if best.id in s.effects), None)
+    kept = [_leading(best, dx, first)]
+    known = {c.id: c for c in dx.ranking}
+    told = {
+        s: next((e for e in s.effects if e in known), "") for s in proposed.sets if s is not first
+    }
+    vague = [s for s, effect in told.items() if not effect]
+    fit = best.fit
+    waiting = {s: effect for s, effect in told.items() if effect}
+    # The one that gains most comes first: beside what is still missing any effect gains something.
+    while waiting:
+        tried = {
+            s: _beside(fit, known[e], dx) for s, e in waiting.items() if e not in fit.model.effects
+        }
+        waiting = {s: waiting[s] for s, c in tried.items() if c.statistic >= price}
+        if not waiting:
+            break
+        found = max(waiting, key=lambda s: tried[s].statistic)
+        kept.append(found)
+        del waiting[found]
+        fit = tried[found].fit or fit
+    if vague and omnibus(fit, dx.driving, rules).rejects:
+        kept += vague
+    return proposed.only(kept, dx.sizes)
+
+
+def _beside(fit: Fit, c: Candidate, dx: Diagnosis) -> Candidate:
+    """A candidate refitted beside what is in the model by now."""
+    value, std = dx.proposed.sizes[c.id]
+    return refitted(fit, dx.driving, replace(c, value=value, std=std, fit=None))
+
+
+def _leading(best: Candidate, dx: Diagnosis, proposed: CredibleSet | None) -> CredibleSet:
+    """The set of the best refit: what is confounded with it, weighed by the exact likelihoods."""
+    scored = {} if proposed is None else proposed.weights
+    near = dict.fromkeys((best.id, *best.indistinguishable_from, *scored))
+    known = {c.id: c for c in dx.ranking}
+    log_odds = {}
+    for e in near:
+        c = known.get(e)
+        if c is not None and c.fit is not None:
+            log_odds[e] = 0.5 * (c.statistic - best.statistic)
+        elif e in scored and best.id in scored:
+            log_odds[e] = float(np.log(scored[e] / scored[best.id]))
+        elif e in best.indistinguishable_from:
+            log_odds[e] = 0.0  # it was not refitted, and its score is no other
+    order = sorted(log_odds, key=lambda e: -log_odds[e])
+    weights = np.exp([log_odds[e] - log_odds[order[0]] for e in order])
+    weights /= weights.sum()
+    few = int(np.argmax(np.cumsum(weights) >= dx.rules.credible)) + 1
+    told = dict(zip(order, map(float, weights), strict=True))
+    return CredibleSet(tuple(order[:few]), tuple(told.values())[:few], told)

@@ -1,0 +1,68 @@
+"""A candidate's exact dynamics in place of its score."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import NumericalError
+from ..estimate import Driving
+from ..identify import Fit, refine, refit
+from .diagnosis import Candidate
+
+__all__ = ["finished", "refitted"]
+
+_BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
+
+
+def refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
+    """The candidate with its exact dynamics, under the noise of the model without it.
+
+    Its statistic is what that gains over `fit`, twice the log-likelihood; 0 where the model fails.
+    """
+    best: Fit | None = None
+    for values in (*_starts(c), {}):
+        if not values and best is not None and best.log_likelihood >= fit.log_likelihood:
+            break  # else from the model that it contains, so that it cannot be a worse one
+        model = fit.model.add(c.effect).with_values(values)
+        try:
+            trial = refit(model, driving, fit.noise)
+        except (NumericalError, np.linalg.LinAlgError):
+            continue
+        if best is None or trial.log_likelihood > best.log_likelihood:
+            best = trial
+    return replace(c, statistic=0.0) if best is None else _with_fit(fit, c, best)
+
+
+def finished(fit: Fit, c: Candidate) -> Candidate:
+    """The candidate with noise of its own."""
+    if c.fit is None:
+        return c
+    return _with_fit(fit, c, refine(c.fit.model, c.fit.driving, c.fit.noise))
+
+
+def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:
+    names = [f"{c.id}.{p.name}" for p in c.effect.parameters]
+    return replace(
+        c,
+        statistic=2.0 * (found.log_likelihood - fit.log_likelihood),
+        value=tuple(found[n].value for n in names),
+        std=tuple(found[n].std for n in names),
+        fit=found,
+    )
+
+
+def _starts(c: Candidate) -> list[dict[str, float]]:
+    predicted = {}
+    for p, v in zip(c.effect.parameters, c.value, strict=True):
+        reach = np.inf if p.scan else _BEYOND * p.typical
+        value = float(np.clip(v, p.null_value - reach, p.null_value + reach))
+        predicted[f"{c.id}.{p.name}"] = float(np.clip(value, p.lower, p.upper))
+    starts = [predicted]
+    first = c.effect.parameters[0]
+    near = 0.5 * first.typical <= predicted[f"{c.id}.{first.name}"] <= 2.0 * first.typical
+    if len(c.effect.parameters) == 1 and first.one_sided and not near:
+        # Far from its null value the dynamics of such an effect are not those of the score.
+        starts.append({f"{c.id}.{first.name}": first.typical})
+    return starts
