@@ -58,7 +58,7 @@ def photograph(study: Any, path: Path) -> None:
         )
         shown = Image.open(picture).convert("RGB")
     path.parent.mkdir(exist_ok=True)
-    shown.quantize(64, dither=Image.Dither.NONE).save(path, optimize=True)
+    shown.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def main() -> None:

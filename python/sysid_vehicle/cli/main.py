@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from ..errors import SysidError
+from ..errors import Interrupted, SysidError
 from .commands import COMMANDS
 from .parser import parse
 
@@ -44,8 +44,9 @@ def main(argv: list[str] | None = None) -> int:
     except (SysidError, OSError) as error:
         print(f"sysid-vehicle: error: {_one_line(str(error))}", file=sys.stderr)
         return _FAILED
-    except KeyboardInterrupt:
-        print("sysid-vehicle: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        known = f" {interrupt}" if isinstance(interrupt, Interrupted) else ""
+        print(f"sysid-vehicle: interrupted{known}", file=sys.stderr)
         return _INTERRUPTED
     return 0
 

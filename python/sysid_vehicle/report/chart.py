@@ -221,7 +221,7 @@ class Chart:
         (x0, x1), (y0, y1) = self._x, self._y
         xlabel, ylabel, title = self._text
         xt = ticks(x0, x1, max(int(width / 50), 2)) if self._ticks[0] is None else self._ticks[0]
-        yt = ticks(y0, y1, max(int(height / 26), 2)) if self._ticks[1] is None else self._ticks[1]
+        yt = ticks(y0, y1, max(int(height / 20), 2)) if self._ticks[1] is None else self._ticks[1]
         link = ""
         if self._link:
             frame = " ".join(f"{v:.1f}" for v in self._frame)

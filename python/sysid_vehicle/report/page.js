@@ -159,7 +159,7 @@
           make("text", { x: this.across(v), y: t + h + 13, "text-anchor": "middle" }, g)
             .textContent = word;
         });
-      grid(".yt", ticks(this.view[2], this.view[3], Math.max(Math.floor(h / 26), 2)), (g, v, word) => {
+      grid(".yt", ticks(this.view[2], this.view[3], Math.max(Math.floor(h / 20), 2)), (g, v, word) => {
         make("path", { d: `M${l} ${this.down(v)}h${w}` }, g);
         make("text", { x: l - 4, y: this.down(v) + 4, "text-anchor": "end" }, g).textContent = word;
       });

@@ -148,13 +148,13 @@ def _running(
 def _track(
     v: FloatArray, yaw_rate: FloatArray, step: FloatArray, own: npt.NDArray[np.bool_]
 ) -> tuple[FloatArray, bool]:
-    """Path of one stretch, its longer side lying, and whether it is worth a map."""
+    """Path of one stretch, its longer side upright, and whether it is worth a map."""
     track = np.full((len(v), 2), np.nan)
     heading = np.cumsum((yaw_rate * step)[own])
     moved = (v * step)[own, None] * np.column_stack([np.cos(heading), np.sin(heading)])
     path = np.cumsum(moved, axis=0)
-    if np.ptp(path[:, 1]) > np.ptp(path[:, 0]):
+    if np.ptp(path[:, 0]) > np.ptp(path[:, 1]):
         path = np.column_stack([-path[:, 1], path[:, 0]])
     track[own] = path
     extent = np.ptp(path, axis=0)
-    return track, bool(extent[1] > _OVAL * extent[0])
+    return track, bool(extent[0] > _OVAL * extent[1])
