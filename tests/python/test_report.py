@@ -50,6 +50,15 @@ def test_what_the_driving_cannot_test_is_told_by_refits(study: sv.Study) -> None
     assert re.search(r"0\.4 m that is not modelled adds \+\d", told)
 
 
+def test_a_study_is_a_table(study: sv.Study) -> None:
+    pytest.importorskip("pandas")
+    table = study.to_pandas()
+    assert list(table.index) == list(study.steps)
+    assert list(table["validation_error"]) == [c.error for c in study.test]
+    ranking = study.diagnoses[0].to_pandas()
+    assert list(ranking.index) == [c.id for c in study.diagnoses[0].ranking]
+
+
 class Checker(HTMLParser):
     """Collects what would reach outside the file, and tags that are not closed."""
 
