@@ -1,6 +1,6 @@
-"""The README's example: run it as it is typed, print what it prints, draw its picture.
+"""The README's example: run it as it is typed, print what it prints, show the report it writes.
 
-python docs/picture.py            docs/images/error_falls.png anew, output to the terminal
+python docs/picture.py            docs/images/report.png anew (by Chromium), output to the terminal
 python docs/picture.py --store    the printed output into the README, too
 """
 
@@ -8,24 +8,17 @@ import contextlib
 import io
 import os
 import re
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt
 from PIL import Image
-
-from sysid_vehicle.report import failure_maps, overlay
-from sysid_vehicle.report.excerpt import worst_excerpt
 
 REPO = Path(__file__).resolve().parents[1]
 README = REPO / "README.md"
-PICTURE = REPO / "docs/images/error_falls.png"
+PICTURE = REPO / "docs/images/report.png"
 PRINTED = re.compile(r"(?<=```text\n).*?(?=```)", re.DOTALL)
 
 
@@ -48,29 +41,32 @@ def run(text: str) -> tuple[dict[str, Any], str]:
     return names, out.getvalue()
 
 
-def draw(study: Any, path: Path) -> None:
-    """Measured, baseline and final model over the worst seconds; the failure maps of both."""
-    excerpt = worst_excerpt(study)
-    assert excerpt is not None
-    figure = plt.figure(figsize=(11, 5.2), layout="constrained")
-    left, right = figure.subfigures(1, 2, width_ratios=(1.7, 1))
-    axes = left.subplots(4, 1, sharex=True, height_ratios=(2, 1, 2, 1))
-    overlay(excerpt, axes)
-    failure_maps(study, right.subplots(2, 1, sharex=True, sharey=True))
-    buffer = io.BytesIO()
-    figure.savefig(buffer, dpi=85)
-    picture = Image.open(buffer).convert("RGB")
+def photograph(study: Any, path: Path) -> None:
+    """The first screen of a study's report, as a browser of 1400 x 900 pixels shows it."""
+    with tempfile.TemporaryDirectory() as folder:
+        page, picture = Path(folder) / "report.html", Path(folder) / "report.png"
+        study.report(page)
+        subprocess.run(
+            [
+                *("chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"),
+                *(f"--user-data-dir={folder}/profile", "--window-size=1400,900"),
+                *("--blink-settings=preferredColorScheme=1", f"--screenshot={picture}"),
+                page.as_uri(),
+            ],
+            check=True,
+            capture_output=True,
+        )
+        shown = Image.open(picture).convert("RGB")
     path.parent.mkdir(exist_ok=True)
-    picture.quantize(96, dither=Image.Dither.NONE).save(path, optimize=True)
-    plt.close(figure)
+    shown.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def main() -> None:
-    """Run, print, draw."""
+    """Run, print, show."""
     text = README.read_text("utf-8")
     names, printed = run(text)
     print(printed)
-    draw(names["study"], PICTURE)
+    photograph(names["study"], PICTURE)
     if "--store" in sys.argv[1:]:
         README.write_text(PRINTED.sub(lambda _: printed, text, count=1), "utf-8")
 

@@ -19,7 +19,7 @@ from .diagnose import (
     where,
 )
 from .effects import Effect, catalogue, effect
-from .errors import InvalidInput, NumericalError, SysidError, SysidWarning
+from .errors import Interrupted, InvalidInput, NumericalError, SysidError, SysidWarning
 from .estimate import Driving, NoiseModel
 from .export import casadi_function, export
 from .fleet import Fleet, improve_many
@@ -46,6 +46,7 @@ __all__ = [
     "Effect",
     "Fit",
     "Fleet",
+    "Interrupted",
     "InvalidInput",
     "Log",
     "Model",

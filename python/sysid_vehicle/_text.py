@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
+import textwrap
 from collections.abc import Iterable, Sequence
 from html import escape
 from math import isfinite
 
 __all__ = [
     "brief",
+    "columns",
     "html_list",
     "html_paragraph",
     "html_table",
@@ -15,6 +19,7 @@ __all__ = [
     "number",
     "text_table",
     "with_error",
+    "wrapped",
 ]
 
 
@@ -35,19 +40,79 @@ def with_error(value: float, std: float) -> str:
     return f"{number(value, 3)} +- {number(std, 2)}"
 
 
-def text_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Aligned columns; the first is left-aligned, the others right-aligned."""
+def columns() -> int | None:
+    """How many characters a line of the terminal holds; None where nothing is shown in one."""
+    shown = sys.stdout is not None and sys.stdout.isatty()
+    return shutil.get_terminal_size().columns if shown else None
+
+
+def wrapped(text: str, width: int) -> str:
+    """The lines of a text, those that are too long broken between words, and indented further."""
+    lines = []
+    for line in text.split("\n"):
+        indent = line[: len(line) - len(line.lstrip())]
+        lines += _broken(line, width, indent, f"{indent}    "[: width // 2])
+    return "\n".join(lines)
+
+
+def text_table(head: Sequence[str], rows: Sequence[Sequence[str]], width: int | None = None) -> str:
+    """Aligned columns; the first is left-aligned, the others right-aligned.
+
+    Parameters
+    ----------
+    head : sequence of str
+    rows : sequence of sequence of str
+    width : int, optional
+        Of a line, by default that of the terminal, without limit elsewhere. Cells of the widest
+        columns are broken between words until the table fits; such columns are left-aligned.
+    """
     table = [list(head), *[list(r) for r in rows]]
     widths = [max(len(r[i]) for r in table) for i in range(len(head))]
+    limit = columns() if width is None else width
+    narrow = widths if limit is None else _narrowed(table, widths, limit)
+    left = [i == 0 or narrow[i] < widths[i] for i in range(len(head))]
     lines = []
     for r in table:
-        cells = [
-            r[0].ljust(widths[0]),
-            *(c.rjust(w) for c, w in zip(r[1:], widths[1:], strict=True)),
-        ]
-        lines.append("  " + "  ".join(cells).rstrip())
-    lines.insert(1, "  " + "  ".join("-" * w for w in widths))
+        cells = [_broken(c, w) for c, w in zip(r, narrow, strict=True)]
+        for k in range(max(map(len, cells))):
+            parts = [c[k] if k < len(c) else "" for c in cells]
+            aligned = (
+                p.ljust(w) if at_left else p.rjust(w)
+                for p, w, at_left in zip(parts, narrow, left, strict=True)
+            )
+            lines.append("  " + "  ".join(aligned).rstrip())
+        if r is table[0]:
+            lines.append("  " + "  ".join("-" * w for w in narrow))
     return "\n".join(lines)
+
+
+def _broken(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
+    """Lines of whole words; a text that fits stays as it is."""
+    if len(text) <= width:
+        return [text]
+    return textwrap.wrap(
+        text,
+        width,
+        initial_indent=first,
+        subsequent_indent=rest,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def _narrowed(table: Sequence[Sequence[str]], widths: Sequence[int], limit: int) -> list[int]:
+    """Widths of columns whose sum fits a line, none smaller than its longest word."""
+    least = [
+        max((len(word) for r in table for word in r[i].split()), default=0)
+        for i in range(len(widths))
+    ]
+    narrow = list(widths)
+    while sum(narrow) + 2 * len(narrow) > limit:
+        wide = [i for i in range(len(narrow)) if narrow[i] > least[i]]
+        if not wide:
+            break
+        narrow[max(wide, key=lambda i: narrow[i])] -= 1
+    return narrow
 
 
 def html_paragraph(text: object) -> str:

@@ -8,10 +8,12 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
 __all__ = [
+    "Interrupted",
     "InvalidInput",
     "NumericalError",
     "SysidError",
@@ -47,6 +49,19 @@ class NumericalError(SysidError, ArithmeticError):
 
     sample: int | None = None
     remedy: str = ""
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C in the middle of a study; the message says what was known by then.
+
+    Attributes
+    ----------
+    fits : tuple of Fit
+        The baseline, then one for each effect added so far: in an interactive session
+        `sys.last_value.fits`.
+    """
+
+    fits: tuple[Any, ...] = ()
 
 
 class SysidWarning(UserWarning):

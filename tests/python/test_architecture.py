@@ -13,7 +13,7 @@ MAX_LINES = 400
 
 # A module imports from its own layer and from the layers above it in this list, never from below.
 PYTHON_LAYERS = [
-    {"errors", "_arguments", "_arrays", "_core", "_files", "_replace", "_style", "_text"}
+    {"errors", "_arguments", "_arrays", "_core", "_files", "_replace", "_style", "_tables", "_text"}
     | {"_progress", "_threads", "vehicle", "effects", "model", "formula", "rules", "saved"}
     | {"user_effects"},
     {"log"},

@@ -4,7 +4,9 @@ import ast
 import dataclasses
 import importlib
 import inspect
+import json
 import pkgutil
+import re
 import textwrap
 import warnings
 from collections.abc import Iterator
@@ -111,7 +113,13 @@ def test_no_object_of_a_study_shows_markup_of_others(study: sv.Study) -> None:
 def test_a_report_runs_nothing(study: sv.Study, tmp_path: Path) -> None:
     study.report(tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert harm(page) == []
+    own, found = Path(PACKAGE / "report/page.js").read_text("utf-8"), harm(page)
+    assert found == ["script", "script"], "the page's data and its own script"
+    assert page.count(f"<script>{own}</script>") == 1
+    data = re.search(r'<script type="application/json" id="samples">(.*?)</script>', page)
+    assert data is not None
+    assert "<" not in data[1]
+    assert set(json.loads(data[1])) > {"t", "v", "selected"}
     assert "&lt;script&gt;" in page
 
 

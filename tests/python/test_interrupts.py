@@ -10,6 +10,7 @@ import time
 import numpy as np
 import pytest
 
+import sysid_vehicle as sv
 from sysid_vehicle import _core
 from sysid_vehicle._threads import Workers
 
@@ -74,6 +75,30 @@ def test_an_interrupt_ends_a_kernel_within_half_a_second() -> None:
     for name, seconds in took.items():
         assert isinstance(seconds, float), f"{name}: {seconds}"
         assert seconds < 0.5, f"{name}: {seconds:.2f} s of processor time after the signal"
+
+
+@pytest.mark.slow
+def test_a_study_that_is_interrupted_keeps_its_steps(
+    truth: sv.Model,
+) -> None:
+    values = {"tyre_load_sensitivity.sensitivity": 0.3}
+    loaded = truth.add("tyre_load_sensitivity").with_values(values)
+    courses = sv.manoeuvres.lap(30.0), sv.manoeuvres.handling_course(30.0)
+    logs = [sv.drive(loaded, course, seed=1, rate_hz=50.0) for course in courses]
+
+    def press(text: str) -> None:
+        if text.startswith("Added"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(sv.Interrupted, match="tyre_load_sensitivity: sensitivity 0") as caught:
+        sv.improve(
+            sv.Model(truth.vehicle),
+            *logs,
+            candidates=["tyre_load_sensitivity", "steer_lag"],
+            starts=2,
+            tell=press,
+        )
+    assert [f.model.effects for f in caught.value.fits] == [(), ("tyre_load_sensitivity",)]
 
 
 def _runs(count: int) -> None:

@@ -58,13 +58,26 @@ def test_a_notebook_watches(monkeypatch: pytest.MonkeyPatch) -> None:
     assert watched()
 
 
-def test_a_study_tells_its_steps(
-    monkeypatch: pytest.MonkeyPatch, truth: sv.Model, lap: sv.Log, course: sv.Log
-) -> None:
-    stream = terminal(monkeypatch)
+class Impatient(Terminal):
+    """Its reader presses Ctrl-C as soon as the baseline is fitted."""
 
-    sv.improve(truth, lap, course, candidates=["steer_offset"], starts=1)
-    assert "Fitted the baseline to lap" in stream.getvalue()
+    def write(self, text: str) -> int:
+        super().write(text)
+        if "Fitted the baseline to lap" in text:
+            raise KeyboardInterrupt
+        return len(text)
+
+
+def test_a_study_tells_its_steps_and_after_ctrl_c_what_is_known(
+    monkeypatch: pytest.MonkeyPatch, truth: sv.Model
+) -> None:
+    log = sv.drive(truth, sv.manoeuvres.lap(20.0), seed=1, rate_hz=25.0)
+    monkeypatch.setattr(sys, "stderr", Impatient())
+    with pytest.raises(sv.Interrupted, match=r"after 0 step.*no effect was added yet") as caught:
+        sv.improve(truth, log, log, candidates=["steer_offset"], starts=1)
+    (fit,) = caught.value.fits
+    assert fit.model.effects == ()
+    assert isinstance(caught.value, KeyboardInterrupt), "a loop over studies ends, too"
 
 
 def test_who_asks_for_silence_gets_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,6 @@
 """What a report draws: the first screen, the excerpt, maps, sizes, tyre curves."""
 
+import json
 import re
 from dataclasses import replace
 
@@ -8,10 +9,10 @@ import pytest
 from reported import TRUTH, ended_at_once, reported_study
 
 import sysid_vehicle as sv
-from sysid_vehicle import _style
 from sysid_vehicle.estimate import MEASURED
-from sysid_vehicle.report import figures
+from sysid_vehicle.report import chart, figures
 from sysid_vehicle.report.excerpt import worst_excerpt
+from sysid_vehicle.report.samples import Samples, samples_of
 from sysid_vehicle.report.screen import first_screen
 from sysid_vehicle.report.tyres import driven_slip, identified_curves, model_curves
 from sysid_vehicle.study import look_ahead
@@ -23,13 +24,22 @@ def study() -> sv.Study:
 
 
 @pytest.fixture(scope="module")
+def samples(study: sv.Study) -> Samples:
+    found = samples_of(study)
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
 def nothing_added(study: sv.Study) -> sv.Study:
     return ended_at_once(study)
 
 
-def test_the_first_screen_tells_the_story(study: sv.Study, nothing_added: sv.Study) -> None:
+def test_the_first_screen_tells_the_story(
+    study: sv.Study, samples: Samples, nothing_added: sv.Study
+) -> None:
     told = re.findall(r'<div class="panel w\d"><h2>(.*?)</h2>(.*?)(?=<div class="panel|</section>)',
-                      "".join(first_screen(study)), re.DOTALL)  # fmt: skip
+                      "".join(first_screen(study, samples)), re.DOTALL)  # fmt: skip
     panels = dict(told)
     assert list(panels) == ["1 Compare", "2 Where", "3 Which", "4 Added", "5 Error falls"]
     assert "measured" in panels["1 Compare"]
@@ -44,7 +54,7 @@ def test_the_first_screen_tells_the_story(study: sv.Study, nothing_added: sv.Stu
     assert f"{before:.2f}" in panels["5 Error falls"]
     lengths = [float(x) for x in re.findall(r"width: ([\d.]+)%", panels["5 Error falls"])]
     assert lengths == pytest.approx([100.0, 100.0 * after / before, 100.0 / before], abs=0.06)
-    bare = "".join(first_screen(nothing_added))
+    bare = "".join(first_screen(nothing_added, samples_of(nothing_added)))
     assert "none of them holds on validation data" in bare
     assert "final" not in bare
     assert "5 Error<" in bare
@@ -61,36 +71,87 @@ def test_the_excerpt_is_where_the_baseline_predicts_worst(study: sv.Study) -> No
     )
 
 
-def test_a_place_is_shown_on_a_track_or_over_both_accelerations(study: sv.Study) -> None:
-    found = worst_excerpt(study)
-    assert found is not None
-    ax = _style.framed(5.0, 4.0).add_subplot()
-    assert figures.place(study, found, ax) == "Track from speed and yaw rate"
-    log = study.validation.logs[0]
-    distance = float(np.sum(log["vx_mps"]) / log.rate_hz)
-    drawn = np.asarray(ax.collections[0].get_offsets())
-    along = float(np.hypot(*np.diff(drawn, axis=0).T).sum())
-    assert along == pytest.approx(distance, rel=0.02)
+def test_samples_are_those_of_the_driving(study: sv.Study, samples: Samples) -> None:
+    """Thinned, and dense where the baseline is worst; the track is as long as what was driven."""
+    log, excerpt = study.validation.logs[0], samples.excerpt
+    rows = np.searchsorted(log["time_s"], samples["t"] - 1e-6)
+    np.testing.assert_array_equal(samples["ay"], log["ay_mps2"][rows])
+    np.testing.assert_array_equal(samples["m.ay_mps2"], log["ay_mps2"][rows])
+    np.testing.assert_array_equal(samples["t"][samples.inside], excerpt.time_s)
+    for k, errors in enumerate(excerpt.errors.values()):
+        left = (samples["m.ay_mps2"] - samples[f"p{k}.ay_mps2"])[samples.inside]
+        np.testing.assert_allclose(left, errors[:, 1], atol=1e-9)
+    residual = study.test[0].residual[rows]
+    np.testing.assert_allclose(samples["s0"], np.nanmean(residual**2, axis=1))
+    assert samples.has_track
+    along = np.hypot(np.diff(samples["x"]), np.diff(samples["y"]))
+    assert along.sum() == pytest.approx(samples["d"][-1] - samples["d"][0], rel=0.02)
+    told = json.loads(samples.json())
+    assert {len(column) for column in told.values()} == {len(rows)}
+    np.testing.assert_allclose(told["e0"], samples["e0"], rtol=1e-3)
+
+
+def points(path: str) -> np.ndarray:
+    return np.array(re.findall(r"[ML]([-\d.]+) ([-\d.]+)", path), dtype=float)
+
+
+def test_a_chart_puts_values_where_its_axes_say() -> None:
+    drawn = chart.Chart(200, 100, (0.0, 10.0), (-1.0, 1.0), left=40.0, bottom=24.0)
+    drawn.line([0.0, 5.0, np.nan, 10.0], [-1.0, 0.0, 0.0, 1.0], "after")
+    svg = drawn.svg("what it shows")
+    path = re.search(r'class="line after" d="(.*?)"', svg)
+    assert path is not None
+    assert path[1].count("M") == 2, "it breaks where a value is missing"
+    np.testing.assert_allclose(points(path[1]), [[40.0, 76.0], [116.0, 41.0], [192.0, 6.0]])
+    at = {
+        word: float(x)
+        for x, word in re.findall(r'<text x="([\d.]+)"[^>]*"middle">(.*?)</text>', svg)
+    }
+    assert at["5"] == pytest.approx(116.0)
+    assert 'aria-label="what it shows"' in svg
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "most", "words"),
+    [
+        (0.0, 10.0, 5, ["0", "2", "4", "6", "8", "10"]),
+        (-0.013, 0.021, 4, ["\u22120.01", "0.00", "0.01", "0.02"]),
+        (13.2, 19.7, 7, ["14", "15", "16", "17", "18", "19"]),
+        (1e4, 6e4, 3, ["20000", "40000", "60000"]),
+    ],
+)
+def test_ticks_are_round(low: float, high: float, most: int, words: list[str]) -> None:
+    assert [word for _, word in chart.ticks(low, high, most)] == words
+
+
+def test_colours_run_from_end_to_end() -> None:
+    found = chart.colours([-1.0, 1.0, 1.5, 2.0, 9.0], (1.0, 2.0), ("#000000", "#808080", "#ffffff"))
+    assert found == ["#000000", "#000000", "#808080", "#ffffff", "#ffffff"]
 
 
 def test_failure_maps_share_one_colour_scale(study: sv.Study) -> None:
-    axes = _style.new_figure(8.0, 3.0).subplots(1, 2)
-    figures.failure_maps(study, list(axes))
-    scales = [ax.collections[0].get_clim() for ax in axes]
-    assert scales[0] == scales[1]
-    shown = [np.ma.filled(ax.collections[0].get_array(), np.nan) for ax in axes]
-    for values, comparison in zip(shown, (study.test[0], study.test[-1]), strict=True):
-        np.testing.assert_array_equal(values, comparison.failure_map.error)
+    html = figures.failure_maps(study, "maps")
+    drawn = [re.findall(r'fill="(#\w+)"', svg) for svg in html.split('<svg role="img"')[1:]]
+    cells = [study.test[i].failure_map.error for i in (0, -1)]
+    assert [len(d) for d in drawn] == [int(np.isfinite(c).sum()) for c in cells]
+    errors = np.concatenate([c[np.isfinite(c)] for c in cells])
+    ink = dict(zip(errors.tolist(), [*drawn[0], *drawn[1]], strict=True))
+    order = sorted(ink)
+    green = [int(ink[e][3:5], 16) for e in order]
+    assert green == sorted(green), "the larger the error, the greener, in both maps"
+    assert green[0] < 20 < 200 < green[-1]
 
 
 def test_sizes_are_drawn_in_units_of_the_typical_one(study: sv.Study) -> None:
-    ax = figures.sizes(study, truth=TRUTH)
-    drawn = [line.get_xdata() for line in ax.lines if line.get_marker() == "o"]
+    html = figures.sizes(study, TRUTH, "sizes")
     typical = sv.effect("tyre_load_sensitivity").parameters[0].typical
     size = study.fit["tyre_load_sensitivity.sensitivity"].value / typical
-    assert float(np.ravel(drawn[0])[0]) == pytest.approx(size)
-    truth = [line.get_xdata() for line in ax.lines if line.get_marker() == "|"]
-    assert any(np.ravel(x)[0] == pytest.approx(0.25 / typical) for x in truth)
+    labels = re.findall(r'<text x="([\d.]+)"[^>]*"middle">([\u2212\d.]+)</text>', html)
+    x, value = np.array([[float(a), float(b.replace("\u2212", "-"))] for a, b in labels]).T
+    for kind, expected in (("after", size), ("truth", 0.25 / typical)):
+        dot = re.search(rf'class="dots {kind} large" d="M([\d.]+) ', html)
+        assert dot is not None
+        assert np.interp(float(dot[1]), x, value) == pytest.approx(expected, abs=0.01)
 
 
 def test_tyre_curves_follow_the_magic_formula() -> None:

@@ -178,16 +178,22 @@ def test_no_more_effects_are_added_than_allowed(
     baseline: Fit, driving: tuple[Driving, Driving]
 ) -> None:
     told: list[str] = []
-    none = search(driving[1], 0, told).from_baseline(baseline)
+
+    def followed(way: Search) -> Trail:
+        trail = Trail([baseline])
+        way.follow(trail)
+        return trail
+
+    none = followed(search(driving[1], 0, told))
     assert none.fit is baseline
     assert len(none.diagnoses) == 1
-    late = replace(search(driving[1], 6, told), ends=0.0).from_baseline(baseline)
+    late = followed(replace(search(driving[1], 6, told), ends=0.0))
     assert late.fit is baseline
     assert len(late.diagnoses) == 1
     assert set(late.stopped) == {c.id for c in late.diagnoses[0].significant}
     assert late.stopped
     assert none.stopped == ()
-    one = search(driving[1], 1, told).from_baseline(baseline)
+    one = followed(search(driving[1], 1, told))
     assert len(one.fit.model.effects) == 1
     assert one.diagnoses[-1].fit is one.fit
 

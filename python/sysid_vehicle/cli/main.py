@@ -6,10 +6,11 @@ import os
 import sys
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import TextIO
+from contextlib import contextmanager, redirect_stdout
+from typing import Any, TextIO
 
-from ..errors import SysidError
+from .._text import columns, wrapped
+from ..errors import Interrupted, SysidError
 from .commands import COMMANDS
 from .parser import parse
 
@@ -34,7 +35,7 @@ def main(argv: list[str] | None = None) -> int:
     """
     try:
         args = parse(argv)
-        with _warnings_as_lines() as heard:
+        with _warnings_as_lines() as heard, _lines_that_fit(args.command):
             COMMANDS[args.command](args, heard)
         sys.stdout.flush()
     except BrokenPipeError:
@@ -44,10 +45,36 @@ def main(argv: list[str] | None = None) -> int:
     except (SysidError, OSError) as error:
         print(f"sysid-vehicle: error: {_one_line(str(error))}", file=sys.stderr)
         return _FAILED
-    except KeyboardInterrupt:
-        print("sysid-vehicle: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        known = f" {interrupt}" if isinstance(interrupt, Interrupted) else ""
+        print(f"sysid-vehicle: interrupted{known}", file=sys.stderr)
         return _INTERRUPTED
     return 0
+
+
+class _Fitting:
+    """A terminal whose lines are broken between words, not where they end."""
+
+    def __init__(self, stream: TextIO, width: int) -> None:
+        self._stream, self._width = stream, width
+
+    def write(self, text: str) -> int:
+        self._stream.write(wrapped(text, self._width))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def _lines_that_fit(command: str) -> Iterator[None]:
+    """Break long lines in a terminal, but none of a file that is to be copied from it."""
+    width = columns()
+    if width is None or command == "map":
+        yield
+        return
+    with redirect_stdout(_Fitting(sys.stdout, width)):
+        yield
 
 
 @contextmanager

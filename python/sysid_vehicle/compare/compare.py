@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._arrays import FloatArray
+from .._tables import dataset, frame
 from .._text import brief, html_list, html_paragraph, html_table, number, text_table
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..identify import Fit, explaining
@@ -104,6 +105,33 @@ class Comparison:
             html_paragraph(self._headline())
             + html_table(self._HEAD, self._rows())
             + html_list([*self.unrelated.values(), *self.regions])
+        )
+
+    def to_pandas(self) -> Any:
+        """A DataFrame of the scores, by channel."""
+        scores = list(self.channels.values())
+        names = ("rmse", "noise_floor", "nrmse", "r2")
+        columns = {name: [getattr(s, name) for s in scores] for name in names}
+        units = [UNITS[c] for c in self.channels]
+        return frame({"channel": list(self.channels), **columns, "unit": units}, "channel")
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset: residuals by sample and channel, errors by speed and acceleration."""
+        m = self.failure_map
+        speed, lateral = (0.5 * (e[1:] + e[:-1]) for e in (m.speed_mps, m.lateral_mps2))
+        return dataset(
+            {
+                "residual": (("sample", "channel"), self.residual, ""),
+                "time": (("sample",), self.time_s, "s"),
+                "log": (("sample",), self.log_number, ""),
+                "error": (("speed", "lateral_acceleration"), m.error, ""),
+            },
+            {
+                "channel": (list(MEASURED), ""),
+                "speed": (speed, "m/s"),
+                "lateral_acceleration": (lateral, "m/s2"),
+            },
+            self.title,
         )
 
     def plot(self, ax: Axes | None = None) -> Axes:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._tables import frame
 from .._text import brief, html_paragraph, html_table, text_table, with_error
 from .._threads import in_parallel
 from ..compare import one_step_error
@@ -156,6 +157,19 @@ class Diagnosis:
                 return float("inf")
 
         return dict(zip(refitted, in_parallel(error, refitted.values()), strict=True))
+
+    def to_pandas(self) -> Any:
+        """A DataFrame of the ranking, by effect."""
+        found = self.ranking
+        columns: dict[str, list[Any]] = {
+            "effect": [c.id for c in found],
+            "statistic": [c.statistic for c in found],
+            "p_value": [c.p_value for c in found],
+            "probability": [self.causes.inclusion.get(c.id, float("nan")) for c in found],
+            "error": [c.error for c in found],
+            "size": [c.size for c in found],
+        }
+        return frame(columns, "effect")
 
     @property
     def sizes(self) -> dict[str, Size]:

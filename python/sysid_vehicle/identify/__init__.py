@@ -3,6 +3,7 @@
 from .estimates import Estimate
 from .fit import Fit
 from .identify import free_box, identify, objective_of, profile_fit, refine, refit
+from .posterior import Posterior
 from .predictive import Prediction, predict
 from .profile import Profile
 from .runs import Difference, RunsFit, identify_runs
@@ -16,6 +17,7 @@ __all__ = [
     "Difference",
     "Estimate",
     "Fit",
+    "Posterior",
     "Prediction",
     "Profile",
     "RunsFit",

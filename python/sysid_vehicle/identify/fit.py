@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
 from .._arrays import FloatArray
+from .._tables import frame
 from .._text import brief, html_paragraph, html_table, number, text_table
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
 from ..vehicle import GRAVITY_MPS2
 from .estimates import Estimate, profiled
+from .posterior import Posterior, posterior
 from .profile import Profile
 from .quantities import Quantity, parameter, std_of, tyre_quantity
 from .starts import Starts
@@ -128,6 +131,52 @@ class Fit:
                 return found
         known = ", ".join(f.name for f in self.profiles) or 'none; pass intervals="profile"'
         raise KeyError(f"'{name}'; there are {known}")
+
+    def posterior(
+        self,
+        count: int = 1000,
+        seed: int | np.random.Generator = 0,
+        *,
+        method: Literal["normal", "ensemble"] = "normal",
+        progress: bool | None = None,
+    ) -> Posterior:
+        """Draw from what the driving leaves open about the parameters.
+
+        Parameters
+        ----------
+        count : int
+            Draws, at least; of an ensemble, those of all walkers together.
+        seed : int or numpy Generator
+        method : str
+            `normal`: of the normal distribution of the estimates within their bounds. `ensemble`:
+            of the likelihood itself, with the gains of the fitted filter, by emcee; minutes.
+        progress : bool, optional
+            Show progress; by default in a terminal or a notebook.
+
+        Raises
+        ------
+        InvalidInput
+            For another method, where emcee is not installed, or where hardly any draw lies within
+            the bounds.
+        """
+        return posterior(self, count, seed, method, progress)
+
+    def to_pandas(self) -> Any:
+        """A DataFrame of the estimates and what follows from them, by parameter."""
+        every = (*self.estimates, *self.derived)
+        low, high = np.array([e.interval for e in every]).T
+        return frame(
+            {
+                "parameter": [e.name for e in every],
+                "value": [e.value for e in every],
+                "std": [e.std for e in every],
+                "low": low,
+                "high": high,
+                "unit": [e.unit for e in every],
+                "note": [e.note for e in every],
+            },
+            "parameter",
+        )
 
     def _rows(self) -> list[list[str]]:
         rows = []

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._files import write_text
+from .._tables import dataset, frame
 from ..errors import InvalidInput, near_names, warn
 from ._build import build
 from ._channels import CHANNELS, FloatArray
@@ -234,6 +235,16 @@ class Log:
         lines = [",".join(_quoted(name) for name in self._data)]
         lines += map(",".join, zip(*columns, strict=True))
         write_text(path, "\n".join(lines) + "\n")
+
+    def to_pandas(self) -> Any:
+        """A DataFrame of all channels over ``time_s``."""
+        return frame(self._data, "time_s")
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset of all channels over ``time_s``, with units."""
+        units = {name: CHANNELS[name].unit if name in CHANNELS else "" for name in self._data}
+        rest = {n: (("time_s",), v, units[n]) for n, v in self._data.items() if n != "time_s"}
+        return dataset(rest, {"time_s": (self["time_s"], "s")}, self.name)
 
     def _title(self) -> str:
         return f"{self.name}: {self.duration_s:.6g} s at {self.rate_hz:.4g} Hz, {self.n} samples"

@@ -2,58 +2,195 @@
 
 from __future__ import annotations
 
-from .._style import framed
+import numpy as np
+
+from .._arrays import FloatArray
+from ..diagnose import INPUTS, Coherence, Curve, ForceMap, Surface, Where
+from ..diagnose.coordinates import COORDINATES
+from ..diagnose.force_map import UNITS
 from ..model import Model
 from ..study import Study
-from .page import bullets, heading, paragraph, picture
+from .chart import DIVERGING, Chart, figure, legend, scale
+from .page import bullets, heading, paragraph
+from .samples import Samples
 
 __all__ = ["unknown", "where_and_when"]
 
+_SIZE = 430, 260
 
-def where_and_when(study: Study, truth: Model | None) -> list[str]:
+
+def where_and_when(study: Study, samples: Samples | None, truth: Model | None) -> list[str]:
     """Where the baseline fails, and where, when and at which frequencies the final model does."""
     final, baseline = study.where, study.where_baseline
-    figure = framed(9.0, 6.4, hspace=0.3)
-    axes = figure.subplots(2, 2)
-    baseline.plot(axes[0, 0])
-    final.plot_time(axes[0, 1])
-    baseline.coherence[0].plot(axes[1, 0])
-    final.coherence[0].plot_phase(axes[1, 1])
     parts = []
     for title, lines in study.where_lines:
         parts += [heading(title, 3), bullets(f"{line[0].upper()}{line[1:]}." for line in lines)]
     whose = "the final model" if study.added else "the baseline"
+    grid, told = _map(baseline.best_pair)
+    follows = baseline.coherence[0]
+    channels = list(follows.coherence)
+    key = legend([*((f"c{i}", c) for i, c in enumerate(channels)), ("chance", "by chance, 95 %")])
     return [
         *parts,
-        picture(
-            figure,
-            "Left, of the baseline: the force that it lacks, over the pair of coordinates that "
+        figure(
+            [grid, _coherence(follows)],
+            "Of the baseline: the force that it lacks, over the pair of coordinates that "
             "predicts most of it on driving it was not made from (grey: hardly any driving; dots: "
-            "beyond two standard errors), and how far its residuals follow the steering, by "
-            f"frequency. Right, of {whose}: the force that it lacks over the time driven with 95 % "
-            "intervals (red lines are moments at which the car changed), and by what phase the car "
-            "lags it; a delay is a straight line.",
+            "beyond two standard errors), and how far its residuals follow the "
+            f"{INPUTS[follows.input]}, by frequency.",
+            told + key,
+            "row",
+        ),
+        figure(
+            [_over_time(final), _phase(final.coherence[0])],
+            f"Of {whose}: the force that it lacks over the time driven with 95 % intervals "
+            "(upright lines are moments at which the car changed), and by what phase the car "
+            "lags it, with the delay that fits; a delay is a straight line.",
+            kind="row",
         ),
     ]
 
 
-def unknown(study: Study, truth: Model | None) -> list[str]:
+def _map(found: ForceMap) -> tuple[Chart, str]:
+    """The map of the strongest force over two coordinates, and what its colours mean."""
+    target = found.strongest
+    i = found.targets.index(target)
+    force, std = found.force[i], found.std[i]
+    up, along = (COORDINATES[c] for c in found.coordinates)
+    y, x = (c.scale * e for c, e in zip((up, along), found.edges, strict=True))
+    beyond = np.argwhere(np.abs(force) > 2.0 * std)
+    middles = [0.5 * (e[1:] + e[:-1]) for e in (y, x)]
+    return _grid(
+        (x, y), force, (middles[1][beyond[:, 1]], middles[0][beyond[:, 0]]),
+        (along.axis, up.axis), f"missing {target} [{UNITS[target]}]",
+    )  # fmt: skip
+
+
+def _grid(
+    edges: tuple[FloatArray, FloatArray],
+    force: FloatArray,
+    sure: tuple[FloatArray, FloatArray],
+    labels: tuple[str, str],
+    name: str,
+) -> tuple[Chart, str]:
+    x, y = edges
+    top = max(float(np.nanmax(np.abs(force), initial=0.0)), 1e-9)
+    chart = Chart(
+        *_SIZE, (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1])),
+        xlabel=labels[0], ylabel=labels[1],
+    )  # fmt: skip
+    chart.cells(x, y, force, (-top, top), DIVERGING)
+    chart.dots(*sure, "small")
+    return chart, scale((-top, top), DIVERGING, name)
+
+
+def _over_time(found: Where) -> Chart:
+    over = found.over_time
+    target = over.strongest
+    i = over.targets.index(target)
+    coordinate, edges = COORDINATES["time_s"], over.edges[0]
+    middle = coordinate.scale * 0.5 * (edges[1:] + edges[:-1])
+    force, half = over.force[i], 1.96 * over.std[i]
+    known = [float(v) for v in (*(force - half), *(force + half)) if np.isfinite(v)]
+    chart = Chart(
+        *_SIZE, (0.0, coordinate.scale * float(edges[-1])),
+        (min([*known, 0.0]), max([*known, 0.0])), xlabel=coordinate.axis,
+        ylabel=f"missing {target} [{UNITS[target]}]", left=60,
+    )  # fmt: skip
+    chart.level(0.0)
+    chart.bars(middle, force, half)
+    for c in found.change_points or ():
+        chart.moment(c.driven_s, c.what)
+    return chart
+
+
+def _coherence(found: Coherence) -> Chart:
+    f = found.frequency_hz
+    chart = Chart(
+        *_SIZE, (0.0, float(f[-1])), (0.0, 1.0), xlabel="frequency [Hz]",
+        ylabel=f"coherence with the {INPUTS[found.input]}",
+    )  # fmt: skip
+    for i, c in enumerate(found.coherence.values()):
+        chart.line(f, c, f"c{i}")
+    chart.level(found.threshold, "chance")
+    return chart
+
+
+def _phase(found: Coherence) -> Chart:
+    x_name, y_name = "frequency [Hz]", f"lag behind the {INPUTS[found.input]} [deg]"
+    d = found.delay
+    if d is None:
+        empty = Chart(*_SIZE, (0.0, 5.0), (-10.0, 10.0), xlabel=x_name, ylabel=y_name)
+        empty.level(0.0)
+        return empty
+    f = np.linspace(0.0, 1.1 * float(d.frequency_hz.max()), 50)
+    line = np.degrees(2.0 * np.pi * f)
+    low, high = (end * line for end in d.interval)
+    phase, half = np.degrees(d.phase_rad), 1.96 * np.degrees(d.phase_std_rad)
+    known = half < 1.96 * 30.0
+    x, phase, half = d.frequency_hz[known], phase[known], half[known]
+    ends = [*low, *high, *(phase - half), *(phase + half)]
+    said = f"{1e3 * d.delay_s:.1f} \u00b1 {1e3 * d.std_s:.1f} ms"
+    chart = Chart(
+        *_SIZE,
+        (0.0, float(f[-1])),
+        (min(ends), max(ends)),
+        title=said,
+        xlabel=x_name,
+        ylabel=y_name,
+    )
+    chart.level(0.0)
+    chart.band(f, low, high, "after")
+    chart.line(f, d.delay_s * line, "after")
+    chart.bars(x, phase, half)
+    return chart
+
+
+def _curve(found: Curve) -> Chart:
+    x = found.coordinate.scale * found.at
+    low, high = found.force - found.half_width, found.force + found.half_width
+    chart = Chart(
+        *_SIZE, (float(x[0]), float(x[-1])),
+        (min(float(low.min()), 0.0), max(float(high.max()), 0.0)),
+        xlabel=found.coordinate.axis, ylabel=f"missing {found.target} [{UNITS[found.target]}]",
+        left=60,
+    )  # fmt: skip
+    chart.level(0.0)
+    chart.band(x, low, high, "after")
+    chart.line(x, found.force, "after")
+    return chart
+
+
+def _surface(found: Surface) -> tuple[Chart, str]:
+    y, x = (c.scale * a for c, a in zip(found.coordinates, found.at, strict=True))
+    sure = np.argwhere(np.abs(found.force) > found.half_width)
+    up, along = found.coordinates
+    return _grid(
+        (_edges(x), _edges(y)), found.force, (x[sure[:, 1]], y[sure[:, 0]]),
+        (along.axis, up.axis), f"missing {found.target} [{UNITS[found.target]}]",
+    )  # fmt: skip
+
+
+def _edges(middle: FloatArray) -> FloatArray:
+    """Borders half way between points."""
+    half = 0.5 * np.diff(middle)
+    return np.concatenate([[middle[0] - half[0]], middle[:-1] + half, [middle[-1] + half[-1]]])
+
+
+def unknown(study: Study, samples: Samples | None, truth: Model | None) -> list[str]:
     """The shape of what is still missing, and formulas for it; nothing where nothing is."""
     found = study.unknown
     if found is None:
         return []
-    drawn = found.curves[:2]
-    figure = framed(4.0 * (len(drawn) + 1), 3.3)
-    axes = figure.subplots(1, len(drawn) + 1)
-    for ax, curve in zip(axes, drawn, strict=False):
-        curve.plot(ax)
-    found.surface.plot(axes[-1])
+    grid, told = _surface(found.surface)
     parts = [
-        picture(
-            figure,
+        figure(
+            [*map(_curve, found.curves[:2]), grid],
             "The missing force beyond all that the fitted parameters can do, over the coordinates "
             "that tell most of it. A band holds its whole curve with 95 %. On the map dots mark "
             "where the band excludes zero; grey: hardly any driving.",
+            told,
+            "row",
         ),
     ]
     if found.proposals:

@@ -1,22 +1,21 @@
-"""The figures of a report; each draws onto given axes."""
+"""The figures of a report: HTML of charts with captions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, legend_above, tidy
+from .._arrays import FloatArray
 from ..diagnose import Causes
+from ..estimate import MEASURED
 from ..model import Model
 from ..study import Study
-from .excerpt import Excerpt
+from .chart import CIVIDIS, VIRIDIS, Chart, figure, legend, scale
+from .page import bars
+from .samples import Samples
 from .tyres import TyreCurve
 from .words import shown_in, stages
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 __all__ = [
     "ahead",
@@ -26,192 +25,229 @@ __all__ = [
     "place",
     "residuals",
     "sizes",
-    "tyre_curve",
+    "tyre_curves",
 ]
 
-_OVAL = 0.15  # a track's smaller extent over its larger one, above which its map is worth a look
-_POINTS = 1200
+LOOKS = ("before", "after")
+"""Style classes of the baseline and the final model."""
 
 
-def failure_maps(study: Study, axes: Sequence[Axes]) -> None:
-    """Draw where the model of each stage fails on validation data, on one colour scale."""
+def overlay(study: Study, samples: Samples, caption: str) -> str:
+    """Measured and predicted channels over the worst seconds, what is left, and all the driving."""
+    names = [title for title, _ in stages(study)]
+    inside = samples.inside
+    seconds = samples["t"][inside]
+    view = float(seconds[0]), float(seconds[-1])
+    charts: list[Chart] = []
+    last = 2 * len(samples.excerpt.channels) - 1
+    for c in samples.excerpt.channels:
+        shown = shown_in(c)
+        signals = [f"m.{c}", *(f"p{k}.{c}" for k in range(len(names)))]
+        left = [f"d{k}.{c}" for k in range(len(names))]
+        for columns, told, words, height, title in (
+            (
+                signals,
+                ["measured", *names],
+                ("measured", *LOOKS),
+                112,
+                f"{shown.name} [{shown.unit}]",
+            ),
+            (left, names, LOOKS, 56, ""),
+        ):
+            chart = Chart(
+                768, height, view, samples.range(*columns, rows=inside), title=title,
+                ylabel="" if title else "error", xticks=() if len(charts) < last else None,
+                bottom=4.0 if len(charts) < last else 17.0, link="zoom",
+            )  # fmt: skip
+            if not title:
+                chart.level(0.0)
+            for column, name, kind in zip(columns, told, words, strict=False):
+                chart.line(seconds, samples[column][inside], kind, column, name)
+            charts.append(chart)
+    charts.append(_whole(samples, names))
+    key = legend([("measured", "measured"), *zip(LOOKS, names, strict=False)])
+    return figure(charts, caption, key)
+
+
+def _whole(samples: Samples, names: Sequence[str]) -> Chart:
+    """The running error over all the driving, in which seconds are selected."""
+    columns = [f"e{k}" for k in range(len(names))]
+    t = samples["t"]
+    top = samples.range(*columns)[1]
+    chart = Chart(
+        768, 76, (float(t[0]), float(t[-1])), (0.0, top), ylabel="/ floor", link="t",
+        xlabel="time [s]",
+    )  # fmt: skip
+    within = t[samples.inside]
+    chart.hatch(float(within[0]), float(within[-1]))
+    for column, name, kind in zip(columns, names, LOOKS, strict=False):
+        chart.line(_broken(samples), samples[column], kind, column, f"error, {name}")
+    return chart
+
+
+def _broken(samples: Samples) -> FloatArray:
+    """Time, no number where another stretch begins."""
+    t = samples["t"].copy()
+    t[1:][np.diff(samples["run"]) != 0] = np.nan
+    return t
+
+
+def place(samples: Samples, caption: str) -> str:
+    """Where the baseline fails: on the track, where there is one, and over both accelerations."""
+    error = samples["e0"]
+    known = error[np.isfinite(error)]
+    limits = 1.0, max(float(np.percentile(known, 99.0)) if known.size else 1.5, 1.5)
+    pairs = [("ay", "ax", "lateral [m/s\u00b2]", "longitudinal [m/s\u00b2]")]
+    if samples.has_track:
+        pairs.insert(0, ("x", "y", "track [m]", ""))
+    charts: list[Chart] = []
+    for x, y, across, up in pairs:
+        if not np.isfinite(samples[y]).any():
+            continue
+        chart = Chart(
+            (528, 260)[len(pairs) - 1], 300, samples.range(x), samples.range(y), xlabel=across,
+            ylabel=up, equal=x == "x", link=f"{x},{y}",
+        )  # fmt: skip
+        chart.selected(samples[x][samples.inside], samples[y][samples.inside])
+        chart.shaded(samples[x], samples[y], error, limits, CIVIDIS)
+        charts.append(chart)
+    return figure(charts, caption, scale(limits, CIVIDIS, "error / noise floor"), "row shade")
+
+
+def failure_maps(study: Study, caption: str) -> str:
+    """Where the model of each stage fails on validation data, on one colour scale."""
     maps = [study.test[i].failure_map for _, i in stages(study)]
     # Single extreme cells would leave all others in one colour.
     cells = np.concatenate([m.error[np.isfinite(m.error)] for m in maps])
-    highest = max(float(np.percentile(cells, 98.0)), 1.5) if cells.size else 1.5
-    for ax, shown, (title, _) in zip(axes, maps, stages(study), strict=True):
-        shown.plot(ax, highest=highest)
-        _as_pixels(ax)
-        ax.set_title(title, fontsize="medium")
-    for ax in axes[1:]:
-        ax.set_ylabel("")
+    limits = 1.0, max(float(np.percentile(cells, 98.0)), 1.5) if cells.size else 1.5
+    charts: list[Chart] = []
+    for m, (title, _) in zip(maps, stages(study), strict=True):
+        ends = [(float(e[0]), float(e[-1])) for e in (m.lateral_mps2, m.speed_mps)]
+        chart = Chart(
+            420, 300, *ends, title=title, xlabel="lateral acceleration [m/s\u00b2]",
+            ylabel="speed [m/s]", link="ay,v",
+        )  # fmt: skip
+        chart.cells(m.lateral_mps2, m.speed_mps, m.error, limits, VIRIDIS)
+        charts.append(chart)
+    return figure(charts, caption, scale(limits, VIRIDIS, "error / noise floor"), "row")
 
 
-def causes(
-    found: Causes, grades: Mapping[str, str], ax: Axes | None = None, most: int = 10
-) -> Axes:
-    """Draw inclusion probabilities by credible set, with the grades of what was added."""
-    return tidy(found.plot(axes_or_new(ax, 7.0, 3.4), most, grades))
+def causes(found: Causes, grades: Mapping[str, str], most: int = 10) -> str:
+    """Inclusion probabilities by credible set, with the grades of what was added."""
+    grouped = list(dict.fromkeys(e for s in found.sets for e in s.effects))
+    others = (e for e, p in found.inclusion.items() if e not in grouped and p >= 0.005)
+    shown = [*grouped, *others][:most]
+    rows = []
+    for e in shown:
+        own = found.of(e)
+        number = next((i + 1 for i, s in enumerate(found.sets) if s is own), None)
+        told = [f"{found.inclusion[e]:.2f}", f"set {number}" if number else "", grades.get(e, "")]
+        rows.append((e, found.inclusion[e], ", ".join(filter(None, told)), "" if own else "mute"))
+    return bars(rows)
 
 
-def sizes(study: Study, ax: Axes | None = None, truth: Model | None = None) -> Axes:
-    """Draw parameters of the added effects with 95 % intervals, in units of their typical size."""
+def sizes(study: Study, truth: Model | None, caption: str) -> str:
+    """Parameters of the added effects with 95 % intervals, in units of their typical size."""
     known = study.model.parameters
-    estimates = [e for a in study.added for e in a.parameters]
-    ax = axes_or_new(ax, 7.0, 0.9 + 0.4 * len(estimates))
-    for row, e in enumerate(reversed(estimates)):
+    estimates = [e for a in study.added for e in a.parameters][::-1]
+    rows = []
+    for e in estimates:
         p = known[e.name]
-        matters = p.matters / p.typical
-        ax.fill_betweenx([row - 0.35, row + 0.35], -matters, matters, color="0.88", linewidth=0.0)
-        size = (e.value - p.null_value) / p.typical
         half = 1.96 * e.std / p.typical
-        spread = half if np.isfinite(half) else 0.0
-        ax.errorbar(size, row, xerr=spread, fmt="o", color=AFTER, capsize=4, markersize=5)
-        if truth is not None and e.name in truth.names:
-            real = (truth.value(e.name) - p.null_value) / p.typical
-            ax.plot(real, row, "|", color=TRUTH, markersize=18, markeredgewidth=2.0)
-    ax.axvline(0.0, color=FLOOR, linewidth=1.0)
-    ax.set_yticks(range(len(estimates)), [e.name for e in reversed(estimates)])
-    ax.set_ylim(-0.6, len(estimates) - 0.4)
-    return tidy(ax, xlabel="size / typical size (grey: too small to matter)")
+        real = None if truth is None or e.name not in truth.names else truth.value(e.name)
+        rows.append(
+            (
+                (e.value - p.null_value) / p.typical,
+                abs(half) if np.isfinite(half) else 0.0,
+                p.matters / p.typical,
+                None if real is None else (real - p.null_value) / p.typical,
+            )
+        )
+    ends = [v for x, half, matters, real in rows for v in (x - half, x + half, -matters, matters)]
+    ends += [real for *_, real in rows if real is not None] + [0.0]
+    room = 0.05 * (max(ends) - min(ends))
+    chart = Chart(
+        680, 52 + 32 * len(rows), (min(ends) - room, max(ends) + room), (-0.6, len(rows) - 0.4),
+        yticks=[(float(k), e.name) for k, e in enumerate(estimates)], left=260,
+        xlabel="size / typical size (grey: too small to matter)",
+    )  # fmt: skip
+    for k, (x, half, matters, real) in enumerate(rows):
+        chart.band([-matters, matters], [k - 0.35] * 2, [k + 0.35] * 2, "mute")
+        chart.along(x - half, x + half, k, "after")
+        chart.dots([x], [k], "after large")
+        if real is not None:
+            chart.dots([real], [k], "truth large")
+    return figure([chart], caption)
 
 
-def tyre_curve(
-    curve: TyreCurve,
-    ax: Axes | None = None,
-    *,
-    start: TyreCurve | None = None,
-    truth: TyreCurve | None = None,
-) -> Axes:
-    """Draw lateral force over slip angle with its 95 % band; hatched where nobody drove."""
-    ax = axes_or_new(ax, 3.8, 3.2)
-    slip = np.degrees(curve.slip_rad)
-    force = curve.force_n / 1e3
-    half = 1.96 * curve.std_n / 1e3
-    ax.fill_between(slip, force - half, force + half, color=AFTER, alpha=0.25, linewidth=0.0)
-    ax.plot(slip, force, color=AFTER, label="identified, 95 % band")
-    if start is not None:
-        ax.plot(slip, start.force_n / 1e3, color=BEFORE, linestyle=":", label="vehicle file")
-    if truth is not None:
-        ax.plot(slip, truth.force_n / 1e3, color=TRUTH, linestyle="--", label="truth")
-    ends = float(np.degrees(curve.driven_rad))
-    if ends < slip[-1]:
-        ax.axvspan(ends, slip[-1], facecolor="none", edgecolor="0.8", hatch="///", linewidth=0.0)
-    ax.set_xlim(0.0, float(slip[-1]))
-    ax.set_ylim(0.0, 1.2 * float(force.max()))
-    ax.set_title(f"{curve.axle} axle", fontsize="medium")
-    ax.legend(frameon=False, loc="lower right", fontsize="small")
-    return tidy(ax, xlabel="slip angle [deg]", ylabel="lateral force at static load [kN]")
+def tyre_curves(
+    curves: Sequence[TyreCurve],
+    start: Sequence[TyreCurve],
+    truth: Sequence[TyreCurve] | None,
+    caption: str,
+) -> str:
+    """Lateral force over slip angle with its 95 % band; grey where nobody drove."""
+    top = 1.15e-3 * max(float(c.force_n.max()) for c in (*curves, *start))
+    charts: list[Chart] = []
+    for i, curve in enumerate(curves):
+        slip, force = np.degrees(curve.slip_rad), curve.force_n / 1e3
+        half = 1.96 * curve.std_n / 1e3
+        chart = Chart(
+            400, 300, (0.0, float(slip[-1])), (0.0, top), title=f"{curve.axle} axle",
+            xlabel="slip angle [deg]", ylabel="force at static load [kN]",
+        )  # fmt: skip
+        ends = float(np.degrees(curve.driven_rad))
+        if ends < slip[-1]:
+            chart.hatch(ends, float(slip[-1]))
+        chart.band(slip, force - half, force + half, "after")
+        chart.line(slip, start[i].force_n / 1e3, "before")
+        chart.line(slip, force, "after")
+        if truth is not None:
+            chart.line(slip, truth[i].force_n / 1e3, "truth")
+        charts.append(chart)
+    key = [("after", "identified, 95 % band"), ("before", "vehicle file")]
+    return figure(charts, caption, legend([*key, *([("truth", "truth")] if truth else [])]), "row")
 
 
-def overlay(excerpt: Excerpt, axes: Sequence[Axes]) -> None:
-    """Draw measured and predicted channels over a few seconds, and below each what is left.
-
-    `axes` holds two per channel of the excerpt: signal, then error.
-    """
-    t = excerpt.time_s
-    for i, channel in enumerate(excerpt.channels):
-        signal, error, shown = axes[2 * i], axes[2 * i + 1], shown_in(channel)
-        measured = shown.factor * excerpt.measured[:, i]
-        signal.plot(t, measured, color=MEASURED, linewidth=1.4, label="measured")
-        styles = ((BEFORE, "--"), (AFTER, "-"))
-        for (label, errors), (colour, line) in zip(excerpt.errors.items(), styles, strict=False):
-            left = shown.factor * errors[:, i]
-            look: dict[str, Any] = {"color": colour, "linestyle": line}
-            signal.plot(t, measured - left, linewidth=1.1, label=label, **look)
-            error.plot(t, left, linewidth=1.0, **look)
-        error.axhline(0.0, color=FLOOR, linewidth=0.8)
-        signal.set_title(f"{shown.name} [{shown.unit}]", loc="left", fontsize="medium")
-        tidy(signal)
-        tidy(error, ylabel="error")
-    legend_above(axes[0])
-    axes[-1].set_xlabel("time [s]")
-
-
-def place(study: Study, excerpt: Excerpt, ax: Axes) -> str:
-    """Draw where the baseline fails: on a map of the track, or over both accelerations.
-
-    Returns what was drawn, in words. The map is that of the stretch of the excerpt, from speed and
-    yaw rate; a track that is hardly wider than its road is not worth a map.
-    """
-    driving = study.validation
-    begin = 0
-    for s in driving.stretches:
-        end = begin + s.where.stop - s.where.start
-        if begin <= excerpt.where.start < end:
-            break
-        begin = end
-    stretch = slice(begin, end)
-    rate = driving.logs[s.log].rate_hz
-    residual = study.test[0].residual[stretch]
-    box = np.ones(max(round(0.5 * rate), 1))
-    squares, count = (
-        np.convolve(x, box, "same")
-        for x in (np.nansum(residual**2, axis=1), np.isfinite(residual).sum(axis=1))
-    )
-    error = np.sqrt(squares / np.maximum(count, 1.0))
-    v, r, ax_, ay = (
-        np.nan_to_num(driving.channel(c)[stretch])
-        for c in ("vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
-    )
-    heading = np.cumsum(r) / rate
-    track = np.cumsum(v[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
-    extent = np.sort(np.ptp(track, axis=0))
-    on_track = bool(extent[0] > _OVAL * extent[1])
-    points = track / rate if on_track else np.column_stack([ay, ax_])
-    if on_track and np.ptp(points[:, 1]) > np.ptp(points[:, 0]):
-        points = np.column_stack([-points[:, 1], points[:, 0]])  # the longer side lies
-    ax.set_facecolor("#f2f2f2")  # in the dark, too: the colours of the error begin dark
-    every = max(len(points) // _POINTS, 1)
-    inside = slice(excerpt.where.start - begin, excerpt.where.stop - begin, max(every, 1))
-    around: dict[str, Any] = {"markersize": 9, "markerfacecolor": "none", "markeredgewidth": 0.8}
-    (ring,) = ax.plot(points[inside, 0], points[inside, 1], "o", color=MEASURED, **around)
-    ring.set_rasterized(True)
-    shown = points[::every]
-    drawn = ax.scatter(shown[:, 0], shown[:, 1], s=14, c=error[::every], cmap="cividis", zorder=3)
-    drawn.set_clim(1.0, max(float(np.percentile(error, 99.0)), 1.5))
-    drawn.set_rasterized(True)
-    ax.figure.colorbar(drawn, ax=ax, label="error / noise floor", pad=0.02, fraction=0.06)
-    if on_track:
-        ax.set_aspect("equal", adjustable="datalim")
-        tidy(ax, xlabel="[m]", ylabel="[m]")
-        return "Track from speed and yaw rate"
-    tidy(ax, xlabel="lateral acceleration [m/s\u00b2]", ylabel="longitudinal [m/s\u00b2]")
-    return "Both accelerations"
-
-
-def ahead(study: Study, channels: Sequence[str], axes: Sequence[Axes]) -> None:
-    """Draw the validation error of each stage over the horizon, a channel on each axes."""
+def ahead(study: Study, channels: Sequence[str], caption: str) -> str:
+    """The validation error of each stage over the horizon, a chart for each channel."""
     found = study.horizons
-    looks = ((BEFORE, "--o"), (AFTER, "-o"))
-    for ax, channel in zip(axes, channels, strict=True):
+    at = np.array(found.horizons_s)
+    charts: list[Chart] = []
+    for channel in channels:
         j, shown = found.channels.index(channel), shown_in(channel)
-        for (title, i), (colour, line) in zip(stages(study), looks, strict=False):
-            error = shown.factor * np.where(np.isfinite(found.error), found.error, np.nan)[i, :, j]
-            ax.plot(found.horizons_s, error, line, color=colour, markersize=4, label=title)
+        errors = shown.factor * np.where(np.isfinite(found.error), found.error, np.nan)[:, :, j]
         noise = shown.factor * float(found.noise[j])
-        ax.axhline(noise, color=FLOOR, linestyle=":", linewidth=1.2)
-        ax.set_ylim(bottom=0.0)
-        tidy(ax, xlabel="predicted ahead [s]", ylabel=f"{shown.name} [{shown.unit}]")
-    legend_above(axes[0])
+        drawn = [errors[i] for _, i in stages(study)]
+        known = [float(v) for e in drawn for v in e[np.isfinite(e)]]
+        top = 1.06 * max([*known, noise if np.isfinite(noise) else 0.0, 1e-9])
+        chart = Chart(
+            300, 240, (0.0, 1.04 * float(at[-1])), (0.0, top), title=f"{shown.name} [{shown.unit}]",
+            xlabel="predicted ahead [s]",
+        )  # fmt: skip
+        for e, kind in zip(drawn, LOOKS, strict=False):
+            chart.line(at, e, kind)
+            chart.dots(at, e, kind)
+        chart.level(noise, "chance")
+        charts.append(chart)
+    names = [*zip(LOOKS, (title for title, _ in stages(study)), strict=False)]
+    return figure(charts, caption, legend([*names, ("chance", "noise of the sensor")]), "row")
 
 
-def residuals(study: Study, axes: Sequence[Axes]) -> None:
-    """Draw the running size of the validation residuals at each stage of the study, by channel."""
-    for ax, (title, i) in zip(axes, stages(study), strict=True):
-        study.test[i].plot_residuals(ax)
-        _as_pixels(ax)
-        ax.set_title(title, fontsize="medium", loc="left")
-        tidy(ax, ylabel="residual / floor")
-        legend = ax.get_legend()
-        if legend is not None:
-            legend.remove()
-    for ax in axes[:-1]:
-        ax.set_xlabel("")
-    legend_above(axes[0])
-
-
-def _as_pixels(ax: Axes) -> None:
-    """Keep what has thousands of points, or seams between cells, out of the vectors."""
-    for artist in (*ax.lines, *ax.collections):
-        artist.set_rasterized(True)
+def residuals(study: Study, samples: Samples, caption: str) -> str:
+    """The running size of the validation residuals at each stage of the study, by channel."""
+    t = _broken(samples)
+    channels = [c for c in MEASURED if f"r0.{c}" in samples.columns]
+    charts: list[Chart] = []
+    for k, (title, _) in enumerate(stages(study)):
+        columns = [f"r{k}.{c}" for c in channels]
+        chart = Chart(
+            860, 190, (float(samples["t"][0]), float(samples["t"][-1])),
+            (0.0, samples.range(*(c.replace(f"r{k}.", "r0.") for c in columns), *columns)[1]),
+            title=title, xlabel="time [s]", ylabel="residual / floor", link="t",
+        )  # fmt: skip
+        chart.level(1.0, "chance")
+        for i, (column, channel) in enumerate(zip(columns, channels, strict=True)):
+            chart.line(t, samples[column], f"c{i}", column, channel)
+        charts.append(chart)
+    return figure(charts, caption, legend((f"c{i}", c) for i, c in enumerate(channels)))

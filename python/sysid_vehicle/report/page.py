@@ -1,10 +1,11 @@
-"""Pieces of a self-contained HTML page: no scripts, no other files, light and dark, print."""
+"""Pieces of a self-contained HTML page: no other files, light and dark, print."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Sequence
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .._style import inline_svg
@@ -15,67 +16,20 @@ if TYPE_CHECKING:
 
 __all__ = ["bars", "bullets", "fold", "heading", "page", "panel", "paragraph", "picture", "table"]
 
-# Dark blue and vermilion differ in lightness too (Okabe & Ito, 2008): no name needs colour vision.
-_CSS = """
-:root { color-scheme: light dark; --ink: #111; --paper: #fff; --mute: #5c5c5c; --grid: #b0b0b0;
-  --unseen: #dcdcdc; --line: #c8c8c8; --panel: #f6f6f6; --before: #c05000; --after: #0072b2;
-  --truth: #00805c; --warn: #8a2b00; }
-@media (prefers-color-scheme: dark) { :root { --ink: #e8e8e8; --paper: #16181b; --mute: #a0a0a0;
-  --grid: #5a5a5a; --unseen: #3a3d42; --line: #454950; --panel: #1e2125; --before: #ff9a4d;
-  --after: #5cb8f0; --truth: #3ccfa0; --warn: #ffb38a; } }
-* { stroke-linejoin: round; stroke-linecap: butt; box-sizing: border-box; }
-body { font: 15px/1.45 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; color: var(--ink);
-  background: var(--paper); max-width: 86rem; margin: 0 auto; padding: 0.6rem 1rem; }
-h1 { font-size: 1.35rem; margin: 0 0 0.1rem; }
-h2 { font-size: 1.05rem; margin: 1.2rem 0 0.4rem; }
-h3 { font-size: 0.95rem; margin: 0.8rem 0 0.2rem; }
-p { margin: 0.3rem 0; } ul { margin: 0.3rem 0; padding-left: 1.3rem; }
-p.lead { font-size: 1rem; }
-p.small, .panel p { font-size: 0.85rem; }
-section.screen { display: grid; grid-template-columns: repeat(12, minmax(0, 1fr)); gap: 0.6rem; }
-.panel { background: var(--panel); border: 1px solid var(--line); border-radius: 6px;
-  padding: 0.4rem 0.7rem; overflow: hidden; }
-.panel h2 { margin: 0 0 0.2rem; font-size: 0.95rem; }
-.w4 { grid-column: span 4; } .w5 { grid-column: span 5; } .w7 { grid-column: span 7; }
-@media (max-width: 900px) { .w4, .w5, .w7 { grid-column: span 12; } }
-.bars { display: grid; grid-template-columns: minmax(6rem, max-content) 1fr max-content;
-  gap: 0.15rem 0.5rem; font-size: 0.85rem; align-items: center; }
-.bars i { display: block; height: 0.85rem; background: var(--after); min-width: 1px; }
-.bars i.before { background: repeating-linear-gradient(45deg, var(--before) 0 5px,
-  color-mix(in srgb, var(--before) 70%, var(--paper)) 5px 8px); }
-.bars i.mute { background: var(--grid); }
-table { border-collapse: collapse; margin: 0.4rem 0; font-size: 0.85rem; }
-th, td { padding: 0.1rem 0.55rem; text-align: right; border-bottom: 1px solid var(--line); }
-th:first-child, td:first-child { text-align: left; white-space: nowrap; }
-div.wide { overflow-x: auto; }
-div.ranking th:nth-child(n+5), div.ranking td:nth-child(n+5), div.text th, div.text td
-  { text-align: left; }
-figure { margin: 0.3rem 0; }
-figure svg { display: block; max-width: 100%; height: auto; }
-figure svg text { fill: var(--ink); font-family: inherit !important; }
-figcaption { font-size: 0.85rem; color: var(--mute); max-width: 60rem; }
-details { border-top: 1px solid var(--line); padding: 0.3rem 0; }
-summary { cursor: pointer; font-weight: 600; }
-details > :not(summary) { max-width: 62rem; }
-li.warning { color: var(--warn); }
-@media print {
-  :root { color-scheme: light; --ink: #111; --paper: #fff; --mute: #5c5c5c; --grid: #b0b0b0;
-    --unseen: #dcdcdc; --line: #c8c8c8; --panel: #fff; --before: #c05000; --after: #0072b2;
-    --truth: #00805c; --warn: #8a2b00; }
-  @page { size: A4 landscape; margin: 12mm; }
-  body { font-size: 9.5pt; max-width: none; padding: 0; print-color-adjust: exact;
-    -webkit-print-color-adjust: exact; }
-  details::details-content { content-visibility: visible; display: block; height: auto; }
-  .panel, figure, tr { break-inside: avoid; }
-  summary, h2, h3 { break-after: avoid; }
-  div.wide { overflow: visible; }
-}
-"""
+_SCRIPT = Path(__file__).with_name("page.js").read_text("utf-8")
+_CSS = Path(__file__).with_name("page.css").read_text("utf-8")
 
 
-def page(title: str, parts: Iterable[str]) -> str:
-    """Make a whole document."""
+def page(title: str, parts: Iterable[str], samples: str = "") -> str:
+    """Make a whole document.
+
+    `samples` is the JSON of what its charts share, which a script lets the reader explore.
+    """
     body = "\n".join(parts)
+    if samples:
+        told = samples.replace("<", "\\u003c")
+        body += f'\n<script type="application/json" id="samples">{told}</script>'
+        body += f"\n<script>{_SCRIPT}</script>"
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._style import framed
 from .._text import number
 from ..study import AddedEffect, Study
 from . import figures
-from .excerpt import Excerpt, worst_excerpt
-from .page import bars, bullets, panel, paragraph, picture, table
+from .page import bars, bullets, panel, paragraph, table
+from .samples import Samples
 from .words import errors, interval, quantity, shown_in, stages, summary, unit
 
 __all__ = ["first_screen"]
@@ -18,12 +17,11 @@ _AHEAD_S = 1.0
 _CANDIDATES = 5
 
 
-def first_screen(study: Study) -> list[str]:
+def first_screen(study: Study, samples: Samples | None) -> list[str]:
     """Tell the whole story in five panels."""
     verdict = summary(study)[0]
-    excerpt = worst_excerpt(study)
     panels = [
-        *([] if excerpt is None else [_compare(excerpt), _where(study, excerpt)]),
+        *([] if samples is None else [_compare(study, samples), _where(study, samples)]),
         _which(study),
         _added(study),
         _falls(study),
@@ -36,29 +34,27 @@ def first_screen(study: Study) -> list[str]:
     ]
 
 
-def _compare(excerpt: Excerpt) -> str:
-    n = len(excerpt.channels)
-    figure = framed(8.0, 0.6 + 1.7 * n, left=0.6, bottom=0.45, hspace=0.42)
-    axes = figure.subplots(2 * n, 1, sharex=True, height_ratios=[2.0, 1.0] * n)
-    figures.overlay(excerpt, list(axes))
-    figure.align_ylabels(list(axes))
+def _compare(study: Study, samples: Samples) -> str:
+    excerpt = samples.excerpt
     caption = (
         f"{excerpt.log}, validation data: the seconds in which the baseline is worst, predicted "
-        f"{excerpt.horizon_s:g} s ahead from what was known by then and the inputs since."
+        f"{excerpt.horizon_s:g} s ahead from what was known by then and the inputs since. Below: "
+        "the one-step error of all the driving."
     )
-    return panel("1 Compare", [picture(figure, caption)], 7)
+    return panel("1 Compare", [figures.overlay(study, samples, caption)], 7)
 
 
-def _where(study: Study, excerpt: Excerpt) -> str:
-    figure = framed(5.6, 3.2, left=0.65, right=0.5, bottom=0.45)
-    kind = figures.place(study, excerpt, figure.add_subplot())
+def _where(study: Study, samples: Samples) -> str:
     worst = study.test[0].regions[:1]
     said = f" The largest share: {worst[0]}." if worst else ""
-    caption = (
-        f"{kind}, coloured by the error of the baseline over half a second; circles: the seconds "
-        f"shown beside it.{said}"
+    kind = (
+        "Track from speed and yaw rate, and accelerations" if samples.has_track else "Accelerations"
     )
-    return panel("2 Where", [picture(figure, caption)], 5)
+    caption = (
+        f"{kind}, coloured by the error of the baseline over half a second; rings: the seconds "
+        f"shown beside.{said}"
+    )
+    return panel("2 Where", [figures.place(samples, caption)], 5)
 
 
 def _which(study: Study) -> str:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from .._style import framed
 from .._text import html_table, number
 from ..diagnose import EffectVerdict, bias_report
 from ..estimate import UNITS
@@ -15,14 +14,15 @@ from ..model import Model
 from ..study import LATERAL, Study
 from . import figures
 from .failure import unknown, where_and_when
-from .page import bullets, fold, heading, paragraph, picture, table
-from .tyres import AXLES, identified_curves, model_curves
+from .page import bullets, fold, heading, paragraph, table
+from .samples import Samples
+from .tyres import identified_curves, model_curves
 from .words import RANKING_HEAD, interval, quantity, ranking_rows, stages, summary, unit
 
 __all__ = ["SECTIONS"]
 
 
-def _where(study: Study, truth: Model | None) -> list[str]:
+def _where(study: Study, samples: Samples | None, truth: Model | None) -> list[str]:
     shown = [(title, study.test[i]) for title, i in stages(study)]
     first = study.test[0]
     head = ["channel", "unit", "noise floor"]
@@ -41,17 +41,14 @@ def _where(study: Study, truth: Model | None) -> list[str]:
                 *(f"{s.r2:.4f}" for s in scores),
             ]
         )
-    figure = framed(4.5 * len(shown), 3.2, wspace=0.1)
-    axes = figure.subplots(1, len(shown), sharey=True, squeeze=False)
-    figures.failure_maps(study, list(axes[0]))
     parts = [
         table(head, rows),
         paragraph(
             "One step ahead. Normalised errors are in units of the spread that the noise model "
             "expects of each prediction, so that 1 is the noise floor."
         ),
-        picture(
-            figure,
+        figures.failure_maps(
+            study,
             "Error over speed and lateral acceleration, on one colour scale. Grey: hardly any "
             "driving there.",
         ),
@@ -62,7 +59,7 @@ def _where(study: Study, truth: Model | None) -> list[str]:
     return parts
 
 
-def _which(study: Study, truth: Model | None) -> list[str]:
+def _which(study: Study, samples: Samples | None, truth: Model | None) -> list[str]:
     whose = "final" if study.added else "fitted"
     parts = []
     for i, dx in enumerate(study.diagnoses):
@@ -72,18 +69,15 @@ def _which(study: Study, truth: Model | None) -> list[str]:
         if not dx.ranking:
             parts.append(paragraph("There was no candidate to test."))
             continue
-        shown = min(len(dx.causes.inclusion), 10)
-        figure = framed(7.0, 0.9 + 0.28 * shown, left=2.2)
         grades = {a.id: a.grade for a in study.added}
-        figures.causes(dx.causes, grades, figure.add_subplot(), most=shown)
         n = len(dx.significant)
         parts += [
-            picture(
-                figure,
+            figures.causes(dx.causes, grades),
+            paragraph(
                 "Probability that each effect is missing, by credible set: effects of one set are "
                 "confounded, and one of them acts. Beside a bar stands the grade of what the study "
                 f"added. {n} of {len(dx.ranking)} effects are significant at {dx.alpha:g} over all "
-                "of them together.",
+                "of them together."
             ),
             table(RANKING_HEAD, _with_minus_signs(ranking_rows(study, i)), "ranking"),
         ]
@@ -103,7 +97,7 @@ def _which(study: Study, truth: Model | None) -> list[str]:
 _UNTOUCHED = ("absent", "negligible")
 
 
-def _verdicts(study: Study, truth: Model | None) -> list[str]:
+def _verdicts(study: Study, samples: Samples | None, truth: Model | None) -> list[str]:
     told = {v.effect.id: [v.effect.id, v.finding, v.sentence] for v in study.verdicts.all}
     rows = [row for row in told.values() if row[1] not in _UNTOUCHED]
     rest = [row for row in told.values() if row[1] in _UNTOUCHED]
@@ -158,20 +152,18 @@ def _hidden(study: Study) -> list[str]:
     ]
 
 
-def _ahead(study: Study, truth: Model | None) -> list[str]:
+def _ahead(study: Study, samples: Samples | None, truth: Model | None) -> list[str]:
     channels = [c for c in study.horizons.channels if c in LATERAL] or study.horizons.channels[:1]
-    figure = framed(3.4 * len(channels) + 0.6, 2.9, wspace=0.35)
-    axes = figure.subplots(1, len(channels), squeeze=False)
-    figures.ahead(study, channels, list(axes[0]))
     shares = study.shares
     return [
         paragraph(shares.sentence),
         html_table(shares.HEAD, shares.rows()),
-        picture(
-            figure,
+        figures.ahead(
+            study,
+            channels,
             "Error on validation data over how far ahead was predicted, from what was known then "
-            "and the steering and force since: median over pieces of 5 s. Dotted: noise of the "
-            "sensor.",
+            "and the steering and force since: median over pieces of 5 s. "
+            "Dotted: noise of the sensor.",
         ),
     ]
 
@@ -181,7 +173,7 @@ def _with_minus_signs(rows: list[list[str]]) -> list[list[str]]:
     return [[row[0], *(cell.replace("-", "\u2212") for cell in row[1:-1]), row[-1]] for row in rows]
 
 
-def _parameters(study: Study, truth: Model | None) -> list[str]:
+def _parameters(study: Study, samples: Samples | None, truth: Model | None) -> list[str]:
     fit = study.fit
     real = {} if truth is None else {n: quantity(truth.value(n)) for n in truth.names}
     if truth is not None:
@@ -193,38 +185,29 @@ def _parameters(study: Study, truth: Model | None) -> list[str]:
     head = ["parameter", "value", "95 % interval", "unit", "note"]
     parts = [table(head if truth is None else [*head, "truth"], rows)]
     if study.added:
-        count = sum(len(a.parameters) for a in study.added)
-        figure = framed(7.0, 1.0 + 0.35 * count, left=2.6)
-        figures.sizes(study, figure.add_subplot(), truth)
         text = "Size of the added effects with 95 % intervals"
-        parts.append(picture(figure, f"{text}; green: the truth." if truth else f"{text}."))
-    return parts + _tyres(study, truth)
+        told = f"{text}; green: the truth." if truth else f"{text}."
+        parts.append(figures.sizes(study, truth, told))
+    return [*parts, _tyres(study, truth)]
 
 
-def _tyres(study: Study, truth: Model | None) -> list[str]:
+def _tyres(study: Study, truth: Model | None) -> str:
     curves = identified_curves(study.fit)
     slip = curves[0].slip_rad
     start = model_curves(Model(study.model.vehicle), slip)
-    real = (None, None) if truth is None else model_curves(truth, slip)
-    figure = framed(8.0, 3.4, wspace=0.08)
-    axes = figure.subplots(1, len(AXLES), sharey=True)
-    for i, ax in enumerate(axes):
-        figures.tyre_curve(curves[i], ax, start=start[i], truth=real[i])
-        ax.label_outer()
-    axes[0].set_ylim(0.0, 1.15e-3 * max(float(c.force_n.max()) for c in (*curves, *start)))
+    real = None if truth is None else model_curves(truth, slip)
     caption = (
-        "Tyre curves at static load, without effects. Hatched: slip angles that this driving did "
+        "Tyre curves at static load, without effects. Grey: slip angles that this driving did "
         "not reach; the curve there is extrapolated."
     )
-    return [picture(figure, caption)]
+    return figures.tyre_curves(curves, start, real, caption)
 
 
-def _remains(study: Study, truth: Model | None) -> list[str]:
+_RUNNING = "Residuals on validation data, root mean square over half a second by channel."
+
+
+def _remains(study: Study, samples: Samples | None, truth: Model | None) -> list[str]:
     noise = study.fit.noise
-    count = len(stages(study))
-    figure = framed(9.0, 2.1 * count + 0.4, hspace=0.25)
-    axes = figure.subplots(count, 1, sharex=True, sharey=True, squeeze=False)
-    figures.residuals(study, list(axes[:, 0]))
     sensors = [
         [c, number(s, 3), UNITS[c]]
         for c, s in zip(UNITS, noise.sensor, strict=True)
@@ -233,7 +216,7 @@ def _remains(study: Study, truth: Model | None) -> list[str]:
     x, y, moment = noise.disturbance
     parts = [
         paragraph(study.in_the_end),
-        picture(figure, "Residuals on validation data, running root mean square per channel."),
+        *([] if samples is None else [figures.residuals(study, samples, _RUNNING)]),
         heading("Noise model", 3),
         table(("sensor", "white noise", "unit"), sensors),
         paragraph(
@@ -263,7 +246,7 @@ _METHOD = (
 )
 
 
-def _method(study: Study, truth: Model | None) -> list[str]:
+def _method(study: Study, samples: Samples | None, truth: Model | None) -> list[str]:
     starts = study.fits[0].starts
     validation = study.test[0].title.split(" on ", 1)[1]
     parts = [
@@ -281,7 +264,7 @@ def _method(study: Study, truth: Model | None) -> list[str]:
     return parts
 
 
-SECTIONS: tuple[tuple[str, Callable[[Study, Model | None], list[str]]], ...] = (
+SECTIONS: tuple[tuple[str, Callable[[Study, Samples | None, Model | None], list[str]]], ...] = (
     ("Errors on validation data", _where),
     ("Further ahead", _ahead),
     ("Which effect is missing", _which),

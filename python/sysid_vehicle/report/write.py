@@ -8,6 +8,7 @@ from .._files import write_text
 from ..model import Model
 from ..study import Study
 from .page import fold, page
+from .samples import samples_of
 from .screen import first_screen
 from .sections import SECTIONS
 
@@ -31,5 +32,9 @@ def write_report(study: Study, path: str | Path, *, truth: Model | None = None) 
         If the folder does not exist or is not writable.
     """
     title = f"Study of {study.model.vehicle.name}"
-    folded = [fold(name, parts) for name, make in SECTIONS if (parts := make(study, truth))]
-    write_text(path, page(title, [*first_screen(study), *folded]))
+    samples = samples_of(study)
+    folded = [
+        fold(name, parts) for name, make in SECTIONS if (parts := make(study, samples, truth))
+    ]
+    told = "" if samples is None else samples.json()
+    write_text(path, page(title, [*first_screen(study, samples), *folded], told))

@@ -24,7 +24,7 @@ from ..sensors import SensorCheck, made_ready, put_right
 from .added import AddedEffect
 from .horizons import horizons
 from .matters import sizes_that_matter, within
-from .search import Search, Trail
+from .search import Search, Trail, kept
 from .steps import way
 from .study import Study
 from .validation import beyond_noise_ahead, serving, set_aside
@@ -97,6 +97,11 @@ def improve(
     Returns
     -------
     Study
+
+    Raises
+    ------
+    Interrupted
+        After Ctrl-C, with the models so far; a `KeyboardInterrupt`.
     """
     most_effects = whole(most_effects, "most_effects")
     rules = rules.at(alpha)
@@ -111,70 +116,72 @@ def improve(
     say = tell if tell is not None else teller(progress)
     train_driving, test_driving = set_aside(train, test)
     baseline = identify(model, train_driving, starts=starts, seed=seed, progress=progress)
-    say(f"Fitted the baseline to {train_driving}.")
-    search = Search(
-        test_driving,
-        candidates=candidates,
-        most_effects=most_effects,
-        ends=ends,
-        rules=rules,
-        seed=seed,
-        progress=progress,
-        say=say,
-    )
-    found = search.from_baseline(baseline)
-    fit, diagnoses = found.fit, found.diagnoses
-    fits = way(found.fits)
-    floor = fit.noise
-    on_train = [compare(f, train_driving, noise=floor) for f in fits]
-    on_test = [compare(f, test_driving, noise=floor) for f in fits]
-    last = diagnoses[-1]
-    fitted = last.omnibus if last.fit is fit else omnibus(fit, train_driving, rules)
-    validation = explained = None
-    if len(fits) > 1:
-        validation = omnibus(serving(fit, test_driving), test_driving, rules)
-        explained = beyond_noise_ahead(fits, test_driving)
-    told = judge(
-        fit,
-        scored=(last.scores, last.family) if last.fit is fit else None,
-        lacked={e.id for e in considered(model, candidates)},
-        groups={e: g for e, g in found.rivals.items() if e in fit.model.effects},
-        acted={c.id for dx in diagnoses for c in dx.significant},
-        rules=rules,
-        seed=seed,
-        refitted=found.sizes,
-        settled=True,
-    )
-    facts = facts_of(
-        fits,
-        told,
-        on_train[-1],
-        (0.0,) if explained is None else explained.squares,
-        before=diagnoses[0].omnibus,
-        fitted=fitted,
-        validation=validation,
-        candidate=min((c.p_value for c in last.ranking), default=1.0),
-        excited=_excited(train_driving),
-        small=sizes is not None and within(horizons([fit], [""], test_driving), sizes),
-    )
-    decision = verdict(facts, rules)
-    alone, told = told, in_the_light_of(decision, told)
-    return Study(
-        verdict=decision.verdict,
-        fits=tuple(fits),
-        diagnoses=tuple(diagnoses),
-        train=tuple(on_train),
-        test=tuple(on_test),
-        validation=test_driving,
-        added=_added(fits, on_test, found, told, alone),
-        omnibus=fitted,
-        omnibus_validation=validation,
-        verdicts=told,
-        warnings=_warnings(fit, train_driving, found),
-        seconds=time.perf_counter() - began,
-        rules=rules,
-        explained=explained,
-    )
+    found = Trail([baseline])
+    with kept(found):
+        say(f"Fitted the baseline to {train_driving}.")
+        search = Search(
+            test_driving,
+            candidates=candidates,
+            most_effects=most_effects,
+            ends=ends,
+            rules=rules,
+            seed=seed,
+            progress=progress,
+            say=say,
+        )
+        search.follow(found)
+        fit, diagnoses = found.fit, found.diagnoses
+        fits = way(found.fits)
+        floor = fit.noise
+        on_train = [compare(f, train_driving, noise=floor) for f in fits]
+        on_test = [compare(f, test_driving, noise=floor) for f in fits]
+        last = diagnoses[-1]
+        fitted = last.omnibus if last.fit is fit else omnibus(fit, train_driving, rules)
+        validation = explained = None
+        if len(fits) > 1:
+            validation = omnibus(serving(fit, test_driving), test_driving, rules)
+            explained = beyond_noise_ahead(fits, test_driving)
+        told = judge(
+            fit,
+            scored=(last.scores, last.family) if last.fit is fit else None,
+            lacked={e.id for e in considered(model, candidates)},
+            groups={e: g for e, g in found.rivals.items() if e in fit.model.effects},
+            acted={c.id for dx in diagnoses for c in dx.significant},
+            rules=rules,
+            seed=seed,
+            refitted=found.sizes,
+            settled=True,
+        )
+        facts = facts_of(
+            fits,
+            told,
+            on_train[-1],
+            (0.0,) if explained is None else explained.squares,
+            before=diagnoses[0].omnibus,
+            fitted=fitted,
+            validation=validation,
+            candidate=min((c.p_value for c in last.ranking), default=1.0),
+            excited=_excited(train_driving),
+            small=sizes is not None and within(horizons([fit], [""], test_driving), sizes),
+        )
+        decision = verdict(facts, rules)
+        alone, told = told, in_the_light_of(decision, told)
+        return Study(
+            verdict=decision.verdict,
+            fits=tuple(fits),
+            diagnoses=tuple(diagnoses),
+            train=tuple(on_train),
+            test=tuple(on_test),
+            validation=test_driving,
+            added=_added(fits, on_test, found, told, alone),
+            omnibus=fitted,
+            omnibus_validation=validation,
+            verdicts=told,
+            warnings=_warnings(fit, train_driving, found),
+            seconds=time.perf_counter() - began,
+            rules=rules,
+            explained=explained,
+        )
 
 
 def _excited(driving: Driving) -> bool:

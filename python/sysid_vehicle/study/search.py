@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from .._text import with_error
 from ..diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
+from ..errors import Interrupted
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import Rules
 from .steps import alternatives, exchanged, first_that_holds, first_together, likeliest
 
-__all__ = ["Search", "Trail"]
+__all__ = ["Search", "Trail", "kept"]
 
 
 @dataclass(eq=False)
@@ -51,6 +53,15 @@ class Trail:
         """Where it leads."""
         return self.fits[-1]
 
+    @property
+    def told(self) -> str:
+        """The effects so far with their sizes, in words."""
+        effects = [e for e in self.fit.model.effects if e not in self.fits[0].model.effects]
+        if not effects:
+            found = ", ".join(c.id for dx in self.diagnoses[:1] for c in dx.significant[:3])
+            return f"no effect was added yet; there is evidence for {found or 'none'}"
+        return "; ".join(f"{e}: {_sizes(self.fit, [e])}" for e in effects)
+
     def note_several(self, dx: Diagnosis, chosen: Sequence[str]) -> None:
         """Remember what was chosen together, and what is confounded with each of it."""
         for name in chosen:
@@ -70,6 +81,25 @@ class Trail:
             self.rivals.setdefault(c.id, c.indistinguishable_from)
         self.rivals[chosen.id] = chosen.indistinguishable_from
         self.sizes |= dx.sizes
+
+
+@contextmanager
+def kept(trail: Trail) -> Iterator[None]:
+    """Say after Ctrl-C in the block what is known by then.
+
+    Raises
+    ------
+    Interrupted
+    """
+    try:
+        yield
+    except KeyboardInterrupt as signal:
+        told = Interrupted(
+            f"after {len(trail.fits) - 1} step(s): {trail.told}. The models so far, the baseline "
+            "first, are the `fits` of this exception (sys.last_value.fits)"
+        )
+        told.fits = tuple(trail.fits)
+        raise told from signal
 
 
 @dataclass(frozen=True)
@@ -94,15 +124,14 @@ class Search:
     progress: bool | None
     say: Callable[[str], None]
 
-    def from_baseline(self, baseline: Fit) -> Trail:
-        """Add what is missing until nothing more is that the driving can show."""
-        trail = Trail([baseline])
+    def follow(self, trail: Trail) -> None:
+        """Add what is missing to the last model until nothing more is that the driving can show."""
         while True:
             dx = self._diagnosis(trail.fit)
             trail.diagnoses.append(dx)
             if time.perf_counter() > self.ends:
                 trail.stopped = tuple(c.id for c in dx.significant)
-                return trail
+                return
             step = first_that_holds(dx, trail.fit, self.test) if self.most_effects else None
             single = None if step is None else step[1]
             several = first_together(dx, self.test, single, self.most_effects)
@@ -115,16 +144,16 @@ class Search:
                 chosen, lean = (step[0].id,), step[1]
                 trail.note(dx, step[0])
             else:
-                return trail
+                return
             found = exchanged(
                 lean, trail.nearly, self.test, most_effects=self.most_effects, rules=self.rules
             )
             effects = set(found.model.effects)
             # One more than allowed may make another needless.
             if len(effects) > self.most_effects:
-                return trail
+                return
             if any(set(f.model.effects) == effects for f in trail.fits):
-                return trail
+                return
             before = set(trail.fit.model.effects)
             trail.fits.append(found)
             more = _more(found, before - effects, effects - before - set(chosen))

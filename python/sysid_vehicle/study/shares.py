@@ -21,6 +21,7 @@ import numpy.typing as npt
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._text import html_paragraph, html_table, number, text_table
+from .._threads import in_parallel
 from ..diagnose import blocks
 from ..diagnose.ceiling import Inputs, folds, ridge
 from ..diagnose.coordinates import begins
@@ -196,10 +197,10 @@ def shares(
     inputs = Inputs.of(final, final.driving, test)
     models = (baseline,) if final is baseline else (baseline, final)
     # Shape (models and ceilings, blocks, horizons, channels).
-    squares = np.stack(
-        [_squares(models, noise, final.driving, test, inputs, h)[..., columns] for h in horizons_s],
-        axis=2,
+    found = in_parallel(
+        lambda h: _squares(models, noise, final.driving, test, inputs, h)[..., columns], horizons_s
     )
+    squares = np.stack(found, axis=2)
     n = len(models)
     deciles = _deciles(np.sqrt(squares))
     # The best regression, and no worse than the final model: it is a function of the driving too.

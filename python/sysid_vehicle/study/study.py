@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .._files import write_json
+from .._tables import frame
 from .._text import brief, html_list, html_paragraph, html_table, text_table
 from ..compare import Comparison
 from ..diagnose import (
@@ -328,6 +329,12 @@ class Study:
             + html_table(self._HEAD, self._rows())
             + html_paragraph(self.in_the_end)
         )
+
+    def to_pandas(self) -> Any:
+        """A DataFrame of the one-step-ahead errors of every step, in units of the noise floor."""
+        train, test = ([c.error for c in found] for found in (self.train, self.test))
+        columns = {"step": self.steps, "train_error": train, "validation_error": test}
+        return frame(columns, "step")
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""
