@@ -75,7 +75,8 @@ class Log:
         name : str
             Name of the run.
         despike : iterable of str
-            Channels in which isolated one-sample spikes become missing values.
+            Channels in which isolated one-sample spikes and dropouts, short readings that no car
+            reaches, become missing values.
         check : bool
             Whether to look for wrong units, wrong signs, frozen sensors, a log that is too short,
             too slow or without corners. False suits simulated pieces. The order of time, the
