@@ -102,5 +102,9 @@ def expect(value: object, wanted: type, function: str) -> None:
     ):
         kind = "table"
     name = wanted.__name__
-    remedy = _REMEDIES.get((name, kind), f"pass a {name}")
-    raise InvalidInput(f"{function}: a {given} was given in place of a {name}; {remedy}")
+    remedy = _REMEDIES.get((name, kind), f"pass {_one(name)}")
+    raise InvalidInput(f"{function}: {_one(given)} was given in place of {_one(name)}; {remedy}")
+
+
+def _one(name: str) -> str:
+    return f"an {name}" if name[0] in "AEIOUaeiou" else f"a {name}"

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -108,6 +109,11 @@ def test_seeds_of_everything_that_draws(fit: Fit, truth: Model) -> None:
             draw()
 
 
+def fleet(cars: Any, logs: Any, **how: Any) -> object:
+    """A fleet that nothing is written of."""
+    return sv.improve_many(cars, logs, out="/nowhere/at all", progress=False, **how)
+
+
 MISTAKES: tuple[tuple[Callable[..., object], str], ...] = (
     (lambda fit, lap, model: sv.identify(model, "lap.csv"), "str was given .* read_log"),
     (lambda fit, lap, model: sv.identify(model, Path("x")), "Path was given .* read_log"),
@@ -132,6 +138,23 @@ MISTAKES: tuple[tuple[Callable[..., object], str], ...] = (
     (lambda fit, lap, model: sv.improve(fit, lap), r"improve: a Fit .* pass its \.model"),
     (lambda fit, lap, model: sv.improve(model, "lap.csv"), "str .* read_log"),
     (lambda fit, lap, model: sv.improve(model, lap, Table()), r"Table .* Log\.from_arrays"),
+    (lambda fit, lap, model: sv.check(None), r"check: a NoneType .* pass a Log"),
+    (lambda fit, lap, model: sv.check([]), "check: no log was given"),
+    (lambda fit, lap, model: sv.check(lap, model), "check: a Model .* pass a Vehicle"),
+    (lambda fit, lap, model: sv.axle_forces("lap.csv", model.vehicle), "forces: a str .* read_log"),
+    (lambda fit, lap, model: sv.axle_forces(lap, "car.toml"), "axle_forces: a str .* Vehicle"),
+    (
+        lambda fit, lap, model: sv.axle_forces(lap, model.vehicle, sensors=fit),  # type: ignore[arg-type]
+        "axle_forces: a Fit .* SensorCheck",
+    ),
+    (lambda fit, lap, model: fleet(model, None), "improve_many: None is no log"),
+    (lambda fit, lap, model: fleet(model, {"a": None}), "a: None is no log"),
+    (lambda fit, lap, model: fleet(model, [lap], validation=[lap]), "validation is a list"),
+    (
+        lambda fit, lap, model: fleet(model, [lap], executor=3),
+        "an int was given .* pass an Executor",
+    ),
+    (lambda fit, lap, model: fleet({}, {"a": lap}), "a: no car is given for it; name 'a' among"),
     (lambda fit, lap, model: Model("car.toml"), r"made of a Vehicle, .*Vehicle\.from_toml"),
     (lambda fit, lap, model: Model(model.vehicle, "mass"), "give a tuple of names"),
 )

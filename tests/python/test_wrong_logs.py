@@ -158,6 +158,19 @@ ERRORS: dict[str, tuple[Change, list[str]]] = {
     "ax sign": (times(ax_mps2=-1), ["ax_mps2: wrong sign", "t = ", "factor = -1"]),
     "fx sign": (times(fx_n=-1), ["fx_n: wrong sign", "t = ", "factor = -1"]),
     "vx sign": (times(vx_mps=-1), ["vx_mps: wrong sign", "t = ", "factor = -1"]),
+    "steering dropouts": (
+        lambda d: [put("steer_rad", slice(k, k + 4), 8.333)(d) for k in (700, 1500)] and None,
+        [
+            "steer_rad: 8 impossible value(s), 8.333 rad at samples 700 to 703 (t = 7 to 7.03 s)",
+            "and 1 more time(s)",
+            "dropped out",
+            "despike = true",
+        ],
+    ),
+    "dropouts in degrees": (
+        lambda d: times(steer_rad=DEG)(d) or put("steer_rad", slice(700, 704), 477.0)(d),
+        ["steer_rad: 477 rad at sample 700", "factor = 0.0174533"],
+    ),
 }
 
 WARNINGS: dict[str, tuple[Change, list[str]]] = {
@@ -184,6 +197,10 @@ WARNINGS: dict[str, tuple[Change, list[str]]] = {
     "spikes in the steering": (
         put("steer_rad", [700, 1500], 0.3),  # type: ignore[arg-type]
         ["steer_rad: 2 one-sample spike(s)", "sample 700 (t = 7 s)", "despike = true"],
+    ),
+    "dropout of one sample": (
+        put("steer_rad", 700, 8.333),
+        ["steer_rad: 1 impossible value(s), 8.333 rad at sample 700 (t = 7 s)", "despike = true"],
     ),
     "straight": (straight, ["steer_rad and ay_mps2: not excited", "drive corners"]),
     "straight without noise": (constant_straight, ["not excited", "drive corners"]),
@@ -274,6 +291,24 @@ def test_warning(data: Columns, case: str) -> None:
 def test_usable_logs_are_silent(data: Columns, change: Change) -> None:
     change(data)
     assert Log.from_arrays(data).n > 0
+
+
+@pytest.mark.parametrize(("channel", "value"), [("steer_rad", 8.333), ("ay_mps2", 327.67)])
+def test_the_remedy_for_dropouts_mends_them(data: Columns, channel: str, value: float) -> None:
+    clean = data[channel].copy()
+    put(channel, slice(700, 704), value)(data)
+    with pytest.warns(SysidWarning, match=r"removed 4 value\(s\) that no car reaches"):
+        log = Log.from_arrays(data, despike=[channel])
+    away = np.r_[0:700, 704:4000]
+    np.testing.assert_array_equal(log[channel][away], clean[away])
+    assert not np.any(np.abs(log[channel][700:704]) > np.abs(clean).max())
+
+
+def test_a_contradiction_names_the_channel_that_the_text_is_about(data: Columns) -> None:
+    put("yaw_rate_radps", slice(700, 704), 90.0)(data)
+    (found,) = Log.from_arrays(data, check=False).contradictions
+    assert found.channel == "yaw_rate_radps"
+    assert found.text.startswith("yaw_rate_radps: 4 impossible")
 
 
 def test_plausibility_can_be_switched_off(data: Columns) -> None:

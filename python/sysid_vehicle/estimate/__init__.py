@@ -1,7 +1,7 @@
 """State estimation: prepared driving, the noise model, filters for models of one's own."""
 
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
-from .driving import MEASURED, UNITS, Driving, several_logs
+from .driving import MEASURED, UNITS, Driving
 from .filters import FilterRun, FilterState, LateMeasurements, StateFilter, StateModel
 from .noise import (
     NoiseModel,
@@ -30,6 +30,5 @@ __all__ = [
     "nees_check",
     "nis_check",
     "noise_range",
-    "several_logs",
     "whiteness_check",
 ]

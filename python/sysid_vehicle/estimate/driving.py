@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from .. import _core
-from .._arguments import expect
 from .._arrays import FloatArray, as_float64
 from .._text import brief
 from ..errors import InvalidInput
-from ..log import Log
+from ..log import Log, several_logs
 from ..model import Model
 from ..sensors import quantum
 from .inputs import quiet
@@ -25,23 +23,6 @@ MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 """Measured channels, in the core's order."""
 
 UNITS = dict(zip(MEASURED, ("m/s", "m/s", "rad/s", "m/s2", "m/s2"), strict=True))
-
-
-def several_logs(logs: Log | Sequence[Log]) -> tuple[Log, ...]:
-    """One log or many as many.
-
-    Raises
-    ------
-    InvalidInput
-        There is none, or something else; the message says what to make of that.
-    """
-    single = isinstance(logs, Log | str | Mapping) or hasattr(logs, "columns")
-    found: tuple[Any, ...] = tuple(logs) if isinstance(logs, Iterable) and not single else (logs,)
-    if not found:
-        raise InvalidInput("no log was given; pass one Log or a list of them")
-    for log in found:
-        expect(log, Log, "driving")
-    return found
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from .._arguments import whole
+from .._arguments import expect, whole
 from .._files import as_path, write_text
 from .._progress import with_progress
 from .._threads import cores
@@ -115,6 +115,8 @@ def run(
 ) -> Fleet:
     """Do the jobs that `out` does not hold yet; the arguments are those of `improve_many`."""
     count = cores() if workers is None else whole(workers, "workers", 1)
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        expect(executor, Executor, "improve_many")
     store = Store(out)
     say = tell if tell is not None else _silent
     digests = {job.name: job.digest() for job in jobs}

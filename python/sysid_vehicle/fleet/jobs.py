@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path, PurePosixPath
@@ -109,6 +109,11 @@ def jobs_of(
     named = logs if isinstance(logs, Mapping) else _named(logs)
     if not named:
         raise InvalidInput("improve_many: there are no logs; give one or more")
+    if validation is not None and not isinstance(validation, Mapping):
+        raise InvalidInput(
+            f"improve_many: validation is a {type(validation).__name__}; give a mapping from the "
+            f"names of the logs to their validation data"
+        )
     held_out = dict(validation or {})
     refuse_unknown(held_out, named, "validation")
     models = {n: model_of(c) for n, c in cars.items()} if isinstance(cars, Mapping) else {}
@@ -118,10 +123,8 @@ def jobs_of(
         check_name(name)
         model = one or models.get(name) or models.get(name.partition("/")[0])
         if model is None:
-            raise InvalidInput(
-                f"{name}: no car is given for it; name '{name}' or '{name.partition('/')[0]}' "
-                "among the cars"
-            )
+            either = " or ".join(dict.fromkeys((f"'{name}'", f"'{name.partition('/')[0]}'")))
+            raise InvalidInput(f"{name}: no car is given for it; name {either} among the cars")
         kept = _drives(held_out.get(name, ()), name)
         jobs.append(Job(name, model, _drives(drives, name), kept, **shared))
     return jobs
@@ -164,11 +167,9 @@ def check_options(options: Options, where: str) -> None:
 
 def _named(logs: Sequence[Drive | Sequence[Drive]]) -> dict[str, Drive | Sequence[Drive]]:
     """Logs by the names of the first of each study."""
-    if isinstance(logs, str | Path | Log):
-        logs = [logs]
     named: dict[str, Drive | Sequence[Drive]] = {}
-    for entry in logs:
-        first = entry if isinstance(entry, str | Path | Log) else next(iter(entry), None)
+    for entry in _many(logs, "improve_many"):
+        first = next(iter(_many(entry, "improve_many")), None)
         if first is None:
             raise InvalidInput("improve_many: a study has no logs; give one or more")
         name = first.name if isinstance(first, Log) else as_path(first).stem
@@ -180,8 +181,17 @@ def _named(logs: Sequence[Drive | Sequence[Drive]]) -> dict[str, Drive | Sequenc
     return named
 
 
+def _many(given: Any, name: str) -> list[Any]:
+    """One log, or those of a sequence."""
+    if isinstance(given, str | Path | Log):
+        return [given]
+    if not isinstance(given, Iterable):
+        raise InvalidInput(f"{name}: {given!r} is no log; give a Log or the path of a file")
+    return list(given)
+
+
 def _drives(entry: Drive | Sequence[Drive], name: str) -> tuple[Log | Path, ...]:
-    drives = [entry] if isinstance(entry, str | Path | Log) else list(entry)
+    drives = _many(entry, name)
     for x in drives:
         if not isinstance(x, str | Path | Log):
             raise InvalidInput(f"{name}: {x!r} is no log; give a Log or the path of a file")

@@ -11,10 +11,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from .._arguments import real, whole
+from .._arguments import expect, real, whole
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
-from ..log import Log
+from ..log import Log, several_logs
 from ..sensors import SensorCheck, check
 from ..vehicle import GRAVITY_MPS2, Vehicle
 from ._motion import Motion, Places, draws, smoothed
@@ -86,7 +86,10 @@ def axle_forces(
     proportion. Differences of F_x between left and right wheels are taken as none. Slip angles take
     the steering angle as it was read, and have no part of its noise.
     """
-    together = (logs,) if isinstance(logs, Log) else tuple(logs)
+    together = several_logs(logs, "axle_forces")
+    expect(vehicle, Vehicle, "axle_forces")
+    if sensors is not None:
+        expect(sensors, SensorCheck, "axle_forces")
     ahead = real(cg_ahead_m)
     if ahead is None or not np.isfinite(ahead):
         raise InvalidInput(f"cg_ahead_m = {cg_ahead_m!r}: give metres")

@@ -5,7 +5,7 @@ from ._channels import CHANNELS, Channel
 from ._columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
 from ._held import held_rows
 from ._laws import Contradiction
-from ._log import Log, check_excitation
+from ._log import Log, check_excitation, several_logs
 
 __all__ = [
     "CHANNELS",
@@ -21,4 +21,5 @@ __all__ = [
     "listed",
     "named_columns",
     "seconds_of_stamps",
+    "several_logs",
 ]

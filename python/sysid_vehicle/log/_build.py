@@ -14,6 +14,7 @@ from ._columns import Columns, collect
 from ._grid import at, check_time, own_period, to_grid
 from ._held import blank_held
 from ._plausibility import check_coherence
+from ._ranges import dropouts
 from ._signals import fill_short_gaps, spikes
 
 _MIN_USABLE_S = 5.0
@@ -75,10 +76,21 @@ def _build(data: Columns, despike: tuple[str, ...], check: bool, notes: list[str
 def _handle_spikes(
     time_s: FloatArray, columns: dict[str, FloatArray], despike: tuple[str, ...], notes: list[str]
 ) -> set[str]:
-    """Blank spikes in the channels of `despike`; elsewhere only tell of them in the steering."""
+    """Blank spikes and dropouts in the channels of `despike`.
+
+    Elsewhere only tell of spikes in the steering.
+    """
     removed = set()
     for name in dict.fromkeys((*despike, "steer_rad")):
-        found = spikes(columns[name])
+        lost = dropouts(name, columns[name])
+        if name in despike and lost.size:
+            notes.append(
+                f"{name}: removed {lost.size} value(s) that no car reaches, the first "
+                f"{columns[name][lost[0]]:.4g} at {at(int(lost[0]), time_s)}; check the sensor"
+            )
+            columns[name][lost] = np.nan
+            removed.add(name)
+        found = np.setdiff1d(spikes(columns[name]), lost)
         if found.size == 0:
             continue
         place = f"{found.size} one-sample spike(s), first at {at(int(found[0]), time_s)}"

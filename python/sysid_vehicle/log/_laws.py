@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InvalidInput
-from ._channels import CHANNELS, FloatArray
+from ._channels import FloatArray
 from ._motion import Motion
 from ._regression import Regression, regress
 
@@ -54,7 +53,7 @@ class Contradiction:
     Attributes
     ----------
     channel : str
-        The first that `text` names.
+        That is wrong, or the first of several that may be.
     text : str
         What is wrong, where, and the likely remedy.
     late_s : float
@@ -69,14 +68,16 @@ class Contradiction:
     late_s: float = 0.0
     on_the_level: bool = False
 
-    @classmethod
-    def said(cls, text: str) -> Contradiction:
-        """Take the channel from a sentence."""
-        names = re.findall("|".join(CHANNELS), text)
-        return cls(names[0] if names else "time_s", text)
+
+class Implausible(InvalidInput):
+    """A log is refused for the contradiction that it holds."""
+
+    def __init__(self, channel: str, text: str) -> None:
+        super().__init__(text)
+        self.contradiction = Contradiction(channel, text)
 
 
-class KnownUnit(InvalidInput):
+class KnownUnit(Implausible):
     """A unit that explains what does not fit."""
 
 
@@ -104,10 +105,11 @@ def cosine(x: FloatArray, y: FloatArray) -> float:
     return float(x @ y) / size if size > 0.0 else 0.0
 
 
-def wrong_sign(channel: str, what: str, values: FloatArray, drive: Drive) -> str:
-    return (
+def wrong_sign(channel: str, what: str, values: FloatArray, drive: Drive) -> Implausible:
+    return Implausible(
+        channel,
         f"{channel}: wrong sign: it {what}, {drive.place(values)} "
-        f"(ISO 8855: x forward, y and yaw to the left); put factor = -1 in the channel map"
+        f"(ISO 8855: x forward, y and yaw to the left); put factor = -1 in the channel map",
     )
 
 
@@ -116,12 +118,15 @@ def check_scale(
     deviation: float,
     usual: float,
     slips: Slips,
+    channel: str,
     formula: str,
     driver: FloatArray,
     drive: Drive,
     inverse: bool = False,
 ) -> None:
     """Refuse a coefficient that is far from one, by the unit that explains it best.
+
+    Where no unit explains it, `channel` is told.
 
     The logarithm of the ratio is taken as normal about that of each unit, with the deviation of
     the fit and the `usual` one of sensors; compared are the likelihoods.
@@ -131,18 +136,17 @@ def check_scale(
     best, channels = min(slips, key=lambda slip: abs(math.log(ratio / slip[0])))
     miss = abs(math.log(ratio / best)) / deviation
     shown = 1.0 / ratio if inverse else ratio
-    if inverse:
-        numerator, denominator = "ax_mps2", "(d vx_mps / dt)"
-        formula = f"{numerator} / {denominator}"
     if off > _NOT_ONE and miss < _FITS and off**2 - miss**2 > _NOT_ONE**2:
-        units = " and ".join(f"{channel}: seems to be in {unit}" for channel, unit, _ in channels)
-        remedy = " and ".join(f"{factor} for {channel}" for channel, _, factor in channels)
+        units = " and ".join(f"{name}: seems to be in {unit}" for name, unit, _ in channels)
+        remedy = " and ".join(f"{factor} for {name}" for name, _, factor in channels)
         raise KnownUnit(
+            channels[0][0],
             f"{units}: {formula} is {shown:.3g} instead of about 1, {drive.place(driver)}; put "
-            f"{remedy} in the channel map"
+            f"{remedy} in the channel map",
         )
     if off > _NOT_ONE and abs(math.log(ratio)) > _UNNAMED:
-        raise InvalidInput(
+        raise Implausible(
+            channel,
             f"{formula} is {shown:.3g} instead of about 1, {drive.place(driver)}; check the units "
-            f"of these channels and put their factors in the channel map"
+            f"of these channels and put their factors in the channel map",
         )

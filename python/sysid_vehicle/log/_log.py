@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._arguments import expect
 from .._files import write_text
 from .._tables import dataset, frame
 from ..errors import InvalidInput, near_names, warn
@@ -76,7 +77,8 @@ class Log:
         name : str
             Name of the run.
         despike : iterable of str
-            Channels in which isolated one-sample spikes become missing values.
+            Channels in which isolated one-sample spikes and dropouts, short readings that no car
+            reaches, become missing values.
         check : bool
             Whether to look for wrong units, wrong signs, frozen sensors, a log that is too short,
             too slow or without corners. False suits simulated pieces. The order of time, the
@@ -358,3 +360,20 @@ def check_excitation(logs: Log | Sequence[Log]) -> bool:
         return bool(notes)
     warn("; ".join(f"{log.name}: {note}" for log, note in zip(together, notes, strict=True)))
     return False
+
+
+def several_logs(logs: Log | Sequence[Log], function: str = "driving") -> tuple[Log, ...]:
+    """One log or many as many, as they were given to a function.
+
+    Raises
+    ------
+    InvalidInput
+        There is none, or something else; the message says what to make of that.
+    """
+    single = isinstance(logs, Log | str | Mapping) or hasattr(logs, "columns")
+    found: tuple[Any, ...] = tuple(logs) if isinstance(logs, Iterable) and not single else (logs,)
+    if not found:
+        raise InvalidInput(f"{function}: no log was given; pass one Log or a list of them")
+    for log in found:
+        expect(log, Log, function)
+    return found

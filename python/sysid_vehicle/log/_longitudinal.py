@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2
 from ._channels import FloatArray
 from ._lags import sideways
@@ -13,6 +12,7 @@ from ._laws import (
     SCALE_STD,
     Contradiction,
     Drive,
+    Implausible,
     Slips,
     check_scale,
     cosine,
@@ -52,17 +52,19 @@ def check_longitudinal(drive: Drive) -> None:
     ratio, deviation = float(found.coefficients[0]), float(found.deviations[0])
     if ratio < -4.0 * deviation and found.coherence > 0.3 and cosine(ramp, ax) < -0.3:
         text = "moves against the change of vx_mps"
-        raise InvalidInput(wrong_sign("ax_mps2", text, ax, drive))
+        raise wrong_sign("ax_mps2", text, ax, drive)
     if found.coherence < 0.15 and (
         spread_of(ramp) > _CLEARLY_RAMP or spread_of(ax) > _CLEARLY_FELT
     ):
-        raise InvalidInput(
+        raise Implausible(
+            "ax_mps2",
             f"ax_mps2: does not follow the change of vx_mps, {drive.place(ramp)}; check both "
-            f"columns, and that their rows are in the order of time"
+            f"columns, and that their rows are in the order of time",
         )
     if found.coherence > 0.6 and ratio > 0.0 and size_of(ramp) > EXCITED:
-        formula = "(d vx_mps / dt) / ax_mps2"
-        check_scale(ratio, deviation, SCALE_STD, _LONGITUDINAL_SLIPS, formula, ramp, drive, True)
+        formula = "ax_mps2 / (d vx_mps / dt)"
+        slips = _LONGITUDINAL_SLIPS
+        check_scale(ratio, deviation, SCALE_STD, slips, "ax_mps2", formula, ramp, drive, True)
 
 
 def ramp_on(drive: Drive, name: str) -> tuple[FloatArray, FloatArray, Regression]:
@@ -106,11 +108,12 @@ def check_force(drive: Drive) -> None:
     inverse, deviation = float(found.coefficients[0]), float(found.deviations[0])
     if inverse < -4.0 * deviation and found.coherence > 0.3 and cosine(ramp, force) < -0.3:
         text = "moves against the change of vx_mps"
-        raise InvalidInput(wrong_sign("fx_n", text, force, drive))
+        raise wrong_sign("fx_n", text, force, drive)
     if found.coherence < 0.15 and spread_of(ramp) > _CLEARLY_DRIVEN:
-        raise InvalidInput(
+        raise Implausible(
+            "fx_n",
             f"fx_n: does not follow the acceleration, {drive.place(ramp)}; check that the column "
-            f"holds the force of all wheels, in the order of time, or leave it out"
+            f"holds the force of all wheels, in the order of time, or leave it out",
         )
     if found.coherence < 0.6 or inverse <= 0.0:
         return
@@ -118,9 +121,10 @@ def check_force(drive: Drive) -> None:
     i = int(np.argmax(np.abs(force)))
     if not 50.0 < mass < 1e5:
         what = "kN, put factor = 1000" if mass < 50.0 else "mN, put factor = 0.001"
-        raise InvalidInput(
+        raise Implausible(
+            "fx_n",
             f"fx_n: {force[i]:.4g} at t = {drive.motion.times_s[drive.rows][i]:.6g} s gives the "
-            f"car a mass of {mass:.3g} kg; if it is in {what} in the channel map"
+            f"car a mass of {mass:.3g} kg; if it is in {what} in the channel map",
         )
 
 

@@ -13,7 +13,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2
 from ._channels import DEG, FloatArray
 from ._clock import clock_notes
@@ -24,6 +23,7 @@ from ._laws import (
     WINDOW_S,
     Contradiction,
     Drive,
+    Implausible,
     KnownUnit,
     Slips,
     check_scale,
@@ -36,7 +36,7 @@ from ._laws import (
 )
 from ._longitudinal import check_force, check_longitudinal, held_speed_note
 from ._motion import Motion
-from ._ranges import WHITE, check_ranges
+from ._ranges import WHITE, blank, check_lost, check_ranges, dropouts
 
 _MOVING = 3.0  # in whatever unit vx has; only windows above are compared
 _MIN_WINDOWS = 8
@@ -97,29 +97,31 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[C
     InvalidInput
         For the first channel that cannot be right; the message names channel, time and remedy.
     """
-    notes: list[str] = []
+    implausible: list[Contradiction] = []
     clock: list[Contradiction] = []
+    lost = {name: dropouts(name, values) for name, values in columns.items()}
+    given, columns = columns, blank(columns, lost)
     motion = Motion(columns, rate_hz)
     motion.windows(WINDOW_S)
     speed = motion.mean(motion.channels["vx_mps"])
     rows = motion.usable & (np.abs(speed) > _MOVING)
     if np.count_nonzero(rows) < _MIN_WINDOWS:
-        return [Contradiction.said(text) for text in check_ranges(columns, rate_hz)]
+        return check_ranges(columns, rate_hz) + check_lost(given, lost)
     drive = Drive(motion, rows)
-    problem: InvalidInput | None = None
+    problem: Implausible | None = None
     try:
-        notes = check_ranges(columns, rate_hz)
-    except InvalidInput as error:
+        implausible = check_ranges(columns, rate_hz)
+    except Implausible as error:
         problem = error  # the unit, if it can be told, says more
     try:
         clock = _check_laws(drive)
     except KnownUnit:
         raise
-    except InvalidInput as error:
+    except Implausible as error:
         raise problem or error from None
     if problem is not None:
         raise problem
-    implausible = [Contradiction.said(text) for text in notes]
+    implausible += check_lost(given, lost)
     if "fx_n" in columns:
         implausible += held_speed_note(drive)
     return implausible + (clock or lag_notes(motion))
@@ -129,15 +131,15 @@ def contradictions(columns: Mapping[str, FloatArray], rate_hz: float) -> tuple[C
     """Return what :func:`check_coherence` refuses or doubts."""
     try:
         return tuple(check_coherence(columns, rate_hz))
-    except InvalidInput as error:
-        return (Contradiction.said(str(error)),)
+    except Implausible as error:
+        return (error.contradiction,)
 
 
 def _check_laws(drive: Drive) -> list[Contradiction]:
     channels = drive.motion.channels
     speed = drive.mean(channels["vx_mps"])
     if np.median(speed) < 0.0:
-        raise InvalidInput(wrong_sign("vx_mps", "is negative for most of the drive", speed, drive))
+        raise wrong_sign("vx_mps", "is negative for most of the drive", speed, drive)
     _check_lateral(drive)
     clock = clock_notes(drive.motion)
     if not clock:
@@ -173,10 +175,11 @@ def _check_lateral(drive: Drive) -> None:
         odd = "ay_mps2" if cosine(steer, turn) > 0.0 else "yaw_rate_radps"
         other = "yaw_rate_radps * vx_mps" if odd == "ay_mps2" else "ay_mps2"
         text = f"moves against both {other} and steer_rad"
-        raise InvalidInput(wrong_sign(odd, text, drive.mean(c[odd]), drive))
+        raise wrong_sign(odd, text, drive.mean(c[odd]), drive)
     if both.coherence > 0.6 and ratio > 0.0:
         formula = "ay_mps2 / (vx_mps * yaw_rate_radps)"
-        check_scale(ratio, deviation, SCALE_STD, _LATERAL_SLIPS, formula, turn, drive)
+        slips = _LATERAL_SLIPS
+        check_scale(ratio, deviation, SCALE_STD, slips, "ay_mps2", formula, turn, drive)
 
 
 def _refuse_lateral(drive: Drive, turn: FloatArray, ay: FloatArray) -> None:
@@ -185,10 +188,11 @@ def _refuse_lateral(drive: Drive, turn: FloatArray, ay: FloatArray) -> None:
     if "ax_mps2" in c:
         ax, ramp = drive.mean(c["ax_mps2"]), drive.change(c["vx_mps"])
         if cosine(turn, ax) > 0.8 and (spread_of(ay) < EXCITED or cosine(ramp, ay) > 0.3):
-            raise InvalidInput(
+            raise Implausible(
+                "ax_mps2",
                 f"ax_mps2 and ay_mps2: seem to be swapped: ax_mps2 follows vx_mps * yaw_rate_radps "
                 f"and ay_mps2 does not, {drive.place(turn)}; swap the two columns in the channel "
-                f"map"
+                f"map",
             )
     steer = drive.mean(c["steer_rad"])
     speed = drive.mean(c["vx_mps"])
@@ -199,9 +203,10 @@ def _refuse_lateral(drive: Drive, turn: FloatArray, ay: FloatArray) -> None:
     odd = min(answers, key=lambda name: answers[name])
     other = "vx_mps * yaw_rate_radps" if odd == "ay_mps2" else "ay_mps2 / vx_mps"
     driver = turn if odd == "ay_mps2" else ay
-    raise InvalidInput(
+    raise Implausible(
+        odd,
         f"{odd}: does not follow {other}, as it must in every corner, {drive.place(driver)}; check "
-        f"that the column holds what it says, in the order of time"
+        f"that the column holds what it says, in the order of time",
     )
 
 
@@ -228,14 +233,15 @@ def _check_steer(drive: Drive) -> None:
     answer = fit(steer[rows], columns, [np.inf, np.inf, offset])
     alone = cosine(curvature[rows], steer[rows])
     if answer.coherence < 0.25 and abs(alone) < 0.45 and spread_of(ay[rows]) > _CLEARLY:
-        raise InvalidInput(
+        raise Implausible(
+            "steer_rad",
             f"steer_rad: does not turn with yaw_rate_radps and ay_mps2, {drive.place(ay)}; check "
-            f"that the column holds the steering angle, in the order of time"
+            f"that the column holds the steering angle, in the order of time",
         )
     base, deviation = float(answer.coefficients[0]), float(answer.deviations[0])
     if base < -3.0 * deviation and alone < -0.5 and answer.coherence > 0.3:
         text = "moves against both yaw_rate_radps and ay_mps2"
-        raise InvalidInput(wrong_sign("steer_rad", text, steer, drive))
+        raise wrong_sign("steer_rad", text, steer, drive)
     if base <= 0.0 or answer.coherence < 0.5:
         return
     speed_2 = float(np.median(drive.mean(c["vx_mps"]))) ** 2
@@ -258,9 +264,10 @@ def _check_steer(drive: Drive) -> None:
     size = "large" if ratio > 1.0 else "small"
     if ratio < 1.0:
         what = f"check its unit; factor = {1.0 / ratio:.2g} would make it fit"
-    raise InvalidInput(
+    raise Implausible(
+        "steer_rad",
         f"steer_rad: {steer[i]:.4g} at t = {drive.motion.times_s[drive.rows][i]:.6g} s is too "
-        f"{size} for the yaw rate (a wheelbase of {base:.3g} m would answer so); {what}"
+        f"{size} for the yaw rate (a wheelbase of {base:.3g} m would answer so); {what}",
     )
 
 
@@ -281,16 +288,18 @@ def _check_sliding(drive: Drive) -> None:
     ratio, deviation = float(found.coefficients[0]), float(found.deviations[0])
     if ratio < -4.0 * deviation and found.coherence > 0.3:
         text = "changes against what ay_mps2 - vx_mps * yaw_rate_radps demands"
-        raise InvalidInput(wrong_sign("vy_mps", text, drive.mean(c["vy_mps"]), drive))
+        raise wrong_sign("vy_mps", text, drive.mean(c["vy_mps"]), drive)
     # Of a channel in disorder nothing of the change is left, and it is white.
     lost = found.coherence < 0.1 and ratio + 5.0 * deviation < 0.8 and ratio < 0.3
     clear = spread_of(expected - found.coefficients[1] * turn) > _CLEARLY
     if lost and (clear or drive.motion.disorder["vy_mps"] > WHITE):
-        raise InvalidInput(
+        raise Implausible(
+            "vy_mps",
             f"vy_mps: does not change as ay_mps2 - vx_mps * yaw_rate_radps demands, "
             f"{drive.place(expected)}; check that the column holds the lateral speed, in the "
-            f"order of time, or leave it out"
+            f"order of time, or leave it out",
         )
     if found.coherence > 0.5 and ratio > 0.0:
         formula = "(d vy_mps / dt) / (ay_mps2 - vx_mps * yaw_rate_radps)"
-        check_scale(ratio, deviation, _SLIDE_STD, _SLIDING_SLIPS, formula, slide, drive)
+        slips = _SLIDING_SLIPS
+        check_scale(ratio, deviation, _SLIDE_STD, slips, "vy_mps", formula, slide, drive)

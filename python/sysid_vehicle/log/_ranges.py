@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InvalidInput
 from ._channels import CHANNELS, DEG, FloatArray
-from ._grid import at
-from ._signals import disorder, filled, median_of_five, white_noise
+from ._grid import at, between
+from ._laws import Contradiction, Implausible
+from ._signals import disorder, filled, median_of_five, runs, white_noise
 
 WHITE = 0.7  # share of white variance from which a channel has no order
 
@@ -19,6 +19,9 @@ _DRIVEN_MPS = 15.0
 _LEAST_FORCE_N = 30.0  # drag alone takes more at that speed
 # Force that holds a speed at most: rolling and climbing of a lorry, and the drag of 10 m2.
 _HOLDING_N, _HOLDING_NS2PM2 = 5e4, 6.2
+# Readings beyond the range are dropouts where they are so few, and jump there and back by more than
+# this part of what they read. A channel in another unit goes there step by step.
+_LOST_SHARE, _LOST_JUMP = 0.05, 0.5
 
 
 @dataclass(frozen=True)
@@ -53,12 +56,93 @@ _RANGES = {
 }
 
 
-def check_ranges(columns: Mapping[str, FloatArray], rate_hz: float) -> list[str]:
-    """Refuse a channel that leaves its range for longer than a spike; warn of spikes beyond it.
+def dropouts(name: str, values: FloatArray) -> np.ndarray:
+    """Return the samples at which a sensor reads, for a moment, what no car does.
+
+    Parameters
+    ----------
+    name : str
+        A canonical channel; of others nothing is known.
+    values : ndarray, shape (n,)
+        NaN is missing.
+
+    Returns
+    -------
+    ndarray of int, shape (k,)
+        Sorted.
+    """
+    if name not in _RANGES:
+        return np.empty(0, dtype=np.intp)
+    known = np.flatnonzero(np.isfinite(values))
+    read = values[known]
+    beyond = np.abs(read) > _RANGES[name].largest
+    if not 0 < np.count_nonzero(beyond) <= _LOST_SHARE * known.size:
+        return np.empty(0, dtype=np.intp)
+    lost = [
+        known[a:b]
+        for a, b in runs(beyond)
+        if (a == 0 or _leaps(read[a], read[a - 1]))
+        and (b == read.size or _leaps(read[b - 1], read[b]))
+    ]
+    return np.concatenate([np.empty(0, dtype=np.intp), *lost])
+
+
+def _leaps(beyond: float, within: float) -> bool:
+    return bool(abs(beyond - within) > _LOST_JUMP * abs(beyond))
+
+
+def blank(
+    columns: Mapping[str, FloatArray], lost: Mapping[str, np.ndarray]
+) -> dict[str, FloatArray]:
+    """Return the columns with these samples of each missing."""
+    result = dict(columns)
+    for name, samples in lost.items():
+        if samples.size:
+            result[name] = columns[name].copy()
+            result[name][samples] = np.nan
+    return result
+
+
+def check_lost(
+    columns: Mapping[str, FloatArray], lost: Mapping[str, np.ndarray]
+) -> list[Contradiction]:
+    """Refuse dropouts that are longer than a spike, warn of the others.
 
     Raises
     ------
-    InvalidInput
+    Implausible
+        If a channel has more than two dropped samples in five.
+    """
+    time_s, notes = columns["time_s"], []
+    for name, samples in lost.items():
+        if samples.size == 0:
+            continue
+        beyond = np.zeros(time_s.size, dtype=bool)
+        beyond[samples] = True
+        blocks = runs(beyond)
+        a, b = max(blocks, key=lambda block: block[1] - block[0])
+        place = between(a, b, time_s) if b - a > 1 else at(a, time_s)
+        more = f" and {len(blocks) - 1} more time(s)" if len(blocks) > 1 else ""
+        text = (
+            f"{name}: {samples.size} impossible value(s), {columns[name][a]:.4g} "
+            f"{CHANNELS[name].unit} at {place}{more}: the sensor dropped out there; "
+            f"put despike = true for {name} in the channel map, or empty these cells, so that "
+            f"they count as missing"
+        )
+        if median_of_five(beyond.astype(float)).any():
+            raise Implausible(name, text)
+        notes.append(Contradiction(name, text))
+    return notes
+
+
+def check_ranges(columns: Mapping[str, FloatArray], rate_hz: float) -> list[Contradiction]:
+    """Refuse a channel that leaves its range for longer than a spike; warn of spikes beyond it.
+
+    Dropouts are taken out of `columns` before.
+
+    Raises
+    ------
+    Implausible
         If more than two samples in five lie beyond what a car does, or if the channel jumps from
         sample to sample as no car moves.
     """
@@ -71,17 +155,19 @@ def check_ranges(columns: Mapping[str, FloatArray], rate_hz: float) -> list[str]
         size = np.abs(median_of_five(filled(values)))
         if size.max() > limits.largest:
             i = int(np.argmax(size))
-            raise InvalidInput(
+            raise Implausible(
+                name,
                 f"{name}: {filled(values)[i]:.4g} {CHANNELS[name].unit} at {at(i, time_s)} is no "
-                f"value of a car (at most {limits.largest:g}): {limits.likely} in the channel map"
+                f"value of a car (at most {limits.largest:g}): {limits.likely} in the channel map",
             )
         lone = np.flatnonzero(np.abs(values) > limits.largest)
         if lone.size:
-            notes.append(
+            text = (
                 f"{name}: {lone.size} impossible value(s), first {values[lone[0]]:.4g} "
-                f"{CHANNELS[name].unit} at {at(int(lone[0]), time_s)}: put despike = true for "
-                f"{name} in the channel map"
+                f"{CHANNELS[name].unit} at {at(int(lone[0]), time_s)}; check the sensor, and empty "
+                f"these cells"
             )
+            notes.append(Contradiction(name, text))
         if rate_hz > _MIN_RATE_HZ:
             notes += _check_jumps(name, values, limits, time_s)
     if "fx_n" in columns:
@@ -89,7 +175,9 @@ def check_ranges(columns: Mapping[str, FloatArray], rate_hz: float) -> list[str]
     return notes
 
 
-def _check_jumps(name: str, values: FloatArray, limits: _Range, time_s: FloatArray) -> list[str]:
+def _check_jumps(
+    name: str, values: FloatArray, limits: _Range, time_s: FloatArray
+) -> list[Contradiction]:
     """Refuse a channel whose usual second difference is that of large white noise.
 
     Warn of one that holds nothing else than noise, if it is more than a sensor has.
@@ -100,10 +188,11 @@ def _check_jumps(name: str, values: FloatArray, limits: _Range, time_s: FloatArr
     noise = white_noise(known)
     if noise > limits.jump:
         i = int(np.argmax(np.abs(np.diff(filled(values)))))
-        raise InvalidInput(
+        raise Implausible(
+            name,
             f"{name}: jumps from sample to sample by {2.0**0.5 * noise:.3g} {CHANNELS[name].unit}, "
             f"most at {at(i, time_s)}; no car moves so: check the column, and that its rows are in "
-            f"the order of time"
+            f"the order of time",
         )
     if noise > limits.noise and disorder(known) > WHITE:
         i = int(np.argmax(np.abs(np.diff(filled(values)))))
@@ -112,7 +201,7 @@ def _check_jumps(name: str, values: FloatArray, limits: _Range, time_s: FloatArr
             f"(most at {at(i, time_s)}); check the column, and that its rows are in the order of "
             f"time"
         )
-        return [text]
+        return [Contradiction(name, text)]
     return []
 
 
@@ -120,16 +209,18 @@ def _check_force(columns: Mapping[str, FloatArray]) -> None:
     force, speed = filled(columns["fx_n"]), filled(columns["vx_mps"])
     typical, largest = float(np.median(speed)), float(np.abs(force).max())
     if typical > _DRIVEN_MPS and 0.0 < largest < _LEAST_FORCE_N and np.ptp(force) > 0.0:
-        raise InvalidInput(
+        raise Implausible(
+            "fx_n",
             f"fx_n: is at most {largest:.3g} N over samples 0 to {force.size - 1} at "
             f"{typical:.3g} m/s, where drag alone takes more: if it is in kN, put factor = 1000 "
-            f"in the channel map"
+            f"in the channel map",
         )
     usual = float(np.median(np.abs(force)))
     if usual > _HOLDING_N + _HOLDING_NS2PM2 * typical**2:
         i = int(np.argmax(np.abs(force)))
-        raise InvalidInput(
+        raise Implausible(
+            "fx_n",
             f"fx_n: is {usual:.4g} N half of the time (largest at {at(i, columns['time_s'])}), "
             f"more than any car needs at {typical:.3g} m/s; if it is in mN, put factor = 0.001 in "
-            f"the channel map"
+            f"the channel map",
         )

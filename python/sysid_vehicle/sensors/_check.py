@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._arguments import whole
-from ..errors import InvalidInput
-from ..log import Log
+from .._arguments import expect, whole
+from ..log import Log, several_logs
 from ..vehicle import Vehicle
 from ._equations import FAULTS, Readings
 from ._estimate import estimate, noise_of
@@ -62,9 +61,9 @@ def check(
     Flight path reconstruction: V. Klein, E. A. Morelli, *Aircraft System Identification*, 2nd ed.,
     ch. 10; R. V. Jategaonkar, *Flight Vehicle System Identification*, ch. 10.
     """
-    together = [logs] if isinstance(logs, Log) else list(logs)
-    if not together or not all(isinstance(log, Log) for log in together):
-        raise InvalidInput("check: give a Log, or a sequence of at least one")
+    together = several_logs(logs, "check")
+    if vehicle is not None:
+        expect(vehicle, Vehicle, "check")
     seed = whole(seed, "seed")
     stretches = pieces(together)
     readings = readings_of(together, stretches)

@@ -15,9 +15,9 @@ from ..compare import Comparison, compare
 from ..diagnose import Verdicts, considered, judge, omnibus
 from ..effects import effect
 from ..errors import InvalidInput, SysidWarning, warn
-from ..estimate import Driving, several_logs
+from ..estimate import Driving
 from ..identify import Fit, explaining, identify
-from ..log import Log, check_excitation
+from ..log import Log, check_excitation, several_logs
 from ..model import Model
 from ..rules import USUAL, Rules, grade, verdict
 from ..sensors import SensorCheck, made_ready, put_right

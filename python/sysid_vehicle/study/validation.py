@@ -11,9 +11,9 @@ import numpy as np
 from .._arrays import FloatArray
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
-from ..estimate import Driving, several_logs
+from ..estimate import Driving
 from ..identify import Fit, Prediction, predict
-from ..log import Log
+from ..log import Log, several_logs
 from ..rules import Change, Gain
 from .horizons import Beyond, beyond_noise, changes, typical_error
 
