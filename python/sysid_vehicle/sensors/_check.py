@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from .._arguments import expect, whole
+from ..errors import SysidError
 from ..log import Log, several_logs
 from ..vehicle import Vehicle
 from ._equations import FAULTS, Readings
-from ._estimate import estimate, noise_of
+from ._estimate import Estimate, estimate, noise_of
 from ._faults import faults_of
-from ._motion import Grid
+from ._motion import Grid, Stretch
+from ._parts import cut
 from ._result import SensorCheck
 from ._signals import MOVING, Signal, averaged, pieces, readings_of, refuse_mixed_up, signals
 
@@ -73,16 +76,19 @@ def check(
     told = tuple(signal for log in together for signal in signals(log))
     floors = {r.channel: _floor(r, told) for r in readings}
     step_s = _step(readings)
-    found = estimate(
-        [averaged(r, _MEAN_S) for r in readings],
-        Grid(stretches, step_s),
-        _names(have),
-        floors=floors,
-        seed=seed,
-    )
+
+    def of(some: Sequence[Readings], where: Sequence[Stretch]) -> Estimate:
+        means = [averaged(r, _MEAN_S) for r in some]
+        return estimate(means, Grid(where, step_s), _names(have), floors=floors, seed=seed)
+
+    found = of(readings, stretches)
+    parts = []
+    for some in cut(stretches):
+        with suppress(SysidError):  # a part may hold too little
+            parts.append(of(readings_of(together, some), some))
     return SensorCheck(
         logs=tuple(together),
-        faults=faults_of(found, lacking),
+        faults=faults_of(found, lacking, parts),
         signals=told,
         estimate=found,
         noise=noise_of(readings, found, floors),

@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from ._estimate import Estimate
+from ._parts import scatter
 from ._texts import DEG, why_not
 
 __all__ = ["SensorFault", "faults_of"]
@@ -106,8 +107,20 @@ _TOLD = (
 )  # fmt: skip
 
 
-def faults_of(found: Estimate, absent: Sequence[str]) -> tuple[SensorFault, ...]:
-    """Say what an estimate tells of each fault."""
+def faults_of(
+    found: Estimate, absent: Sequence[str], parts: Sequence[Estimate] = ()
+) -> tuple[SensorFault, ...]:
+    """Say what an estimate tells of each fault.
+
+    Parameters
+    ----------
+    found : Estimate
+        Of all the driving.
+    absent : sequence of str
+        Channels without which faults cannot be told.
+    parts : sequence of Estimate
+        Of parts of the driving, which have to ask for the same faults.
+    """
     names = list(found.faults)
     naive = np.linalg.inv(found.information)
     rows = [t for t in _TOLD if t.of[-1] in names]
@@ -123,9 +136,15 @@ def faults_of(found: Estimate, absent: Sequence[str]) -> tuple[SensorFault, ...]
             )
             continue
         pick = np.array([1.0 if name in told.of else 0.0 for name in names])
-        value = float(pick @ np.array([found.faults[name] for name in names]))
-        std = float(np.sqrt(pick @ found.covariance @ pick))
-        at_null = float(np.sqrt(pick @ found.null_covariance @ pick))
+        value, std = _size(found, pick, found.covariance)
+        at_null = _size(found, pick, found.null_covariance)[1]
+        own = [(*_size(part, pick, part.covariance), part) for part in parts]
+        spread = scatter(
+            [v for v, _, _ in own],
+            [max(s, _size(part, pick, part.null_covariance)[1]) for _, s, part in own],
+        )
+        if spread is not None:
+            std = spread.widened(value, std)
         widest = max(std, at_null)
         prior = 1.0 / float(np.sum(1.0 / found.prior[pick > 0.0]))
         claimed = abs(value) > max(critical * widest, told.negligible)
@@ -144,6 +163,12 @@ def faults_of(found: Estimate, absent: Sequence[str]) -> tuple[SensorFault, ...]
             )
         )  # fmt: skip
     return tuple(result)
+
+
+def _size(found: Estimate, pick: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:
+    """Value and standard deviation of a sum of faults."""
+    value = float(pick @ np.array(list(found.faults.values())))
+    return value, float(np.sqrt(pick @ covariance @ pick))
 
 
 def _confounded(
