@@ -27,7 +27,7 @@ from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import METHODS, refine, refit
 from sysid_vehicle.identify.objective import Objective
 from sysid_vehicle.identify.search import Box, minimise
-from sysid_vehicle.identify.settle import risen
+from sysid_vehicle.identify.settle import climb, risen, settle
 
 G = 9.80665
 WHATS = ("cornering stiffness", "peak friction", "slip at the peak")
@@ -306,6 +306,46 @@ def test_a_small_gain_of_a_damped_step_is_not_the_end(rng: np.random.Generator) 
     found = minimise(problem, away, None, box, tolerance=0.05)  # type: ignore[arg-type]
     assert found.settled
     assert found.cost < 0.05
+
+
+class Ridge:
+    """A product that is known, and a filter whose spread alone tells its two factors apart.
+
+    With frozen gains each pair of factors is nearly as good as any other. The likelihood has its
+    maximum where one of them is at its bound.
+    """
+
+    def errors(self, p: np.ndarray) -> np.ndarray:
+        return np.array([30.0 * np.log(p[0] * p[1]), 1e-3 * np.log(p[0] / p[1])])
+
+    def freeze(self, p: np.ndarray, noise: np.ndarray) -> SimpleNamespace:
+        spread = 20.0 * np.tanh(0.25 * np.log(p[1] / p[0]))
+        return SimpleNamespace(log_likelihood=spread - self.half_sum_of_squares(p, None))
+
+    def half_sum_of_squares(self, p: np.ndarray, _: object) -> float:
+        return 0.5 * float(self.errors(p) @ self.errors(p))
+
+    def normal_equations(
+        self, p: np.ndarray, gains: object, _: object
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        by = -np.array([[30.0, 30.0], [1e-3, -1e-3]]) / p
+        return self.half_sum_of_squares(p, gains), by.T @ self.errors(p), by.T @ by
+
+    def noise_score(self, p: np.ndarray, noise: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        return self.freeze(p, noise).log_likelihood, np.zeros(1), np.eye(1)
+
+
+def test_the_likelihood_is_climbed_where_frozen_gains_see_no_slope() -> None:
+    noise, box = np.ones(1), Box([0, 1], np.array([0.2, 0.2]), np.array([5.0, 3.0]))
+    objective = Objective(Ridge(), (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
+    highest = objective.log_likelihood(np.array([1.0 / 3.0, 3.0]), noise)
+    p, _, converged = settle(objective, np.array([1.3, 0.8]), noise, box)
+    assert converged
+    assert objective.log_likelihood(p, noise) < highest - 10.0
+    p, reached = climb(objective, p, noise, box)
+    assert reached == objective.log_likelihood(p, noise)
+    assert reached > highest - 0.05
+    assert p[1] == box.upper[1]
 
 
 def test_parameters_move_only_where_the_likelihood_rises() -> None:

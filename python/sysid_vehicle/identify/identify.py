@@ -19,7 +19,7 @@ from .fit import Fit
 from .objective import Objective, gaussian_prior
 from .profile import profile_all
 from .search import METHODS, Box, minimise
-from .settle import risen, settle, settle_finely
+from .settle import risen, settle, settle_finely, to_the_top
 from .starts import Runner, Starts, space_filling
 from .suspects import explaining
 
@@ -28,7 +28,7 @@ __all__ = ["free_box", "identify", "objective_of", "profile_fit", "refine", "ref
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road that wanders, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts
-_POLISHED = 3  # ends of searches that are followed to the maximum
+_FOLLOWED = 2  # ends of searches that are followed with noise of their own
 _SAME = 1e-3  # of the box: ends no farther apart are one
 _BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 
@@ -128,8 +128,12 @@ def identify(
         names, as_float64(begins[:, box.columns]), as_float64(ends[:, box.columns]), values
     )
     # Which end is the best is told by the noise as it then is, not by that of the start.
-    polished = [_polish(model, driving, end, noise, table) for end in _apart(ends, values, box)]
-    fit = _on_its_road(max(polished, key=lambda f: f.log_likelihood))
+    objective, few = _objectives(model, driving)
+    settled = [
+        settle(objective, end, noise.vector(), box, thin=few) for end in _apart(ends, values, box)
+    ]
+    best = max(settled, key=lambda end: objective.log_likelihood(end[0], end[1]))
+    fit = _on_its_road(_top(model, driving, objective, best, table))
     if intervals == "profile":
         return profile_fit(fit, workers=workers, progress=progress)
     return fit
@@ -145,7 +149,7 @@ def _apart(ends: FloatArray, values: FloatArray, box: Box) -> list[FloatArray]:
             np.all(np.abs(x - other[box.columns]) < near) for other in found
         ):
             found.append(ends[i])
-        if len(found) == _POLISHED:
+        if len(found) == _FOLLOWED:
             break
     return found
 
@@ -277,15 +281,34 @@ def _polish(
     inputs: FloatArray | None = None,
 ) -> Fit:
     """Noise and parameters of maximum likelihood, from values that are already near."""
+    objective, few = _objectives(model, driving, inputs)
+    found = settle(objective, p, noise.vector(), free_box(model), thin=few)
+    return _top(model, driving, objective, found, starts)
+
+
+def _objectives(
+    model: Model, driving: Driving, inputs: FloatArray | None = None
+) -> tuple[Objective, Objective]:
+    """The likelihood, and that of fewer samples.
+
+    Noise needs fewer samples than parameters do; the last word has all of them.
+    """
     objective = objective_of(model, driving.problem(model, other_inputs=inputs), driving)
-    # Noise needs fewer samples than parameters do; the last word has all of them.
-    thin = driving.problem(model, most_samples=_THINNED, other_inputs=inputs)
-    p, found, converged = settle(
-        objective, p, noise.vector(), free_box(model), thin=replace(objective, problem=thin)
-    )
-    found, _ = objective.learn_noise(p, found, rounds=1)
-    told = NoiseModel.from_vector(found)
-    return _summary(model, driving, objective, p, told, starts, converged)
+    few = driving.problem(model, most_samples=_THINNED, other_inputs=inputs)
+    return objective, replace(objective, problem=few)
+
+
+def _top(
+    model: Model,
+    driving: Driving,
+    objective: Objective,
+    settled: tuple[FloatArray, FloatArray, bool],
+    starts: Starts,
+) -> Fit:
+    """The maximum, from where a search has settled."""
+    p, noise = to_the_top(objective, *settled[:2], free_box(model))
+    told = NoiseModel.from_vector(noise)
+    return _summary(model, driving, objective, p, told, starts, settled[2])
 
 
 def _on_its_road(fit: Fit) -> Fit:

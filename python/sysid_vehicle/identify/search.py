@@ -11,10 +11,10 @@ import numpy as np
 import scipy
 
 from .. import _core
-from .._arrays import FloatArray
+from .._arrays import FloatArray, as_float64
 from .objective import Problem
 
-__all__ = ["METHODS", "Box", "Outcome", "minimise"]
+__all__ = ["METHODS", "Box", "Outcome", "minimise", "stride"]
 
 _LEAST_DAMPING = 1e-9
 
@@ -78,7 +78,7 @@ def _gauss_newton(
             return Outcome(x, np.inf, False)
         gained, begin = 0.0, x
         for _ in range(10):
-            trial = _step(begin, gradient, information, damping, box)
+            trial, _ = stride(begin, gradient, information, damping, box)
             trial_cost = problem.half_sum_of_squares(_filled(p, box, trial), frozen)
             if trial_cost < cost:
                 gained = cost - trial_cost
@@ -91,7 +91,7 @@ def _gauss_newton(
         if gained < tolerance:
             # Where parameters copy each other damping makes steps short, and a small gain is no
             # end: the whole step has to gain as little.
-            whole = _step(begin, gradient, information, _LEAST_DAMPING, box)
+            whole, _ = stride(begin, gradient, information, _LEAST_DAMPING, box)
             whole_cost = problem.half_sum_of_squares(_filled(p, box, whole), frozen)
             if not whole_cost < cost - tolerance:
                 return Outcome(x, cost, True)
@@ -102,10 +102,10 @@ def _gauss_newton(
     return Outcome(x, cost, False)
 
 
-def _step(
+def stride(
     x: FloatArray, gradient: FloatArray, information: FloatArray, damping: float, box: Box
-) -> FloatArray:
-    """Minimum of the damped quadratic model over the box.
+) -> tuple[FloatArray, float]:
+    """Give the minimum of the damped quadratic model over the box, and what it promises to gain.
 
     Cutting the unbounded minimum at the box is not enough: where parameters can copy each other, as
     B, C, D and E can, the cut step may lead uphill however much is to be gained inside. Positive
@@ -128,8 +128,9 @@ def _step(
         method="bvls",
     )
     step = found.x / scale
-    there: FloatArray = np.where(positive, x * np.exp(np.where(positive, step, 0.0)), x + step)
-    return np.clip(there, box.lower, box.upper)
+    there = np.where(positive, x * np.exp(np.where(positive, step, 0.0)), x + step)
+    gain = (gradient * unit / scale) @ found.x - 0.5 * found.x @ normal @ found.x
+    return as_float64(np.clip(there, box.lower, box.upper)), float(gain)
 
 
 def _nlopt(

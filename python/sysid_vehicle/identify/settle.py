@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, as_float64
+from .._threads import in_parallel
 from ..errors import NumericalError
 from .objective import Objective
-from .search import Box, minimise
+from .search import Box, minimise, stride
 from .valley import down_the_valley
 
-__all__ = ["bottom", "descend", "risen", "settle", "settle_finely"]
+__all__ = ["bottom", "climb", "descend", "risen", "settle", "settle_finely", "to_the_top"]
 
 _STANDS = 0.5  # nats
 _STILL = 3e-4  # nats
+_GAIN = 0.05  # nats
 _REFREEZES = 8
 _ROUNDS = 12
+_CLIMBS = 40  # steps
+_CLIMBED = 4  # times, with noise learned anew
+_NUDGE = 0.02  # standard errors by which the likelihood is differentiated
+_NARROW = 0.01  # of the box, which is narrower than that for what the data do not tell
+_SLIGHT = 1e-6  # damping at which a step shows what is to be had
+_TINY = 1e-300
 _SHARES = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, tried until the likelihood rises
 
 
@@ -143,6 +152,93 @@ def settle(
         x = minimise(objective, p, gains, box, method=method, rounds=8, tolerance=0.05).x
         p, gains = risen(objective, p, gains, x, noise, box)
     return p, noise, False
+
+
+def climb(
+    objective: Objective, p: FloatArray, noise: FloatArray, box: Box
+) -> tuple[FloatArray, float]:
+    """From where searches with frozen gains stand still to the maximum of the likelihood itself.
+
+    The gains, and the spread that they predict, change with the parameters. Derivatives with frozen
+    gains leave that out: they vanish elsewhere. In a flat valley, as that of tyres whose B C D is
+    the same, this is far from the maximum, often with a parameter at its bound. Here the slope is
+    that of the likelihood, by differences, and the curvature that of Gauss and Newton.
+
+    Parameters
+    ----------
+    objective : Objective
+    p : array, shape (parameters,)
+    noise : array, shape (noises,)
+    box : Box
+
+    Returns
+    -------
+    p : array, shape (parameters,)
+    log_likelihood : float
+        Priors included; never below that of the start.
+    """
+
+    def value_at(trial: FloatArray) -> float:
+        try:
+            return objective.log_likelihood(trial, noise)
+        except NumericalError:
+            return -np.inf
+
+    value, damping = objective.log_likelihood(p, noise), 1e-3
+    for _ in range(_CLIMBS):
+        _, _, information = objective.normal_equations(p, objective.freeze(p, noise), box.columns)
+        x = p[box.columns]
+        slope = _slope(value_at, p, information, box)
+        if stride(x, slope, information, _SLIGHT, box)[1] < _GAIN:
+            break
+        gained = 0.0
+        for _ in range(10):
+            trial = p.copy()
+            trial[box.columns], _ = stride(x, slope, information, damping, box)
+            there = value_at(trial)
+            if there > value:
+                p, gained, value = trial, there - value, there
+                damping = max(damping / 8.0, _SLIGHT)
+                break
+            damping *= 6.0
+        if gained < _GAIN:
+            break
+    return p, value
+
+
+def to_the_top(
+    objective: Objective, p: FloatArray, noise: FloatArray, box: Box
+) -> tuple[FloatArray, FloatArray]:
+    """Parameters and noise of the maximum, from where `settle` came to a stand.
+
+    Returns
+    -------
+    p : array, shape (parameters,)
+    noise : array, shape (noises,)
+    """
+    value = objective.log_likelihood(p, noise)
+    for _ in range(_CLIMBED):
+        p, reached = climb(objective, p, noise, box)
+        noise, _ = objective.learn_noise(p, noise, rounds=1 if reached < value + _STANDS else 3)
+        if reached < value + _STANDS:
+            break
+        value = objective.log_likelihood(p, noise)
+    return p, noise
+
+
+def _slope(
+    value_at: Callable[[FloatArray], float], p: FloatArray, information: FloatArray, box: Box
+) -> FloatArray:
+    """Derivatives by central differences, one-sided at a bound; zero where the model fails."""
+    step = _NUDGE / np.sqrt(np.maximum(np.diag(information), _TINY))
+    step = np.minimum(step, _NARROW * (box.upper - box.lower))
+    x = p[box.columns]
+    ends = np.array([np.maximum(x - step, box.lower), np.minimum(x + step, box.upper)])
+    trials = np.tile(p, (2, len(x), 1))
+    trials[:, np.arange(len(x)), box.columns] = ends
+    low, high = np.reshape(in_parallel(value_at, trials.reshape(-1, p.size)), (2, -1))
+    slope = (high - low) / np.maximum(ends[1] - ends[0], _TINY)
+    return as_float64(np.where(np.isfinite(slope), slope, 0.0))
 
 
 def bottom(
