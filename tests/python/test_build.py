@@ -70,7 +70,7 @@ def test_the_import_leaves_what_is_slow_to_load_until_it_is_used() -> None:
     code = (
         "import sys, sysid_vehicle\n"
         "slow = ('scipy.stats', 'scipy.optimize', 'scipy.interpolate', 'scipy.signal',\n"
-        "        'scipy.linalg', 'scipy.special', 'matplotlib', 'nlopt', 'pandas', 'tqdm')\n"
+        "        'scipy.linalg', 'scipy.special', 'matplotlib', 'nlopt', 'pandas')\n"
         "print(*(name for name in slow if name in sys.modules))\n"
     )
     loaded = subprocess.run(

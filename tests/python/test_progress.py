@@ -1,13 +1,16 @@
 """Long calls tell where they are, where somebody watches."""
 
 import io
+import re
 import sys
+import threading
+import time
 import types
 
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle._progress import teller, watched, with_progress
+from sysid_vehicle._progress import doing, teller, watched, with_progress
 
 
 class Terminal(io.StringIO):
@@ -46,9 +49,41 @@ def test_short_work_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_long_work_is_shown_unasked(monkeypatch: pytest.MonkeyPatch) -> None:
     stream = terminal(monkeypatch)
+    monkeypatch.setattr("sysid_vehicle._progress._SILENT_S", 0.05)
+    monkeypatch.setattr("sysid_vehicle._progress._REFRESH_S", 0.02)
+    for _ in with_progress(range(3), "things", shown=None):
+        time.sleep(0.15)  # a step of its own is shown too
+    lines = [line.strip() for line in stream.getvalue().split("\r")]
+    assert lines[-1] == "", "it is taken away in the end"
+    assert any(line.startswith("things 0/3 (") for line in lines)
+    assert any(re.match(r"things 1/3, about \d s left \(\d s\)$", line) for line in lines)
+
+
+def test_the_line_tells_the_outermost_and_the_innermost(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = terminal(monkeypatch)
     monkeypatch.setattr("sysid_vehicle._progress._SILENT_S", 0.0)
-    assert list(with_progress(range(3), "things", shown=None)) == [0, 1, 2]
-    assert "things" in stream.getvalue()
+    monkeypatch.setattr("sysid_vehicle._progress._REFRESH_S", 0.02)
+    monkeypatch.setenv("COLUMNS", "40")
+    with doing("study"), doing("fit"), doing("starts", total=8) as task:
+        task.advance(8)
+        time.sleep(0.1)
+        teller(None)("said")
+        time.sleep(0.1)
+    lines = stream.getvalue().split("\r")
+    assert "study: starts 8/8 (0 s)" in lines
+    at = lines.index("said\n")
+    assert lines[at - 1].strip() == "", "a sentence has a line of its own"
+    assert lines[at + 1] == lines[at - 2] == "study: starts 8/8 (0 s)"
+    assert max(map(len, stream.getvalue().replace("\n", "\r").split("\r"))) < 40
+    assert not [t for t in threading.enumerate() if t.name == "progress" and t.is_alive()][1:]
+
+
+def test_other_threads_tell_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = terminal(monkeypatch)
+    work = threading.Thread(target=lambda: list(with_progress(range(3), "things", shown=True)))
+    work.start()
+    work.join()
+    assert stream.getvalue() == ""
 
 
 def test_a_notebook_watches(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .._files import write_json, write_text
+from .._progress import note
 from .._text import text_table
 from ..compare import Comparison, compare
 from ..demo import run_demo
@@ -172,7 +173,7 @@ def _study(args: argparse.Namespace, heard: Warnings) -> Study:
         exclude=args.exclude,
         time_limit_s=args.time_limit,
         matters=args.matters,
-        tell=lambda text: print(text, file=sys.stderr, flush=True),
+        tell=note,
     )
     return _with_warnings(study, heard)
 

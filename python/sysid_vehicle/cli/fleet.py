@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
+from .._progress import note
 from ..fleet import manifest_jobs
 from ..fleet.improve_many import run as improve_all
 
@@ -38,13 +38,13 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     jobs = manifest_jobs(args.manifest)
     for path in dict.fromkeys(p for job in jobs for p in job.define):
         text = f"sysid-vehicle: runs {path} as a Python program, with all your rights"
-        print(text, file=sys.stderr, flush=True)
+        note(text)
     fleet = improve_all(
         jobs,
         args.out,
         workers=args.workers,
         retry=args.retry,
-        tell=lambda text: print(text, file=sys.stderr, flush=True),
+        tell=note,
     )
     print(fleet)
     print(f"Report: {args.out / 'report.html'}")

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from typing import Any, TextIO
 
+from .._progress import note
 from .._text import columns, wrapped
 from ..errors import Interrupted, SysidError
 from .commands import COMMANDS
@@ -93,7 +94,7 @@ def _warnings_as_lines() -> Iterator[list[str]]:
         text = _one_line(str(message))
         if text not in heard:
             heard.append(text)
-            print(f"sysid-vehicle: warning: {text}", file=sys.stderr, flush=True)
+            note(f"sysid-vehicle: warning: {text}")
 
     with warnings.catch_warnings():
         warnings.simplefilter("default")

@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 
+from .._progress import doing
 from .._text import brief, html_table, number, with_error
 from ..effects import Effect
 from ..identify import Fit
@@ -169,6 +170,7 @@ class Verdicts:
         }
 
 
+@doing("verdicts")
 def verdicts(dx: Diagnosis, *, seed: int = 0) -> Verdicts:
     """Give a verdict on every effect that a diagnosed model lacks.
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from .._arguments import expect, real, whole
 from .._arrays import FloatArray, as_float64
+from .._progress import doing
 from ..errors import InvalidInput
 from ..log import Log, several_logs
 from ..sensors import SensorCheck, check
@@ -32,6 +33,7 @@ class _Forces:
     moment_nm: FloatArray
 
 
+@doing("axle forces")
 def axle_forces(
     logs: Log | Sequence[Log],
     vehicle: Vehicle,

@@ -10,6 +10,7 @@ from typing import ParamSpec, TypeVar
 import numpy as np
 
 from .._arguments import expect, whole
+from .._progress import doing
 from ..errors import explained
 from ..estimate import Driving
 from ..log import Log
@@ -58,7 +59,8 @@ def explaining(function: Callable[_P, _T]) -> Callable[_P, _T]:
     """A public function whose arguments are checked, and whose failures name what is to blame.
 
     Checked are a leading `Fit` or `Model`, and whatever is called `seed`, `starts` or `workers`.
-    Numerical failures name the suspects among all arguments.
+    Numerical failures name the suspects among all arguments. Where somebody watches, a call that
+    takes long says that it goes on.
     """
     told = signature(function)
     first = next(iter(told.parameters.values()))
@@ -73,9 +75,13 @@ def explaining(function: Callable[_P, _T]) -> Callable[_P, _T]:
             if name in by_name and not (name == "workers" and by_name[name] is None):
                 whole(by_name[name], name, least)
         given = (*args, *kwargs.values())
-        with explained(
-            lambda: ", ".join(log.name for log in _logs(given)),
-            lambda: suspects(next(_models(given), None), _logs(given)),
+        shown = None if by_name.get("progress") is not False else False
+        with (
+            doing(function.__name__.replace("_", " "), shown),
+            explained(
+                lambda: ", ".join(log.name for log in _logs(given)),
+                lambda: suspects(next(_models(given), None), _logs(given)),
+            ),
         ):
             return function(*args, **kwargs)
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
-from tqdm import tqdm
 
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
+from .._progress import doing
 from .._style import AFTER, BEFORE, axes_or_new, tidy
 from .._threads import Workers
 from ..errors import InvalidInput, NumericalError
@@ -261,7 +261,7 @@ def design_excitation(
     rng = generator(seed)
     with (
         Workers(workers) as pool,
-        tqdm(total=trials, desc="excitations", disable=not progress) as bar,
+        doing("excitations", progress, trials) as task,
     ):
         while len(tried) < trials:
             if len(tried) >= spread:
@@ -269,7 +269,7 @@ def design_excitation(
                 points = points[: trials - len(tried)]
             made = [_weaving(point, box, duration_s) for point in points]
             tried += pool.map(designer.trial, made)
-            bar.update(len(made))
+            task.advance(len(made))
     best = min(tried, key=lambda t: t.cost)
     if best.broken:
         raise NumericalError(

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
+from .._progress import doing
 from .._style import AFTER, BEFORE, FLOOR, axes_or_new, tidy
 from .._text import html_table, number, text_table
 from ..errors import InvalidInput, NumericalError, near_names
@@ -249,6 +250,7 @@ def _refuse_frozen(process: FloatArray, scale: Sequence[int]) -> None:
             )
 
 
+@doing("noise of the observer")
 def learn_observer_noise(
     observer: Observer,
     records: ObserverRecord | Sequence[ObserverRecord],

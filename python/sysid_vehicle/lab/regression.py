@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
+from .._progress import doing
 from .._text import html_paragraph, html_table, number, text_table
 from ..errors import InvalidInput
 from ..identify.search import METHODS
@@ -87,6 +88,7 @@ class TyreRegression:
         return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
 
 
+@doing("regression of the tyres")
 def regress_tyres(
     vehicle: GreyBoxVehicle,
     motion: TyreMotion,

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
+from .._progress import doing
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..identify.estimates import with_profiles
@@ -31,6 +32,7 @@ _BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 _KINEMATIC_VY = 0.1  # how far integrated accelerations may be off [m/s]
 
 
+@doing("identification of the tyres")
 def identify_tyres(
     vehicle: GreyBoxVehicle,
     logs: TyreLog | Sequence[TyreLog],

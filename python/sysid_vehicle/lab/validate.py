@@ -13,6 +13,7 @@ import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from .._files import read_text
+from .._progress import doing
 from .._style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
 from .._text import html_table, number, text_table
 from ..errors import InvalidInput
@@ -174,6 +175,7 @@ class Validation:
         return axes
 
 
+@doing("validation of the tyres")
 def validate_tyres(
     car: TyreFit | IdentifiedCar, logs: TyreLog | Sequence[TyreLog], *, horizon_s: float = 1.0
 ) -> tuple[Validation, ...]:

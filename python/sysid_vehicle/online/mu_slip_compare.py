@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from html import escape
 from typing import Any
 
+from .._progress import doing
 from .._text import brief, text_table
 from ..errors import InvalidInput
 from .mu_slip_curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
@@ -58,6 +59,7 @@ class MuSlipComparison:
         return f"<pre>{escape(str(self))}</pre>"
 
 
+@doing("estimators of the curve")
 def compare_mu_slip(data: MuSlipData, *, curve: MuSlipCurve = TWO_PARAMETER) -> MuSlipComparison:
     """Run every estimator: filters, smoother, and least squares of 1, 2, 5 and all iterations.
 

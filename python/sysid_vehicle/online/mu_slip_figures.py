@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._arrays import FloatArray
+from .._progress import doing
 from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, new_figure, tidy
 from ..errors import InvalidInput
 from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
@@ -135,6 +136,7 @@ def animate_mu_slip(
     return FuncAnimation(figure, show, frames=frames, interval=interval_ms, blit=False)
 
 
+@doing("animation")
 def save_animation(animation: FuncAnimation, path: str | Path, *, per_second: int = 5) -> None:
     """Write a GIF, whole or not at all.
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
+from .._progress import doing
 from .._style import FLOOR, axes_or_new, tidy
 from .._text import brief, html_text, text_table
 from ..errors import InvalidInput
@@ -151,6 +152,7 @@ class MuSlipNoiseStudy:
         )
 
 
+@doing("estimators over noise")
 def mu_slip_over_noise(
     values: Sequence[float] | FloatArray = (0.35, 0.15),
     *,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from .._files import write_text
+from .._progress import doing
 from ..model import Model
 from ..study import Study
 from .page import fold, page
@@ -32,9 +33,10 @@ def write_report(study: Study, path: str | Path, *, truth: Model | None = None) 
         If the folder does not exist or is not writable.
     """
     title = f"Study of {study.model.vehicle.name}"
-    samples = samples_of(study)
-    folded = [
-        fold(name, parts) for name, make in SECTIONS if (parts := make(study, samples, truth))
-    ]
+    with doing("report"):
+        samples = samples_of(study)
+        first = first_screen(study, samples)
+        made = [(name, make(study, samples, truth)) for name, make in SECTIONS]
+    folded = [fold(name, parts) for name, parts in made if parts]
     told = "" if samples is None else samples.json()
-    write_text(path, page(title, [*first_screen(study, samples), *folded], told))
+    write_text(path, page(title, [*first, *folded], told))

@@ -8,6 +8,7 @@ from contextlib import suppress
 import numpy as np
 
 from .._arguments import expect, whole
+from .._progress import doing
 from ..errors import SysidError
 from ..log import Log, several_logs
 from ..vehicle import Vehicle
@@ -29,6 +30,7 @@ _STEP_SAMPLES = 1.618  # of a channel that is slower than that
 _FLOOR = 1e-3  # least noise, of the channel's standard deviation
 
 
+@doing("check of the sensors")
 def check(
     logs: Log | Sequence[Log], vehicle: Vehicle | None = None, *, seed: int = 0
 ) -> SensorCheck:

@@ -19,6 +19,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
+from .._progress import doing
 from ..errors import InvalidInput, NumericalError
 from .car import LOAD_NAMES
 from .checks import checked_step, checked_stride
@@ -91,6 +92,7 @@ class Twin(Protocol):
         """Make another that stands where this one does (``clone``)."""
 
 
+@doing("observer")
 def observe_with(
     twin: Twin,
     inputs: FloatArray,
