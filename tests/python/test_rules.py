@@ -49,6 +49,7 @@ NUMERICAL = {
     "study/validation.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED", "_AHEAD"},
     "study/horizons.py": {"_BLOCK_S", "_FEWEST", "_DRAWS", "_APART", "_NORMAL", "_LOST"},
     "study/improve.py": {"_SHORT_S"},
+    "study/next_steps.py": {"_SHOWN"},
     "study/shares.py": {
         "_LEAST_APART_S", "_APART", "_BLOCK_S", "_FEWEST", "_DRAWS", "_LONG_S", "_FEW",
         "_VISIBLE", "_LOST", "_LEAST", "_QUANTILES",

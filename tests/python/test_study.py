@@ -122,6 +122,7 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
         "errors",
         "explained",
         "horizons",
+        "next_steps",
         "parameters",
         "ranking",
         "regions",

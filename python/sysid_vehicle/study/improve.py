@@ -181,6 +181,8 @@ def improve(
             seconds=time.perf_counter() - began,
             rules=rules,
             explained=explained,
+            stopped=found.stopped,
+            checked=bool(sensors),
         )
 
 

@@ -62,6 +62,7 @@ def record(study: Study) -> dict[str, Any]:
         },
         "parameters": {e.name: e.to_dict() for e in (*study.fit.estimates, *study.fit.derived)},
         "warnings": list(study.warnings),
+        "next_steps": list(study.next_steps),
     }
 
 

@@ -35,6 +35,7 @@ from ..rules import USUAL, Rules, Verdict
 from ..saved import save
 from .added import AddedEffect
 from .horizons import Beyond, Horizons, horizons
+from .next_steps import next_steps
 from .record import record
 from .shares import Shares, shares
 from .waterfall import Waterfall, waterfall
@@ -82,6 +83,10 @@ class Study:
     explained : Beyond or None
         Of the errors 1 to 5 s ahead on validation data, beyond the noise of the sensors, what the
         added effects take away together; None where nothing was added.
+    stopped : tuple of str
+        Effects with evidence that the time limit left untried.
+    checked : bool
+        Whether the logs were put right by a check of the sensors.
     """
 
     verdict: Verdict
@@ -98,6 +103,8 @@ class Study:
     seconds: float
     rules: Rules = USUAL
     explained: Beyond | None = None
+    stopped: tuple[str, ...] = ()
+    checked: bool = False
 
     @property
     def fit(self) -> Fit:
@@ -280,6 +287,7 @@ class Study:
         lines += [f"  {text}" for text in self.sensors]
         lines.append(text_table(self._HEAD, self._rows()))
         lines.append(self.in_the_end)
+        lines += [f"Next: {text}." for text in self.next_steps]
         lines += [f"Warning: {w}" for w in self.warnings]
         return "\n".join(lines)
 
@@ -322,12 +330,18 @@ class Study:
             said += f" There is evidence for {some}, which predict validation data no better."
         return said
 
+    @property
+    def next_steps(self) -> tuple[str, ...]:
+        """What to mend, record or look at next, in sentences; none where the model may be used."""
+        return next_steps(self)
+
     def _repr_html_(self) -> str:
         return (
             f"<p><b>{escape(self.verdict)}</b>: {escape(self.meaning)}.</p>"
             + html_list([*self.added, *self.sensors])
             + html_table(self._HEAD, self._rows())
             + html_paragraph(self.in_the_end)
+            + html_list([f"Next: {text}." for text in self.next_steps])
         )
 
     def to_pandas(self) -> Any:

@@ -1,0 +1,95 @@
+"""What to do after a study, in the order in which it helps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .study import Study
+
+__all__ = ["next_steps"]
+
+_SHOWN = 4
+_MEND = (
+    "mend the channels that contradict each other, before anything else: `sysid-vehicle check` "
+    "tells delays, scales and places of sensors"
+)
+
+
+def next_steps(study: Study) -> tuple[str, ...]:
+    """Sentences that say what to mend, record or look at; none where the model may be used.
+
+    Parameters
+    ----------
+    study : Study
+    """
+    if study.train[-1].unrelated:
+        return (_MEND,)
+    found = [*_of_names(study)]
+    if study.verdict in ("unknown", "partly_explained"):
+        found += _of_what_is_left(study)
+    if study.verdict == "not_testable":
+        found.append("record corners, steps and sweeps of the steering, and study them")
+    return tuple(found)
+
+
+def _of_names(study: Study) -> list[str]:
+    found = []
+    for a in study.added:
+        if a.confounded_with:
+            some = ", ".join(a.confounded_with[:_SHOWN])
+            found.append(
+                f"tell {a.id} from {some}: `sysid-vehicle next-drive` designs a drive that "
+                "does, or give what is known of them to the vehicle file"
+            )
+    aliases = [a.id for a in study.added if a.stands_in]
+    if aliases:
+        found.append(
+            f"do not take the size of {', '.join(aliases)} for a property of the car: the model "
+            "predicts better with it, and what is missing may be something else"
+        )
+    return found
+
+
+def _of_what_is_left(study: Study) -> list[str]:
+    found = []
+    untried = [c.id for c in study.diagnoses[-1].significant if c.fit is None]
+    if study.stopped:
+        found.append(f"give the search more time: {_few(study.stopped)} were still to be tried")
+    elif untried:
+        found.append(f"ask for more refits: {_few(untried)} have evidence and were not refitted")
+    if not study.sensors and not study.checked:
+        found.append(
+            "check the sensors, and give the result to the study: `sv.check`, or "
+            "`sysid-vehicle check`; scales, biases and places of sensors act like "
+            "effects of the car"
+        )
+    open_ = [n for n in study.fit.undetermined if "." not in n]
+    if open_:
+        found.append(
+            f"drive nearer the limit of the tyres: {_few(open_)} are not determined, and tyres "
+            "that are open hide what is missing"
+        )
+    if not study.fit.driving.force_known:
+        found.append(
+            "log the wheel force `fx_n`, if it can be had: without it drag, slopes and the "
+            "split of forces cannot be told"
+        )
+    where = " and ".join(
+        dict.fromkeys(
+            o.strongest
+            for o in (study.omnibus, study.omnibus_validation)
+            if o is not None and o.rejects
+        )
+    )
+    if where:
+        found.append(
+            f"look at the shape of what is left of {where} (`study.unknown`), and define an effect "
+            "that has it: `sv.define_effect`"
+        )
+    return found
+
+
+def _few(names: tuple[str, ...] | list[str]) -> str:
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return f"{', '.join(names[:_SHOWN])}{more}"
