@@ -13,7 +13,6 @@ import importlib
 import io
 import json
 import math
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ __all__ = ["VERSION", "fingerprint", "load", "packed", "save"]
 VERSION = 1
 _NAME = "sysid_vehicle result"
 _CONTENT = "content"
+_NUMBERS = "biuf"  # kinds of arrays
 _PACKAGE = __name__.rpartition(".")[0]
 # Stations of the package whose dataclasses may stand in a file.
 _STATIONS = (
@@ -112,12 +112,14 @@ def load(path: str | Path) -> Any:
     """
     path = as_path(path)
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             content = json.loads(bytes(archive[_CONTENT]))
             arrays = {name: archive[name] for name in archive.files if name != _CONTENT}
-    except OSError as error:
-        raise InvalidInput(f"{path}: cannot be read ({error.strerror}); check the path") from error
-    except (ValueError, KeyError, TypeError, zipfile.BadZipFile, EOFError) as error:
+    except Exception as error:  # of damaged bytes zlib, zipfile and NumPy say many things
+        if isinstance(error, OSError) and error.strerror:
+            raise InvalidInput(
+                f"{path}: cannot be read ({error.strerror}); check the path"
+            ) from error
         raise InvalidInput(
             f"{path}: is no saved result of sysid_vehicle, or is broken; save it again"
         ) from error
@@ -131,6 +133,9 @@ def load(path: str | Path) -> Any:
             f"versions up to {VERSION}: install a later sysid_vehicle"
         )
     try:
+        for name, array in arrays.items():
+            if array.dtype.kind not in _NUMBERS:
+                raise TypeError(f"{name} holds {array.dtype}")
         reader = _Reader(content["objects"], arrays)
         return reader.value(content["root"])
     except InvalidInput as error:
@@ -183,12 +188,12 @@ class _Writer:
             return {"dict": [[self.value(k), self.value(v)] for k, v in x.items()]}
         if isinstance(x, slice):
             return {"slice": [x.start, x.stop, x.step]}
-        if isinstance(x, np.ndarray) and x.dtype.kind in "biuf":
+        if isinstance(x, np.ndarray) and x.dtype.kind in _NUMBERS:
             return self._once(x, lambda: {"array": self._array(x)})
         if dataclasses.is_dataclass(x) and not isinstance(x, type):
             return self._once(x, lambda: {"object": self._object(x)})
         raise InvalidInput(
-            f"a {type(x).__name__} cannot be saved; save the model, the fit or the study"
+            f"{type(x).__name__}: cannot be saved; save the model, the fit or the study"
         )
 
     def _once(self, x: object, make: Any) -> dict[str, int]:
@@ -205,7 +210,7 @@ class _Writer:
         module = type(x).__module__.removeprefix(_PACKAGE + ".")
         if module.split(".")[0] not in _STATIONS:
             raise InvalidInput(
-                f"a {type(x).__name__} cannot be saved; save the model, the fit or the study"
+                f"{type(x).__name__}: cannot be saved; save the model, the fit or the study"
             )
         if isinstance(x, Effect) and x.__reduce__()[0] is effect:
             self.objects.append({"effect": x.id})

@@ -152,6 +152,26 @@ def test_files_that_are_something_else(tmp_path: Path) -> None:
         sv.load(path)
 
 
+def test_damaged_files_are_refused(tmp_path: Path, lap: sv.Log) -> None:
+    path, rng = tmp_path / "x.npz", np.random.default_rng(0)
+    saved.save(lap.between(0.0, 2.0), path)
+    whole = path.read_bytes()
+    refused = 0
+    for k in range(80):
+        damaged = bytearray(whole[: rng.integers(len(whole))] if k % 4 == 0 else whole)
+        for at in rng.integers(0, len(damaged), 5):
+            damaged[at] = rng.integers(256)
+        path.write_bytes(damaged)
+        try:
+            sv.load(path)
+        except InvalidInput:
+            refused += 1
+    assert refused > 60
+    np.savez(path, content=np.frombuffer(b'{"format": 1}', dtype=np.uint8), a0=np.array(["text"]))
+    with pytest.raises(InvalidInput, match="no saved result"):
+        sv.load(path)
+
+
 def test_what_no_file_can_hold(tmp_path: Path, fit: sv.Fit) -> None:
     for thing in (print, sv.ChannelMap({}), {"f": open}, np.array([object()])):
         with pytest.raises(InvalidInput, match="cannot be saved"):
