@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -42,22 +43,47 @@ SEARCH = [
 ]
 
 
+STUDIES: list[tuple[str, sv.Study]] = []
+"""What the command asked for, in words, and the study that it got."""
+
+
+def asked(model: sv.Model, *logs: Any, **keywords: Any) -> str:
+    """Everything that a study depends on."""
+    data = [[log.name, {c: log[c].tolist() for c in log.channels}] for each in logs for log in each]
+    told = {name: value for name, value in keywords.items() if name != "tell"}
+    return repr((model, data, sorted(told.items())))
+
+
 @pytest.fixture(scope="module")
 def improved(folder: Path) -> tuple[Path, dict[str, Any]]:
     """Folder and JSON of one `improve` run."""
-    status = main(
-        [
-            "improve",
-            str(folder / "lap.csv"),
-            *("--vehicle", str(folder / "car.toml")),
-            *("--test", str(folder / "course.csv")),
-            *("--report", str(folder / "out.html")),
-            *("--json", str(folder / "out.json")),
-            *SEARCH,
-        ]
-    )
+    real = commands.improve
+
+    def kept(*args: Any, **keywords: Any) -> sv.Study:
+        STUDIES.append((asked(*args, **keywords), real(*args, **keywords)))
+        return STUDIES[-1][1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(commands, "improve", kept)
+        status = main(
+            [
+                "improve",
+                str(folder / "lap.csv"),
+                *("--vehicle", str(folder / "car.toml")),
+                *("--test", str(folder / "course.csv")),
+                *("--report", str(folder / "out.html")),
+                *("--json", str(folder / "out.json")),
+                *SEARCH,
+            ]
+        )
     assert status == 0
     return folder, json.loads((folder / "out.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def one_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Searches from the vehicle file alone, which is right."""
+    monkeypatch.setattr(commands, "identify", partial(sv.identify, starts=1))
 
 
 def fails(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
@@ -112,9 +138,19 @@ def test_improve_finds_the_effect_and_writes_json_and_report(
 
 
 def test_diagnose_prints_the_ranking_and_has_the_keys_of_improve(
-    improved: tuple[Path, dict[str, Any]], capsys: pytest.CaptureFixture[str]
+    improved: tuple[Path, dict[str, Any]],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """The same study for the same arguments: it is not done twice."""
     folder, result = improved
+    ((wanted, study),) = STUDIES
+
+    def again_(*args: Any, **keywords: Any) -> sv.Study:
+        assert asked(*args, **keywords) == wanted
+        return study
+
+    monkeypatch.setattr(commands, "improve", again_)
     capsys.readouterr()
     status = main(
         [
@@ -134,6 +170,7 @@ def test_diagnose_prints_the_ranking_and_has_the_keys_of_improve(
     assert result["verdict"] in out.lower().replace(" ", "_")
 
 
+@pytest.mark.usefixtures("one_start")
 def test_compare_fits_with_the_effects_that_are_named(
     arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -154,6 +191,7 @@ def test_compare_fits_with_the_effects_that_are_named(
     assert result["effects"] == ["steer_lag", "mass"]
 
 
+@pytest.mark.usefixtures("one_start")
 def test_a_channel_map_is_used(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -250,6 +288,7 @@ def test_a_log_that_breaks_in_the_middle_leaves_no_output(
     assert not out.exists()
 
 
+@pytest.mark.usefixtures("one_start")
 def test_warnings_are_single_lines_on_the_error_stream_and_in_the_json(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -326,6 +365,7 @@ def test_ctrl_c_is_status_130(
     assert not path.exists()
 
 
+@pytest.mark.usefixtures("one_start")
 def test_the_process_leaves_warning_filters_as_they_were(arguments: list[str]) -> None:
     before, show = list(warnings.filters), warnings.showwarning
     assert main(["compare", *arguments]) == 0
@@ -357,11 +397,16 @@ def test_python_m_runs_the_same_program(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
-def test_progress_bars_stay_away_from_files(arguments: list[str]) -> None:
-    done = run("compare", *arguments)
-    assert done.returncode == 0
-    assert "\r" not in done.stdout + done.stderr
-    assert "starts:" not in done.stderr
+@pytest.mark.usefixtures("one_start")
+def test_progress_stays_away_from_files(
+    arguments: list[str], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sysid_vehicle._progress._SILENT_S", 0.0)
+    monkeypatch.setattr("sysid_vehicle._progress._REFRESH_S", 0.01)
+    assert main(["compare", *arguments]) == 0
+    out, err = capfd.readouterr()
+    assert "\r" not in out + err
+    assert "identify" not in err
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the shell's pipes are those of Unix")

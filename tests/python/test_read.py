@@ -263,3 +263,8 @@ class TestRealLogs:
         assert len(caught) == 1
         assert log["time_s"][0] == -6.028965
         assert not log.uniform
+
+
+def test_a_channel_map_of_names_is_told_how_to_be_made() -> None:
+    with pytest.raises(InvalidInput, match=r"vx_mps = 'speed' is no Source; .*from_dict"):
+        ChannelMap({"vx_mps": "speed"})  # type: ignore[dict-item]

@@ -50,6 +50,27 @@ def test_what_the_driving_cannot_test_is_told_by_refits(study: sv.Study) -> None
     assert re.search(r"0\.4 m that is not modelled adds \+\d", told)
 
 
+def test_a_report_in_markdown_has_its_text_and_tables(
+    study: sv.Study, written: Path, tmp_path: Path
+) -> None:
+    study.report(tmp_path / "report.md")
+    text = (tmp_path / "report.md").read_text("utf-8")
+    lines = text.splitlines()
+    assert lines[0].startswith("# Study of ")
+    assert study.meaning in text
+    assert "## 4 Added" in lines
+    assert "## Parameters of the final model" in lines
+    before, after = (c.error for c in study.test)
+    assert f"- baseline: {before:.2f}" in lines
+    assert f"- + tyre\\_load\\_sensitivity: {after:.2f}" in lines
+    tables = re.findall(r"(?:^\|.*\|$\n)+", text, re.MULTILINE)
+    assert len(tables) == written.read_text("utf-8").count("<table>")
+    for table in tables:
+        columns = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
+        assert len(columns) == 1, "as many cells in each line"
+    assert "<" not in text.replace("\\<", "")
+
+
 def test_a_study_is_a_table(study: sv.Study) -> None:
     pytest.importorskip("pandas")
     table = study.to_pandas()

@@ -87,6 +87,8 @@ def test_samples_are_those_of_the_driving(study: sv.Study, samples: Samples) -> 
     along = np.hypot(np.diff(samples["x"]), np.diff(samples["y"]))
     assert along.sum() == pytest.approx(samples["d"][-1] - samples["d"][0], rel=0.02)
     told = json.loads(samples.json())
+    assert told.pop("logs") == ["other"]
+    assert samples.time_label == "time [s]"
     assert {len(column) for column in told.values()} == {len(rows)}
     np.testing.assert_allclose(told["e0"], samples["e0"], rtol=1e-3)
 

@@ -113,3 +113,17 @@ def test_shares_are_known_only_where_something_could_be_explained() -> None:
     assert not share_between(noise * np.array([1.0, 0.99, 0.99]), 0.05).known
     worse = share_between(noise * np.array([2.0, 3.0, 1.0]))
     assert worse.value == pytest.approx(-1.0, abs=0.2)
+
+
+def test_a_channel_that_was_not_measured_is_left_out(fit: Fit, course: Log) -> None:
+    """Without a warning of the arithmetic: here these are errors."""
+    blind = {c: np.array(course[c]) for c in course.channels if c != "vy_mps"}
+    driving = Driving.of(Log.from_arrays(blind, name="blind"))
+    _, errors = _errors(fit, fit.noise.floor(), driving, 0.5)
+    known = np.isfinite(errors).any(axis=0)
+    assert dict(zip(CHANNELS, known, strict=True)) == {
+        "vy_mps": False,
+        "yaw_rate_radps": True,
+        "ay_mps2": True,
+        "path_m": False,
+    }

@@ -56,6 +56,14 @@ class ChannelMap:
     absent: tuple[str, ...] = ()
     rate_hz: float | None = None
 
+    def __post_init__(self) -> None:
+        for channel, source in self.sources.items():
+            if not isinstance(source, Source):
+                raise InvalidInput(
+                    f"ChannelMap: {channel} = {source!r} is no Source; ChannelMap.from_dict takes "
+                    "names of columns"
+                )
+
     @classmethod
     def from_toml(cls, path: str | Path) -> ChannelMap:
         """Read a channel map, a TOML file with the table ``[channels]``.

@@ -76,7 +76,7 @@ def _whole(samples: Samples, names: Sequence[str]) -> Chart:
     top = samples.range(*columns)[1]
     chart = Chart(
         768, 76, (float(t[0]), float(t[-1])), (0.0, top), ylabel="/ floor", link="t",
-        xlabel="time [s]",
+        xlabel=samples.time_label,
     )  # fmt: skip
     within = t[samples.inside]
     chart.hatch(float(within[0]), float(within[-1]))
@@ -244,7 +244,7 @@ def residuals(study: Study, samples: Samples, caption: str) -> str:
         chart = Chart(
             860, 190, (float(samples["t"][0]), float(samples["t"][-1])),
             (0.0, samples.range(*(c.replace(f"r{k}.", "r0.") for c in columns), *columns)[1]),
-            title=title, xlabel="time [s]", ylabel="residual / floor", link="t",
+            title=title, xlabel=samples.time_label, ylabel="residual / floor", link="t",
         )  # fmt: skip
         chart.level(1.0, "chance")
         for i, (column, channel) in enumerate(zip(columns, channels, strict=True)):

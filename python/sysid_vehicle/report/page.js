@@ -10,7 +10,7 @@
     return parent.appendChild(e);
   };
   const known = v => v !== null && v !== undefined;
-  const rounded = v => String(Number(v.toPrecision(4))).replace("-", "\u2212");
+  const rounded = v => known(v) ? String(Number(v.toPrecision(4))).replace("-", "\u2212") : "?";
 
   const ticks = (low, high, most) => {
     const raw = (high - low) / most, power = 10 ** Math.floor(Math.log10(raw));
@@ -198,7 +198,8 @@
     at = i;
     if (!event) return;
     const own = charts.find(c => c.svg === event.currentTarget);
-    const told = [`${S.t[i].toFixed(2)} s, ${S.d[i].toFixed(0)} m`,
+    const told = [`${S.t[i].toFixed(2)} s, ${S.d[i].toFixed(0)} m` +
+      (S.logs.length > 1 ? `, ${S.logs[S.run[i]]}` : ""),
       `${rounded(S.v[i])} m/s` + (known(S.ay[i]) ? `, a_y ${rounded(S.ay[i])} m/s\u00b2` : "")];
     for (const { values, name } of own.lines)
       if (known(values[i])) told.push(`${name}: ${rounded(values[i])}`);

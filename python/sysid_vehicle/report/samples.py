@@ -38,12 +38,20 @@ class Samples:
         The seconds of the excerpt.
     has_track : bool
         Whether the track is worth a map.
+    logs : tuple of str
+        Name of the log of each stretch.
     """
 
     excerpt: Excerpt
     columns: dict[str, FloatArray]
     inside: npt.NDArray[np.bool_]
     has_track: bool
+    logs: tuple[str, ...]
+
+    @property
+    def time_label(self) -> str:
+        """Of an axis: clocks of several stretches tell nothing together."""
+        return "time [s]" if len(self.logs) == 1 else "seconds driven"
 
     def __getitem__(self, name: str) -> FloatArray:
         return self.columns[name]
@@ -66,7 +74,7 @@ class Samples:
             for name, column in self.columns.items()
         }
         told["selected"] = self.inside.astype(int).tolist()
-        return json.dumps(told, separators=(",", ":"), allow_nan=False)
+        return json.dumps({**told, "logs": self.logs}, separators=(",", ":"), allow_nan=False)
 
 
 def _rounded(name: str, column: FloatArray) -> list[float]:
@@ -89,7 +97,7 @@ def samples_of(study: Study) -> Samples | None:
     own = int(run[excerpt.where.start])
     track, has_track = _track(np.nan_to_num(v), np.nan_to_num(r), step, run == own)
     time = driving.channel("time_s")
-    if len(lengths) > 1:  # the seconds driven: clocks of several logs tell nothing together
+    if len(lengths) > 1:
         time = np.cumsum(step) - step[0]
     all_: dict[str, FloatArray] = {
         "t": time,
@@ -128,8 +136,9 @@ def samples_of(study: Study) -> Samples | None:
     within = np.arange(excerpt.where.start, excerpt.where.stop)
     keep[within[:: max(len(within) // _MOST, 1)]] = True
     rows = np.flatnonzero(keep)
+    logs = tuple(driving.logs[s.log].name for s in driving.stretches)
     inside = (rows >= excerpt.where.start) & (rows < excerpt.where.stop)
-    return Samples(excerpt, {n: c[rows] for n, c in all_.items()}, inside, has_track)
+    return Samples(excerpt, {n: c[rows] for n, c in all_.items()}, inside, has_track, logs)
 
 
 def _running(

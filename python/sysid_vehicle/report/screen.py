@@ -46,15 +46,15 @@ def _compare(study: Study, samples: Samples) -> str:
 
 def _where(study: Study, samples: Samples) -> str:
     worst = study.test[0].regions[:1]
-    said = f" The largest share: {worst[0]}." if worst else ""
     kind = (
         "Track from speed and yaw rate, and accelerations" if samples.has_track else "Accelerations"
     )
     caption = (
         f"{kind}, coloured by the error of the baseline over half a second; rings: the seconds "
-        f"shown beside.{said}"
+        "shown beside."
     )
-    return panel("2 Where", [figures.place(samples, caption)], 5)
+    said = [paragraph(f"The largest share: {worst[0]}.")] if worst else []
+    return panel("2 Where", [figures.place(samples, caption), *said], 5)
 
 
 def _which(study: Study) -> str:

@@ -8,6 +8,7 @@ from .._files import write_text
 from .._progress import doing
 from ..model import Model
 from ..study import Study
+from .markdown import markdown
 from .page import fold, page
 from .samples import samples_of
 from .screen import first_screen
@@ -17,7 +18,7 @@ __all__ = ["write_report"]
 
 
 def write_report(study: Study, path: str | Path, *, truth: Model | None = None) -> None:
-    """Write a study as one self-contained HTML file, whole or not at all.
+    """Write a study as one self-contained HTML file, whole or not at all; `.md` as Markdown.
 
     Parameters
     ----------
@@ -39,4 +40,5 @@ def write_report(study: Study, path: str | Path, *, truth: Model | None = None) 
         made = [(name, make(study, samples, truth)) for name, make in SECTIONS]
     folded = [fold(name, parts) for name, parts in made if parts]
     told = "" if samples is None else samples.json()
-    write_text(path, page(title, [*first, *folded], told))
+    whole = page(title, [*first, *folded], told)
+    write_text(path, markdown(whole) if Path(path).suffix.lower() == ".md" else whole)

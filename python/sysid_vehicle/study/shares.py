@@ -301,7 +301,9 @@ def _errors(
     """Samples at which predictions end, and the errors there, shape (predictions, 4)."""
     problem, p, w = driving.problem(fit.model), fit.model.vector(), noise.vector()
     lateral = [MEASURED.index(c) for c in CHANNELS[:-1]]
-    spread = np.nanstd(driving.measured[:, lateral], axis=0)
+    with catch_warnings():
+        simplefilter("ignore", RuntimeWarning)  # channels that were not measured
+        spread = np.nanstd(driving.measured[:, lateral], axis=0)
     ends, errors = [], []
     for rate in np.unique(driving.sample_rate_hz):
         ahead = max(round(horizon_s * rate), 1)

@@ -359,7 +359,7 @@ class Study:
         write_json(path, self.to_dict())
 
     def report(self, path: str | Path) -> None:
-        """Write the study as one self-contained HTML file."""
+        """Write the study as one self-contained HTML file, or as Markdown (`.md`)."""
         # Drawing is the last stage; it is imported only where somebody asks for it.
         from ..report import write_report
 
