@@ -44,6 +44,13 @@ template <class S>
 Workings<S> workings(const std::array<double, 17>& v) {
     Workings<S> w;
     w.time_s = v[0];
+    static const std::array<double, kUserChannels> channels{1.0, -2.0, 0.0, 1e3};
+    static const std::array<S, kUserStates> states{S(0.5), S(-40.0)};
+    w.channels = channels.data();
+    w.user_states = states.data();
+    w.track_f = w.track_r = 1.5;
+    w.h = S(0.5);
+    w.l_f = w.l_r = S(1.3);
     S* places[] = {&w.v_x,  &w.v_y,  &w.r,    &w.delta, &w.fx,   &w.alpha_f, &w.alpha_r, &w.fx_f,
                    &w.fx_r, &w.fz_f, &w.fz_r, &w.fy_f,  &w.fy_r, &w.a_x,     &w.a_y,     &w.r_dot};
     for (std::size_t i = 0; i < 16; ++i) *places[i] = S(v[i + 1]);
@@ -59,14 +66,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (double& v : signals) v = 0.1 * bytes.byte() - 12.0;
     for (double& v : p) v = bytes.number();
     std::vector<Instruction> steps;
-    while (bytes.left() && steps.size() < 120) {
+    while (bytes.left() && steps.size() < 280) {
         Instruction step;
-        step.operation = static_cast<Operation>(bytes.byte() % 24);
+        step.operation = static_cast<Operation>(bytes.byte() % 26);
         const bool places = step.operation > Operation::kParameter;
         for (std::size_t& from : step.from)
             // Mostly such that the program is accepted.
             from = places && !steps.empty() ? bytes.byte() % (steps.size() + bytes.byte() / 250)
-                                            : bytes.byte() % 20;
+                                            : bytes.byte() % 32;
         if (step.operation == Operation::kConstant) step.constant = bytes.number();
         steps.push_back(step);
     }

@@ -10,7 +10,9 @@ namespace {
 void add_run(Problem& problem, double dt, const Array& inputs, const Array& measurements,
              double start, const std::string& name) {
     const auto n = inputs.ndim() == 2 ? inputs.shape(0) : 0;
-    const double* u = matrix(inputs, n, 2, "inputs");
+    const auto width =
+        std::clamp<py::ssize_t>(inputs.ndim() == 2 ? inputs.shape(1) : 0, 2, 2 + kUserChannels);
+    const double* u = matrix(inputs, n, width, "inputs");
     const double* y = matrix(measurements, n, kChannels, "measurements");
     if (n < 2) throw std::invalid_argument("inputs: expected two samples or more");
     if (!(dt > 0.0) || !std::isfinite(dt)) throw std::invalid_argument("dt: expected above zero");
@@ -20,9 +22,13 @@ void add_run(Problem& problem, double dt, const Array& inputs, const Array& meas
     run.name = name;
     run.inputs.resize(static_cast<std::size_t>(n));
     run.measurements.resize(static_cast<std::size_t>(n));
-    for (std::size_t k = 0; k < run.size(); ++k) {
-        run.inputs[k] = {u[2 * k], u[2 * k + 1], start + static_cast<double>(k) * dt};
-        if (!std::isfinite(u[2 * k]) || !std::isfinite(u[2 * k + 1]))
+    for (std::size_t k = 0; k < run.size(); ++k, u += width) {
+        run.inputs[k] = {u[0], u[1], start + static_cast<double>(k) * dt};
+        // Channels that the log lacks are no numbers, for whatever model should read them.
+        auto& channels = run.inputs[k].channels;
+        channels.fill(std::nan(""));
+        std::copy(u + 2, u + width, channels.begin());
+        if (!std::isfinite(u[0]) || !std::isfinite(u[1]))
             throw std::invalid_argument(log + "inputs: not finite at sample " + std::to_string(k));
         run.measurements[k] = Eigen::Map<const Vec<kChannels>>(y + kChannels * k);
         if (run.measurements[k].array().isInf().any())

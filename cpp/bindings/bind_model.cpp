@@ -78,7 +78,8 @@ Array evaluate(const SingleTrack& model, const Array& p, const Array& motion, do
     const double* values = vector(p, kParameterCount, "parameters");
     const double* x = vector(motion, kMotionStates, "motion");
     const std::array<double, kExternals> calm{};
-    const Input u{steer, longitudinal};
+    Input u{steer, longitudinal};
+    u.channels.fill(std::nan(""));  // no log stands behind one evaluation
     ModelState<double> state{};
     std::copy(x, x + kMotionStates, state.begin());
     settle_auxiliary(model, state, calm.data(), u, values);
@@ -94,28 +95,47 @@ Array evaluate(const SingleTrack& model, const Array& p, const Array& motion, do
 
 /// As Python hands a formula over: what is added to, and steps (operation, operands, constant).
 using Step = std::tuple<int, std::array<std::size_t, 3>, double>;
-using Act = std::pair<int, std::vector<Step>>;
+using Steps = std::vector<Step>;
+using Act = std::pair<int, Steps>;
+/// Rate of a state, minus its derivative by the state, and where it begins if that is said.
+using OwnState = std::tuple<Steps, Steps, std::optional<Steps>>;
+/// An effect: its place, the numbers of the channels that it reads, what it adds, its states.
+using User =
+    std::tuple<std::size_t, std::vector<std::size_t>, std::vector<Act>, std::vector<OwnState>>;
 
-Formula formula(const std::vector<Step>& steps) {
+/// Channels and states are numbered by effect in `steps`, by model in the formula.
+Formula formula(const Steps& steps, const std::vector<std::size_t>& channels,
+                std::size_t first_state, std::size_t states) {
     std::vector<Instruction> all;
     all.reserve(steps.size());
-    for (const auto& [operation, from, constant] : steps) {
-        if (operation < 0 || operation >= static_cast<int>(Operation::kOperations))
+    for (const auto& [number, from, constant] : steps) {
+        if (number < 0 || number >= static_cast<int>(Operation::kOperations))
             throw std::invalid_argument("formula: there is no such operation");
-        // Places that an operation does not read are zero; they are looked up all the same.
-        if (operation > static_cast<int>(Operation::kParameter))
-            for (const std::size_t place : from)
-                if (place >= all.size())
-                    throw std::invalid_argument("formula: a step reads a later one");
-        all.push_back({static_cast<Operation>(operation), from, constant});
+        const auto operation = static_cast<Operation>(number);
+        Instruction step{operation, from, constant};
+        if (operation == Operation::kChannel || operation == Operation::kState) {
+            const bool channel = operation == Operation::kChannel;
+            if (from[0] >= (channel ? channels.size() : states))
+                throw std::invalid_argument("formula: it reads what there is none of");
+            step.from[0] = channel ? channels[from[0]] : first_state + from[0];
+        }
+        all.push_back(step);
     }
     return {std::move(all), kUserParameters};
 }
 
-UserEffects user_effects(const std::vector<std::pair<std::size_t, std::vector<Act>>>& given) {
-    if (given.empty()) return nullptr;
+/// Lets users' effects act in a model.
+void set_user_effects(SingleTrack& model, const std::vector<User>& given) {
+    if (given.empty()) return;
     std::vector<UserEffect> all;
-    for (const auto& [slot, acts] : given) {
+    std::size_t first_state = 0;
+    for (const auto& [slot, channels, acts, states] : given) {
+        const std::size_t own = states.size();
+        if (first_state + own > kUserStates)
+            throw std::invalid_argument("user: there are more states than there is room for");
+        const auto read = [&, &names = channels, first = first_state](const Steps& steps) {
+            return formula(steps, names, first, own);
+        };
         if (slot >= kUserEffects)
             throw std::invalid_argument("user: there is no such place for an effect");
         UserEffect effect;
@@ -123,11 +143,17 @@ UserEffects user_effects(const std::vector<std::pair<std::size_t, std::vector<Ac
         for (const auto& [target, steps] : acts) {
             if (target < 0 || target >= static_cast<int>(Target::kTargets))
                 throw std::invalid_argument("user: there is no such target");
-            effect.acts.emplace_back(static_cast<Target>(target), formula(steps));
+            effect.acts.emplace_back(static_cast<Target>(target), read(steps));
+        }
+        effect.first_state = first_state;
+        for (const auto& [rate, decay, initial] : states) {
+            model.effects |= user_state_bit(first_state++);
+            effect.states.push_back({read(rate), read(decay), std::nullopt});
+            if (initial) effect.states.back().initial = read(*initial);
         }
         all.push_back(std::move(effect));
     }
-    return std::make_shared<const std::vector<UserEffect>>(std::move(all));
+    model.user = std::make_shared<const std::vector<UserEffect>>(std::move(all));
 }
 
 template <std::size_t N>
@@ -144,10 +170,14 @@ py::dict formula_parts() {
     d["operations"] = texts(kOperationNames);
     d["signals"] = texts(kSignalNames);
     d["targets"] = texts(kTargetNames);
-    py::list known;
-    for (std::size_t i = 0; i < kTargetNames.size(); ++i)
-        known.append(static_cast<int>(first_unknown(static_cast<Target>(i))));
-    d["signals_known"] = py::tuple(known);
+    py::list by_target;
+    for (std::size_t i = 0; i < kTargetNames.size(); ++i) {
+        py::list there;
+        for (std::size_t n = 0; n < kSignalNames.size(); ++n)
+            if (known(static_cast<Signal>(n), static_cast<Target>(i))) there.append(n);
+        by_target.append(py::tuple(there));
+    }
+    d["signals_known"] = py::tuple(by_target);
     return d;
 }
 
@@ -160,13 +190,15 @@ void register_model(py::module_& m) {
         .def_readwrite("lf_m", &VehicleData::lf_m)
         .def_readwrite("lr_m", &VehicleData::lr_m)
         .def_readwrite("cg_height_m", &VehicleData::cg_height_m)
+        .def_readwrite("track_front_m", &VehicleData::track_front_m)
+        .def_readwrite("track_rear_m", &VehicleData::track_rear_m)
         .def_readwrite("drag_area_m2", &VehicleData::drag_area_m2)
         .def_readwrite("air_density_kgpm3", &VehicleData::air_density_kgpm3)
         .def_readwrite("brake_front_share", &VehicleData::brake_front_share)
         .def_readwrite("drive_front_share", &VehicleData::drive_front_share);
     py::class_<SingleTrack>(m, "SingleTrack")
         .def(py::init([](const VehicleData& car, EffectMask effects, bool force_known,
-                         const std::vector<std::pair<std::size_t, std::vector<Act>>>& user) {
+                         const std::vector<User>& user) {
                  if (effects >> kEffectCount != 0)
                      throw std::invalid_argument(
                          "effects: the mask names effects there are none of");
@@ -174,11 +206,11 @@ void register_model(py::module_& m) {
                  model.car = car;
                  model.effects = effects;
                  model.force_known = force_known;
-                 model.user = user_effects(user);
+                 set_user_effects(model, user);
                  return model;
              }),
              py::arg("car"), py::arg("effects"), py::arg("force_known"),
-             py::arg("user") = std::vector<std::pair<std::size_t, std::vector<Act>>>{})
+             py::arg("user") = std::vector<User>{})
         .def("evaluate", &evaluate, py::arg("parameters"), py::arg("motion"), py::arg("steer"),
              py::arg("longitudinal"));
     m.def("base_parameters", &base_parameters);
@@ -188,6 +220,9 @@ void register_model(py::module_& m) {
     m.attr("USER_OFFSET") = kBaseParameterCount + user_offset(0);
     m.attr("USER_EFFECTS") = kUserEffects;
     m.attr("USER_PARAMETERS") = kUserParameters;
+    m.attr("USER_CHANNELS") = kUserChannels;
+    m.attr("USER_STATES") = kUserStates;
+    m.attr("USER_STATES_FROM") = kMotionStates + kCatalogueStates;
 }
 
 }  // namespace sysid::bindings

@@ -31,7 +31,7 @@ void register_simulate(py::module_& m) {
         "simulate",
         [](const SingleTrack& model, const Array& p, double dt, const Array& references,
            const Driver& driver, const Array& disturbance, double initial_speed, double initial_vy,
-           double initial_yaw_rate, double initial_steer, double start) {
+           double initial_yaw_rate, double initial_steer, double start, const Array& channels) {
             const auto n = references.ndim() == 2 ? references.shape(0) : 0;
             if (n < 2) throw std::invalid_argument("references: expected two samples or more");
             const double* r = matrix(references, n, 3, "references");
@@ -42,19 +42,24 @@ void register_simulate(py::module_& m) {
                 w = {r[0], r[1], r[2]};
                 r += 3;
             }
+            const py::ssize_t width = channels.ndim() == 2 ? channels.shape(1) : 0;
+            if (width > static_cast<py::ssize_t>(kUserChannels))
+                throw std::invalid_argument("channels: there are more than there is room for");
+            const Logged logged{width > 0 ? matrix(channels, n, width, "channels") : nullptr,
+                                static_cast<std::size_t>(width)};
             check_driver(driver, step_of(dt));
             const Beginning beginning{
                 initial_speed, initial_vy, initial_yaw_rate, initial_steer, start,
             };
-            const Drive drive =
-                unlocked([&] { return simulate(model, values, dt, wanted, driver, d, beginning); });
+            const Drive drive = unlocked(
+                [&] { return simulate(model, values, dt, wanted, driver, d, beginning, logged); });
             return py::make_tuple(copy_of(drive.inputs, 2), copy_of(drive.states, kModelStates),
                                   copy_of(drive.outputs, kChannels), drive.lost_at);
         },
         py::arg("model"), py::arg("parameters"), py::arg("dt"), py::arg("references"),
         py::arg("driver"), py::arg("disturbance"), py::arg("initial_speed"),
         py::arg("initial_vy") = 0.0, py::arg("initial_yaw_rate") = 0.0,
-        py::arg("initial_steer") = 0.0, py::arg("start") = 0.0);
+        py::arg("initial_steer") = 0.0, py::arg("start") = 0.0, py::arg("channels") = Array());
 }
 
 }  // namespace sysid::bindings

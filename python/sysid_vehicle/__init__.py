@@ -27,13 +27,14 @@ from .forces import AxleForces, axle_forces
 from .identify import Fit, RunsFit, identify, identify_runs
 from .log import Log, check_excitation
 from .model import Model
+from .plugins import installed_effects
 from .read import ChannelMap, propose_channels, read_log
 from .rules import Rules
 from .saved import load
 from .sensors import SensorCheck, check
 from .simulate import RoadDisturbance, SensorNoise, drive, example_vehicle
 from .study import Study, improve
-from .user_effects import define_effect, forget_effect, load_effects, parameter
+from .user_effects import define_effect, forget_effect, load_effects, parameter, state
 from .vehicle import Tyre, Vehicle
 
 __all__ = [
@@ -82,12 +83,14 @@ __all__ = [
     "identify_runs",
     "improve",
     "improve_many",
+    "installed_effects",
     "load",
     "load_effects",
     "manoeuvres",
     "parameter",
     "propose_channels",
     "read_log",
+    "state",
     "suggest_manoeuvre",
     "unknown",
     "verdicts",

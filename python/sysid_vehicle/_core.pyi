@@ -39,6 +39,10 @@ from ._core_twin import observe_double_track as observe_double_track
 
 _Array = npt.NDArray[np.float64]
 _Step = tuple[int, tuple[int, int, int], float]  # operation, operands, constant
+_Steps = Sequence[_Step]
+_OwnState = tuple[_Steps, _Steps, _Steps | None]  # rate, decay, initial
+# Place, channels, what is added to, states.
+_User = tuple[int, Sequence[int], Sequence[tuple[int, _Steps]], Sequence[_OwnState]]
 
 __version__: str
 CHANNELS: int
@@ -47,7 +51,10 @@ NOISE_PARAMETERS: int
 PARAMETERS: int
 USER_EFFECTS: int
 USER_OFFSET: int
+USER_CHANNELS: int
 USER_PARAMETERS: int
+USER_STATES: int
+USER_STATES_FROM: int
 EXTERNALS: int
 
 @type_check_only
@@ -75,6 +82,8 @@ class VehicleData(metaclass=_Bound):
     lf_m: float
     lr_m: float
     cg_height_m: float
+    track_front_m: float
+    track_rear_m: float
     drag_area_m2: float
     air_density_kgpm3: float
     brake_front_share: float
@@ -87,7 +96,7 @@ class SingleTrack(metaclass=_Bound):
         car: VehicleData,
         effects: int,
         force_known: bool,
-        user: Sequence[tuple[int, Sequence[tuple[int, Sequence[_Step]]]]] = ...,
+        user: Sequence[_User] = ...,
     ) -> None: ...
     def evaluate(
         self, parameters: _Array, motion: _Array, steer: float, longitudinal: float
@@ -246,6 +255,7 @@ def simulate(
     initial_yaw_rate: float = 0.0,
     initial_steer: float = 0.0,
     start: float = 0.0,
+    channels: _Array = ...,
 ) -> tuple[_Array, _Array, _Array, int]: ...
 
 # --- lab observer

@@ -13,11 +13,23 @@ from typing import Any
 
 import numpy as np
 
-from . import _core
+from . import _core, plugins
 from ._arrays import FloatArray, as_float64
 from .errors import InvalidInput, near_names
 
-__all__ = ["Effect", "Parameter", "base_parameters", "catalogue", "effect", "forget", "register"]
+__all__ = [
+    "Effect",
+    "OwnState",
+    "Parameter",
+    "base_parameters",
+    "catalogue",
+    "channels_in_use",
+    "effect",
+    "forget",
+    "register",
+]
+
+Steps = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
@@ -70,6 +82,28 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class OwnState:
+    """A state of an effect that a user defined.
+
+    Attributes
+    ----------
+    name, unit : str
+    rate : tuple
+        Steps of the formula of its derivative by time.
+    decay : tuple
+        Minus the derivative of the rate by the state itself.
+    initial : tuple or None
+        Where a run begins; None where it would rest.
+    """
+
+    name: str
+    unit: str
+    rate: Steps
+    decay: Steps
+    initial: Steps | None = None
+
+
+@dataclass(frozen=True)
 class Effect:
     """A physical effect that a model may lack.
 
@@ -95,6 +129,10 @@ class Effect:
         How many states of its own it adds to the model.
     acts : tuple
         Of an effect that a user defined: what its formulas add to, and their steps.
+    channels : tuple of str
+        Of such an effect: columns of the log that its formulas read.
+    own_states : tuple of OwnState
+        Of such an effect.
     """
 
     id: str
@@ -112,6 +150,13 @@ class Effect:
     through: str
     states: int
     acts: tuple[tuple[int, Any], ...] = ()
+    channels: tuple[str, ...] = ()
+    own_states: tuple[OwnState, ...] = ()
+
+    def __post_init__(self) -> None:
+        # Before any problem is made for it: its runs hold the channels by number.
+        for name in self.channels:
+            _channel_number(name)
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         """An effect of the catalogue by its name, whose places may differ; others by value."""
@@ -145,6 +190,11 @@ class Effect:
     def bit(self) -> int:
         """The effect's bit in the core's mask; a user's effect has none."""
         return 0 if self.acts else 1 << self.index
+
+    def core(self) -> tuple[Any, ...]:
+        """What the core takes of a user's effect."""
+        states = [(s.rate, s.decay, s.initial) for s in self.own_states]
+        return self.index, [_channel_number(c) for c in self.channels], self.acts, states
 
     @property
     def columns(self) -> list[int]:
@@ -214,6 +264,23 @@ def _by_id() -> dict[str, Effect]:
 
 
 _users: dict[str, Effect] = {}
+_channels: list[str] = []  # by their number in the core, for as long as the process lives
+
+
+def channels_in_use() -> tuple[str, ...]:
+    """Columns of logs that users' effects read, by their number in the core."""
+    return tuple(_channels)
+
+
+def _channel_number(name: str) -> int:
+    if name not in _channels:
+        if len(_channels) == _core.USER_CHANNELS:
+            raise InvalidInput(
+                f"channel '{name}': there is room for {_core.USER_CHANNELS} channels in one "
+                f"process, taken by {', '.join(_channels)}; start another one"
+            )
+        _channels.append(name)
+    return _channels.index(name)
 
 
 def catalogue() -> tuple[Effect, ...]:
@@ -251,9 +318,16 @@ def effect(name: str | Effect) -> Effect:
     if isinstance(name, Effect):
         return name
     known = {**_by_id(), **_users}
-    if name not in known:
+    if name in known:
+        return known[name]
+    if plugins.run(name):
+        if name in _users:
+            return _users[name]
         raise InvalidInput(
-            f"no effect is called '{name}'{near_names(name, known)}; "
-            "`sysid-vehicle effects` lists them"
+            f"effect '{name}': a package names it in its entry points and does not define it"
         )
-    return known[name]
+    found = [p.id for p in plugins.installed_effects()]
+    raise InvalidInput(
+        f"no effect is called '{name}'{near_names(name, [*known, *found])}; "
+        "`sysid-vehicle effects` lists them"
+    )

@@ -17,14 +17,21 @@ from . import _core
 from ._arrays import FloatArray
 from .errors import InvalidInput
 
-__all__ = ["SIGNALS", "TARGETS", "Formula", "Traced", "trace"]
+__all__ = ["EVERYTHING", "OUTSET", "SIGNALS", "TARGETS", "Formula", "Traced", "evaluate", "trace"]
 
 _PARTS = _core.formula_parts()
 _OPERATIONS = {name: number for number, name in enumerate(_PARTS["operations"])}
 SIGNALS: tuple[str, ...] = _PARTS["signals"]
 TARGETS: tuple[str, ...] = _PARTS["targets"]
-_KNOWN = dict(zip(TARGETS, _PARTS["signals_known"], strict=True))
+# Places of a formula beside those targets: the rate of a state, which knows all, and its beginning.
+EVERYTHING, OUTSET = "rate", "initial"
+_KNOWN = {
+    target: tuple(SIGNALS[i] for i in there)
+    for target, there in zip(TARGETS, _PARTS["signals_known"], strict=True)
+} | {EVERYTHING: SIGNALS}
+_KNOWN[OUTSET] = _KNOWN["force_x"]
 _HIGHEST_POWER = 8
+_LEAST_KNOTS = 2
 
 _UNARY = ("negative", "absolute", "sign", "sin", "cos", "arctan", "sqrt", "exp", "log", "tanh")
 _BINARY = ("add", "subtract", "multiply", "divide", "arctan2", "minimum", "maximum", "greater")
@@ -82,6 +89,8 @@ class Traced:
             return self._apply("where", *args)
         if function is np.clip and len(args) == 3:
             return self._apply("minimum", self._apply("maximum", args[0], args[1]), args[2])
+        if function is np.interp and len(args) == 3 and not how:
+            return self._interpolated(*args)
         raise InvalidInput(f"numpy.{function.__name__} cannot be followed; {_ALLOWED}")
 
     def _of(self, x: Any) -> Traced:
@@ -115,6 +124,29 @@ class Traced:
         if name == "negative":
             return Traced(self._tape, place, f"-{given[0]._bound()}", plain=False)
         return Traced(self._tape, place, f"{name}({', '.join(g._text for g in given)})")
+
+    def _interpolated(self, x: Any, knots: Any, values: Any) -> Traced:
+        """A table, linear between its knots and held beyond them, as numpy.interp has it."""
+        try:
+            at = [float(k) for k in knots]
+        except TypeError:
+            raise InvalidInput("numpy.interp: the knots must be a list of numbers") from None
+        given = list(values)
+        if len(at) != len(given) or len(at) < _LEAST_KNOTS or not (np.diff(at) > 0.0).all():
+            raise InvalidInput(
+                "numpy.interp: give two or more knots that increase, and a value for each"
+            )
+        x = self._of(x)
+        within = self._apply("minimum", self._apply("maximum", x, at[0]), at[-1])
+        slopes = [
+            (b - a) / (q - p) for a, b, p, q in zip(given, given[1:], at, at[1:], strict=False)
+        ]
+        result = given[0] + slopes[0] * (within - at[0])
+        for knot, before, after in zip(at[1:], slopes, slopes[1:], strict=False):
+            result = result + (after - before) * self._apply("maximum", within - knot, 0.0)
+        shown = ", ".join(v._text if isinstance(v, Traced) else f"{float(v):g}" for v in given)
+        knots_shown = ", ".join(f"{k:g}" for k in at)
+        return Traced(self._tape, result._place, f"interp({x._text}, [{knots_shown}], [{shown}])")
 
     def _power(self, base: Traced, exponent: Any) -> Traced:
         if isinstance(exponent, Traced):
@@ -191,13 +223,19 @@ class Traced:
 
 
 _ALLOWED = (
-    "allowed are + - * / ** and abs, numpy's where, clip, square, power, tan, less, "
+    "allowed are + - * / ** and abs, numpy's where, clip, interp, square, power, tan, less, "
     + ", ".join((*_UNARY, *_BINARY))
 )
 
 
 def trace(
-    function: Callable[[Any, Any], Any], parameters: Sequence[str], target: str, what: str
+    function: Callable[[Any, Any], Any],
+    parameters: Sequence[str],
+    target: str,
+    what: str,
+    *,
+    channels: Sequence[str] = (),
+    states: Sequence[str] = (),
 ) -> Formula:
     """Follow a function of signals and parameters.
 
@@ -207,9 +245,11 @@ def trace(
         Takes two namespaces, of signals (`SIGNALS`) and of parameters.
     parameters : sequence of str
     target : str
-        What the result is added to, of `TARGETS`.
+        What the result is added to, of `TARGETS`, or `EVERYTHING` or `OUTSET`.
     what : str
         What to call it in messages.
+    channels, states : sequence of str
+        Channels of the log, and states of the effect, that the function may read too.
 
     Raises
     ------
@@ -218,21 +258,24 @@ def trace(
         or calls what cannot be followed.
     """
     tape = _Tape()
-    known = SIGNALS[: _KNOWN[target]]
+    known = _KNOWN[target]
 
-    def read(kind: str, names: Sequence[str]) -> SimpleNamespace:
-        made = {n: Traced(tape, tape.add(kind, i), n) for i, n in enumerate(names)}
-        return SimpleNamespace(**made)
+    def read(kind: str, names: Sequence[str]) -> dict[str, Traced]:
+        of = SIGNALS.index if kind == "signal" else list(names).index
+        return {n: Traced(tape, tape.add(kind, of(n)), n) for n in names}
 
     try:
-        result = function(read("signal", known), read("parameter", parameters))
+        d = read("signal", known) | read("channel", channels) | read("state", states)
+        result = function(SimpleNamespace(**d), SimpleNamespace(**read("parameter", parameters)))
     except AttributeError as e:
         raise InvalidInput(
-            f"{what}: {e}; its signals are {', '.join(known)}, "
+            f"{what}: {e}; its signals are {', '.join((*known, *channels, *states))}, "
             f"its parameters {', '.join(parameters)}"
         ) from e
     except InvalidInput as e:
         raise InvalidInput(f"{what}: {e}") from e
+    if not isinstance(result, Traced) and target in (EVERYTHING, OUTSET):
+        result = Traced(tape, 0, "")._of(result)
     if not isinstance(result, Traced):
         raise InvalidInput(
             f"{what}: the result depends on no signal and no parameter, it is {result!r}"
@@ -242,7 +285,7 @@ def trace(
 
 def _needed(steps: list[Step], last: int) -> tuple[Step, ...]:
     """The steps that the last one needs, numbered anew."""
-    leaves = {_OPERATIONS[k] for k in ("constant", "signal", "parameter")}
+    leaves = {_OPERATIONS[k] for k in ("constant", "signal", "parameter", "channel", "state")}
     operands = {_OPERATIONS[k]: 1 for k in _UNARY} | {_OPERATIONS[k]: 2 for k in _BINARY}
     operands[_OPERATIONS["where"]] = 3
     wanted = {last}
@@ -266,7 +309,8 @@ def evaluate(
     parameters: Mapping[str, float],
 ) -> FloatArray:
     """The function's values on arrays, as NumPy works them out."""
-    known = {n: signals[n] for n in SIGNALS[: _KNOWN[target]]}
+    hidden = set(SIGNALS) - set(_KNOWN[target])
+    known = {n: x for n, x in signals.items() if n not in hidden}
     result = function(SimpleNamespace(**known), SimpleNamespace(**parameters))
     n = len(next(iter(signals.values())))
     return np.broadcast_to(np.asarray(result, dtype=float), (n,)).astype(float)

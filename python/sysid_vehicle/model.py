@@ -207,6 +207,11 @@ class Model:
         return tuple(n for n in self.names if told.get(n, not (known and n == _YAW_INERTIA)))
 
     @property
+    def channels(self) -> tuple[str, ...]:
+        """Columns that a log must have beside the canonical ones: effects of users read them."""
+        return tuple(dict.fromkeys(c for e in self.parts for c in e.channels))
+
+    @property
     def candidates(self) -> tuple[Effect, ...]:
         """Effects of the catalogue that could be added."""
         unknown_inertia = _YAW_INERTIA in self.free_names
@@ -281,9 +286,13 @@ class Model:
         mask = 0
         for e in acting:
             mask |= e.bit
-        return _core.SingleTrack(
-            data, mask, force_known, [(e.index, e.acts) for e in acting if e.acts]
-        )
+        users = [e for e in acting if e.acts]
+        if sum(e.states for e in users) > _core.USER_STATES:
+            raise InvalidInput(
+                f"{', '.join(e.id for e in users if e.states)}: together they have more than the "
+                f"{_core.USER_STATES} states that effects of your own may have in a model; drop one"
+            )
+        return _core.SingleTrack(data, mask, force_known, [e.core() for e in users])
 
     def __str__(self) -> str:
         what = ", ".join(self.effects) if self.effects else "baseline"
@@ -306,6 +315,8 @@ def vehicle_data(vehicle: Vehicle) -> _core.VehicleData:
         "lf_m",
         "lr_m",
         "cg_height_m",
+        "track_front_m",
+        "track_rear_m",
         "drag_area_m2",
         "air_density_kgpm3",
         "brake_front_share",

@@ -4,29 +4,18 @@ from __future__ import annotations
 
 import re
 import runpy
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from . import _core
-from ._arrays import FloatArray
-from .effects import Effect, Parameter, catalogue, forget, register
+from . import plugins
+from ._formula_slope import decay_of
+from ._user_checks import Function, State, check_names, checked
+from .effects import Effect, OwnState, Parameter, catalogue, effect, forget, register
 from .errors import InvalidInput
-from .formula import SIGNALS, TARGETS, Formula, evaluate, trace
+from .formula import EVERYTHING, OUTSET, SIGNALS, TARGETS, Formula, trace
 
-__all__ = ["define_effect", "forget_effect", "load_effects", "parameter"]
+__all__ = ["define_effect", "forget_effect", "load_effects", "parameter", "state"]
 
-Function = Callable[[Any, Any], Any]
-
-_LATERAL = {"v_y", "r", "steer", "alpha_f", "alpha_r", "F_yf", "F_yr", "a_y", "r_dot"}
-_TURNING = {"force_y", "moment_z", "force_y_front", "force_y_rear"} | {
-    "vy_mps",
-    "yaw_rate_radps",
-    "ay_mps2",
-}
 _MOVES = {
     "force_x": ("ax_mps2", "vx_mps"),
     "force_y": ("ay_mps2",),
@@ -35,26 +24,6 @@ _MOVES = {
     "force_y_rear": ("yaw_rate_radps", "ay_mps2"),
 }
 _NEEDS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ay_mps2")
-# What a car in brisk driving shows, for checking functions.
-_RANGES = {
-    "time": (0.0, 60.0),
-    "v_x": (8.0, 50.0),
-    "v_y": (-2.0, 2.0),
-    "r": (-0.8, 0.8),
-    "steer": (-0.1, 0.1),
-    "F_x": (-8e3, 6e3),
-    "alpha_f": (-0.1, 0.1),
-    "alpha_r": (-0.1, 0.1),
-    "F_xf": (-5e3, 3e3),
-    "F_xr": (-3e3, 5e3),
-    "F_zf": (3e3, 9e3),
-    "F_zr": (3e3, 9e3),
-    "F_yf": (-7e3, 7e3),
-    "F_yr": (-7e3, 7e3),
-    "a_x": (-8.0, 5.0),
-    "a_y": (-9.0, 9.0),
-    "r_dot": (-2.0, 2.0),
-}
 
 
 def parameter(
@@ -64,7 +33,7 @@ def parameter(
     typical: float,
     lower: float,
     upper: float,
-    null_value: float = 0.0,
+    null_value: float | None = None,
     matters: float | None = None,
     typical_low: float | None = None,
     typical_high: float | None = None,
@@ -80,20 +49,24 @@ def parameter(
     lower, upper : float
         Bounds of the search.
     null_value : float
-        Where the effect vanishes exactly.
+        Where the effect vanishes exactly; by default 0, or the typical value if it is scanned.
     matters : float, optional
         Smallest distance from the null value worth acting on; by default a fifth of the typical.
     typical_low, typical_high : float, optional
         Where most cars lie; by default a third and three times the typical distance.
     scan : str
-        `range` for a second parameter that means nothing while the first is null.
+        `range` for a second parameter that means nothing while the first is null, such as a time
+        constant: it is tried at several values of its typical range.
 
     Raises
     ------
     InvalidInput
         The figures contradict each other.
     """
-    distance = typical - null_value
+    if null_value is None:
+        null_value = typical if scan else 0.0
+    distance = typical if scan else typical - null_value
+    nothing = 0.0 if scan else null_value
     made = Parameter(
         name=name,
         unit=unit,
@@ -102,8 +75,8 @@ def parameter(
         matters=abs(distance) / 5.0 if matters is None else float(matters),
         lower=float(lower),
         upper=float(upper),
-        typical_low=null_value + distance / 3.0 if typical_low is None else float(typical_low),
-        typical_high=null_value + 3.0 * distance if typical_high is None else float(typical_high),
+        typical_low=nothing + distance / 3.0 if typical_low is None else float(typical_low),
+        typical_high=nothing + 3.0 * distance if typical_high is None else float(typical_high),
         mirrored=False,
         scan=scan,
         column=-1,
@@ -115,7 +88,7 @@ def parameter(
             f"parameter '{name}': null value {null_value:g} and typical size {typical:g} must lie "
             f"within the bounds {lower:g} to {upper:g}"
         )
-    if typical == null_value or not made.matters > 0.0:
+    if (typical == null_value and not scan) or not made.matters > 0.0:
         raise InvalidInput(
             f"parameter '{name}': the typical size must differ from the null value "
             f"{null_value:g}, and the size that matters must be above 0"
@@ -123,6 +96,48 @@ def parameter(
     if scan not in ("", "range") or (scan and not made.typical_low > 0.0):
         raise InvalidInput(f"parameter '{name}': scan may be 'range', with a typical range above 0")
     return made
+
+
+def state(
+    name: str,
+    unit: str,
+    *,
+    rate: Function,
+    usual: tuple[float, float],
+    initial: Function | float | None = None,
+) -> State:
+    """A state of an effect of your own: a temperature, a filtered signal, a wear.
+
+    Parameters
+    ----------
+    name, unit : str
+        Functions read it as `d.name`.
+    rate : callable
+        Its derivative by time, of the namespaces `d` and `p`; `d` has all signals, the channels and
+        the states.
+    usual : tuple of 2 floats
+        Where its values lie in brisk driving, to check the functions there.
+    initial : callable or float, optional
+        Its value when a run begins, of `d` as `force_x` knows it and `p`. By default it begins
+        where it would rest, which a state that only adds up does not have.
+
+    Returns
+    -------
+    State
+
+    Raises
+    ------
+    InvalidInput
+        The name is no Python name.
+    """
+    if not name.isidentifier():
+        raise InvalidInput(f"state '{name}': the name must be a Python name")
+    begins = initial if callable(initial) or initial is None else _constant(float(initial))
+    return State(name, unit, rate, begins, usual)
+
+
+def _constant(value: float) -> Function:
+    return lambda _d, _p: value
 
 
 def define_effect(
@@ -136,6 +151,8 @@ def define_effect(
     force_y_front: Function | None = None,
     force_y_rear: Function | None = None,
     reads: Mapping[str, Function] | None = None,
+    channels: Mapping[str, tuple[float, float]] | None = None,
+    states: Sequence[State] = (),
     equation: str = "",
     source: str = "defined by the user",
     excited_by: str = "",
@@ -158,11 +175,19 @@ def define_effect(
         Force along the car at its centre of gravity [N]; knows d.time, v_x, v_y, r, steer.
     force_y, force_y_front, force_y_rear : callable, optional
         Lateral force at the centre of gravity, or along the wheel's axis at an axle [N]; know
-        also d.F_x, alpha_f, alpha_r, F_xf, F_xr, F_zf, F_zr, F_yf, F_yr.
+        also d.F_x, alpha_f, alpha_r, F_xf, F_xr, F_zf, F_zr, F_yf, F_yr, and of each wheel
+        F_zfl, F_zfr, F_zrl, F_zrr, alpha_fl and so on, v_xfl and so on (the speed of its contact
+        along the car, which force_x knows too).
     moment_z : callable, optional
         Yaw moment [N m]; knows the same.
     reads : mapping of str to callable, optional
         What a sensor reads too much, by channel (`ay_mps2`); knows also d.a_x, a_y, r_dot.
+    channels : mapping of str to tuple of 2 floats, optional
+        Further columns of the log that functions read as `d.name`, each with the lowest and the
+        highest value one meets. Put the unit in the name. A log without one cannot be used with
+        the effect.
+    states : sequence of State
+        States of the effect's own, made by :func:`state`; functions read them as `d.name`.
     equation, source, excited_by : str
         For the lists; the equation is that of the functions unless you give another.
     twins : sequence of str
@@ -200,26 +225,48 @@ def define_effect(
         if function is not None
     }
     what = f"effect '{id}'"
-    _check_names(id, what, parameters, functions)
+    columns = dict(channels or {})
+    check_names(id, what, parameters, functions, columns, states)
     names = [p.name for p in parameters]
-    formulas = {t: trace(f, names, t, f"{what}, {t}") for t, f in functions.items()}
-    parameters, steep = _checked(what, tuple(parameters), functions)
+
+    def followed(function: Function, place: str, told: str, reads_states: bool = True) -> Formula:
+        own = [s.name for s in states] if reads_states else []
+        return trace(function, names, place, f"{what}, {told}", channels=list(columns), states=own)
+
+    formulas = {t: followed(f, t, t) for t, f in functions.items()}
+    rates = {s.name: followed(s.rate, EVERYTHING, f"rate of {s.name}") for s in states}
+    own_states = []
+    for i, s in enumerate(states):
+        rate = rates[s.name].steps
+        begins = s.initial and followed(s.initial, OUTSET, f"initial {s.name}", False).steps
+        decay = decay_of(rate, i)
+        if begins is None and decay[-1][0] == 0 and not decay[-1][2] > 0.0:
+            raise InvalidInput(
+                f"{what}: the state {s.name} does not come to rest by itself; give it an initial "
+                "value"
+            )
+        own_states.append(OwnState(s.name, s.unit, rate, decay, begins))
+    parameters, steep = checked(what, tuple(parameters), functions, columns, states)
+    equations = [f"{t} += {f.text}" for t, f in formulas.items()]
+    equations += [f"d{n}/dt = {f.text}" for n, f in rates.items()]
     made = Effect(
         id=id,
         title=title,
-        equation=equation or ", ".join(f"{t} += {f.text}" for t, f in formulas.items()),
+        equation=equation or ", ".join(equations),
         source=source,
-        excited_by=excited_by or "driving in which " + _read(formulas) + " vary",
+        excited_by=excited_by or "driving in which " + _read(formulas | rates, columns) + " vary",
         moves=", ".join(dict.fromkeys(c for t in formulas for c in _MOVES.get(t, (t,)))),
         parameters=parameters,
         index=-1,
         scored_at_typical=steep,
         needs_force=set(formulas) == {"force_x"},
-        needs=_NEEDS,
+        needs=(*_NEEDS, *columns),
         twins=tuple(twins),
         through="",
-        states=0,
+        states=len(own_states),
         acts=tuple((TARGETS.index(t), f.steps) for t, f in formulas.items()),
+        channels=tuple(columns),
+        own_states=tuple(own_states),
     )
     return register(made)
 
@@ -240,12 +287,25 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
 
     The file is a program: run only what you trust.
 
+    Parameters
+    ----------
+    path : str or Path
+        The file, or the id of an effect that an installed package defines
+        (:func:`installed_effects` lists them).
+
     Raises
     ------
     InvalidInput
         The file cannot be read, fails, or defines nothing.
+
+    Warns
+    -----
+    SysidWarning
+        If code of an installed package runs.
     """
     path = Path(path)
+    if not path.exists() and any(p.id == str(path) for p in plugins.installed_effects()):
+        return (effect(str(path)),)
     before = [*catalogue()]
     try:
         runpy.run_path(str(path))
@@ -259,84 +319,8 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
     return found
 
 
-def _check_names(
-    id_: str, what: str, parameters: Sequence[Parameter], functions: Mapping[str, Function]
-) -> None:
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", id_):
-        raise InvalidInput(f"{what}: use small letters, digits and underscores")
-    if any(e.id == id_ and not e.acts for e in catalogue()):
-        raise InvalidInput(f"{what}: the catalogue has one of this name")
-    if not functions:
-        raise InvalidInput(f"{what}: give at least one function of {', '.join(TARGETS)}")
-    unknown = [t for t in functions if t not in TARGETS]
-    if unknown:
-        raise InvalidInput(f"{what}: there is no '{unknown[0]}'; there are {', '.join(TARGETS)}")
-    if not 1 <= len(parameters) <= _core.USER_PARAMETERS:
-        raise InvalidInput(f"{what}: it must have 1 to {_core.USER_PARAMETERS} parameters")
-    names = [p.name for p in parameters]
-    if len(set(names)) < len(names):
-        raise InvalidInput(f"{what}: two parameters have the same name")
-    scanned = [i for i, p in enumerate(parameters) if p.scan]
-    if scanned and (scanned != [1] or len(parameters) != 2):
-        raise InvalidInput(f"{what}: only the second of two parameters may be scanned")
-
-
-def _checked(
-    what: str, parameters: tuple[Parameter, ...], functions: Mapping[str, Function]
-) -> tuple[tuple[Parameter, ...], bool]:
-    """Parameters that know whether a mirror turns them, and whether a slope at null is missing."""
-    rng = np.random.default_rng(0)
-    signals = {n: rng.uniform(*_RANGES[n], 200) for n in SIGNALS}
-    mirror = {n: -x if n in _LATERAL else x for n, x in signals.items()}
-    null = {p.name: p.null_value for p in parameters}
-    scanned = {p.name: p.typical for p in parameters if p.scan}
-
-    def values(at: Mapping[str, float], given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        with np.errstate(all="ignore"):
-            return {t: evaluate(f, t, given, at) for t, f in functions.items()}
-
-    for target, y in values(null | scanned, signals).items():
-        if not np.isfinite(y).all():
-            raise InvalidInput(f"{what}, {target}: it is not finite for all of brisk driving")
-        if np.any(y != 0.0):
-            at = ", ".join(f"{n} = {v:g}" for n, v in (null | scanned).items())
-            raise InvalidInput(
-                f"{what}, {target}: at the null values ({at}) it must vanish exactly, "
-                f"and is up to {np.abs(y).max():g}"
-            )
-    steep = False
-    seen = []
-    for p in parameters:
-        if p.scan:
-            seen.append(p)
-            continue
-        full = values(null | scanned | {p.name: p.typical}, signals)
-        few = values(
-            null | scanned | {p.name: p.null_value + 1e-4 * (p.typical - p.null_value)}, signals
-        )
-        size = sum(float(np.linalg.norm(y)) for y in full.values())
-        if not np.isfinite(size):
-            raise InvalidInput(
-                f"{what}: with {p.name} = {p.typical:g} it is not finite for all of brisk driving"
-            )
-        if size == 0.0:
-            raise InvalidInput(
-                f"{what}: {p.name} does nothing by itself; where it means nothing while another "
-                "is null, give it scan='range'"
-            )
-        slope = sum(float(np.linalg.norm(y)) for y in few.values()) / (1e-4 * size)
-        steep |= not 0.02 < slope < 50.0
-        turned = values(null | scanned | {p.name: p.typical}, mirror)
-        other = all(
-            np.allclose(turned[t], y if t in _TURNING else -y, rtol=1e-9, atol=1e-12)
-            for t, y in full.items()
-        )
-        seen.append(replace(p, mirrored=other))
-    return tuple(seen), steep
-
-
-def _read(formulas: Mapping[str, Formula]) -> str:
-    """Names of the signals that the formulas read."""
+def _read(formulas: Mapping[str, Formula], channels: Mapping[str, object]) -> str:
+    """Names of the signals and channels that the formulas read."""
     text = " ".join(f.text for f in formulas.values())
-    found = [s for s in SIGNALS if re.search(rf"\b{re.escape(s)}\b", text)]
+    found = [s for s in (*SIGNALS, *channels) if re.search(rf"\b{re.escape(s)}\b", text)]
     return ", ".join(found) if found else "speed and steering"

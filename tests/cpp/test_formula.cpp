@@ -101,5 +101,29 @@ TEST(UserEffects, EachAddsWhereItIsMeantTo) {
     EXPECT_EQ(w.force_x, 8.0);
 }
 
+// The integrals by the rule of Simpson, with many pieces.
+TEST(PhiWeights, AreTheirIntegrals) {
+    for (const double z : {-3.0, -0.3, 0.0, 1e-9, 0.499, 0.501, 4.0, 60.0}) {
+        const PhiWeights w(z);
+        EXPECT_DOUBLE_EQ(w.value[0], std::exp(-z));
+        constexpr int pieces = 2000;
+        double factorial = 1.0;
+        for (std::size_t n = 1; n < w.value.size(); ++n) {
+            double value = 0.0, slope = 0.0;
+            for (int i = 0; i <= pieces; ++i) {
+                const double at = static_cast<double>(i) / pieces;
+                const double weight = i == 0 || i == pieces ? 1.0 : (i % 2 == 1 ? 4.0 : 2.0);
+                const double f = weight / (3.0 * pieces) * std::exp(-z * (1.0 - at)) *
+                                 std::pow(at, static_cast<double>(n - 1)) / factorial;
+                value += f;
+                slope -= (1.0 - at) * f;
+            }
+            EXPECT_NEAR(w.value[n], value, 1e-8 * std::abs(value)) << z << ", " << n;
+            EXPECT_NEAR(w.slope[n], slope, 1e-8 * std::abs(slope)) << z << ", " << n;
+            factorial *= static_cast<double>(n);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace sysid

@@ -21,6 +21,7 @@ from sysid_vehicle.formula import SIGNALS, TARGETS, trace
 from sysid_vehicle.identify import refine
 from sysid_vehicle.model import Model
 
+CHANNEL, STATE = (_core.formula_parts()["operations"].index(n) for n in ("channel", "state"))
 WIND = [sv.parameter("gain", "N s2/m2", typical=0.6, lower=-5.0, upper=5.0)]
 
 
@@ -227,18 +228,25 @@ def test_the_core_refuses_formulas_that_read_what_is_not_there() -> None:
     data = sv.model.vehicle_data(sv.example_vehicle())
     for steps in (
         [],
-        [(0, (0, 0, 0), 1.0)] * 97,
+        [(0, (0, 0, 0), 1.0)] * 257,
         [(3, (0, 0, 0), 0.0)],
         [(1, (len(SIGNALS), 0, 0), 0.0)],
         [(2, (4, 0, 0), 0.0)],
         [(99, (0, 0, 0), 0.0)],
+        [(CHANNEL, (1, 0, 0), 0.0)],
+        [(STATE, (0, 0, 0), 0.0)],
     ):
         with pytest.raises(ValueError, match="formula"):
-            _core.SingleTrack(data, 0, True, [(0, [(0, steps)])])
+            _core.SingleTrack(data, 0, True, [(0, [3], [(0, steps)], [])])
+    one = [(0, (0, 0, 0), 1.0)]
+    with pytest.raises(ValueError, match="formula"):
+        _core.SingleTrack(data, 0, True, [(0, [99], [(0, [(CHANNEL, (0, 0, 0), 0.0)])], [])])
+    with pytest.raises(ValueError, match="more states"):
+        _core.SingleTrack(data, 0, True, [(0, [], [], [(one, one, None)] * 5)])
     with pytest.raises(ValueError, match="no such target"):
-        _core.SingleTrack(data, 0, True, [(0, [(len(TARGETS), [(0, (0, 0, 0), 1.0)])])])
+        _core.SingleTrack(data, 0, True, [(0, [], [(len(TARGETS), one)], [])])
     with pytest.raises(ValueError, match="no such place"):
-        _core.SingleTrack(data, 0, True, [(8, [])])
+        _core.SingleTrack(data, 0, True, [(8, [], [], [])])
 
 
 def test_steps_that_nothing_needs_are_left_out() -> None:

@@ -16,7 +16,7 @@ constexpr double kLostSideslip = 0.7;  // [rad]
 
 Drive simulate(const SingleTrack& model, const double* p, double dt,
                const std::vector<Reference>& references, const Driver& driver,
-               const double* disturbance, const Beginning& beginning) {
+               const double* disturbance, const Beginning& beginning, const Logged& logged) {
     Drive out;
     out.lost_at = references.size();
     const VehicleData& car = model.car;
@@ -33,6 +33,12 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
         known.resistance(beginning.v_x),
         beginning.time_s,
     };
+    const auto read_channels = [&](std::size_t k, Input& at) {
+        at.channels.fill(std::nan(""));
+        for (std::size_t i = 0; i < logged.width; ++i)
+            at.channels[i] = logged.values[k * logged.width + i];
+    };
+    read_channels(0, u);
     std::array<double, kExternals> external{};
     settle_auxiliary(model, x, external.data(), u, p);
     const std::size_t last = references.size() - 1;
@@ -61,6 +67,7 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
         Input next =
             hands.next(u, references[ahead], acceleration, {state[0], state[2], references[then]});
         next.time_s = u.time_s + dt;
+        read_channels(std::min(k + 1, last), next);
         const int substeps = std::max(fewest, substeps_for(model, p, x[0], dt));
         advance(model, x, external.data(), u, next, p, dt, substeps);
         u = next;

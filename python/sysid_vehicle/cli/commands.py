@@ -20,6 +20,7 @@ from ..errors import warn
 from ..identify import Fit, identify
 from ..log import Log
 from ..model import Model
+from ..plugins import installed_effects
 from ..read import ChannelMap, propose_channels, read_log
 from ..report import RANKING_HEAD, ranking_rows, ranking_title, summary, write_report
 from ..study import Study, improve
@@ -116,6 +117,10 @@ def _print_where(study: Study) -> None:
 def _effects(args: argparse.Namespace, heard: Warnings) -> None:
     _define(args)
     print("\n\n".join(str(e) for e in catalogue()))
+    known = {e.id for e in catalogue()}
+    others = [str(p) for p in installed_effects() if p.id not in known]
+    if others:
+        print("\nInstalled, not loaded; --define ID loads one:", *others, sep="\n  ")
 
 
 def _map(args: argparse.Namespace, heard: Warnings) -> None:
@@ -151,11 +156,12 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
 def _define(args: argparse.Namespace) -> None:
     """Run the user's files that define effects, and say so: they can do whatever the user can."""
     for path in args.define:
-        print(
-            f"sysid-vehicle: runs {path} as a Python program, with all your rights",
-            file=sys.stderr,
-            flush=True,
-        )
+        if path.exists():  # for what a package brings, `load_effects` says it
+            print(
+                f"sysid-vehicle: runs {path} as a Python program, with all your rights",
+                file=sys.stderr,
+                flush=True,
+            )
         load_effects(path)
 
 

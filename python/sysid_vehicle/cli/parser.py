@@ -99,8 +99,9 @@ def _define(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=Path,
         metavar="PY",
-        help="Python file that defines effects of your own; it is run as a program with all your "
-        "rights: give only what you trust (may be repeated)",
+        help="Python file that defines effects of your own, or the id of an effect that an "
+        "installed package defines; it is run as a program with all your rights: give only what "
+        "you trust (may be repeated)",
     )
 
 

@@ -54,6 +54,8 @@ class _Stretch:
         F_x, F_y [N] and M_z [N m] that act on the car.
     scatter : array, shape (n, 5)
         Noise of the sensors.
+    channels : array, shape (n, channels in use)
+        Columns of the log that effects of users read.
     """
 
     dt: float
@@ -63,6 +65,7 @@ class _Stretch:
     seen: np.ndarray[tuple[int, int], np.dtype[np.bool_]]
     road: FloatArray
     scatter: FloatArray
+    channels: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,6 +212,7 @@ class Replay:
                 yaw_rate,
                 float(s.steer[0] - references[0, 2]),
                 s.start_s,
+                s.channels,
             )
             if lost_at < len(s.steer):
                 raise NumericalError(
@@ -219,6 +223,7 @@ class Replay:
             if not known:
                 inputs[:, 1] = outputs[:, _A_X]
                 reading[:, _A_X] = np.nan
+            inputs = as_float64(np.column_stack([inputs, s.channels]))
             problem.add_run(s.dt, inputs, as_float64(reading), s.start_s)
         return problem
 
@@ -257,7 +262,8 @@ class Replay:
     def _stretches(self) -> tuple[_Stretch, ...]:
         fit, driving = self.fit, self.fit.driving
         rng = np.random.default_rng(self.seed)
-        inputs, measured = driving.inputs(), driving.measured
+        channels, measured = driving.channels(), driving.measured
+        inputs = as_float64(np.column_stack([driving.inputs(), channels]))
         made = []
         for log, where, at in self._windows():
             here = slice(at, at + where.stop - where.start)
@@ -278,6 +284,7 @@ class Replay:
                     np.logical_or.reduceat(np.isfinite(measured[here]), parts, axis=0),
                     self._road(n, dt, rng),
                     as_float64(scatter),
+                    as_float64(channels[here][parts]),
                 )
             )
         return tuple(made)

@@ -51,7 +51,7 @@ def sensitivities(evidence: Evidence, candidates: Sequence[Effect]) -> Sensitivi
     """
     driving = evidence.driving
     model = evidence.fit.model
-    possible = model.seated(e for e in candidates if driving.force_known or not e.needs_force)
+    possible = model.seated(e for e in candidates if driving.shows(e))
     long = duration(driving)
     ends = np.cumsum([0, *(_width(e, long) for e in possible)])
     places = {

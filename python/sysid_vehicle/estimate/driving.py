@@ -11,10 +11,12 @@ import numpy as np
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._text import brief
+from ..effects import Effect, channels_in_use
 from ..errors import InvalidInput
 from ..log import Log, several_logs
 from ..model import Model
 from ..sensors import quantum
+from .channels import check_channels, has_channels, logged_channels
 from .inputs import quiet
 
 __all__ = ["MEASURED", "UNITS", "Driving", "Stretch"]
@@ -167,6 +169,18 @@ class Driving:
             self._quiet[key] = both
         return self._quiet[key]
 
+    def channels(self) -> FloatArray:
+        """Columns that effects of users read, samples x channels in use; NaN where missing."""
+        return as_float64(
+            np.vstack([logged_channels(self.logs[s.log], s.where) for s in self.stretches])
+        )
+
+    def shows(self, effect: Effect) -> bool:
+        """Whether this driving holds the inputs without which an effect cannot be seen."""
+        if effect.needs_force and not self.force_known:
+            return False
+        return all(has_channels(self.logs[s.log], s.where, effect) for s in self.stretches)
+
     @cached_property
     def _quiet(self) -> dict[tuple[int, int, int], FloatArray]:
         return {}
@@ -186,6 +200,11 @@ class Driving:
             Of at most so many samples.
         other_inputs : array, shape (samples, 2), optional
             In place of `inputs()`.
+
+        Raises
+        ------
+        InvalidInput
+            A log lacks a column that an effect of the model reads.
         """
         problem = _core.Problem(model.core(force_known=self.force_known))
         for log, where, at in self._pieces(most_samples):
@@ -193,6 +212,9 @@ class Driving:
                 inputs = self._inputs(log, where)
             else:
                 inputs = other_inputs[at : at + where.stop - where.start]
+            if channels_in_use():
+                check_channels(log, where, model.parts)
+                inputs = np.column_stack([inputs, logged_channels(log, where)])
             y = np.full((len(inputs), len(MEASURED)), np.nan)
             for i, c in enumerate(MEASURED):
                 if log.has(c) and (self.force_known or c != "ax_mps2"):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -10,10 +11,11 @@ import numpy as np
 
 from .. import _core
 from .._arguments import generator
-from .._arrays import FloatArray
+from .._arrays import FloatArray, as_float64
 from .._text import brief
-from ..errors import NumericalError
-from ..log import Log
+from ..effects import channels_in_use
+from ..errors import InvalidInput, NumericalError
+from ..log import CHANNELS, Log
 from ..manoeuvres import Manoeuvre
 from ..model import Model
 from ._noise import RoadDisturbance, SensorNoise
@@ -24,6 +26,9 @@ if TYPE_CHECKING:
 __all__ = ["Drive", "drive", "drive_truth"]
 
 _OUTPUTS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+Channel = float | FloatArray | Callable[[FloatArray], FloatArray]
+"""A column of the log: a constant, its samples, or a function of the time of all samples [s]."""
+
 _STOPPED_MPS = 1.0  # where the core's simulator gives up
 
 
@@ -49,6 +54,8 @@ class Drive:
         Sensor readings free of noise: v_x, v_y, yaw rate, a_x, a_y.
     disturbance : ndarray, shape (n, 3)
         F_x [N], F_y [N] and M_z [N m] that acted on the car.
+    own_states : mapping of str to ndarray, shape (n,)
+        States of effects that users defined, by `effect.state`.
     """
 
     log: Log
@@ -59,6 +66,7 @@ class Drive:
     states: FloatArray
     outputs: FloatArray
     disturbance: FloatArray
+    own_states: Mapping[str, FloatArray] = field(default_factory=dict)
 
     __repr__ = brief
 
@@ -104,6 +112,7 @@ def drive_truth(
     disturbance: RoadDisturbance | None = None,
     rate_hz: float = 100.0,
     name: str | None = None,
+    channels: Mapping[str, Channel] | None = None,
 ) -> Drive:
     """Drive a model through a manoeuvre and keep what no sensor sees; parameters as :func:`drive`.
 
@@ -114,6 +123,7 @@ def drive_truth(
     rng = generator(seed)
     references = manoeuvre.references(model.vehicle, rate_hz)
     n = len(references)
+    logged = _channels(model, channels or {}, np.arange(n) / rate_hz)
     external = (disturbance or RoadDisturbance()).sample(n, rate_hz, rng)
     inputs, states, outputs, lost_at = _core.simulate(
         model.core(),
@@ -123,6 +133,7 @@ def drive_truth(
         manoeuvre.driver(model.vehicle),
         external,
         float(references[0, 0]),
+        channels=_by_number(logged, n),
     )
     if lost_at < n:
         raise NumericalError(_how_it_was_lost(manoeuvre, states[-1], lost_at / rate_hz))
@@ -137,13 +148,47 @@ def drive_truth(
         **{channel: outputs[:, i] for i, channel in enumerate(_OUTPUTS)},
         "steer_rad": inputs[:, 0],
         "fx_n": inputs[:, 1].copy(),
+        **logged,
     }
     sensors = noise if noise is not None else SensorNoise()
-    for field in fields(sensors):
-        deviation = getattr(sensors, field.name)
-        columns[field.name] = columns[field.name] + deviation * rng.standard_normal(n)
+    for f in fields(sensors):
+        deviation = getattr(sensors, f.name)
+        columns[f.name] = columns[f.name] + deviation * rng.standard_normal(n)
     log = Log.from_arrays(columns, name=name or manoeuvre.name, check=False)
-    return Drive(log, model, manoeuvre, references, inputs, states[:, :3], outputs, external)
+    names = [f"{e.id}.{s.name}" for e in model.parts for s in e.own_states]
+    own = {name: states[:, _core.USER_STATES_FROM + i] for i, name in enumerate(names)}
+    return Drive(log, model, manoeuvre, references, inputs, states[:, :3], outputs, external, own)
+
+
+def _by_number(logged: Mapping[str, FloatArray], n: int) -> FloatArray:
+    """Channels in the order of their numbers in the core; NaN for those that there are none of."""
+    columns = [logged.get(c, np.full(n, np.nan)) for c in channels_in_use()]
+    return as_float64(np.array(columns).reshape(len(columns), n).T)
+
+
+def _channels(
+    model: Model, given: Mapping[str, Channel], time_s: FloatArray
+) -> dict[str, FloatArray]:
+    """Columns that the model reads, and others that the log is to hold."""
+    for name in model.channels:
+        if name not in given:
+            reads = ", ".join(e.id for e in model.parts if name in e.channels)
+            raise InvalidInput(
+                f"the effect {reads} reads the column {name}; give channels={{'{name}': ...}}, a "
+                "number, its samples, or a function of time"
+            )
+    made = {}
+    for name, value in given.items():
+        if name in CHANNELS:
+            raise InvalidInput(f"channels: {name} is what the drive makes; give other columns")
+        values = np.asarray(value(time_s) if callable(value) else value, dtype=float)
+        if values.shape not in ((), time_s.shape) or not np.isfinite(values).all():
+            raise InvalidInput(
+                f"channels: {name} has the shape {values.shape}; give a number, or {time_s.size} "
+                "finite samples"
+            )
+        made[name] = np.broadcast_to(values, time_s.shape).astype(float)
+    return made
 
 
 def drive(
@@ -155,6 +200,7 @@ def drive(
     disturbance: RoadDisturbance | None = None,
     rate_hz: float = 100.0,
     name: str | None = None,
+    channels: Mapping[str, Channel] | None = None,
 ) -> Log:
     """Drive a model through a manoeuvre and return the log that the sensors would write.
 
@@ -174,11 +220,14 @@ def drive(
         Sample rate.
     name : str, optional
         Name of the log; the manoeuvre's if left out.
+    channels : mapping of str to float, array or callable, optional
+        Further columns, such as those that effects of users read: a number, an array of samples, or
+        a function of the time of all samples [s].
 
     Returns
     -------
     Log
-        All canonical channels.
+        All canonical channels, and the further ones.
 
     Raises
     ------
@@ -196,6 +245,7 @@ def drive(
         disturbance=disturbance,
         rate_hz=rate_hz,
         name=name,
+        channels=channels,
     ).log
 
 

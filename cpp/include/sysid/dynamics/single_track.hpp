@@ -24,6 +24,7 @@ struct Input {
     double longitudinal =
         0.0;              // total wheel force [N], or measured a_x [m/s2] where that is unknown
     double time_s = 0.0;  // since the log began
+    std::array<double, kUserChannels> channels{};  // that users' effects read
 };
 
 /// What disturbs the motion: forces and a moment, and accelerations that no accelerometer feels.
@@ -86,6 +87,7 @@ struct SingleTrack {
     void once(Workings<S>& w, const S* motion, const S* external, const Lags<S>& lags,
               const Input& u, const T* p) const {
         begin(w, motion, u, p);
+        w.user_states = lags.states() + kCatalogueStates;
         const T* q = p + kBaseParameterCount;
         const auto each = [&](auto&& visit) { for_each_active(effects, q, visit); };
         using At = std::size_t;
@@ -112,6 +114,7 @@ struct SingleTrack {
         user_forces(user, q, w);
         balance(w);
         each([&](auto e, const T* own, At at) { return e.follow(own, w, lags.from(at)); });
+        user_states(user, q, w, lags.from(kCatalogueStates));
     }
 
     template <class S, class T>
@@ -130,6 +133,9 @@ struct SingleTrack {
         w.mu_peak_f = S(p[kDFront]);
         w.mu_peak_r = S(p[kDRear]);
         w.time_s = u.time_s;
+        w.track_f = car.track_front_m;
+        w.track_r = car.track_rear_m;
+        w.channels = u.channels.data();
         w.v_x = motion[0];
         w.v_y = motion[1];
         w.r = motion[2];

@@ -22,11 +22,15 @@ template <class S>
 using ModelState = std::array<S, kModelStates>;
 
 inline Input between(const Input& a, const Input& b, double part) {
-    return {
-        a.steer_rad + part * (b.steer_rad - a.steer_rad),
-        a.longitudinal + part * (b.longitudinal - a.longitudinal),
-        a.time_s + part * (b.time_s - a.time_s),
+    const auto mix = [&](double from, double to) { return from + part * (to - from); };
+    Input mixed{
+        mix(a.steer_rad, b.steer_rad),
+        mix(a.longitudinal, b.longitudinal),
+        mix(a.time_s, b.time_s),
     };
+    for (std::size_t i = 0; i < kUserChannels; ++i)
+        mixed.channels[i] = mix(a.channels[i], b.channels[i]);
+    return mixed;
 }
 
 /// Speeds below this are treated as this in the slip angles' denominator [m/s].

@@ -35,7 +35,10 @@ constexpr std::size_t kEffectCount = std::tuple_size_v<Catalogue>;
 
 /// Which effects act: bit i stands for the i-th of the catalogue.
 using EffectMask = std::uint64_t;
-static_assert(kEffectCount <= 64);
+static_assert(kEffectCount + kUserStates <= 64);
+
+/// Bit of a mask that says that a state of users' effects takes part.
+constexpr EffectMask user_state_bit(std::size_t i) { return EffectMask{1} << (kEffectCount + i); }
 
 namespace detail {
 
@@ -88,17 +91,19 @@ constexpr std::size_t effect_state_offset(std::size_t index) {
     for (std::size_t i = 0; i < index; ++i) offset += detail::kEffectStateCounts[i];
     return offset;
 }
-/// Standard deviations of all those states when a run begins.
-constexpr std::array<double, effect_state_offset(kEffectCount)> effect_state_spreads() {
-    std::array<double, effect_state_offset(kEffectCount)> spreads{};
+constexpr std::size_t kCatalogueStates = effect_state_offset(kEffectCount);
+/// Those of users' effects stand behind.
+constexpr int kAuxiliaryStates = static_cast<int>(kCatalogueStates + kUserStates);
+
+/// Standard deviations of all those states when a run begins; users' begin where they say.
+constexpr std::array<double, kAuxiliaryStates> effect_state_spreads() {
+    std::array<double, kAuxiliaryStates> spreads{};
     std::size_t at = 0;
     for (std::size_t i = 0; i < kEffectCount; ++i)
         for (std::size_t n = 0; n < detail::kEffectStateCounts[i]; ++n)
             spreads[at++] = detail::kEffectStateSpreads[i];
     return spreads;
 }
-constexpr int kAuxiliaryStates = static_cast<int>(effect_state_offset(kEffectCount));
-
 constexpr EffectMask kReadYawAcceleration =
     detail::mask_reading_yaw_acceleration(std::make_index_sequence<kEffectCount>{});
 
@@ -161,6 +166,8 @@ inline ActiveStates active_states(EffectMask mask) {
             found.place[found.count++] = at + n;
         at += own;
     }
+    for (std::size_t i = 0; i < kUserStates; ++i)
+        if (mask & user_state_bit(i)) found.place[found.count++] = kCatalogueStates + i;
     return found;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -14,7 +15,6 @@ namespace sysid {
 /// Places for such effects behind those of the catalogue, and parameters kept for each.
 constexpr std::size_t kUserEffects = 8;
 constexpr std::size_t kUserParameters = 4;
-static_assert(kEffectCount + kUserEffects <= 64);
 
 /// What a formula adds to.
 enum class Target : std::uint8_t {
@@ -35,15 +35,24 @@ constexpr std::array<const char*, static_cast<std::size_t>(Target::kTargets)> kT
     "vx_mps",  "vy_mps",  "yaw_rate_radps", "ax_mps2",       "ay_mps2",
 };
 
-/// The first signal that is not yet known where a target is added to.
-constexpr Signal first_unknown(Target target) {
-    if (target == Target::kForceX) return Signal::kForceX;
-    return target < Target::kReadVx ? Signal::kAx : Signal::kSignals;
+/// Whether a signal is known where a target is added to.
+constexpr bool known(Signal which, Target target) {
+    if (target == Target::kForceX) return known(which) == Known::kAtOnce;
+    return target >= Target::kReadVx || known(which) != Known::kMotion;
 }
+
+/// A state of a user's effect, ds/dt = f. `decay` is -df/ds: by it the integration stays stable
+/// however quick the state is. Without `initial` a run begins where the state would rest.
+struct UserState {
+    Formula rate, decay;
+    std::optional<Formula> initial;
+};
 
 struct UserEffect {
     std::size_t slot = 0;
     std::vector<std::pair<Target, Formula>> acts;
+    std::size_t first_state = 0;  // among those of all users' effects of a model
+    std::vector<UserState> states{};
 };
 
 /// Shared by all copies of a model, and never changed.
@@ -83,6 +92,27 @@ void user_forces(const UserEffects& effects, const T* effect_parameters, Working
                                   if (target == Target::kForceYFront) w.fy_f += more;
                                   if (target == Target::kForceYRear) w.fy_r += more;
                               });
+}
+
+/// When everything is known: how the states move.
+///
+/// They are states of the filter like those of the catalogue, without noise of their own, and
+/// certain when a run begins: what is known of the motion is known of them.
+template <class S, class T>
+void user_states(const UserEffects& effects, const T* effect_parameters, const Workings<S>& w,
+                 Lags<S> lags) {
+    if (!effects) return;
+    for (const UserEffect& effect : *effects) {
+        const T* p = effect_parameters + user_offset(effect.slot);
+        for (std::size_t i = 0; i < effect.states.size(); ++i) {
+            const UserState& state = effect.states[i];
+            const std::size_t n = effect.first_state + i;
+            if (lags.settling() && state.initial)
+                lags.put(n, (*state.initial)(w, p));
+            else
+                lags.move(n, state.rate(w, p), state.decay(w, p));
+        }
+    }
 }
 
 template <class S, class T>

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "sysid/math/dual.hpp"
+#include "sysid/model/kinematics.hpp"
 #include "sysid/model/workings.hpp"
 
 namespace sysid {
@@ -40,15 +41,17 @@ enum class Operation : std::uint8_t {
     kMaximum,
     kGreater,  // 1 where the first exceeds the second, otherwise 0
     kSelect,   // the second where the first is not 0, otherwise the third
+    kChannel,  // of the log; these two are read by number, as signals and parameters are
+    kState,    // of a user's effect
     kOperations,
 };
 constexpr std::array<const char*, static_cast<std::size_t>(Operation::kOperations)> kOperationNames{
-    "constant", "signal", "parameter", "add",     "subtract", "multiply", "divide", "negative",
-    "absolute", "sign",   "sin",       "cos",     "arctan",   "arctan2",  "sqrt",   "exp",
-    "log",      "tanh",   "minimum",   "maximum", "greater",  "where",
+    "constant", "signal", "parameter", "add",     "subtract", "multiply", "divide",  "negative",
+    "absolute", "sign",   "sin",       "cos",     "arctan",   "arctan2",  "sqrt",    "exp",
+    "log",      "tanh",   "minimum",   "maximum", "greater",  "where",    "channel", "state",
 };
 
-/// What a formula may read, in the order in which the model comes to know it.
+/// What a formula may read. Files hold these numbers: what is new comes last.
 enum class Signal : std::uint8_t {
     kTime,
     kVx,
@@ -67,12 +70,57 @@ enum class Signal : std::uint8_t {
     kAx,
     kAy,
     kYawAcceleration,
+    kLoadFrontLeft,  // of the wheels: load, slip angle, speed of the contact along the car
+    kLoadFrontRight,
+    kLoadRearLeft,
+    kLoadRearRight,
+    kSlipFrontLeft,
+    kSlipFrontRight,
+    kSlipRearLeft,
+    kSlipRearRight,
+    kSpeedFrontLeft,
+    kSpeedFrontRight,
+    kSpeedRearLeft,
+    kSpeedRearRight,
     kSignals,
 };
 constexpr std::array<const char*, static_cast<std::size_t>(Signal::kSignals)> kSignalNames{
-    "time", "v_x",  "v_y",  "r",    "steer", "F_x", "alpha_f", "alpha_r", "F_xf",
-    "F_xr", "F_zf", "F_zr", "F_yf", "F_yr",  "a_x", "a_y",     "r_dot",
+    "time",     "v_x",   "v_y",   "r",     "steer", "F_x",      "alpha_f",  "alpha_r",
+    "F_xf",     "F_xr",  "F_zf",  "F_zr",  "F_yf",  "F_yr",     "a_x",      "a_y",
+    "r_dot",    "F_zfl", "F_zfr", "F_zrl", "F_zrr", "alpha_fl", "alpha_fr", "alpha_rl",
+    "alpha_rr", "v_xfl", "v_xfr", "v_xrl", "v_xrr",
 };
+
+/// When the model comes to know something: before the tyres act, with the forces of the tyres, with
+/// the motion they bring about.
+enum class Known : std::uint8_t { kAtOnce, kForces, kMotion };
+constexpr Known known(Signal which) {
+    if (which < Signal::kForceX || which >= Signal::kSpeedFrontLeft) return Known::kAtOnce;
+    const bool motion = which >= Signal::kAx && which <= Signal::kYawAcceleration;
+    return motion ? Known::kMotion : Known::kForces;
+}
+
+/// What stands at a wheel; `left` is 1 on the left, -1 on the right.
+///
+/// Each axle's own lateral force, at the height of the centre of gravity, is carried by the
+/// difference of the loads of its wheels: F_z,left = F_z / 2 - h F_y / t. How the body's roll
+/// shares it between the axles is not known.
+template <class S>
+S wheel_load(const S& load, const S& force, const Workings<S>& w, double track, double left) {
+    return 0.5 * load - (left / track) * (w.h * force);
+}
+template <class S>
+S wheel_speed(const Workings<S>& w, double track, double left) {
+    return w.v_x - (0.5 * left * track) * w.r;
+}
+template <class S>
+S front_slip(const Workings<S>& w, double left) {
+    return slip_angle(wheel_speed(w, w.track_f, left), S(w.v_y + w.l_f * w.r), w.delta);
+}
+template <class S>
+S rear_slip(const Workings<S>& w, double left) {
+    return slip_angle(wheel_speed(w, w.track_r, left), S(w.v_y - w.l_r * w.r), 0.0);
+}
 
 template <class S>
 S signal_of(const Workings<S>& w, Signal which) {
@@ -111,6 +159,30 @@ S signal_of(const Workings<S>& w, Signal which) {
             return w.a_y;
         case Signal::kYawAcceleration:
             return w.r_dot;
+        case Signal::kLoadFrontLeft:
+            return wheel_load(w.fz_f, w.fy_f, w, w.track_f, 1.0);
+        case Signal::kLoadFrontRight:
+            return wheel_load(w.fz_f, w.fy_f, w, w.track_f, -1.0);
+        case Signal::kLoadRearLeft:
+            return wheel_load(w.fz_r, w.fy_r, w, w.track_r, 1.0);
+        case Signal::kLoadRearRight:
+            return wheel_load(w.fz_r, w.fy_r, w, w.track_r, -1.0);
+        case Signal::kSlipFrontLeft:
+            return front_slip(w, 1.0);
+        case Signal::kSlipFrontRight:
+            return front_slip(w, -1.0);
+        case Signal::kSlipRearLeft:
+            return rear_slip(w, 1.0);
+        case Signal::kSlipRearRight:
+            return rear_slip(w, -1.0);
+        case Signal::kSpeedFrontLeft:
+            return wheel_speed(w, w.track_f, 1.0);
+        case Signal::kSpeedFrontRight:
+            return wheel_speed(w, w.track_f, -1.0);
+        case Signal::kSpeedRearLeft:
+            return wheel_speed(w, w.track_r, 1.0);
+        case Signal::kSpeedRearRight:
+            return wheel_speed(w, w.track_r, -1.0);
         case Signal::kSignals:
             break;
     }
@@ -127,68 +199,73 @@ struct Instruction {
 
 class Formula {
   public:
-    static constexpr std::size_t kLongest = 96;
+    static constexpr std::size_t kLongest = 256;
 
     /// Throws `std::invalid_argument` where a step reads what does not exist.
     Formula(std::vector<Instruction> steps, std::size_t parameters) : steps_(std::move(steps)) {
         if (steps_.empty() || steps_.size() > kLongest)
-            throw std::invalid_argument("formula: it must have 1 to 96 steps");
+            throw std::invalid_argument("formula: it must have 1 to 256 steps");
         for (std::size_t i = 0; i < steps_.size(); ++i) {
             const Instruction& step = steps_[i];
             if (step.operation >= Operation::kOperations)
                 throw std::invalid_argument("formula: there is no such operation");
-            const std::size_t operands = arity(step.operation);
-            for (std::size_t n = 0; n < operands; ++n)
-                if (step.from.at(n) >= i)
-                    throw std::invalid_argument("formula: a step reads a later one");
+            // Places that an operation does not read are looked up all the same.
+            if (!leaf(step.operation))
+                for (const std::size_t place : step.from)
+                    if (place >= i)
+                        throw std::invalid_argument("formula: a step reads a later one");
             const std::size_t first = step.from[0];
             if ((step.operation == Operation::kSignal &&
                  first >= static_cast<std::size_t>(Signal::kSignals)) ||
-                (step.operation == Operation::kParameter && first >= parameters))
+                (step.operation == Operation::kParameter && first >= parameters) ||
+                (step.operation == Operation::kChannel && first >= kUserChannels) ||
+                (step.operation == Operation::kState && first >= kUserStates))
                 throw std::invalid_argument("formula: it reads what there is none of");
         }
     }
 
     template <class S, class T>
     S operator()(const Workings<S>& w, const T* p) const {
-        std::array<S, kLongest> value;
+        // Most are short: places for results are set to zero each time.
+        return steps_.size() <= kShort ? result<kShort>(w, p) : result<kLongest>(w, p);
+    }
+
+  private:
+    static constexpr std::size_t kShort = 24;
+
+    template <std::size_t N, class S, class T>
+    S result(const Workings<S>& w, const T* p) const {
+        std::array<S, N> value;
         for (std::size_t i = 0; i < steps_.size(); ++i) {
             const Instruction& step = steps_[i];
-            if (step.operation == Operation::kConstant) {
-                value[i] = S(step.constant);
-            } else if (step.operation == Operation::kSignal) {
-                value[i] = signal_of(w, static_cast<Signal>(step.from[0]));
-            } else if (step.operation == Operation::kParameter) {
-                value[i] = S(p[step.from[0]]);
-            } else {
-                value[i] = apply(step.operation, value[step.from[0]], value[step.from[1]],
-                                 value[step.from[2]]);
+            const std::size_t first = step.from[0];
+            switch (step.operation) {
+                case Operation::kConstant:
+                    value[i] = S(step.constant);
+                    break;
+                case Operation::kSignal:
+                    value[i] = signal_of(w, static_cast<Signal>(first));
+                    break;
+                case Operation::kParameter:
+                    value[i] = S(p[first]);
+                    break;
+                case Operation::kChannel:
+                    value[i] = S(w.channels[first]);
+                    break;
+                case Operation::kState:
+                    value[i] = w.user_states[first];
+                    break;
+                default:
+                    value[i] = apply(step.operation, value[first], value[step.from[1]],
+                                     value[step.from[2]]);
             }
         }
         return value[steps_.size() - 1];
     }
 
-  private:
-    static std::size_t arity(Operation operation) {
-        switch (operation) {
-            case Operation::kConstant:
-            case Operation::kSignal:
-            case Operation::kParameter:
-                return 0;
-            case Operation::kAdd:
-            case Operation::kSubtract:
-            case Operation::kMultiply:
-            case Operation::kDivide:
-            case Operation::kAtan2:
-            case Operation::kMinimum:
-            case Operation::kMaximum:
-            case Operation::kGreater:
-                return 2;
-            case Operation::kSelect:
-                return 3;
-            default:
-                return 1;
-        }
+    static bool leaf(Operation operation) {
+        return operation <= Operation::kParameter || operation == Operation::kChannel ||
+               operation == Operation::kState;
     }
 
     template <class S>

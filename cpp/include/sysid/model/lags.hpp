@@ -61,6 +61,38 @@ struct LagWeights {
     }
 };
 
+/// phi_n(-z) = int_0^1 e^(-z (1 - theta)) theta^(n-1) / (n-1)! dtheta, phi_0(-z) = e^-z, with their
+/// derivatives to z; z may be zero or negative.
+struct PhiWeights {
+    std::array<double, 4> value{}, slope{};
+
+    explicit PhiWeights(double z) {
+        value[0] = std::exp(-z);
+        slope[0] = -value[0];
+        double factorial = 1.0;  // 1 / n!
+        for (std::size_t n = 1; n < value.size(); ++n) {
+            if (std::abs(z) < 0.5) {
+                series(z, static_cast<double>(n), factorial / static_cast<double>(n), n);
+            } else {
+                value[n] = (factorial - value[n - 1]) / z;
+                slope[n] = -(slope[n - 1] + value[n]) / z;
+            }
+            factorial /= static_cast<double>(n);
+        }
+    }
+
+  private:
+    // phi_n(-z) = sum_k (-z)^k / (k + n)!: the recurrence would cancel.
+    void series(double z, double n, double term, std::size_t at) {
+        for (int k = 0; k < 14; ++k) {
+            value[at] += term;
+            term /= n + k + 1;
+            slope[at] -= (k + 1) * term;
+            term *= -z;
+        }
+    }
+};
+
 inline double with_slope(const double& /*z*/, double value, double /*slope*/) { return value; }
 template <int N>
 Dual<N> with_slope(const Dual<N>& z, double value, double slope) {
@@ -172,6 +204,68 @@ class Lags {
             step_.after[n] = target;
         else
             state_rate_[n] = rate * (target - state_[n]);
+    }
+
+    bool settling() const { return stage_ == LagStage::kSettle; }
+
+    /// Where a state begins.
+    void put(std::size_t i, const S& value) { step_.after[first_ + i] = value; }
+
+    /// Moves a state by ds/dt = rate, which may depend on the state itself; `decay` is minus that
+    /// derivative. The linear part is solved exactly, the rest as Runge-Kutta does: the rule is
+    /// that one where `decay` is zero, exact where `rate` is linear in the state and quadratic in
+    /// time, and stable for any decay.
+    /// Cox & Matthews, J. Comp. Phys. 176 (2002), 430-455, eq. (26) to (29).
+    void move(std::size_t i, const S& rate, const S& decay) {
+        const std::size_t n = first_ + i;
+        const S& now = state_[n];
+        if (stage_ == LagStage::kSettle) {
+            if (value_of(decay) > 0.0) step_.after[n] = now + rate / decay;
+            return;
+        }
+        if (stage_ == LagStage::kRates) {
+            if (step_.fastest != nullptr)
+                *step_.fastest = std::max(*step_.fastest, value_of(decay));
+            state_rate_[n] = rate;
+            return;
+        }
+        if (stage_ == LagStage::kStart) step_.rate_start[n] = decay;
+        const S& c = step_.rate_start[n];
+        const S rest = rate + c * now;  // what is not the linear part
+        const S z = (0.5 * step_.h) * c;
+        const PhiWeights half(value_of(z));
+        const S phi = with_slope(z, half.value[1], half.slope[1]);
+        // The rule of the motion makes the next stage, and the end, from these.
+        if (stage_ == LagStage::kStart) {
+            step_.target_start[n] = rest;
+            state_rate_[n] = phi * rate;
+            return;
+        }
+        const S& before = step_.before[n];
+        if (stage_ == LagStage::kMiddle) {
+            step_.target_middle[n] = rest;
+            state_rate_[n] = phi * (rest - c * before);
+            return;
+        }
+        const S first = phi * (step_.target_start[n] - c * before);
+        if (stage_ == LagStage::kMiddleAgain) {
+            step_.target_again[n] = rest;
+            state_rate_[n] = phi * (rest - c * (before + (0.25 * step_.h) * first));
+            return;
+        }
+        const S& again = step_.target_again[n];
+        const S second = phi * (step_.target_middle[n] - c * before);
+        const S third = phi * (again - c * (before + (0.25 * step_.h) * first));
+        const PhiWeights whole(2.0 * value_of(z));
+        const S zz = 2.0 * z;
+        const auto weight = [&](double a, double b, double d) {
+            return with_slope(zz, a * whole.value[1] + b * whole.value[2] + d * whole.value[3],
+                              a * whole.slope[1] + b * whole.slope[2] + d * whole.slope[3]);
+        };
+        const S mean = weight(1.0, -3.0, 4.0) * step_.target_start[n] +
+                       weight(0.0, 2.0, -4.0) * (step_.target_middle[n] + again) +
+                       weight(0.0, -1.0, 4.0) * rest - weight(1.0, 0.0, 0.0) * (c * before);
+        state_rate_[n] = 6.0 * mean - first - 2.0 * (second + third);
     }
 
   private:

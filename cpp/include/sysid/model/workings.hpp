@@ -4,9 +4,16 @@
 // they are complete and not yet used. Symbols follow the equations in `single_track.hpp`.
 #pragma once
 
+#include <cstddef>
+
 #include "sysid/model/tyre.hpp"
 
 namespace sysid {
+
+/// Room for what users' formulas read beyond the model: channels of the log that they name, and
+/// states of their own.
+constexpr std::size_t kUserChannels = 8;
+constexpr std::size_t kUserStates = 4;
 
 template <class S>
 struct Workings {
@@ -39,6 +46,10 @@ struct Workings {
     // results
     S a_x, a_y;  // specific force at the centre of gravity [m/s2]
     S r_dot;     // yaw acceleration [rad/s2]
+    // what only formulas of users read
+    double track_f = 0.0, track_r = 0.0;  // [m]
+    const double* channels = nullptr;     // `kUserChannels` of the log
+    const S* user_states = nullptr;       // `kUserStates`
 };
 
 /// Measured channels, in the order of every measurement vector.

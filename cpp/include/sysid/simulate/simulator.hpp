@@ -17,6 +17,12 @@ struct Beginning {
     double time_s = 0.0;     // since the log began
 };
 
+/// Channels that users' effects read: samples x `width`, row after row.
+struct Logged {
+    const double* values = nullptr;
+    std::size_t width = 0;
+};
+
 /// Samples of a finished drive, row after row.
 struct Drive {
     std::vector<double> inputs;   // samples x (steer, force)
@@ -28,6 +34,6 @@ struct Drive {
 /// `disturbance`: samples x (F_x, F_y, M_z). The drive ends where the car is lost.
 Drive simulate(const SingleTrack& model, const double* p, double dt,
                const std::vector<Reference>& references, const Driver& driver,
-               const double* disturbance, const Beginning& beginning);
+               const double* disturbance, const Beginning& beginning, const Logged& logged = {});
 
 }  // namespace sysid
