@@ -114,6 +114,17 @@ def test_swapped_accelerations_are_found(right: sv.Log) -> None:
     found(renamed(right, names), right)
 
 
+@pytest.mark.parametrize(("unit", "factor"), [(1.0, 1.0), (1e-3, 1e3), (-1e-3, -1e3), (-1.0, -1.0)])
+def test_a_force_without_unit_is_told_by_the_mass_that_it_moves(
+    right: sv.Log, unit: float, factor: float
+) -> None:
+    data = renamed(right, {c: (c, 1.0) for c in right.channels if c != "fx_n"})
+    data["WheelForce"] = unit * right["fx_n"]
+    proposed = sv.propose_channels(data).channels["fx_n"]
+    assert (proposed.column, proposed.factor) == ("WheelForce", factor)
+    assert sv.read_log(data, sv.propose_channels(data).channel_map).has("fx_n")
+
+
 def test_canonical_names_are_taken_as_they_are(right: sv.Log) -> None:
     proposal = sv.propose_channels(right)
     assert {c: (p.column, p.factor) for c, p in proposal.channels.items()} == {

@@ -116,7 +116,8 @@ def _check_presence(names: list[str]) -> None:
         )
         raise InvalidInput(
             f"missing column{'s' if len(missing) > 1 else ''} {wanted}; rename the column, or name "
-            f"its source in a channel map (columns: {listed(names)})"
+            f"its source in a channel map, which `sysid-vehicle map` or sv.propose_channels "
+            f"proposes (columns: {listed(names)})"
         )
     name, count = Counter(names).most_common(1)[0]
     if count > 1:

@@ -39,6 +39,7 @@ _USUAL = {
 _LAW_STD = 0.15
 _WHEELBASE_M, _WHEELBASE_STD = 2.9, 0.35
 _RATIO, _RATIO_STD = 15.0, 0.25  # of steering gears
+_FORCES, _MASS_KG = (1.0, 1e3), 1300.0
 _FOLLOWS = 0.5  # cosine from which two channels are taken to go together
 _LINEAR_MPS2 = 5.0
 
@@ -78,6 +79,8 @@ def scales(
     _signs(drive, factors, notes)
     if "steer_rad" in columns:
         factors["steer_rad"] = _steer(drive, factors, stated.get("steer_rad"), notes)
+    if drive.has("fx_n", "ax_mps2"):
+        factors["fx_n"] = _force(drive, factors, stated.get("fx_n"), notes)
     return Scales(factors, notes, swapped)
 
 
@@ -115,6 +118,26 @@ def _cosine(x: FloatArray, y: FloatArray) -> float:
     x, y = x - np.median(x), y - np.median(y)
     size = float(np.linalg.norm(x) * np.linalg.norm(y))
     return float(x @ y) / size if size > 0.0 else 0.0
+
+
+def _force(
+    drive: _Windows, factors: Mapping[str, float], stated: float | None, notes: dict[str, str]
+) -> float:
+    """Newton or kilonewton, by the mass that the force moves; its sign, by the acceleration."""
+    force, ax = drive.mean("fx_n"), factors.get("ax_mps2", 1.0) * drive.mean("ax_mps2")
+    told = _cosine(force, ax)
+    if abs(told) < _FOLLOWS:
+        return 1.0 if stated is None else stated
+    factor = stated
+    if factor is None:
+        mass = _slope(force, ax)
+        factor = min(_FORCES, key=lambda f: abs(math.log(f * mass / _MASS_KG)))
+        if factor != 1.0:
+            notes["fx_n"] = "unit found by the mass that it moves"
+    if told < 0.0:
+        notes["fx_n"] = "turned round: it is positive where the car is braked"
+        return -factor
+    return factor
 
 
 def _slope(y: FloatArray, x: FloatArray) -> float:

@@ -124,7 +124,8 @@ class Recording:
         if not used:
             raise InvalidInput(
                 f"none of the channels has a name that is known, such as vx_mps; name them in a "
-                f"channel map (channels are {listed(self.entries)})"
+                f"channel map, which `sysid-vehicle map` or sv.propose_channels proposes "
+                f"(channels are {listed(self.entries)})"
             )
         groups = {self.entries[name].group for name in used}
         beside = [

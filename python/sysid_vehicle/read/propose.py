@@ -172,7 +172,7 @@ def _proposal(view: _View, chosen: dict[str, list[str]]) -> Proposal:
         elif name == channel:
             stated[channel] = 1.0
     time = first.get("time_s")
-    driven = {c: n for c, n in first.items() if c not in ("time_s", "fx_n", "vy_mps")}
+    driven = {c: n for c, n in first.items() if c not in ("time_s", "vy_mps")}
     held = view.values(list(driven.values()), time)
     factors = dict(stated)
     why: dict[str, str] = {}
