@@ -1,9 +1,6 @@
 """The command line: what it prints, what it writes, and how it fails."""
 
 import json
-import os
-import subprocess
-import sys
 import warnings
 from functools import partial
 from pathlib import Path
@@ -373,30 +370,6 @@ def test_the_process_leaves_warning_filters_as_they_were(arguments: list[str]) -
     assert warnings.showwarning is show
 
 
-def run(*argv: str, **keywords: Any) -> "subprocess.CompletedProcess[str]":
-    package = Path(sv.__file__).parents[1]
-    path = os.pathsep.join([str(package), os.environ.get("PYTHONPATH", "")])
-    return subprocess.run(
-        [sys.executable, "-m", "sysid_vehicle", *argv],
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        **keywords,
-    )
-
-
-def test_python_m_runs_the_same_program(tmp_path: Path) -> None:
-    done = run("--version")
-    assert (done.returncode, done.stdout.strip()) == (0, sv.__version__)
-    done = run("compare", "none.csv", "--vehicle", "none.toml", cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.count("\n") == 1
-    assert "Traceback" not in done.stderr
-
-
 @pytest.mark.usefixtures("one_start")
 def test_progress_stays_away_from_files(
     arguments: list[str], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
@@ -407,19 +380,3 @@ def test_progress_stays_away_from_files(
     out, err = capfd.readouterr()
     assert "\r" not in out + err
     assert "identify" not in err
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="the shell's pipes are those of Unix")
-def test_a_closed_pipe_is_no_error() -> None:
-    package = Path(sv.__file__).parents[1]
-    path = os.pathsep.join([str(package), os.environ.get("PYTHONPATH", "")])
-    done = subprocess.run(
-        ["sh", "-c", f'"{sys.executable}" -u -m sysid_vehicle effects | head -n 1'],
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.stdout.count("\n") == 1
-    assert done.stderr == ""

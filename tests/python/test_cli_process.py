@@ -1,0 +1,51 @@
+"""The command line as a process of its own."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import sysid_vehicle as sv
+
+
+def run(*argv: str, **keywords: Any) -> "subprocess.CompletedProcess[str]":
+    package = Path(sv.__file__).parents[1]
+    path = os.pathsep.join([str(package), os.environ.get("PYTHONPATH", "")])
+    return subprocess.run(
+        [sys.executable, "-m", "sysid_vehicle", *argv],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        **keywords,
+    )
+
+
+def test_python_m_runs_the_same_program(tmp_path: Path) -> None:
+    done = run("--version")
+    assert (done.returncode, done.stdout.strip()) == (0, sv.__version__)
+    done = run("compare", "none.csv", "--vehicle", "none.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the shell's pipes are those of Unix")
+def test_a_closed_pipe_is_no_error() -> None:
+    package = Path(sv.__file__).parents[1]
+    path = os.pathsep.join([str(package), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        ["sh", "-c", f'"{sys.executable}" -u -m sysid_vehicle effects | head -n 1'],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.stdout.count("\n") == 1
+    assert done.stderr == ""
