@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from . import _core, plugins
+from ._arguments import expect
 from ._arrays import FloatArray, as_float64
 from .errors import InvalidInput, near_names
 
@@ -317,6 +318,7 @@ def effect(name: str | Effect) -> Effect:
     """
     if isinstance(name, Effect):
         return name
+    expect(name, str, "effect")
     known = {**_by_id(), **_users}
     if name in known:
         return known[name]

@@ -147,6 +147,14 @@ MISTAKES: tuple[tuple[Callable[..., object], str], ...] = (
         lambda fit, lap, model: sv.axle_forces(lap, model.vehicle, sensors=fit),  # type: ignore[arg-type]
         "axle_forces: a Fit .* SensorCheck",
     ),
+    (lambda fit, lap, model: sv.export(None, "x.fmu"), "export: a NoneType .* pass a Model"),  # type: ignore[arg-type]
+    (lambda fit, lap, model: sv.casadi_function(fit), r"function: a Fit .* pass its \.model"),
+    (lambda fit, lap, model: sv.read_log(fit), "a Fit has no named columns"),
+    (lambda fit, lap, model: sv.drive(model, "lap", seed=1), "drive: a str .* Manoeuvre"),  # type: ignore[arg-type]
+    (lambda fit, lap, model: sv.drive(lap, lap, seed=1), "drive: a Log .* Model"),
+    (lambda fit, lap, model: sv.verdicts(fit), "verdicts: a Fit .* pass a Diagnosis"),
+    (lambda fit, lap, model: sv.effect(["mass"]), "effect: a list .* pass a str"),  # type: ignore[arg-type]
+    (lambda fit, lap, model: sv.check_excitation(fit), "check_excitation: a Fit"),
     (lambda fit, lap, model: fleet(model, None), "improve_many: None is no log"),
     (lambda fit, lap, model: fleet(model, {"a": None}), "a: None is no log"),
     (lambda fit, lap, model: fleet(model, [lap], validation=[lap]), "validation is a list"),

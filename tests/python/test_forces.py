@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle.cli.main import main
-from sysid_vehicle.forces import COLOURS
+from sysid_vehicle.forces import COLOURS, _motion
 from sysid_vehicle.simulate import Drive, drive_truth
 
 mpl.use("Agg")
@@ -148,3 +149,21 @@ def test_the_command(truth: Drive, tmp_path: Path, capsys: pytest.CaptureFixture
     assert "slip angle" in capsys.readouterr().out
     assert plot.read_text().startswith("<?xml")
     assert len(json.loads(figures.read_text())["lateral_n"]) > 300
+
+
+def test_many_draws_are_made_a_block_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of all at once the memory would grow with their number, and Ctrl-C would wait for them."""
+    asked: list[int] = []
+
+    def draw(count: int, rng: np.random.Generator) -> tuple[np.ndarray]:
+        asked.append(count)
+        return (rng.standard_normal((3, count)),)
+
+    plain = SimpleNamespace(motion=lambda x: x)
+    monkeypatch.setattr(_motion, "_Evaluation", lambda check, places: plain)
+    check = SimpleNamespace(estimate=SimpleNamespace(draw=draw))
+    found = np.array(list(_motion.draws(check, None, 250, 0)))  # type: ignore[arg-type, call-overload]
+    assert found.shape == (250, 3)
+    assert sum(asked) == 250
+    assert max(asked) <= 100
+    assert len(np.unique(found[:, 0])) == 250

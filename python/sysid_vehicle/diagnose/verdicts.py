@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 
+from .._arguments import expect
 from .._progress import doing
 from .._text import brief, html_table, number, with_error
 from ..effects import Effect
@@ -115,6 +116,8 @@ class Verdicts:
 
     all: tuple[EffectVerdict, ...]
 
+    __iter__ = None  # numbers are no names
+
     def __getitem__(self, effect: str) -> EffectVerdict:
         for v in self.all:
             if v.effect.id == effect:
@@ -184,6 +187,7 @@ def verdicts(dx: Diagnosis, *, seed: int = 0) -> Verdicts:
     -------
     Verdicts
     """
+    expect(dx, Diagnosis, "verdicts")
     best = dx.named
     final = dx.fit if best is None or best.fit is None else best.fit
     groups = {} if best is None else {best.id: best.indistinguishable_from}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from .._arguments import expect
 from .._files import as_path, write_bytes, write_text
 from ..errors import InvalidInput, warn
 from ..identify import Fit
@@ -51,6 +52,7 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
         cannot be written.
     """
     model = what.model if isinstance(what, Fit) else what
+    expect(model, Model, "export")
     path = as_path(path)
     suffix = path.suffix.lower()
     if suffix == ".fmu":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from .._arguments import expect
 from .._core import __version__
 from ..errors import InvalidInput
 from ..model import Model
@@ -177,6 +178,7 @@ def casadi_function(model: Model) -> Any:
     InvalidInput
         If CasADi is not installed, or the model has an effect that cannot be exported.
     """
+    expect(model, Model, "casadi_function")
     try:
         import casadi
     except ImportError as error:

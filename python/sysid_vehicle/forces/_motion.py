@@ -14,6 +14,8 @@ from ..sensors._motion import Basis, Grid, IntArray
 
 __all__ = ["Motion", "Places", "draws", "smoothed"]
 
+_AT_ONCE = 100  # draws
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -101,8 +103,10 @@ def smoothed(check: SensorCheck, places: Places) -> Motion:
 def draws(check: SensorCheck, places: Places, count: int, seed: int) -> Iterator[Motion]:
     """Motions as likely as what the sensors leave open."""
     evaluation = _Evaluation(check, places)
-    for x in check.estimate.draw(count, seed)[0].T:
-        yield evaluation.motion(as_float64(x))
+    rng = np.random.default_rng(seed)
+    for begun in range(0, count, _AT_ONCE):  # Ctrl-C is heard in between, and memory is bounded
+        for x in check.estimate.draw(min(count - begun, _AT_ONCE), rng)[0].T:
+            yield evaluation.motion(as_float64(x))
 
 
 class _Evaluation:

@@ -64,6 +64,8 @@ class Fit:
     converged: bool
     profiles: tuple[Profile, ...] = ()
 
+    __iter__ = None  # numbers are no names
+
     def __getitem__(self, name: str) -> Estimate:
         every = (*self.estimates, *self.derived)
         for e in every:

@@ -44,6 +44,10 @@ def named_columns(data: object) -> list[tuple[str, Any]]:
     InvalidInput
         If `data` has no named columns.
     """
+    none = InvalidInput(
+        f"a {type(data).__name__} has no named columns; give a dict of arrays by channel name, "
+        f"or a table (pandas, polars, Arrow)"
+    )
     if isinstance(data, np.ndarray) and data.dtype.names:
         keys: Sequence[Any] = data.dtype.names
     elif callable(getattr(data, "keys", None)):
@@ -51,11 +55,11 @@ def named_columns(data: object) -> list[tuple[str, Any]]:
     elif (names := getattr(data, "column_names", getattr(data, "columns", None))) is not None:
         keys = [str(name) for name in names]
     else:
-        raise InvalidInput(
-            f"a {type(data).__name__} has no named columns; give a dict of arrays by channel name, "
-            f"or a table (pandas, polars, Arrow)"
-        )
-    return [(str(key), data[key]) for key in keys]  # type: ignore[index]
+        raise none
+    try:
+        return [(str(key), data[key]) for key in keys]  # type: ignore[index]
+    except (LookupError, TypeError):
+        raise none from None
 
 
 def collect(data: object, notes: list[str]) -> dict[str, FloatArray]:

@@ -351,7 +351,7 @@ def check_excitation(logs: Log | Sequence[Log]) -> bool:
     SysidWarning
         If none is; the message tells how far steering and lateral acceleration went.
     """
-    together = [logs] if isinstance(logs, Log) else list(logs)
+    together = several_logs(logs, "check_excitation")
     notes = []
     for log in together:
         columns: dict[str, Any] = {name: log[name] for name in ("ay_mps2", "steer_rad")}

@@ -90,14 +90,16 @@ class Estimate:
     factor: FloatArray
     across: FloatArray
 
-    def draw(self, count: int, seed: int = 0) -> tuple[FloatArray, FloatArray]:
+    def draw(
+        self, count: int, seed: int | np.random.Generator = 0
+    ) -> tuple[FloatArray, FloatArray]:
         """Motions and faults as likely as the estimate leaves them.
 
         Parameters
         ----------
         count : int
             How many.
-        seed : int
+        seed : int or Generator
 
         Returns
         -------

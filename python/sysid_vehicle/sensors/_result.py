@@ -94,6 +94,8 @@ class SensorCheck:
         """Faults that this log cannot show."""
         return tuple(fault for fault in self.faults if not fault.told)
 
+    __iter__ = None  # numbers are no names
+
     def __getitem__(self, name: str) -> SensorFault:
         """Return a fault by its name.
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._arguments import generator
+from .._arguments import expect, generator
 from .._arrays import FloatArray, as_float64
 from .._text import brief
 from ..effects import channels_in_use
@@ -120,6 +120,8 @@ def drive_truth(
     -------
     Drive
     """
+    expect(model, Model, "drive")
+    expect(manoeuvre, Manoeuvre, "drive")
     rng = generator(seed)
     references = manoeuvre.references(model.vehicle, rate_hz)
     n = len(references)
