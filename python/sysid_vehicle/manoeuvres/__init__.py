@@ -13,6 +13,7 @@ from ._on_path import (
     straight_acceleration,
 )
 from ._open_loop import ramp_steer, sine_sweep, sine_with_dwell, step_steer
+from ._recognise import Recognised, recognise
 from ._steady import peak_lateral_mps2, steady_steer, understeer_gradient
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "Manoeuvre",
     "Pulse",
     "Pulses",
+    "Recognised",
     "Sweep",
     "all",
     "brake_in_turn",
@@ -31,6 +33,7 @@ __all__ = [
     "lap",
     "peak_lateral_mps2",
     "ramp_steer",
+    "recognise",
     "sine_sweep",
     "sine_with_dwell",
     "slalom",
