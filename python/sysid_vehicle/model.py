@@ -211,6 +211,21 @@ class Model:
         """Columns that a log must have beside the canonical ones: effects of users read them."""
         return tuple(dict.fromkeys(c for e in self.parts for c in e.channels))
 
+    def refuse_channels(self, where: str) -> None:
+        """Refuse a model that reads columns of a log where there is none.
+
+        Raises
+        ------
+        InvalidInput
+            An effect reads a column; the message names it.
+        """
+        for e in self.parts:
+            if e.channels:
+                raise InvalidInput(
+                    f"{where}: there is no log, and the effect {e.id} reads the column "
+                    f"{e.channels[0]}; drop the effect"
+                )
+
     @property
     def candidates(self) -> tuple[Effect, ...]:
         """Effects of the catalogue that could be added."""

@@ -69,6 +69,7 @@ def problem_of(
     for i, name in enumerate(MEASURED):
         if name in readings:
             y[:, i] = drive.sensed[name]
+    model.refuse_channels("the laboratory")
     problem = _core.Problem(model.core())
     problem.add_run(1.0 / drive.setup.rate_hz, inputs, as_float64(y))
     return problem

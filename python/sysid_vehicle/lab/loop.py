@@ -253,6 +253,7 @@ def run_closed_loop(
     setup = setup if setup is not None else Setup.default()
     rng = generator(seed)
     model = setup.plant
+    model.refuse_channels("the laboratory")
     wanted = excitation.wanted(model.vehicle, setup.rate_hz)
     n = len(wanted)
     if normal is None:
