@@ -191,8 +191,10 @@ void SideslipDual::weigh() {
 }
 
 std::size_t SideslipDual::likeliest() const {
-    const auto most = std::max_element(weights_.begin(), weights_.end());
-    return static_cast<std::size_t>(most - weights_.begin());
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < kMembers; ++i)
+        if (weights_[i] > weights_[best]) best = i;
+    return best;
 }
 
 double SideslipDual::mean_of(int state) const {
