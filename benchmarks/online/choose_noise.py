@@ -9,8 +9,9 @@ deviations, and every cell of simulator and drive counts alike. The search is an
 with one parent and one child over the logarithms of the settings. It prints every step that
 improved the score, and at the end the settings.
 
-The defaults came from two passes: 60 trials on cars 0 and 1, whose result is `START`, and the one
-that this program repeats.
+The defaults began with two passes for one tyre filter in place of three (60 trials on cars 0 and 1,
+45 on cars 1, 3 and 4). Those of the three, with `START`, were set by hand on cars of the seeds 50
+and 51 of the same draw, with an eye on the published logs and on failing sensors.
 """
 
 import argparse
@@ -25,16 +26,18 @@ import numpy as np
 
 from sysid_vehicle.online import SideslipSettings, cornering_stiffness, estimate_sideslip
 
-# What the first pass found.
+# Where the search begins: the defaults.
 START = {
-    "roll_expected": 0.03023,
-    "roll_share": 0.0373,
-    "error_load": 0.001777,
-    "yaw_walk_radps": 0.03,
-    "sideslip_walk_rad": 0.0003348,
-    "stiffness_prior": 0.3332,
-    "stiffness_walk": 0.0002743,
-    "friction_prior": 0.2175,
+    "roll_expected": 0.045,
+    "roll_share": 0.05,
+    "error_load": 0.003,
+    "error_curve": 0.06,
+    "error_slip_rad": 0.0004,
+    "yaw_walk_radps": 0.02,
+    "sideslip_walk_rad": 0.0003,
+    "stiffness_prior": 0.4,
+    "stiffness_walk": 0.0003,
+    "friction_prior": 0.1,
 }
 # What these simulators cannot tell. Their tyres are Magic Formulas, as the observer's are: with
 # 0.036 of the lateral force and 0.04 of the grip that braking takes, over 0.09 s, which the search
@@ -50,8 +53,8 @@ KNOWN = {
     "error_time_s": 0.25,
     "error_drive": 0.05,
     "friction_time_s": 50.0,
-    "relaxation_m": 0.5,
-    "relaxation_std": 0.3,
+    "relaxation_m": 0.3,
+    "relaxation_std": 0.6,
 }
 MOST_SQUARED = 16.0
 LENGTH_S = 22.0  # of each drive; the rest costs time and tells little more

@@ -128,7 +128,7 @@ TEST(Covariances, OfTheSideslipObservers) {
         of_an_observer(SideslipUkf<Method::kExtended>(observed_car(), s, false), kSteps / 5);
         of_an_observer(SideslipUkf<Method::kUnscented>(observed_car(), s, false), kSteps / 5);
         of_an_observer(SideslipUkf<Method::kSquareRoot>(observed_car(), s, false), kSteps / 5);
-        of_an_observer(SideslipDual(observed_car(), s), kSteps / 15);
+        of_an_observer(SideslipDual(observed_car(), s), kSteps / 45);  // three filters each
     }
 }
 

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
+#include <vector>
 
 #include "sysid/online/cornering_rls.hpp"
 #include "sysid/online/published_dual.hpp"
@@ -77,6 +79,35 @@ TEST(SideslipObservers, TheDualDoubtsASideslipThatOnlyTheTyresTellOf) {
     for (int k = 0; k < 1000; ++k) out = dual.step(0.01, corner.sample());
     EXPECT_LT(std::abs(out.beta_rad - corner.beta), 2.0 * out.beta_std_rad);
     EXPECT_GT(out.beta_std_rad, 0.3 * std::abs(corner.beta));
+}
+
+/// 20 s straight on: the noise of the sensors, and `shift` [m/s2] of lateral acceleration that
+/// comes and goes with no steering.
+std::vector<SideslipEstimate> straight_on(double shift) {
+    const ObserverSettings settings;
+    SideslipDual dual(car(), settings);
+    std::mt19937 random(1);
+    std::normal_distribution<double> noise;
+    std::vector<SideslipEstimate> out;
+    for (int k = 0; k < 2000; ++k) {
+        const double ay = k / 30 % 2 == 0 ? shift : -shift;
+        const double r = settings.yaw_rate_radps * noise(random);
+        const double ax = settings.ax_mps2 * noise(random);
+        out.push_back(dual.step(0.01, {0.0, 20.0, r, ax, ay + settings.ay_mps2 * noise(random)}));
+    }
+    return out;
+}
+
+TEST(SideslipObservers, AStraightTeachesNoStiffness) {
+    // Slip that is estimated from noise says nothing of tyres.
+    const auto run = straight_on(0.0);
+    EXPECT_NEAR(run.back().cf_npr / run.front().cf_npr, 1.0, 0.05);
+    EXPECT_NEAR(run.back().cr_npr / run.front().cr_npr, 1.0, 0.05);
+    EXPECT_GT(run.back().cf_std_npr, 0.9 * ObserverSettings().stiffness_prior * run.back().cf_npr);
+}
+
+TEST(SideslipObservers, TheBandIsWiderForACarThatDepartsFromTheModel) {
+    EXPECT_GT(straight_on(0.2).back().beta_std_rad, 4.0 * straight_on(0.0).back().beta_std_rad);
 }
 
 TEST(SideslipObservers, AFrozenSensorIsLeftOut) {

@@ -28,7 +28,8 @@ _LEARNT = (
     "road_mps2", "road_time_s", "roll_expected", "roll_share", "roll_time_s", "error_load",
     "error_lateral", "error_braking", "error_drive", "error_time_s", "yaw_walk_radps",
     "sideslip_walk_rad", "stiffness_prior", "stiffness_walk", "friction_prior",
-    "friction_time_s", "relaxation_m", "relaxation_std", "yaw_rate_radps", "ay_mps2",
+    "friction_time_s", "relaxation_m", "relaxation_std", "error_curve", "error_slip_rad",
+    "yaw_rate_radps", "ay_mps2",
 )  # fmt: skip
 _FIRST_STEP, _WIDEN, _NARROW = 0.7, 1.15, 0.96  # of the logarithms
 

@@ -83,7 +83,7 @@ struct ObserverSettings {
     // share of it that it feels too much, by gravity in body roll: expected, standard deviation,
     // delay
     double road_mps2 = 0.02, road_time_s = 10.0;
-    double roll_expected = 0.03, roll_share = 0.05, roll_time_s = 0.1;
+    double roll_expected = 0.045, roll_share = 0.05, roll_time_s = 0.1;
     // lateral axle forces as observer A lets them change, as a share of the load
     double force_walk = 1.0;
     // error of the tyre model, as a share of load, lateral force, and grip lost to braking
@@ -95,8 +95,11 @@ struct ObserverSettings {
     // logarithm of the tyre's numbers: stiffness is uncertain at first and changes in hard driving,
     // friction changes with the road and comes back
     double stiffness_prior = 0.4, stiffness_walk = 0.0003;
-    double friction_prior = 0.05, friction_time_s = 50.0;
-    double relaxation_m = 0.5, relaxation_std = 0.3;  // of both axles, and of its logarithm
+    double friction_prior = 0.1, friction_time_s = 50.0;
+    double relaxation_m = 0.3, relaxation_std = 0.6;  // of both axles, and of its logarithm
+    // what the observer cannot learn of the tyres: error of their curve, share of the slip, and of
+    // the slip without force; lateral force over load up to which slip tells less of the stiffness
+    double error_curve = 0.06, error_slip_rad = 0.0004, learning_use = 0.2;
     // gate, frozen sensors, low speed
     double gate_probability = 1e-6, gate_patience_s = 3.0, frozen_after_s = 0.2;
     double stop_below_mps = 3.0, go_above_mps = 4.0;

@@ -1,0 +1,103 @@
+// Observer B of the dual sideslip observer: the car on tyres that are known only roughly.
+//
+// State: beta, r, both slip angles behind their relaxation length, and what is uncertain of the
+// tyres: stiffness, grip, an error of the force for each axle, and the relaxation length; of the
+// road, of body roll, and of the yaw moment by drive and brakes (a locking differential makes one
+// as large as a tenth of the tyres'). It reads r and a_y.
+#pragma once
+
+#include "sysid/estimate/filter.hpp"
+#include "sysid/online/sensor_watch.hpp"
+#include "sysid/online/tyre_forces.hpp"
+
+namespace sysid {
+
+struct TyreModel {  // observer B
+    // Stiffness and grip are logarithms of what the tyre of the vehicle file is multiplied by;
+    // errors are in units of their standard deviation.
+    enum State {
+        kBeta,
+        kYawRate,
+        kSlipF,
+        kSlipR,
+        kStiffF,
+        kStiffR,
+        kGripF,
+        kGripR,
+        kRelax,  // logarithm of what the relaxation length is multiplied by
+        kRoll,   // share of `kLean` that the accelerometer feels too much, by gravity in body roll
+        kRoad,   // lateral acceleration that moves the car and that no accelerometer feels
+        kErrorF,
+        kErrorR,
+        kDrive,  // yaw moment of wheels that drive or brake unlike left and right
+        kLean,   // lateral acceleration that the body has rolled with by now
+    };
+    static constexpr int kStates = 15;
+    // What is learnt of the car and outlives a stop.
+    static constexpr int kLearnt = kStiffF, kLearntStates = kRoll - kStiffF + 1;
+    static constexpr int kMeasured = 2;  // r, a_y
+    struct Input {
+        double dt = 0.0;
+        double steer = 0.0, steer_before = 0.0;  // now and at the sample before
+        double vx = 1.0, vx_before = 1.0;
+        double ax = 0.0, ax_before = 0.0;
+        AxleForces loads{};
+        double error_f_n = 0.0, error_r_n = 0.0;  // standard deviation of the tyre model's error
+        double drive_nm = 0.0;                    // standard deviation of that yaw moment
+        double stiffness_walk_f = 0.0, stiffness_walk_r = 0.0;  // [1/sqrt(s)]
+        double slip_f_walk = 0.0;  // of an unknown steering angle [rad/sqrt(s)]
+    };
+
+    ObservedCar car;
+    ObserverSettings settings;
+
+    template <class S>
+    void forces(const Input& u, const S* x, S& front, S& rear) const;
+    template <class S>
+    void predict(const Input& u, const S* x, S* next) const;
+    template <class S>
+    void observe(const Input& u, const S* x, S* y) const;
+    Mat<15, 15> process_noise(const Input& u) const;
+    Mat<2, 2> measurement_noise(const Input& u) const;
+};
+
+/// One observer B: a filter, and what it makes of its innovations.
+class TyreObserver {
+  public:
+    TyreObserver(const ObservedCar& car, const ObserverSettings& settings);
+
+    /// Begins from a steady corner; what was learnt of the tyres stays, unless the readings refute
+    /// it. `common` holds the inputs at this sample.
+    void start(double dt, const SensorSample& s, const TyreModel::Input& common);
+    /// Uses one sample; `common` holds the inputs that do not depend on the tyres.
+    void step(const TyreModel::Input& common, const SensorSample& s);
+    bool lost() const;
+    /// Goes on with the estimate of another.
+    void adopt(const TyreObserver& other);
+    /// Log density of the last sample; a refused reading counts as one at the bound of the gate.
+    double log_likelihood() const { return log_likelihood_; }
+    const Filter<TyreModel>& filter() const { return filter_; }
+    const TyreModel::Input& input() const { return input_; }
+    void forces(double& front, double& rear) const;
+    /// Variance of the sideslip, with that of the error of the tyre curve.
+    double sideslip_variance() const;
+
+    template <class Row>
+    void remember(Row& row) {
+        row(filter_, input_, contradiction_, log_likelihood_);
+    }
+
+  private:
+    bool refuted() const;
+    void learn_less(double use_f, double use_r);
+
+    ObservedCar car_;
+    ObserverSettings settings_;
+    Filter<TyreModel> filter_;
+    TyreModel::Input input_;
+    double contradiction_ = 1.0;  // squared innovations over their variance, of the last while
+    double log_likelihood_ = 0.0;
+    double refusal_ = 0.0;  // what a refused reading takes from it
+};
+
+}  // namespace sysid
