@@ -1,6 +1,7 @@
 // Prediction errors with frozen gains, and their derivatives.
 #include "helpers.hpp"
 #include "sysid/identify/prediction_error.hpp"
+#include "sysid/identify/run_system.hpp"
 
 namespace sysid::test {
 namespace {
@@ -91,6 +92,16 @@ TEST(PredictionError, ResidualsAreTheFiltersWhitenedInnovations) {
         // White: about one per measured element, near the truth.
         EXPECT_NEAR(e.squaredNorm() / static_cast<double>(there), 1.0, 0.25);
     }
+}
+
+TEST(PredictionError, ObservationHasNoPlaceThatNothingWrites) {
+    const Problem problem = two_runs(kAllEffects);
+    const Parameters p = typical_parameters();
+    const RunSystem<kStatesMost> system(problem.model, problem.runs[0], p.data(), ordinary_noise());
+    Mat<kChannels, kStatesMost> H;
+    H.setConstant(std::nan(""));
+    EXPECT_TRUE(system.observe(0, system.initial_mean(), H).allFinite());
+    EXPECT_TRUE(H.allFinite());
 }
 
 class Sensitivities : public testing::TestWithParam<std::pair<EffectMask, bool>> {};

@@ -98,7 +98,7 @@ TEST(Step, LagsOfAnySizeNeedNoShorterSteps) {
 
 TEST(Step, LagWeightsAreTheIntegralsTheyClaimToBe) {
     for (double z : {-0.3, 1e-9, 0.01, 0.4999, 0.5001, 3.0, 80.0, 1e5}) {
-        const LagWeights w(z);
+        const LagWeights<double> w(z);
         EXPECT_NEAR(w.kept, std::exp(-z), 1e-15);
         EXPECT_NEAR(w.J0, 1.0 - std::exp(-z), 1e-13);
         if (z < 100.0) {
@@ -115,7 +115,7 @@ TEST(Step, LagWeightsAreTheIntegralsTheyClaimToBe) {
             EXPECT_NEAR(w.J2, sum[2], 1e-10) << z;
         }
         const double step = 1e-4 * std::max(std::abs(z), 1e-3);
-        const LagWeights up(z + step), down(z - step);
+        const LagWeights<double> up(z + step), down(z - step);
         EXPECT_NEAR(w.J1_slope, (up.J1 - down.J1) / (2.0 * step), 1e-7) << z;
         EXPECT_NEAR(w.J2_slope, (up.J2 - down.J2) / (2.0 * step), 1e-7) << z;
     }

@@ -43,7 +43,7 @@ NUMERICAL = {
         "_RATE_HZ", "_WINDOW_S", "_LOOKS", "_ROUNDS", "_BENDS", "_AS_GOOD",
     },
     "diagnose/refits.py": {"_BEYOND"},
-    "diagnose/score.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
+    "diagnose/score.py": {"_BLOCK_S", "_FEWEST_BLOCKS", "_ROWS"},
     "diagnose/sensitivity.py": {"_AT_ONCE"},
     "diagnose/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},
     "study/validation.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED", "_AHEAD"},

@@ -1,5 +1,7 @@
 #include "sysid/lab/tyre_fit.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "sysid/identify/least_squares.hpp"
@@ -22,14 +24,21 @@ void TyreLoss::add(const TyreSample& s) {
     const double per_mass = s.a_y_weight / car_.mass_kg;
     const double per_inertia = s.yaw_weight / car_.yaw_inertia_kgm2;
     const double front = cosine * s.fz_front_n;
-    rows_.push_back({
-        slip_angles(speed, s.v_y, s.r, car_.lf_m, car_.lr_m, s.steer_rad),
-        {per_mass * front, per_mass * s.fz_rear_n},
-        {per_inertia * car_.lf_m * front, -per_inertia * car_.lr_m * s.fz_rear_n},
-        {s.a_y_weight * s.v_x * s.v_x, s.a_y_weight * s.v_y, s.a_y_weight * s.r},
-        s.a_y_weight * s.a_y,
-        s.yaw_weight * s.yaw_acceleration,
-    });
+    const Axles<double> alpha = slip_angles(speed, s.v_y, s.r, car_.lf_m, car_.lr_m, s.steer_rad);
+    const std::size_t i = samples_++ % kLanes;
+    if (i == 0) blocks_.push_back({});
+    CurveSamples& to = blocks_.back();
+    to.alpha[0].at[i] = alpha.front;
+    to.alpha[1].at[i] = alpha.rear;
+    to.first[0].at[i] = per_mass * front;
+    to.first[1].at[i] = per_mass * s.fz_rear_n;
+    to.second[0].at[i] = per_inertia * car_.lf_m * front;
+    to.second[1].at[i] = -per_inertia * car_.lr_m * s.fz_rear_n;
+    to.rest[0].at[i] = s.a_y_weight * s.v_x * s.v_x;
+    to.rest[1].at[i] = s.a_y_weight * s.v_y;
+    to.rest[2].at[i] = s.a_y_weight * s.r;
+    to.reading[0].at[i] = s.a_y_weight * s.a_y;
+    to.reading[1].at[i] = s.yaw_weight * s.yaw_acceleration;
 }
 
 void residuals(const TyreLoss& loss, const double* p, std::nullptr_t /*filter*/, double* out) {
@@ -37,7 +46,7 @@ void residuals(const TyreLoss& loss, const double* p, std::nullptr_t /*filter*/,
 }
 
 double half_sum_of_squares(const TyreLoss& loss, const double* p, std::nullptr_t /*filter*/) {
-    return half_sum_of(walk_of(loss), p);
+    return loss.squares(p, 0, nullptr, nullptr);
 }
 
 void sensitivities(const TyreLoss& loss, const double* p, std::nullptr_t /*filter*/,
@@ -47,8 +56,24 @@ void sensitivities(const TyreLoss& loss, const double* p, std::nullptr_t /*filte
 
 double normal_equations(const TyreLoss& loss, const double* p, std::nullptr_t /*filter*/,
                         const std::vector<int>& columns, double* gradient, double* information) {
-    return kPasses.normal_equations(walk_of(loss), p, 2 * loss.samples(), columns, gradient,
-                                    information);
+    // Nothing else has a part in it.
+    const auto sought = [](int c) { return c < kCurveParameters; };
+    const bool rest =
+        std::any_of(columns.begin(), columns.end(), [&](int c) { return c >= kP1 && sought(c); });
+    std::array<double, kCurveParameters> slope{};
+    std::array<double, kCurveParameters * kCurveParameters> squares{};
+    const double half =
+        loss.squares(p, rest ? kCurveParameters : kP1, slope.data(), squares.data());
+    const std::size_t n = columns.size();
+    for (std::size_t i = 0; i < n; ++i) {
+        gradient[i] = sought(columns[i]) ? slope[static_cast<std::size_t>(columns[i])] : 0.0;
+        for (std::size_t j = 0; j < n; ++j) {
+            const int a = std::max(columns[i], columns[j]), b = std::min(columns[i], columns[j]);
+            information[i * n + j] =
+                sought(a) ? squares[static_cast<std::size_t>(a * kCurveParameters + b)] : 0.0;
+        }
+    }
+    return half;
 }
 
 }  // namespace sysid::lab

@@ -20,7 +20,7 @@ __all__ = ["FORCES", "READINGS", "TARGETS", "Evidence", "Solution"]
 FORCES = {"F_x": 0, "F_y": 1, "M_z": 2}
 READINGS = {"r": 7, "a_x": 8, "a_y": 9}
 TARGETS = {**FORCES, **READINGS}
-_AT_ONCE = 8  # columns that the core differentiates in one pass
+_AT_ONCE = 16  # columns of one pass
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,6 +33,7 @@ from .sensitivity import duration, sensitivities
 __all__ = ["Score", "ScoreBoard", "score_board", "score_board_of"]
 
 _BLOCK_S, _FEWEST_BLOCKS = 0.5, 24
+_ROWS = 5 * 512  # of residuals at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,11 +157,15 @@ def score_board_of(
     e = evidence.left
     if not found.candidates:
         return ScoreBoard((), {}, e, np.empty(0), np.empty((0, 0)), np.empty((0, 0)))
-    # All at once and in place: most of the work is in passing over as many numbers.
+    # In place and by pieces that stay in the cache: most of the work is in passing over as many
+    # numbers.
     R = found.columns
     copied = evidence.basis.T @ R
-    R -= evidence.basis @ copied
-    information = R.T @ R
+    information = np.zeros((R.shape[1], R.shape[1]))
+    for first in range(0, len(R), _ROWS):
+        piece = R[first : first + _ROWS]
+        piece -= evidence.basis[first : first + _ROWS] @ copied
+        information += piece.T @ piece
     after = np.diag(information)
     before = after + np.einsum("ij,ij->j", copied, copied)
     visible: list[tuple[Effect, float, slice]] = []
@@ -172,7 +177,10 @@ def score_board_of(
             visible.append((effect, retained, slice(len(kept), len(kept) + own.stop - own.start)))
             kept += list(range(own.start, own.stop))
     if len(kept) < R.shape[1]:
-        R, information = R[:, kept], information[np.ix_(kept, kept)]
+        for first in range(0, len(R), _ROWS):
+            piece = R[first : first + _ROWS]
+            piece[:, : len(kept)] = piece[:, kept]
+        R, information = R[:, : len(kept)], information[np.ix_(kept, kept)]
     S = R.T @ e
     covariance = np.zeros_like(information)
     for *_, own in visible:

@@ -70,19 +70,29 @@ def _gauss_newton(
     tolerance: float,
 ) -> Outcome:
     """Levenberg-Marquardt whose every step is the best one within the box."""
+
+    def linearised(x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        return problem.normal_equations(_filled(p, box, x), frozen, box.columns)
+
+    def cost_of(x: FloatArray) -> float:
+        return problem.half_sum_of_squares(_filled(p, box, x), frozen)
+
     x = np.clip(p[box.columns], box.lower, box.upper)
-    cost, gradient, information = problem.normal_equations(_filled(p, box, x), frozen, box.columns)
+    cost, gradient, information = linearised(x)
     damping = 1e-3
     for _ in range(rounds):
         if not np.isfinite(cost):
             return Outcome(x, np.inf, False)
         gained, begin = 0.0, x
-        for _ in range(10):
+        there = None
+        for attempt in range(10):
             trial, _ = stride(begin, gradient, information, damping, box)
-            trial_cost = problem.half_sum_of_squares(_filled(p, box, trial), frozen)
+            # Most first steps are taken: the derivatives there cost as much again as the value.
+            ahead = linearised(trial) if attempt == 0 else None
+            trial_cost = cost_of(trial) if ahead is None else ahead[0]
             if trial_cost < cost:
                 gained = cost - trial_cost
-                x, cost = trial, trial_cost
+                x, cost, there = trial, trial_cost, ahead
                 damping = max(damping / 8.0, _LEAST_DAMPING)
                 break
             damping *= 6.0
@@ -92,13 +102,11 @@ def _gauss_newton(
             # Where parameters copy each other damping makes steps short, and a small gain is no
             # end: the whole step has to gain as little.
             whole, _ = stride(begin, gradient, information, _LEAST_DAMPING, box)
-            whole_cost = problem.half_sum_of_squares(_filled(p, box, whole), frozen)
+            whole_cost = cost_of(whole)
             if not whole_cost < cost - tolerance:
                 return Outcome(x, cost, True)
-            x, cost, damping = whole, whole_cost, _LEAST_DAMPING
-        cost, gradient, information = problem.normal_equations(
-            _filled(p, box, x), frozen, box.columns
-        )
+            x, cost, damping, there = whole, whole_cost, _LEAST_DAMPING, None
+        cost, gradient, information = linearised(x) if there is None else there
     return Outcome(x, cost, False)
 
 

@@ -19,13 +19,16 @@
 namespace sysid {
 
 /// What the driver does, at one instant.
-struct Input {
-    double steer_rad = 0.0;
-    double longitudinal =
-        0.0;              // total wheel force [N], or measured a_x [m/s2] where that is unknown
-    double time_s = 0.0;  // since the log began
-    std::array<double, kUserChannels> channels{};  // that users' effects read
+template <class V>
+struct InputOf {
+    V steer_rad{};
+    V longitudinal{};  // total wheel force [N], or measured a_x [m/s2] where that is unknown
+    V time_s{};        // since the log began
+    std::array<V, kUserChannels> channels{};  // that users' effects read
 };
+using Input = InputOf<double>;
+template <class S>
+using InputFor = InputOf<Given<S>>;
 
 /// What disturbs the motion: forces and a moment, and accelerations that no accelerometer feels.
 enum External : int { kForceX, kForceY, kMomentZ, kGravityX, kGravityY, kExternals };
@@ -48,12 +51,12 @@ struct SingleTrack {
     /// Evaluates (1) to (5). `motion` = v_x, v_y, r; `external` = disturbance, see `External`;
     /// `lags` = how the auxiliary states move; `rate` receives the derivatives of the motion.
     template <class S, class T>
-    Workings<S> evaluate(const S* motion, const S* external, const Lags<S>& lags, const Input& u,
-                         const T* p, S* rate) const;
+    Workings<S> evaluate(const S* motion, const S* external, const Lags<S>& lags,
+                         const InputFor<S>& u, const T* p, S* rate) const;
 
     /// The same with the derivatives of the auxiliary states `aux`.
     template <class S, class T>
-    Workings<S> evaluate(const S* motion, const S* external, const S* aux, const Input& u,
+    Workings<S> evaluate(const S* motion, const S* external, const S* aux, const InputFor<S>& u,
                          const T* p, S* rate, S* aux_rate) const {
         for (int i = 0; i < kAuxiliaryStates; ++i) aux_rate[i] = S(0.0);
         return evaluate(motion, external, Lags<S>(LagStage::kRates, aux, aux_rate), u, p, rate);
@@ -85,7 +88,7 @@ struct SingleTrack {
     // `w.r_dot` is the yaw acceleration as far as it is known.
     template <class S, class T>
     void once(Workings<S>& w, const S* motion, const S* external, const Lags<S>& lags,
-              const Input& u, const T* p) const {
+              const InputFor<S>& u, const T* p) const {
         begin(w, motion, u, p);
         w.user_states = lags.states() + kCatalogueStates;
         const T* q = p + kBaseParameterCount;
@@ -118,7 +121,7 @@ struct SingleTrack {
     }
 
     template <class S, class T>
-    void begin(Workings<S>& w, const S* motion, const Input& u, const T* p) const {
+    void begin(Workings<S>& w, const S* motion, const InputFor<S>& u, const T* p) const {
         w.m = S(car.mass_kg);
         w.I_z = S(p[kYawInertia]);
         w.l_f = S(car.lf_m);
@@ -140,8 +143,8 @@ struct SingleTrack {
         w.v_y = motion[1];
         w.r = motion[2];
         w.delta = S(u.steer_rad);
-        w.fx = S(force_known ? u.longitudinal : 0.0);
-        w.ax_input = S(force_known ? 0.0 : u.longitudinal);
+        w.fx = force_known ? S(u.longitudinal) : S(0.0);
+        w.ax_input = force_known ? S(0.0) : S(u.longitudinal);
         w.grip_f = w.grip_r = S(1.0);
     }
 
@@ -179,7 +182,7 @@ struct SingleTrack {
             pull = w.m * w.ax_input;
             const S front = w.fz0_f - lever * pull;
             const S along = pull - w.force_x + front * (mu_f * s);  // F_xf cos(delta) + F_xr
-            const S& share = front_share(w, along);
+            const S share = front_share(w, along);
             w.fx = along / (share * c + (1.0 - share));
             split_force(w);
         }
@@ -188,13 +191,13 @@ struct SingleTrack {
     }
 
     template <class S>
-    static const S& front_share(const Workings<S>& w, const S& force) {
-        return value_of(force) < 0.0 ? w.brake_front : w.drive_front;
+    static S front_share(const Workings<S>& w, const S& force) {
+        return if_below(force, 0.0, w.brake_front, w.drive_front);
     }
 
     template <class S>
     static void split_force(Workings<S>& w) {
-        const S& front = front_share(w, w.fx);
+        const S front = front_share(w, w.fx);
         w.fx_f = front * w.fx;
         w.fx_r = (1.0 - front) * w.fx;
     }
@@ -216,7 +219,7 @@ struct SingleTrack {
 
 template <class S, class T>
 Workings<S> SingleTrack::evaluate(const S* motion, const S* external, const Lags<S>& lags,
-                                  const Input& u, const T* p, S* rate) const {
+                                  const InputFor<S>& u, const T* p, S* rate) const {
     // An accelerometer beside the centre of gravity makes the measured a_x, which stands for
     // the force, depend on the yaw acceleration it brings about. Each pass shrinks the error
     // by l_y dr/dt per a_x, a few hundredths.

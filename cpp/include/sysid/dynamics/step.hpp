@@ -21,9 +21,10 @@ constexpr int kModelStates = kMotionStates + kAuxiliaryStates;
 template <class S>
 using ModelState = std::array<S, kModelStates>;
 
-inline Input between(const Input& a, const Input& b, double part) {
-    const auto mix = [&](double from, double to) { return from + part * (to - from); };
-    Input mixed{
+template <class V>
+InputOf<V> between(const InputOf<V>& a, const InputOf<V>& b, double part) {
+    const auto mix = [&](const V& from, const V& to) { return from + part * (to - from); };
+    InputOf<V> mixed{
         mix(a.steer_rad, b.steer_rad),
         mix(a.longitudinal, b.longitudinal),
         mix(a.time_s, b.time_s),
@@ -85,10 +86,11 @@ struct NoLags {
 /// One Runge-Kutta step of the motion. Lags move by their exact solution between the targets of its
 /// stages, slow states with the motion.
 template <class S, class T, class Memory>
-void model_step(const SingleTrack& model, ModelState<S>& x, const S* external, const Input& from,
-                const Input& to, const T* p, double h, const ActiveStates& own, Memory& memory) {
+void model_step(const SingleTrack& model, ModelState<S>& x, const S* external,
+                const InputFor<S>& from, const InputFor<S>& to, const T* p, double h,
+                const ActiveStates& own, Memory& memory) {
     const LagStep<S> lags = memory.begin(x, h);
-    const std::array<Input, 3> input{from, between(from, to, 0.5), to};
+    const std::array<InputFor<S>, 3> input{from, between(from, to, 0.5), to};
     const auto rate = [&](std::size_t stage, const ModelState<S>& at, ModelState<S>& k) {
         S* own_rate = k.data() + kMotionStates;
         model.evaluate(at.data(), external,
@@ -110,8 +112,8 @@ void model_step(const SingleTrack& model, ModelState<S>& x, const S* external, c
 
 /// Moves `x` over `dt` seconds in `substeps` equal parts; `external` is held.
 template <class S, class T>
-void advance(const SingleTrack& model, ModelState<S>& x, const S* external, const Input& from,
-             const Input& to, const T* p, double dt, int substeps) {
+void advance(const SingleTrack& model, ModelState<S>& x, const S* external, const InputFor<S>& from,
+             const InputFor<S>& to, const T* p, double dt, int substeps) {
     const ActiveStates own = active_states(model.effects);
     const auto steps = [&](auto&& memory) {
         for (int n = 0; n < substeps; ++n)
@@ -127,7 +129,7 @@ void advance(const SingleTrack& model, ModelState<S>& x, const S* external, cons
 /// The sensors' readings in state `x`.
 template <class S, class T>
 std::array<S, kChannels> sense(const SingleTrack& model, const ModelState<S>& x, const S* external,
-                               const Input& u, const T* p) {
+                               const InputFor<S>& u, const T* p) {
     ModelState<S> rate;
     const auto w = model.evaluate(x.data(), external, x.data() + kMotionStates, u, p, rate.data(),
                                   rate.data() + kMotionStates);
@@ -138,8 +140,8 @@ std::array<S, kChannels> sense(const SingleTrack& model, const ModelState<S>& x,
 
 /// Auxiliary states that have settled: they equal what they follow.
 template <class S, class T>
-void settle_auxiliary(const SingleTrack& model, ModelState<S>& x, const S* external, const Input& u,
-                      const T* p) {
+void settle_auxiliary(const SingleTrack& model, ModelState<S>& x, const S* external,
+                      const InputFor<S>& u, const T* p) {
     const ActiveStates own = active_states(model.effects);
     if (own.count == 0) return;
     // One round settles any chain of lags. Only slow states act before their target is known.
@@ -152,31 +154,28 @@ void settle_auxiliary(const SingleTrack& model, ModelState<S>& x, const S* exter
         model.evaluate(x.data(), external, lags, u, p, rate.data());
 }
 
-/// Directions that one pass through the model differentiates by: states in a filter, in one with
-/// states of many effects, and parameters or signals, many of them and few.
+/// Directions that one pass through the model differentiates by: states in a filter, and in one
+/// with states of many effects.
 constexpr int kStatePass = 6, kWideStatePass = 9;
-constexpr int kParameterPass = 8, kShortParameterPass = 4;
 
 // The model takes seconds to compile for each scalar. These are what kernels use; each is compiled
 // once, by the files of this name in `src/dynamics/`.
 // NOLINTBEGIN(bugprone-macro-parentheses): types take none
-#define SYSID_COMPILED_MODEL(PREFIX, S, T)                                                     \
-    PREFIX template Workings<S> SingleTrack::evaluate(const S*, const S*, const Lags<S>&,      \
-                                                      const Input&, const T*, S*) const;       \
-    PREFIX template void SingleTrack::sense(const Workings<S>&, const T*, const S*, S*) const; \
-    PREFIX template void advance(const SingleTrack&, ModelState<S>&, const S*, const Input&,   \
-                                 const Input&, const T*, double, int);                         \
-    PREFIX template std::array<S, kChannels> sense(const SingleTrack&, const ModelState<S>&,   \
-                                                   const S*, const Input&, const T*);          \
-    PREFIX template void settle_auxiliary(const SingleTrack&, ModelState<S>&, const S*,        \
-                                          const Input&, const T*);
+#define SYSID_COMPILED_MODEL(PREFIX, S, T)                                                         \
+    PREFIX template Workings<S> SingleTrack::evaluate(const S*, const S*, const Lags<S>&,          \
+                                                      const InputFor<S>&, const T*, S*) const;     \
+    PREFIX template void SingleTrack::sense(const Workings<S>&, const T*, const S*, S*) const;     \
+    PREFIX template void advance(const SingleTrack&, ModelState<S>&, const S*, const InputFor<S>&, \
+                                 const InputFor<S>&, const T*, double, int);                       \
+    PREFIX template std::array<S, kChannels> sense(const SingleTrack&, const ModelState<S>&,       \
+                                                   const S*, const InputFor<S>&, const T*);        \
+    PREFIX template void settle_auxiliary(const SingleTrack&, ModelState<S>&, const S*,            \
+                                          const InputFor<S>&, const T*);
 // NOLINTEND(bugprone-macro-parentheses)
 
 SYSID_COMPILED_MODEL(extern, double, double)
 SYSID_COMPILED_MODEL(extern, Dual<kStatePass>, double)
 SYSID_COMPILED_MODEL(extern, Dual<kWideStatePass>, double)
-SYSID_COMPILED_MODEL(extern, Dual<kParameterPass>, double)
-SYSID_COMPILED_MODEL(extern, Dual<kParameterPass>, Dual<kParameterPass>)
-SYSID_COMPILED_MODEL(extern, Dual<kShortParameterPass>, Dual<kShortParameterPass>)
+SYSID_COMPILED_MODEL(extern, Recorded, Recorded)
 
 }  // namespace sysid

@@ -35,7 +35,7 @@ struct ForceGain : Effect {
 
     template <class T, class S>
     static void input(const T* p, Workings<S>& w) {
-        w.fx *= 1.0 + p[value_of(w.fx) < 0.0 ? 1 : 0];
+        w.fx *= 1.0 + if_below(w.fx, 0.0, S(p[1]), S(p[0]));
     }
 };
 
@@ -129,7 +129,7 @@ struct LockedDifferential : Effect {
 
     template <class T, class S>
     static void body(const T* p, Workings<S>& w) {
-        const S speed = value_of(w.v_x) > 1.0 ? w.v_x : S(1.0);
+        const S speed = if_below(w.v_x, 1.0, S(1.0), w.v_x);
         w.moment_z = w.moment_z - p[0] * (w.r / speed);
     }
 };

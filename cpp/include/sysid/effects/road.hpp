@@ -109,9 +109,9 @@ struct FrictionChange : Effect {
     template <class T>
     static T after(const T& x) {
         using std::exp;
-        if (value_of(x) < -40.0) return T(0.0);
-        if (value_of(x) > 40.0) return T(1.0);
-        return 1.0 / (1.0 + exp(-x));
+        // Beyond, nothing is left to blend.
+        const T above = if_below(x, -40.0, T(-40.0), x);
+        return 1.0 / (1.0 + exp(-if_below(above, 40.0, above, T(40.0))));
     }
 };
 

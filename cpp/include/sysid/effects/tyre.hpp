@@ -58,7 +58,8 @@ struct TyreRelaxation : Effect {
         using std::abs;
         if (!(value_of(p[0]) > 0.0)) return;
         S rate = abs(w.v_x) / p[0];
-        if (value_of(rate) > 1.0 / kShortestLag) rate = S(1.0 / kShortestLag);
+        constexpr double kFastest = 1.0 / kShortestLag;
+        rate = if_below(rate, kFastest, rate, S(kFastest));
         w.alpha_f = lags.follow(0, w.alpha_f, rate);
         w.alpha_r = lags.follow(1, w.alpha_r, rate);
     }
@@ -113,9 +114,9 @@ struct TyreTemperature : Effect {
 
     template <class S>
     static void apply(const S& left, S& peak, S& grip) {
-        if (value_of(left) < 0.05) return apply(S(0.05), peak, grip);
-        peak *= left;
-        grip *= left;
+        const S kept = if_below(left, 0.05, S(0.05), left);
+        peak *= kept;
+        grip *= kept;
     }
 };
 

@@ -1,6 +1,7 @@
 // Driving of one car, ready for estimation: what was done, what was measured, how noisy it is.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -85,7 +86,10 @@ ModelState<S> initial_state(const SingleTrack& model, const Run& run, const T* p
     x[1] = S(first(kVy, 0.0));
     x[2] = S(first(kYawRate, 0.0));
     const std::array<S, kExternals> calm{};
-    settle_auxiliary(model, x, calm.data(), run.inputs.front(), p);
+    const Input& u = run.inputs.front();
+    InputFor<S> input{u.steer_rad, u.longitudinal, u.time_s};
+    std::copy(u.channels.begin(), u.channels.end(), input.channels.begin());
+    settle_auxiliary(model, x, calm.data(), input, p);
     return x;
 }
 

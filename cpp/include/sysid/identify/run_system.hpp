@@ -86,6 +86,7 @@ class RunSystem {
 
     Vec<kChannels> observe(std::size_t k, const Vec<NX>& x, Mat<kChannels, NX>& H) const {
         Vec<kChannels> expected;
+        H.setZero();  // not every pass is made
         in_passes(x, [&](ModelState<D>& s, const auto& external, auto&& keep) {
             const auto y = sense(model_, s, external.data(), run_.inputs[k], p_);
             for (int i = 0; i < kChannels; ++i)

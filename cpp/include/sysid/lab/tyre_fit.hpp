@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "sysid/lab/grey_box.hpp"
+#include "sysid/math/lanes.hpp"
 
 namespace sysid::lab {
 
@@ -32,7 +33,14 @@ class TyreLoss {
         : car_(car), projects_steer_(projects_steer) {}
 
     void add(const TyreSample& sample);
-    std::size_t samples() const { return rows_.size(); }
+    std::size_t samples() const { return samples_; }
+
+    /// Half the sum of squares; with `gradient` G^T e and the lower triangle of G^T G by the first
+    /// `wanted` parameters, `kCurveParameters` in a row.
+    double squares(const double* p, int wanted, double* gradient, double* information) const {
+        return lane_kernels().curve_squares(blocks_.data(), blocks_.size(), p, wanted, gradient,
+                                            information);
+    }
 
     /// Weighted errors of a_y and of the yaw acceleration of each sample, as
     /// `identify/least_squares.hpp` takes them.
@@ -40,29 +48,26 @@ class TyreLoss {
     void walk(const S* p, Keep&& keep) const {
         const TyreCoefficients<S> front{p[0], p[1], p[2], p[3]};
         const TyreCoefficients<S> rear{p[4], p[5], p[6], p[7]};
-        for (const Row& row : rows_) {
-            const S mu_f = magic_formula(row.alpha.front, front);
-            const S mu_r = magic_formula(row.alpha.rear, rear);
-            const S rest = row.rest[0] * p[kP1] + row.rest[1] * p[kP2] + row.rest[2] * p[kP3];
+        for (std::size_t k = 0; k < samples_; ++k) {
+            const CurveSamples& s = blocks_[k / kLanes];
+            const std::size_t i = k % kLanes;
+            const S mu_f = magic_formula(s.alpha[0].at[i], front);
+            const S mu_r = magic_formula(s.alpha[1].at[i], rear);
+            const S rest =
+                s.rest[0].at[i] * p[kP1] + s.rest[1].at[i] * p[kP2] + s.rest[2].at[i] * p[kP3];
             keep(std::array<S, 2>{
-                row.a_y - row.lateral.front * mu_f - row.lateral.rear * mu_r - rest,
-                row.yaw_acceleration - row.yaw.front * mu_f - row.yaw.rear * mu_r,
+                s.reading[0].at[i] - s.first[0].at[i] * mu_f - s.first[1].at[i] * mu_r - rest,
+                s.reading[1].at[i] - s.second[0].at[i] * mu_f - s.second[1].at[i] * mu_r,
             });
         }
     }
 
   private:
-    struct Row {
-        Axles<double> alpha;
-        Axles<double> lateral;       // a_y per unit of friction, weighted
-        Axles<double> yaw;           // yaw acceleration per unit of friction, weighted
-        std::array<double, 3> rest;  // factors of P_1, P_2, P_3, weighted
-        double a_y, yaw_acceleration;
-    };
-
     GreyBoxCar car_;
     bool projects_steer_;
-    std::vector<Row> rows_;
+    // Front and rear; a_y and the yaw acceleration, weighted; zero beyond the last sample.
+    std::vector<CurveSamples> blocks_;
+    std::size_t samples_ = 0;
 };
 
 /// As in `tyre_likelihood.hpp`; no filter has a part in it, and nullptr stands for its gains.

@@ -103,4 +103,11 @@ double value_of(const Dual<N>& x) {
     return x.v;
 }
 
+/// A choice between two numbers by a third one, which programs can write down (`Recorded`) where a
+/// condition would have to be the same for all samples.
+template <class S>
+S if_below(const S& x, double limit, const S& below, const S& otherwise) {
+    return value_of(x) < limit ? below : otherwise;
+}
+
 }  // namespace sysid

@@ -293,7 +293,7 @@ class Formula {
             case Operation::kAbs:
                 return abs(a);
             case Operation::kSign:
-                return S((value_of(a) > 0.0 ? 1.0 : 0.0) - (value_of(a) < 0.0 ? 1.0 : 0.0));
+                return if_below(a, 0.0, S(-1.0), if_below(S(-a), 0.0, S(1.0), S(0.0)));
             case Operation::kSin:
                 return sin(a);
             case Operation::kCos:
@@ -311,13 +311,13 @@ class Formula {
             case Operation::kTanh:
                 return tanh(a);
             case Operation::kMinimum:
-                return value_of(a) < value_of(b) ? a : b;
+                return if_below(S(a - b), 0.0, a, b);
             case Operation::kMaximum:
-                return value_of(a) < value_of(b) ? b : a;
+                return if_below(S(a - b), 0.0, b, a);
             case Operation::kGreater:
-                return S(value_of(a) > value_of(b) ? 1.0 : 0.0);
+                return if_below(S(b - a), 0.0, S(1.0), S(0.0));
             case Operation::kSelect:
-                return value_of(a) != 0.0 ? b : c;
+                return if_below(S(-abs(a)), 0.0, b, c);
             default:
                 return S(0.0);
         }

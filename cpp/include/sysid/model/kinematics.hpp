@@ -68,8 +68,7 @@ template <class T, class S>
 S ellipse_left(const T& p, const S& used) {
     using std::sqrt;
     const S rest = 1.0 - p * (used * used);
-    if (value_of(rest) < 0.04) return S(0.2);
-    return sqrt(rest);
+    return sqrt(if_below(rest, 0.04, S(0.04), rest));
 }
 
 }  // namespace sysid

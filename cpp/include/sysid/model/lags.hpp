@@ -12,7 +12,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "sysid/math/dual.hpp"
+#include "sysid/math/lag_weights.hpp"
 
 namespace sysid {
 
@@ -26,77 +26,6 @@ constexpr double kShortestLag = 1e-6;
 template <class T>
 T lag_rate(const T& time_constant) {
     return value_of(time_constant) > kShortestLag ? 1.0 / time_constant : T(1.0 / kShortestLag);
-}
-
-/// e^-z, and of the powers theta^n of the part of a step the integrals
-/// J_n = int_0^1 z e^(-z (1 - theta)) theta^n dtheta, with their derivatives to z.
-struct LagWeights {
-    double kept, J0, J1, J2;
-    double J1_slope, J2_slope;  // dJ0/dz = kept = -d(kept)/dz
-
-    explicit LagWeights(double z) : kept(std::exp(-z)), J0(-std::expm1(-z)) {
-        if (std::abs(z) < 0.5) {
-            // J_n = n! sum_k (-1)^(k+1) z^k / (n + k)!: the recurrence below would cancel.
-            series(z, 1, J1, J1_slope);
-            series(z, 2, J2, J2_slope);
-        } else {
-            J1 = 1.0 - J0 / z;
-            J2 = 1.0 - 2.0 * J1 / z;
-            J1_slope = (J0 / z - kept) / z;
-            J2_slope = 2.0 * (J1 / z - J1_slope) / z;
-        }
-    }
-
-  private:
-    static void series(double z, int n, double& sum, double& slope) {
-        double term = 1.0;  // n! (-z)^(k-1) / (n + k)!
-        sum = slope = 0.0;
-        for (int k = 1; k <= 12; ++k) {
-            term /= n + k;
-            sum += term;
-            slope += k * term;
-            term *= -z;
-        }
-        sum *= z;
-    }
-};
-
-/// phi_n(-z) = int_0^1 e^(-z (1 - theta)) theta^(n-1) / (n-1)! dtheta, phi_0(-z) = e^-z, with their
-/// derivatives to z; z may be zero or negative.
-struct PhiWeights {
-    std::array<double, 4> value{}, slope{};
-
-    explicit PhiWeights(double z) {
-        value[0] = std::exp(-z);
-        slope[0] = -value[0];
-        double factorial = 1.0;  // 1 / n!
-        for (std::size_t n = 1; n < value.size(); ++n) {
-            if (std::abs(z) < 0.5) {
-                series(z, static_cast<double>(n), factorial / static_cast<double>(n), n);
-            } else {
-                value[n] = (factorial - value[n - 1]) / z;
-                slope[n] = -(slope[n - 1] + value[n]) / z;
-            }
-            factorial /= static_cast<double>(n);
-        }
-    }
-
-  private:
-    // phi_n(-z) = sum_k (-z)^k / (k + n)!: the recurrence would cancel.
-    void series(double z, double n, double term, std::size_t at) {
-        for (int k = 0; k < 14; ++k) {
-            value[at] += term;
-            term /= n + k + 1;
-            slope[at] -= (k + 1) * term;
-            term *= -z;
-        }
-    }
-};
-
-inline double with_slope(const double& /*z*/, double value, double /*slope*/) { return value; }
-template <int N>
-Dual<N> with_slope(const Dual<N>& z, double value, double slope) {
-    return Dual<N>::chain(z, value, slope);
 }
 
 /// The stages at which a model is evaluated while its lags move.
@@ -169,27 +98,21 @@ class Lags {
                     target;
                 step_.rate_middle[n] = rate;
                 const S z = (0.25 * step_.h) * (step_.rate_start[n] + rate);
-                const LagWeights w(value_of(z));
-                step_.after[n] =
-                    with_slope(z, w.kept, -w.kept) * step_.before[n] +
-                    with_slope(z, w.J0 - w.J1, w.kept - w.J1_slope) * step_.target_start[n] +
-                    with_slope(z, w.J1, w.J1_slope) * target;
+                const LagWeights<S> w(z);
+                step_.after[n] = w.kept * step_.before[n] + (w.J0 - w.J1) * step_.target_start[n] +
+                                 w.J1 * target;
                 return step_.after[n];
             }
             case LagStage::kEnd: {
                 const S z =
                     (step_.h / 6.0) * (step_.rate_start[n] + 4.0 * step_.rate_middle[n] + rate);
-                const LagWeights w(value_of(z));
-                const auto weight = [&](double a, double b, double c) {
-                    return with_slope(z, a * w.J0 + b * w.J1 + c * w.J2,
-                                      a * w.kept + b * w.J1_slope + c * w.J2_slope);
-                };
-                step_.after[n] =
-                    with_slope(z, w.kept, -w.kept) * step_.before[n] +
-                    weight(1.0, -3.0, 2.0) * step_.target_start[n] +
-                    // The two middle stages are off by h^2/8 x'' on either side.
-                    weight(0.0, 2.0, -2.0) * (step_.target_middle[n] + step_.target_again[n]) +
-                    weight(0.0, -1.0, 2.0) * target;
+                const LagWeights<S> w(z);
+                const S middle = w.J1 - w.J2;
+                step_.after[n] = w.kept * step_.before[n] +
+                                 (w.J0 - w.J1 - 2.0 * middle) * step_.target_start[n] +
+                                 // The two middle stages are off by h^2/8 x'' on either side.
+                                 2.0 * middle * (step_.target_middle[n] + step_.target_again[n]) +
+                                 (w.J2 - middle) * target;
                 return step_.after[n];
             }
         }
@@ -233,8 +156,7 @@ class Lags {
         const S& c = step_.rate_start[n];
         const S rest = rate + c * now;  // what is not the linear part
         const S z = (0.5 * step_.h) * c;
-        const PhiWeights half(value_of(z));
-        const S phi = with_slope(z, half.value[1], half.slope[1]);
+        const S phi = phi_weights(z)[1];
         // The rule of the motion makes the next stage, and the end, from these.
         if (stage_ == LagStage::kStart) {
             step_.target_start[n] = rest;
@@ -256,21 +178,17 @@ class Lags {
         const S& again = step_.target_again[n];
         const S second = phi * (step_.target_middle[n] - c * before);
         const S third = phi * (again - c * (before + (0.25 * step_.h) * first));
-        const PhiWeights whole(2.0 * value_of(z));
-        const S zz = 2.0 * z;
-        const auto weight = [&](double a, double b, double d) {
-            return with_slope(zz, a * whole.value[1] + b * whole.value[2] + d * whole.value[3],
-                              a * whole.slope[1] + b * whole.slope[2] + d * whole.slope[3]);
-        };
-        const S mean = weight(1.0, -3.0, 4.0) * step_.target_start[n] +
-                       weight(0.0, 2.0, -4.0) * (step_.target_middle[n] + again) +
-                       weight(0.0, -1.0, 4.0) * rest - weight(1.0, 0.0, 0.0) * (c * before);
+        const auto whole = phi_weights(S(2.0 * z));
+        const S middle = 2.0 * whole[2] - 4.0 * whole[3];
+        const S mean = (whole[1] - whole[2] - middle) * step_.target_start[n] +
+                       middle * (step_.target_middle[n] + again) + (whole[2] - middle) * rest -
+                       whole[1] * (c * before);
         state_rate_[n] = 6.0 * mean - first - 2.0 * (second + third);
     }
 
   private:
     static S explicit_rate(const S& rate) {
-        return value_of(rate) < kFastestExplicitLag ? rate : S(kFastestExplicitLag);
+        return if_below(rate, kFastestExplicitLag, rate, S(kFastestExplicitLag));
     }
 
     LagStage stage_;

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 
+#include "sysid/math/given.hpp"
 #include "sysid/model/tyre.hpp"
 
 namespace sysid {
@@ -26,7 +27,7 @@ struct Workings {
     S fz0_f, fz0_r;              // static axle loads [N]
     // motion
     S v_x, v_y, r;
-    double time_s = 0.0;  // since the log began
+    Given<S> time_s{};  // since the log began
     // inputs (stages `input` and `steering`)
     S delta;     // road-wheel angle that acts [rad]
     S fx;        // total wheel force [N], or
@@ -48,7 +49,7 @@ struct Workings {
     S r_dot;     // yaw acceleration [rad/s2]
     // what only formulas of users read
     double track_f = 0.0, track_r = 0.0;  // [m]
-    const double* channels = nullptr;     // `kUserChannels` of the log
+    const Given<S>* channels = nullptr;   // `kUserChannels` of the log
     const S* user_states = nullptr;       // `kUserStates`
 };
 

@@ -1,0 +1,92 @@
+// How one sample of the model answers to states, disturbances and parameters: its derivatives at
+// many samples of a known path, side by side.
+//
+// With frozen gains the path of the mean is known from the residuals themselves. The derivatives of
+// each single step then do not depend on those of others, and are worked out for `kLanes` samples
+// at once; what is left to be done one sample after the other is linear.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "sysid/identify/problem.hpp"
+#include "sysid/math/recorder.hpp"
+
+namespace sysid {
+
+/// One sample of the path: before the step to it and after, up to its reading. States are packed:
+/// v_x, v_y, r, then those of the model's effects.
+struct PathSample {
+    const Run* run = nullptr;
+    std::size_t at = 0;              // sample of the run
+    int substeps = 0;                // of the step to it; none for the first of a run
+    const double* before = nullptr;  // corrected states of the sample before
+    const double* pushed = nullptr;  // what disturbs the step to it, kExternals
+    const double* here = nullptr;    // predicted states
+    const double* pushed_here = nullptr;
+};
+
+class LocalModel {
+  public:
+    /// Derivatives by the parameters `columns`, for which `width` places are kept, by states and by
+    /// externals: all of them, or the forces and the moment alone.
+    LocalModel(const SingleTrack& model, const double* p, const std::vector<int>& columns,
+               std::size_t width, bool all_externals);
+
+    std::size_t states() const { return states_; }
+    std::size_t externals() const { return externals_; }
+
+    /// Numbers for one sample: of the step a row for each state by states and externals, then one
+    /// for each by parameters; of the reading the same with a row for each channel.
+    std::size_t size() const { return read_parameters_ + kChannels * width_; }
+    std::size_t step_parameters() const { return step_parameters_; }
+    std::size_t read() const { return read_at_; }
+    std::size_t read_parameters() const { return read_parameters_; }
+
+    /// Derivatives at `count` samples.
+    void differentiate(const PathSample* samples, std::size_t count, double* out);
+
+    /// Derivatives of the states with which a run begins: `width` for each.
+    std::vector<double> start(const Run& run) const;
+
+  private:
+    /// A program with the rows it works on.
+    struct Ready {
+        Program program;
+        std::vector<LaneRow> rows, adjoints;
+        void set(std::size_t input, std::size_t lane, double value) {
+            const std::int32_t row = program.inputs[input];
+            if (row >= 0) rows[static_cast<std::size_t>(row)].at[lane] = value;
+        }
+    };
+
+    struct Moving {
+        ModelState<Recorded> x{};
+        std::array<Recorded, kExternals> external{};
+    };
+
+    Moving moving(Recorder& to) const;
+    std::vector<Recorded> parameters(Recorder& to) const;
+    std::vector<Recorded> packed(const ModelState<Recorded>& x) const;
+    static Ready ready(Program program);
+    Ready& step_of(double h);
+    void step(const PathSample* samples, const std::size_t* which, std::size_t count, double* out);
+    void read(const PathSample* samples, std::size_t count, double* out);
+    void chain(const std::vector<double>& part, double* whole) const;
+    template <class Put>
+    static void sweep(Ready& ready, Put&& put);
+    template <class Put>
+    void spread(Ready& ready, std::size_t given, std::size_t by_state, std::size_t by_parameter,
+                Put&& put) const;
+
+    SingleTrack model_;
+    const double* p_;
+    std::vector<std::vector<std::size_t>> columns_of_;  // of each parameter
+    std::size_t width_;
+    ActiveStates own_;
+    std::size_t states_, externals_, step_parameters_, read_at_, read_parameters_;
+    Ready read_;
+    std::map<double, Ready> steps_;  // by the length of a step
+};
+
+}  // namespace sysid

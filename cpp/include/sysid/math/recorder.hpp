@@ -1,0 +1,52 @@
+// Makes a `Program` of what is done to `Recorded` numbers.
+#pragma once
+
+#include <cstring>
+#include <unordered_map>
+#include <vector>
+
+#include "sysid/math/program.hpp"
+#include "sysid/math/recorded.hpp"
+
+namespace sysid {
+
+class Recorder {
+  public:
+    /// An input that differs from sample to sample; `active` where derivatives by it are wanted.
+    Recorded input(bool active);
+    /// One that has this value for all samples. Those without derivatives are steps too, so that a
+    /// program is the same whatever it is differentiated by.
+    Recorded parameter(double value, bool active);
+
+    /// The steps that lead to these numbers; inputs are numbered in the order of their making.
+    Program program(const std::vector<Recorded>& outputs) const;
+
+  private:
+    friend struct RecordedAccess;
+
+    struct Node {
+        Op op = Op::kInput;
+        int a = -1, b = -1, c = -1;
+        double constant = 0.0, value = 0.0, slope_a = 0.0, slope_b = 0.0;
+        bool uniform = false, active = false;
+        bool same(const Node& o) const {
+            return op == o.op && a == o.a && b == o.b && c == o.c &&
+                   std::memcmp(&constant, &o.constant, sizeof constant) == 0;
+        }
+    };
+
+    /// What has been noted before is not noted twice.
+    Recorded noted(const Node& node);
+    /// A node of its own for a constant, where a step has no form for one.
+    int node_of(const Recorded& x);
+    /// The cosine of a sine and the other way round, which stand side by side; -1 for others.
+    int partner_of(int node) const;
+    void add_sweep(const std::vector<int>& nodes, const std::vector<int>& outputs,
+                   const std::vector<int>& rows, Program& out) const;
+
+    std::vector<Node> nodes_;
+    std::vector<int> inputs_;
+    std::unordered_multimap<std::size_t, int> known_;
+};
+
+}  // namespace sysid

@@ -1,0 +1,12 @@
+// The kernels for processors with AVX2 and FMA.
+#ifdef SYSID_AVX2
+#define SYSID_LANE_BYTES 32
+#include "lanes.inc"
+#include "lanes_sums.inc"
+
+extern const LaneKernels kAvx2Lanes;
+const LaneKernels kAvx2Lanes{"AVX2",       &forward,     &backward,
+                             &add_product, &add_squares, &curve_squares};
+
+}  // namespace sysid
+#endif

@@ -1,0 +1,12 @@
+// The kernels for processors with AVX-512.
+#ifdef SYSID_AVX512
+#define SYSID_LANE_BYTES 64
+#include "lanes.inc"
+#include "lanes_sums.inc"
+
+extern const LaneKernels kAvx512Lanes;
+const LaneKernels kAvx512Lanes{"AVX-512",    &forward,     &backward,
+                               &add_product, &add_squares, &curve_squares};
+
+}  // namespace sysid
+#endif

@@ -1,0 +1,10 @@
+// The kernels for any processor.
+#define SYSID_LANE_BYTES 16
+#include "lanes.inc"
+#include "lanes_sums.inc"
+
+extern const LaneKernels kPlainLanes;
+const LaneKernels kPlainLanes{"plain",      &forward,     &backward,
+                              &add_product, &add_squares, &curve_squares};
+
+}  // namespace sysid
