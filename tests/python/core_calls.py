@@ -59,7 +59,7 @@ def main_job(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
     yield "signal_sensitivities", (known.signal_sensitivities, signals)
     motion = {"parameters": p, "motion": rows(3, 20.0)[0], "steer": 0.01, "longitudinal": 100.0}
     yield "evaluate", (model.core().evaluate, motion)
-    user = [(0, [(0, [(0, (0, 0, 0), 1.0)])])]
+    user = [(0, [], [(0, [(0, (0, 0, 0), 1.0)])], [])]
     yield (
         "SingleTrack",
         (_core.SingleTrack, {"car": vehicle_data(vehicle), "effects": 3, "force_known": True}),

@@ -30,7 +30,8 @@ def problem(truth: Model) -> _core.Problem:
 @pytest.mark.parametrize(
     ("inputs", "measurements", "message"),
     [
-        (np.zeros((N, 3)), np.zeros((N, 5)), r"inputs: expected shape \(50, 2\)"),
+        (np.zeros((N, 1)), np.zeros((N, 5)), r"inputs: expected shape \(50, 2\)"),
+        (np.zeros((N, 11)), np.zeros((N, 5)), r"inputs: expected shape \(50, 10\)"),
         (np.zeros((N, 2)), np.zeros((N, 4)), r"measurements: expected shape \(50, 5\)"),
         (np.zeros((N, 2)), np.zeros((N - 1, 5)), r"measurements: expected shape \(50, 5\)"),
         (np.zeros(2 * N), np.zeros((N, 5)), "inputs: expected shape"),

@@ -3,6 +3,7 @@
 #define SYSID_LANE_BYTES 32
 #include "lanes.inc"
 #include "lanes_sums.inc"
+#include "sysid/math/lanes.hpp"
 
 extern const LaneKernels kAvx2Lanes;
 const LaneKernels kAvx2Lanes{"AVX2",       &forward,     &backward,

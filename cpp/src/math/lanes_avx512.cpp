@@ -3,6 +3,7 @@
 #define SYSID_LANE_BYTES 64
 #include "lanes.inc"
 #include "lanes_sums.inc"
+#include "sysid/math/lanes.hpp"
 
 extern const LaneKernels kAvx512Lanes;
 const LaneKernels kAvx512Lanes{"AVX-512",    &forward,     &backward,

@@ -2,6 +2,7 @@
 #define SYSID_LANE_BYTES 16
 #include "lanes.inc"
 #include "lanes_sums.inc"
+#include "sysid/math/lanes.hpp"
 
 extern const LaneKernels kPlainLanes;
 const LaneKernels kPlainLanes{"plain",      &forward,     &backward,
