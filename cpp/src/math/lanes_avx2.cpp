@@ -1,9 +1,10 @@
 // The kernels for processors with AVX2 and FMA.
 #ifdef SYSID_AVX2
+#include "sysid/math/lanes.hpp"
+
 #define SYSID_LANE_BYTES 32
 #include "lanes.inc"
 #include "lanes_sums.inc"
-#include "sysid/math/lanes.hpp"
 
 extern const LaneKernels kAvx2Lanes;
 const LaneKernels kAvx2Lanes{"AVX2",       &forward,     &backward,

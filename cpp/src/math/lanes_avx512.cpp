@@ -1,9 +1,10 @@
 // The kernels for processors with AVX-512.
 #ifdef SYSID_AVX512
+#include "sysid/math/lanes.hpp"
+
 #define SYSID_LANE_BYTES 64
 #include "lanes.inc"
 #include "lanes_sums.inc"
-#include "sysid/math/lanes.hpp"
 
 extern const LaneKernels kAvx512Lanes;
 const LaneKernels kAvx512Lanes{"AVX-512",    &forward,     &backward,

@@ -1,8 +1,9 @@
 // The kernels for any processor.
+#include "sysid/math/lanes.hpp"
+
 #define SYSID_LANE_BYTES 16
 #include "lanes.inc"
 #include "lanes_sums.inc"
-#include "sysid/math/lanes.hpp"
 
 extern const LaneKernels kPlainLanes;
 const LaneKernels kPlainLanes{"plain",      &forward,     &backward,
