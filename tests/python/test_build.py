@@ -43,11 +43,15 @@ def test_the_version_is_the_same_everywhere() -> None:
     assert sysid_vehicle.__version__ == stated[1]
 
 
+# Kernels that are compiled for newer processors too, each a file of its own; cpuid chooses.
+LANES = re.compile(r"(src/math/lanes_avx\w+\.cpp)\s+PROPERTIES COMPILE_OPTIONS \"[-\w;]+\"")
+
+
 def test_no_build_file_asks_for_flags_that_change_results() -> None:
     found = {
         f"{path.relative_to(REPO)}: {match[0]}"
         for path in build_files()
-        for match in BANNED.finditer(path.read_text(encoding="utf-8"))
+        for match in BANNED.finditer(LANES.sub("", path.read_text(encoding="utf-8")))
     }
     assert found == set()
 
@@ -88,14 +92,27 @@ def test_the_extension_brings_no_thread_runtime() -> None:
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="looks for x86-64 instructions")
 @pytest.mark.skipif(shutil.which("objdump") is None, reason="objdump is not installed")
 def test_the_extension_runs_on_any_x86_64_processor() -> None:
-    code = subprocess.run(
-        ["objdump", "--disassemble", "--no-show-raw-insn", CORE],
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout
+    """Newer instructions stand in the kernels alone that cpuid chooses."""
+    built = [
+        path.parents[2] for path in REPO.glob("build/*/cpp/CMakeFiles/*/src/math/lanes_avx2.cpp.o")
+    ]
+    built.sort(key=lambda folder: folder.stat().st_mtime)
+    if not built:
+        pytest.skip("the objects of the library are not here: it was built elsewhere")
+    objects = [*built[-1].rglob("*.cpp.o"), *built[-1].with_name("_core.dir").rglob("*.cpp.o")]
+    chosen = [path for path in objects if path.name.startswith("lanes_avx")]
+    assert len(chosen) == 2
+    others = [path for path in objects if path not in chosen]
+    code = _said("objdump", "--disassemble", "--no-show-raw-insn", *others)
     assert "%xmm" in code
-    assert not re.search(r"%[yz]mm\d", code), "it has AVX instructions, which older ones lack"
+    assert not re.search(r"%[yz]mm\d", code), "AVX instructions, which older processors lack"
+    # The linker may take a weak function from any object: none may come from these.
+    weak = [line for line in _said("nm", *chosen).splitlines() if re.search(r" [VWu] ", line)]
+    assert weak == []
+
+
+def _said(*command: str | Path) -> str:
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
 def test_the_package_says_that_it_is_typed() -> None:
@@ -124,7 +141,7 @@ def test_the_source_distribution_holds_all_that_the_build_needs(
     needed = {
         str(path.relative_to(REPO))
         for folder, patterns in {
-            "cpp": ("CMakeLists.txt", "*.cmake", "*.cpp", "*.hpp"),
+            "cpp": ("CMakeLists.txt", "*.cmake", "*.cpp", "*.hpp", "*.inc"),
             "python": ("*.py", "*.pyi", "py.typed"),
         }.items()
         for pattern in patterns
