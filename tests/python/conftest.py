@@ -23,6 +23,16 @@ settings.load_profile("repeatable")
 
 REPO = Path(__file__).resolve().parents[2]
 
+# Without these files, `-m "not slow"`, the tests take less than a minute on two cores.
+SLOW = frozenset((Path(__file__).parent / "slow_files.txt").read_text("utf-8").split())
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what stands in a slow file, or takes too long for continuous integration."""
+    for item in items:
+        if item.path.name in SLOW or item.get_closest_marker("manual"):
+            item.add_marker(pytest.mark.slow)
+
 
 @pytest.fixture(autouse=True)
 def _figures_closed() -> Iterator[None]:

@@ -114,7 +114,7 @@ def test_every_public_name_is_a_function_or_among_these() -> None:
     assert public - errors - slow <= set(NAMES)
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_a_study_is_copied_whole(start: Model, lap: Log, course: Log) -> None:
     study = sv.improve(start, lap, course, candidates=["steer_lag"], starts=1)
     for again in (copy.deepcopy(study), pickle.loads(pickle.dumps(study))):

@@ -59,6 +59,7 @@ def test_each_effect_can_be_driven_and_logs_do_not_name_it(e: sv.Effect) -> None
         assert np.abs(log["ay_mps2"]).max() > 6.5
 
 
+@pytest.mark.manual
 @pytest.mark.usefixtures("quick")
 def test_the_story_finds_the_default_effect_and_names_it_last(tmp_path: Path) -> None:
     told: list[str] = []
@@ -87,7 +88,7 @@ def test_the_story_finds_the_default_effect_and_names_it_last(tmp_path: Path) ->
     assert report.stat().st_size > 10_000
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 @pytest.mark.usefixtures("quick")
 def test_a_miss_is_told_as_a_miss(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     json_path = tmp_path / "out.json"
@@ -103,7 +104,7 @@ def test_a_miss_is_told_as_a_miss(tmp_path: Path, capsys: pytest.CaptureFixture[
     }
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_the_whole_demonstration(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     report, path = tmp_path / "report.html", tmp_path / "out.json"
     assert main(["demo", "--report", str(report), "--json", str(path)]) == 0

@@ -93,7 +93,7 @@ def test_the_readme_is_short_and_names_the_test_command() -> None:
     assert all((REPO / picture).stat().st_size < 150_000 for picture in pictures)
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_the_readme_prints_what_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -152,7 +152,7 @@ while main(sys.argv[1:]) == 0:
 """
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_killed_commands_leave_whole_files(data: Path) -> None:
     folder = data.parent
     out, picture = folder / "out.json", folder / "out.svg"

@@ -243,7 +243,7 @@ def test_processes_and_the_command_line_find_the_same(
         assert again.study(name).to_dict() == done.study(name).to_dict()
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_a_process_that_is_killed_costs_its_study_alone(garage: Path, tmp_path: Path) -> None:
     killer = tmp_path / "killer.py"
     killer.write_text("import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n")
@@ -261,7 +261,7 @@ def children(parent: int) -> list[int]:
     return [int(c) for c in Path(f"/proc/{parent}/task/{parent}/children").read_text().split()]
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 @pytest.mark.skipif(sys.platform != "linux", reason="it looks into /proc")
 def test_a_run_that_is_killed_goes_on_where_it_stopped(
     garage: Path, done: sv.Fleet, tmp_path: Path
@@ -304,7 +304,7 @@ def on_executor(garage: Path, out: Path, executor: Executor, done: sv.Fleet) -> 
     assert again.study("b/one").to_dict() == done.study("b/one").to_dict()
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 @pytest.mark.filterwarnings("ignore")
 def test_dask(garage: Path, done: sv.Fleet, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
@@ -316,7 +316,7 @@ def test_dask(garage: Path, done: sv.Fleet, tmp_path: Path) -> None:
         on_executor(garage, tmp_path, executor, done)
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 @pytest.mark.filterwarnings("ignore")
 def test_ray(garage: Path, done: sv.Fleet, tmp_path: Path) -> None:
     """With the executor that the how-to makes of its tasks."""

@@ -10,7 +10,7 @@ import sysid_vehicle as sv
 from sysid_vehicle.diagnose import BiasReport
 from sysid_vehicle.diagnose.replay import Replay
 
-pytestmark = pytest.mark.slow  # refits of many simulated drives
+pytestmark = pytest.mark.manual  # refits of many simulated drives
 
 # What disturbances take up, and what moves the tyres much.
 HARMLESS = ("aero_drag", "rolling_resistance", "road_grade", "head_wind")

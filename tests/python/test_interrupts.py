@@ -77,7 +77,7 @@ def test_an_interrupt_ends_a_kernel_within_half_a_second() -> None:
         assert seconds < 0.5, f"{name}: {seconds:.2f} s of processor time after the signal"
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_a_study_that_is_interrupted_keeps_its_steps(
     truth: sv.Model,
 ) -> None:

@@ -104,6 +104,7 @@ def test_it_draws_what_was_measured_and_predicted(log: lab.TyreLog) -> None:
         found.plot(reading="wind")
 
 
+@pytest.mark.manual
 def test_from_drive_to_validation_on_the_command_line(
     tmp_path: Path, drive: lab.ClosedLoop, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -129,7 +130,7 @@ def test_a_file_without_tyres_is_named(tmp_path: Path) -> None:
         lab.IdentifiedCar.from_json(tmp_path / "other.json")
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_what_a_fit_writes_can_be_read(log: lab.TyreLog, tmp_path: Path) -> None:
     fit = lab.identify_tyres(CAR, log, start=TRUE, starts=1, profiles=False)
     (tmp_path / "tyres.json").write_text(json.dumps(fit.to_dict()))

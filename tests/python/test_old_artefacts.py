@@ -100,7 +100,7 @@ def test_identified_tyres(artefacts: Path) -> None:
     assert stored["estimates"]["B_front"]["unit"] == "1/rad"
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_todays_reports_have_all_that_stood_there(
     artefacts: Path, truth: Model, tmp_path: Path
 ) -> None:

@@ -57,7 +57,7 @@ def test_a_draw_repeats_and_the_other_is_another(bench):
     assert one[0].vehicle.mass_kg != other[0].vehicle.mass_kg
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_a_simulation_of_many_bodies_drives_a_circle(bench):
     if not bench.multibody.AVAILABLE:
         pytest.skip("commonroad-vehicle-models is not installed: pip install '.[benchmark]'")

@@ -23,7 +23,7 @@ def plain(fit: Fit, driving: Driving) -> float:
     return float(np.sum(trace["log_density"]) - 0.5 * np.sum(trace["whitened"] ** 2))
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_it_is_the_integral_over_the_parameters(
     fit: Fit, truth: Model, course: Log, rng: np.random.Generator
 ) -> None:

@@ -316,7 +316,7 @@ def in_browser(page: Path, folder: Path, script: str, scheme: str = "light") -> 
 needs_browser = pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no chromium")
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 @needs_browser
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_story_fits_on_one_screen(written: Path, tmp_path: Path, scheme: str) -> None:
@@ -362,7 +362,7 @@ return { ...out, pictures: all.length };
 """
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 @needs_browser
 def test_every_picture_follows_what_is_brushed_in_one(
     study: sv.Study, written: Path, tmp_path: Path

@@ -175,6 +175,7 @@ def test_what_the_model_delays_itself_is_no_contradiction(
     assert late("steer_rad", -0.25, "steer_delay") == {}
 
 
+@pytest.mark.manual
 def test_a_missing_effect_is_named_and_others_stay_open(
     truth: Model, hidden_fit: Callable[[str, float], Fit]
 ) -> None:

@@ -254,7 +254,7 @@ def test_what_no_candidate_explains_is_not_explained(
     assert contradictions(str(found)) == []
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_one_effect_that_leaves_something_is_none(
     start: Model, truth: Model, drives: Drives
 ) -> None:
@@ -273,7 +273,7 @@ def test_one_effect_that_leaves_something_is_none(
     assert both.verdict == "explained"
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_what_leaves_the_evidence_as_it_was_is_a_stand_in(
     start: Model, truth: Model, drives: Drives
 ) -> None:
@@ -290,6 +290,7 @@ def test_what_leaves_the_evidence_as_it_was_is_a_stand_in(
     assert contradictions(str(found)) == []
 
 
+@pytest.mark.manual
 def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: Drives) -> None:
     hidden = {"aero_drag.drag_area_m2": 0.45, "steer_offset.offset_rad": 0.006}
     car = truth.add("aero_drag", "steer_offset").with_values(hidden)
@@ -302,7 +303,7 @@ def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: D
         assert abs(found.fit[name].value - value) < 4.0 * found.fit[name].std
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_it_stops_at_the_most_effects_allowed(start: Model, lagging: tuple[Log, Log]) -> None:
     short = [log.between(0.0, 21.0) for log in lagging]
     none = improve(start, *short, starts=1, most_effects=0, exclude=["steer_lag"])

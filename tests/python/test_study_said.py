@@ -6,6 +6,7 @@ from contradictions import contradictions
 from sysid_vehicle import Model, drive, improve, manoeuvres
 
 
+@pytest.mark.manual
 @pytest.mark.filterwarnings("ignore:.*not excited:sysid_vehicle.SysidWarning")
 @pytest.mark.filterwarnings("ignore:.*too short:sysid_vehicle.SysidWarning")
 @pytest.mark.filterwarnings("ignore:.*did not converge:sysid_vehicle.SysidWarning")

@@ -59,7 +59,7 @@ def by_id(dx: Diagnosis, name: str) -> Fit:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_a_head_wind_gives_way_to_drag_and_rolling_resistance(
     dx: Diagnosis, driving: tuple[Driving, Driving]
 ) -> None:
@@ -83,7 +83,7 @@ def test_what_fits_to_the_last_digit_alike_is_no_alternative(dx: Diagnosis) -> N
     assert [c.id for c in alternatives(replace(dx, ranking=others), wind)] == ["rolling_resistance"]
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_a_slope_and_a_bias_give_way_to_rolling_resistance(start: Model, truth: Model) -> None:
     """Beside the slope the bias does to the last digit what rolling resistance does alone."""
     car = truth.add("rolling_resistance").with_values({"rolling_resistance.coefficient": 0.02})
@@ -121,7 +121,7 @@ def test_held_out_driving_has_a_say_between_what_the_fit_cannot_tell_apart(
         assert chosen[0].id == (other.id if told_apart else preferred.id)
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(
     start: Model, truth: Model
 ) -> None:
@@ -173,7 +173,7 @@ def search(test: Driving, most_effects: int, told: list[str]) -> Search:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_no_more_effects_are_added_than_allowed(
     baseline: Fit, driving: tuple[Driving, Driving]
 ) -> None:
@@ -265,7 +265,7 @@ def test_a_search_that_ends_at_its_bound_wanted_more_than_any_car_has() -> None:
     assert not possible(rolling, (-0.02, 0.0), (0.001, 0.001))
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 @pytest.mark.parametrize("downforce", [1.3, 0.0])
 def test_two_that_may_hold_only_together_are_sought_together(
     truth: Model, start: Model, downforce: float

@@ -15,6 +15,7 @@ def test_of_effects_that_act_alike_the_later_counts_for_what_it_adds(fit: Fit, l
     assert taken == pytest.approx({"aero_drag": 5.0, "head_wind": 0.39})
 
 
+@pytest.mark.manual
 def test_tyres_that_the_fit_never_saw_do_not_speak_against_the_right_effect(
     start: Model, truth: Model
 ) -> None:

@@ -371,7 +371,7 @@ def test_a_mirror_turns_states_that_lag_lateral_motion() -> None:
     assert follows(lambda d: d.F_zfl + d.F_zfr)
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_a_hidden_effect_with_a_state_is_found(tmp_path: Path) -> None:
     effect = heat()
     car = sv.example_vehicle()

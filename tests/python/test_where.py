@@ -53,7 +53,7 @@ def test_the_errors_of_the_maps_are_those_of_a_complete_model(null: tuple[Where,
     assert np.mean(np.abs(z) > 1.96) < 0.10
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_change_points_are_claimed_at_the_stated_rate(complete_fits: tuple[Fit, ...]) -> None:
     evidence = Evidence(complete_fits[0], complete_fits[0].driving)
     rng = np.random.default_rng(7)
@@ -77,7 +77,7 @@ def test_a_change_of_grip_is_dated(wet: Where) -> None:
     assert "grip changes in lap at 15." in str(wet) or "grip changes in lap at 14." in str(wet)
 
 
-@pytest.mark.slow
+@pytest.mark.manual
 def test_a_late_steering_is_timed(truth: Model) -> None:
     late = truth.add("steer_delay")
     z = []
