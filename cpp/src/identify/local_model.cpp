@@ -60,6 +60,7 @@ LocalModel::Moving LocalModel::moving(Recorder& to) const {
 
 std::vector<Recorded> LocalModel::parameters(Recorder& to) const {
     std::vector<Recorded> all;
+    all.reserve(kParameterCount);
     for (std::size_t i = 0; i < kParameterCount; ++i)
         all.push_back(to.parameter(p_[i], !columns_of_[i].empty()));
     return all;

@@ -154,7 +154,8 @@ class Derivatives {
     }
 
   private:
-    static constexpr std::size_t kTogether = 8 * kLanes;  // samples, so that they stay in the cache
+    static constexpr std::size_t kTogether =
+        std::size_t{8} * kLanes;  // samples, so that they stay in the cache
     static std::size_t padded(std::size_t columns) { return (columns + 7) / 8 * 8; }
 
     void take(const Run& run, std::size_t k, const std::array<double, kChannels>& white,

@@ -61,16 +61,17 @@ double normal_equations(const TyreLoss& loss, const double* p, std::nullptr_t /*
     const bool rest =
         std::any_of(columns.begin(), columns.end(), [&](int c) { return c >= kP1 && sought(c); });
     std::array<double, kCurveParameters> slope{};
-    std::array<double, kCurveParameters * kCurveParameters> squares{};
+    constexpr auto kAll = static_cast<std::size_t>(kCurveParameters);
+    std::array<double, kAll * kAll> squares{};
     const double half =
         loss.squares(p, rest ? kCurveParameters : kP1, slope.data(), squares.data());
     const std::size_t n = columns.size();
     for (std::size_t i = 0; i < n; ++i) {
         gradient[i] = sought(columns[i]) ? slope[static_cast<std::size_t>(columns[i])] : 0.0;
         for (std::size_t j = 0; j < n; ++j) {
-            const int a = std::max(columns[i], columns[j]), b = std::min(columns[i], columns[j]);
-            information[i * n + j] =
-                sought(a) ? squares[static_cast<std::size_t>(a * kCurveParameters + b)] : 0.0;
+            const auto a = static_cast<std::size_t>(std::max(columns[i], columns[j]));
+            const auto b = static_cast<std::size_t>(std::min(columns[i], columns[j]));
+            information[i * n + j] = a < kAll ? squares[a * kAll + b] : 0.0;
         }
     }
     return half;

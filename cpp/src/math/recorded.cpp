@@ -250,7 +250,8 @@ std::size_t index(int i) { return static_cast<std::size_t>(i); }
 int Recorder::partner_of(int node) const {
     const Node& n = nodes_[index(node)];
     if (n.uniform) return -1;
-    return n.op == Op::kSin ? node + 1 : n.op == Op::kCos ? node - 1 : -1;
+    if (n.op == Op::kSin) return node + 1;
+    return n.op == Op::kCos ? node - 1 : -1;
 }
 
 Program Recorder::program(const std::vector<Recorded>& outputs) const {

@@ -52,7 +52,7 @@ struct UserEffect {
     std::size_t slot = 0;
     std::vector<std::pair<Target, Formula>> acts;
     std::size_t first_state = 0;  // among those of all users' effects of a model
-    std::vector<UserState> states{};
+    std::vector<UserState> states;
 };
 
 /// Shared by all copies of a model, and never changed.

@@ -103,7 +103,8 @@ class NoiseScore {
     }
 
   private:
-    static constexpr std::size_t kWide = (L + 7) / 8 * 8;  // numbers kept for `L` lanes
+    // Numbers kept for `L` lanes.
+    static constexpr std::size_t kWide = (static_cast<std::size_t>(L) + 7) / 8 * 8;
     static constexpr int kPairs = NY * (NY + 1) / 2;
 
     struct Correlated {
@@ -165,7 +166,7 @@ class NoiseScore {
             u.lower.template triangularView<Eigen::Lower>().solve(Mat<NY, NY>::Identity());
         const Vec<NY> white = inverse * u.innovation;
         // H dP H^T + dR, then L^-1 dS, then L^-1 dS L^-T; dP H^T and dx have the sign of -S, -e.
-        std::array<double, NY * NY * kWide> change{}, left{}, both{};
+        std::array<double, std::size_t{NY} * NY * kWide> change{}, left{}, both{};
         std::array<double, NY * kWide> shift{}, moved{};
         const auto row = [](auto& of, int a, int b = 0) {
             return of.data() + (a * NY + b) * kWide;

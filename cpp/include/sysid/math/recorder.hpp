@@ -1,7 +1,8 @@
 // Makes a `Program` of what is done to `Recorded` numbers.
 #pragma once
 
-#include <cstring>
+#include <bit>
+#include <cstdint>
 #include <unordered_map>
 #include <vector>
 
@@ -31,7 +32,8 @@ class Recorder {
         bool uniform = false, active = false;
         bool same(const Node& o) const {
             return op == o.op && a == o.a && b == o.b && c == o.c &&
-                   std::memcmp(&constant, &o.constant, sizeof constant) == 0;
+                   std::bit_cast<std::uint64_t>(constant) ==
+                       std::bit_cast<std::uint64_t>(o.constant);
         }
     };
 
