@@ -68,6 +68,18 @@ def test_derived_quantities_are_found_by_name(fit: Fit) -> None:
         fit["cornering stiffness middle"]
 
 
+def test_what_a_fit_means_is_worked_out_for_a_car_without_its_effects(
+    fit: Fit, truth: Model
+) -> None:
+    """A demonstration sets the true car beside a model that has a wrong effect."""
+    with_effect = refine(fit.model.add("steer_offset"), fit.driving, fit.noise)
+    found = with_effect.values_of(truth)
+    assert list(found) == [e.name for e in fit.derived]
+    front, rear = true_stiffness(truth.vehicle)
+    assert found["cornering stiffness front"] == pytest.approx(front)
+    assert found["cornering stiffness rear"] == pytest.approx(rear)
+
+
 def test_the_cornering_stiffness_is_found(fit: Fit, car: Vehicle, start: Model) -> None:
     assert fit.converged
     assert_stiffness_found(fit, car)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from .._text import text_table
 from ..compare import Comparison
 from ..effects import effect
@@ -92,8 +90,7 @@ def revelation(study: Study, truth: Model) -> str:
     lines = [f"The hidden effect was {hidden.id}: {hidden.title}."]
     found = hidden.id in study.model.effects
     if found:
-        real = replace(study.fit, model=truth)
-        true = {n: truth.value(n) for n in truth.names} | {e.name: e.value for e in real.derived}
+        true = {n: truth.value(n) for n in truth.names} | study.fit.values_of(truth)
         shown = [e for e in study.fit.estimates if e.name.startswith(f"{hidden.id}.")]
         rows = [
             [e.name, quantity(true[e.name]), quantity(e.value), interval(e), unit(e.unit).strip()]

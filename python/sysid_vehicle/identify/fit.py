@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -105,6 +105,11 @@ class Fit:
             note = "" if np.isfinite(std) else "no peak"
             found.append(Estimate(what.name, what.of(p), std, unit, note))
         return tuple(profiled(e, self.profiles) for e in found)
+
+    def values_of(self, model: Model) -> dict[str, float]:
+        """What `derived` is of another model, which may lack this one's effects: the true one."""
+        bare = replace(self, model=model, estimates=(), covariance=np.zeros((0, 0)), profiles=())
+        return {e.name: e.value for e in bare.derived}
 
     @property
     def columns(self) -> list[int]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -177,7 +176,7 @@ def _parameters(study: Study, samples: Samples | None, truth: Model | None) -> l
     fit = study.fit
     real = {} if truth is None else {n: quantity(truth.value(n)) for n in truth.names}
     if truth is not None:
-        real |= {e.name: quantity(e.value) for e in replace(fit, model=truth).derived}
+        real |= {name: quantity(value) for name, value in fit.values_of(truth).items()}
     rows = []
     for e in (*fit.estimates, *fit.derived):
         row = [e.name, quantity(e.value), interval(e), unit(e.unit).strip(), e.note or "-"]
