@@ -47,6 +47,16 @@ def test_a_search_that_was_cut_short_is_to_go_on(unknown: Study) -> None:
     assert not any("check the sensors" in text for text in said)
 
 
+def test_only_what_the_driving_leaves_open_asks_for_harder_driving(unknown: Study) -> None:
+    first, second, *others = unknown.fit.estimates
+    notes = (replace(first, note="not determined"), replace(second, note="at bound"))
+    rest = tuple(replace(e, note="") for e in others)
+    fit = replace(unknown.fit, estimates=(*notes, *rest))
+    (said,) = (t for t in next_steps(replace(unknown, fits=(fit,))) if "limit of the tyres" in t)
+    assert first.name in said
+    assert second.name not in said
+
+
 def test_what_is_confounded_is_to_be_told_apart(unknown: Study) -> None:
     drag = AddedEffect("aero_drag", (), 2.0, 1.0, 1e-9, confounded_with=("head_wind",))
     proxy = AddedEffect("mass", (), 2.0, 1.0, 1e-9, stands_in="it is not constant")

@@ -53,18 +53,17 @@ def _of_names(study: Study) -> list[str]:
 
 def _of_what_is_left(study: Study) -> list[str]:
     found = []
-    untried = [c.id for c in study.diagnoses[-1].significant if c.fit is None]
     if study.stopped:
         found.append(f"give the search more time: {_few(study.stopped)} were still to be tried")
-    elif untried:
-        found.append(f"ask for more refits: {_few(untried)} have evidence and were not refitted")
     if not study.sensors and not study.checked:
         found.append(
             "check the sensors, and give the result to the study: `sv.check`, or "
             "`sysid-vehicle check`; scales, biases and places of sensors act like "
             "effects of the car"
         )
-    open_ = [n for n in study.fit.undetermined if "." not in n]
+    open_ = [
+        e.name for e in study.fit.estimates if e.note == "not determined" and "." not in e.name
+    ]
     if open_:
         found.append(
             f"drive nearer the limit of the tyres: {_few(open_)} are not determined, and tyres "
