@@ -139,6 +139,7 @@ def test_the_laboratory_without_a_vehicle(
         {"mass.relative_error": 0.3},
         {"force_gain.drive_error": 0.3},
         {"steer_lag.time_constant_s": 0.1},
+        {"locked_differential.slip_stiffness_nm2": 240e3},
         {"tyre_load_sensitivity.sensitivity": 0.3},
     ],
     ids=str,

@@ -23,6 +23,7 @@ _MOVING = 5.0  # m/s
 _MIN_WINDOWS = 12
 _LINEAR_MPS2 = 5.0
 _SETTLING = 1  # windows before and after harder driving
+_FAR = 2.5  # times the usual steering: beyond it an angle counts as that much
 _SURE = 3.0  # deviations
 _COHERENT = 0.6
 # What logs of good cars are off by: the commanded force by its gain and by slopes, the steering by
@@ -137,8 +138,13 @@ def _steer(drive: Drive, wheelbase_m: float) -> _Told | None:
     steer = drive.mean(c["steer_rad"])
     curvature = drive.mean(c["yaw_rate_radps"] / np.clip(c["vx_mps"], 1.0, None))
     yaw = drive.change(c["yaw_rate_radps"])
+    # Front tyres that slip ask for any angle at little a_y: no bend decides alone.
+    size = np.abs(steer)
+    usual = _FAR * float(np.median(size[gentle & (np.abs(ay) >= EXCITED)]))
+    even = np.minimum(1.0, usual / np.maximum(size, _TINY))[gentle, None]
     columns = np.column_stack([steer, wheelbase_m * curvature, ay, np.ones(ay.size)])[gentle]
-    yaw = yaw[gentle, None]
+    columns *= even
+    yaw = even * yaw[gentle, None]
     columns -= yaw * (yaw.T @ columns / max(float(np.sum(yaw**2)), _TINY))
     squares = columns.T @ columns
     offset = _OFFSET * size_of(steer[gentle])
