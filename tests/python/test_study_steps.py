@@ -5,16 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Diagnosis, Fit, Model, compare, diagnose, drive, identify, manoeuvres
+from sysid_vehicle import Diagnosis, Fit, Log, Model, compare, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
 from sysid_vehicle.rules import USUAL, share_explained
+from sysid_vehicle.study.improve import _room
 from sysid_vehicle.study.search import Search, Trail, _more
 from sysid_vehicle.study.steps import (
     _distance,
+    _leading_subsets,
     _mattering,
+    _with_subset,
     alternatives,
     better,
     exchanged,
@@ -319,6 +322,36 @@ def test_two_are_added_together_where_the_posterior_names_both(truth: Model, sta
     assert set(trail.p_values) == set(both)
     assert max(trail.p_values.values()) < 1e-6
     assert first_together(dx, test, None, 1) is None  # there has to be room for two
+
+
+@pytest.mark.manual
+def test_a_group_with_a_value_that_no_car_has_is_not_added(truth: Model, start: Model) -> None:
+    both = ("gyro_bias", "steer_ratio")
+    sizes = {"gyro_bias.bias_radps": 0.006, "steer_ratio.ratio_error": -0.36}
+    car = truth.add(*both).with_values(sizes)
+    fit = identify(start, drive(car, manoeuvres.ramp_steer(), seed=81), starts=1)
+    test = Driving.of(drive(car, manoeuvres.lap(25.0), seed=82))
+    dx = diagnose(fit, candidates=[*both, "mass"], refits=0)
+    assert both in _leading_subsets(dx, 2)
+    found = _with_subset(dx, both)
+    assert found is not None
+    assert found.model.effects == both
+    assert first_together(dx, test, None, 2) is None
+
+
+def test_a_factor_is_as_many_times_smaller_as_it_may_be_larger() -> None:
+    inertia = effect("yaw_inertia")
+    assert possible(inertia, (1.2,), (0.01,))
+    assert possible(inertia, (-0.5,), (0.01,))
+    assert not possible(inertia, (-0.76,), (0.08,))
+    assert not possible(inertia, (1.3,), (0.01,))
+
+
+def test_short_driving_leaves_room_for_few_effects(truth: Model, lap: Log) -> None:
+    assert _room(truth, Driving.of(lap.between(0.0, 8.0)), USUAL) == 1
+    assert _room(truth, Driving.of(lap.between(0.0, 3.0)), USUAL) == 1
+    assert _room(truth.add("aero_drag"), Driving.of(lap.between(0.0, 8.0)), USUAL) == 2
+    assert _room(truth, Driving.of(lap), USUAL) > 4
 
 
 def test_what_came_with_a_step_is_told(dx: Diagnosis) -> None:

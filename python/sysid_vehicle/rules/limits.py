@@ -56,6 +56,9 @@ class Rules:
         "of an effect that fitted parameters cannot copy; less is not testable",
         _NULLS,
     )
+    lasts: float = _limit(
+        5.0, "s", "of usable training data that each effect of a model takes", _EFFECTS
+    )
     interval: float = _limit(1.96, "standard errors", "of a 95 % interval", _CONVENTION)
     bound: float = _limit(1.645, "standard errors", "of a 95 % bound, one side", _CONVENTION)
     implausible: float = _limit(

@@ -68,7 +68,7 @@ def improve(
         What to fit to, and validation data. Without `test` the last 30 % of the training
         driving are held out.
     most_effects : int
-        Stop after so many.
+        Stop after so many, or where the training data are too short for more (`Rules.lasts`).
     alpha : float
         Rate of false claims accepted, over all effects together, per step; by default that of the
         rules.
@@ -122,7 +122,7 @@ def improve(
         search = Search(
             test_driving,
             candidates=candidates,
-            most_effects=most_effects,
+            most_effects=min(most_effects, _room(model, train_driving, rules)),
             ends=ends,
             rules=rules,
             seed=seed,
@@ -184,6 +184,11 @@ def improve(
             stopped=found.stopped,
             checked=bool(sensors),
         )
+
+
+def _room(model: Model, driving: Driving, rules: Rules) -> int:
+    """How many effects the driving is long enough for, one at least beside those of the model."""
+    return len(model.effects) + max(int(driving.usable_s / rules.lasts), 1)
 
 
 def _excited(driving: Driving) -> bool:
