@@ -34,7 +34,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "sysid_vehicle"
 NUMERICAL = {
     "diagnose/causes.py": {"_KEPT", "_LEAST"},
     "diagnose/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
-    "diagnose/diagnose.py": {"_REFITS", "_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS"},
+    "diagnose/diagnose.py": {"_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS"},
     "diagnose/evidence.py": {"_AT_ONCE"},
     "diagnose/information.py": {"_COPIED"},
     "diagnose/possible.py": {"_AT_BOUND"},

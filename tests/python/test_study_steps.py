@@ -7,6 +7,7 @@ import pytest
 
 from sysid_vehicle import Diagnosis, Fit, Log, Model, compare, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import possible
+from sysid_vehicle.diagnose.refits import in_time
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
@@ -199,6 +200,32 @@ def test_no_more_effects_are_added_than_allowed(
     one = followed(search(driving[1], 1, told))
     assert len(one.fit.model.effects) == 1
     assert one.diagnoses[-1].fit is one.fit
+
+
+def test_what_was_refitted_when_the_time_is_over_is_added(
+    dx: Diagnosis,
+    baseline: Fit,
+    driving: tuple[Driving, Driving],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The diagnosis begins in time and ends late: no further refit, and no step is lost."""
+    clock = iter([0.0])
+    monkeypatch.setattr("time.perf_counter", lambda: next(clock, 2.0))
+    monkeypatch.setattr(Search, "_diagnosis", lambda _, fit: replace(dx, fit=fit))
+    for refits in ("first_together", "exchanged"):
+        monkeypatch.setattr(f"sysid_vehicle.study.search.{refits}", None)
+    trail = Trail([baseline])
+    replace(search(driving[1], 4, []), ends=1.0).follow(trail)
+    held = first_that_holds(dx, baseline, driving[1])
+    assert held is not None
+    assert [f.model.effects for f in trail.fits] == [(), held[1].model.effects]
+    assert set(trail.stopped) == {c.id for c in dx.significant}
+
+
+def test_no_refit_begins_after_the_time_limit(dx: Diagnosis) -> None:
+    c = dx.ranking[0]
+    assert in_time(lambda c: replace(c, statistic=-1.0), np.inf)(c).statistic == -1.0
+    assert in_time(lambda c: replace(c, statistic=-1.0), 0.0)(c) is c
 
 
 def test_the_story_leads_over_every_effect_of_its_end(

@@ -9,12 +9,12 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from .._arguments import real, whole
+from .._arguments import duration, whole
 from .._progress import teller
 from ..compare import Comparison, compare
 from ..diagnose import Verdicts, considered, judge, omnibus
 from ..effects import effect
-from ..errors import InvalidInput, SysidWarning, warn
+from ..errors import SysidWarning, warn
 from ..estimate import Driving
 from ..identify import Fit, explaining, identify
 from ..log import Log, check_excitation, several_logs
@@ -83,8 +83,8 @@ def improve(
         considered. Without one only what the likelihood cannot hold is taken out: delays of one
         channel against another, low-passes of sensors, and vibration; with False not even that.
     time_limit_s : float, optional
-        After so many seconds no further step begins; what was found until then is judged, and a
-        warning tells.
+        After so many seconds no further refit begins; of what was refitted by then the best is
+        added if validation data confirm it, the model is judged, and a warning tells.
     matters : mapping, optional
         Errors that matter, such as ``{"yaw_rate": "0.5deg/s"}`` (`sizes_that_matter`); those not
         given have usual sizes. A baseline whose errors 0.5 to 5 s ahead on validation data are all
@@ -106,7 +106,7 @@ def improve(
     most_effects = whole(most_effects, "most_effects")
     rules = rules.at(alpha)
     began = time.perf_counter()
-    ends = began + _limit(time_limit_s)
+    ends = began + duration(time_limit_s, "time_limit_s")
     sizes = None if matters is None else sizes_that_matter(matters)
     train, test, settled = _ready(train, test, sensors)
     exclude = (*exclude, *settled)
@@ -210,15 +210,6 @@ def _ready(
         return [sensors.apply(log) for log in logs], put_right(sensors, test), sensors.settles
     own, rest, delayed = made_ready(logs, others)
     return own, None if test is None else rest, ("sensor_delay",) if delayed else ()
-
-
-def _limit(seconds: float | None) -> float:
-    if seconds is None:
-        return np.inf
-    value = real(seconds)
-    if value is None or not value > 0.0:
-        raise InvalidInput(f"time_limit_s = {seconds!r}: give seconds, above 0")
-    return value
 
 
 def _added(
