@@ -136,12 +136,10 @@ class Search:
                 return
             # What was refitted is not lost; what takes further refits waits for another study.
             step = first_that_holds(dx, trail.fit, self.test) if self.most_effects else None
-            several = None
-            if time.perf_counter() < self.ends:
-                single = None if step is None else step[1]
-                several = first_together(dx, self.test, single, self.most_effects)
-                if step is None and several is None:
-                    step = self._beside_another(dx, trail)
+            single = None if step is None else step[1]
+            several = first_together(dx, self.test, single, self.most_effects, self.ends)
+            if step is None and several is None and time.perf_counter() < self.ends:
+                step = self._beside_another(dx, trail)
             if several is not None:
                 chosen, lean = several
                 trail.note_several(dx, chosen)
@@ -152,11 +150,14 @@ class Search:
                 if time.perf_counter() > self.ends:
                     trail.stopped = tuple(c.id for c in dx.significant)
                 return
-            found = lean
-            if time.perf_counter() < self.ends:
-                found = exchanged(
-                    lean, trail.nearly, self.test, most_effects=self.most_effects, rules=self.rules
-                )
+            found = exchanged(
+                lean,
+                trail.nearly,
+                self.test,
+                most_effects=self.most_effects,
+                rules=self.rules,
+                ends=self.ends,
+            )
             effects = set(found.model.effects)
             # One more than allowed may make another needless.
             if len(effects) > self.most_effects:
