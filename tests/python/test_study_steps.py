@@ -368,14 +368,6 @@ def test_a_group_with_a_value_that_no_car_has_is_not_added(truth: Model, start: 
     assert first_together(dx, test, None, 2) is None
 
 
-def test_a_factor_is_as_many_times_smaller_as_it_may_be_larger() -> None:
-    inertia = effect("yaw_inertia")
-    assert possible(inertia, (1.2,), (0.01,))
-    assert possible(inertia, (-0.5,), (0.01,))
-    assert not possible(inertia, (-0.76,), (0.08,))
-    assert not possible(inertia, (1.3,), (0.01,))
-
-
 def test_short_driving_leaves_room_for_few_effects(truth: Model, lap: Log) -> None:
     assert _room(truth, Driving.of(lap.between(0.0, 8.0)), USUAL) == 1
     assert _room(truth, Driving.of(lap.between(0.0, 3.0)), USUAL) == 1

@@ -19,15 +19,15 @@ from ..estimate import Driving
 from ..identify import Fit, explaining, identify
 from ..log import Log, check_excitation, several_logs
 from ..model import Model
-from ..rules import USUAL, Rules, grade, verdict
+from ..rules import USUAL, Change, Decision, Rules, grade, verdict
 from ..sensors import SensorCheck, made_ready, put_right
 from .added import AddedEffect
-from .horizons import horizons
+from .horizons import changes, horizons
 from .matters import sizes_that_matter, within
 from .search import Search, Trail, kept
 from .steps import way
 from .study import Study
-from .validation import beyond_noise_ahead, serving, set_aside
+from .validation import AHEAD, beyond_noise_ahead, changes_ahead, serving, set_aside
 from .verdict import facts_of, in_the_light_of
 
 __all__ = ["improve"]
@@ -141,6 +141,7 @@ def improve(
         if len(fits) > 1:
             validation = omnibus(serving(fit, test_driving), test_driving, rules)
             explained = beyond_noise_ahead(fits, test_driving)
+        much_left = explained is not None and explained.share < rules.most
         told = judge(
             fit,
             scored=(last.scores, last.family) if last.fit is fit else None,
@@ -156,12 +157,13 @@ def improve(
             fits,
             told,
             on_train[-1],
-            (0.0,) if explained is None else explained.squares,
+            explained,
             before=diagnoses[0].omnibus,
             fitted=fitted,
             validation=validation,
             candidate=min((c.p_value for c in last.ranking), default=1.0),
             excited=_excited(train_driving),
+            changes=_changes(baseline, fit, test_driving) if much_left else ((), ()),
             small=sizes is not None and within(horizons([fit], [""], test_driving), sizes),
         )
         decision = verdict(facts, rules)
@@ -173,7 +175,7 @@ def improve(
             train=tuple(on_train),
             test=tuple(on_test),
             validation=test_driving,
-            added=_added(fits, on_test, found, told, alone),
+            added=_added(fits, on_test, found, told, alone, decision),
             omnibus=fitted,
             omnibus_validation=validation,
             verdicts=told,
@@ -184,6 +186,12 @@ def improve(
             stopped=found.stopped,
             checked=bool(sensors),
         )
+
+
+def _changes(
+    baseline: Fit, fit: Fit, test: Driving
+) -> tuple[tuple[Change, ...], tuple[Change, ...]]:
+    return changes_ahead(baseline, fit, test), changes(baseline, fit, fit.driving, AHEAD)
 
 
 def _room(model: Model, driving: Driving, rules: Rules) -> int:
@@ -213,7 +221,12 @@ def _ready(
 
 
 def _added(
-    fits: list[Fit], on_test: list[Comparison], found: Trail, told: Verdicts, alone: Verdicts
+    fits: list[Fit],
+    on_test: list[Comparison],
+    found: Trail,
+    told: Verdicts,
+    alone: Verdicts,
+    decision: Decision,
 ) -> tuple[AddedEffect, ...]:
     added = []
     final = fits[-1]
@@ -233,7 +246,7 @@ def _added(
                     found.p_values.get(name, np.nan),
                     tuple(e for e in found.rivals.get(name, ()) if e in group),
                     told[name].because if told[name].finding == "proxy" else "",
-                    grade(alone[name].finding, told[name].finding),
+                    grade(alone[name].finding, told[name].finding, much_left=decision.much_left),
                 )
             )
     return tuple(added)
