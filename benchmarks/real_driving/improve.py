@@ -44,6 +44,8 @@ def one(name: str, args: argparse.Namespace) -> dict[str, object]:
     for v in study.verdicts.all:
         if v.finding in ("missing", "one of a group", "proxy"):
             print(f"  {v}")
+    if args.save is not None:
+        study.save(args.save / f"{name}.npz")
     told: dict[str, object] = {"verdict": study.verdict, "added": [a.name for a in study.added]}
     fits = {"before": study.fits[0], "after": study.fit}
     try:
@@ -55,8 +57,6 @@ def one(name: str, args: argparse.Namespace) -> dict[str, object]:
             error = ahead(fit.model, motion, seconds)
             told[f"{word} {seconds:g} s"] = vars(error)
             print(f"  {word}, {seconds:g} s ahead: {error}", flush=True)
-    if args.save is not None:
-        study.save(args.save / f"{name}.npz")
     if args.report is not None:
         study.report(args.report / f"{name}.html")
     print(f"  {time.perf_counter() - began:.0f} s\n", flush=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from .errors import InvalidInput
 
-__all__ = ["expect", "generator", "real", "whole"]
+__all__ = ["duration", "expect", "generator", "real", "whole"]
 
 
 def real(value: object) -> float | None:
@@ -43,6 +43,20 @@ def whole(value: object, name: str, least: int = 0) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
         raise InvalidInput(f"{name} = {value!r}: give a whole number, {least} or more")
     return int(value)
+
+
+def duration(seconds: object, name: str) -> float:
+    """The duration as a float [s]; endless where it is None.
+
+    Raises
+    ------
+    InvalidInput
+        It is no number above 0.
+    """
+    value = math.inf if seconds is None else real(seconds)
+    if value is None or not value > 0.0:
+        raise InvalidInput(f"{name} = {seconds!r}: give seconds, above 0")
+    return value
 
 
 def generator(seed: object) -> np.random.Generator:

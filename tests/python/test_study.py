@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from sysid_vehicle import (
     manoeuvres,
 )
 from sysid_vehicle.rules import Gain, share_explained
+from sysid_vehicle.study.horizons import Beyond
 from sysid_vehicle.study.validation import (
     error_falls,
     gain_in_log_likelihood,
@@ -225,6 +227,12 @@ def test_infinite_figures_become_null(study: Study, tmp_path: Path) -> None:
     study.to_json(path)
     written = json.loads(path.read_text(encoding="utf-8"))["parameters"]
     assert [n for n, e in written.items() if e["std"] is None] == names
+
+
+def test_a_part_is_told_with_its_share(study: Study) -> None:
+    part = replace(study, verdict="partly_explained", explained=Beyond((1.0, 0.7), 0.3, 0.2, 0.4))
+    assert "takes up 30 % (20 to 40) of the error 1 to 5 s ahead; the rest is" in part.meaning
+    assert "takes up" not in replace(part, explained=study.explained).meaning
 
 
 def test_undetermined_parameters_are_among_the_warnings(study: Study) -> None:

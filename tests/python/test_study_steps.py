@@ -5,16 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Diagnosis, Fit, Model, compare, diagnose, drive, identify, manoeuvres
+from sysid_vehicle import Diagnosis, Fit, Log, Model, compare, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import possible
+from sysid_vehicle.diagnose.refits import in_time
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
 from sysid_vehicle.rules import USUAL, share_explained
+from sysid_vehicle.study.improve import _room
 from sysid_vehicle.study.search import Search, Trail, _more
 from sysid_vehicle.study.steps import (
     _distance,
+    _leading_subsets,
     _mattering,
+    _with_subset,
     alternatives,
     better,
     exchanged,
@@ -199,6 +203,32 @@ def test_no_more_effects_are_added_than_allowed(
     assert one.diagnoses[-1].fit is one.fit
 
 
+def test_what_was_refitted_when_the_time_is_over_is_added(
+    dx: Diagnosis,
+    baseline: Fit,
+    driving: tuple[Driving, Driving],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The diagnosis begins in time and ends late: no further refit, and no step is lost."""
+    clock = iter([0.0])
+    monkeypatch.setattr("time.perf_counter", lambda: next(clock, 2.0))
+    monkeypatch.setattr(Search, "_diagnosis", lambda _, fit: replace(dx, fit=fit))
+    for refits in ("_with_subset", "_with_others"):
+        monkeypatch.setattr(f"sysid_vehicle.study.steps.{refits}", None)
+    trail = Trail([baseline])
+    replace(search(driving[1], 4, []), ends=1.0).follow(trail)
+    held = first_that_holds(dx, baseline, driving[1])
+    assert held is not None
+    assert [f.model.effects for f in trail.fits] == [(), held[1].model.effects]
+    assert set(trail.stopped) == {c.id for c in dx.significant}
+
+
+def test_no_refit_begins_after_the_time_limit(dx: Diagnosis) -> None:
+    c = dx.ranking[0]
+    assert in_time(lambda c: replace(c, statistic=-1.0), np.inf)(c).statistic == -1.0
+    assert in_time(lambda c: replace(c, statistic=-1.0), 0.0)(c) is c
+
+
 def test_the_story_leads_over_every_effect_of_its_end(
     dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving]
 ) -> None:
@@ -320,6 +350,30 @@ def test_two_are_added_together_where_the_posterior_names_both(truth: Model, sta
     assert set(trail.p_values) == set(both)
     assert max(trail.p_values.values()) < 1e-6
     assert first_together(dx, test, None, 1) is None  # there has to be room for two
+
+
+@pytest.mark.manual
+def test_a_group_with_a_value_that_no_car_has_is_not_added(truth: Model, start: Model) -> None:
+    both = ("gyro_bias", "steer_ratio")
+    sizes = {"gyro_bias.bias_radps": 0.006, "steer_ratio.ratio_error": -0.36}
+    car = truth.add(*both).with_values(sizes)
+    fit = identify(start, drive(car, manoeuvres.ramp_steer(), seed=81), starts=1)
+    test = Driving.of(drive(car, manoeuvres.lap(25.0), seed=82))
+    dx = diagnose(fit, candidates=[*both, "mass"], refits=0)
+    assert both in _leading_subsets(dx, 2)
+    assert _with_subset(dx, both) is None
+    tolerant = replace(dx, rules=replace(USUAL, implausible=9.0))
+    found = _with_subset(tolerant, both)
+    assert found is not None
+    assert found.model.effects == both
+    assert first_together(dx, test, None, 2) is None
+
+
+def test_short_driving_leaves_room_for_few_effects(truth: Model, lap: Log) -> None:
+    assert _room(truth, Driving.of(lap.between(0.0, 8.0)), USUAL) == 1
+    assert _room(truth, Driving.of(lap.between(0.0, 3.0)), USUAL) == 1
+    assert _room(truth.add("aero_drag"), Driving.of(lap.between(0.0, 8.0)), USUAL) == 2
+    assert _room(truth, Driving.of(lap), USUAL) > 4
 
 
 def test_what_came_with_a_step_is_told(dx: Diagnosis) -> None:

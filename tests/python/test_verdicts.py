@@ -15,7 +15,7 @@ from sysid_vehicle import (
     manoeuvres,
     verdicts,
 )
-from sysid_vehicle.diagnose import EffectVerdict, Verdicts
+from sysid_vehicle.diagnose import EffectVerdict, Verdicts, possible
 from sysid_vehicle.diagnose.verdicts import _of_present, judge
 from sysid_vehicle.rules import USUAL
 
@@ -146,3 +146,11 @@ def test_one_that_only_acted_like_others_names_them() -> None:
     assert of.sentence == "only acted like what steer_lag explains"
     both = EffectVerdict(effect("mass"), "proxy", group=("steer_lag", "aero_drag"))
     assert both.sentence == "only acted like what steer_lag, aero_drag explain"
+
+
+def test_a_factor_is_as_many_times_smaller_as_it_may_be_larger() -> None:
+    inertia = effect("yaw_inertia")
+    assert possible(inertia, (1.2,), (0.01,))
+    assert possible(inertia, (-0.5,), (0.01,))
+    assert not possible(inertia, (-0.76,), (0.08,))
+    assert not possible(inertia, (1.3,), (0.01,))

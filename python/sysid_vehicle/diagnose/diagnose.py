@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 
+from .._arguments import duration
 from .._progress import with_progress
 from .._threads import Workers
 from ..compare import compare
@@ -19,12 +21,12 @@ from .diagnosis import Candidate, Diagnosis
 from .evidence import Evidence
 from .omnibus import omnibus_of
 from .refits import finished as finished_of
-from .refits import refitted
+from .refits import in_time, refitted
 from .score import Score, ScoreBoard, score_board_of
 
-__all__ = ["considered", "diagnose"]
+__all__ = ["REFITS", "considered", "diagnose"]
 
-_REFITS = 5
+REFITS = 5
 # Of the best statistic: what scores less than this share does not overtake it. States of their own
 # make a refit slow, and what has some is scored at its typical size, not far from the refit.
 _HOPELESS = 0.15
@@ -40,8 +42,9 @@ def diagnose(
     candidates: Sequence[str | Effect] | None = None,
     alpha: float | None = None,
     rules: Rules = USUAL,
-    refits: int = _REFITS,
+    refits: int = REFITS,
     workers: int | None = None,
+    time_limit_s: float | None = None,
     seed: int = 0,
     progress: bool | None = None,
 ) -> Diagnosis:
@@ -65,7 +68,10 @@ def diagnose(
         How many of the best to refit; 0 ranks by score alone, and then none is named.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
+    time_limit_s : float, optional
+        After so many seconds no further refit begins; the best effect is refitted in any case.
     """
+    ends = time.perf_counter() + duration(time_limit_s, "time_limit_s")
     rules = rules.at(alpha)
     driving = fit.driving if logs is None else Driving.of(logs)
     possible = considered(fit.model, candidates)
@@ -101,7 +107,7 @@ def diagnose(
             tried = [
                 first,
                 *with_progress(
-                    pool.map(lambda c: refitted(fit, driving, c), others),
+                    pool.map(in_time(lambda c: refitted(fit, driving, c), ends), others),
                     "refits",
                     total=len(others),
                     shown=progress,
@@ -110,7 +116,7 @@ def diagnose(
             # Under the noise of the poorer model they differ less than they really do.
             top = max(c.statistic for c in tried)
             near = [c for c in tried if c.statistic > 0.4 * top]
-            finished = list(pool.map(lambda c: finished_of(fit, c), near))
+            finished = list(pool.map(in_time(lambda c: finished_of(fit, c), ends), near))
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         finished = [_with_refit_rivals(c, finished, 2.0 * rules.apart) for c in finished]
         done = {c.id for c in finished}

@@ -15,6 +15,7 @@ Size = tuple[tuple[float, ...], tuple[float, ...]]
 """Parameters of an effect, and their standard errors."""
 
 _AT_BOUND = 1e-5  # of the width between the bounds
+_OF_A_FACTOR = "_error"  # names of relative errors: what is multiplied by 1 + e
 
 
 def possible(
@@ -22,7 +23,8 @@ def possible(
 ) -> bool:
     """Whether the 95 % intervals of an effect's parameters hold values that a car can have.
 
-    A search that ends at a bound other than nothing wanted more than any car has.
+    A search that ends at a bound other than nothing wanted more than any car has. A factor can be
+    as many times smaller as it can be larger: no car turns with a quarter of its yaw inertia.
 
     Parameters
     ----------
@@ -51,7 +53,8 @@ def sizes(
 
 def _impossible(p: Parameter, off: float, reach: float, rules: Rules) -> bool:
     most = rules.implausible * abs(p.typical - p.null_value)
-    low, high = max(p.lower - p.null_value, -most), min(p.upper - p.null_value, most)
+    least = most / (1.0 + most) if p.name.endswith(_OF_A_FACTOR) else most
+    low, high = max(p.lower - p.null_value, -least), min(p.upper - p.null_value, most)
     if np.isinf(reach):
         at = _AT_BOUND * (p.upper - p.lower)
         return bool((low < 0.0 and off < low + at) or (high > 0.0 and off > high - at))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +13,7 @@ from ..estimate import Driving
 from ..identify import Fit, refine, refit
 from .diagnosis import Candidate
 
-__all__ = ["finished", "refitted"]
+__all__ = ["finished", "in_time", "refitted"]
 
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
 
@@ -33,6 +35,13 @@ def refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
         if best is None or trial.log_likelihood > best.log_likelihood:
             best = trial
     return replace(c, statistic=0.0) if best is None else _with_fit(fit, c, best)
+
+
+def in_time(
+    work: Callable[[Candidate], Candidate], ends: float
+) -> Callable[[Candidate], Candidate]:
+    """The same, but what would begin after `ends`, by `time.perf_counter`, is left as it is."""
+    return lambda c: work(c) if time.perf_counter() < ends else c
 
 
 def finished(fit: Fit, c: Candidate) -> Candidate:

@@ -14,6 +14,7 @@
    implausible, or differs between pieces of the driving (`spread`).
 8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead,
    leave more than `stays` of the evidence, take up less than is left, or should have explained it.
+   Where those errors are shown to fall in every lateral channel, names with a share (`taken`) stay.
 9. The verdict follows from what is left and which names stand (`verdict`).
 10. `Rules` holds every limit with unit, meaning, and the benchmark that chose or judges it.
 
@@ -21,16 +22,11 @@ Nothing here sees a fit or a log: others measure, this decides.
 """
 
 from .accept import Change, Gain, Measures, accept, bic, worse
+from .facts import Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
 from .verdict import (
-    Added,
-    Decision,
-    Facts,
     Grade,
     Share,
-    Tested,
-    Verdict,
-    Withdrawn,
     excess,
     grade,
     share_between,

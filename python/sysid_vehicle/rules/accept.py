@@ -10,7 +10,7 @@ import numpy as np
 
 from .limits import USUAL, Rules
 
-__all__ = ["Change", "Gain", "Measures", "accept", "bic", "worse"]
+__all__ = ["Change", "Gain", "Measures", "accept", "bic", "fallen", "worse"]
 
 
 def bic(log_likelihood: float, parameters: int, samples: int) -> float:
@@ -109,3 +109,9 @@ def worse(changes: Sequence[Change], rules: Rules = USUAL) -> tuple[Change, ...]
     """The errors some seconds ahead that are shown to have grown, by more than it matters."""
     least = math.log1p(rules.worse)
     return tuple(c for c in changes if c.log_ratio > max(least, rules.grown * c.error))
+
+
+def fallen(changes: Sequence[Change], rules: Rules = USUAL) -> tuple[Change, ...]:
+    """The errors some seconds ahead that are shown to have fallen, by more than it matters."""
+    least = math.log1p(rules.worse)
+    return tuple(c for c in changes if -c.log_ratio > max(least, rules.fallen * c.error))

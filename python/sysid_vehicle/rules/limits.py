@@ -56,6 +56,9 @@ class Rules:
         "of an effect that fitted parameters cannot copy; less is not testable",
         _NULLS,
     )
+    lasts: float = _limit(
+        5.0, "s", "of usable training data that each effect of a model takes", _EFFECTS
+    )
     interval: float = _limit(1.96, "standard errors", "of a 95 % interval", _CONVENTION)
     bound: float = _limit(1.645, "standard errors", "of a 95 % bound, one side", _CONVENTION)
     implausible: float = _limit(
@@ -80,10 +83,16 @@ class Rules:
         4.5, "standard errors", "of likelihood on validation data, which decide alone", _EFFECTS
     )
     worse: float = _limit(
-        0.05, "share", "by which no error 1 to 5 s ahead may grow on validation data", _EFFECTS
+        0.05, "share", "by which no error 1 to 5 s ahead may grow; a smaller fall is none", _EFFECTS
     )
     grown: float = _limit(
-        3.0, "standard errors", "by which an error 1 to 5 s ahead is shown to grow", _EFFECTS
+        2.0, "standard errors", "by which an error 1 to 5 s ahead is shown to grow", _EFFECTS
+    )
+    fallen: float = _limit(
+        3.0,
+        "standard errors",
+        "by which it is shown to fall in a channel, so that names stand beside much that is left",
+        _OUTSIDE,
     )
     nothing: float = _limit(
         0.5, "probability", "before any data, that one of a sum of effects is none", _NULLS

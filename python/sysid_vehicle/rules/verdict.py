@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from .accept import fallen
+from .facts import Added, Decision, Facts, Tested, Withdrawn
 from .limits import USUAL, Rules
 
 __all__ = [
-    "Added",
-    "Decision",
-    "Facts",
     "Grade",
     "Share",
-    "Tested",
-    "Verdict",
-    "Withdrawn",
     "excess",
     "grade",
     "share_between",
@@ -30,28 +26,7 @@ __all__ = [
     "verdict",
 ]
 
-Verdict = Literal["adequate", "explained", "partly_explained", "unknown", "not_testable"]
 Grade = Literal["confirmed", "plausible", "alias"]
-
-
-class Tested(Protocol):
-    """A test for anything left."""
-
-    @property
-    def statistic(self) -> float:
-        """Chi-squared of a complete model."""
-
-    @property
-    def degrees(self) -> int:
-        """Degrees of freedom."""
-
-    @property
-    def p_value(self) -> float:
-        """Of a complete model."""
-
-    @property
-    def moves(self) -> tuple[str, ...]:
-        """Channels that what is left moves most."""
 
 
 def excess(test: Tested) -> float:
@@ -134,100 +109,15 @@ def share_between(
     return Share(float((before[0] - after[0]) / explainable[0]), float(low), float(high))
 
 
-@dataclass(frozen=True)
-class Added:
-    """An effect of the final model that the baseline lacked.
-
-    Attributes
-    ----------
-    finding : str
-        What is said of it by itself: `missing`, `one of a group`, `negligible` or `proxy`.
-    group : tuple of str
-        Its rivals, where it is one of a group.
-    moves : frozenset of str
-        Channels that it moves.
-    taken : float
-        Of `Facts.missing`, what it took up in its turn.
-    """
-
-    id: str
-    finding: str
-    group: tuple[str, ...] = ()
-    moves: frozenset[str] = frozenset()
-    taken: float = 0.0
-
-    @property
-    def named(self) -> bool:
-        """Whether it is said to be missing, not only to act like it or to be negligible."""
-        return self.finding in ("missing", "one of a group")
-
-
-@dataclass(frozen=True)
-class Facts:
-    """What a study measured, from which its verdict follows.
-
-    Attributes
-    ----------
-    before, fitted : Tested
-        For anything left by the baseline and by the final model, on the training data.
-    validation : Tested or None
-        The latter on validation data; None where nothing was added.
-    candidate : float
-        Smallest p-value of an effect that the final model lacks.
-    missing : (float, float)
-        Squares of errors 1 to 5 s ahead on validation data, beyond the noise of sensors, without
-        and with what was added; in one unit.
-    contradictions : tuple of str
-        Channels that contradict the others, in words.
-    excited : bool
-        Whether the training data excite the lateral motion.
-    small : bool
-        Whether no error 0.5 to 5 s ahead on validation data is as large as matters to the user.
-    """
-
-    before: Tested
-    fitted: Tested
-    validation: Tested | None = None
-    candidate: float = 1.0
-    missing: tuple[float, float] = (0.0, 0.0)
-    added: tuple[Added, ...] = ()
-    contradictions: tuple[str, ...] = ()
-    excited: bool = True
-    small: bool = False
-
-
-@dataclass(frozen=True)
-class Withdrawn:
-    """Names that are taken back, and why.
-
-    Attributes
-    ----------
-    effects : frozenset of str
-    because : str
-    beside : frozenset of str
-        Effects of the model, which are no mere rivals of these: each stands or falls by itself.
-    """
-
-    effects: frozenset[str]
-    because: str
-    beside: frozenset[str] = frozenset()
-
-
-@dataclass(frozen=True)
-class Decision:
-    """A verdict, and the names that are withdrawn, in this order."""
-
-    verdict: Verdict
-    withdrawn: tuple[Withdrawn, ...] = ()
-
-
-def grade(alone: str, beside: str) -> Grade:
+def grade(alone: str, beside: str, *, much_left: bool = False) -> Grade:
     """How sure the name of an added effect is.
 
     Parameters
     ----------
     alone, beside : str
         What is said of it by itself, and beside what is left.
+    much_left : bool
+        As in `Decision`.
 
     Returns
     -------
@@ -237,7 +127,7 @@ def grade(alone: str, beside: str) -> Grade:
     """
     if alone == "proxy":
         return "alias"
-    return "confirmed" if beside == "missing" else "plausible"
+    return "confirmed" if beside == "missing" and not much_left else "plausible"
 
 
 def something_left(facts: Facts, rules: Rules = USUAL) -> bool:
@@ -280,15 +170,21 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     if proxies == names or (left and proxies | negligible == names):
         return Decision("unknown", tuple(withdrawn))
     whole = not left and not proxies
-    return Decision("explained" if whole else "partly_explained", tuple(withdrawn))
+    much = left and share_of(*facts.missing) < rules.most
+    return Decision("explained" if whole else "partly_explained", tuple(withdrawn), much)
 
 
 def _withdrawn(
     facts: Facts, rules: Rules, names: frozenset[str], stand_ins: frozenset[str]
 ) -> list[Withdrawn]:
     """Names that are not safe beside something that is left."""
-    after = facts.missing[1]
-    share = share_of(*facts.missing)
+    before, after = facts.missing
+    share = share_of(before, after)
+    if share < rules.most and _falls_throughout(facts, rules):
+        # A real road, and what nobody knows of a car, leave much beside the right effect too.
+        little = frozenset(a.id for a in facts.added if a.taken < rules.taken * before)
+        because = "alone it takes up next to nothing of the error 1 to 5 s ahead"
+        return [Withdrawn(little, because, names)]
     if share < rules.most:
         because = f"takes up only {max(100 * share, 0.0):.0f} % of the error 1 to 5 s ahead"
         return [Withdrawn(names, because, names)]
@@ -302,6 +198,18 @@ def _withdrawn(
     alone = _alone(facts, rules, small)
     because = "were it what is missing, nothing would be left"
     return [first, Withdrawn(alone, because, names)]
+
+
+def _falls_throughout(facts: Facts, rules: Rules) -> bool:
+    """Whether errors 1 to 5 s ahead fall in every channel and at every horizon, on all data.
+
+    What only stands in for something else serves some channels and moments at the price of others.
+    In each channel validation data have to show the fall, by more than it matters.
+    """
+    channels = {c.channel for c in facts.changes}
+    shown = {c.channel for c in fallen(facts.changes, rules)}
+    both = (*facts.changes, *facts.changes_in_training)
+    return bool(channels) and shown == channels and all(c.log_ratio < 0.0 for c in both)
 
 
 def _alone(facts: Facts, rules: Rules, small: frozenset[str]) -> frozenset[str]:

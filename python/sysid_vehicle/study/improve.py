@@ -9,25 +9,25 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from .._arguments import real, whole
+from .._arguments import duration, whole
 from .._progress import teller
 from ..compare import Comparison, compare
 from ..diagnose import Verdicts, considered, judge, omnibus
 from ..effects import effect
-from ..errors import InvalidInput, SysidWarning, warn
+from ..errors import SysidWarning, warn
 from ..estimate import Driving
 from ..identify import Fit, explaining, identify
 from ..log import Log, check_excitation, several_logs
 from ..model import Model
-from ..rules import USUAL, Rules, grade, verdict
+from ..rules import USUAL, Change, Decision, Rules, grade, verdict
 from ..sensors import SensorCheck, made_ready, put_right
 from .added import AddedEffect
-from .horizons import horizons
+from .horizons import changes, horizons
 from .matters import sizes_that_matter, within
 from .search import Search, Trail, kept
 from .steps import way
 from .study import Study
-from .validation import beyond_noise_ahead, serving, set_aside
+from .validation import AHEAD, beyond_noise_ahead, changes_ahead, serving, set_aside
 from .verdict import facts_of, in_the_light_of
 
 __all__ = ["improve"]
@@ -68,7 +68,7 @@ def improve(
         What to fit to, and validation data. Without `test` the last 30 % of the training
         driving are held out.
     most_effects : int
-        Stop after so many.
+        Stop after so many, or where the training data are too short for more (`Rules.lasts`).
     alpha : float
         Rate of false claims accepted, over all effects together, per step; by default that of the
         rules.
@@ -83,8 +83,8 @@ def improve(
         considered. Without one only what the likelihood cannot hold is taken out: delays of one
         channel against another, low-passes of sensors, and vibration; with False not even that.
     time_limit_s : float, optional
-        After so many seconds no further step begins; what was found until then is judged, and a
-        warning tells.
+        After so many seconds no further refit begins; of what was refitted by then the best is
+        added if validation data confirm it, the model is judged, and a warning tells.
     matters : mapping, optional
         Errors that matter, such as ``{"yaw_rate": "0.5deg/s"}`` (`sizes_that_matter`); those not
         given have usual sizes. A baseline whose errors 0.5 to 5 s ahead on validation data are all
@@ -106,7 +106,7 @@ def improve(
     most_effects = whole(most_effects, "most_effects")
     rules = rules.at(alpha)
     began = time.perf_counter()
-    ends = began + _limit(time_limit_s)
+    ends = began + duration(time_limit_s, "time_limit_s")
     sizes = None if matters is None else sizes_that_matter(matters)
     train, test, settled = _ready(train, test, sensors)
     exclude = (*exclude, *settled)
@@ -122,7 +122,7 @@ def improve(
         search = Search(
             test_driving,
             candidates=candidates,
-            most_effects=most_effects,
+            most_effects=min(most_effects, _room(model, train_driving, rules)),
             ends=ends,
             rules=rules,
             seed=seed,
@@ -141,6 +141,7 @@ def improve(
         if len(fits) > 1:
             validation = omnibus(serving(fit, test_driving), test_driving, rules)
             explained = beyond_noise_ahead(fits, test_driving)
+        much_left = explained is not None and explained.share < rules.most
         told = judge(
             fit,
             scored=(last.scores, last.family) if last.fit is fit else None,
@@ -156,12 +157,13 @@ def improve(
             fits,
             told,
             on_train[-1],
-            (0.0,) if explained is None else explained.squares,
+            explained,
             before=diagnoses[0].omnibus,
             fitted=fitted,
             validation=validation,
             candidate=min((c.p_value for c in last.ranking), default=1.0),
             excited=_excited(train_driving),
+            changes=_changes(baseline, fit, test_driving) if much_left else ((), ()),
             small=sizes is not None and within(horizons([fit], [""], test_driving), sizes),
         )
         decision = verdict(facts, rules)
@@ -173,7 +175,7 @@ def improve(
             train=tuple(on_train),
             test=tuple(on_test),
             validation=test_driving,
-            added=_added(fits, on_test, found, told, alone),
+            added=_added(fits, on_test, found, told, alone, decision),
             omnibus=fitted,
             omnibus_validation=validation,
             verdicts=told,
@@ -184,6 +186,17 @@ def improve(
             stopped=found.stopped,
             checked=bool(sensors),
         )
+
+
+def _changes(
+    baseline: Fit, fit: Fit, test: Driving
+) -> tuple[tuple[Change, ...], tuple[Change, ...]]:
+    return changes_ahead(baseline, fit, test), changes(baseline, fit, fit.driving, AHEAD)
+
+
+def _room(model: Model, driving: Driving, rules: Rules) -> int:
+    """How many effects the driving is long enough for, one at least beside those of the model."""
+    return len(model.effects) + max(int(driving.usable_s / rules.lasts), 1)
 
 
 def _excited(driving: Driving) -> bool:
@@ -207,17 +220,13 @@ def _ready(
     return own, None if test is None else rest, ("sensor_delay",) if delayed else ()
 
 
-def _limit(seconds: float | None) -> float:
-    if seconds is None:
-        return np.inf
-    value = real(seconds)
-    if value is None or not value > 0.0:
-        raise InvalidInput(f"time_limit_s = {seconds!r}: give seconds, above 0")
-    return value
-
-
 def _added(
-    fits: list[Fit], on_test: list[Comparison], found: Trail, told: Verdicts, alone: Verdicts
+    fits: list[Fit],
+    on_test: list[Comparison],
+    found: Trail,
+    told: Verdicts,
+    alone: Verdicts,
+    decision: Decision,
 ) -> tuple[AddedEffect, ...]:
     added = []
     final = fits[-1]
@@ -237,7 +246,7 @@ def _added(
                     found.p_values.get(name, np.nan),
                     tuple(e for e in found.rivals.get(name, ()) if e in group),
                     told[name].because if told[name].finding == "proxy" else "",
-                    grade(alone[name].finding, told[name].finding),
+                    grade(alone[name].finding, told[name].finding, much_left=decision.much_left),
                 )
             )
     return tuple(added)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from .._text import with_error
 from ..diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
+from ..diagnose.diagnose import REFITS
 from ..errors import Interrupted
 from ..estimate import Driving
 from ..identify import Fit
@@ -111,7 +112,7 @@ class Search:
     test : Driving
         Validation data, which every step must predict better.
     ends : float
-        When no further step begins, by `time.perf_counter`.
+        When no further refit begins, by `time.perf_counter`.
     rules : Rules
     """
 
@@ -127,15 +128,17 @@ class Search:
     def follow(self, trail: Trail) -> None:
         """Add what is missing to the last model until nothing more is that the driving can show."""
         while True:
+            in_time = time.perf_counter() < self.ends
             dx = self._diagnosis(trail.fit)
             trail.diagnoses.append(dx)
-            if time.perf_counter() > self.ends:
+            if not in_time:
                 trail.stopped = tuple(c.id for c in dx.significant)
                 return
+            # What was refitted is not lost; what takes further refits waits for another study.
             step = first_that_holds(dx, trail.fit, self.test) if self.most_effects else None
             single = None if step is None else step[1]
-            several = first_together(dx, self.test, single, self.most_effects)
-            if step is None and several is None:
+            several = first_together(dx, self.test, single, self.most_effects, self.ends)
+            if step is None and several is None and time.perf_counter() < self.ends:
                 step = self._beside_another(dx, trail)
             if several is not None:
                 chosen, lean = several
@@ -144,9 +147,16 @@ class Search:
                 chosen, lean = (step[0].id,), step[1]
                 trail.note(dx, step[0])
             else:
+                if time.perf_counter() > self.ends:
+                    trail.stopped = tuple(c.id for c in dx.significant)
                 return
             found = exchanged(
-                lean, trail.nearly, self.test, most_effects=self.most_effects, rules=self.rules
+                lean,
+                trail.nearly,
+                self.test,
+                most_effects=self.most_effects,
+                rules=self.rules,
+                ends=self.ends,
             )
             effects = set(found.model.effects)
             # One more than allowed may make another needless.
@@ -180,10 +190,14 @@ class Search:
         return first, step[1]
 
     def _diagnosis(self, fit: Fit) -> Diagnosis:
+        """All effects scored; where no time is left none is refitted."""
+        left = self.ends - time.perf_counter()
         return diagnose(
             fit,
             candidates=self.candidates,
             rules=self.rules,
+            refits=REFITS if left > 0.0 else 0,
+            time_limit_s=left if left > 0.0 else None,
             seed=self.seed,
             progress=self.progress,
         )

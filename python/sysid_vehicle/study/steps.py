@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter
 from ..errors import NumericalError
 from ..estimate import Driving
-from ..identify import Estimate, Fit, refine
+from ..identify import Estimate, Fit, refine, refit
 from ..rules import USUAL, Measures, Rules, accept, bic, worse
 from .validation import as_sure, changes_ahead, error_falls, fall_in_error, gain_in_log_likelihood
 
@@ -69,7 +70,7 @@ def likeliest(dx: Diagnosis) -> Candidate | None:
 
 
 def first_together(
-    dx: Diagnosis, test: Driving, single: Fit | None, most_effects: int
+    dx: Diagnosis, test: Driving, single: Fit | None, most_effects: int, ends: float = np.inf
 ) -> tuple[tuple[str, ...], Fit] | None:
     """Effects that are added together: the posterior names them, refit and validation confirm them.
 
@@ -87,9 +88,13 @@ def first_together(
         With the single effect that holds.
     most_effects : int
         That the model may have.
+    ends : float
+        When no further refit begins, by `time.perf_counter`.
     """
     rules, fit = dx.rules, dx.fit
     for names in _leading_subsets(dx, most_effects - len(fit.model.effects)):
+        if time.perf_counter() > ends:
+            break
         found = _with_subset(dx, names)
         if found is None or not set(names) <= set(found.model.effects):
             continue
@@ -117,7 +122,11 @@ def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:
 
 
 def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
-    """The model with several effects, refitted; None where the search fails."""
+    """The model with several effects, refitted; None where that fails, or no car has the values.
+
+    Parameters alone come first, under the noise of the model without them: that takes a fraction of
+    the time, and shows where the values lead.
+    """
     effects = {c.id: c.effect for c in dx.ranking}
     values: dict[str, float] = {}
     for name in names:
@@ -126,7 +135,10 @@ def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
             values[f"{name}.{p.name}"] = float(np.clip(v, p.lower, p.upper))
     model = dx.fit.model.add(*(effects[n] for n in names)).with_values(values)
     try:
-        return without_insignificant(refine(model, dx.fit.driving, dx.fit.noise), dx.rules)
+        near = refit(model, dx.fit.driving, dx.fit.noise)
+        if not all(_real(near, name, dx.rules) for name in names):
+            return None
+        return without_insignificant(refine(near.model, near.driving, near.noise), dx.rules)
     except (NumericalError, np.linalg.LinAlgError):
         return None
 
@@ -183,6 +195,7 @@ def exchanged(
     *,
     most_effects: int,
     rules: Rules = USUAL,
+    ends: float = np.inf,
 ) -> Fit:
     """The fit with others in place of effects that they explain away, one or two for each.
 
@@ -199,6 +212,8 @@ def exchanged(
     most_effects : int
         That the model may have.
     rules : Rules
+    ends : float
+        When no further refit begins, by `time.perf_counter`.
 
     Returns
     -------
@@ -212,6 +227,8 @@ def exchanged(
             for others in dict.fromkeys([*((c,) for c in near), tuple(near)]):
                 if not others or len(fit.model.effects) - 1 + len(others) > most_effects:
                     continue
+                if time.perf_counter() > ends:
+                    return best
                 trial = _with_others(fit, name, others, rules)
                 if trial is None or frozenset(trial.model.effects) in seen:
                     continue

@@ -18,6 +18,7 @@ from ..rules import Change, Gain
 from .horizons import Beyond, beyond_noise, changes, typical_error
 
 __all__ = [
+    "AHEAD",
     "as_sure",
     "at_its_best",
     "beyond_noise_ahead",
@@ -32,7 +33,7 @@ __all__ = [
 _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6
 _TRIMMED = 0.1  # of the pieces, at either end
-_AHEAD = (1.0, 2.0, 5.0)
+AHEAD = (1.0, 2.0, 5.0)
 _NONE = Gain(-np.inf, 0.0, -np.inf, 0.0)
 
 
@@ -151,12 +152,12 @@ def _with_error(difference: FloatArray, test: Driving) -> Gain:
 def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[Change, ...]:
     """How errors 1 to 5 s ahead change, both models with the parameters of `at_its_best`."""
     one, other = (at_its_best(fit, test) for fit in (poorer, richer))
-    return changes(one, other, test, _AHEAD)
+    return changes(one, other, test, AHEAD)
 
 
 def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
     """Errors 1 to 5 s ahead beyond the noise, of models with the parameters of `at_its_best`."""
-    return beyond_noise([at_its_best(fit, test) for fit in fits], test, _AHEAD)
+    return beyond_noise([at_its_best(fit, test) for fit in fits], test, AHEAD)
 
 
 # One object for each fit: errors ahead are remembered by it.
@@ -173,7 +174,7 @@ def at_its_best(fit: Fit, test: Driving) -> Fit:
     except (NumericalError, np.linalg.LinAlgError):
         return fit
     noise = fit.noise.floor()
-    return min((fit, served), key=lambda f: typical_error(f, noise, test, _AHEAD))
+    return min((fit, served), key=lambda f: typical_error(f, noise, test, AHEAD))
 
 
 def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:

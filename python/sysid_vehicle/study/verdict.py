@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from ..compare import Comparison
 from ..diagnose import Omnibus, Verdicts
 from ..identify import Fit
-from ..rules import Added, Decision, Facts
+from ..rules import Added, Change, Decision, Facts
+from .horizons import Beyond
 
 __all__ = ["facts_of", "in_the_light_of"]
 
@@ -16,7 +17,7 @@ def facts_of(
     fits: Sequence[Fit],
     told: Verdicts,
     on_train: Comparison,
-    missing: Sequence[float],
+    explained: Beyond | None,
     *,
     before: Omnibus,
     fitted: Omnibus,
@@ -24,6 +25,7 @@ def facts_of(
     candidate: float,
     excited: bool,
     small: bool = False,
+    changes: tuple[tuple[Change, ...], tuple[Change, ...]] = ((), ()),
 ) -> Facts:
     """Collect what is known of a final model.
 
@@ -35,11 +37,14 @@ def facts_of(
         On every effect, each for itself.
     on_train : Comparison
         Of the last fit with what it was fitted to.
-    missing : sequence of float
-        Of every fit, as in `Facts`.
+    explained : Beyond or None
+        What every fit leaves of the errors ahead; None where nothing was added.
     before, fitted, validation, candidate, excited, small
         As in `Facts`.
+    changes : (tuple of Change, tuple of Change)
+        On validation and on training data, as in `Facts`.
     """
+    missing = (0.0,) if explained is None else explained.squares
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
     taken = _taken_up(fits, missing)
     return Facts(
@@ -62,6 +67,7 @@ def facts_of(
         tuple(on_train.unrelated.values()),
         excited,
         small,
+        *changes,
     )
 
 

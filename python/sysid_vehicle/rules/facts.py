@@ -1,0 +1,131 @@
+"""What a study measured, and what is decided on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from .accept import Change
+
+__all__ = ["Added", "Decision", "Facts", "Tested", "Verdict", "Withdrawn"]
+
+Verdict = Literal["adequate", "explained", "partly_explained", "unknown", "not_testable"]
+
+
+class Tested(Protocol):
+    """A test for anything left."""
+
+    @property
+    def statistic(self) -> float:
+        """Chi-squared of a complete model."""
+
+    @property
+    def degrees(self) -> int:
+        """Degrees of freedom."""
+
+    @property
+    def p_value(self) -> float:
+        """Of a complete model."""
+
+    @property
+    def moves(self) -> tuple[str, ...]:
+        """Channels that what is left moves most."""
+
+
+@dataclass(frozen=True)
+class Added:
+    """An effect of the final model that the baseline lacked.
+
+    Attributes
+    ----------
+    finding : str
+        What is said of it by itself: `missing`, `one of a group`, `negligible` or `proxy`.
+    group : tuple of str
+        Its rivals, where it is one of a group.
+    moves : frozenset of str
+        Channels that it moves.
+    taken : float
+        Of `Facts.missing`, what it took up in its turn.
+    """
+
+    id: str
+    finding: str
+    group: tuple[str, ...] = ()
+    moves: frozenset[str] = frozenset()
+    taken: float = 0.0
+
+    @property
+    def named(self) -> bool:
+        """Whether it is said to be missing, not only to act like it or to be negligible."""
+        return self.finding in ("missing", "one of a group")
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a study measured, from which its verdict follows.
+
+    Attributes
+    ----------
+    before, fitted : Tested
+        For anything left by the baseline and by the final model, on the training data.
+    validation : Tested or None
+        The latter on validation data; None where nothing was added.
+    candidate : float
+        Smallest p-value of an effect that the final model lacks.
+    missing : (float, float)
+        Squares of errors 1 to 5 s ahead on validation data, beyond the noise of sensors, without
+        and with what was added; in one unit.
+    contradictions : tuple of str
+        Channels that contradict the others, in words.
+    excited : bool
+        Whether the training data excite the lateral motion.
+    small : bool
+        Whether no error 0.5 to 5 s ahead on validation data is as large as matters to the user.
+    changes, changes_in_training : tuple of Change
+        From the baseline to the final model, of the errors 1 to 5 s ahead: on validation data, and
+        on training data, where errors of one step were fitted.
+    """
+
+    before: Tested
+    fitted: Tested
+    validation: Tested | None = None
+    candidate: float = 1.0
+    missing: tuple[float, float] = (0.0, 0.0)
+    added: tuple[Added, ...] = ()
+    contradictions: tuple[str, ...] = ()
+    excited: bool = True
+    small: bool = False
+    changes: tuple[Change, ...] = ()
+    changes_in_training: tuple[Change, ...] = ()
+
+
+@dataclass(frozen=True)
+class Withdrawn:
+    """Names that are taken back, and why.
+
+    Attributes
+    ----------
+    effects : frozenset of str
+    because : str
+    beside : frozenset of str
+        Effects of the model, which are no mere rivals of these: each stands or falls by itself.
+    """
+
+    effects: frozenset[str]
+    because: str
+    beside: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A verdict, and the names that are withdrawn, in this order.
+
+    Attributes
+    ----------
+    much_left : bool
+        Whether names stand beside an error of which they take up less than `Rules.most`.
+    """
+
+    verdict: Verdict
+    withdrawn: tuple[Withdrawn, ...] = ()
+    much_left: bool = False
