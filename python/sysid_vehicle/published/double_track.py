@@ -13,9 +13,9 @@ import numpy as np
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
+from ..twin.car import TwinCar
+from ..twin.readings import Readings
 from ..vehicle import GRAVITY_MPS2
-from .car import TwinCar
-from .readings import Readings
 
 __all__ = ["DoubleTrackObserver", "DoubleTrackRun"]
 

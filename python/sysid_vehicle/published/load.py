@@ -17,11 +17,11 @@ import numpy as np
 
 from .._text import brief
 from ..errors import InvalidInput
-from .car import LOAD_NAMES, LOADED_SUV, NOMINAL_SUV, Load, TwinCar
-from .drives import INPUTS, Drive14, rough_road, swept_steer, urban_cycle
-from .laws import ParameterLaw, SideBySide, inertia_law, mass_law, unknowns
-from .observer import Observation, Observer, observe
-from .readings import Readings, measure, noisy_road
+from ..twin.car import LOAD_NAMES, LOADED_SUV, NOMINAL_SUV, Load, TwinCar
+from ..twin.drives import INPUTS, Drive14, rough_road, swept_steer, urban_cycle
+from ..twin.laws import ParameterLaw, SideBySide, inertia_law, mass_law, unknowns
+from ..twin.observer import Observation, Observer, observe
+from ..twin.readings import Readings, measure, noisy_road
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

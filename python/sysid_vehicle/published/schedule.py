@@ -17,18 +17,18 @@ import numpy as np
 
 from .._text import brief
 from ..errors import InvalidInput
-from .car import LOADED_SUV, NOMINAL_SUV, Load, TwinCar
-from .drives import Drive14
-from .experiments import (
+from ..twin.car import LOADED_SUV, NOMINAL_SUV, Load, TwinCar
+from ..twin.drives import Drive14
+from ..twin.laws import SideBySide, Unknown, mass_law, unknowns
+from ..twin.observer import Observer, observe
+from ..twin.readings import measure, noisy_road
+from .load import (
     NOISE_FLOOR,
     Law,
     LoadExperiment,
     drive_of,
     laws_of,
 )
-from .laws import SideBySide, Unknown, mass_law, unknowns
-from .observer import Observer, observe
-from .readings import measure, noisy_road
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
