@@ -5,6 +5,7 @@
 - Dettu, Formentin and Savaresi, Joint vehicle state and parameters estimation via
   Twin-in-the-Loop observers (2023): `estimate_mass`, `estimate_roll_yaw`, `estimate_pitch`,
   `run_schedule`, `mass_and_sideslip`, and the double track that they compare with.
+- The dual sideslip observer of Cl4y3R/VehicleStateEstimation (2024): `estimate_sideslip`.
 """
 
 from .closed_loop import OBSERVER_FORM, OBSERVER_NOISE, observer, setup
@@ -13,6 +14,7 @@ from .excitation import Identification, Oval, excitations
 from .joint import JointExperiment, mass_and_sideslip, sideslip_and_mass_cost
 from .load import LoadExperiment, estimate_mass, estimate_pitch, estimate_roll_yaw
 from .schedule import ScheduleRun, run_schedule
+from .sideslip import PublishedSideslipObserver, estimate_sideslip
 from .tyres import LOSSES, TYRE_BOX, TYRE_START, TyreRegression, regress_tyres
 
 __all__ = [
@@ -27,11 +29,13 @@ __all__ = [
     "JointExperiment",
     "LoadExperiment",
     "Oval",
+    "PublishedSideslipObserver",
     "ScheduleRun",
     "TyreRegression",
     "estimate_mass",
     "estimate_pitch",
     "estimate_roll_yaw",
+    "estimate_sideslip",
     "excitations",
     "mass_and_sideslip",
     "observer",
