@@ -13,9 +13,9 @@ MAX_LINES = 400
 
 # A module imports from its own layer and from the layers above it in this list, never from below.
 PYTHON_LAYERS = [
-    {"errors", "_arguments", "_arrays", "_core", "_files", "_replace", "_style", "_tables", "_text"}
-    | {"_progress", "_threads", "vehicle", "effects", "model", "formula", "rules", "saved"}
-    | {"user_effects", "plugins", "_formula_slope", "_user_checks"},
+    {"errors", "_arguments", "_arrays", "_core", "_files", "_printed", "_replace", "_style"}
+    | {"_progress", "_tables", "_text", "_threads", "vehicle", "effects", "model", "formula"}
+    | {"rules", "saved", "user_effects", "plugins", "_formula_slope", "_user_checks"},
     {"log"},
     {"read"},
     {"manoeuvres"},
@@ -50,6 +50,7 @@ CPP_LAYERS = [
     "lab",
     "online",
     "twin",
+    "published",
 ]
 
 # `Study.report` writes the report of itself, a convenience; it imports only when it is called.

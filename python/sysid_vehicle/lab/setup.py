@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field
-from html import escape
 
 import numpy as np
 
 from .. import _core
+from .._text import html_text
 from ..errors import InvalidInput
 from ..model import Model
 from ..vehicle import Tyre, Vehicle
@@ -156,5 +156,4 @@ class Setup:
             f"feedback {'late' if s.late_feedback else 'predicted'}"
         )
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+    _repr_html_ = html_text

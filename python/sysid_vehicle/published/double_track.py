@@ -1,6 +1,6 @@
 """The observer to compare with: a planar double track with constant gains.
 
-Equations: `cpp/include/sysid/twin/double_track.hpp`.
+Equations: `cpp/include/sysid/published/double_track.hpp`.
 """
 
 from __future__ import annotations

@@ -10,13 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from html import escape
 from typing import Any, Literal
 
 import numpy as np
 
 from .._arrays import FloatArray
-from .._text import brief
+from .._text import brief, html_text
 from ..errors import InvalidInput
 from ..manoeuvres import double_lane_change, lap
 from ..twin.calibrate import Box
@@ -172,6 +171,7 @@ class JointExperiment:
         return {"course": self.drive.name, **self.figures()}
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         lines = [str(self.drive)]
@@ -181,9 +181,6 @@ class JointExperiment:
                 f"mass off by {f['mass_error_percent']:6.2f} % of {-MASS_ERROR_KG:g} kg"
             )
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
 
 def mass_and_sideslip(

@@ -10,12 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .._text import brief
+from .._text import brief, html_text
 from ..errors import InvalidInput
 from ..twin.car import LOAD_NAMES, LOADED_SUV, NOMINAL_SUV, Load, TwinCar
 from ..twin.drives import INPUTS, Drive14, rough_road, swept_steer, urban_cycle
@@ -99,6 +98,7 @@ class LoadExperiment:
         return self.found.plot(name, truth=getattr(self.true, name), ax=ax)
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         lines = [f"{self.name}: {self.drive}"]
@@ -111,9 +111,6 @@ class LoadExperiment:
                 f"{wide}{true} {error}"
             )
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
 
 @lru_cache(maxsize=4)

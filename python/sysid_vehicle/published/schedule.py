@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._text import brief
+from .._text import brief, html_text
 from ..errors import InvalidInput
 from ..twin.car import LOADED_SUV, NOMINAL_SUV, Load, TwinCar
 from ..twin.drives import Drive14
@@ -118,6 +117,7 @@ class ScheduleRun:
         raise InvalidInput(f"no stage looked for '{name}'; there are {', '.join(self.rows())}")
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         lines = [str(stage.drive) for stage in self.stages]
@@ -137,9 +137,6 @@ class ScheduleRun:
             for text in stage.found.contradictions
         ]
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
 
 def run_schedule(

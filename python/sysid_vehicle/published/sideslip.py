@@ -1,6 +1,6 @@
 """The dual sideslip observer of Cl4y3R/VehicleStateEstimation (2024) as published.
 
-Equations and defects: `cpp/include/sysid/published/sideslip_dual.hpp`.
+Equations and defects: `cpp/include/sysid/published/sideslip_observer.hpp`.
 """
 
 from __future__ import annotations

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
+from .._printed import Part, Printed, Table
 from .._progress import doing
-from .._text import html_paragraph, html_table, number, text_table
+from .._text import number
 from ..errors import InvalidInput
 from ..identify.search import METHODS
 from ..identify.starts import Starts, space_filling
@@ -40,7 +41,7 @@ TYRE_START = {f"{letter}_{axle}": value for axle in _AXLES for letter, value in 
 
 
 @dataclass(frozen=True, eq=False)
-class TyreRegression:
+class TyreRegression(Printed):
     """Tyre coefficients of a regression.
 
     Attributes
@@ -78,14 +79,11 @@ class TyreRegression:
             for axle in ("front", "rear")
         ]
 
-    def __str__(self) -> str:
-        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
+    def _parts(self) -> list[Part]:
+        return [self._headline(), Table(self._HEAD, self._rows())]
 
     def _headline(self) -> str:
         return f"Regression, {self.loss} loss {number(self.value, 7)}; {self.starts}"
-
-    def _repr_html_(self) -> str:
-        return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
 
 
 @doing("regression of the tyres")

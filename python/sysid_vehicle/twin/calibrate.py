@@ -10,7 +10,6 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -18,7 +17,7 @@ import numpy as np
 from .._arguments import generator
 from .._arrays import FloatArray
 from .._style import AFTER, MEASURED, axes_or_new, tidy
-from .._text import brief
+from .._text import brief, html_text
 from ..errors import InvalidInput, NumericalError
 
 if TYPE_CHECKING:
@@ -269,6 +268,7 @@ class Calibration:
         return tidy(ax, xlabel="trial", ylabel="cost")
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         lines = [f"Cost {self.cost:.4g} after {len(self.tried)} trials, {self.lost} lost the twin"]
@@ -278,9 +278,6 @@ class Calibration:
         ]
         lines += [f"  {name:12s} {value:.5g}" for name, value in self.gains.items()]
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
 
 def calibrate(
