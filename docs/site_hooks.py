@@ -24,7 +24,7 @@ PAGES = {
 }
 # Modules whose public names the reference holds, beside the package itself and its errors.
 MODULES = ["manoeuvres", "estimate", "compare", "diagnose", "identify", "study"]
-MODULES += ["export", "sensors", "lab", "online", "twin"]
+MODULES += ["export", "sensors", "lab", "online", "twin", "published"]
 log = logging.getLogger("mkdocs.hooks.site")  # warnings there count where the build is strict
 PICTURES = {"image/png": "png", "image/gif": "gif", "image/svg+xml": "svg", "image/jpeg": "jpg"}
 LINK = re.compile(r"(?<=\]\()([^)#:\s]+)(#[^)\s]*)?(?=\))")

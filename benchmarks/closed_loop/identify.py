@@ -27,8 +27,6 @@ from scipy.optimize import minimize
 
 from sysid_vehicle.identify.tyre_shape import friction, peak_slip, stiffness, top
 from sysid_vehicle.lab import (
-    PUBLISHED_BOX,
-    PUBLISHED_START,
     GreyBoxVehicle,
     TyreFit,
     TyreLog,
@@ -36,9 +34,9 @@ from sysid_vehicle.lab import (
     drive_tyres,
     hold_value,
     identify_tyres,
-    regress_tyres,
 )
 from sysid_vehicle.lab.tyre_fit import PARAMETERS
+from sysid_vehicle.published import TYRE_BOX, TYRE_START, regress_tyres
 
 CAR = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6, air_density_kgpm3=1.2929)
 TYRE = np.array([22.0, 1.8, 1.6, 0.8])
@@ -119,9 +117,9 @@ def plain_numpy(motion: TyreMotion) -> float:
     begin = time.perf_counter()
     minimize(
         loss,
-        [PUBLISHED_START[n] for n in names],
+        [TYRE_START[n] for n in names],
         method="SLSQP",
-        bounds=[PUBLISHED_BOX[n] for n in names],
+        bounds=[TYRE_BOX[n] for n in names],
         options={"maxiter": 1500, "ftol": 1e-9},
     )
     return time.perf_counter() - begin
@@ -130,9 +128,7 @@ def plain_numpy(motion: TyreMotion) -> float:
 def speed(motion: TyreMotion) -> None:
     def once() -> float:
         begin = time.perf_counter()
-        regress_tyres(
-            CAR, motion, start=PUBLISHED_START, box=PUBLISHED_BOX, projection=False, starts=1
-        )
+        regress_tyres(CAR, motion, start=TYRE_START, box=TYRE_BOX, projection=False, starts=1)
         return time.perf_counter() - begin
 
     ours = min(once() for _ in range(25))  # as `timeit` does: others may use the machine

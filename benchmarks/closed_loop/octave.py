@@ -17,14 +17,11 @@ from golden import CAR, golden
 from scipy.io import savemat
 from speed import TARGET, first, smallest
 
-from sysid_vehicle import _core
+from sysid_vehicle import _core, published
 from sysid_vehicle.lab import (
     READINGS,
     STATES,
     NoiseStructure,
-    Observer,
-    ObserverForm,
-    ObserverNoise,
     ObserverRecord,
 )
 
@@ -33,7 +30,7 @@ SCRIPT = Path(__file__).with_name("em_published.m")
 
 def of_octave(program: str, record: ObserverRecord, repeats: int) -> tuple[np.ndarray, np.ndarray]:
     """Seconds of a forward pass and an iteration of both kinds; what each of these found."""
-    noise = ObserverNoise.published()
+    noise = published.OBSERVER_NOISE
     car = {
         "m": CAR.mass_kg,
         "i": CAR.yaw_inertia_kgm2,
@@ -60,9 +57,9 @@ def of_octave(program: str, record: ObserverRecord, repeats: int) -> tuple[np.nd
 
 def of_core(record: ObserverRecord) -> tuple[np.ndarray, np.ndarray]:
     """The same of the core."""
-    noise = ObserverNoise.published()
+    noise = published.OBSERVER_NOISE
     Q, R = noise.process, noise.sensors
-    log = Observer(CAR, noise, ObserverForm.published()).core_log(record)
+    log = published.observer(CAR).core_log(record)
     structure = NoiseStructure(floor=1e-9)
     forms = (*structure.core(STATES), *structure.core(READINGS))
 

@@ -13,17 +13,16 @@ from pathlib import Path
 import numpy as np
 from golden import CAR, Golden, golden
 
+from sysid_vehicle import published
 from sysid_vehicle.lab import (
     EMResult,
     NoiseStructure,
     Observer,
-    ObserverForm,
-    ObserverNoise,
     learn_observer_noise,
 )
 
-PUBLISHED = Observer(CAR, ObserverNoise.published(), ObserverForm.published())
-MENDED = Observer(CAR, ObserverNoise.published())
+PUBLISHED = published.observer(CAR)
+MENDED = Observer(CAR, published.OBSERVER_NOISE)
 TRUE_SENSORS = np.array([0.01, 1e-5, 1e-5, 1e-5])
 FLOOR = NoiseStructure(floor=1e-9)
 Row = tuple[str, str, str, str, bool]
@@ -37,7 +36,7 @@ def learn(observer: Observer, log: Golden, sensors: NoiseStructure = FLOOR) -> E
         sensors=sensors,
         most_iterations=20,
         tolerance=0.0,
-        never_fall=observer.form != ObserverForm.published(),
+        never_fall=observer.form != published.OBSERVER_FORM,
         accelerate=False,
     )
 

@@ -16,14 +16,12 @@ import numpy as np
 from golden import CAR, golden
 from plain_numpy import Plain
 
-from sysid_vehicle import _core
+from sysid_vehicle import _core, published
 from sysid_vehicle.lab import (
     READINGS,
     STATES,
     NoiseStructure,
     Observer,
-    ObserverForm,
-    ObserverNoise,
     ObserverRecord,
 )
 
@@ -46,17 +44,16 @@ def first(record: ObserverRecord, samples: int) -> ObserverRecord:
     return dataclasses.replace(record, **{key: getattr(record, key)[:samples] for key in keys})
 
 
-def compare(record: ObserverRecord, form: ObserverForm, title: str) -> None:
-    noise = ObserverNoise.published()
-    Q, R = noise.process, noise.sensors
-    log = Observer(CAR, noise, form).core_log(record)
+def compare(record: ObserverRecord, observer: Observer, title: str) -> None:
+    Q, R = observer.noise.process, observer.noise.sensors
+    log = observer.core_log(record)
     n = len(record.readings)
-    published = form == ObserverForm.published()
-    if published:
+    as_published = observer.form == published.OBSERVER_FORM
+    if as_published:
         start = np.array([5.0, 0, 0, 0, 0, 0]), np.zeros((6, 6))
     else:
         start = _core.observer_start(CAR.vector(), record.readings[0], R)
-    plain = Plain(CAR, record, published)
+    plain = Plain(CAR, record, as_published)
     structure = NoiseStructure(floor=1e-9)
     forms = (*structure.core(STATES), *structure.core(READINGS))
 
@@ -101,8 +98,8 @@ def main() -> None:
         record = first(record, 1500)
     print(f"{len(record.readings)} samples")
     print("what                     core [ms]  NumPy [ms]  ratio   of Octave's published, target")
-    compare(record, ObserverForm.published(), "published")
-    compare(record, ObserverForm(), "mended")
+    compare(record, published.observer(CAR), "published")
+    compare(record, Observer(CAR, published.OBSERVER_NOISE), "corrected")
 
 
 if __name__ == "__main__":

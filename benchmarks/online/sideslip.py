@@ -25,6 +25,8 @@ from sysid_vehicle.online import (
     estimate_sideslip,
     fitted_vehicle,
 )
+from sysid_vehicle.published import PublishedSideslipObserver
+from sysid_vehicle.published import estimate_sideslip as as_published
 
 HERE = Path(__file__).resolve().parent
 CARS = HERE.parent / "real_driving"
@@ -134,7 +136,7 @@ def at_excited(log: sv.Log, seconds: float) -> int:
 
 def handling_rows(table: Table, data: Path, seeds: int) -> None:
     log, vehicle = handling(data), car("carsim_like_handling")
-    published = estimate_sideslip(published_car(vehicle), log, kind="published")
+    published = as_published(published_car(vehicle), log)
     e = published.error()
     good = abs(e.rms_deg / 0.462 - 1) < 0.05 and abs(e.max_deg / 3.60 - 1) < 0.05
     table.row("handling course, published", shown(published), "0.462 / 3.60 +- 5 %", good)
@@ -194,7 +196,7 @@ def stiffness_rows(table: Table, log: sv.Log, vehicle: sv.Vehicle) -> None:
 
 def low_speed_rows(table: Table, data: Path) -> None:
     log, vehicle = low_speed(data), car("carsim_like_handling")
-    published = estimate_sideslip(published_car(vehicle), log, kind="published")
+    published = as_published(published_car(vehicle), log)
     table.row("lowspeed, published dual", shown(published), "0.067")
     dual = estimate_sideslip(vehicle, log)
     # Offline stiffness, as the three-state observer asks for it: least squares that know the
@@ -281,10 +283,12 @@ def speed_rows(table: Table, data: Path) -> None:
     dt = np.full(log.n, 0.01)
     times = {}
     for kind in ("ukf", "linear-ukf", "square-root-ukf", "ekf", "dual", "published"):
-        used = published_car(vehicle) if kind == "published" else vehicle
         best = np.inf
         for _ in range(3):
-            observer = SideslipObserver(used, settings, kind)
+            if kind == "published":
+                observer = PublishedSideslipObserver(published_car(vehicle))
+            else:
+                observer = SideslipObserver(vehicle, settings, kind)
             begun = time.process_time()
             observer.run(dt, sensors)
             best = min(best, (time.process_time() - begun) / log.n)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid_vehicle.twin import estimate_mass, estimate_pitch, estimate_roll_yaw
+from sysid_vehicle.published import estimate_mass, estimate_pitch, estimate_roll_yaw
 
 INF = float("inf")
 RUN = {"mass": estimate_mass, "roll_yaw": estimate_roll_yaw, "pitch": estimate_pitch}

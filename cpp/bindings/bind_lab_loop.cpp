@@ -125,12 +125,11 @@ void register_lab_loop(py::module_& m) {
         .def("set_noise", &set_noise, py::arg("process"), py::arg("sensors"))
         .def("set_track", &set_track, py::arg("points"), py::arg("metres"), py::arg("seconds"))
         .def(
-            "set_published_form",
-            [](LabLoop& s, bool published) {
-                s.observer.form =
-                    published ? lab::ObserverForm::published() : lab::ObserverForm::corrected();
+            "set_observer_form",
+            [](LabLoop& s, const std::array<bool, 5>& form) {
+                s.observer.form = {form[0], form[1], form[2], form[3], form[4]};
             },
-            py::arg("published"))
+            py::arg("form"))
         .def_property(
             "steer_by", [](const LabLoop& s) { return static_cast<int>(s.loop.steer_by); },
             [](LabLoop& s, int v) { s.loop.steer_by = static_cast<lab::SteerBy>(v); })
@@ -146,7 +145,7 @@ void register_lab_loop(py::module_& m) {
             },
             py::arg("speed_mps"), py::arg("x_m"), py::arg("y_m"))
         .def(
-            "set_published_ways",
+            "set_ways",
             [](LabLoop& s, double pose_gain, bool load_sensors, bool late_feedback,
                double first_late_load_n, bool certain_start, bool inputs_linear) {
                 s.loop.pose_gain = pose_gain;

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from . import _core, plugins
 from ._arguments import expect
 from ._arrays import FloatArray, as_float64
+from ._text import html_text
 from .errors import InvalidInput, near_names
 
 __all__ = [
@@ -240,8 +240,7 @@ class Effect:
             lines.append(f"  through     {self.through}")
         return "\n".join(lines)
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+    _repr_html_ = html_text
 
 
 def _parameter(info: dict[str, Any], column: int) -> Parameter:

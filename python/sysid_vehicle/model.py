@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from . import _core
 from ._arrays import FloatArray
+from ._text import html_text
 from .effects import Effect, Parameter, base_parameters, catalogue, effect
 from .errors import InvalidInput
 from .saved import save
@@ -318,8 +318,7 @@ class Model:
             lines.append(f"  {name:34s} {self.value(name):12.6g} {p.unit}{note}")
         return "\n".join(lines)
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+    _repr_html_ = html_text
 
 
 def vehicle_data(vehicle: Vehicle) -> _core.VehicleData:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid_vehicle import Log, Model, drive, lab, manoeuvres, read_log
+from sysid_vehicle import Log, Model, drive, lab, manoeuvres, published, read_log
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.log._regression import find_lag, regress
 
@@ -63,7 +63,7 @@ def test_with_fewer_channels_too(truth: Model, without: tuple[str, ...]) -> None
 
 @pytest.mark.parametrize("duration_s", [120.0, 200.0])
 def test_the_laboratory_drives_an_oval(duration_s: float) -> None:
-    oval = dataclasses.replace(lab.excitation.Oval(), duration_s=duration_s)
+    oval = dataclasses.replace(published.Oval(), duration_s=duration_s)
     log = lab.run_closed_loop(oval, lab.Setup.default(), seed=1).to_log()
     assert heard(columns_of(log)) == ""
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle import Fit, Log, Model
+from sysid_vehicle import Fit, Log, Model, published
 from sysid_vehicle import lab as laboratory
 from sysid_vehicle.fleet import Row
 
@@ -47,7 +47,7 @@ def results(fit: Fit, lap: Log, course: Log, truth: Model) -> dict[str, object]:
     """One of each result, by name."""
     found = sv.diagnose(fit, candidates=["mass", "steer_lag"])
     drive = sv.simulate.drive_truth(truth, sv.manoeuvres.step_steer(), seed=0)
-    wanted = laboratory.excitation.Oval()
+    wanted = published.Oval()
     run = laboratory.run_closed_loop(wanted, seed=0)
     checked = sv.check(lap)
     return {

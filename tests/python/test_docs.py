@@ -19,7 +19,7 @@ PAGES = [
     *sorted((REPO / "docs").rglob("*.md")),
 ]
 MODULES = {"sv": "sysid_vehicle"} | {
-    name: f"sysid_vehicle.{name}" for name in ("lab", "online", "twin")
+    name: f"sysid_vehicle.{name}" for name in ("lab", "online", "twin", "published")
 }
 
 

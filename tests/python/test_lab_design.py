@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_vehicle import InvalidInput, Model, NumericalError, Tyre
+from sysid_vehicle import InvalidInput, Model, NumericalError, Tyre, published
 from sysid_vehicle.identify.search import Box, minimise
 from sysid_vehicle.lab import (
     Design,
@@ -100,7 +100,7 @@ def test_information_adds_up_and_grows_with_readings(setup: Setup) -> None:
 
 
 def test_half_the_load_halves_the_grip_that_is_told() -> None:
-    seen = preview(excitation.Identification(amplitude_rad=0.60), Setup.published())
+    seen = preview(published.Identification(amplitude_rad=0.60), published.setup())
     assert seen["D_front"].value == 1.6
     assert seen["D_front"].relative < 0.01
     assert seen.coverage[0].reached > 1.0
@@ -135,7 +135,7 @@ def test_a_design_keeps_its_limits_and_tells_what_the_published_drive_does_not(
     assert design.best.relative == max(
         t.relative for t in design.trials if t.cost == design.best.cost
     )
-    for plain in (EASY, excitation.Identification(duration_s=20.0)):
+    for plain in (EASY, published.Identification(duration_s=20.0)):
         assert seen.worst.relative < 0.05 * preview(plain, setup).worst.relative
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid_vehicle import InvalidInput, Model, NumericalError, Vehicle, drive, manoeuvres
+from sysid_vehicle import InvalidInput, Model, NumericalError, Vehicle, drive, manoeuvres, published
 from sysid_vehicle.cli import lab_em
 from sysid_vehicle.cli.parser import parse
 from sysid_vehicle.lab import (
@@ -17,7 +17,6 @@ from sysid_vehicle.lab import (
     NoiseStructure,
     Observer,
     ObserverCar,
-    ObserverForm,
     ObserverNoise,
     ObserverRecord,
     learn_observer_noise,
@@ -99,11 +98,11 @@ def golden(shared_data: Path) -> tuple[ObserverRecord, np.ndarray]:
 
 class TestGolden:
     def test_published_form_is_reproduced(self, golden: tuple[ObserverRecord, np.ndarray]) -> None:
-        published = Observer(CAR, ObserverNoise.published(), ObserverForm.published())
-        assert published.log_likelihood(golden[0]) == pytest.approx(120432.7509, abs=1e-3)
+        as_published = published.observer(CAR)
+        assert as_published.log_likelihood(golden[0]) == pytest.approx(120432.7509, abs=1e-3)
         floor = NoiseStructure(floor=1e-9)
         em = learn_observer_noise(
-            published,
+            as_published,
             golden[0],
             process=floor,
             sensors=floor,
@@ -117,7 +116,7 @@ class TestGolden:
         self, golden: tuple[ObserverRecord, np.ndarray]
     ) -> None:
         record, truth = golden
-        mended = Observer(CAR, ObserverNoise.published())
+        mended = Observer(CAR, published.OBSERVER_NOISE)
         em = learn_observer_noise(
             mended, record, most_iterations=20, tolerance=0.0, accelerate=False
         )

@@ -6,12 +6,12 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from sysid_vehicle import InvalidInput
+from sysid_vehicle import InvalidInput, published
 from sysid_vehicle.lab import Setup, excitation, run_closed_loop
-from sysid_vehicle.lab.excitation import Excitation, Identification, MultiSine, Oval
+from sysid_vehicle.lab.excitation import Excitation, MultiSine
 from sysid_vehicle.manoeuvres import Knots
 
-ALL = excitation.all()
+ALL = {**published.excitations(), **excitation.all()}
 
 
 def test_all_gives_each_excitation_under_its_name() -> None:
@@ -50,7 +50,7 @@ def test_the_wanted_derivatives_are_those_of_the_wanted_curves(name: str) -> Non
 
 
 def test_the_identification_trajectory_has_the_published_numbers() -> None:
-    e = Identification()
+    e = published.Identification()
     time_s = np.array([0.0, 50.0, 100.0])
     np.testing.assert_allclose(e.speed_mps(time_s), [10.0, 80.0, 10.0])
     t = np.linspace(0.0, 145.0, 1000)
@@ -61,7 +61,7 @@ def test_the_identification_trajectory_has_the_published_numbers() -> None:
 
 
 def test_the_oval_is_closed_clockwise_and_as_long_as_it_says() -> None:
-    oval = Oval()
+    oval = published.Oval()
     points = oval.track()
     steps = np.linalg.norm(np.diff(np.vstack([points, points[:1]]), axis=0), axis=1)
     assert steps.max() < 1.5
@@ -102,8 +102,8 @@ def test_the_multi_sine_keeps_its_peak_low_and_its_lines_equal(lines: int) -> No
     [
         (lambda: MultiSine(1.0, 1.0, 0.2, 0.4), "no line"),
         (lambda: MultiSine(1.0, -1.0, 0.2, 0.4), "period_s"),
-        (lambda: Identification(duration_s=0.0), "duration_s"),
-        (lambda: Oval(radius_m=-5.0), "radius_m"),
+        (lambda: published.Identification(duration_s=0.0), "duration_s"),
+        (lambda: published.Oval(radius_m=-5.0), "radius_m"),
         (lambda: excitation.speed_ramp(0.0), "from_mps"),
         (lambda: excitation.multi_sine(speed_mps=-3.0), "speed_mps"),
         (

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid_vehicle import InvalidInput, RoadDisturbance, catalogue, manoeuvres
+from sysid_vehicle import InvalidInput, RoadDisturbance, catalogue, manoeuvres, published
 from sysid_vehicle.lab import (
     Actuator,
     ClosedLoop,
@@ -50,13 +50,13 @@ def test_the_published_preset_repeats_drives_computed_elsewhere(
         pytest.skip(f"the recorded drive is not at {path}")
     with np.load(path) as archive:
         recorded = {name: archive[name] for name in archive.files}
-    setup = Setup.published()
+    setup = published.setup()
     noise = np.zeros((len(recorded["u"]), len(Sensors.names())))
     exact = np.column_stack([recorded["truth_gt"][:, 3:], recorded["ay_true"]])
     std = setup.sensors.table()[[0, 1, 2, 4], 0]
     noise[:, [0, 1, 2, 4]] = (recorded["measurements"] - exact) / std
     drive = run_closed_loop(
-        excitation.Identification(amplitude_rad=amplitude_rad), setup, seed=0, normal=noise
+        published.Identification(amplitude_rad=amplitude_rad), setup, seed=0, normal=noise
     )
     for name, column in RECORDED.items():
         size = np.abs(recorded[name]).max()
@@ -64,7 +64,7 @@ def test_the_published_preset_repeats_drives_computed_elsewhere(
 
 
 def test_the_published_oval_is_driven_as_published() -> None:
-    drive = run_closed_loop(excitation.Oval(duration_s=750.0), Setup.published(), seed=2)
+    drive = run_closed_loop(published.Oval(duration_s=750.0), published.setup(), seed=2)
     settled = slice(1000, None)
     assert drive.lost_s is None
     assert np.abs(drive.truth["ay_mps2"][settled]).max() == pytest.approx(6.1, abs=0.4)

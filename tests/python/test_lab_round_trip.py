@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
+from sysid_vehicle import published
 from sysid_vehicle.errors import SysidWarning
 from sysid_vehicle.lab import excitation, run_closed_loop
 from sysid_vehicle.lab.excitation import Excitation
@@ -23,7 +24,7 @@ def of_length(e: Excitation, duration_s: float) -> Excitation:
     return dataclasses.replace(e, duration_s=duration_s)  # type: ignore[type-var]
 
 
-ALL = excitation.all()
+ALL = {**published.excitations(), **excitation.all()}
 # A manoeuvre has the length that follows from its own parameters.
 OF_ANY_LENGTH = [n for n, e in ALL.items() if not isinstance(e, excitation.OnManoeuvre)]
 CASES = [pytest.param(e, id=name) for name, e in ALL.items() if name not in OF_ANY_LENGTH] + [

@@ -7,16 +7,14 @@ from scipy.optimize import least_squares
 from sysid_vehicle.errors import InvalidInput
 from sysid_vehicle.identify.tyre_shape import friction
 from sysid_vehicle.lab import (
-    PUBLISHED_BOX,
-    PUBLISHED_START,
     GreyBoxVehicle,
     TyreMotion,
-    regress_tyres,
 )
 from sysid_vehicle.lab.box import box_of
 from sysid_vehicle.lab.projection import Regression
-from sysid_vehicle.lab.regression_search import RegressionTask
 from sysid_vehicle.lab.tyre_fit import PARAMETERS
+from sysid_vehicle.published import TYRE_BOX, TYRE_START, regress_tyres
+from sysid_vehicle.published.tyre_search import LossTask
 
 CAR = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6)
 FRONT = np.array([22.0, 1.8, 1.6, 0.8])
@@ -140,13 +138,11 @@ def test_joint_loss_prefers_the_likelier_end() -> None:
 
 def test_regularised_loss_is_the_same_from_every_start() -> None:
     told = motion(noise=0.05, published=True)
-    fit = regress_tyres(
-        CAR, told, loss="regularised", start=PUBLISHED_START, box=PUBLISHED_BOX, starts=4
-    )
+    fit = regress_tyres(CAR, told, loss="regularised", start=TYRE_START, box=TYRE_BOX, starts=4)
     given = np.zeros(len(PARAMETERS))
-    given[:8] = [PUBLISHED_START[n] for n in PARAMETERS[:8]]
-    box = box_of(PARAMETERS[:8], PUBLISHED_BOX)
-    task = RegressionTask(CAR, told, "regularised", box, True, "gauss-newton", given)
+    given[:8] = [TYRE_START[n] for n in PARAMETERS[:8]]
+    box = box_of(PARAMETERS[:8], TYRE_BOX)
+    task = LossTask(CAR, told, box, given, loss="regularised")
     for end, merit in zip(fit.starts.end, fit.starts.log_likelihood, strict=True):
         p = given.copy()
         p[:8] = end
@@ -156,8 +152,8 @@ def test_regularised_loss_is_the_same_from_every_start() -> None:
 
 def test_regularised_loss_is_the_published_sum() -> None:
     told = motion(noise=0.05, published=True)
-    start = PUBLISHED_START
-    fit = regress_tyres(CAR, told, loss="regularised", start=start, box=PUBLISHED_BOX)
+    start = TYRE_START
+    fit = regress_tyres(CAR, told, loss="regularised", start=start, box=TYRE_BOX)
     p = fit.parameters
     a_y = (
         told.motion[:, 4] * friction(_slip(told, "front"), p[:4])
@@ -171,7 +167,7 @@ def test_regularised_loss_is_the_published_sum() -> None:
     )
     assert fit.value == pytest.approx(wanted, rel=1e-9)
     # Drawn towards equal axles, away from what the data say.
-    plain = regress_tyres(CAR, told, loss="weighted", start=start, box=PUBLISHED_BOX)
+    plain = regress_tyres(CAR, told, loss="weighted", start=start, box=TYRE_BOX)
     apart = [np.sum(((q[:4] - q[4:8]) / first[:4]) ** 2) for q in (p, plain.parameters)]
     assert apart[0] < 0.9 * apart[1]
 

@@ -9,6 +9,7 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle.online import KINDS, CorneringRls, MuSlipFilter, SideslipObserver
+from sysid_vehicle.published import PublishedSideslipObserver
 
 SENSORS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 THREADS = 4
@@ -40,25 +41,32 @@ def slips(n):
     return np.column_stack([alpha, 100.0 * alpha.sum(axis=1), 10.0 * (alpha[:, 0] - alpha[:, 1])])
 
 
+def made(vehicle, kind):
+    """An observer of any kind, the published one too."""
+    if kind == "published":
+        return PublishedSideslipObserver(vehicle)
+    return SideslipObserver(vehicle, kind=kind)
+
+
 def in_threads(calls):
     with ThreadPoolExecutor(len(calls)) as pool:
         return [future.result() for future in [pool.submit(call) for call in calls]]
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("kind", [*KINDS, "published"])
 def test_calls_on_one_observer_take_turns(vehicle, dt, sensors, kind):
-    alone = SideslipObserver(vehicle, kind=kind)
+    alone = made(vehicle, kind)
     wanted = sorted(alone.run(dt, sensors)[:, 0].tolist() for _ in range(THREADS))
-    shared = SideslipObserver(vehicle, kind=kind)
+    shared = made(vehicle, kind)
     found = in_threads([lambda: shared.run(dt, sensors)] * THREADS)
     assert sorted(run[:, 0].tolist() for run in found) == wanted
     assert shared.samples == THREADS * len(dt)
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("kind", [*KINDS, "published"])
 def test_one_observer_for_each_thread_is_like_one_alone(vehicle, dt, sensors, kind):
-    alone = SideslipObserver(vehicle, kind=kind).run(dt, sensors)
-    observers = [SideslipObserver(vehicle, kind=kind) for _ in range(THREADS)]
+    alone = made(vehicle, kind).run(dt, sensors)
+    observers = [made(vehicle, kind) for _ in range(THREADS)]
     for found in in_threads([lambda o=o: o.run(dt, sensors) for o in observers]):
         assert np.array_equal(found, alone, equal_nan=True)
 
@@ -83,9 +91,9 @@ def test_least_squares_and_friction_filter_take_turns(vehicle):
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda o: pickle.loads(pickle.dumps(o))])
-@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("kind", [*KINDS, "published"])
 def test_a_copy_goes_on_where_the_observer_stood(vehicle, dt, sensors, kind, copied):
-    observer = SideslipObserver(vehicle, kind=kind)
+    observer = made(vehicle, kind)
     half = len(dt) // 2
     observer.run(dt[:half], sensors[:half])
     other = copied(observer)
@@ -122,7 +130,7 @@ def test_a_state_of_another_version_is_refused(vehicle):
             type(core).__new__(type(core)).__setstate__(other)
 
 
-FOLLOWED = sorted(set(KINDS) - {"published"})
+FOLLOWED = sorted(KINDS)
 
 
 @pytest.mark.parametrize("value", [1e30, -1e30, 200.0, 5e3])
@@ -187,7 +195,7 @@ def test_a_long_step_is_bridged_or_begins_again(vehicle, log, dt, sensors, kind,
 
 
 def test_the_published_observer_refuses_what_cannot_be(vehicle, dt, sensors):
-    observer = SideslipObserver(vehicle, kind="published")
+    observer = PublishedSideslipObserver(vehicle)
     observer.run(dt[:100], sensors[:100])
     for column, name in enumerate(SENSORS):
         absurd = sensors[100].copy()

@@ -18,6 +18,7 @@ from sysid_vehicle.online import (
     cornering_stiffness,
     estimate_sideslip,
 )
+from sysid_vehicle.published import PublishedSideslipObserver
 
 SENSORS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 
@@ -235,7 +236,7 @@ def test_the_published_observer_repeats_its_figures(shared_data: Path):
     )  # fmt: skip
     columns = ("delta_f", "vx", "yawrate", "ax", "ay")
     sensors = np.column_stack([raw[name] for name in columns])
-    found = SideslipObserver(car, kind="published").run(np.full(len(raw), 0.01), sensors)
+    found = PublishedSideslipObserver(car).run(np.full(len(raw), 0.01), sensors)
     error = np.degrees(found[:, 0] - raw["beta"])
     assert np.sqrt(np.mean(error**2)) == pytest.approx(0.462, rel=0.02)
     assert np.abs(error).max() == pytest.approx(3.60, rel=0.02)

@@ -7,6 +7,13 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import InvalidInput, NumericalError
+from sysid_vehicle.published import (
+    DoubleTrackObserver,
+    estimate_mass,
+    estimate_pitch,
+    estimate_roll_yaw,
+    sideslip_and_mass_cost,
+)
 from sysid_vehicle.twin import (
     LOADED_SUV,
     READINGS,
@@ -14,14 +21,9 @@ from sysid_vehicle.twin import (
     BayesianSearch,
     Box,
     Calibration,
-    DoubleTrackObserver,
     Optimiser,
     calibrate,
-    estimate_mass,
-    estimate_pitch,
-    estimate_roll_yaw,
     measure,
-    sideslip_and_mass_cost,
     urban_cycle,
 )
 

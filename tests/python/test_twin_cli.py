@@ -10,15 +10,15 @@ import pytest
 from sysid_vehicle import InvalidInput
 from sysid_vehicle.cli import main
 from sysid_vehicle.cli import twin as command
-from sysid_vehicle.twin import (
-    NOMINAL_SUV,
+from sysid_vehicle.published import (
     JointExperiment,
     LoadExperiment,
     estimate_pitch,
     mass_and_sideslip,
     run_schedule,
 )
-from sysid_vehicle.twin.figures import joint_figure, load_figure
+from sysid_vehicle.published.figures import joint_figure, load_figure
+from sysid_vehicle.twin import NOMINAL_SUV
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle import _core, lab
+from sysid_vehicle import _core, lab, published
 from sysid_vehicle._formula_slope import decay_of
 from sysid_vehicle.estimate.channels import has_channels, logged_channels
 from sysid_vehicle.formula import EVERYTHING, evaluate, trace
@@ -297,7 +297,7 @@ def test_the_laboratory_has_no_log_to_read_from() -> None:
     setup = lab.Setup.default()
     reads = dataclasses.replace(setup, plant=setup.plant.add(heat()))
     with pytest.raises(sv.InvalidInput, match="heat reads the column track_degC; drop"):
-        lab.run_closed_loop(lab.excitation.Identification(duration_s=2.0), reads, seed=1)
+        lab.run_closed_loop(published.Identification(duration_s=2.0), reads, seed=1)
 
 
 def test_a_slow_column_is_linear_between_its_samples_and_a_hole_is_named() -> None:

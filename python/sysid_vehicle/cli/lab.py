@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from .. import published
 from .._files import write_json, write_text
 from .._style import svg
 from ..errors import InvalidInput, near_names
@@ -32,7 +33,7 @@ from .outputs import refuse_other_suffix, refuse_unwritable
 __all__ = ["add_parser", "run"]
 
 _DESIGNED = "designed"
-_PRESETS = {"default": Setup.default, "published": Setup.published}
+_PRESETS = {"default": Setup.default, "published": published.setup}
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def _run_arguments(parser: argparse.ArgumentParser) -> None:
         default="identification",
         metavar="NAME",
         help=f"what is driven: '{_DESIGNED}' to have one designed for this car, or one of "
-        f"{', '.join(excitation.all())} (default: %(default)s)",
+        f"{', '.join(_excitations())} (default: %(default)s)",
     )
     parser.add_argument(
         "--preset",
@@ -144,8 +145,12 @@ def _setup(args: argparse.Namespace) -> Setup:
     return setup
 
 
+def _excitations() -> dict[str, excitation.Excitation]:
+    return {**published.excitations(), **excitation.all()}
+
+
 def _excitation(args: argparse.Namespace) -> excitation.Excitation:
-    known = excitation.all()
+    known = _excitations()
     if args.excitation not in known:
         raise InvalidInput(
             f"--excitation: nothing is called '{args.excitation}'"
@@ -154,7 +159,7 @@ def _excitation(args: argparse.Namespace) -> excitation.Excitation:
     chosen = known[args.excitation]
     if args.duration is None:
         return chosen
-    if not isinstance(chosen, excitation.Identification | excitation.Oval | excitation.Weaving):
+    if not isinstance(chosen, published.Identification | published.Oval | excitation.Weaving):
         raise InvalidInput(f"--duration: {chosen.name} has a length of its own; leave it out")
     return replace(chosen, duration_s=args.duration)
 

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from .. import published
 from .._files import write_json, write_text
 from .._style import svg
 from ..online import KINDS, estimate_sideslip, sideslip_overview
@@ -16,6 +17,8 @@ from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_parser", "run"]
 
+_PUBLISHED = "dual UKF of Cl4y3R/VehicleStateEstimation, 2024, with its defects"
+_KINDS = {**KINDS, "published": _PUBLISHED}
 _CONTRACT = """\
 Estimates sideslip, cornering stiffness and axle forces from steering angle, speed, yaw rate and
 both accelerations. A measured vy_mps is not used; where the log has one, the error is printed."""
@@ -27,7 +30,7 @@ def add_parser(commands: Any) -> None:
         "sideslip",
         help="sideslip and cornering stiffness from a log without vy_mps",
         description=_CONTRACT,
-        epilog="kinds: " + "; ".join(f"{kind}: {what}" for kind, what in KINDS.items()),
+        epilog="kinds: " + "; ".join(f"{kind}: {what}" for kind, what in _KINDS.items()),
     )
     parser.add_argument("log", type=Path, metavar="LOG", help=LOG_HELP)
     parser.add_argument(
@@ -35,7 +38,7 @@ def add_parser(commands: Any) -> None:
     )
     add_reading(parser)
     parser.add_argument(
-        "--kind", choices=sorted(KINDS), default="dual", help="observer (default: %(default)s)"
+        "--kind", choices=sorted(_KINDS), default="dual", help="observer (default: %(default)s)"
     )
     parser.add_argument("--plot", type=Path, metavar="SVG", help="file for the figures")
     parser.add_argument("--json", type=Path, metavar="JSON", help="file for all numbers")
@@ -49,7 +52,10 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     refuse_unwritable([args.plot, args.json], inputs=inputs)
     vehicle = Vehicle.from_toml(args.vehicle)
     log = read_log(args.log, args.channels, dbc=args.dbc)
-    found = estimate_sideslip(vehicle, log, kind=args.kind)
+    if args.kind == "published":
+        found = published.estimate_sideslip(vehicle, log)
+    else:
+        found = estimate_sideslip(vehicle, log, kind=args.kind)
     print(found)
     if args.plot is not None:
         write_text(args.plot, svg(sideslip_overview(found)).decode())

@@ -14,23 +14,23 @@ from typing import Any
 from .._files import read_text, write_json, write_text
 from .._style import new_figure, svg
 from ..errors import InvalidInput
-from ..twin import (
+from ..published import (
     LoadExperiment,
-    calibrate,
     estimate_mass,
     estimate_pitch,
     estimate_roll_yaw,
     mass_and_sideslip,
     run_schedule,
 )
-from ..twin.figures import joint_figure, load_figure, schedule_figure
-from ..twin.joint import (
+from ..published.figures import joint_figure, load_figure, schedule_figure
+from ..published.joint import (
     BENCHMARK_BOX,
     BENCHMARK_GAINS,
     TWIN_BOX,
     benchmark_cost,
     twin_cost,
 )
+from ..twin import calibrate
 from .outputs import refuse_other_suffix, refuse_unwritable
 
 __all__ = ["add_parser", "run"]

@@ -95,8 +95,7 @@ class Ceiling:
             f"is missing (at best {most}): as far as they tell it is disturbance"
         )
 
-    def _repr_html_(self) -> str:
-        return html_text(self)
+    _repr_html_ = html_text
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""

@@ -67,6 +67,7 @@ class Coherence:
         return channel, float(self.frequency_hz[at]), float(self.coherence[channel][at])
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         channel, f, c = self.peak
@@ -81,9 +82,6 @@ class Coherence:
             if not d.linear:
                 text += ", but not equally at all frequencies"
         return text
-
-    def _repr_html_(self) -> str:
-        return html_text(self)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw coherence over frequency, and what exceeds chance."""

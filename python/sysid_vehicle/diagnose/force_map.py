@@ -105,13 +105,11 @@ class ForceMap:
         )
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         head = f"missing force over {self.title}: predicts {100 * max(self.share, 0.0):.0f} %"
         return "\n".join([head, *(f"  {self.peak(t)}" for t in self.targets)])
-
-    def _repr_html_(self) -> str:
-        return html_text(self)
 
     def plot(self, ax: Axes | None = None, target: str | None = None) -> Axes:
         """Draw one target: grey where nobody drove, dots where it is beyond two standard errors.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,7 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from .._files import write_text
 from .._style import AFTER, MEASURED, axes_or_new, new_figure, tidy
-from .._text import brief
+from .._text import brief, html_text
 from ..manoeuvres import Manoeuvre
 from ..simulate import Drive
 
@@ -201,12 +200,10 @@ class Suggestion:
         }
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         return (
             f"{self.manoeuvre.name}: {self.sigmas:.1f} standard errors\n  {self.instructions()}\n"
             f"  {self.manoeuvre.purpose}"
         )
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"

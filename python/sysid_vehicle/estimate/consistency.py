@@ -7,12 +7,12 @@ section 5.4.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 import scipy
 
 from .._arrays import FloatArray, as_float64
+from .._text import html_text
 from ..errors import InvalidInput
 
 __all__ = ["Consistency", "nees_check", "nis_check", "whiteness_check"]
@@ -50,8 +50,7 @@ class Consistency:
             f"({verdict}, {self.count} samples)"
         )
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+    _repr_html_ = html_text
 
 
 def nis_check(nis: FloatArray, observed: FloatArray, *, probability: float = 0.95) -> Consistency:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from typing import Protocol
 
 import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
+from .._text import html_text
 from ..errors import NumericalError
 from ..vehicle import GRAVITY_MPS2, Vehicle
 from .driving import MEASURED, UNITS, Driving
@@ -127,8 +127,7 @@ class NoiseModel:
         x, y, moment = (f"{t:.2g}" for t in self.correlation_time_s)
         return f"{x}, {y} and {moment} s"
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+    _repr_html_ = html_text
 
 
 # Per square root of a second: over one, 5 mm/s and 1 mrad/s.

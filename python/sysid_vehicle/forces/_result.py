@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from .._arrays import FloatArray
+from .._printed import Part, Printed, Table
 from .._style import MEASURED, tidy
-from .._text import brief, html_list, html_paragraph, html_table, number, text_table
+from .._text import brief, number
 from ..errors import InvalidInput, near_names
 from ..sensors import SensorCheck
 from ..vehicle import Vehicle
@@ -38,7 +39,7 @@ COLOURS = tuple(_COLOURS)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AxleForces:
+class AxleForces(Printed):
     """Axle forces from motion, before any tyre is assumed; made by `axle_forces`.
 
     Arrays have the shape (n,), or (n, 2) for the front and the rear axle.
@@ -171,15 +172,8 @@ class AxleForces:
 
     __repr__ = brief
 
-    def __str__(self) -> str:
-        return "\n".join([self.headline, text_table(_HEAD, self._rows()), *self._said()])
-
-    def _repr_html_(self) -> str:
-        return (
-            html_paragraph(self.headline)
-            + html_table(_HEAD, self._rows())
-            + html_list(self._said())
-        )
+    def _parts(self) -> list[Part]:
+        return [self.headline, Table(_HEAD, self._rows()), self._said()]
 
     def plot(self, ax: Sequence[Axes] | None = None, colour: str = "load") -> tuple[Axes, Axes]:
         """Draw the side force over the slip angle, one axle beside the other, with 95 % bands.

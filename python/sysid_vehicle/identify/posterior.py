@@ -9,9 +9,10 @@ import numpy as np
 
 from .._arguments import generator, whole
 from .._arrays import FloatArray, as_float64
+from .._printed import Part, Printed, Table
 from .._progress import with_progress
 from .._tables import frame, imported
-from .._text import brief, html_paragraph, html_table, number, text_table
+from .._text import brief, number
 from ..errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _BURN_IN = 0.3  # share of the steps that is left out
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class Posterior(Printed):
     """Draws of the parameters of a fit.
 
     Attributes
@@ -90,11 +91,8 @@ class Posterior:
 
     __repr__ = brief
 
-    def __str__(self) -> str:
-        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
-
-    def _repr_html_(self) -> str:
-        return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
+    def _parts(self) -> list[Part]:
+        return [self._headline(), Table(self._HEAD, self._rows())]
 
 
 def posterior(

@@ -17,7 +17,8 @@ import scipy
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
-from .._text import brief, html_paragraph, html_table, number, text_table, with_error
+from .._printed import Part, Printed, Table
+from .._text import brief, number, with_error
 from ..errors import InvalidInput, near_names
 from ..estimate import Driving, NoiseModel, noise_range
 from ..log import Log
@@ -70,7 +71,7 @@ class Difference:
 
 
 @dataclass(frozen=True, eq=False)
-class RunsFit:
+class RunsFit(Printed):
     """One fit of several runs; `found["name of the run"]` is that run's :class:`Fit`.
 
     Attributes
@@ -135,11 +136,8 @@ class RunsFit:
 
     __repr__ = brief
 
-    def __str__(self) -> str:
-        return f"{self._headline()}\n{text_table(self._head, self._rows())}"
-
-    def _repr_html_(self) -> str:
-        return html_paragraph(self._headline()) + html_table(self._head, self._rows())
+    def _parts(self) -> list[Part]:
+        return [self._headline(), Table(self._head, self._rows())]
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""

@@ -13,19 +13,15 @@ from .parts import Actuator, Controller, Nominal, Online, Sensor, Sensors, Simul
 from .pictures import overview
 from .preview import Coverage, Expected, Preview, preview
 from .record import ObserverCar, ObserverRecord
-from .regression import PUBLISHED_BOX, PUBLISHED_START, TyreRegression, regress_tyres
 from .saturation import Saturation
 from .setup import Setup
 from .tyre_data import GreyBoxVehicle, TyreLog
-from .tyre_drive import PUBLISHED_SENSORS, drive_tyres
+from .tyre_drive import drive_tyres
 from .tyre_fit import TyreFit
 from .tyres import identify_tyres
 from .validate import IdentifiedCar, Validation, validate_tyres
 
 __all__ = [
-    "PUBLISHED_BOX",
-    "PUBLISHED_SENSORS",
-    "PUBLISHED_START",
     "READINGS",
     "STATES",
     "Actuator",
@@ -57,7 +53,6 @@ __all__ = [
     "TyreFit",
     "TyreLog",
     "TyreMotion",
-    "TyreRegression",
     "Validation",
     "design_excitation",
     "drive_tyres",
@@ -68,7 +63,6 @@ __all__ = [
     "learn_observer_noise",
     "overview",
     "preview",
-    "regress_tyres",
     "run_closed_loop",
     "validate_tyres",
 ]

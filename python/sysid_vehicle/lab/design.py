@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ import scipy
 
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
+from .._printed import Part, Printed
 from .._progress import doing
 from .._style import AFTER, BEFORE, axes_or_new, tidy
 from .._threads import Workers
@@ -115,7 +115,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class Design(Printed):
     """A designed excitation.
 
     Attributes
@@ -155,12 +155,8 @@ class Design:
         )
         return [what, how]
 
-    def __str__(self) -> str:
-        return "\n".join([*self._notes(), str(self.preview)])
-
-    def _repr_html_(self) -> str:
-        notes = "".join(f"<p>{escape(n)}</p>" for n in self._notes())
-        return notes + self.preview._repr_html_()
+    def _parts(self) -> list[Part]:
+        return [*self._notes(), *self.preview._parts()]
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw how well each trial would tell the least-known coefficient.

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
+from .._printed import Part, Printed, Table
 from .._progress import doing
 from .._style import AFTER, BEFORE, FLOOR, axes_or_new, tidy
-from .._text import html_table, number, text_table
+from .._text import number
 from ..errors import InvalidInput, NumericalError, near_names
 from .observed import READINGS, STATES
 from .observer import Observer, ObserverNoise
@@ -107,7 +107,7 @@ def _group(
 
 
 @dataclass(frozen=True, eq=False)
-class EMResult:
+class EMResult(Printed):
     """Noise learned from logs, and how it was reached.
 
     Attributes
@@ -223,11 +223,8 @@ class EMResult:
                 rows.append((label, number(float(np.sqrt(a))), number(float(np.sqrt(b))), note))
         return rows
 
-    def __str__(self) -> str:
-        return f"{self._title}\n{text_table(_HEAD, self._rows())}"
-
-    def _repr_html_(self) -> str:
-        return f"<p>{escape(self._title)}</p>{html_table(_HEAD, self._rows())}"
+    def _parts(self) -> list[Part]:
+        return [self._title, Table(_HEAD, self._rows())]
 
 
 def _refuse_too_little(records: Sequence[ObserverRecord]) -> None:

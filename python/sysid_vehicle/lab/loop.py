@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,8 +10,9 @@ import numpy.typing as npt
 
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
+from .._printed import Part, Printed, Table
 from .._style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
-from .._text import html_table, number, text_table
+from .._text import number
 from ..errors import InvalidInput
 from ..log import Log
 from ..simulate import RoadDisturbance
@@ -49,7 +49,7 @@ _INPUTS = ("fx_n", "steer_rad", "fx_command_n", "steer_command_rad")
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedLoop:
+class ClosedLoop(Printed):
     """A finished drive of the closed loop.
 
     Attributes
@@ -165,14 +165,8 @@ class ClosedLoop:
             return "The reference was too hard for the car: " + "; ".join(hard) + "."
         return "The reference was within the car's means."
 
-    def __str__(self) -> str:
-        return "\n".join(
-            [self._title(), text_table(("what", "value"), self._rows()), self._verdict()]
-        )
-
-    def _repr_html_(self) -> str:
-        table = html_table(("what", "value"), self._rows())
-        return f"<p>{escape(self._title())}</p>{table}<p>{escape(self._verdict())}</p>"
+    def _parts(self) -> list[Part]:
+        return [self._title(), Table(("what", "value"), self._rows()), self._verdict()]
 
     def plot(self, ax: Axes | None = None, what: str = "yaw_rate_radps") -> Axes:
         """Draw a quantity as wanted, as driven and as observed.

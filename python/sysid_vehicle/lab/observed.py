@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._arrays import FloatArray
+from .._printed import Part, Printed, Table
 from .._style import AFTER, BEFORE, MEASURED, TRUTH, axes_or_new, tidy
-from .._text import html_table, number, text_table
+from .._text import number
 from ..errors import InvalidInput, near_names
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ _HEAD = ("state", "rms", "mean std")
 
 
 @dataclass(frozen=True, eq=False)
-class StateEstimate:
+class StateEstimate(Printed):
     """States and readings without their noise, with their uncertainty.
 
     Attributes
@@ -151,8 +151,5 @@ class StateEstimate:
             for n, x, s in values
         ]
 
-    def __str__(self) -> str:
-        return f"{self._title}\n{text_table(_HEAD, self._rows())}"
-
-    def _repr_html_(self) -> str:
-        return f"<p>{escape(self._title)}</p>{html_table(_HEAD, self._rows())}"
+    def _parts(self) -> list[Part]:
+        return [self._title, Table(_HEAD, self._rows())]

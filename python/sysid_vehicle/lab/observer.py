@@ -51,11 +51,6 @@ class ObserverForm:
     coupling: bool = True
     speed_predicted: bool = True
 
-    @classmethod
-    def published(cls) -> ObserverForm:
-        """Give the observer as published, with its defects, to reproduce its numbers."""
-        return cls(False, False, False, False, False)
-
 
 @dataclass(frozen=True, eq=False)
 class ObserverNoise:
@@ -87,14 +82,6 @@ class ObserverNoise:
     def from_variances(cls, process: npt.ArrayLike, sensors: npt.ArrayLike) -> ObserverNoise:
         """Uncorrelated noise of six and four variances."""
         return cls(np.diag(as_float64(process)), np.diag(as_float64(sensors)))
-
-    @classmethod
-    def published(cls) -> ObserverNoise:
-        """Give the noise the publication ships."""
-        return cls.from_variances(
-            [4.9439e-4, 5.8044e-4, 5.55501e-6, 17.535, 1321.6, 28.569],
-            [0.0093, 5.8534e-5, 6.1532e-6, 0.0026],
-        )
 
     @classmethod
     def first_guess(cls, record: ObserverRecord, car: ObserverCar) -> ObserverNoise:
@@ -145,11 +132,14 @@ class Observer:
         Covariances; `learn_observer_noise` finds them.
     form : ObserverForm
         The equations; corrected by default.
+    certain_start_mps : float or None
+        Speed one sample before the first, taken as certain; None begins with the first reading.
     """
 
     car: ObserverCar
     noise: ObserverNoise
     form: ObserverForm = ObserverForm()
+    certain_start_mps: float | None = None
 
     def with_noise(self, noise: ObserverNoise) -> Observer:
         """Give the same observer with other covariances."""
@@ -178,15 +168,16 @@ class Observer:
 
     def core_log(self, record: ObserverRecord) -> _core.ObserverLog:
         """Put the record into the core, with the state it starts from."""
-        if self.form == ObserverForm.published():
-            mean, covariance, one_before = np.array([5.0, 0, 0, 0, 0, 0]), np.zeros((6, 6)), True
+        speed = self.certain_start_mps
+        if speed is not None:
+            mean = as_float64([speed, 0.0, 0.0, 0.0, 0.0, 0.0])
+            covariance = np.zeros((len(STATES), len(STATES)))
         else:
             first = record.readings[0].copy()
             if np.isnan(first[0]):  # where the speed is first known is better than nothing
                 first[0] = record.readings[np.isfinite(record.readings[:, 0]), 0][0]
             car = self.car.vector()
             mean, covariance = _core.observer_start(car, first, as_float64(self.noise.sensors))
-            one_before = False
         return _core.ObserverLog(
             self.car.vector(),
             dataclasses.astuple(self.form),
@@ -195,7 +186,7 @@ class Observer:
             record.readings,
             mean,
             covariance,
-            one_before,
+            speed is not None,
         )
 
     def _trace(self, record: ObserverRecord, *, smoothed: bool) -> StateEstimate:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2, Vehicle
+from .observer import ObserverForm
 
 __all__ = ["Actuator", "Controller", "Nominal", "Online", "Sensor", "Sensors", "Simulator"]
 
@@ -86,11 +87,6 @@ class Sensors:
     fx_n: Sensor = Sensor()
     steer_rad: Sensor = Sensor()
     ay_repeats_yaw_noise: bool = False
-
-    @classmethod
-    def published(cls) -> Sensors:
-        """Return the published sensors: heading, place and loads are free of noise."""
-        return cls(heading_rad=Sensor(), x_m=Sensor(), y_m=Sensor(), ay_repeats_yaw_noise=True)
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
@@ -223,11 +219,6 @@ class Controller:
     def __post_init__(self) -> None:
         _refuse_negative(self)
 
-    @classmethod
-    def published(cls) -> Controller:
-        """Return the published gains and limits."""
-        return cls(4.0, 30.0, 12.0, 0.3, 1.0, _INF, _INF, _INF, 10.0, 1.0, False, False, 1e-6, 1e-6)
-
 
 @dataclass(frozen=True)
 class Online:
@@ -239,15 +230,15 @@ class Online:
         Variances per sample of v_x, v_y, r and the unknown F_x, F_y, M_z.
     sensors : tuple of 4 floats
         Variances of the readings of v_x, v_y, r, a_y.
-    published_form : bool
-        The published equations with their defects, in place of the corrected ones.
+    form : ObserverForm
+        Its equations; corrected by default.
     certain_start : bool
         Begin with the drive's first speed, certain; otherwise with the first reading.
     """
 
     process: tuple[float, ...] = (1e-6, 1e-6, 1e-8, 50.0, 1500.0, 300.0)
     sensors: tuple[float, ...] = (1e-2, 1e-5, 1e-5, 1e-5)
-    published_form: bool = False
+    form: ObserverForm = field(default_factory=ObserverForm)
     certain_start: bool = False
 
     def __post_init__(self) -> None:
@@ -259,13 +250,6 @@ class Online:
                 )
         if min(self.sensors) == 0.0:
             raise InvalidInput("Online: sensors holds a zero; give every reading some noise")
-
-    @classmethod
-    def published(cls) -> Online:
-        """Return the published form with its shipped variances."""
-        process = (4.9439e-4, 5.8044e-4, 5.55501e-6, 17.535, 1321.6, 28.569)
-        sensors = (0.0093, 5.8534e-5, 6.1532e-6, 0.0026)
-        return cls(process, sensors, published_form=True, certain_start=True)
 
 
 @dataclass(frozen=True)
@@ -320,9 +304,3 @@ class Simulator:
                 f"Simulator: load_share = {self.load_share!r}, steps = {self.steps!r}; give a "
                 f"share above 0 and at most 1, and 0 to 1000 steps"
             )
-
-    @classmethod
-    def published(cls) -> Simulator:
-        """Return the published way: half load, one-sample delays, one step a sample."""
-        # The published programs take 9.81 m/s2 for gravity.
-        return cls(0.5, True, True, 1, 0.0, 9.81, True, 5.0, True)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._arrays import FloatArray
+from .._printed import Part, Printed, Table
 from .._style import AFTER, BEFORE, FLOOR, MEASURED, axes_or_new, tidy
-from .._text import html_table, number, text_table
+from .._text import number
 from ..model import Model
 from ..vehicle import Tyre
 from .excitation import Excitation
@@ -81,7 +81,7 @@ class Coverage:
 
 
 @dataclass(frozen=True, eq=False)
-class Preview:
+class Preview(Printed):
     """What an excitation will teach about a car, if the car is as it is believed to be.
 
     Attributes
@@ -150,13 +150,8 @@ class Preview:
     def _title(self) -> str:
         return f"What {self.drive.excitation.name} will teach about {self.believed.vehicle.name}"
 
-    def __str__(self) -> str:
-        return "\n".join([self._title(), text_table(self._HEAD, self._rows()), *self._notes()])
-
-    def _repr_html_(self) -> str:
-        notes = "".join(f"<li>{escape(n)}</li>" for n in self._notes())
-        table = html_table(self._HEAD, self._rows())
-        return f"<p>{escape(self._title())}</p>{table}<ul>{notes}</ul>"
+    def _parts(self) -> list[Part]:
+        return [self._title(), Table(self._HEAD, self._rows()), self._notes()]
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw how long each slip angle is held, and the tyre curves as believed.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, field, replace
-from html import escape
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 
 from .. import _core
+from .._text import html_text
 from ..errors import InvalidInput
 from ..model import Model
 from ..vehicle import Tyre, Vehicle
@@ -20,7 +20,7 @@ _FORCE = Actuator(-8000.0, 6000.0, 60e3)
 _STEER = Actuator(-0.35, 0.35, 2.0)
 
 
-def _published_plant() -> Model:
+def _example_plant() -> Model:
     tyre = Tyre(B=22.0, C=1.8, D=1.6, E=0.8)
     vehicle = Vehicle(
         name="published single track",
@@ -110,28 +110,7 @@ class Setup:
     @classmethod
     def default(cls) -> Setup:
         """Return the published car at its full load, with the corrected loop."""
-        return cls.of(_published_plant())
-
-    @classmethod
-    def published(cls) -> Setup:
-        """Return the published experiment: half load, one-sample delays, exact knowledge."""
-        plant = _published_plant()
-        simulator = Simulator.published()
-        nominal = replace(Nominal.of(plant.vehicle, 63.0), gravity_mps2=simulator.gravity_mps2)
-        return cls(
-            plant,
-            nominal,
-            Sensors.published(),
-            Actuator(-4000.0, 2000.0),
-            Actuator(-0.262, 0.262),
-            Controller.published(),
-            Online.published(),
-            simulator,
-            5.0,
-            100.0,
-            "published",
-            1.0,
-        )
+        return cls.of(_example_plant())
 
     def core(
         self, steer_by: str, speed_mps: float, start: Sequence[float] = (0.0, 0.0)
@@ -147,8 +126,8 @@ class Setup:
         loop.set_sensors(self.sensors.table())
         o, s = self.observer, self.simulator
         loop.set_noise(np.diag(o.process).astype(float), np.diag(o.sensors).astype(float))
-        loop.set_published_form(o.published_form)
-        loop.set_published_ways(
+        loop.set_observer_form(astuple(o.form))
+        loop.set_ways(
             self.pose_gain,
             s.load_sensors,
             s.late_feedback,
@@ -177,5 +156,4 @@ class Setup:
             f"feedback {'late' if s.late_feedback else 'predicted'}"
         )
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+    _repr_html_ = html_text

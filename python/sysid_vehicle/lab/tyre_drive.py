@@ -13,10 +13,9 @@ from ..errors import InvalidInput
 from .box import first_point
 from .tyre_data import READINGS, GreyBoxVehicle, TyreLog
 
-__all__ = ["PUBLISHED_SENSORS", "drive_tyres"]
+__all__ = ["drive_tyres"]
 
-PUBLISHED_SENSORS = (0.1, 3.16e-3, 3.16e-3, 3.16e-3)
-"""Standard deviations of v_x, v_y [m/s], yaw rate [rad/s] and a_y [m/s2]."""
+_SENSORS = (0.1, 3.16e-3, 3.16e-3, 3.16e-3)  # v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2]
 
 
 def drive_tyres(
@@ -26,7 +25,7 @@ def drive_tyres(
     *,
     step_s: float = 0.01,
     begin: tuple[float, float, float] = (25.0, 0.0, 0.0),
-    sensors: tuple[float, float, float, float] = PUBLISHED_SENSORS,
+    sensors: tuple[float, float, float, float] = _SENSORS,
     seed: int | np.random.Generator = 0,
     name: str = "simulated drive",
 ) -> TyreLog:

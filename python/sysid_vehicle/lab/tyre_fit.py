@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
+from .._printed import Part, Printed, Table
 from .._style import AFTER, BEFORE, axes_or_new, tidy
-from .._text import html_paragraph, html_table, number, text_table
+from .._text import number
 from ..identify.estimates import Estimate
 from ..identify.profile import Profile
 from ..identify.quantities import Quantity, parameter, std_of, tyre_quantity
@@ -114,7 +115,7 @@ def quantities(names: Sequence[str]) -> dict[str, Quantity]:
 
 
 @dataclass(frozen=True, eq=False)
-class TyreFit:
+class TyreFit(Printed):
     """Tyre coefficients identified from driving.
 
     Attributes
@@ -349,15 +350,8 @@ class TyreFit:
             )
         return "\n".join(lines)
 
-    def __str__(self) -> str:
-        return f"{self._headline()}\n{text_table(self._head, self._rows())}\n{self._closing()}"
-
-    def _repr_html_(self) -> str:
-        return (
-            html_paragraph(self._headline())
-            + html_table(self._head, self._rows())
-            + html_paragraph(self._closing())
-        )
+    def _parts(self) -> list[Part]:
+        return [self._headline(), Table(self._head, self._rows()), self._closing()]
 
 
 def strongest_correlations(fit: TyreFit, count: int = 5) -> Sequence[tuple[str, str, float]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +12,10 @@ import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from .._files import read_text
+from .._printed import Part, Printed, Table
 from .._progress import doing
 from .._style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
-from .._text import html_table, number, text_table
+from .._text import number
 from ..errors import InvalidInput
 from .tyre_data import READINGS, GreyBoxVehicle, TyreLog, tyre_problem
 from .tyre_fit import NOISES, PARAMETERS, TyreFit
@@ -72,7 +72,7 @@ class IdentifiedCar:
 
 
 @dataclass(frozen=True, eq=False)
-class Validation:
+class Validation(Printed):
     """Prediction errors of one drive.
 
     Attributes
@@ -125,11 +125,8 @@ class Validation:
     def _title(self) -> str:
         return f"Rms prediction errors on {self.log}"
 
-    def __str__(self) -> str:
-        return f"{self._title()}\n{text_table(('ahead', *READINGS), self._rows())}"
-
-    def _repr_html_(self) -> str:
-        return f"<p>{escape(self._title())}</p>{html_table(('ahead', *READINGS), self._rows())}"
+    def _parts(self) -> list[Part]:
+        return [self._title(), Table(("ahead", *READINGS), self._rows())]
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""

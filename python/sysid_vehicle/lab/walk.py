@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from .._arrays import FloatArray
@@ -10,7 +12,7 @@ from ..identify.search import Box, minimise
 from ..identify.settle import descend
 from ..identify.tyre_shape import look_alike
 
-__all__ = ["valleys", "walk"]
+__all__ = ["looking_alike", "valleys", "walk"]
 
 _CURVATURES = (-1.0, 0.0, 0.4, 0.8)
 _SIDES = ((0,), (4,), (0, 4))  # where the coefficients of the axles that are moved begin
@@ -20,6 +22,16 @@ _WALKS = 4
 _HOPELESS = 15.0  # nats above, after the taste
 _TRIED = 4
 _APART = 0.02  # of the box's width
+
+
+def looking_alike(p: FloatArray) -> Iterator[FloatArray]:
+    """Points with tyres of other curvature, but of the same stiffness and peak, at either axle."""
+    for sides in _SIDES:
+        for e in _CURVATURES:
+            trial = p.copy()
+            for first in sides:
+                trial[first : first + 4] = look_alike(p[first : first + 4], e)
+            yield trial
 
 
 def walk(
@@ -60,15 +72,11 @@ def valleys(
     gains = objective.freeze(p, noise)
     here = objective.half_sum_of_squares(p, gains)
     tasted = []
-    for sides in _SIDES:
-        for e in _CURVATURES:
-            trial = p.copy()
-            for first in sides:
-                trial[first : first + 4] = look_alike(p[first : first + 4], e)
-            found = minimise(objective, trial, gains, box, rounds=_TASTE)
-            trial[box.columns] = found.x
-            if found.cost < here + _HOPELESS and not _same(trial, p, box):
-                tasted.append((found.cost, trial))
+    for trial in looking_alike(p):
+        found = minimise(objective, trial, gains, box, rounds=_TASTE)
+        trial[box.columns] = found.x
+        if found.cost < here + _HOPELESS and not _same(trial, p, box):
+            tasted.append((found.cost, trial))
     ends: list[tuple[FloatArray, float]] = []
     tried: list[FloatArray] = [p]
     for _, trial in sorted(tasted, key=lambda one: one[0])[:_TRIED]:

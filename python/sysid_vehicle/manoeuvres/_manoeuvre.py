@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
+from .._text import html_text
 from ..errors import InvalidInput
 from ..vehicle import Vehicle
 from ._curves import Curve
@@ -134,8 +134,7 @@ class Manoeuvre:
             f"{lateral.min():+.1f} to {lateral.max():+.1f} m/s2 wanted; {how}"
         )
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+    _repr_html_ = html_text
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the wanted speed, and the wanted lateral acceleration on a second axis.

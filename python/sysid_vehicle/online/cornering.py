@@ -7,7 +7,6 @@ Where the slip angles are known, lateral and yaw acceleration are linear in the 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +15,7 @@ import scipy
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, MEASURED, axes_or_new, tidy
-from .._text import brief
+from .._text import brief, html_text
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..log import Log
@@ -160,6 +159,7 @@ class CorneringRun:
         return int(self.used.sum()) >= _ENOUGH
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         return (
@@ -168,9 +168,6 @@ class CorneringRun:
             f"{self.cr_std_npr[-1] / 1e3:.1f} kN/rad, from {int(self.used.sum())} of "
             f"{len(self.used)} samples"
         )
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw both stiffnesses over time onto `ax`."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from html import escape
 from typing import Any
 
 from .._progress import doing
-from .._text import brief, text_table
+from .._text import brief, html_text, text_table
 from ..errors import InvalidInput
 from .mu_slip_curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
 from .mu_slip_data import MuSlipData
@@ -44,6 +43,7 @@ class MuSlipComparison:
         return self.estimates[-1]
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         names = self.best.curve.parameters
@@ -54,9 +54,6 @@ class MuSlipComparison:
         table = text_table([f"{self.best.curve.name} curve", *names], rows)
         notes = (f"  note: {note}" for note in (*self.notes, *self.best.notes))
         return "\n".join([str(self.data), table, *notes])
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
 
 @doing("estimators of the curve")

@@ -83,6 +83,7 @@ class MuSlipNoiseStudy:
         )
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         head = ["noise of a reading", *(f"{s:.4g}" for s in self.noise_std)]
@@ -102,9 +103,6 @@ class MuSlipNoiseStudy:
             if count
         ]
         return "\n".join([self._head(), text_table(head, rows), *notes])
-
-    def _repr_html_(self) -> str:
-        return html_text(self)
 
     def plot(self, ax: Axes | None = None, parameter: str = "mu_peak") -> Axes:
         """Draw the rms error of the peak friction, or of its slip, over signal-to-noise.

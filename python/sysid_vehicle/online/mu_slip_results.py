@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._arrays import FloatArray
 from .._style import AFTER, MEASURED, axes_or_new, tidy
-from .._text import brief, text_table
+from .._text import brief, html_text, text_table
 from .mu_slip_curve import MuSlipCurve, magic_formula_coefficients
 from .mu_slip_data import MuSlipData
 
@@ -56,6 +55,7 @@ class MuSlipEstimate:
         return mu, np.sqrt(np.maximum(variance, 0.0))
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         rows = [
@@ -67,9 +67,6 @@ class MuSlipEstimate:
             letters = zip("BCDE", magic_formula_coefficients(list(self.values)), strict=True)
             text += "\n  " + ", ".join(f"{name} {x:.4g}" for name, x in letters)
         return "\n".join([text, *(f"  note: {note}" for note in self.notes)])
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def plot(self, data: MuSlipData, ax: Axes | None = None) -> Axes:
         """Draw the readings, the curve and its 2-sigma band onto `ax`."""
@@ -145,12 +142,10 @@ class MuSlipRun:
         return MuSlipEstimate(self.method, self.curve, values, self.covariance[-1], notes)
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         return str(self.estimate)
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
 
 @dataclass(frozen=True)
@@ -184,9 +179,7 @@ class MuSlipSmoothed:
         return MuSlipEstimate("iterated smoother", self.curve, values, self.covariance[-1], notes)
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         return str(self.estimate)
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"

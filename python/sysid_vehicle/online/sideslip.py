@@ -25,7 +25,6 @@ KINDS: Mapping[str, str] = {
     "ekf": "the same as an extended Kalman filter",
     "square-root-ukf": "the same as a square-root UKF",
     "linear-ukf": "the UKF with tyres that do not saturate",
-    "published": "dual UKF of Cl4y3R/VehicleStateEstimation, 2024, with its defects",
 }
 _SENSORS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 
@@ -83,7 +82,7 @@ class SideslipObserver:
     Readings that no car gives, by their size or by how fast they change, are refused: the tyre
     model stands in, and `mode` says so. Steps beyond 0.05 s are divided. After a step of more than
     1 s, or where the estimate leaves 1.2 rad, the motion begins again with its initial covariance;
-    what was learnt of the tyres stays. The published kind needs every reading and raises instead.
+    what was learnt of the tyres stays.
 
     Calls from several threads take turns. An observer pickles and copies with its state.
     """
@@ -96,12 +95,10 @@ class SideslipObserver:
     ) -> None:
         values = dict(settings if settings is not None else SideslipSettings())
         self.vehicle, self.kind = vehicle, kind
-        car = _car(vehicle)
+        car = observed_car(vehicle)
         self._core: _core._SideslipObserver
         if kind == "dual":
             self._core = _core.SideslipDual(car, values)
-        elif kind == "published":
-            self._core = _core.PublishedDual(car, *static_stiffness(vehicle))
         elif kind == "ekf":
             self._core = _core.SideslipEkf(car, values, False)
         elif kind == "square-root-ukf":
@@ -126,8 +123,7 @@ class SideslipObserver:
         ------
         NumericalError
             If a reading is infinite, the time step is not positive, or the filter leaves the range
-            of numbers; the message gives the sample. The published kind also raises for a reading
-            that is missing or that no car gives, and for a step of more than 1 s.
+            of numbers; the message gives the sample.
         """
         return SideslipEstimate._make(
             self._core.step(dt_s, steer_rad, vx_mps, yaw_rate_radps, ax_mps2, ay_mps2)
@@ -159,7 +155,7 @@ class SideslipObserver:
 
     def copy(self) -> SideslipObserver:
         """An independent observer in the same state."""
-        other = object.__new__(SideslipObserver)
+        other = object.__new__(type(self))
         other.vehicle, other.kind, other._core = self.vehicle, self.kind, self._core.copy()
         return other
 
@@ -197,13 +193,18 @@ def estimate_sideslip(
         If the filter leaves the range of numbers; the message gives the sample.
     """
     settings = settings if settings is not None else SideslipSettings.of(log)
-    observer = SideslipObserver(vehicle, settings, kind)
+    return run_over(log, SideslipObserver(vehicle, settings, kind), settings)
+
+
+def run_over(log: Log, observer: SideslipObserver, settings: SideslipSettings) -> SideslipRun:
+    """Run an observer over a whole log."""
     sensors = np.column_stack([log[name] for name in _SENSORS])
     dt = np.full(log.n, 1.0 / log.rate_hz)
     found = SideslipEstimate._make(observer.run(dt, sensors).T)
     true_beta = np.arctan2(log["vy_mps"], log["vx_mps"]) if log.has("vy_mps") else None
     return SideslipRun(
-        kind, vehicle, log.name, settings, log["time_s"], log["ay_mps2"], true_beta,
+        observer.kind, observer.vehicle, log.name, settings, log["time_s"], log["ay_mps2"],
+        true_beta,
         **{name: np.ascontiguousarray(column) for name, column in found._asdict().items()},
     )  # fmt: skip
 
@@ -229,7 +230,9 @@ def yaw_inertia(vehicle: Vehicle) -> float:
     return typical
 
 
-def _car(vehicle: Vehicle) -> _core.ObservedCar:
+def observed_car(vehicle: Vehicle) -> _core.ObservedCar:
+    """The car as the core's observers take it."""
+
     def letters(tyre: Tyre) -> list[float]:
         return [tyre.B, tyre.C, tyre.D, tyre.E]
 

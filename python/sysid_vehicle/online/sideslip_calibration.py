@@ -6,13 +6,12 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 
 from .._arguments import generator
 from .._arrays import FloatArray
-from .._text import brief
+from .._text import brief, html_text
 from ..errors import InvalidInput
 from ..identify import Fit
 from ..log import Log
@@ -55,6 +54,7 @@ class SideslipCalibration:
     score_after: float
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         score = f"{self.score_before:.3f} to {self.score_after:.3f} per sample"
@@ -69,9 +69,6 @@ class SideslipCalibration:
         new = {name: value for name, value in self.settings.items() if value != old[name]}
         changed = [f"{name} {old[name]:.3g} to {value:.3g}" for name, value in new.items()]
         return "\n".join([*lines, "  " + ", ".join(changed)])
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
 
 def calibrate_sideslip(

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._arrays import FloatArray
 from .._style import AFTER, MEASURED, TRUTH, axes_or_new, new_figure, tidy
-from .._text import brief, text_table
+from .._text import brief, html_text, text_table
 from ..vehicle import Vehicle
 from .sideslip_settings import SideslipSettings
 
@@ -128,6 +127,7 @@ class SideslipRun:
         )
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         beta = np.degrees(self.beta_rad)
@@ -160,9 +160,6 @@ class SideslipRun:
                 lines.append(f"  {100.0 * share:.1f} % of samples {meaning}")
         found = self.error()
         return "\n".join([*lines, *([str(found)] if found is not None else [])])
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def to_dict(self) -> dict[str, Any]:
         """All figures and series as plain numbers."""

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from html import escape
 
 from .. import _core
 from .._files import refuse_unknown
-from .._text import text_table
+from .._text import html_text, text_table
 from ..errors import InvalidInput
 from ..estimate.inputs import white_noise_std
 from ..log import Log
@@ -115,5 +114,4 @@ class SideslipSettings(Mapping[str, float]):
     def __repr__(self) -> str:
         return f"SideslipSettings({', '.join(f'{k}={v:.4g}' for k, v in self.items())})"
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+    _repr_html_ = html_text

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from .. import _core
 from .._arguments import expect, generator
 from .._arrays import FloatArray, as_float64
-from .._text import brief
+from .._text import brief, html_text
 from ..effects import channels_in_use
 from ..errors import InvalidInput, NumericalError
 from ..log import CHANNELS, Log
@@ -69,6 +68,7 @@ class Drive:
     own_states: Mapping[str, FloatArray] = field(default_factory=dict)
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         steer, force = np.abs(self.inputs).max(axis=0)
@@ -80,9 +80,6 @@ class Drive:
             f"lateral acceleration up to {np.abs(self.outputs[:, 4]).max():.1f} m/s2, "
             f"steering up to {steer:.3f} rad, wheel force up to {force:.0f} N"
         )
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw driven and wanted speed, and the lateral acceleration on a second axis.

@@ -13,7 +13,6 @@ from .calibrate import (
     Candidate,
     Optimiser,
     calibrate,
-    sideslip_and_mass_cost,
 )
 from .car import (
     LOAD_NAMES,
@@ -25,7 +24,6 @@ from .car import (
     PointMass,
     TwinCar,
 )
-from .double_track import DoubleTrackObserver, DoubleTrackRun
 from .drives import (
     INPUTS,
     OUTPUTS,
@@ -36,14 +34,7 @@ from .drives import (
     swept_steer,
     urban_cycle,
 )
-from .experiments import (
-    LoadExperiment,
-    estimate_mass,
-    estimate_pitch,
-    estimate_roll_yaw,
-)
 from .fmu import FMUTwin, FMUVariables
-from .joint import JointExperiment, mass_and_sideslip
 from .laws import (
     ParameterLaw,
     Schedule,
@@ -58,7 +49,6 @@ from .observer import STATES, Observation, Observer, StateGain, observe
 from .protocol import Twin, observe_with
 from .readings import READINGS, Readings, measure, noisy_road
 from .residuals import ChannelResidual
-from .schedule import ScheduleRun, run_schedule
 
 __all__ = [
     "INPUTS",
@@ -76,14 +66,10 @@ __all__ = [
     "CallableTwin",
     "Candidate",
     "ChannelResidual",
-    "DoubleTrackObserver",
-    "DoubleTrackRun",
     "Drive14",
     "FMUTwin",
     "FMUVariables",
-    "JointExperiment",
     "Load",
-    "LoadExperiment",
     "NativeTwin",
     "Observation",
     "Observer",
@@ -92,7 +78,6 @@ __all__ = [
     "PointMass",
     "Readings",
     "Schedule",
-    "ScheduleRun",
     "SideBySide",
     "StateGain",
     "Twin",
@@ -100,11 +85,7 @@ __all__ = [
     "Unknown",
     "calibrate",
     "drive14",
-    "estimate_mass",
-    "estimate_pitch",
-    "estimate_roll_yaw",
     "inertia_law",
-    "mass_and_sideslip",
     "mass_law",
     "measure",
     "noisy_road",
@@ -112,8 +93,6 @@ __all__ = [
     "observe_with",
     "on_manoeuvre",
     "rough_road",
-    "run_schedule",
-    "sideslip_and_mass_cost",
     "single_track",
     "swept_steer",
     "to_log",

@@ -10,7 +10,6 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -18,10 +17,8 @@ import numpy as np
 from .._arguments import generator
 from .._arrays import FloatArray
 from .._style import AFTER, MEASURED, axes_or_new, tidy
-from .._text import brief
+from .._text import brief, html_text
 from ..errors import InvalidInput, NumericalError
-from .drives import Drive14
-from .observer import Observation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +30,6 @@ __all__ = [
     "Candidate",
     "Optimiser",
     "calibrate",
-    "sideslip_and_mass_cost",
 ]
 
 _LOST = 10.0  # a run that fails costs so many times the dearest that did not
@@ -272,6 +268,7 @@ class Calibration:
         return tidy(ax, xlabel="trial", ylabel="cost")
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         lines = [f"Cost {self.cost:.4g} after {len(self.tried)} trials, {self.lost} lost the twin"]
@@ -281,40 +278,6 @@ class Calibration:
         ]
         lines += [f"  {name:12s} {value:.5g}" for name, value in self.gains.items()]
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
-
-
-def sideslip_and_mass_cost(
-    sideslip_rad: FloatArray,
-    mass_kg: FloatArray,
-    drive: Drive14,
-    true_mass_kg: float,
-    *,
-    stride: int = 1,
-) -> float:
-    """Equation (26): ten times the rms of the sideslip in degrees, plus that of the mass in kg.
-
-    The mass counts over the last ten seconds. The paper does not give the unit of the sideslip; in
-    radians its term would vanish beside the mass.
-    """
-    error = np.degrees(sideslip_rad - drive["sideslip_rad"][::stride])
-    last = round(10.0 / (drive.dt_s * stride))
-    mass = mass_kg[-last:] - true_mass_kg
-    return float(10.0 * np.sqrt(np.mean(error**2)) + np.sqrt(np.mean(mass**2)))
-
-
-def observation_cost(found: Observation, drive: Drive14, true_mass_kg: float) -> float:
-    """Equation (26) of an observation of the built-in twin."""
-    stride = round(float(found.time_s[1]) / drive.dt_s)
-    return sideslip_and_mass_cost(
-        found.outputs["sideslip_rad"],
-        found.parameters["mass_kg"],
-        drive,
-        true_mass_kg,
-        stride=stride,
-    )
 
 
 def calibrate(

@@ -8,12 +8,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from html import escape
 
 import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray
+from .._text import html_text
 from ..errors import InvalidInput, near_names
 
 __all__ = [
@@ -247,8 +247,7 @@ class TwinCar:
             lines.append(f"  {name:34s} {value:12.6g}{note}")
         return "\n".join(lines)
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+    _repr_html_ = html_text
 
 
 # Mass, inertia and centre of mass as published; the rest, which is not, as two-seaters have it.

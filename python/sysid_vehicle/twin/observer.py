@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from html import escape
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, TRUTH, axes_or_new, tidy
-from .._text import brief
+from .._text import brief, html_text
 from ..errors import InvalidInput, NumericalError, warn
 from .car import LOAD_NAMES, Load, TwinCar
 from .checks import checked_rows, checked_step, checked_stride
@@ -181,6 +180,7 @@ class Observation:
         return tidy(ax, xlabel="time [s]", ylabel=name)
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         lines = [f"Observer over {self.time_s[-1]:.0f} s; parameters from first to last:"]
@@ -191,9 +191,6 @@ class Observation:
         lines += [f"  {residual}" for residual in self.residuals]
         lines += [f"  NOT TO BE BELIEVED: {text}" for text in self.contradictions]
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
 
 def observe(

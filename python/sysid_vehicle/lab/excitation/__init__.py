@@ -1,4 +1,4 @@
-"""What the closed loop is asked to do: published trajectories, multi-sines, and manoeuvres."""
+"""What the closed loop is asked to do: multi-sines and manoeuvres."""
 
 from __future__ import annotations
 
@@ -6,16 +6,13 @@ from ...manoeuvres import all as _manoeuvres
 from ._driven import Driven, OnManoeuvre, multi_sine, speed_ramp
 from ._excitation import Excitation
 from ._multisine import MultiSine
-from ._published import Identification, Oval
 from ._weaving import Weaving
 
 __all__ = [
     "Driven",
     "Excitation",
-    "Identification",
     "MultiSine",
     "OnManoeuvre",
-    "Oval",
     "Weaving",
     "all",
     "multi_sine",
@@ -24,6 +21,6 @@ __all__ = [
 
 
 def all() -> dict[str, Excitation]:
-    """Make every excitation of the package with its default parameters, by name."""
-    own = (Identification(), Oval(), speed_ramp(), multi_sine(), Weaving())
+    """Make every excitation of the laboratory with its default parameters, by name."""
+    own = (speed_ramp(), multi_sine(), Weaving())
     return {e.name: e for e in (*own, *map(OnManoeuvre, _manoeuvres().values()))}

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ..._arrays import FloatArray, as_float64
 from ..._style import axes_or_new, tidy
+from ..._text import html_text
 from ...errors import InvalidInput
 from ...vehicle import Vehicle
 
@@ -130,8 +130,7 @@ class Excitation(ABC):
         lateral = speed * derivative(self.heading_rad(time_s), 20.0)
         return text + f", lateral {lateral.min():+.1f} to {lateral.max():+.1f} m/s2 wanted"
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+    _repr_html_ = html_text
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the wanted speed, and the heading on a second axis; or the track.

@@ -10,25 +10,24 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._text import brief
+from .._text import brief, html_text
 from ..errors import InvalidInput
-from .car import LOADED_SUV, NOMINAL_SUV, Load, TwinCar
-from .drives import Drive14
-from .experiments import (
+from ..twin.car import LOADED_SUV, NOMINAL_SUV, Load, TwinCar
+from ..twin.drives import Drive14
+from ..twin.laws import SideBySide, Unknown, mass_law, unknowns
+from ..twin.observer import Observer, observe
+from ..twin.readings import measure, noisy_road
+from .load import (
     NOISE_FLOOR,
     Law,
     LoadExperiment,
     drive_of,
     laws_of,
 )
-from .laws import SideBySide, Unknown, mass_law, unknowns
-from .observer import Observer, observe
-from .readings import measure, noisy_road
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,6 +117,7 @@ class ScheduleRun:
         raise InvalidInput(f"no stage looked for '{name}'; there are {', '.join(self.rows())}")
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         lines = [str(stage.drive) for stage in self.stages]
@@ -137,9 +137,6 @@ class ScheduleRun:
             for text in stage.found.contradictions
         ]
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
 
 def run_schedule(

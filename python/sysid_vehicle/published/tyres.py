@@ -8,18 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
+from .._printed import Part, Printed, Table
 from .._progress import doing
-from .._text import html_paragraph, html_table, number, text_table
+from .._text import number
 from ..errors import InvalidInput
 from ..identify.search import METHODS
 from ..identify.starts import Starts, space_filling
-from .box import BOX, GIVEN, box_of, first_point
-from .motion import TyreMotion
-from .regression_search import RegressionTask, search
-from .tyre_data import GreyBoxVehicle
-from .tyre_fit import PARAMETERS
+from ..lab.box import BOX, GIVEN, box_of, first_point
+from ..lab.motion import TyreMotion
+from ..lab.tyre_data import GreyBoxVehicle
+from ..lab.tyre_fit import PARAMETERS
+from .tyre_search import LossTask, search
 
-__all__ = ["LOSSES", "PUBLISHED_BOX", "PUBLISHED_START", "TyreRegression", "regress_tyres"]
+__all__ = ["LOSSES", "TYRE_BOX", "TYRE_START", "TyreRegression", "regress_tyres"]
 
 LOSSES = {
     "plain": "sum of squared errors of a_y",
@@ -29,18 +30,18 @@ LOSSES = {
 }
 """The losses there are; the first three are the published ones."""
 
-_TYRE_BOX = {"B": (1.0, 40.0), "C": (0.5, 3.0), "D": (0.1, 3.0), "E": (0.7, 2.0)}
-PUBLISHED_BOX = BOX | {
-    f"{letter}_{axle}": bounds for axle in ("front", "rear") for letter, bounds in _TYRE_BOX.items()
-}
+_AXLES = ("front", "rear")
+_BOX = {"B": (1.0, 40.0), "C": (0.5, 3.0), "D": (0.1, 3.0), "E": (0.7, 2.0)}
+TYRE_BOX = BOX | {f"{letter}_{axle}": bounds for axle in _AXLES for letter, bounds in _BOX.items()}
 """Where the published search looks; E is kept near the value of the published car."""
 
-_TYRE_START = {"B": 30.0, "C": 1.0, "D": 1.0, "E": 1.0}
-PUBLISHED_START = {f"{x}_{axle}": v for axle in ("front", "rear") for x, v in _TYRE_START.items()}
+_START = {"B": 30.0, "C": 1.0, "D": 1.0, "E": 1.0}
+TYRE_START = {f"{letter}_{axle}": value for axle in _AXLES for letter, value in _START.items()}
+"""Where the published search begins."""
 
 
 @dataclass(frozen=True, eq=False)
-class TyreRegression:
+class TyreRegression(Printed):
     """Tyre coefficients of a regression.
 
     Attributes
@@ -78,14 +79,11 @@ class TyreRegression:
             for axle in ("front", "rear")
         ]
 
-    def __str__(self) -> str:
-        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
+    def _parts(self) -> list[Part]:
+        return [self._headline(), Table(self._HEAD, self._rows())]
 
     def _headline(self) -> str:
         return f"Regression, {self.loss} loss {number(self.value, 7)}; {self.starts}"
-
-    def _repr_html_(self) -> str:
-        return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
 
 
 @doing("regression of the tyres")
@@ -121,7 +119,7 @@ def regress_tyres(
     start : mapping, optional
         Starting values of some of `lab.tyre_fit.PARAMETERS`.
     box : mapping, optional
-        Bounds; `BOX` if left out, `PUBLISHED_BOX` is the published one.
+        Bounds; `BOX` if left out, `TYRE_BOX` is the published one.
     residual_terms : bool
         Also fit P1, P2, P3 of a_y = ... + P1 v_x^2 + P2 v_y + P3 r.
     projection : bool
@@ -159,7 +157,7 @@ def regress_tyres(
     begins = space_filling(
         p[bounds.columns], bounds.lower, bounds.upper, starts, seed, list(range(8))
     )
-    task = RegressionTask(vehicle, motion, loss, bounds, projection, method, p)
+    task = LossTask(vehicle, motion, bounds, p, projection, method, loss)
     ends, values, merits = search(task, begins)
     table = Starts(tuple(free), begins, as_float64(ends[:, bounds.columns]), merits)
     best = int(np.argmax(merits))

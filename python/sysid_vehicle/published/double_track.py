@@ -1,6 +1,6 @@
 """The observer to compare with: a planar double track with constant gains.
 
-Equations: `cpp/include/sysid/twin/double_track.hpp`.
+Equations: `cpp/include/sysid/published/double_track.hpp`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy as np
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
+from ..twin.car import TwinCar
+from ..twin.readings import Readings
 from ..vehicle import GRAVITY_MPS2
-from .car import TwinCar
-from .readings import Readings
 
 __all__ = ["DoubleTrackObserver", "DoubleTrackRun"]
 

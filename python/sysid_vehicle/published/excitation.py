@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..._arrays import FloatArray, as_float64
-from ...manoeuvres._curves import check_positive
-from ._excitation import Excitation
+from .._arrays import FloatArray, as_float64
+from ..lab.excitation import Excitation
+from ..manoeuvres._curves import check_positive
 
-__all__ = ["Identification", "Oval"]
+__all__ = ["Identification", "Oval", "excitations"]
 
 
 @dataclass(frozen=True)
@@ -154,6 +154,11 @@ class Oval(Excitation):
         rising = speeds[0] * time_s / self.first_rise_s
         speed = np.where(time_s < self.first_rise_s, rising, speed)
         return as_float64(np.maximum(speed, self.lowest_mps))
+
+
+def excitations() -> dict[str, Excitation]:
+    """Make both with their default parameters, by name."""
+    return {e.name: e for e in (Identification(), Oval())}
 
 
 def _straight(begin: FloatArray, end: FloatArray) -> FloatArray:

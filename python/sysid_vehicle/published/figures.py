@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, new_figure, tidy
-from .car import SPORTS_CAR
-from .experiments import LoadExperiment
+from ..twin.car import SPORTS_CAR
 from .joint import JointExperiment
+from .load import LoadExperiment
 from .schedule import ScheduleRun
 
 if TYPE_CHECKING:

@@ -10,18 +10,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .._text import brief
+from .._text import brief, html_text
 from ..errors import InvalidInput
-from .car import LOAD_NAMES, LOADED_SUV, NOMINAL_SUV, Load, TwinCar
-from .drives import INPUTS, Drive14, rough_road, swept_steer, urban_cycle
-from .laws import ParameterLaw, SideBySide, inertia_law, mass_law, unknowns
-from .observer import Observation, Observer, observe
-from .readings import Readings, measure, noisy_road
+from ..twin.car import LOAD_NAMES, LOADED_SUV, NOMINAL_SUV, Load, TwinCar
+from ..twin.drives import INPUTS, Drive14, rough_road, swept_steer, urban_cycle
+from ..twin.laws import ParameterLaw, SideBySide, inertia_law, mass_law, unknowns
+from ..twin.observer import Observation, Observer, observe
+from ..twin.readings import Readings, measure, noisy_road
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,6 +98,7 @@ class LoadExperiment:
         return self.found.plot(name, truth=getattr(self.true, name), ax=ax)
 
     __repr__ = brief
+    _repr_html_ = html_text
 
     def __str__(self) -> str:
         lines = [f"{self.name}: {self.drive}"]
@@ -111,9 +111,6 @@ class LoadExperiment:
                 f"{wide}{true} {error}"
             )
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
 
 
 @lru_cache(maxsize=4)
