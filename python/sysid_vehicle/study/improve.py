@@ -152,6 +152,7 @@ def improve(
             seed=seed,
             refitted=found.sizes,
             settled=True,
+            untried=found.stopped,
         )
         facts = facts_of(
             fits,
