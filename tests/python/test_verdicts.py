@@ -78,6 +78,21 @@ def test_a_rival_of_what_is_not_missing_itself_is_not_missing_either(
     assert of({}).finding == "proxy"
 
 
+def test_what_time_did_not_suffice_for_is_open(found: Diagnosis) -> None:
+    def of(untried: tuple[str, ...]) -> EffectVerdict:
+        known = found.scores, found.family
+        lacked = {e.id for e in found.fit.model.candidates}
+        told = judge(
+            found.fit, lacked=lacked, groups={}, acted=set(), scored=known, settled=True,
+            untried=untried,
+        )  # fmt: skip
+        return told["steer_offset"]
+
+    assert "predicted no better" in of(()).because
+    assert of(("steer_offset",)).finding == "open"
+    assert of(("steer_offset",)).sentence.startswith("evidence for it, and not tried yet; offset")
+
+
 def test_what_is_absent_is_bounded_below_what_matters(judged: Verdicts) -> None:
     absent = judged.of("absent")
     assert len(absent) >= 5

@@ -7,7 +7,7 @@ so that what merely acted like one of them is told from what is missing too.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -51,8 +51,8 @@ class EffectVerdict:
     effect : Effect
     finding : str
         `missing`; `one of a group` of rivals that explain this driving as well; `open`, for which
-        there is evidence beside a missing one, but no refit yet; `proxy`, which acts like something
-        else; `negligible`; `absent`; or `not testable` with this data.
+        there is evidence, perhaps beside a missing one, but no refit yet; `proxy`, which acts like
+        something else; `negligible`; `absent`; or `not testable` with this data.
     value, std : tuple of float
         Parameters, predicted or refitted; empty where nothing is known of them.
     bound : tuple of float
@@ -82,6 +82,8 @@ class EffectVerdict:
             return f"missing; {size}"
         if self.finding == "one of a group":
             return f"missing, or else {rivals}, which this driving cannot tell from it; {size}"
+        if self.finding == "open" and not rivals:
+            return f"evidence for it, and not tried yet; {size}"
         if self.finding == "open":
             return f"evidence for it beside {rivals}; {size}; add {rivals} and diagnose again"
         if self.finding == "proxy" and rivals:
@@ -222,6 +224,7 @@ def judge(
     scored: tuple[tuple[Score, ...], Mapping[str, float]] | None = None,
     refitted: Mapping[str, Size] | None = None,
     settled: bool = False,
+    untried: Collection[str] = (),
 ) -> Verdicts:
     """Judge every effect beside those of the final model.
 
@@ -246,6 +249,8 @@ def judge(
     settled : bool
         Whether everything worth adding was added. What there is still evidence for is then no
         explanation: with it, driving that no fit saw is not predicted better.
+    untried : collection of str
+        Effects that time did not suffice for: of these nobody knows whether they hold.
     """
     if scored is None:
         lacking = tuple(e for e in final.model.candidates if e.id in lacked)
@@ -279,6 +284,8 @@ def judge(
                 # Beside its rival it explains nothing: its size is that of the model without it.
                 value, std = refitted.get(effect.id, (value, std))
             verdict = EffectVerdict(effect, kind, value, std, verdict.bound, group=instead or names)
+        elif effect.id in untried and verdict.finding == "missing":
+            verdict = replace(verdict, finding="open")
         elif settled and verdict.finding == "missing":
             because = "with it, driving that no fit saw is predicted no better"
             verdict = replace(verdict, finding="proxy", because=because)

@@ -46,6 +46,9 @@ class Added:
         Channels that it moves.
     taken : float
         Of `Facts.missing`, what it took up in its turn.
+    changes, changes_in_training : tuple of Change
+        With it, of the errors 1 to 5 s ahead: on validation data, and on training data, where
+        errors of one step were fitted. Nothing where little is left.
     """
 
     id: str
@@ -53,6 +56,8 @@ class Added:
     group: tuple[str, ...] = ()
     moves: frozenset[str] = frozenset()
     taken: float = 0.0
+    changes: tuple[Change, ...] = ()
+    changes_in_training: tuple[Change, ...] = ()
 
     @property
     def named(self) -> bool:
@@ -81,9 +86,6 @@ class Facts:
         Whether the training data excite the lateral motion.
     small : bool
         Whether no error 0.5 to 5 s ahead on validation data is as large as matters to the user.
-    changes, changes_in_training : tuple of Change
-        From the baseline to the final model, of the errors 1 to 5 s ahead: on validation data, and
-        on training data, where errors of one step were fitted.
     """
 
     before: Tested
@@ -95,8 +97,6 @@ class Facts:
     contradictions: tuple[str, ...] = ()
     excited: bool = True
     small: bool = False
-    changes: tuple[Change, ...] = ()
-    changes_in_training: tuple[Change, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -180,11 +180,15 @@ def _withdrawn(
     """Names that are not safe beside something that is left."""
     before, after = facts.missing
     share = share_of(before, after)
-    if share < rules.most and _falls_throughout(facts, rules):
+    stands = frozenset(
+        a.id
+        for a in facts.added
+        if a.named and a.taken >= rules.taken * before and _falls_throughout(a, rules)
+    )
+    if share < rules.most and stands:
         # A real road, and what nobody knows of a car, leave much beside the right effect too.
-        little = frozenset(a.id for a in facts.added if a.taken < rules.taken * before)
-        because = "alone it takes up next to nothing of the error 1 to 5 s ahead"
-        return [Withdrawn(little, because, names)]
+        because = "with it errors 1 to 5 s ahead are not shown to fall in every channel"
+        return [Withdrawn(names - stands, because, names)]
     if share < rules.most:
         because = f"takes up only {max(100 * share, 0.0):.0f} % of the error 1 to 5 s ahead"
         return [Withdrawn(names, because, names)]
@@ -200,15 +204,15 @@ def _withdrawn(
     return [first, Withdrawn(alone, because, names)]
 
 
-def _falls_throughout(facts: Facts, rules: Rules) -> bool:
+def _falls_throughout(effect: Added, rules: Rules) -> bool:
     """Whether errors 1 to 5 s ahead fall in every channel and at every horizon, on all data.
 
     What only stands in for something else serves some channels and moments at the price of others.
     In each channel validation data have to show the fall, by more than it matters.
     """
-    channels = {c.channel for c in facts.changes}
-    shown = {c.channel for c in fallen(facts.changes, rules)}
-    both = (*facts.changes, *facts.changes_in_training)
+    channels = {c.channel for c in effect.changes}
+    shown = {c.channel for c in fallen(effect.changes, rules)}
+    both = (*effect.changes, *effect.changes_in_training)
     return bool(channels) and shown == channels and all(c.log_ratio < 0.0 for c in both)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Literal
 from warnings import catch_warnings, simplefilter
 
@@ -152,6 +153,7 @@ def improve(
             seed=seed,
             refitted=found.sizes,
             settled=True,
+            untried=found.stopped,
         )
         facts = facts_of(
             fits,
@@ -163,7 +165,7 @@ def improve(
             validation=validation,
             candidate=min((c.p_value for c in last.ranking), default=1.0),
             excited=_excited(train_driving),
-            changes=_changes(baseline, fit, test_driving) if much_left else ((), ()),
+            changes=_changes(fits, test_driving) if much_left else {},
             small=sizes is not None and within(horizons([fit], [""], test_driving), sizes),
         )
         decision = verdict(facts, rules)
@@ -189,9 +191,17 @@ def improve(
 
 
 def _changes(
-    baseline: Fit, fit: Fit, test: Driving
-) -> tuple[tuple[Change, ...], tuple[Change, ...]]:
-    return changes_ahead(baseline, fit, test), changes(baseline, fit, fit.driving, AHEAD)
+    fits: Sequence[Fit], test: Driving
+) -> dict[str, tuple[tuple[Change, ...], tuple[Change, ...]]]:
+    """How errors 1 to 5 s ahead change with each effect, on validation and on training data."""
+    return {
+        name: (
+            changes_ahead(before, after, test),
+            changes(before, after, after.driving, AHEAD),
+        )
+        for before, after in pairwise(fits)
+        for name in set(after.model.effects) - set(before.model.effects)
+    }
 
 
 def _room(model: Model, driving: Driving, rules: Rules) -> int:

@@ -138,7 +138,7 @@ class Study:
         if self.verdict == "partly_explained" and beyond and beyond.share < self.rules.most:
             return (
                 f"what was added takes up {beyond} of the error 1 to 5 s ahead; the rest is "
-                "disturbance, or something else is missing"
+                "disturbance, and something else that is missing"
             )
         if self.verdict == "adequate" and (self.omnibus.rejects or self.diagnoses[-1].significant):
             return "what is left is smaller, 0.5 to 5 s ahead, than the errors that matter"

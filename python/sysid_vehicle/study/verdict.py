@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from ..compare import Comparison
 from ..diagnose import Omnibus, Verdicts
@@ -25,7 +26,7 @@ def facts_of(
     candidate: float,
     excited: bool,
     small: bool = False,
-    changes: tuple[tuple[Change, ...], tuple[Change, ...]] = ((), ()),
+    changes: Mapping[str, tuple[tuple[Change, ...], tuple[Change, ...]]] = MappingProxyType({}),
 ) -> Facts:
     """Collect what is known of a final model.
 
@@ -41,8 +42,8 @@ def facts_of(
         What every fit leaves of the errors ahead; None where nothing was added.
     before, fitted, validation, candidate, excited, small
         As in `Facts`.
-    changes : (tuple of Change, tuple of Change)
-        On validation and on training data, as in `Facts`.
+    changes : mapping
+        By effect, those on validation and on training data, as in `Added`.
     """
     missing = (0.0,) if explained is None else explained.squares
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
@@ -60,6 +61,7 @@ def facts_of(
                 v.group,
                 frozenset(v.effect.moves.split(", ")),
                 taken.get(v.effect.id, 0.0),
+                *changes.get(v.effect.id, ()),
             )
             for v in told.all
             if v.effect.id in added
@@ -67,7 +69,6 @@ def facts_of(
         tuple(on_train.unrelated.values()),
         excited,
         small,
-        *changes,
     )
 
 
