@@ -194,7 +194,7 @@ def compare(
     ----------
     fit : Fit
     logs : Log, sequence of Log, or Driving
-        Driving to compare with; what the fit never saw tells most.
+        Driving to compare with; validation data tell most.
     noise : NoiseModel, optional
         Whose sensors and white motion noise are the noise floor; by default the fit's. Models that
         are compared with each other need the same one.

@@ -285,8 +285,8 @@ class Diagnosis:
             return f"something is wrong that no effect can be named for: {self.reservation}"
         what = f"most likely missing: {self.named.effect.title}"
         if self.named.indistinguishable_from:
-            twins = ", ".join(self.named.indistinguishable_from)
-            what += f" (this driving cannot tell it from {twins})"
+            others = ", ".join(self.named.indistinguishable_from)
+            what += f" (this driving cannot tell it from {others})"
         # The test against unknown forces is blunter than that of one effect: its silence is none.
         return f"{what}; with it {self.beside.omnibus}" if self.omnibus.rejects else what
 
