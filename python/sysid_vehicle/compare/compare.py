@@ -20,8 +20,6 @@ from .where import FailureMap, Region
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["ChannelScore", "Comparison", "compare", "one_step_error"]
-
 
 @dataclass(frozen=True)
 class ChannelScore:

@@ -13,8 +13,6 @@ from ..estimate import Driving
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["FailureMap", "Region"]
-
 _FEWEST = 20  # samples that make a cell worth showing
 
 

@@ -10,8 +10,6 @@ from ..model import Model
 from ..report.words import effect_found, interval, quantity, summary, unit
 from ..study import Study
 
-__all__ = ["findings", "opening", "revelation"]
-
 _RIVALS = 6
 
 

@@ -24,8 +24,6 @@ from .single_effects import Hypothesis, Posterior, ScoreModel, Subset
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Causes", "CredibleSet", "causes_of"]
-
 _UNKNOWN = "unknown "
 _KEPT = 40  # of the leading subsets
 _LEAST = 1e-6  # probability that is remembered

@@ -24,8 +24,6 @@ from .refits import finished as finished_of
 from .refits import in_time, refitted
 from .score import Score, ScoreBoard, score_board_of
 
-__all__ = ["REFITS", "considered", "diagnose"]
-
 REFITS = 5
 # Of the best statistic: what scores less than this share does not overtake it. States of their own
 # make a refit slow, and what has some is scored at its typical size, not far from the refit.

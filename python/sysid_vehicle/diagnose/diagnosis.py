@@ -26,8 +26,6 @@ from .score import Score
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Candidate", "Diagnosis"]
-
 
 @dataclass(frozen=True, eq=False)
 class Candidate:

@@ -18,8 +18,6 @@ from ..saved import fingerprint
 from ..study import improve
 from ..vehicle import Vehicle
 
-__all__ = ["Car", "Drive", "Job", "Options", "check_options", "jobs_of", "model_of"]
-
 Car = Vehicle | Model | str | Path
 Drive = Log | str | Path
 Options = Mapping[str, Any]

@@ -27,8 +27,6 @@ from .setup import Setup
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Design", "Limits", "Trial", "design_excitation"]
-
 _FRONT_SLIP_SHARE = 1.5  # of the slip angle at the peak, where the controller holds the tyre
 _REAR_SLIP_SHARE = 1.25
 _MOST_SWING_MPS = 12.0

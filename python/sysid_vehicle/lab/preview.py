@@ -22,8 +22,6 @@ from .setup import Setup
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Coverage", "Expected", "Preview", "preview"]
-
 # An E near zero has no size of its own to be compared with.
 _LEAST_SIZE = 0.1
 _SINGULAR = 1e-13

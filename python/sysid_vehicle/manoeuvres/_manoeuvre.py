@@ -18,8 +18,6 @@ from ._steady import peak_lateral_mps2, slip_difference, steady_steer, understee
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Manoeuvre"]
-
 # A driver on a path may come this near to the peak before the manoeuvre is refused.
 _LARGEST_SHARE = 0.95
 

@@ -14,8 +14,6 @@ from .mu_slip_filter import mu_slip_ekf, mu_slip_smooth
 from .mu_slip_least_squares import counted, mu_slip_fit, noise_of
 from .mu_slip_results import MuSlipEstimate
 
-__all__ = ["MuSlipComparison", "compare_mu_slip"]
-
 _ITERATIONS = 10
 
 

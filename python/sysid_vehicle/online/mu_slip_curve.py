@@ -12,14 +12,6 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 
-__all__ = [
-    "MAGIC_FORMULA",
-    "TWO_PARAMETER",
-    "MuSlipCurve",
-    "MuSlipPrior",
-    "magic_formula_coefficients",
-]
-
 
 @dataclass(frozen=True)
 class MuSlipPrior:

@@ -16,8 +16,6 @@ from ..errors import InvalidInput, near_names
 from ..read._csv import read_table
 from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
 
-__all__ = ["MuSlipData", "simulate_mu_slip", "sinusoidal_slip"]
-
 _COLUMNS = ("slip", "mu")
 _LARGEST = {"slip": 1.5, "mu": 5.0}  # beyond them the unit is wrong
 _REMEDY = {

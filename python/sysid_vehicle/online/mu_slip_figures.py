@@ -24,17 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "MuSlipFrame",
-    "animate_mu_slip",
-    "draw_mu_slip_convergence",
-    "draw_mu_slip_lissajous",
-    "draw_mu_slip_observability",
-    "draw_mu_slip_signal",
-    "mu_slip_overview",
-    "save_animation",
-]
-
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 120)
 
 

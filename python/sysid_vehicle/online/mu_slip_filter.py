@@ -18,8 +18,6 @@ from .mu_slip_data import MuSlipData, at_least_one, check_noise, check_values
 from .mu_slip_least_squares import noise_of
 from .mu_slip_results import MuSlipRun, MuSlipSmoothed
 
-__all__ = ["MuSlipFilter", "mu_slip_ekf", "mu_slip_smooth"]
-
 _NOISE_FACTOR = 3.0  # Rudd, In[20]: keeps the truth inside the one-sigma contour
 
 

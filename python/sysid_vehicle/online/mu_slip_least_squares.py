@@ -14,8 +14,6 @@ from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
 from .mu_slip_data import MuSlipData, at_least_one, check_noise, check_values
 from .mu_slip_results import MuSlipEstimate, cautions
 
-__all__ = ["mu_slip_cramer_rao", "mu_slip_fit", "noise_of"]
-
 
 def mu_slip_fit(
     data: MuSlipData,

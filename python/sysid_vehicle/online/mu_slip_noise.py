@@ -23,8 +23,6 @@ from .mu_slip_least_squares import mu_slip_cramer_rao
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["MuSlipNoiseStudy", "mu_slip_over_noise"]
-
 _LEVELS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
 _MARKERS = "os^vDPX*<>"
 

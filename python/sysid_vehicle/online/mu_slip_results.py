@@ -16,8 +16,6 @@ from .mu_slip_data import MuSlipData
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["MuSlipEstimate", "MuSlipRun", "MuSlipSmoothed"]
-
 
 @dataclass(frozen=True)
 class MuSlipEstimate:

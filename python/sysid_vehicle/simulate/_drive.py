@@ -22,8 +22,6 @@ from ._noise import RoadDisturbance, SensorNoise
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Drive", "drive", "drive_truth"]
-
 _OUTPUTS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 Channel = float | FloatArray | Callable[[FloatArray], FloatArray]
 """A column of the log: a constant, its samples, or a function of the time of all samples [s]."""

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from ..preview import Preview
     from ..setup import Setup
 
-__all__ = ["Excitation", "derivative", "sample_times"]
-
 
 def sample_times(duration_s: float, rate_hz: float) -> FloatArray:
     """Sample times from 0 to the end, both included."""
