@@ -157,17 +157,7 @@ class Design(Printed):
         return [*self._notes(), *self.preview._parts()]
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw how well each trial would tell the least-known coefficient.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw; a new figure is made without it.
-
-        Returns
-        -------
-        matplotlib Axes
-        """
+        """Draw how well each trial would tell the least-known coefficient."""
         ax = axes_or_new(ax, 8.0, 3.0)
         for label, colour, inside in (
             ("within the limits", AFTER, True),

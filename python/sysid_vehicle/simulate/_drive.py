@@ -80,17 +80,7 @@ class Drive:
         )
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw driven and wanted speed, and the lateral acceleration on a second axis.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw; a new figure is made without it.
-
-        Returns
-        -------
-        matplotlib Axes
-        """
+        """Draw driven and wanted speed, and the lateral acceleration on a second axis."""
         ax = self.manoeuvre.plot(ax)
         time_s = self.log["time_s"]
         ax.plot(time_s, self.states[:, 0], "C0--")
