@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from .. import _core
-from .._arrays import FloatArray, as_float64
-from ..errors import InvalidInput
+from ... import _core
+from ..._arrays import FloatArray, as_float64
+from ...errors import InvalidInput
 
 
 @dataclass(frozen=True)

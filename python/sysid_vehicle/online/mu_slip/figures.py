@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray
-from .._progress import doing
-from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, new_figure, tidy
-from ..errors import InvalidInput
-from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
-from .mu_slip_results import MuSlipRun
+from ..._arrays import FloatArray
+from ..._progress import doing
+from ..._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, new_figure, tidy
+from ...errors import InvalidInput
+from .curve import TWO_PARAMETER, MuSlipCurve
+from .results import MuSlipRun
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
