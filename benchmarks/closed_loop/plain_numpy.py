@@ -41,7 +41,7 @@ class Pass:
 
 
 class Plain:
-    """Mended or published observer of one record."""
+    """Corrected or published observer of one record."""
 
     def __init__(self, car: ObserverCar, record: ObserverRecord, published: bool) -> None:
         self.car, self.u, self.y = car, record.inputs(), record.readings

@@ -22,7 +22,7 @@ from sysid_vehicle.lab import (
 )
 
 PUBLISHED = published.observer(CAR)
-MENDED = Observer(CAR, published.OBSERVER_NOISE)
+CORRECTED = Observer(CAR, published.OBSERVER_NOISE)
 TRUE_SENSORS = np.array([0.01, 1e-5, 1e-5, 1e-5])
 FLOOR = NoiseStructure(floor=1e-9)
 Row = tuple[str, str, str, str, bool]
@@ -79,8 +79,8 @@ def published_rows(log: Golden) -> Iterator[Row]:
     yield ("  rms error ay", ".0140", "", f"{rms[3]:.4f}", True)
 
 
-def mended_rows(log: Golden, title: str, sensors: NoiseStructure = FLOOR) -> Iterator[Row]:
-    em = learn(MENDED, log, sensors)
+def corrected_rows(log: Golden, title: str, sensors: NoiseStructure = FLOOR) -> Iterator[Row]:
+    em = learn(CORRECTED, log, sensors)
     yield (
         f"20 EM iterations, {title}",
         "125638",
@@ -99,7 +99,7 @@ def mended_rows(log: Golden, title: str, sensors: NoiseStructure = FLOOR) -> Ite
             abs(d) <= 0.05,
         )
     yield ("  R of ay against truth", "", "", f"{100 * off[3]:+.1f} %", True)
-    rms = smoothed_errors(MENDED, em, log)
+    rms = smoothed_errors(CORRECTED, em, log)
     yield (
         "  rms error vy after smoothing",
         ".00255",
@@ -118,13 +118,13 @@ def main() -> None:
     parser.add_argument("--stiffness", nargs=2, type=float, metavar=("F", "R"))
     options = parser.parse_args()
     log = golden(options.logs)
-    rows = [*published_rows(log), *mended_rows(log, "mended, nominal stiffness")]
+    rows = [*published_rows(log), *corrected_rows(log, "corrected, nominal stiffness")]
     both = NoiseStructure(correlated=(("yaw_rate_radps", "ay_mps2"),), floor=1e-9)
     if not options.quick:
-        rows += mended_rows(log, "yaw rate and ay correlated", both)
+        rows += corrected_rows(log, "yaw rate and ay correlated", both)
     if options.stiffness:
         other = golden(options.logs, tuple(options.stiffness))
-        rows += mended_rows(other, "mended, identified stiffness")
+        rows += corrected_rows(other, "corrected, identified stiffness")
     head = ("what", "published", "must reach", "reached", "")
     table = [head, *((*r[:4], "" if not r[2] else "met" if r[4] else "MISSED") for r in rows)]
     widths = [max(len(r[i]) for r in table) for i in range(5)]

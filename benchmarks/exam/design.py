@@ -120,7 +120,7 @@ class Trial:
         if self.kind == "itself removed":
             return self.truth
         if self.kind == "group removed":
-            return (*self.truth, *(t for e in self.truth for t in sv.effect(e).twins))
+            return (*self.truth, *(t for e in self.truth for t in sv.effect(e).confounded_with))
         return ()
 
     def to_dict(self) -> dict[str, Any]:

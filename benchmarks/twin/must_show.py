@@ -4,7 +4,7 @@ python benchmarks/twin/must_show.py [--seeds 20] [--sweep-seeds 20] [--jobs 2] [
     [--json FILE]
 
 Rms over the last second in % of the true change. "twins" are twins side by side, "law" is the
-published law with its sign mended and taken from the twin.
+published law with its sign corrected and taken from the twin.
 """
 
 import argparse

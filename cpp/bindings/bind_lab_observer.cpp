@@ -1,7 +1,7 @@
 // The extended-state observer: over whole logs, one sample at a time, and learning its noise.
 #include "arrays.hpp"
 #include "register.hpp"
-#include "sysid/lab/lab_em.hpp"
+#include "sysid/published/observer_em.hpp"
 
 namespace sysid::bindings {
 
@@ -155,7 +155,11 @@ void register_lab_observer(py::module_& m) {
             const auto q = to_structure<6>(process_scale, process_block, process_floor);
             const auto r = to_structure<4>(sensor_scale, sensor_block, sensor_floor);
             const EmOptions options{most_iterations, tolerance, never_fall, accelerate};
-            return to_dict(unlocked([&] { return learn(logs, start, q, r, options); }));
+            const bool as_published = logs.at(0).model.form() == published_form();
+            return to_dict(unlocked([&] {
+                return as_published ? learn_as_published(logs, start, q, r, options)
+                                    : learn(logs, start, q, r, options);
+            }));
         },
         py::arg("logs"), py::arg("process"), py::arg("sensors"), py::arg("process_scale"),
         py::arg("process_block"), py::arg("process_floor"), py::arg("sensor_scale"),

@@ -58,7 +58,7 @@ py::list effects() {
         d["excited_by"] = info.excited_by;
         d["moves"] = info.moves;
         d["needs"] = names(info.needs);
-        d["twins"] = names(info.confounded_with);
+        d["confounded_with"] = names(info.confounded_with);
         d["through"] = info.through;
         d["states"] = detail::kEffectStateCounts[i];
         d["scored_at_typical"] = info.scored_at_typical;

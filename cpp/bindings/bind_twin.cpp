@@ -3,7 +3,7 @@
 
 #include "arrays.hpp"
 #include "register.hpp"
-#include "sysid/twin/double_track.hpp"
+#include "sysid/published/double_track.hpp"
 #include "sysid/twin/drive14.hpp"
 #include "sysid/twin/observer.hpp"
 

@@ -122,7 +122,7 @@ class Effect:
         Visible only where the total wheel force was logged.
     needs : tuple of str
         Channels without which a log cannot show it.
-    twins : tuple of str
+    confounded_with : tuple of str
         Effects that act alike in most driving; each names the other.
     through : str
         Effect through which it chiefly acts, if any: weak in a model without that.
@@ -147,7 +147,7 @@ class Effect:
     scored_at_typical: bool
     needs_force: bool
     needs: tuple[str, ...]
-    twins: tuple[str, ...]
+    confounded_with: tuple[str, ...]
     through: str
     states: int
     acts: tuple[tuple[int, Any], ...] = ()
@@ -234,8 +234,8 @@ class Effect:
             f"  moves first {self.moves}",
             f"  needs       {', '.join(self.needs)}",
         ]
-        if self.twins:
-            lines.append(f"  acts like   {', '.join(self.twins)}")
+        if self.confounded_with:
+            lines.append(f"  acts like   {', '.join(self.confounded_with)}")
         if self.through:
             lines.append(f"  through     {self.through}")
         return "\n".join(lines)

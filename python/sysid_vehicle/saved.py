@@ -39,6 +39,7 @@ _STATIONS = (
 _MOVED: dict[str, str] = {"diagnose.doubt:Beside": "diagnose.reservation:Beside"}
 # Fields that have another name since, by class.
 _RENAMED: dict[str, dict[str, str]] = {
+    "effects:Effect": {"twins": "confounded_with"},
     "estimate.noise:NoiseModel": {"wander": "disturbance"},
     "rules.limits:Rules": {"idle": "insignificant"},
     "diagnose.diagnosis:Diagnosis": {"causes": "proposed"},

@@ -156,7 +156,7 @@ def define_effect(
     equation: str = "",
     source: str = "defined by the user",
     excited_by: str = "",
-    twins: Sequence[str] = (),
+    confounded_with: Sequence[str] = (),
 ) -> Effect:
     """Define an effect, checked and from then on used like one of the catalogue.
 
@@ -190,7 +190,7 @@ def define_effect(
         States of the effect's own, made by :func:`state`; functions read them as `d.name`.
     equation, source, excited_by : str
         For the lists; the equation is that of the functions unless you give another.
-    twins : sequence of str
+    confounded_with : sequence of str
         Effects that act alike in most driving.
 
     Returns
@@ -261,7 +261,7 @@ def define_effect(
         scored_at_typical=steep,
         needs_force=set(formulas) == {"force_x"},
         needs=(*_NEEDS, *columns),
-        twins=tuple(twins),
+        confounded_with=tuple(confounded_with),
         through="",
         states=len(own_states),
         acts=tuple((TARGETS.index(t), f.steps) for t, f in formulas.items()),

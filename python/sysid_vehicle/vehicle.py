@@ -82,6 +82,12 @@ def _check_ranges(ranges: Mapping[str, _Range], values: Mapping[str, object], wh
         raise InvalidInput(f"{where}: " + "; ".join(complaints))
 
 
+def magic_formula(slip_rad: npt.ArrayLike, B: float, C: float, D: float, E: float) -> FloatArray:
+    """Lateral force per vertical load [-] at slip angles [rad], whatever the coefficients are."""
+    x = B * np.asarray(slip_rad, dtype=float)
+    return np.asarray(D * np.sin(C * np.arctan(x - E * (x - np.arctan(x)))), dtype=float)
+
+
 @dataclass(frozen=True)
 class Tyre:
     """Magic-formula tyre of one axle: ``F_y = D F_z sin(C atan(Ba - E (Ba - atan(Ba))))``.
@@ -121,10 +127,7 @@ class Tyre:
 
     def friction(self, slip_rad: npt.ArrayLike) -> FloatArray:
         """Lateral force per vertical load [-] at slip angles [rad]."""
-        x = self.B * np.asarray(slip_rad, dtype=float)
-        return np.asarray(
-            self.D * np.sin(self.C * np.arctan(x - self.E * (x - np.arctan(x)))), dtype=float
-        )
+        return magic_formula(slip_rad, self.B, self.C, self.D, self.E)
 
     def peak_slip_rad(self, largest_rad: float = 0.6) -> float:
         """Slip angle of the curve's peak [rad], at most `largest_rad`."""

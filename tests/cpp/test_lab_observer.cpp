@@ -1,6 +1,6 @@
 // The extended-state observer: its equations, its sampling, and its two ways of running.
 #include "helpers.hpp"
-#include "sysid/lab/lab_em.hpp"
+#include "sysid/published/observer_em.hpp"
 
 namespace sysid::lab {
 namespace {
@@ -45,7 +45,7 @@ ObserverLog pushed_car(ObserverForm form, std::size_t samples, double side_force
         log.readings.push_back(y);
     }
     log.start = form.coupling ? ObserverStart::from_reading(log.readings[0], noise, kCar)
-                              : ObserverStart::published();
+                              : ObserverStart::certain(5.0);
     return log;
 }
 
@@ -142,11 +142,11 @@ TEST(ObserverModel, StaysStableAtWalkingPaceUnlikeEuler) {
         return A.topLeftCorner<3, 3>().eigenvalues().cwiseAbs().maxCoeff();
     };
     EXPECT_LE(radius(ObserverForm::corrected()), 1.0);
-    EXPECT_GT(radius(ObserverForm::published()), 2.0);
+    EXPECT_GT(radius(published_form()), 2.0);
 }
 
 TEST(ObserverModel, PublishedFormIsItsMatrices) {
-    const ObserverModel model(kCar, ObserverForm::published(), 0.01);
+    const ObserverModel model(kCar, published_form(), 0.01);
     ObserverMat A = ObserverMat::Identity();
     ObserverRow H;
     const ObserverVec x = model.predict(kState, kBefore, kNow, A);
@@ -172,7 +172,7 @@ TEST(ObserverModel, PublishedFormIsItsMatrices) {
 
 TEST(Observer, StepByStepIsTheFilterOverTheLog) {
     const ObserverNoise noise = noise_of_a_good_car();
-    for (const auto& form : {ObserverForm::corrected(), ObserverForm::published()}) {
+    for (const auto& form : {ObserverForm::corrected(), published_form()}) {
         const ObserverLog log = pushed_car(form, 300, 400.0);
         const ObserverTrace whole = trace(log, noise, false);
         Observer observer(log.model, noise, log.start);
@@ -206,7 +206,7 @@ TEST(Observer, CoastsThroughAMinuteWithoutReadings) {
     constexpr double dt = 0.01;
     constexpr std::size_t kLost = 1000, kBack = 7000, kSamples = 7300;
     const ObserverNoise noise = noise_of_a_good_car();
-    for (const auto& form : {ObserverForm::corrected(), ObserverForm::published()}) {
+    for (const auto& form : {ObserverForm::corrected(), published_form()}) {
         const ObserverModel truth(kCar, ObserverForm::corrected(), dt);
         ObserverLog log{ObserverModel(kCar, form, dt), {}, {}, {}};
         ObserverVec x = ObserverVec::Zero();
@@ -228,7 +228,7 @@ TEST(Observer, CoastsThroughAMinuteWithoutReadings) {
             log.readings.push_back(y);
         }
         log.start = form.coupling ? ObserverStart::from_reading(log.readings[0], noise, kCar)
-                                  : ObserverStart::published();
+                                  : ObserverStart::certain(5.0);
         const ObserverTrace whole = trace(log, noise, false);
         for (std::size_t k = kLost; k < kBack; ++k) log.readings[k].setConstant(std::nan(""));
         const ObserverTrace found = trace(log, noise, false);

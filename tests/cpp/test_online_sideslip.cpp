@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "sysid/online/cornering_rls.hpp"
-#include "sysid/online/published_dual.hpp"
 #include "sysid/online/sideslip_dual.hpp"
 #include "sysid/online/sideslip_ukf.hpp"
+#include "sysid/published/sideslip_observer.hpp"
 
 namespace sysid {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "sysid/math/errors.hpp"
-#include "sysid/twin/double_track.hpp"
+#include "sysid/published/double_track.hpp"
 #include "sysid/twin/observer.hpp"
 
 using namespace sysid;

@@ -331,7 +331,7 @@ def test_warnings_of_a_study_come_once_and_reach_the_json(
         assert text not in out
 
 
-def test_a_log_that_is_both_fitted_and_held_out_is_noticed(
+def test_a_log_that_is_in_training_and_validation_data_is_noticed(
     arguments: list[str],
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -342,7 +342,7 @@ def test_a_log_that_is_both_fitted_and_held_out_is_noticed(
     monkeypatch.setattr(commands, "improve", stop)
     assert main(["diagnose", *arguments, "--test", arguments[0]]) == 2
     err = capsys.readouterr().err.splitlines()
-    assert "lap.csv is both fitted and held out" in err[0]
+    assert "lap.csv is training and validation data" in err[0]
     assert err[1] == "sysid-vehicle: error: far enough"
 
 

@@ -161,7 +161,7 @@ def test_a_rival_that_scores_nearly_as_well_is_refitted(truth: Model, start: Mod
     assert "tyre_relaxation" in {best.id} | rivals <= {best.id} | refitted
     assert found.ranking[0].id == "tyre_relaxation"
     assert found.ranking[0].value[0] == pytest.approx(0.9, abs=0.02)
-    twin = next(c for c in by_score if c.id in best.effect.twins)
+    twin = next(c for c in by_score if c.id in best.effect.confounded_with)
     stranger = next(c for c in by_score if c.id == "road_grade")
     assert _rivals(replace(twin, statistic=0.5 * best.statistic), best)
     assert not _rivals(replace(twin, statistic=0.2 * best.statistic), best)

@@ -44,8 +44,8 @@ def test_twins_name_each_other_and_needs_are_channels() -> None:
         assert e.needs
         assert set(e.needs) <= {*MEASURED, "steer_rad", "fx_n"}
         assert ("fx_n" in e.needs) >= e.needs_force
-        for twin in e.twins:
-            assert e.id in effect(twin).twins
+        for twin in e.confounded_with:
+            assert e.id in effect(twin).confounded_with
             assert twin in str(e)
         assert not e.through or effect(e.through).id in str(e)
 

@@ -112,19 +112,19 @@ class TestGolden:
         )
         assert em.log_likelihood[-1] == pytest.approx(125624.68, abs=0.05)
 
-    def test_mended_form_learns_the_sensors(
+    def test_corrected_form_learns_the_sensors(
         self, golden: tuple[ObserverRecord, np.ndarray]
     ) -> None:
         record, truth = golden
-        mended = Observer(CAR, published.OBSERVER_NOISE)
+        corrected = Observer(CAR, published.OBSERVER_NOISE)
         em = learn_observer_noise(
-            mended, record, most_iterations=20, tolerance=0.0, accelerate=False
+            corrected, record, most_iterations=20, tolerance=0.0, accelerate=False
         )
         assert em.log_likelihood[-1] >= 190433
         assert em.monotone
         found = np.diag(em.noise.sensors)
         np.testing.assert_allclose(found[:3], [0.01, 1e-5, 1e-5], rtol=0.05)
-        error = mended.with_noise(em.noise).smoothed(record).reading - truth
+        error = corrected.with_noise(em.noise).smoothed(record).reading - truth
         rms = np.sqrt(np.mean(error**2, axis=0))
         assert (rms[1:] <= [0.00062, 0.00030, 0.0032]).all()
 

@@ -29,7 +29,7 @@ from sysid_vehicle.online import (
     save_animation,
     simulate_mu_slip,
 )
-from sysid_vehicle.online.mu_slip_figures import one_sigma_contour
+from sysid_vehicle.online.mu_slip.figures import one_sigma_contour
 
 TRUTH = (0.35, 0.15)
 PACEJKA = (0.9, 0.12, 1.65, 2.4)

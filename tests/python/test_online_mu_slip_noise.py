@@ -59,7 +59,7 @@ def test_sets_that_an_estimator_cannot_use_are_counted(monkeypatch: pytest.Monke
             raise InvalidInput("mu: the readings do not determine the curve; take more")
         return mu_slip_fit(data, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("sysid_vehicle.online.mu_slip_compare.mu_slip_fit", fail)
+    monkeypatch.setattr("sysid_vehicle.online.mu_slip.compare.mu_slip_fit", fail)
     study = mu_slip_over_noise(noise_std=(0.02, 0.08), sets=3)
     row = study.methods.index("least squares")
     np.testing.assert_array_equal(study.failed[row], [0, 3])

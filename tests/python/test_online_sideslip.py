@@ -68,7 +68,7 @@ def test_steps_and_whole_log_give_the_same_numbers(vehicle, log, kind):
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
-def test_wrong_stiffness_is_mended_within_20_s_of_cornering(vehicle, log, factor):
+def test_wrong_stiffness_is_corrected_within_20_s_of_cornering(vehicle, log, factor):
     run = estimate_sideslip(with_tyres_times(vehicle, factor), log)
     true = estimate_sideslip(vehicle, log, kind="ukf")  # carries the stiffness of the vehicle
     cornering = np.cumsum(np.abs(log["ay_mps2"]) > 1.0) / log.rate_hz

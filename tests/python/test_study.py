@@ -36,7 +36,7 @@ LOOKS_LIKE_LAG = {
     "steer_compliance",
     "tyre_relaxation",
     "yaw_inertia",
-    *effect("steer_lag").twins,
+    *effect("steer_lag").confounded_with,
 }
 Drives = Callable[[Model, int], tuple[Log, Log]]
 
@@ -76,7 +76,7 @@ def test_the_hidden_effect_is_added_first(study: Study) -> None:
     assert study.added[0].p_value < 1e-6
 
 
-def test_the_held_out_error_falls_to_the_noise_floor(study: Study) -> None:
+def test_the_validation_error_falls_to_the_noise_floor(study: Study) -> None:
     assert study.test[0].error > 1.2
     assert study.test[-1].error <= 1.05
     assert study.train[-1].error == pytest.approx(1.0, abs=0.02)
@@ -346,7 +346,7 @@ def test_absent_channels_are_among_the_warnings(
     assert [w for w in found.warnings if w.startswith("lap") and train.missing()["vy_mps"] in w]
 
 
-def test_held_out_driving_tells_the_richer_model(study: Study, lagging: tuple[Log, Log]) -> None:
+def test_validation_data_tell_the_richer_model(study: Study, lagging: tuple[Log, Log]) -> None:
     test = set_aside(*lagging)[1]
     poorer, richer = study.fits
     gain = gain_in_log_likelihood(poorer, richer, test)
@@ -364,7 +364,7 @@ def test_held_out_driving_tells_the_richer_model(study: Study, lagging: tuple[Lo
     assert difference - 20.0 < gain.value < difference + 5.0
 
 
-def test_a_model_that_fails_on_held_out_driving_gains_nothing(fit: Fit, course: Log) -> None:
+def test_a_model_that_fails_on_validation_data_gains_nothing(fit: Fit, course: Log) -> None:
     test = set_aside([course], course)[1]
     broken = Fit(
         fit.model.with_values({"B_front": float("nan")}),

@@ -110,7 +110,7 @@ def test_a_slope_and_a_bias_give_way_to_rolling_resistance(start: Model, truth: 
     assert not better(bias, found, test)
 
 
-def test_held_out_driving_has_a_say_between_what_the_fit_cannot_tell_apart(
+def test_validation_data_have_a_say_between_what_the_fit_cannot_tell_apart(
     dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving]
 ) -> None:
     wind, drag = (next(c for c in dx.ranking if c.id == name) for name in AGAINST[::-2])

@@ -19,7 +19,7 @@ def test_of_effects_that_act_alike_the_later_counts_for_what_it_adds(fit: Fit, l
 def test_tyres_that_the_fit_never_saw_do_not_speak_against_the_right_effect(
     start: Model, truth: Model
 ) -> None:
-    """A sine in the linear range is fitted, a lap held out."""
+    """A sine in the linear range is fitted, a lap is validation data."""
     car = truth.add("accelerometer_scale").with_values(
         {"accelerometer_scale.ax_error": 0.05, "accelerometer_scale.ay_error": 0.05}
     )

@@ -93,7 +93,7 @@ def test_added_masses_keep_the_inequality_that_table_3_breaks() -> None:
     assert excess(LOADED_SUV) < excess(NOMINAL_SUV)
 
 
-def test_the_mass_converges_by_the_published_law_with_its_sign_mended(town: Drive14) -> None:
+def test_the_mass_converges_by_the_published_law_with_its_sign_corrected(town: Drive14) -> None:
     readings = measure(town, ["ax_mps2"], snr=10.0, seed=1)
     observer = Observer(laws=[mass_law(150.0)])
     found = observe(TwinCar(), LIGHT, town.inputs, readings, observer, speed_mps=12.0)

@@ -1,4 +1,4 @@
-"""Validation data: what is held out, what it says of two models, and how surely."""
+"""Validation data: what is set aside, what it says of two models, and how surely."""
 
 import numpy as np
 import pytest
@@ -54,16 +54,16 @@ def test_what_lasts_for_seconds_is_not_taken_for_many_pieces_of_evidence(
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(sums), rel=0.25)
 
 
-def test_the_end_of_the_only_log_is_held_out(lap: Log) -> None:
-    with pytest.warns(SysidWarning, match="'lap' is fitted up to 28.0 s and the rest is held out"):
+def test_the_end_of_the_only_log_is_set_aside(lap: Log) -> None:
+    with pytest.warns(SysidWarning, match="'lap' is fitted up to 28.0 s and the rest taken"):
         train, test = set_aside(lap, None)
     assert train.logs[0]["time_s"][-1] == pytest.approx(28.0)
     assert test.logs[0]["time_s"][-1] == lap["time_s"][-1]
     assert abs(train.samples + test.samples - lap.n) <= 1
 
 
-def test_the_last_of_several_logs_is_held_out(lap: Log, course: Log) -> None:
-    with pytest.warns(SysidWarning, match="'handling_course' is held out"):
+def test_the_last_of_several_logs_is_set_aside(lap: Log, course: Log) -> None:
+    with pytest.warns(SysidWarning, match="'handling_course' is taken for them"):
         train, test = set_aside([lap, course], None)
     assert train.logs == (lap,)
     assert test.logs == (course,)

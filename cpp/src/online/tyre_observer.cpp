@@ -10,7 +10,7 @@ constexpr double kRelaxationWalk = 0.01;                                        
 constexpr double kContradictionTimeS = 1.0, kTolerated = 1.5;  // of the innovations
 constexpr double kContradicted =
     0.3;  // random walk of the stiffness for each sigma above [1/sqrt(s)]
-constexpr double kBlindSideslip = 0.1, kBlindYawRate = 0.5;  // doubt of a start without sensors
+constexpr double kBlindSideslip = 0.1, kBlindYawRate = 0.5;  // std of a start without sensors
 constexpr double kLeastSlope =
     0.3;  // of the tyre curve over its secant, where kinematics take over
 // A slide that the readings contradict is one of tyres that were learnt wrong.

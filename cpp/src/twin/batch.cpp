@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "sysid/estimate/kalman.hpp"
+
 namespace sysid {
 
 namespace {
@@ -150,7 +152,7 @@ const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* t
         const double limit = settings_.clip * std::sqrt(variance);
         const double e = std::clamp(residual_[at(c)], -limit, limit);
         score_.noalias() += slope_.transpose() * (e / variance);
-        // Channels follow one another: the next sees what this one has already mended.
+        // Channels follow one another: the next sees what this one has already corrected.
         learn(c, e, variance, estimate);
     }
     if (learning_s - block_began_s_ >= settings_.block_s) {
@@ -164,12 +166,7 @@ const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* t
 void BatchEstimator::learn(std::size_t channel, double error, double variance,
                            Estimates& estimate) {
     learnt_.noalias() = P_ * slope_.transpose();
-    const double expected = variance + slope_.dot(learnt_);
-    gain_ = learnt_ / expected;
-    // Joseph's form, which stays symmetric and positive (see `estimate/kalman.hpp`).
-    learnt_ -= (0.5 * expected) * gain_;
-    P_.noalias() -= gain_ * learnt_.transpose();
-    P_.noalias() -= learnt_ * gain_.transpose();
+    use_one_reading(P_, learnt_, variance + slope_.dot(learnt_), gain_);
     leaning_ -= gain_ * slope_.dot(leaning_);
     for (std::size_t j = 0; j < parameters_.size(); ++j) {
         const BatchParameter& p = parameters_[j];

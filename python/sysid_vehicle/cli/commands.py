@@ -170,7 +170,9 @@ def _study(args: argparse.Namespace, heard: Warnings) -> Study:
     train = _read(args.logs, args)
     test = _read(args.test, args) if args.test else None
     for path in {p.resolve() for p in args.logs} & {p.resolve() for p in args.test}:
-        warn(f"{path.name} is both fitted and held out; the validation error then proves nothing")
+        warn(
+            f"{path.name} is training and validation data; the validation error then proves nothing"
+        )
     study = improve(
         model,
         train,

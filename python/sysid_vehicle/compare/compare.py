@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._arrays import FloatArray
+from .._style import axes_or_new
 from .._tables import dataset, frame
 from .._text import brief, html_list, html_paragraph, html_table, number, text_table
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
@@ -19,8 +20,6 @@ from .where import FailureMap, Region
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["ChannelScore", "Comparison", "compare", "one_step_error"]
 
 
 @dataclass(frozen=True)
@@ -140,10 +139,7 @@ class Comparison:
 
     def plot_residuals(self, ax: Axes | None = None) -> Axes:
         """Normalised residuals of each channel over the seconds driven, averaged over half one."""
-        import matplotlib.pyplot as plt
-
-        if ax is None:
-            ax = plt.subplots(figsize=(8.0, 3.5))[1]
+        ax = axes_or_new(ax, 8.0, 3.5)
         driven, step = self._driven_s()
         for i, c in enumerate(MEASURED):
             if c in self.channels:
@@ -194,7 +190,7 @@ def compare(
     ----------
     fit : Fit
     logs : Log, sequence of Log, or Driving
-        Driving to compare with; what the fit never saw tells most.
+        Driving to compare with; validation data tell most.
     noise : NoiseModel, optional
         Whose sensors and white motion noise are the noise floor; by default the fit's. Models that
         are compared with each other need the same one.

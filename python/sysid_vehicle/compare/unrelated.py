@@ -18,8 +18,6 @@ from .._text import number
 from ..estimate import MEASURED, Driving
 from ..estimate.inputs import white_noise_std
 
-__all__ = ["incoherent", "unrelated"]
-
 _IGNORANT = 2.0  # times the usual spread
 _WORSE = 1.1  # of the channel's variance: a prediction that errs more is worse than the mean
 _FELT = 0.1  # of the channel's variance, which a prediction must have to be called one

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._arrays import FloatArray
+from .._style import axes_or_new
 from ..estimate import Driving
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["FailureMap", "Region"]
 
 _FEWEST = 20  # samples that make a cell worth showing
 
@@ -101,10 +100,7 @@ class FailureMap:
 
     def plot(self, ax: Axes | None = None, *, highest: float | None = None) -> Axes:
         """Draw the map; grey where nobody drove."""
-        import matplotlib.pyplot as plt
-
-        if ax is None:
-            ax = plt.subplots(figsize=(5.5, 4.0))[1]
+        ax = axes_or_new(ax, 5.5, 4.0)
         ax.set_facecolor("0.88")
         top = highest if highest is not None else max(float(np.nanmax(self.error)), 1.5)
         mesh = ax.pcolormesh(

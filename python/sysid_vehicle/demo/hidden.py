@@ -11,8 +11,6 @@ from ..model import Model
 from ..simulate import drive, example_vehicle
 from ..vehicle import Vehicle
 
-__all__ = ["RANDOM", "drive_both", "hide", "vehicle_file"]
-
 RANDOM = "random"
 
 

@@ -14,8 +14,6 @@ from ..study import Study, improve
 from . import story
 from .hidden import drive_both, hide, vehicle_file
 
-__all__ = ["DEFAULT", "Demonstration", "run_demo"]
-
 DEFAULT = "tyre_load_sensitivity"
 
 

@@ -10,8 +10,6 @@ from ..model import Model
 from ..report.words import effect_found, interval, quantity, summary, unit
 from ..study import Study
 
-__all__ = ["findings", "opening", "revelation"]
-
 _RIVALS = 6
 
 
@@ -20,7 +18,7 @@ def opening(model: Model, train: Log, test: Log) -> str:
     return (
         f"A simulated {model.vehicle.name} drove a lap of {train.duration_s:.0f} s at up to "
         f"{train['vx_mps'].max():.0f} m/s, and another course of {test.duration_s:.0f} s that is "
-        "held out from every fit.\n"
+        "validation data: no fit uses it.\n"
         "Something acts on this car that the model does not have. The vehicle file gives slightly "
         "wrong tyres.\n"
         "Fitting the model, looking for what is missing: about half a minute."
@@ -113,9 +111,10 @@ def revelation(study: Study, truth: Model) -> str:
 def _why_not(study: Study, hidden: str) -> str:
     first = study.diagnoses[0]
     own = next((c for c in first.ranking if c.id == hidden), None)
-    twins = set(study.model.effects) & set(own.indistinguishable_from if own else ())
-    if twins:
-        return f"this driving cannot tell it from {', '.join(sorted(twins))}, which the model got."
+    confounded = set(study.model.effects) & set(own.indistinguishable_from if own else ())
+    if confounded:
+        others = ", ".join(sorted(confounded))
+        return f"this driving cannot tell it from {others}, which the model got."
     if study.added:
         return f"the model got {', '.join(study.model.effects)} instead."
     if study.verdict in ("adequate", "not_testable"):

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._arrays import FloatArray
-from .._text import brief, html_paragraph, html_table, text_table, with_error
+from .._printed import Part, Printed, Table
+from .._style import axes_or_new
+from .._text import brief, with_error
 from ..effects import Effect
 from ..rules import USUAL, Rules
 from .clocks import CLOCKS, clock_scores
@@ -23,8 +25,6 @@ from .single_effects import Hypothesis, Posterior, ScoreModel, Subset
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["Causes", "CredibleSet", "causes_of"]
 
 _UNKNOWN = "unknown "
 _KEPT = 40  # of the leading subsets
@@ -58,7 +58,7 @@ class CredibleSet:
 
 
 @dataclass(frozen=True, eq=False)
-class Causes:
+class Causes(Printed):
     """The posterior of a sum of single effects (`single_effects.py`).
 
     Attributes
@@ -135,11 +135,8 @@ class Causes:
 
     __repr__ = brief
 
-    def __str__(self) -> str:
-        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
-
-    def _repr_html_(self) -> str:
-        return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
+    def _parts(self) -> list[Part]:
+        return [self._headline(), Table(self._HEAD, self._rows())]
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""
@@ -174,11 +171,8 @@ class Causes:
         grades : mapping, optional
             By effect, a word to print beside its bar.
         """
-        import matplotlib.pyplot as plt
-
         shown = self._shown(most)[::-1]
-        if ax is None:
-            ax = plt.subplots(figsize=(6.0, 0.9 + 0.28 * max(len(shown), 1)))[1]
+        ax = axes_or_new(ax, 6.0, 0.9 + 0.28 * max(len(shown), 1))
         for i, s in enumerate(self.sets):
             rows = [k for k, (e, _) in enumerate(shown) if self.of(e) is s]
             widths = [shown[k][1] for k in rows]

@@ -26,8 +26,6 @@ from ..rules import USUAL, Rules
 from .coordinates import begins, blocks
 from .force_map import UNITS, missing_forces
 
-__all__ = ["Ceiling", "Explainable", "Inputs", "Law", "ceiling", "folds", "ridge"]
-
 Whole = npt.NDArray[np.intp]
 
 _RATE_HZ = 20.0  # missing forces are smooth

@@ -14,8 +14,6 @@ from .coordinates import running_time
 from .evidence import FORCES, Evidence
 from .shape import known
 
-__all__ = ["Kind", "beginning", "kinds_of_change", "of_driving"]
-
 _BLEND_S = 0.2  # a change takes about a second, as that of `friction_change`
 _SMALL = 0.01
 _GRIP = ("D_front", "D_rear")

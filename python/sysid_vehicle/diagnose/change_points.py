@@ -36,8 +36,6 @@ from .coordinates import running_time
 from .evidence import Evidence, solve
 from .projection import orthonormal_basis, variance_ratio
 
-__all__ = ["ChangePoint", "change_points"]
-
 _STEP_S, _MOST_STEPS = 0.2, 400
 _LEAST_S = 1.5  # on both sides of a change
 _INTERVAL = 7.35

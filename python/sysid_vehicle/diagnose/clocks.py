@@ -16,8 +16,6 @@ from .delay import delayed, pieces_of
 from .evidence import Evidence
 from .projection import variance_ratio
 
-__all__ = ["CLOCKS", "Clock", "ClockScore", "clock_scores"]
-
 
 @dataclass(frozen=True)
 class Clock:

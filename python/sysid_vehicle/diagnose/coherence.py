@@ -28,8 +28,6 @@ from .omnibus import omnibus_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["INPUTS", "Coherence", "coherence"]
-
 _WINDOW_S = 5.0
 _LEVEL = 0.05
 INPUTS = {"steer": "steering", "force": "wheel force"}

@@ -18,8 +18,6 @@ from .diagnosis import Candidate, Diagnosis
 from .omnibus import omnibus
 from .refits import refitted
 
-__all__ = ["confirmed"]
-
 
 def confirmed(dx: Diagnosis) -> Causes:
     """The proposed causes, without sets that no exact refit confirms.

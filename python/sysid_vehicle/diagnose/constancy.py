@@ -23,8 +23,6 @@ from ..rules import USUAL, Rules
 from .evidence import Evidence
 from .projection import pseudo_inverse, variance_ratio
 
-__all__ = ["Constancy", "constancy"]
-
 _PIECE_S = 10.0
 _MOST_PIECES = 6
 

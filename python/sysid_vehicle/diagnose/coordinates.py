@@ -11,16 +11,6 @@ from .._arrays import FloatArray, as_float64
 from ..estimate import Driving
 from ..identify import Fit
 
-__all__ = [
-    "COORDINATES",
-    "Coordinate",
-    "begins",
-    "blocks",
-    "coordinates",
-    "late",
-    "running_time",
-]
-
 
 @dataclass(frozen=True)
 class Coordinate:

@@ -24,8 +24,6 @@ from .refits import finished as finished_of
 from .refits import in_time, refitted
 from .score import Score, ScoreBoard, score_board_of
 
-__all__ = ["REFITS", "considered", "diagnose"]
-
 REFITS = 5
 # Of the best statistic: what scores less than this share does not overtake it. States of their own
 # make a refit slow, and what has some is scored at its typical size, not far from the refit.
@@ -146,8 +144,8 @@ def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple
 def _worth_refitting(significant: list[Candidate], refits: int) -> list[Candidate]:
     """The best few, and the effects that the catalogue says act like the very best."""
     few = significant[:refits]
-    twins = few[0].effect.twins if few else ()
-    return few + [c for c in significant[refits:] if c.id in twins]
+    confounded = few[0].effect.confounded_with if few else ()
+    return few + [c for c in significant[refits:] if c.id in confounded]
 
 
 def _hopeless(c: Candidate) -> float:
@@ -160,7 +158,7 @@ def _rivals(c: Candidate, best: Candidate) -> bool:
     Score is held against score: at the fit a refit starts from, such effects lead it astray alike,
     and what the first one gains when it is refitted the others may gain too.
     """
-    alike = c.id in best.effect.twins or best.id in c.effect.twins
+    alike = c.id in best.effect.confounded_with or best.id in c.effect.confounded_with
     return alike and c.statistic > _RIVALS * best.statistic
 
 
@@ -179,7 +177,7 @@ def _merit(c: Candidate, samples: int) -> float:
 def _score_rivals(board: ScoreBoard, score: Score, apart: float) -> tuple[str, ...]:
     """Rivals which leave nothing for the effect, and for which the effect leaves nothing."""
     own = board.joint_statistic(score.effect.id)
-    twins = []
+    confounded = []
     if own < apart:
         return ()
     for rival in board.scores:
@@ -190,13 +188,13 @@ def _score_rivals(board: ScoreBoard, score: Score, apart: float) -> tuple[str, .
             continue  # together they tell at least as much as either
         both = board.joint_statistic(score.effect.id, rival.effect.id)
         if both - theirs < apart and both - own < apart:
-            twins.append(rival.effect.id)
-    return tuple(twins)
+            confounded.append(rival.effect.id)
+    return tuple(confounded)
 
 
 def _with_refit_rivals(c: Candidate, all_: list[Candidate], apart: float) -> Candidate:
     """Among refitted effects the likelihood itself says which cannot be told apart."""
     near = tuple(o.id for o in all_ if o is not c and abs(o.statistic - c.statistic) < apart)
     refitted = {o.id for o in all_}
-    twins = (*near, *(t for t in c.indistinguishable_from if t not in refitted))
-    return replace(c, indistinguishable_from=twins)
+    confounded = (*near, *(t for t in c.indistinguishable_from if t not in refitted))
+    return replace(c, indistinguishable_from=confounded)

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._printed import Part, Printed, Table
+from .._style import axes_or_new
 from .._tables import frame
-from .._text import brief, html_paragraph, html_table, text_table, with_error
+from .._text import brief, with_error
 from .._threads import in_parallel
 from ..compare import one_step_error
 from ..effects import Effect
@@ -25,8 +27,6 @@ from .score import Score
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["Candidate", "Diagnosis"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagnosis:
+class Diagnosis(Printed):
     """Effects ranked by the evidence that they are missing.
 
     Attributes
@@ -285,25 +285,19 @@ class Diagnosis:
             return f"something is wrong that no effect can be named for: {self.reservation}"
         what = f"most likely missing: {self.named.effect.title}"
         if self.named.indistinguishable_from:
-            twins = ", ".join(self.named.indistinguishable_from)
-            what += f" (this driving cannot tell it from {twins})"
+            others = ", ".join(self.named.indistinguishable_from)
+            what += f" (this driving cannot tell it from {others})"
         # The test against unknown forces is blunter than that of one effect: its silence is none.
         return f"{what}; with it {self.beside.omnibus}" if self.omnibus.rejects else what
 
     __repr__ = brief
 
-    def __str__(self) -> str:
-        return f"{self._headline()}\n{text_table(self._HEAD, self._rows())}"
-
-    def _repr_html_(self) -> str:
-        return html_paragraph(self._headline()) + html_table(self._HEAD, self._rows())
+    def _parts(self) -> list[Part]:
+        return [self._headline(), Table(self._HEAD, self._rows())]
 
     def plot(self, ax: Axes | None = None, most: int = 10) -> Axes:
         """Bars of the evidence for each effect."""
-        import matplotlib.pyplot as plt
-
-        if ax is None:
-            ax = plt.subplots(figsize=(6.0, 3.5))[1]
+        ax = axes_or_new(ax, 6.0, 3.5)
         shown = self.ranking[:most][::-1]
         colours = ["tab:red" if c.p_value < self.alpha else "0.7" for c in shown]
         ax.barh([c.id for c in shown], [max(c.statistic, 0.1) for c in shown], color=colours)

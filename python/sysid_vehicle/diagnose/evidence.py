@@ -14,8 +14,6 @@ from ..estimate import Driving
 from ..identify import Fit
 from .projection import orthonormal_basis, pseudo_inverse, variance_ratio
 
-__all__ = ["FORCES", "READINGS", "TARGETS", "Evidence", "Solution"]
-
 # Targets in the core's order: external F_x, F_y, M_z, then accelerations, then sensor readings.
 FORCES = {"F_x": 0, "F_y": 1, "M_z": 2}
 READINGS = {"r": 7, "a_x": 8, "a_y": 9}

@@ -27,8 +27,6 @@ from .evidence import FORCES
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["UNITS", "ForceMap", "force_maps"]
-
 PAIRS = (
     ("vx_mps", "ay_mps2"),
     ("ax_mps2", "ay_mps2"),

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Form", "forms", "unit_of_gain"]
-
 
 @dataclass(frozen=True)
 class _Quantity:

@@ -23,8 +23,6 @@ from ..identify import Fit, explaining
 from .replay import Replay
 from .sensitivity import duration
 
-__all__ = ["Bias", "BiasReport", "bias_report"]
-
 _AXLES = ("front", "rear")
 _WORTH_TELLING = 0.01  # of the parameter: refits agree no better
 # How far two drives may lead apart from their mean: of the parameter, or of the bias.

@@ -25,8 +25,6 @@ from ..identify import Fit
 from .evidence import Evidence
 from .sensitivity import sensitivities
 
-__all__ = ["Information", "information_of"]
-
 _COPIED = 1e-9  # share of a column's square that others leave, below which it is their copy
 
 

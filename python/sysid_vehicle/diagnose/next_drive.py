@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from .. import manoeuvres
+from .._printed import Part, Printed, Table
 from .._progress import with_progress
-from .._text import brief, html_paragraph, html_table, text_table
+from .._text import brief
 from ..effects import Effect, effect
 from ..errors import InvalidInput, NumericalError
 from ..estimate import MEASURED, Driving
@@ -77,7 +78,7 @@ class DriveLimits:
 
 
 @dataclass(frozen=True, eq=False)
-class NextDrive:
+class NextDrive(Printed):
     """Drives that tell two effects apart.
 
     Attributes
@@ -134,14 +135,8 @@ class NextDrive:
 
     __repr__ = brief
 
-    def __str__(self) -> str:
-        table = text_table(self._HEAD, self._rows())
-        return "\n".join([self._headline(), table, *self._first()])
-
-    def _repr_html_(self) -> str:
-        table = html_table(self._HEAD, self._rows())
-        told = "".join(html_paragraph(text) for text in self._first())
-        return html_paragraph(self._headline()) + table + told
+    def _parts(self) -> list[Part]:
+        return [self._headline(), Table(self._HEAD, self._rows()), *self._first()]
 
     def to_dict(self) -> dict[str, Any]:
         """Everything for a JSON file."""

@@ -22,8 +22,6 @@ from .coordinates import begins, late
 from .evidence import Evidence
 from .projection import orthonormal_basis, pseudo_inverse, variance_ratio
 
-__all__ = ["Omnibus", "omnibus", "omnibus_of", "unknown_directions"]
-
 # Targets in the core's order: external F_x, F_y, M_z, then accelerations, then sensor readings.
 _TARGETS = {"F_x": 0, "F_y": 1, "M_z": 2, "dv_x/dt": 3, "dv_y/dt": 4}
 _SENSORS = {"r": 7, "a_x": 8, "a_y": 9}

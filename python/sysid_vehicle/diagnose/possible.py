@@ -9,8 +9,6 @@ import numpy as np
 from ..effects import Effect, Parameter
 from ..rules import USUAL, Rules
 
-__all__ = ["Size", "possible", "sizes"]
-
 Size = tuple[tuple[float, ...], tuple[float, ...]]
 """Parameters of an effect, and their standard errors."""
 

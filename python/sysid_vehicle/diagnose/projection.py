@@ -11,15 +11,6 @@ import numpy as np
 from .. import _core
 from .._arrays import FloatArray
 
-__all__ = [
-    "long_run_ratio",
-    "long_run_ratios",
-    "orthonormal_basis",
-    "pseudo_inverse",
-    "score_terms",
-    "variance_ratio",
-]
-
 _COPIED = 1e-7  # of the largest singular value, below which a direction is a copy of others
 _SINGULAR = 1e-6  # the same of the eigenvalues of an information matrix
 _LAGS = (10, 30, 100)

@@ -28,8 +28,6 @@ from .evidence import FORCES, READINGS, Evidence, Solution, solve
 from .grammar import Form, forms, unit_of_gain
 from .shape import known
 
-__all__ = ["Proposal", "propose"]
-
 _MOST = 3
 _TRIED = 4  # on validation data, before a step gives up
 _ALIKE = 9.0  # difference of statistics that does not tell two formulas apart

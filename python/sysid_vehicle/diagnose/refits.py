@@ -13,8 +13,6 @@ from ..estimate import Driving
 from ..identify import Fit, refine, refit
 from .diagnosis import Candidate
 
-__all__ = ["finished", "in_time", "refitted"]
-
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
 
 

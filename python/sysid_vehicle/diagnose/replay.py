@@ -24,8 +24,6 @@ from ..model import Model
 from ..simulate import RoadDisturbance
 from ..vehicle import GRAVITY_MPS2
 
-__all__ = ["Replay"]
-
 # Slow enough to be quick; what tyres do to the motion is slower still.
 _RATE_HZ = 25.0
 _WINDOW_S = 10.0

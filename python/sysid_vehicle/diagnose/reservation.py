@@ -21,8 +21,6 @@ from .evidence import Evidence
 from .omnibus import Omnibus, omnibus_of
 from .score import ScoreBoard, score_board_of
 
-__all__ = ["Beside", "beside", "confirmed", "reservation"]
-
 
 @dataclass(frozen=True, eq=False)
 class Beside:

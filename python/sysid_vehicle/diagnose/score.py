@@ -30,8 +30,6 @@ from .evidence import Evidence
 from .projection import long_run_ratios, pseudo_inverse, score_terms
 from .sensitivity import duration, sensitivities
 
-__all__ = ["Score", "ScoreBoard", "score_board", "score_board_of"]
-
 _BLOCK_S, _FEWEST_BLOCKS = 0.5, 24
 _ROWS = 5 * 512  # of residuals at once
 

@@ -17,8 +17,6 @@ from ..effects import Effect
 from ..estimate import Driving
 from .evidence import Evidence
 
-__all__ = ["Sensitivities", "duration", "sensitivities"]
-
 _AT_ONCE = 24  # columns of one pass: each costs little more, and more are held twice meanwhile
 
 

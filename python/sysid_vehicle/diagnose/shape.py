@@ -36,8 +36,6 @@ from .projection import variance_ratio
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Curve", "Surface", "curves", "surface"]
-
 OVER = ("vx_mps", "ay_mps2", "ax_mps2", "slip_front_rad", "slip_rear_rad", "steer_rad")
 _KNOTS = 7
 _KNOTS_OF_PAIR = 6

@@ -26,8 +26,6 @@ import scipy
 
 from .._arrays import FloatArray, as_float64
 
-__all__ = ["Hypothesis", "Posterior", "ScoreModel", "Subset"]
-
 _ROUNDS, _SETTLED = 200, 1e-4
 _EXTENDED = 12  # of the best subsets, to which one effect more is added
 

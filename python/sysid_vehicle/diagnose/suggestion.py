@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Suggestion", "ground_m", "path_m"]
-
 _BAND = (0.05, 0.95)  # parts of the steering's power below the frequencies that are told
 _SLOWEST_HZ = 0.05  # below, steering is the shape of the road
 

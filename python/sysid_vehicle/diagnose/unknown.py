@@ -22,8 +22,6 @@ from .shape import Curve, Surface, curves, surface
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Unknown", "unknown"]
-
 
 @dataclass(frozen=True, eq=False)
 class Unknown:

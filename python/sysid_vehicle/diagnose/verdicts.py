@@ -24,8 +24,6 @@ from .diagnosis import Diagnosis
 from .possible import Size, possible, sizes
 from .score import Score, score_board
 
-__all__ = ["EffectVerdict", "Finding", "Verdicts", "judge", "verdicts"]
-
 Finding = Literal[
     "missing", "one of a group", "open", "proxy", "negligible", "not testable", "absent"
 ]

@@ -20,8 +20,6 @@ from .force_map import UNITS, ForceMap, force_maps
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Where", "where"]
-
 _TELLS = 0.02  # share of the variance below which a map predicts nothing worth a look
 
 

@@ -10,8 +10,6 @@ from ..errors import InvalidInput, near_names
 from ..log import Log
 from .inputs import quiet
 
-__all__ = ["check_channels", "has_channels", "logged_channels"]
-
 _BRIDGED_S = 1.0  # holes up to this are interpolated,
 _BRIDGED_PERIODS = 1.5  # or up to so many of the channel's own periods: a slow one has no holes
 

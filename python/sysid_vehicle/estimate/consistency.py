@@ -15,8 +15,6 @@ from .._arrays import FloatArray, as_float64
 from .._text import html_text
 from ..errors import InvalidInput
 
-__all__ = ["Consistency", "nees_check", "nis_check", "whiteness_check"]
-
 
 @dataclass(frozen=True)
 class Consistency:

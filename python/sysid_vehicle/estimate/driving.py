@@ -19,8 +19,6 @@ from ..sensors import quantum
 from .channels import check_channels, has_channels, logged_channels
 from .inputs import quiet
 
-__all__ = ["MEASURED", "UNITS", "Driving", "Stretch"]
-
 MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 """Measured channels, in the core's order."""
 

@@ -20,8 +20,6 @@ import scipy
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
 
-__all__ = ["FilterRun", "FilterState", "LateMeasurements", "StateFilter", "StateModel"]
-
 METHODS = ("ekf", "ukf")
 # Of central differences, of the size or standard deviation of the state: rounding stays below
 # 1e-11.

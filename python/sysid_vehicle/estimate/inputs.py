@@ -21,8 +21,6 @@ import scipy
 
 from .._arrays import FloatArray, as_float64
 
-__all__ = ["quiet", "white_noise_std"]
-
 _HALF_WIDTHS = (4, 6, 9, 12)
 _DEGREE = 6
 _AGREES = 1.8  # standard deviations

@@ -16,8 +16,6 @@ from ..vehicle import GRAVITY_MPS2, Vehicle
 from .driving import MEASURED, UNITS, Driving
 from .inputs import white_noise_std
 
-__all__ = ["NoiseModel", "first_guess", "generous", "learn_noise", "maximise_noise", "noise_range"]
-
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
 _DISTURBANCE = slice(8, 11)

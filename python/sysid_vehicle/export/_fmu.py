@@ -24,8 +24,6 @@ from ..model import Model
 from ._equations import Equations, equations
 from ._languages import cpp_assignments, title
 
-__all__ = ["fmu_bytes"]
-
 _NAME = "identified_car"
 _INTERFACE = Path(__file__).with_name("fmi3.cpp.in")
 _FIRST_STATE, _FIRST_RATE, _FIRST_PARAMETER = 100, 200, 300  # value references

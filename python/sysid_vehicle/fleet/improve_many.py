@@ -23,8 +23,6 @@ from .results import Fleet, Row
 from .store import Store
 from .work import Outcome, do, failed
 
-__all__ = ["improve_many", "run"]
-
 _SUMMARY_EVERY_S = 2.0
 
 

@@ -18,8 +18,6 @@ from ..saved import fingerprint
 from ..study import improve
 from ..vehicle import Vehicle
 
-__all__ = ["Car", "Drive", "Job", "Options", "check_options", "jobs_of", "model_of"]
-
 Car = Vehicle | Model | str | Path
 Drive = Log | str | Path
 Options = Mapping[str, Any]
@@ -114,8 +112,8 @@ def jobs_of(
             f"improve_many: validation is a {type(validation).__name__}; give a mapping from the "
             f"names of the logs to their validation data"
         )
-    held_out = dict(validation or {})
-    refuse_unknown(held_out, named, "validation")
+    kept_apart = dict(validation or {})
+    refuse_unknown(kept_apart, named, "validation")
     models = {n: model_of(c) for n, c in cars.items()} if isinstance(cars, Mapping) else {}
     one = None if isinstance(cars, Mapping) else model_of(cars)
     jobs = []
@@ -125,7 +123,7 @@ def jobs_of(
         if model is None:
             either = " or ".join(dict.fromkeys((f"'{name}'", f"'{name.partition('/')[0]}'")))
             raise InvalidInput(f"{name}: no car is given for it; name {either} among the cars")
-        kept = _drives(held_out.get(name, ()), name)
+        kept = _drives(kept_apart.get(name, ()), name)
         jobs.append(Job(name, model, _drives(drives, name), kept, **shared))
     return jobs
 

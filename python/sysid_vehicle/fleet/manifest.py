@@ -12,8 +12,6 @@ from ..errors import InvalidInput
 from ..read import ChannelMap
 from .jobs import Job, check_name, check_options, model_of
 
-__all__ = ["manifest_jobs"]
-
 _SHARED = ("vehicle", "channels", "dbc")
 
 

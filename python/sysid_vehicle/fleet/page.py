@@ -6,8 +6,6 @@ from .._style import AFTER, framed, tidy
 from ..report.page import bullets, heading, page, paragraph, picture, table
 from .results import Fleet, Row
 
-__all__ = ["fleet_page"]
-
 _SHOWN = 15
 
 

@@ -11,8 +11,6 @@ from contextlib import contextmanager
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 
-__all__ = ["process_pool"]
-
 # Each process has one core: threads of linear algebra would compete with the other processes.
 _ALONE = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 

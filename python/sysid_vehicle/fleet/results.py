@@ -15,8 +15,6 @@ from ..errors import InvalidInput, near_names
 from ..saved import load
 from ..study import Study
 
-__all__ = ["Cause", "Effect", "Fleet", "Row"]
-
 AHEAD_S = 1.0
 """How far ahead the physical gains of effects are predicted."""
 

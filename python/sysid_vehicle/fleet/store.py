@@ -15,8 +15,6 @@ from ..study import PREDICTED
 from .results import AHEAD_S, Effect, Row, study_file
 from .work import Outcome
 
-__all__ = ["Store"]
-
 
 class Store:
     """Writes outcomes to a folder, and finds those of an earlier run.

@@ -18,8 +18,6 @@ from ..user_effects import load_effects
 from .jobs import Job
 from .results import AHEAD_S, Effect, Row
 
-__all__ = ["Outcome", "do", "failed"]
-
 _defined: set[Path] = set()
 _defining = threading.Lock()
 

@@ -21,8 +21,6 @@ from ..vehicle import GRAVITY_MPS2, Vehicle
 from ._motion import Motion, Places, draws, smoothed
 from ._result import AxleForces
 
-__all__ = ["axle_forces"]
-
 
 @dataclass(frozen=True, eq=False)
 class _Forces:

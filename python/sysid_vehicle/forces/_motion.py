@@ -12,8 +12,6 @@ from .._arrays import FloatArray, as_float64
 from ..sensors import SensorCheck
 from ..sensors._motion import Basis, Grid, IntArray
 
-__all__ = ["Motion", "Places", "draws", "smoothed"]
-
 _AT_ONCE = 100  # draws
 
 

@@ -20,8 +20,6 @@ from ..vehicle import Vehicle
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["AXLES", "COLOURS", "AxleForces"]
-
 AXLES = ("front", "rear")
 _HEAD = ("axle", "slip angle", "side force", "of the load", "slope", "95 % band")
 _SMALL = 0.3  # of the load, below which a side force is nearly proportional to slip

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import scipy
 
-from .._arrays import FloatArray, as_float64
+from .._arrays import FloatArray
+from ..vehicle import magic_formula
 
 __all__ = ["COMBINATIONS", "friction", "look_alike", "peak_slip", "slope_of", "stiffness", "top"]
 
@@ -14,13 +16,8 @@ _PEAKLESS = 1.0 + 1e-6
 
 
 def friction(slip_rad: FloatArray, bcde: FloatArray) -> FloatArray:
-    """Lateral force over load; shape of `slip_rad`.
-
-    Pacejka, Tire and Vehicle Dynamics, 3rd ed., eq. (4.6) without shifts.
-    """
-    b, c, d, e = bcde
-    x = b * slip_rad
-    return as_float64(d * np.sin(c * np.arctan(x - e * (x - np.arctan(x)))))
+    """Lateral force over load; shape of `slip_rad`."""
+    return magic_formula(slip_rad, *map(float, bcde))
 
 
 def stiffness(bcde: FloatArray) -> float:
@@ -39,19 +36,17 @@ def peak_slip(bcde: FloatArray) -> float:
     if c <= _PEAKLESS:
         return np.inf
     wanted = np.tan(0.5 * np.pi / c)
-    # x - E (x - atan x) = wanted; for E below 1 it grows without end and has one root.
-    low, high = 0.0, 1.0
-    while high - e * (high - np.arctan(high)) < wanted:
+
+    def beyond(x: float) -> float:
+        return float(x - e * (x - np.arctan(x)) - wanted)
+
+    # For E below 1 it grows without end and has one root.
+    high = 1.0
+    while beyond(high) < 0.0:
         high *= 2.0
         if high > 1e9:
             return np.inf
-    for _ in range(100):
-        middle = 0.5 * (low + high)
-        if middle - e * (middle - np.arctan(middle)) < wanted:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high) / b
+    return float(scipy.optimize.brentq(beyond, 0.0, high, xtol=1e-15 * high)) / b
 
 
 def look_alike(bcde: FloatArray, e: float) -> FloatArray:
@@ -68,13 +63,8 @@ def look_alike(bcde: FloatArray, e: float) -> FloatArray:
 
     if not np.isfinite(wanted) or not peak_at(low) > 0.0 > peak_at(high):
         return np.array([b, c, d, e])
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if peak_at(middle) > 0.0:
-            low = middle
-        else:
-            high = middle
-    return np.array([b * c / low, low, d, e])
+    shape = float(scipy.optimize.brentq(peak_at, low, high))
+    return np.array([b * c / shape, shape, d, e])
 
 
 COMBINATIONS: dict[str, tuple[Callable[[FloatArray], float], str]] = {

@@ -11,8 +11,6 @@ from ..errors import InvalidInput, near_names
 from ..identify.search import Box
 from .tyre_fit import PARAMETERS
 
-__all__ = ["BOX", "GIVEN", "box_of", "first_point"]
-
 _LETTERS = {"B": (1.0, 40.0), "C": (0.5, 3.0), "D": (0.1, 3.0), "E": (-3.0, 1.0)}
 BOX: dict[str, tuple[float, float]] = {
     **{f"{x}_{axle}": bounds for axle in ("front", "rear") for x, bounds in _LETTERS.items()},

@@ -27,8 +27,6 @@ from .setup import Setup
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Design", "Limits", "Trial", "design_excitation"]
-
 _FRONT_SLIP_SHARE = 1.5  # of the slip angle at the peak, where the controller holds the tyre
 _REAR_SLIP_SHARE = 1.25
 _MOST_SWING_MPS = 12.0
@@ -159,17 +157,7 @@ class Design(Printed):
         return [*self._notes(), *self.preview._parts()]
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw how well each trial would tell the least-known coefficient.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw; a new figure is made without it.
-
-        Returns
-        -------
-        matplotlib Axes
-        """
+        """Draw how well each trial would tell the least-known coefficient."""
         ax = axes_or_new(ax, 8.0, 3.0)
         for label, colour, inside in (
             ("within the limits", AFTER, True),

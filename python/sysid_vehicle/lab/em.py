@@ -22,8 +22,6 @@ from .record import ObserverRecord
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["EMResult", "NoiseStructure", "learn_observer_noise"]
-
 _FIXED = -1  # as in the core
 _FEWEST = 50  # samples; ten variances are learned from them
 _HEAD = ("disturbance of", "std before", "std learned", "")

@@ -14,8 +14,6 @@ from .box import box_of
 from .tyre_fit import TyreFit
 from .tyre_objective import objective_of
 
-__all__ = ["HeldValue", "hold_value"]
-
 
 @dataclass(frozen=True)
 class HeldValue:

@@ -21,8 +21,6 @@ from ..estimate.driving import MEASURED
 from ..model import Model
 from .loop import ClosedLoop
 
-__all__ = ["MOTION", "READINGS", "TYRES", "information", "problem_of", "sensor_noise"]
-
 TYRES = tuple(f"{letter}_{axle}" for axle in ("front", "rear") for letter in "BCDE")
 """The eight tyre coefficients."""
 

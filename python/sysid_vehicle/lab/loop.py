@@ -24,8 +24,6 @@ from .setup import Setup
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["ESTIMATES", "TRUTH_CHANNELS", "ClosedLoop", "run_closed_loop"]
-
 TRUTH_CHANNELS = (
     "vx_mps",
     "vy_mps",

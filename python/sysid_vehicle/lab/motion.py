@@ -13,8 +13,6 @@ from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from .tyre_data import GreyBoxVehicle, TyreLog
 
-__all__ = ["TyreMotion"]
-
 _COLUMNS = ("vx_mps", "vy_mps", "yaw_rate_radps", "steer_rad", "fz_front_n", "fz_rear_n")
 
 

@@ -14,8 +14,6 @@ from ..identify.settle import descend, settle
 from ..identify.starts import SAME_OPTIMUM, Runner, Search, Starts
 from .walk import walk
 
-__all__ = ["multistart"]
-
 
 def multistart(
     objective: Objective,

@@ -16,8 +16,6 @@ from ..errors import InvalidInput, near_names
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["READINGS", "STATES", "StateEstimate"]
-
 STATES = ("vx_mps", "vy_mps", "yaw_rate_radps", "xi_x_n", "xi_y_n", "xi_psi_nm")
 """Motion, then the unexplained force ahead, force sideways and yaw moment."""
 

@@ -22,8 +22,6 @@ from ..vehicle import GRAVITY_MPS2
 from .observed import READINGS, STATES, StateEstimate
 from .record import ObserverCar, ObserverRecord
 
-__all__ = ["Observer", "ObserverForm", "ObserverNoise"]
-
 _T = TypeVar("_T")
 
 

@@ -11,8 +11,6 @@ from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2, Vehicle
 from .observer import ObserverForm
 
-__all__ = ["Actuator", "Controller", "Nominal", "Online", "Sensor", "Sensors", "Simulator"]
-
 _INF = float("inf")
 
 

@@ -10,8 +10,6 @@ from .loop import ClosedLoop
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["overview"]
-
 _PANELS = ("vx_mps", "yaw_rate_radps", "steer_rad", "fx_n")
 
 

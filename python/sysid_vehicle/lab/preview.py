@@ -22,8 +22,6 @@ from .setup import Setup
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Coverage", "Expected", "Preview", "preview"]
-
 # An E near zero has no size of its own to be compared with.
 _LEAST_SIZE = 0.1
 _SINGULAR = 1e-13
@@ -154,18 +152,7 @@ class Preview(Printed):
         return [self._title(), Table(self._HEAD, self._rows()), self._notes()]
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw how long each slip angle is held, and the tyre curves as believed.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw; a new figure is made without it.
-
-        Returns
-        -------
-        matplotlib Axes
-            The curves are on a second axis.
-        """
+        """Draw how long each slip angle is held; on a second axis the tyre curves as believed."""
         ax = axes_or_new(ax, 8.0, 3.6)
         right = ax.twinx()
         widest = 1.05 * max(max(c.largest_rad, c.peak_rad) for c in self.coverage)

@@ -13,8 +13,6 @@ import scipy
 from .._arrays import FloatArray, as_float64
 from ..identify.objective import Problem
 
-__all__ = ["Regression"]
-
 
 @dataclass
 class Regression:

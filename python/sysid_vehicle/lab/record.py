@@ -14,8 +14,6 @@ from ..log import Log
 from ..vehicle import GRAVITY_MPS2, Vehicle
 from .observed import READINGS
 
-__all__ = ["ObserverCar", "ObserverRecord"]
-
 
 @dataclass(frozen=True)
 class ObserverCar:

@@ -14,8 +14,6 @@ from ..model import Model
 from ..vehicle import Tyre, Vehicle
 from .parts import Actuator, Controller, Nominal, Online, Sensors, Simulator
 
-__all__ = ["Setup"]
-
 _FORCE = Actuator(-8000.0, 6000.0, 60e3)
 _STEER = Actuator(-0.35, 0.35, 2.0)
 

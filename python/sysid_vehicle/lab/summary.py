@@ -16,8 +16,6 @@ from ..identify.starts import Starts
 from .tyre_data import GreyBoxVehicle, TyreLog, tyre_problem
 from .tyre_fit import UNITS, Rival, TyreFit
 
-__all__ = ["summary", "with_rivals"]
-
 _LEVEL_NATS = 1.92  # half the 95 % quantile of chi-square with one degree of freedom
 _HOPELESS = 5.0  # nats that the way to the bottom of a valley does not gain
 _BEYOND = 25.0  # squared distance in standard deviations

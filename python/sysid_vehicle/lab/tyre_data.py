@@ -15,8 +15,6 @@ from ..errors import InvalidInput
 from ..log import Log
 from ..vehicle import GRAVITY_MPS2, Vehicle
 
-__all__ = ["READINGS", "GreyBoxVehicle", "TyreLog", "tyre_problem"]
-
 READINGS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2")
 """Predicted readings, in the core's order."""
 

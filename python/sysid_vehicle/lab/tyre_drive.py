@@ -13,8 +13,6 @@ from ..errors import InvalidInput
 from .box import first_point
 from .tyre_data import READINGS, GreyBoxVehicle, TyreLog
 
-__all__ = ["drive_tyres"]
-
 _SENSORS = (0.1, 3.16e-3, 3.16e-3, 3.16e-3)  # v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2]
 
 

@@ -22,8 +22,6 @@ from .tyre_data import GreyBoxVehicle, TyreLog
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["AXLES", "NOISES", "PARAMETERS", "UNITS", "TyreBand", "TyreFit", "quantities"]
-
 AXLES = ("front", "rear")
 PARAMETERS = (
     *(f"{letter}_{axle}" for axle in AXLES for letter in "BCDE"),

@@ -13,8 +13,6 @@ from ..identify.objective import Objective, gaussian_prior
 from .tyre_data import GreyBoxVehicle, TyreLog, tyre_problem
 from .tyre_fit import PARAMETERS
 
-__all__ = ["free_parameters", "objective_of"]
-
 # Of the disturbances: what steps of 10 ms and axles without a width leave out. Beside the true
 # tyres a step is 3e-7 m/s, 3e-6 m/s and 3e-6 rad/s off in a slide: ten times that per root second
 # where each step errs anew, as of v_y and yaw rate, and a hundred times where all of a second err

@@ -25,8 +25,6 @@ from .tyre_data import GreyBoxVehicle, TyreLog
 from .tyre_fit import PARAMETERS, TyreFit
 from .tyre_objective import free_parameters, objective_of
 
-__all__ = ["identify_tyres"]
-
 _THINNED = 3200  # samples that decide between starts
 _BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 _KINEMATIC_VY = 0.1  # how far integrated accelerations may be off [m/s]

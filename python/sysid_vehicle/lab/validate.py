@@ -23,8 +23,6 @@ from .tyre_fit import NOISES, PARAMETERS, TyreFit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["IdentifiedCar", "Validation", "validate_tyres"]
-
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedCar:

@@ -12,8 +12,6 @@ from ..identify.search import Box, minimise
 from ..identify.settle import descend
 from ..identify.tyre_shape import look_alike
 
-__all__ = ["looking_alike", "valleys", "walk"]
-
 _CURVATURES = (-1.0, 0.0, 0.4, 0.8)
 _SIDES = ((0,), (4,), (0, 4))  # where the coefficients of the axles that are moved begin
 _TASTE = 5  # steps that tell whether a valley is worth going down

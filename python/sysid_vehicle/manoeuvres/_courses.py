@@ -5,8 +5,6 @@ from __future__ import annotations
 from ._curves import Knots, check_positive
 from ._manoeuvre import Manoeuvre
 
-__all__ = ["handling_course", "lap"]
-
 # Rows: time [s], speed [m/s], lateral acceleration as a share of the highest one. Each course ends
 # as it begins, so that it can go round again.
 _Rows = tuple[tuple[float, float, float], ...]

@@ -12,8 +12,6 @@ import scipy
 from .._arrays import FloatArray
 from ..errors import InvalidInput
 
-__all__ = ["Curvature", "Curve", "Knots", "Pulse", "Pulses", "Sweep", "check_positive", "constant"]
-
 
 def check_positive(where: str, **values: float | Sequence[float]) -> None:
     """Refuse arguments that are not positive numbers, or sequences that hold none.

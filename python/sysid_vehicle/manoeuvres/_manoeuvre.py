@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
+from .._style import axes_or_new
 from .._text import html_text
 from ..errors import InvalidInput
 from ..vehicle import Vehicle
@@ -17,8 +18,6 @@ from ._steady import peak_lateral_mps2, slip_difference, steady_steer, understee
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["Manoeuvre"]
 
 # A driver on a path may come this near to the peak before the manoeuvre is refused.
 _LARGEST_SHARE = 0.95
@@ -137,21 +136,8 @@ class Manoeuvre:
     _repr_html_ = html_text
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the wanted speed, and the wanted lateral acceleration on a second axis.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw; a new figure is made without it.
-
-        Returns
-        -------
-        matplotlib Axes
-        """
-        if ax is None:
-            from matplotlib import pyplot
-
-            ax = pyplot.subplots(figsize=(8.0, 3.0), layout="constrained")[1]
+        """Draw the wanted speed, and the wanted lateral acceleration on a second axis."""
+        ax = axes_or_new(ax, 8.0, 3.0)
         time_s = self._times(50.0)
         ax.plot(time_s, self.speed_mps(time_s), color="C0")
         ax.set_xlabel("time_s")

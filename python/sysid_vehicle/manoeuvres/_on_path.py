@@ -9,14 +9,6 @@ from ..errors import InvalidInput
 from ._curves import Curvature, Knots, Pulse, Pulses, Sweep, check_positive, constant
 from ._manoeuvre import Manoeuvre
 
-__all__ = [
-    "brake_in_turn",
-    "constant_radius",
-    "double_lane_change",
-    "slalom",
-    "straight_acceleration",
-]
-
 
 def slalom(
     duration_s: float = 30.0,

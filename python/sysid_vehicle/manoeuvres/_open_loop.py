@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from ._curves import Knots, Pulse, Pulses, Sweep, check_positive, constant
 from ._manoeuvre import Manoeuvre
 
-__all__ = ["ramp_steer", "sine_sweep", "sine_with_dwell", "step_steer"]
-
 _SPEED_CHANGE_MPS2 = 2.0
 # Ends of a speed change are round, so that the next steering meets a settled car.
 _SETTLE_S = 1.5

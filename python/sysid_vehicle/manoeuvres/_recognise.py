@@ -17,8 +17,6 @@ from .._arrays import FloatArray
 from ..log import Log
 from ..vehicle import Vehicle
 
-__all__ = ["Recognised", "recognise"]
-
 _STRAIGHT_MPS2 = 0.6  # lateral acceleration of a car that goes straight
 _STRAIGHT_S = 0.7  # for so long
 _SMOOTHED_S = 0.15

@@ -9,8 +9,6 @@ from .._arrays import FloatArray
 from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2, Tyre, Vehicle
 
-__all__ = ["peak_lateral_mps2", "slip_difference", "steady_steer", "understeer_gradient"]
-
 # Beyond this share of its peak a tyre's curve is too flat to tell a slip angle from a force.
 _USABLE_PEAK = 0.97
 _LARGEST_SLIP_RAD = 0.6

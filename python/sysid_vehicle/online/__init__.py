@@ -1,16 +1,16 @@
 """Estimators that run while driving, one reading at a time."""
 
 from .cornering import CorneringRls, CorneringRun, cornering_stiffness
-from .mu_slip_compare import MuSlipComparison, compare_mu_slip
-from .mu_slip_curve import (
+from .mu_slip.compare import MuSlipComparison, compare_mu_slip
+from .mu_slip.curve import (
     MAGIC_FORMULA,
     TWO_PARAMETER,
     MuSlipCurve,
     MuSlipPrior,
     magic_formula_coefficients,
 )
-from .mu_slip_data import MuSlipData, simulate_mu_slip, sinusoidal_slip
-from .mu_slip_figures import (
+from .mu_slip.data import MuSlipData, simulate_mu_slip, sinusoidal_slip
+from .mu_slip.figures import (
     MuSlipFrame,
     animate_mu_slip,
     draw_mu_slip_convergence,
@@ -20,10 +20,10 @@ from .mu_slip_figures import (
     mu_slip_overview,
     save_animation,
 )
-from .mu_slip_filter import MuSlipFilter, mu_slip_ekf, mu_slip_smooth
-from .mu_slip_least_squares import mu_slip_cramer_rao, mu_slip_fit
-from .mu_slip_noise import MuSlipNoiseStudy, mu_slip_over_noise
-from .mu_slip_results import MuSlipEstimate, MuSlipRun, MuSlipSmoothed
+from .mu_slip.filter import MuSlipFilter, mu_slip_ekf, mu_slip_smooth
+from .mu_slip.least_squares import mu_slip_cramer_rao, mu_slip_fit
+from .mu_slip.noise import MuSlipNoiseStudy, mu_slip_over_noise
+from .mu_slip.results import MuSlipEstimate, MuSlipRun, MuSlipSmoothed
 from .sideslip import KINDS, SideslipEstimate, SideslipObserver, estimate_sideslip
 from .sideslip_calibration import SideslipCalibration, calibrate_sideslip, fitted_vehicle
 from .sideslip_results import SideslipError, SideslipRun, sideslip_overview

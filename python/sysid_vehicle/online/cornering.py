@@ -25,8 +25,6 @@ from .sideslip import static_stiffness, yaw_inertia
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["CorneringRls", "CorneringRun", "cornering_stiffness"]
-
 _ENOUGH = 200  # samples with slip
 _BLOCK = 100  # samples over which the noise is one
 _SHORTEST_S, _LONGEST_S = 0.15, 1.0  # of the window; corners are smoothed away by a longer one

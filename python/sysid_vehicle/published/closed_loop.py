@@ -23,8 +23,6 @@ from ..lab import (
     Simulator,
 )
 
-__all__ = ["OBSERVER_FORM", "OBSERVER_NOISE", "observer", "setup"]
-
 _FIRST_SPEED_MPS = 5.0
 _GRAVITY_MPS2 = 9.81
 _PROCESS = (4.9439e-4, 5.8044e-4, 5.55501e-6, 17.535, 1321.6, 28.569)

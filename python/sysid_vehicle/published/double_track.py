@@ -17,8 +17,6 @@ from ..twin.car import TwinCar
 from ..twin.readings import Readings
 from ..vehicle import GRAVITY_MPS2
 
-__all__ = ["DoubleTrackObserver", "DoubleTrackRun"]
-
 
 @dataclass(frozen=True, eq=False)
 class DoubleTrackRun:

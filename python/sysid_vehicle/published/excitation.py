@@ -11,8 +11,6 @@ from .._arrays import FloatArray, as_float64
 from ..lab.excitation import Excitation
 from ..manoeuvres._curves import check_positive
 
-__all__ = ["Identification", "Oval", "excitations"]
-
 
 @dataclass(frozen=True)
 class Identification(Excitation):

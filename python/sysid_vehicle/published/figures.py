@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["joint_figure", "load_figure", "schedule_figure"]
-
 _ACCEPTABLE = 10.0  # per cent of the change: the paper's limit
 _LINES = (AFTER, BEFORE, MEASURED, FLOOR)
 _CLOSE_UP_S = 15.0

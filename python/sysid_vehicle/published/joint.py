@@ -26,20 +26,6 @@ from ..twin.observer import Observation, Observer, StateGain, observe
 from ..twin.readings import READINGS, Readings, measure
 from .double_track import DoubleTrackObserver, DoubleTrackRun
 
-__all__ = [
-    "BENCHMARK_BOX",
-    "BENCHMARK_GAINS",
-    "TWIN_BOX",
-    "TWIN_GAINS",
-    "JointExperiment",
-    "benchmark_cost",
-    "joint_drive",
-    "joint_readings",
-    "mass_and_sideslip",
-    "sideslip_and_mass_cost",
-    "twin_cost",
-]
-
 MASS_ERROR_KG = -350.0
 _WHEELS = ("fl", "fr", "rl", "rr")
 Course = Literal["lap", "double_lane_change"]

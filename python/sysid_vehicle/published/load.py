@@ -25,8 +25,6 @@ from ..twin.readings import Readings, measure, noisy_road
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["LoadExperiment", "estimate_mass", "estimate_pitch", "estimate_roll_yaw"]
-
 Law = Literal["side_by_side", "published", "gradient"]
 Mass = Literal["known", "stage_1", "wrong"]
 

@@ -32,8 +32,6 @@ from .load import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["ScheduleRun", "run_schedule"]
-
 # A later stage trusts an earlier one no further than to this part of the first spread.
 _LEAST_SPREAD = 0.02
 

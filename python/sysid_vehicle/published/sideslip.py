@@ -11,8 +11,6 @@ from ..online import SideslipObserver, SideslipRun, SideslipSettings
 from ..online.sideslip import observed_car, run_over, static_stiffness
 from ..vehicle import Vehicle
 
-__all__ = ["PublishedSideslipObserver", "estimate_sideslip"]
-
 
 class PublishedSideslipObserver(SideslipObserver):
     """The published dual UKF, with its defects; it has no settings.

@@ -13,8 +13,6 @@ from ..lab.projection import Regression
 from ..lab.regression_search import COARSE, EXACT, FINE, ROUGH, RegressionTask
 from ..lab.walk import looking_alike
 
-__all__ = ["LossTask", "search"]
-
 _PRIOR_WEIGHT = 0.1
 _PRIOR_OF_RESIDUAL_TERMS = 0.1  # relative to that of the tyres
 _SIMILARITY_WEIGHT = 1000.0

@@ -20,8 +20,6 @@ from ..lab.tyre_data import GreyBoxVehicle
 from ..lab.tyre_fit import PARAMETERS
 from .tyre_search import LossTask, search
 
-__all__ = ["LOSSES", "TYRE_BOX", "TYRE_START", "TyreRegression", "regress_tyres"]
-
 LOSSES = {
     "plain": "sum of squared errors of a_y",
     "weighted": "errors of a_y over their standard deviation, which has a floor",

@@ -135,7 +135,7 @@ def ranking_rows(study: Study, which: int = 0, most: int = 10) -> list[list[str]
             f"{p.name} {number(v, 3)} ± {number(s, 2)}{unit(p.unit)}"
             for p, v, s in zip(c.effect.parameters, c.value, c.std, strict=True)
         )
-        twins = ", ".join(c.indistinguishable_from) or "-"
+        confounded = ", ".join(c.indistinguishable_from) or "-"
         rows.append(
             [
                 c.id,
@@ -143,7 +143,7 @@ def ranking_rows(study: Study, which: int = 0, most: int = 10) -> list[list[str]
                 f"{c.p_value:.2g}",
                 f"{known[c.id][1]:.3f}" if c.id in known else "-",
                 size,
-                twins,
+                confounded,
             ]
         )
     return rows

@@ -22,8 +22,6 @@ from ._noise import RoadDisturbance, SensorNoise
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Drive", "drive", "drive_truth"]
-
 _OUTPUTS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 Channel = float | FloatArray | Callable[[FloatArray], FloatArray]
 """A column of the log: a constant, its samples, or a function of the time of all samples [s]."""
@@ -82,17 +80,7 @@ class Drive:
         )
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw driven and wanted speed, and the lateral acceleration on a second axis.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw; a new figure is made without it.
-
-        Returns
-        -------
-        matplotlib Axes
-        """
+        """Draw driven and wanted speed, and the lateral acceleration on a second axis."""
         ax = self.manoeuvre.plot(ax)
         time_s = self.log["time_s"]
         ax.plot(time_s, self.states[:, 0], "C0--")

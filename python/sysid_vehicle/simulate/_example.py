@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from ..vehicle import Tyre, Vehicle
 
-__all__ = ["example_vehicle"]
-
 
 def example_vehicle() -> Vehicle:
     """Make a plausible sports saloon with rear-wheel drive that understeers."""

@@ -9,8 +9,6 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 
-__all__ = ["RoadDisturbance", "SensorNoise"]
-
 
 def _refuse_negative(thing: object) -> None:
     for field in fields(thing):  # type: ignore[arg-type]

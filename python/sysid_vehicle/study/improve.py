@@ -66,8 +66,8 @@ def improve(
     model : Model
         The baseline.
     train, test : Log or sequence of Log
-        What to fit to, and validation data. Without `test` the last 30 % of the training
-        driving are held out.
+        What to fit to, and validation data. Without `test` the last log, or
+        the last 30 % of the only one, are validation data.
     most_effects : int
         Stop after so many, or where the training data are too short for more (`Rules.lasts`).
     alpha : float

@@ -180,8 +180,8 @@ def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
         and c.statistic > dx.rules.near * chosen.statistic
         and abs(c.statistic - chosen.statistic) >= same
         and (
-            c.id in chosen.effect.twins
-            or chosen.id in c.effect.twins
+            c.id in chosen.effect.confounded_with
+            or chosen.id in c.effect.confounded_with
             or c.id in chosen.indistinguishable_from
         )
     ]
@@ -208,7 +208,7 @@ def exchanged(
     nearly : mapping
         By effect of the model, what was nearly chosen instead.
     test : Driving
-        What the fit never saw, and has a say (`better`).
+        Validation data, which have a say (`better`).
     most_effects : int
         That the model may have.
     rules : Rules

@@ -167,7 +167,7 @@ class Study:
 
     @cached_property
     def errors_with(self) -> tuple[dict[str, tuple[float, float]], ...]:
-        """Errors with each effect that a diagnosis refitted, in training and held out.
+        """Errors with each effect that a diagnosis refitted, on training and validation data.
 
         One step ahead, against the noise floor of the final model, as `train` and `test` are. A
         dictionary by effect for each diagnosis; some seconds at first.
@@ -262,7 +262,7 @@ class Study:
         return horizons(self.fits, self.steps, self.validation)
 
     def waterfall(self, horizons_s: Sequence[float] = (0.5, 1.0, 2.0, 5.0)) -> Waterfall:
-        """Errors of every step, one sample and further ahead, in training and held out.
+        """Errors of every step, one sample and further ahead, on training and validation data.
 
         Parameters
         ----------

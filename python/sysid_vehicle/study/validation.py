@@ -45,13 +45,13 @@ def set_aside(
     if test is not None:
         return Driving.of(logs), Driving.of(test)
     if len(logs) > 1:
-        warn(f"no test log was given: '{logs[-1].name}' is held out from the fit")
+        warn(f"no validation data were given: '{logs[-1].name}' is taken for them")
         return Driving.of(logs[:-1]), Driving.of(logs[-1:])
     log = logs[0]
     cut = float(log["time_s"][int((1.0 - _SHARE) * log.n)])
     warn(
-        f"no test log was given: '{log.name}' is fitted up to {cut:.1f} s and the rest is "
-        "held out; another manoeuvre would tell more"
+        f"no validation data were given: '{log.name}' is fitted up to {cut:.1f} s and the rest "
+        "taken for them; another manoeuvre would tell more"
     )
     return Driving.of(log.between(-np.inf, cut)), Driving.of(log.between(cut, np.inf))
 
@@ -61,8 +61,8 @@ def gain_in_log_likelihood(
 ) -> Gain:
     """What the richer model gains on validation data [nats].
 
-    Either model's parameters are as unsure as the fit left them (`predict`), so that
-    what it never saw of the tyres does not drown what an effect explains. Each model predicts with
+    Either model's parameters are as unsure as the fit left them (`predict`), so that what it leaves
+    open of the tyres does not drown what an effect explains. Each model predicts with
     its own noise, or both with that of the poorer one: a richer model that has only learnt larger
     noise gains by the first and loses by the second, and none is taken to be surer than
     `NoiseModel.elsewhere`. The error comes from pieces (`_with_error`). A model that fails on the
@@ -165,7 +165,7 @@ def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
 def at_its_best(fit: Fit, test: Driving) -> Fit:
     """The fit, or the same model with parameters that serve validation data too (`serving`).
 
-    Which of them predicts better 1 to 5 s ahead. Tyres that the fit never saw at their peak err
+    Which of them predicts better 1 to 5 s ahead. Tyres that were not fitted at their peak err
     there whatever effect is in the model; but parameters which the fit left open may serve the
     errors of one step, which disturbances share, at the price of those some seconds ahead.
     """

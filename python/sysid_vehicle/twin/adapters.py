@@ -14,8 +14,6 @@ from .car import LOAD_NAMES, Load, TwinCar
 from .drives import INPUTS, OUTPUTS
 from .observer import STATES
 
-__all__ = ["CallableTwin", "NativeTwin"]
-
 _WRENCH = INPUTS.index("force_x_n")
 
 

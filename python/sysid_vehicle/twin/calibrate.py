@@ -23,15 +23,6 @@ from ..errors import InvalidInput, NumericalError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "BayesianSearch",
-    "Box",
-    "Calibration",
-    "Candidate",
-    "Optimiser",
-    "calibrate",
-]
-
 _LOST = 10.0  # a run that fails costs so many times the dearest that did not
 _UNKNOWN = 1e3  # or, before any was found, so many times this
 

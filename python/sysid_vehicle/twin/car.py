@@ -16,17 +16,6 @@ from .._arrays import FloatArray
 from .._text import html_text
 from ..errors import InvalidInput, near_names
 
-__all__ = [
-    "LOADED_SUV",
-    "LOAD_NAMES",
-    "NOMINAL_SUV",
-    "SPORTS_CAR",
-    "SPORTS_CAR_LOAD",
-    "Load",
-    "PointMass",
-    "TwinCar",
-]
-
 
 @dataclass(frozen=True)
 class PointMass:

@@ -11,8 +11,6 @@ import numpy.typing as npt
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 
-__all__ = ["checked_rows", "checked_step", "checked_stride"]
-
 _LONGEST_STEP_S = 0.1
 # The most that a name of this beginning or ending can mean, in the units of the name.
 _MOST = (

@@ -15,17 +15,6 @@ from ..errors import InvalidInput, NumericalError
 from ..manoeuvres import Manoeuvre
 from .car import Load, TwinCar
 
-__all__ = [
-    "INPUTS",
-    "OUTPUTS",
-    "Drive14",
-    "drive14",
-    "on_manoeuvre",
-    "rough_road",
-    "swept_steer",
-    "urban_cycle",
-]
-
 _WHEELS = ("fl", "fr", "rl", "rr")
 INPUTS = (
     "steer_fl_rad",

@@ -25,8 +25,6 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError, near_names
 
-__all__ = ["FMUTwin", "FMUVariables"]
-
 Kind = Literal["model_exchange", "co_simulation"]
 _AXES = 3
 

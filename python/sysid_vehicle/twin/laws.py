@@ -20,17 +20,6 @@ from ..errors import InvalidInput, near_names
 from .car import LOAD_NAMES, NOMINAL_SUV, Load
 from .drives import INPUTS
 
-__all__ = [
-    "INPUT_SCALE",
-    "ParameterLaw",
-    "Schedule",
-    "SideBySide",
-    "Unknown",
-    "inertia_law",
-    "mass_law",
-    "unknowns",
-]
-
 # Of the first guess's size: how far the twins stand apart, how wrong the guess may be, limits.
 _APART, _LIMIT = 0.01, 0.45
 _SPREAD = {"mass_kg": 0.15, "jxx_kgm2": 0.15, "jyy_kgm2": 0.2, "jzz_kgm2": 0.2}

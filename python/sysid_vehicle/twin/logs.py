@@ -19,8 +19,6 @@ from ..vehicle import Tyre, Vehicle
 from .car import Load, TwinCar
 from .drives import Drive14
 
-__all__ = ["single_track", "to_log"]
-
 _WHEELS = ("fl", "fr", "rl", "rr")
 
 

@@ -26,8 +26,6 @@ from .residuals import ChannelResidual, contradictions, residual_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["STATES", "Observation", "Observer", "StateGain", "observe"]
-
 _WHEELS = ("fl", "fr", "rl", "rr")
 _FASTEST_MPS = 150.0
 STATES = (

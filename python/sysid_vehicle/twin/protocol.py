@@ -25,8 +25,6 @@ from .car import LOAD_NAMES
 from .checks import checked_step, checked_stride
 from .observer import Observation, Observer, judged
 
-__all__ = ["CAPABILITIES", "Twin", "observe_with"]
-
 CAPABILITIES = ("parameters", "state", "wrench", "snapshot", "clone")
 _MOST_PARAMETERS = len(LOAD_NAMES)
 # Velocity: (force or moment, axis, what resists it). The horizontal axes move the whole mass.

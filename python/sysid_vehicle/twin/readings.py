@@ -13,8 +13,6 @@ from .._arrays import FloatArray
 from ..errors import InvalidInput, near_names
 from .drives import INPUTS, OUTPUTS, Drive14
 
-__all__ = ["READINGS", "Readings", "measure", "noisy_road"]
-
 READINGS = OUTPUTS[:16]
 """What may be measured: eq. (20) of Dettu et al. (2023), then what a reference unit adds."""
 

@@ -20,8 +20,6 @@ import scipy
 
 from .._arrays import FloatArray
 
-__all__ = ["ChannelResidual", "contradictions", "residual_of"]
-
 _PIECES = 20  # of the second half: their sums are taken as independent
 _LEAST = 100  # samples that a channel must have
 _SIGNIFICANT = 4.0  # standard deviations

@@ -235,6 +235,21 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
         throw NumericalFailure("the innovation covariance is not positive definite", sample);
 }
 
+/// Lowers P by one reading whose innovation has a variance, and gives its gain. `cross`, P h, is
+/// used up. The Joseph form (I - k h') P (I - k h')' + R k k' is P - k c' - c k' + s k k', with c =
+/// P h and the variance s; written so it stays symmetric. Sizes may be fixed or not.
+template <class Covariance, class Vector>
+void use_one_reading(Covariance& P, Vector& cross, double variance, Vector& gain) {
+    const double information = 1.0 / variance;
+    for (Eigen::Index i = 0; i < P.rows(); ++i) {
+        gain[i] = cross[i] * information;
+        cross[i] -= (0.5 * variance) * gain[i];
+    }
+    for (Eigen::Index k = 0; k < P.rows(); ++k)
+        for (Eigen::Index i = 0; i < P.rows(); ++i)
+            P(i, k) -= gain[i] * cross[k] + cross[i] * gain[k];
+}
+
 /// An update with one reading after the other, which gives the same where their noise is not
 /// correlated (Durbin & Koopman, Time Series Analysis by State Space Methods, 2012, sec. 6.4).
 /// Column j and element j are those of the state that has seen the readings before j.
@@ -298,25 +313,15 @@ void measurement_update(Vec<NX>& x, Mat<NX, NX>& P, const Vec<NY>& y, const Vec<
                                        sample);
         }
         const double information = 1.0 / variance;
-        Vec<NX> gain, half;
-        // The Joseph form (I - k h') P (I - k h')' + R k k' is P - k c' - c k' + s k k', with
-        // c = P h and the variance s of the innovation; written so it stays symmetric.
-        for (int i = 0; i < NX; ++i) {
-            gain[i] = cross[i] * information;
-            half[i] = cross[i] - (0.5 * variance) * gain[i];
-            x[i] += gain[i] * innovation;
-        }
-        const auto lower = [&] {
-            for (int k = 0; k < NX; ++k)
-                for (int i = 0; i < NX; ++i) P(i, k) -= gain[i] * half[k] + half[i] * gain[k];
-        };
+        Vec<NX> gain;
         if (R(j, j) < kSurest * variance) {
             const Mat<NX, NX> before_it = P;
-            lower();
+            use_one_reading(P, cross, variance, gain);
             keep_positive<NX>(before_it, P);
         } else {
-            lower();
+            use_one_reading(P, cross, variance, gain);
         }
+        for (int i = 0; i < NX; ++i) x[i] += gain[i] * innovation;
         u.squares += innovation * innovation * information;
         u.determinant *= variance;
         u.innovation[j] = innovation;

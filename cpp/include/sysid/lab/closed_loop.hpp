@@ -71,13 +71,13 @@ struct Reckoning {
         heading_rad += dt * e[kEstYawRate];
     }
     void correct(const Readings& y, double gain) {
-        const auto mend = [gain](double& value, double reading) {
+        const auto towards = [gain](double& value, double reading) {
             if (std::isnan(reading)) return;
             value = gain == 1.0 ? reading : value + gain * (reading - value);
         };
-        mend(x_m, y[kSensePlaceX]);
-        mend(y_m, y[kSensePlaceY]);
-        mend(heading_rad, y[kSenseHeading]);
+        towards(x_m, y[kSensePlaceX]);
+        towards(y_m, y[kSensePlaceY]);
+        towards(heading_rad, y[kSenseHeading]);
     }
 };
 

@@ -34,9 +34,7 @@ double log_likelihood(const ObserverLog& log, const ObserverNoise& noise);
 
 ObserverTrace trace(const ObserverLog& log, const ObserverNoise& noise, bool smoothed);
 
-/// Learns Q and R from all logs together. Logs of the published form are learned from as published:
-/// expectations from a smoother whose transition matrix is one sample late, moments of the model
-/// linearised at the smoothed states, with the inputs of the sample before.
+/// Learns Q and R from all logs together.
 ObserverEm learn(const std::vector<ObserverLog>& logs, const ObserverNoise& start,
                  const NoiseStructure<kObserverStates>& process,
                  const NoiseStructure<kObserverMeasurements>& sensors, const EmOptions& options);

@@ -23,8 +23,7 @@ class LoopObserver {
           believed_car_{car.mass_kg, car.yaw_inertia_kgm2, car.lf_m, car.lr_m, car.drag_nspm},
           model_(believed_car_, data.form, dt) {
         if (!data.certain_start) return;
-        ObserverStart start = ObserverStart::published();
-        start.mean[0] = data.first_speed_mps;
+        const ObserverStart start = ObserverStart::certain(data.first_speed_mps);
         observer_.emplace(model_, data_.noise, start);
         state_ = start.mean;
     }

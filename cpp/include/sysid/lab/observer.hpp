@@ -40,7 +40,7 @@ struct ObserverForm {
     bool speed_predicted = true;  // a_y with the predicted speed, not the estimate before it
 
     static ObserverForm corrected() { return {}; }
-    static ObserverForm published() { return {false, false, false, false, false}; }
+    bool operator==(const ObserverForm&) const = default;
 };
 
 /// What the observer believes of the car.
@@ -180,10 +180,10 @@ struct ObserverStart {
     ObserverMat covariance = ObserverMat::Zero();
     bool one_before = false;
 
-    /// Standstill-free start of the published form: 5 m/s, certain.
-    static ObserverStart published() {
+    /// Straight on at a speed that is certain one sample earlier.
+    static ObserverStart certain(double speed_mps) {
         ObserverStart start;
-        start.mean[0] = 5.0;
+        start.mean[0] = speed_mps;
         start.one_before = true;
         return start;
     }

@@ -51,7 +51,7 @@ struct Seen {
     Reference reference;
 };
 
-/// Decides the next steering angle and force: what the path ahead needs, mended by what was seen.
+/// Decides the next steering angle and force: what the path ahead needs, corrected by readings.
 class Hands {
   public:
     Hands(const DrivenCar& car, const Driver& driver, double dt)
@@ -88,9 +88,9 @@ class Hands {
             // Steering that has reached its stop must not wind up the integral.
             const double stop = std::copysign(driver_.steer_limit_rad, error);
             if (std::abs(now.steer_rad - stop) > 1e-9) integral_ += error * dt_;
-            const double mending =
+            const double correction =
                 driver_.yaw_rate_gain * error + driver_.yaw_rate_integral_ps * integral_;
-            angle += steer_per_curvature * (ahead.curvature_radpm + mending / v);
+            angle += steer_per_curvature * (ahead.curvature_radpm + correction / v);
         }
         return std::clamp(angle, -driver_.steer_limit_rad, driver_.steer_limit_rad);
     }

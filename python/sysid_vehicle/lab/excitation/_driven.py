@@ -15,8 +15,6 @@ from ...vehicle import Vehicle
 from ._excitation import Excitation
 from ._multisine import MultiSine
 
-__all__ = ["Driven", "OnManoeuvre", "multi_sine", "speed_ramp"]
-
 _FINE_HZ = 200.0
 
 

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from ..preview import Preview
     from ..setup import Setup
 
-__all__ = ["Excitation", "derivative", "sample_times"]
-
 
 def sample_times(duration_s: float, rate_hz: float) -> FloatArray:
     """Sample times from 0 to the end, both included."""
@@ -133,17 +131,7 @@ class Excitation(ABC):
     _repr_html_ = html_text
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the wanted speed, and the heading on a second axis; or the track.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw; a new figure is made without it.
-
-        Returns
-        -------
-        matplotlib Axes
-        """
+        """Draw the wanted speed, and the heading on a second axis; or the track."""
         ax = axes_or_new(ax, 8.0, 3.0)
         track = self.track()
         if track is not None:

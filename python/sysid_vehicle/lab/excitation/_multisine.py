@@ -10,8 +10,6 @@ from ..._arrays import FloatArray, as_float64
 from ...errors import InvalidInput
 from ...manoeuvres._curves import check_positive
 
-__all__ = ["MultiSine"]
-
 _ROUNDS = 400
 _SAMPLES_PER_PERIOD = 32  # of the highest line
 

@@ -13,8 +13,6 @@ from ...manoeuvres._curves import check_positive
 from ._excitation import Excitation
 from ._multisine import MultiSine
 
-__all__ = ["Weaving"]
-
 
 @dataclass(frozen=True)
 class Weaving(Excitation):

@@ -8,17 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from .. import _core
-from .._arrays import FloatArray, as_float64
-from ..errors import InvalidInput
-
-__all__ = [
-    "MAGIC_FORMULA",
-    "TWO_PARAMETER",
-    "MuSlipCurve",
-    "MuSlipPrior",
-    "magic_formula_coefficients",
-]
+from ... import _core
+from ..._arrays import FloatArray, as_float64
+from ...errors import InvalidInput
 
 
 @dataclass(frozen=True)

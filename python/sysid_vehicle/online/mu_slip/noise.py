@@ -9,21 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .._arguments import generator
-from .._arrays import FloatArray, as_float64
-from .._progress import doing
-from .._style import FLOOR, axes_or_new, tidy
-from .._text import brief, html_text, text_table
-from ..errors import InvalidInput
-from .mu_slip_compare import compare_mu_slip
-from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
-from .mu_slip_data import check_noise, simulate_mu_slip
-from .mu_slip_least_squares import mu_slip_cramer_rao
+from ..._arguments import generator
+from ..._arrays import FloatArray, as_float64
+from ..._progress import doing
+from ..._style import FLOOR, axes_or_new, tidy
+from ..._text import brief, html_text, text_table
+from ...errors import InvalidInput
+from .compare import compare_mu_slip
+from .curve import TWO_PARAMETER, MuSlipCurve
+from .data import check_noise, simulate_mu_slip
+from .least_squares import mu_slip_cramer_rao
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["MuSlipNoiseStudy", "mu_slip_over_noise"]
 
 _LEVELS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
 _MARKERS = "os^vDPX*<>"

@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._arrays import FloatArray
-from .._style import AFTER, MEASURED, axes_or_new, tidy
-from .._text import brief, html_text, text_table
-from .mu_slip_curve import MuSlipCurve, magic_formula_coefficients
-from .mu_slip_data import MuSlipData
+from ..._arrays import FloatArray
+from ..._style import AFTER, MEASURED, axes_or_new, tidy
+from ..._text import brief, html_text, text_table
+from .curve import MuSlipCurve, magic_formula_coefficients
+from .data import MuSlipData
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["MuSlipEstimate", "MuSlipRun", "MuSlipSmoothed"]
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from .._arguments import generator
-from .._arrays import FloatArray, as_float64
-from .._text import brief
-from ..errors import InvalidInput, near_names
-from ..read._csv import read_table
-from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
-
-__all__ = ["MuSlipData", "simulate_mu_slip", "sinusoidal_slip"]
+from ..._arguments import generator
+from ..._arrays import FloatArray, as_float64
+from ..._text import brief
+from ...errors import InvalidInput, near_names
+from ...read._csv import read_table
+from .curve import TWO_PARAMETER, MuSlipCurve
 
 _COLUMNS = ("slip", "mu")
 _LARGEST = {"slip": 1.5, "mu": 5.0}  # beyond them the unit is wrong

@@ -1,4 +1,4 @@
-#include "sysid/online/published_dual.hpp"
+#include "sysid/published/sideslip_observer.hpp"
 
 #include <cstdio>
 

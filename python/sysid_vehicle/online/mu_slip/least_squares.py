@@ -8,13 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray, as_float64
-from ..errors import InvalidInput
-from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
-from .mu_slip_data import MuSlipData, at_least_one, check_noise, check_values
-from .mu_slip_results import MuSlipEstimate, cautions
-
-__all__ = ["mu_slip_cramer_rao", "mu_slip_fit", "noise_of"]
+from ..._arrays import FloatArray, as_float64
+from ...errors import InvalidInput
+from .curve import TWO_PARAMETER, MuSlipCurve
+from .data import MuSlipData, at_least_one, check_noise, check_values
+from .results import MuSlipEstimate, cautions
 
 
 def mu_slip_fit(

@@ -11,29 +11,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray
-from .._progress import doing
-from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, new_figure, tidy
-from ..errors import InvalidInput
-from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve
-from .mu_slip_results import MuSlipRun
+from ..._arrays import FloatArray
+from ..._progress import doing
+from ..._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, new_figure, tidy
+from ...errors import InvalidInput
+from .curve import TWO_PARAMETER, MuSlipCurve
+from .results import MuSlipRun
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = [
-    "MuSlipFrame",
-    "animate_mu_slip",
-    "draw_mu_slip_convergence",
-    "draw_mu_slip_lissajous",
-    "draw_mu_slip_observability",
-    "draw_mu_slip_signal",
-    "mu_slip_overview",
-    "save_animation",
-]
 
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 120)
 

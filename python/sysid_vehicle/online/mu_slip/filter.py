@@ -11,14 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
-from ..errors import InvalidInput
-from .mu_slip_curve import TWO_PARAMETER, MuSlipCurve, MuSlipPrior
-from .mu_slip_data import MuSlipData, at_least_one, check_noise, check_values
-from .mu_slip_least_squares import noise_of
-from .mu_slip_results import MuSlipRun, MuSlipSmoothed
-
-__all__ = ["MuSlipFilter", "mu_slip_ekf", "mu_slip_smooth"]
+from ..._arrays import FloatArray, as_float64
+from ...errors import InvalidInput
+from .curve import TWO_PARAMETER, MuSlipCurve, MuSlipPrior
+from .data import MuSlipData, at_least_one, check_noise, check_values
+from .least_squares import noise_of
+from .results import MuSlipRun, MuSlipSmoothed
 
 _NOISE_FACTOR = 3.0  # Rudd, In[20]: keeps the truth inside the one-sigma contour
 

@@ -1,4 +1,4 @@
-#include "sysid/twin/double_track.hpp"
+#include "sysid/published/double_track.hpp"
 
 #include <algorithm>
 #include <cmath>

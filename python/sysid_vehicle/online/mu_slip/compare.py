@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from .._progress import doing
-from .._text import brief, html_text, text_table
-from ..errors import InvalidInput
-from .mu_slip_curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
-from .mu_slip_data import MuSlipData
-from .mu_slip_filter import mu_slip_ekf, mu_slip_smooth
-from .mu_slip_least_squares import counted, mu_slip_fit, noise_of
-from .mu_slip_results import MuSlipEstimate
-
-__all__ = ["MuSlipComparison", "compare_mu_slip"]
+from ..._progress import doing
+from ..._text import brief, html_text, text_table
+from ...errors import InvalidInput
+from .curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
+from .data import MuSlipData
+from .filter import mu_slip_ekf, mu_slip_smooth
+from .least_squares import counted, mu_slip_fit, noise_of
+from .results import MuSlipEstimate
 
 _ITERATIONS = 10
 
