@@ -25,6 +25,12 @@ Problem long_run(EffectMask effects, std::size_t samples = 620) {
     return problem;
 }
 
+/// The error of a speed that is not read stays.
+Problem without_speed(Problem problem) {
+    for (auto& y : problem.runs[0].measurements) y[kVx] = y[kVy] = y[kAx] = std::nan("");
+    return problem;
+}
+
 Eigen::VectorXd residuals_of(const Problem& problem, const Parameters& p,
                              const FrozenFilter& filter) {
     Eigen::VectorXd e(static_cast<int>(problem.samples()) * kChannels);
@@ -94,10 +100,50 @@ TEST_P(SideBySide, OtherParametersAndModelsGoTheSameWay) {
     EXPECT_NE(together.head(alone.size()), alone);  // other roundings: pieces were used
 }
 
+struct Score {
+    double value;
+    Vec<kNoiseParameters> gradient;
+    Mat<kNoiseParameters, kNoiseParameters> information;
+};
+Score score_of(const Problem& problem, const Noise& noise) {
+    Score out;
+    out.value = noise_score(problem, typical_parameters().data(), noise, out.gradient.data(),
+                            out.information.data());
+    return out;
+}
+
+TEST_P(SideBySide, NoiseScoresOfRunsAddUp) {
+    for (const EffectMask effects : {EffectMask{0}, kLagging})
+        for (const Noise& noise : {ordinary_noise(), sloping_noise()}) {
+            Problem problem = long_run(effects, 130);
+            ASSERT_TRUE(pieces_of(problem.runs).empty());
+            const Score one = score_of(problem, noise);
+            problem.runs.resize(16, problem.runs[0]);
+            ASSERT_EQ(pieces_of(problem.runs).size(), 16U);
+            const Score all = score_of(problem, noise);
+            EXPECT_NEAR(all.value, 16.0 * one.value, 1e-12 * std::abs(all.value));
+            EXPECT_LT((all.gradient - 16.0 * one.gradient).norm(), 1e-11 * all.gradient.norm());
+            EXPECT_LT((all.information - 16.0 * one.information).norm(),
+                      1e-11 * all.information.norm());
+        }
+}
+
+TEST(SideBySideToo, NoiseScoreOfPiecesIsThatOfTheWholeRun) {
+    const Noise noise = ordinary_noise();
+    const Problem quick = long_run(kLagging), slow = without_speed(quick);
+    Problem both = quick;  // all in one go, for the sake of the second run
+    both.runs.push_back(slow.runs[0]);
+    const Score pieces = score_of(quick, noise), rest = score_of(slow, noise);
+    const Score whole = score_of(both, noise);
+    EXPECT_NEAR(pieces.value + rest.value, whole.value, 1e-11 * std::abs(whole.value));
+    EXPECT_LT((pieces.gradient + rest.gradient - whole.gradient).norm(),
+              1e-10 * pieces.gradient.norm());
+    EXPECT_LT((pieces.information + rest.information - whole.information).norm(),
+              1e-10 * pieces.information.norm());
+}
+
 TEST(SideBySideToo, WhatIsNotForgottenIsDoneInOneGo) {
-    Problem problem = long_run(EffectMask{0});
-    // Where no speed is read its error stays.
-    for (auto& y : problem.runs[0].measurements) y[kVx] = y[kVy] = y[kAx] = std::nan("");
+    const Problem problem = without_speed(long_run(EffectMask{0}));
     ASSERT_FALSE(pieces_of(problem.runs).empty());
     EXPECT_FALSE(expect_whole(problem, ordinary_noise()));
 }

@@ -176,6 +176,8 @@ class PathWalk {
         return true;
     }
 
+    void finish(std::size_t /*first*/, std::size_t /*last*/) const {}
+
   private:
     const Problem& problem_;
     const std::vector<Piece>& pieces_;

@@ -36,13 +36,13 @@ std::size_t steps_of(const std::vector<Run>& runs, const std::vector<Piece>& pie
 
 }  // namespace
 
-std::vector<Piece> pieces_of(const std::vector<Run>& runs) {
+std::vector<Piece> pieces_of(const std::vector<Run>& runs, std::size_t most) {
     std::size_t all = 0, longest = 1;
     for (const Run& run : runs) {
         all += run.size();
         longest = std::max(longest, run.size());
     }
-    std::vector<Piece> whole = cut(runs, longest);
+    std::vector<Piece> whole = cut(runs, std::min(longest, most));
     const std::size_t lanes = (runs.size() + kLanes - 1) / kLanes * kLanes;
     std::size_t low = 1, high = longest;  // the shortest pieces that fit into so many lanes
     while (low < high) {
@@ -52,7 +52,7 @@ std::vector<Piece> pieces_of(const std::vector<Run>& runs) {
         else
             low = middle + 1;
     }
-    std::vector<Piece> parts = cut(runs, high);
+    std::vector<Piece> parts = cut(runs, std::min(high, most));
     const std::size_t steps_whole = steps_of(runs, whole), steps_parts = steps_of(runs, parts);
     if (kGain * std::min(steps_whole, steps_parts) >= all) return {};
     return steps_parts < steps_whole ? parts : whole;

@@ -41,6 +41,9 @@ struct FrozenFilter {
     const double* whitener(std::size_t run, std::size_t k) const {
         return gain(run, k) + rows.size() * kChannels;
     }
+    double* whitener(std::size_t run, std::size_t k) {
+        return gain(run, k) + rows.size() * kChannels;
+    }
     /// Where among the gains of a sample those of such rows stand; -1 for those that have none.
     std::vector<int> places(const std::vector<int>& of) const;
 };

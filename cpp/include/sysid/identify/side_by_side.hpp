@@ -22,8 +22,10 @@ struct Piece {
     std::size_t size() const { return end - begin; }
 };
 
-/// How runs are cut so that the lanes are full; nothing where lanes would gain nothing.
-std::vector<Piece> pieces_of(const std::vector<Run>& runs);
+/// How runs are cut so that the lanes are full, into pieces of so many samples at most; nothing
+/// where lanes would gain nothing.
+std::vector<Piece> pieces_of(const std::vector<Run>& runs,
+                             std::size_t most = std::numeric_limits<std::size_t>::max());
 
 /// A sample in a lane. Where it is not to be kept the lane has nothing to do.
 struct LaneSample {
@@ -81,7 +83,7 @@ class LaneGroup {
 /// `walk.state()` are the numbers handed from sample to sample, `walk.begin(piece, to)` writes
 /// those of a guess, of what is known where a run begins; `walk.sample(samples)` does a sample in
 /// each lane, false if it cannot; `walk.distance(a, b)` is at most one where two such lists of
-/// numbers are the same.
+/// numbers are the same; `walk.finish(first, last)` gets the pieces of a group that are done.
 template <class Walk>
 bool side_by_side(const std::vector<Run>& runs, const std::vector<Piece>& pieces, Walk& walk) {
     constexpr int kRounds = 8;  // more of them cost as much as no lanes at all
@@ -143,6 +145,7 @@ bool side_by_side(const std::vector<Run>& runs, const std::vector<Piece>& pieces
             }
         }
         std::copy_n(group.end(group.count() - 1), numbers, before.begin());
+        walk.finish(first, first + group.count());
     }
     return true;
 }

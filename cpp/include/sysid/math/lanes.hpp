@@ -27,6 +27,21 @@ struct LaneUpdate {
     LaneRow* gain = nullptr;        // states x readings, of the innovations of the whole sample
     LaneRow* whitener = nullptr;    // of those, a lower triangle
 };
+/// Derivatives of mean and covariance of one filter by `width` parameters of its noise, a multiple
+/// of eight; the first are those of the readings.
+struct LaneScore {
+    std::size_t states = 0, readings = 0, width = 0;
+    const double* observation = nullptr;  // readings x states
+    const double* gain = nullptr;         // states x readings
+    const double* whitener = nullptr;     // lower triangle
+    const double* innovation = nullptr;   // zero where there is no reading
+    const double* sensor = nullptr;       // of each variance by its own parameter; zero likewise
+    double* mean = nullptr;               // states x width
+    double* covariance = nullptr;         // lower triangle x width
+    /// Whose squares add up to the information: of L^-1 dS L^-T the lower triangle, with the
+    /// diagonal over the root of two, each row followed by that of L^-1 H dx.
+    double* rows = nullptr;
+};
 constexpr std::size_t kMostLaneStates = 40, kMostLaneReadings = 8;
 
 struct LaneKernels {
@@ -57,6 +72,12 @@ struct LaneKernels {
                     LaneRow* P);
     /// Mean and covariance after the readings.
     void (*correct)(const LaneUpdate& u, LaneRow* x, LaneRow* P);
+    /// The derivatives after the readings, and `rows`.
+    void (*score_update)(const LaneScore& s);
+    /// The derivatives at the next sample: the first `moving` states have rows of A (moving x
+    /// states), the others are scaled.
+    void (*score_predict)(const double* A, std::size_t moving, const double* forget,
+                          const LaneScore& s);
 };
 
 /// The kernels for this processor; all give the same to rounding.
