@@ -1,8 +1,7 @@
 #include "sysid/identify/local_model.hpp"
 
 #include <algorithm>
-
-#include "sysid/math/lanes.hpp"
+#include <map>
 
 namespace sysid {
 
@@ -10,129 +9,39 @@ namespace {
 
 std::size_t place(int i) { return static_cast<std::size_t>(i); }
 
-constexpr std::size_t kGiven = 3 + kUserChannels;  // numbers of an `Input`
-
-InputFor<Recorded> recorded_input(Recorder& to) {
-    InputFor<Recorded> u;
-    for (Recorded* x : {&u.steer_rad, &u.longitudinal, &u.time_s}) *x = to.input(false);
-    for (Recorded& x : u.channels) x = to.input(false);
-    return u;
-}
-
-std::array<double, kGiven> numbers(const Input& u) {
-    std::array<double, kGiven> all{u.steer_rad, u.longitudinal, u.time_s};
-    std::copy(u.channels.begin(), u.channels.end(), all.begin() + 3);
-    return all;
-}
-
 double at(const LaneRow* row, std::size_t lane) { return row == nullptr ? 1.0 : row->at[lane]; }
 
 }  // namespace
 
 LocalModel::LocalModel(const SingleTrack& model, const double* p, const std::vector<int>& columns,
                        std::size_t width, bool all_externals)
-    : model_(model),
-      p_(p),
+    : model_(model, p, columns, all_externals),
       columns_of_(kParameterCount),
       width_(width),
-      own_(active_states(model.effects)),
-      states_(kMotionStates + own_.count),
-      externals_(all_externals ? kExternals : kMotionStates),
-      step_parameters_(states_ * (states_ + externals_)),
-      read_at_(step_parameters_ + states_ * width_),
-      read_parameters_(read_at_ + kChannels * (states_ + externals_)) {
+      step_parameters_(states() * model_.moving()),
+      read_at_(step_parameters_ + states() * width_),
+      read_parameters_(read_at_ + kChannels * model_.moving()) {
     for (std::size_t j = 0; j < columns.size(); ++j) columns_of_[place(columns[j])].push_back(j);
-    Recorder to;
-    const Moving now = moving(to);
-    const InputFor<Recorded> u = recorded_input(to);
-    const std::vector<Recorded> values = parameters(to);
-    const auto y = sense(model_, now.x, now.external.data(), u, values.data());
-    read_ = ready(to.program({y.begin(), y.end()}));
-}
-
-LocalModel::Moving LocalModel::moving(Recorder& to) const {
-    Moving now;
-    for (std::size_t i = 0; i < kMotionStates; ++i) now.x[i] = to.input(true);
-    for (const std::size_t i : own_) now.x[kMotionStates + i] = to.input(true);
-    for (std::size_t i = 0; i < externals_; ++i) now.external[i] = to.input(true);
-    return now;
-}
-
-std::vector<Recorded> LocalModel::parameters(Recorder& to) const {
-    std::vector<Recorded> all;
-    all.reserve(kParameterCount);
-    for (std::size_t i = 0; i < kParameterCount; ++i)
-        all.push_back(to.parameter(p_[i], !columns_of_[i].empty()));
-    return all;
-}
-
-std::vector<Recorded> LocalModel::packed(const ModelState<Recorded>& x) const {
-    std::vector<Recorded> out(x.begin(), x.begin() + kMotionStates);
-    for (const std::size_t i : own_) out.push_back(x[kMotionStates + i]);
-    return out;
-}
-
-LocalModel::Ready LocalModel::ready(Program program) {
-    Ready out;
-    out.rows.resize(place(program.rows));
-    for (const auto& [row, value] : program.uniform)
-        std::fill_n(out.rows[place(row)].at, kLanes, value);
-    out.adjoints.resize(place(program.slots * kSweep));
-    out.program = std::move(program);
-    return out;
-}
-
-LocalModel::Ready& LocalModel::step_of(double h) {
-    const auto found = steps_.find(h);
-    if (found != steps_.end()) return found->second;
-    Recorder to;
-    Moving now = moving(to);
-    const InputFor<Recorded> from = recorded_input(to);
-    const InputFor<Recorded> until = recorded_input(to);
-    const std::vector<Recorded> values = parameters(to);
-    advance(model_, now.x, now.external.data(), from, until, values.data(), h, 1);
-    return steps_.emplace(h, ready(to.program(packed(now.x)))).first->second;
 }
 
 std::vector<double> LocalModel::start(const Run& run) const {
-    std::vector<double> out(states_ * width_, 0.0);
-    if (own_.count == 0) return out;
-    Recorder to;
-    const std::vector<Recorded> values = parameters(to);
-    Ready all = ready(to.program(packed(initial_state<Recorded>(model_, run, values.data()))));
-    sweep(all, [&](std::size_t output, std::size_t input, const LaneRow* row) {
+    std::vector<double> out(states() * width_, 0.0);
+    if (model_.own().count == 0) return out;
+    Ready all = model_.start_of(run);
+    RecordedModel::sweep(all, [&](std::size_t output, std::size_t input, const LaneRow* row) {
         for (const std::size_t j : columns_of_[input]) out[output * width_ + j] = at(row, 0);
     });
     return out;
 }
 
-/// Calls `put(output, input, row)` for every derivative that is not zero; nullptr for ones.
+/// Calls `put(place, row)` for every derivative that is not zero, with its place among the numbers
+/// of a sample.
 template <class Put>
-void LocalModel::sweep(Ready& ready, Put&& put) {
-    const Program& program = ready.program;
-    for (std::size_t o = 0; o < program.same_as.size(); ++o)
-        if (program.same_as[o] >= 0) put(o, place(program.same_as[o]), nullptr);
-    for (const Sweep& s : program.sweeps) {
-        const std::size_t wide = s.outputs.size();
-        const auto slot = [&](std::int32_t i) { return ready.adjoints.data() + place(i) * wide; };
-        for (const std::int32_t seed : s.seeds)
-            for (std::size_t m = 0; m < wide; ++m) std::fill_n(slot(seed)[m].at, kLanes, 0.0);
-        for (std::size_t m = 0; m < wide; ++m) std::fill_n(slot(s.seeds[m])[m].at, kLanes, 1.0);
-        lane_kernels().backward(s.steps.data(), s.steps.size(), static_cast<int>(wide),
-                                ready.rows.data(), ready.adjoints.data());
-        for (std::size_t i = 0; i < s.inputs.size(); ++i)
-            for (std::size_t m = 0; s.inputs[i] >= 0 && m < wide; ++m)
-                put(place(s.outputs[m]), i, slot(s.inputs[i]) + m);
-    }
-}
-
-/// The same by places among the numbers of a sample; between states and parameters there are
-/// `given` inputs.
-template <class Put>
-void LocalModel::spread(Ready& ready, std::size_t given, std::size_t by_state,
+void LocalModel::spread(Ready& ready, std::size_t inputs_given, std::size_t by_state,
                         std::size_t by_parameter, Put&& put) const {
-    const std::size_t columns = states_ + externals_, first = columns + given;
-    sweep(ready, [&](std::size_t output, std::size_t input, const LaneRow* row) {
+    const std::size_t columns = model_.moving();
+    const std::size_t first = columns + inputs_given * RecordedModel::kGiven;
+    RecordedModel::sweep(ready, [&](std::size_t output, std::size_t input, const LaneRow* row) {
         if (input < columns) return put(by_state + output * columns + input, row);
         for (const std::size_t j : columns_of_[input - first])
             put(by_parameter + output * width_ + j, row);
@@ -140,16 +49,16 @@ void LocalModel::spread(Ready& ready, std::size_t given, std::size_t by_state,
 }
 
 void LocalModel::read(const PathSample* samples, std::size_t count, double* out) {
+    Ready& ready = model_.reading();
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
         const PathSample& s = samples[std::min(lane, count - 1)];
-        std::size_t input = 0;
-        for (std::size_t i = 0; i < states_; ++i) read_.set(input++, lane, s.here[i]);
-        for (std::size_t i = 0; i < externals_; ++i) read_.set(input++, lane, s.pushed_here[i]);
-        for (const double v : numbers(s.run->inputs[s.at])) read_.set(input++, lane, v);
+        for (std::size_t i = 0; i < states(); ++i) ready.set(i, lane, s.here[i]);
+        for (std::size_t i = 0; i < externals(); ++i)
+            ready.set(states() + i, lane, s.pushed_here[i]);
+        ready.give(0, lane, s.run->inputs[s.at]);
     }
-    const auto& steps = read_.program.steps;
-    lane_kernels().forward(steps.data(), steps.size(), read_.rows.data());
-    spread(read_, kGiven, read_at_, read_parameters_, [&](std::size_t to, const LaneRow* row) {
+    ready.run();
+    spread(ready, 1, read_at_, read_parameters_, [&](std::size_t to, const LaneRow* row) {
         for (std::size_t lane = 0; lane < count; ++lane) out[lane * size() + to] = at(row, lane);
     });
 }
@@ -157,34 +66,31 @@ void LocalModel::read(const PathSample* samples, std::size_t count, double* out)
 void LocalModel::step(const PathSample* samples, const std::size_t* which, std::size_t count,
                       double* out) {
     const int parts = samples[which[0]].substeps;
-    Ready& ready = step_of(samples[which[0]].run->dt / parts);
-    const auto& steps = ready.program.steps;
-    std::vector<LaneRow> now(states_);
+    Ready& ready = model_.step_of(samples[which[0]].run->dt / parts);
+    std::vector<LaneRow> now(states());
     std::vector<std::vector<double>> later;
     for (int n = 0; n < parts; ++n) {
-        for (std::size_t i = 0; n > 0 && i < states_; ++i)
-            now[i] = ready.rows[place(ready.program.outputs[i])];
+        for (std::size_t i = 0; n > 0 && i < states(); ++i) now[i] = ready.output(i);
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
             const PathSample& s = samples[which[std::min(lane, count - 1)]];
-            std::size_t input = 0;
-            for (std::size_t i = 0; i < states_; ++i)
-                ready.set(input++, lane, n > 0 ? now[i].at[lane] : s.before[i]);
-            for (std::size_t i = 0; i < externals_; ++i) ready.set(input++, lane, s.pushed[i]);
+            for (std::size_t i = 0; i < states(); ++i)
+                ready.set(i, lane, n > 0 ? now[i].at[lane] : s.before[i]);
+            for (std::size_t i = 0; i < externals(); ++i)
+                ready.set(states() + i, lane, s.pushed[i]);
             const Input &from = s.run->inputs[s.at - 1], &to = s.run->inputs[s.at];
-            for (const int end : {n, n + 1})
-                for (const double v : numbers(between(from, to, static_cast<double>(end) / parts)))
-                    ready.set(input++, lane, v);
+            ready.give(0, lane, between(from, to, static_cast<double>(n) / parts));
+            ready.give(1, lane, between(from, to, (n + 1.0) / parts));
         }
-        lane_kernels().forward(steps.data(), steps.size(), ready.rows.data());
+        ready.run();
         if (n == 0) {
-            spread(ready, 2 * kGiven, 0, step_parameters_, [&](std::size_t to, const LaneRow* row) {
+            spread(ready, 2, 0, step_parameters_, [&](std::size_t to, const LaneRow* row) {
                 for (std::size_t lane = 0; lane < count; ++lane)
                     out[which[lane] * size() + to] = at(row, lane);
             });
             continue;
         }
         later.assign(count, std::vector<double>(read_at_, 0.0));
-        spread(ready, 2 * kGiven, 0, step_parameters_, [&](std::size_t to, const LaneRow* row) {
+        spread(ready, 2, 0, step_parameters_, [&](std::size_t to, const LaneRow* row) {
             for (std::size_t lane = 0; lane < count; ++lane) later[lane][to] = at(row, lane);
         });
         for (std::size_t lane = 0; lane < count; ++lane)
@@ -196,14 +102,14 @@ void LocalModel::step(const PathSample* samples, const std::size_t* which, std::
 /// J_parameters).
 void LocalModel::chain(const std::vector<double>& part, double* whole) const {
     const std::vector<double> before(whole, whole + read_at_);
-    const std::size_t columns = states_ + externals_;
+    const std::size_t columns = model_.moving();
     std::copy(part.begin(), part.end(), whole);
-    for (std::size_t o = 0; o < states_; ++o) {
+    for (std::size_t o = 0; o < states(); ++o) {
         const double* J = part.data() + o * columns;
         double* row = whole + o * columns;
         double* by = whole + step_parameters_ + o * width_;
-        std::fill_n(row, states_, 0.0);
-        for (std::size_t i = 0; i < states_; ++i) {
+        std::fill_n(row, states(), 0.0);
+        for (std::size_t i = 0; i < states(); ++i) {
             if (J[i] == 0.0) continue;
             for (std::size_t c = 0; c < columns; ++c) row[c] += J[i] * before[i * columns + c];
             for (std::size_t c = 0; c < width_; ++c)

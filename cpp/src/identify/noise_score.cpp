@@ -2,6 +2,9 @@
 // stands in `estimate/noise_score.hpp`.
 #include "sysid/estimate/noise_score.hpp"
 
+#include <optional>
+
+#include "sysid/identify/lane_filter.hpp"
 #include "sysid/identify/prediction_error.hpp"
 #include "sysid/identify/run_system.hpp"
 
@@ -18,57 +21,133 @@ constexpr int time_lane(std::size_t i) {
                              : kNoiseParameters - 1;
 }
 
-/// Of `L` noise parameters: those of the road only where there is one.
-template <int L, int NX>
-NoiseScore<kChannels, L> score_of(const RunSystem<NX>& system, const Run& run, const Noise& noise) {
+/// Of `L` noise parameters: those of the road only where there is one. Of `n` states the first
+/// `moving` have a transition; the disturbances stand where `disturbing` says.
+template <int L, class Disturbing>
+NoiseScore<kChannels, L> score_of(const Noise& noise, const Run& run, int n, int moving,
+                                  Disturbing&& disturbing) {
+    const std::size_t disturbances = noise.sloping() ? kDisturbances : kMotionStates;
     Vec<kChannels> sensor;
     for (int i = 0; i < kChannels; ++i) {
         const double s = noise.sensor[static_cast<std::size_t>(i)];
         sensor[i] = 2.0 * s * s;
     }
-    NoiseScore<kChannels, L> score(system.taking_part(), sensor);
+    std::vector<double> forget;
+    for (std::size_t i = 0; i < disturbances && moving < n; ++i)
+        forget.push_back(noise.forget(i, run.dt));
+    NoiseScore<kChannels, L> score(n, moving, std::move(forget), sensor);
     for (int i = 0; i < kMotionStates; ++i) {
         const double s = noise.motion[static_cast<std::size_t>(i)];
         score.white(i, kChannels + i, 2.0 * s * s * run.dt);
     }
-    for (std::size_t i = 0; i < system.disturbances(); ++i) {
+    for (std::size_t i = 0; i < disturbances; ++i) {
         const double s = noise.deviation_of(i);
-        score.correlated(system.disturbing(i), deviation_lane(i), time_lane(i), s * s,
-                         system.forget(i), run.dt / noise.time_of(i));
+        score.correlated(disturbing(i), deviation_lane(i), time_lane(i), s * s,
+                         noise.forget(i, run.dt), run.dt / noise.time_of(i));
     }
     return score;
 }
 
 template <int L>
-double score_all(const Problem& problem, const double* p, const Noise& noise, double* gradient,
-                 double* information) {
+struct Sum {
     Eigen::Array<double, L, 1> score = Eigen::Array<double, L, 1>::Zero();
-    Mat<L, L> info = Mat<L, L>::Zero();
+    Mat<L, L> information = Mat<L, L>::Zero();
     double log_likelihood = 0.0;
+    void add(const NoiseScore<kChannels, L>& of) {
+        score += of.score_sum();
+        information += of.information();
+    }
+};
+
+template <int L>
+Sum<L> one_after_the_other(const Problem& problem, const double* p, const Noise& noise) {
+    Sum<L> sum;
     with_state_size(problem.model.effects, noise, [&](auto nx) {
         constexpr int NX = decltype(nx)::value;
         for (const Run& run : problem.runs) {
             const RunSystem<NX> system(problem.model, run, p, noise);
             const int n = system.taking_part();
-            auto answer = score_of<L>(system, run, noise);
-            log_likelihood +=
+            auto score =
+                score_of<L>(noise, run, n, n, [&](std::size_t i) { return system.disturbing(i); });
+            sum.log_likelihood +=
                 filter_run<NX>(system, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
-                    if (k > 0) answer.predict(s.transition.topLeftCorner(n, n));
-                    answer.update(s, run.measurements[k]);
+                    score.add(s, run.measurements[k], k == 0);
                 });
-            score += answer.score();
-            info += answer.information();
+            sum.add(score);
         }
     });
-    symmetrise(info);
+    return sum;
+}
+
+/// The same with the filter in pieces side by side; false where that cannot be done. Numbers of the
+/// samples are kept until a group of pieces is done, which are therefore not long.
+template <int L>
+bool in_pieces(const Problem& problem, const double* p, const Noise& noise, Sum<L>& sum) {
+    constexpr std::size_t kLongest = 1024;
+    const std::vector<Piece> pieces = pieces_of(problem.runs, kLongest);
+    if (pieces.empty()) return false;
+    LaneFilter filter(problem, p, noise, pieces);
+    filter.with_transition = true;
+    const std::size_t n = filter.states(), moving = filter.moving();
+    const std::size_t wide =
+        n * (moving + 2 * kChannels) + kWhitener + kChannels + n + LaneFilter::packed(n, 0);
+    std::size_t room = 0;
+    for (const Piece& piece : pieces) room = std::max(room, piece.size());
+    std::vector<double> numbers(std::min<std::size_t>(kLanes, pieces.size()) * room * wide);
+    const auto place = [&](std::size_t piece, std::size_t at) {
+        return numbers.data() + (piece % kLanes * room + at - pieces[piece].begin) * wide;
+    };
+    filter.keep = [&](const LaneSample& s, std::size_t lane, int /*parts*/) {
+        double* to = place(s.piece, s.at);
+        to = LaneFilter::write(filter.transition(), lane, to);
+        to = filter.write_observation(lane, to);
+        to = LaneFilter::write(filter.gain(), lane, to);
+        to = LaneFilter::write(filter.whitener(), lane, to);
+        to = LaneFilter::write(filter.innovation(), lane, to);
+        LaneFilter::write(filter.state(), lane, to);
+    };
+    std::optional<NoiseScore<kChannels, L>> score;
+    filter.done = [&](std::size_t first, std::size_t last) {
+        for (std::size_t i = first; i < last; ++i) {
+            const Run& run = problem.runs[pieces[i].run];
+            if (pieces[i].begin == 0)
+                score.emplace(score_of<L>(
+                    noise, run, static_cast<int>(n), static_cast<int>(moving),
+                    [&](std::size_t d) { return static_cast<int>(moving + d); }));
+            for (std::size_t k = pieces[i].begin; k < pieces[i].end; ++k) {
+                ScoreSample s;
+                const double* from = place(i, k);
+                s.transition = k > 0 ? from : nullptr;
+                s.observation = from += moving * n;
+                s.gain = from += kChannels * n;
+                s.whitener = from += n * kChannels;
+                s.innovation = from += kWhitener;
+                s.mean = from += kChannels;
+                s.covariance = from + n;
+                score->add(s, run.measurements[k]);
+            }
+            if (pieces[i].end == run.size()) sum.add(*score);
+        }
+    };
+    if (!side_by_side(problem.runs, pieces, filter)) return false;
+    sum.log_likelihood = filter.log_likelihood();
+    return true;
+}
+
+template <int L>
+double score_all(const Problem& problem, const double* p, const Noise& noise, double* gradient,
+                 double* information) {
+    Sum<L> sum;
+    if (!in_pieces(problem, p, noise, sum)) sum = one_after_the_other<L>(problem, p, noise);
+    symmetrise(sum.information);
     using All = Mat<kNoiseParameters, kNoiseParameters>;
     Eigen::Map<Vec<kNoiseParameters>> to{gradient};
     Eigen::Map<All> table{information};
     to.setZero();
     table.setZero();
-    to.template head<L>() = score.matrix();
-    table.template topLeftCorner<L, L>() = info;
-    return log_likelihood;
+    to.template head<L>() = sum.score.matrix();
+    table.template topLeftCorner<L, L>() = sum.information;
+    return sum.log_likelihood;
 }
 
 }  // namespace

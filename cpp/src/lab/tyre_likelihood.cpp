@@ -179,15 +179,13 @@ double noise_score(const TyreProblem& problem, const double* p, const double* no
     const Vec<kGreyNoises> by = 2.0 * Eigen::Map<const Vec<kGreyNoises>>(noise).cwiseAbs2();
     double value = 0.0;
     for (const TyreRun& run : problem.runs) {
-        Score score(kGreyStates, by.head<kGreyChannels>());
+        Score score(kGreyStates, kGreyStates, {}, by.head<kGreyChannels>());
         for (int i = 0; i < kGreyStates; ++i)
             score.white(i, kGreyChannels + i, by[kGreyChannels + i] * run.dt);
         const GreySystem system(problem.car, run, p, noise);
-        value += system.filter([&](std::size_t k, const Step& s) {
-            if (k > 0) score.predict(s.transition);
-            score.update(s, run.measurements[k]);
-        });
-        slope += score.score();
+        value += system.filter(
+            [&](std::size_t k, const Step& s) { score.add(s, run.measurements[k], k == 0); });
+        slope += score.score_sum();
         info += score.information();
     }
     Eigen::Map<Score::Lanes>{gradient} = slope;

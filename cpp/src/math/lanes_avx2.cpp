@@ -4,11 +4,14 @@
 
 #define SYSID_LANE_BYTES 32
 #include "lanes.inc"
+#include "lanes_filter.inc"
+#include "lanes_score.inc"
 #include "lanes_sums.inc"
 
 extern const LaneKernels kAvx2Lanes;
-const LaneKernels kAvx2Lanes{"AVX2",       &forward,     &backward,
-                             &add_product, &add_squares, &curve_squares};
+const LaneKernels kAvx2Lanes{"AVX2",       &forward,       &backward,     &add_product,
+                             &add_squares, &curve_squares, &propagate,    &disturb,
+                             &correct,     &score_update,  &score_predict};
 
 }  // namespace sysid
 #endif

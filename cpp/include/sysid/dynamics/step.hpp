@@ -47,6 +47,11 @@ inline int substeps_for(const SingleTrack& model, const double* p, double v_x, d
     const double rate = model.fastest_rate(p, std::max(v_x, kLowestSpeed));
     return whole_within(std::ceil(dt * rate / turn), 1, kMostSubsteps);
 }
+/// The same from the fastest rate at 1 m/s: it falls with speed.
+inline int substeps_for(double rate_at_1_mps, double v_x, double dt, double turn = 0.8) {
+    const double rate = rate_at_1_mps / std::max(v_x, kLowestSpeed);
+    return whole_within(std::ceil(dt * rate / turn), 1, kMostSubsteps);
+}
 
 /// What the lags of one model need to remember within a step.
 template <class S>

@@ -6,11 +6,9 @@
 // at once; what is left to be done one sample after the other is linear.
 #pragma once
 
-#include <map>
 #include <vector>
 
-#include "sysid/identify/problem.hpp"
-#include "sysid/math/recorder.hpp"
+#include "sysid/identify/recorded_model.hpp"
 
 namespace sysid {
 
@@ -33,8 +31,8 @@ class LocalModel {
     LocalModel(const SingleTrack& model, const double* p, const std::vector<int>& columns,
                std::size_t width, bool all_externals);
 
-    std::size_t states() const { return states_; }
-    std::size_t externals() const { return externals_; }
+    std::size_t states() const { return model_.states(); }
+    std::size_t externals() const { return model_.externals(); }
 
     /// Numbers for one sample: of the step a row for each state by states and externals, then one
     /// for each by parameters; of the reading the same with a row for each channel.
@@ -50,43 +48,18 @@ class LocalModel {
     std::vector<double> start(const Run& run) const;
 
   private:
-    /// A program with the rows it works on.
-    struct Ready {
-        Program program;
-        std::vector<LaneRow> rows, adjoints;
-        void set(std::size_t input, std::size_t lane, double value) {
-            const std::int32_t row = program.inputs[input];
-            if (row >= 0) rows[static_cast<std::size_t>(row)].at[lane] = value;
-        }
-    };
+    using Ready = RecordedModel::Ready;
 
-    struct Moving {
-        ModelState<Recorded> x{};
-        std::array<Recorded, kExternals> external{};
-    };
-
-    Moving moving(Recorder& to) const;
-    std::vector<Recorded> parameters(Recorder& to) const;
-    std::vector<Recorded> packed(const ModelState<Recorded>& x) const;
-    static Ready ready(Program program);
-    Ready& step_of(double h);
     void step(const PathSample* samples, const std::size_t* which, std::size_t count, double* out);
     void read(const PathSample* samples, std::size_t count, double* out);
     void chain(const std::vector<double>& part, double* whole) const;
     template <class Put>
-    static void sweep(Ready& ready, Put&& put);
-    template <class Put>
-    void spread(Ready& ready, std::size_t given, std::size_t by_state, std::size_t by_parameter,
-                Put&& put) const;
+    void spread(Ready& ready, std::size_t inputs_given, std::size_t by_state,
+                std::size_t by_parameter, Put&& put) const;
 
-    SingleTrack model_;
-    const double* p_;
+    RecordedModel model_;
     std::vector<std::vector<std::size_t>> columns_of_;  // of each parameter
-    std::size_t width_;
-    ActiveStates own_;
-    std::size_t states_, externals_, step_parameters_, read_at_, read_parameters_;
-    Ready read_;
-    std::map<double, Ready> steps_;  // by the length of a step
+    std::size_t width_, step_parameters_, read_at_, read_parameters_;
 };
 
 }  // namespace sysid

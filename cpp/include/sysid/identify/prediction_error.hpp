@@ -12,24 +12,45 @@
 
 namespace sysid {
 
-/// Filter gains of every sample: the correction of (v_x, v_y, r, F_x, F_y, M_z, auxiliary states,
-/// gravity along and across)
-/// and the inverse Cholesky factor that whitens the innovation. Zero where a measurement is
-/// missing. The parts into which the interval before the sample is cut are kept as well: were they
-/// counted anew, residuals would jump where a parameter makes it one more.
-struct FrozenStep {
-    int substeps = 1;
-    Mat<kStatesFull + kRoadStates, kChannels> gain;
-    Mat<kChannels, kChannels> whitener;
+/// Filter gains of every sample of a run: the correction of each state by the innovations, state
+/// after state, then the lower triangle of the inverse Cholesky factor that whitens these. Zero
+/// where a measurement is missing. The parts into which the interval before the sample is cut are
+/// kept as well: were they counted anew, residuals would jump where a parameter makes it one more.
+struct FrozenRun {
+    std::vector<double> numbers;
+    std::vector<int> substeps;
+    std::size_t size() const { return substeps.size(); }
 };
+constexpr std::size_t kWhitener = kChannels * (kChannels + 1) / 2;
 
 /// Belongs to problems with the runs it was made from, whatever their model.
 struct FrozenFilter {
-    std::vector<std::vector<FrozenStep>> runs;
+    std::vector<FrozenRun> runs;
     Noise noise;
     double log_likelihood = 0.0;
-    std::size_t observed = 0;  // measured elements that count
+    std::size_t observed = 0;        // measured elements that count
+    std::vector<int> rows;           // what has gains, see `filter_rows`
+    std::vector<double> deviations;  // of these, the largest at the ends of runs
+
+    /// Numbers of one sample.
+    std::size_t size() const { return rows.size() * kChannels + kWhitener; }
+    const double* gain(std::size_t run, std::size_t k) const {
+        return runs[run].numbers.data() + k * size();
+    }
+    double* gain(std::size_t run, std::size_t k) { return runs[run].numbers.data() + k * size(); }
+    const double* whitener(std::size_t run, std::size_t k) const {
+        return gain(run, k) + rows.size() * kChannels;
+    }
+    double* whitener(std::size_t run, std::size_t k) {
+        return gain(run, k) + rows.size() * kChannels;
+    }
+    /// Where among the gains of a sample those of such rows stand; -1 for those that have none.
+    std::vector<int> places(const std::vector<int>& of) const;
 };
+
+/// Names of the states that a filter corrects: v_x, v_y, r, the states of effects, disturbances.
+/// They are places among `kStatesFull`; gravity along and across stand behind these.
+std::vector<int> filter_rows(EffectMask effects, bool sloping);
 
 FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise);
 

@@ -73,11 +73,17 @@ struct Problem {
 
 inline bool has_own_states(EffectMask mask) { return active_states(mask).count > 0; }
 
-/// Where a run starts: the measured motion where there is one, settled auxiliary states.
+/// Variances of the motion where a run starts. Wide enough that the first measurements, not the
+/// guess, decide.
+constexpr std::array<double, kMotionStates> kFirstVariances{1.0, 1.0, 0.04};
+
+/// Where a run starts: the measured motion where there is one, settled auxiliary states. The same
+/// from sample `begin` on is a guess of the state there.
 template <class S = double, class T>
-ModelState<S> initial_state(const SingleTrack& model, const Run& run, const T* p) {
+ModelState<S> initial_state(const SingleTrack& model, const Run& run, const T* p,
+                            std::size_t begin = 0) {
     const auto first = [&](int channel, double otherwise) {
-        for (std::size_t k = 0; k < run.size() && k < 50; ++k)
+        for (std::size_t k = begin; k < run.size() && k < begin + 50; ++k)
             if (!std::isnan(run.measurements[k][channel])) return run.measurements[k][channel];
         return otherwise;
     };
@@ -86,7 +92,7 @@ ModelState<S> initial_state(const SingleTrack& model, const Run& run, const T* p
     x[1] = S(first(kVy, 0.0));
     x[2] = S(first(kYawRate, 0.0));
     const std::array<S, kExternals> calm{};
-    const Input& u = run.inputs.front();
+    const Input& u = run.inputs[begin];
     InputFor<S> input{u.steer_rad, u.longitudinal, u.time_s};
     std::copy(u.channels.begin(), u.channels.end(), input.channels.begin());
     settle_auxiliary(model, x, calm.data(), input, p);

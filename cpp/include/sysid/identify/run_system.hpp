@@ -49,12 +49,10 @@ class RunSystem {
         return x;
     }
 
-    // Wide enough that the first measurements, not the guess, decide.
     Mat<NX, NX> initial_covariance() const {
         Vec<NX> variance = Vec<NX>::Zero();
-        variance[0] = 1.0;
-        variance[1] = 1.0;
-        variance[2] = 0.04;
+        for (std::size_t i = 0; i < kMotionStates; ++i)
+            variance[static_cast<int>(i)] = kFirstVariances[i];
         for (std::size_t i = 0; i < disturbances_; ++i) variance[disturbing(i)] = variance_[i];
         constexpr auto spreads = effect_state_spreads();
         for (std::size_t i = 0; i < own_.count; ++i)

@@ -16,6 +16,34 @@ struct CurveSamples {
 };
 constexpr int kCurveParameters = 11;  // B, C, D, E of both curves, then the linear terms
 
+/// Readings of a filter in each lane, with noise that is not correlated: one after the other.
+struct LaneUpdate {
+    std::size_t states = 0, readings = 0;
+    const LaneRow* const* observation = nullptr;  // readings x states; nullptr for zero
+    const LaneRow* noise = nullptr;               // variances
+    const LaneRow* present = nullptr;             // one, or zero where there is no reading
+    LaneRow* innovation = nullptr;  // becomes that of the state that has seen the readings before
+    LaneRow* variance = nullptr;    // of that one
+    LaneRow* gain = nullptr;        // states x readings, of the innovations of the whole sample
+    LaneRow* whitener = nullptr;    // of those, a lower triangle
+};
+/// Derivatives of mean and covariance of one filter by `width` parameters of its noise, a multiple
+/// of eight; the first are those of the readings.
+struct LaneScore {
+    std::size_t states = 0, readings = 0, width = 0;
+    const double* observation = nullptr;  // readings x states
+    const double* gain = nullptr;         // states x readings
+    const double* whitener = nullptr;     // lower triangle
+    const double* innovation = nullptr;   // zero where there is no reading
+    const double* sensor = nullptr;       // of each variance by its own parameter; zero likewise
+    double* mean = nullptr;               // states x width
+    double* covariance = nullptr;         // lower triangle x width
+    /// Whose squares add up to the information: of L^-1 dS L^-T the lower triangle, with the
+    /// diagonal over the root of two, each row followed by that of L^-1 H dx.
+    double* rows = nullptr;
+};
+constexpr std::size_t kMostLaneStates = 40, kMostLaneReadings = 8;
+
 struct LaneKernels {
     const char* name;
     void (*forward)(const ForwardStep* steps, std::size_t count, LaneRow* rows);
@@ -36,6 +64,20 @@ struct LaneKernels {
     /// lower triangle of G^T G, minus the derivatives G by the first `wanted` parameters.
     double (*curve_squares)(const CurveSamples* samples, std::size_t count, const double* p,
                             int wanted, double* gradient, double* information);
+    /// A P A' in place of P, of which the lower triangle is kept. The first `moving` of the `n`
+    /// rows of A are given, nullptr for zero; the others are those of the unit matrix.
+    void (*propagate)(const LaneRow* const* A, std::size_t moving, std::size_t n, LaneRow* P);
+    /// Scales the other states by `forget`, then adds `noise` to the variances.
+    void (*disturb)(const LaneRow* forget, const LaneRow* noise, std::size_t moving, std::size_t n,
+                    LaneRow* P);
+    /// Mean and covariance after the readings.
+    void (*correct)(const LaneUpdate& u, LaneRow* x, LaneRow* P);
+    /// The derivatives after the readings, and `rows`.
+    void (*score_update)(const LaneScore& s);
+    /// The derivatives at the next sample: the first `moving` states have rows of A (moving x
+    /// states), the others are scaled.
+    void (*score_predict)(const double* A, std::size_t moving, const double* forget,
+                          const LaneScore& s);
 };
 
 /// The kernels for this processor; all give the same to rounding.

@@ -1,0 +1,108 @@
+// The filter whose gains are kept: its runs one sample after the other, or pieces of them side by
+// side.
+#include <algorithm>
+
+#include "sysid/estimate/frozen.hpp"
+#include "sysid/identify/lane_filter.hpp"
+#include "sysid/identify/prediction_error.hpp"
+#include "sysid/identify/run_system.hpp"
+
+namespace sysid {
+
+namespace {
+
+template <int NX>
+void freeze_run(const Problem& problem, std::size_t number, const double* p, FrozenFilter& filter) {
+    const Run& run = problem.runs[number];
+    const RunSystem<NX> system(problem.model, run, p, filter.noise);
+    const std::size_t own = system.own().count, n = filter.rows.size();
+    std::vector<int> from(n);
+    for (std::size_t i = 0; i < n; ++i) {
+        const bool moves = i < kMotionStates + own;
+        from[i] = i < kMotionStates ? static_cast<int>(i)
+                  : moves           ? system.packed(i - kMotionStates)
+                                    : system.disturbing(i - kMotionStates - own);
+    }
+    std::vector<int>& substeps = filter.runs[number].substeps;
+    filter.log_likelihood +=
+        filter_run<NX>(system, [&](std::size_t k, const FilterStep<NX, kChannels>& s) {
+            double* to = filter.gain(number, k);
+            for (const int row : from)
+                for (int c = 0; c < kChannels; ++c) *to++ = s.update.gain(row, c);
+            const auto whitener = whitener_of<kChannels>(s.update, run.measurements[k]);
+            for (int i = 0; i < kChannels; ++i)
+                for (int j = 0; j <= i; ++j) *to++ = whitener(i, j);
+            if (k + 1 < run.size()) {
+                substeps[k + 1] = substeps_for(problem.model, p, s.mean[0], run.dt);
+                return;
+            }
+            for (std::size_t i = 0; i < n; ++i)
+                filter.deviations[i] =
+                    std::max(filter.deviations[i], std::sqrt(s.covariance(from[i], from[i])));
+        });
+}
+
+/// A filter with room for all samples.
+FrozenFilter empty(const Problem& problem, const Noise& noise) {
+    FrozenFilter filter;
+    filter.noise = noise;
+    filter.rows = filter_rows(problem.model.effects, noise.sloping());
+    filter.deviations.assign(filter.rows.size(), 0.0);
+    filter.runs.resize(problem.runs.size());
+    for (std::size_t i = 0; i < problem.runs.size(); ++i) {
+        for (const Vec<kChannels>& y : problem.runs[i].measurements)
+            for (const double v : y) filter.observed += std::isnan(v) ? 0 : 1;
+        filter.runs[i].numbers.resize(problem.runs[i].size() * filter.size());
+        filter.runs[i].substeps.assign(problem.runs[i].size(), 1);
+    }
+    return filter;
+}
+
+}  // namespace
+
+std::vector<int> filter_rows(EffectMask effects, bool sloping) {
+    std::vector<int> rows;
+    for (int i = 0; i < kMotionStates; ++i) rows.push_back(i);
+    for (const std::size_t i : active_states(effects))
+        rows.push_back(kStatesPlain + static_cast<int>(i));
+    for (int i = 0; i < kMotionStates; ++i) rows.push_back(kMotionStates + i);
+    for (int i = 0; i < kRoadStates && sloping; ++i) rows.push_back(kStatesFull + i);
+    return rows;
+}
+
+std::vector<int> FrozenFilter::places(const std::vector<int>& of) const {
+    std::vector<int> out;
+    for (const int row : of) {
+        const auto found = std::find(rows.begin(), rows.end(), row);
+        out.push_back(found == rows.end() ? -1 : static_cast<int>(found - rows.begin()));
+    }
+    return out;
+}
+
+FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise) {
+    FrozenFilter filter = empty(problem, noise);
+    if (const std::vector<Piece> pieces = pieces_of(problem.runs); !pieces.empty()) {
+        LaneFilter walk(problem, p, noise, pieces);
+        walk.keep = [&](const LaneSample& sample, std::size_t lane, int parts) {
+            const std::size_t run = pieces[sample.piece].run;
+            walk.write(walk.gain(), lane, filter.gain(run, sample.at));
+            walk.write(walk.whitener(), lane, filter.whitener(run, sample.at));
+            if (sample.at > 0) filter.runs[run].substeps[sample.at] = parts;
+            if (sample.at + 1 < sample.run->size()) return;
+            for (std::size_t i = 0; i < filter.rows.size(); ++i)
+                filter.deviations[i] = std::max(filter.deviations[i], walk.deviation(i, lane));
+        };
+        if (side_by_side(problem.runs, pieces, walk)) {
+            filter.log_likelihood = walk.log_likelihood();
+            return filter;
+        }
+        filter = empty(problem, noise);
+    }
+    with_state_size(problem.model.effects, noise, [&](auto nx) {
+        for (std::size_t i = 0; i < problem.runs.size(); ++i)
+            freeze_run<decltype(nx)::value>(problem, i, p, filter);
+    });
+    return filter;
+}
+
+}  // namespace sysid

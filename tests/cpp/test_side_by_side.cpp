@@ -1,0 +1,176 @@
+// Filters over pieces of driving side by side are those over whole runs.
+#include "helpers.hpp"
+#include "sysid/identify/prediction_error.hpp"
+#include "sysid/identify/side_by_side.hpp"
+#include "sysid/math/lanes.hpp"
+
+namespace sysid::test {
+namespace {
+
+constexpr double kClose = 2e-11;  // of whitened residuals
+
+const auto kLagging = mask_of({"tyre_relaxation", "steer_lag", "aero_drag", "side_wind"});
+
+/// Steps of 50 ms have several parts, more of them where the car is slow.
+Problem long_run(EffectMask effects, std::size_t samples = 620) {
+    const SingleTrack truth{saloon(), effects};
+    Parameters p = typical_parameters();
+    p[kBFront] *= 1.1;
+    Problem problem{truth, {noisy_run(truth, p, samples, 0.05, 1)}};
+    auto& y = problem.runs[0].measurements;
+    for (std::size_t k = 0; k < samples; ++k) {
+        if (k % 7 == 3) y[k][kVy] = std::nan("");
+        if (k > 100 && k < 106) y[k].setConstant(std::nan(""));
+    }
+    return problem;
+}
+
+/// The error of a speed that is not read stays.
+Problem without_speed(Problem problem) {
+    for (auto& y : problem.runs[0].measurements) y[kVx] = y[kVy] = y[kAx] = std::nan("");
+    return problem;
+}
+
+Eigen::VectorXd residuals_of(const Problem& problem, const Parameters& p,
+                             const FrozenFilter& filter) {
+    Eigen::VectorXd e(static_cast<int>(problem.samples()) * kChannels);
+    residuals(problem, p.data(), filter, e.data());
+    return e;
+}
+
+/// The first samples of a run and of its filter: too few to be cut.
+FrozenFilter beginning_of(FrozenFilter filter, Problem& problem, std::size_t samples) {
+    for (std::size_t i = 0; i < problem.runs.size(); ++i) {
+        problem.runs[i].inputs.resize(samples);
+        problem.runs[i].measurements.resize(samples);
+        filter.runs[i].substeps.resize(samples);
+        filter.runs[i].numbers.resize(samples * filter.size());
+    }
+    return filter;
+}
+
+/// Returns whether pieces were used: sums of other pieces differ in their last digits.
+bool expect_whole(const Problem& problem, const Noise& noise) {
+    const Parameters p = typical_parameters();
+    const FrozenFilter filter = freeze(problem, p.data(), noise);
+    const Trace whole = trace(problem, p.data(), noise, false);
+    EXPECT_NEAR(filter.log_likelihood, whole.log_likelihood,
+                1e-12 * std::abs(whole.log_likelihood));
+    const Eigen::VectorXd e = residuals_of(problem, p, filter);
+    for (int i = 0; i < e.size(); ++i)
+        EXPECT_NEAR(e[i], whole.whitened[static_cast<std::size_t>(i)], kClose) << i;
+    return filter.log_likelihood != whole.log_likelihood;
+}
+
+class SideBySide : public testing::TestWithParam<const LaneKernels*> {
+  protected:
+    void SetUp() override { use_lane_kernels(*GetParam()); }
+    void TearDown() override { use_lane_kernels(*all_lane_kernels().back()); }
+};
+INSTANTIATE_TEST_SUITE_P(All, SideBySide, testing::ValuesIn(all_lane_kernels()),
+                         [](const auto& it) {
+                             std::string name = it.param->name;
+                             std::erase(name, '-');
+                             return name;
+                         });
+
+TEST_P(SideBySide, FiltersAreThoseOfWholeRuns) {
+    bool cut = false;
+    for (const EffectMask effects : {EffectMask{0}, kLagging})
+        for (const Noise& noise : {ordinary_noise(), sloping_noise()}) {
+            const Problem problem = long_run(effects);
+            ASSERT_EQ(pieces_of(problem.runs).size(), 16U);
+            cut = expect_whole(problem, noise) || cut;
+        }
+    EXPECT_TRUE(cut);
+}
+
+TEST_P(SideBySide, OtherParametersAndModelsGoTheSameWay) {
+    Problem problem = long_run(EffectMask{0});
+    Parameters p = typical_parameters();
+    const FrozenFilter filter = freeze(problem, p.data(), ordinary_noise());
+    p[kBFront] *= 1.2;
+    problem.model = {saloon(), kLagging};
+    const Eigen::VectorXd together = residuals_of(problem, p, filter);
+    constexpr std::size_t kFew = 150;
+    const FrozenFilter few = beginning_of(filter, problem, kFew);
+    ASSERT_TRUE(pieces_of(problem.runs).empty());
+    const Eigen::VectorXd alone = residuals_of(problem, p, few);
+    EXPECT_LT((together.head(alone.size()) - alone).cwiseAbs().maxCoeff(), kClose);
+    EXPECT_NE(together.head(alone.size()), alone);  // other roundings: pieces were used
+}
+
+struct Score {
+    double value;
+    Vec<kNoiseParameters> gradient;
+    Mat<kNoiseParameters, kNoiseParameters> information;
+};
+Score score_of(const Problem& problem, const Noise& noise) {
+    Score out;
+    out.value = noise_score(problem, typical_parameters().data(), noise, out.gradient.data(),
+                            out.information.data());
+    return out;
+}
+
+TEST_P(SideBySide, NoiseScoresOfRunsAddUp) {
+    for (const EffectMask effects : {EffectMask{0}, kLagging})
+        for (const Noise& noise : {ordinary_noise(), sloping_noise()}) {
+            Problem problem = long_run(effects, 130);
+            ASSERT_TRUE(pieces_of(problem.runs).empty());
+            const Score one = score_of(problem, noise);
+            problem.runs.resize(16, problem.runs[0]);
+            ASSERT_EQ(pieces_of(problem.runs).size(), 16U);
+            const Score all = score_of(problem, noise);
+            EXPECT_NEAR(all.value, 16.0 * one.value, 1e-12 * std::abs(all.value));
+            EXPECT_LT((all.gradient - 16.0 * one.gradient).norm(), 1e-11 * all.gradient.norm());
+            EXPECT_LT((all.information - 16.0 * one.information).norm(),
+                      1e-11 * all.information.norm());
+        }
+}
+
+TEST(SideBySideToo, NoiseScoreOfPiecesIsThatOfTheWholeRun) {
+    const Noise noise = ordinary_noise();
+    const Problem quick = long_run(kLagging), slow = without_speed(quick);
+    Problem both = quick;  // all in one go, for the sake of the second run
+    both.runs.push_back(slow.runs[0]);
+    const Score pieces = score_of(quick, noise), rest = score_of(slow, noise);
+    const Score whole = score_of(both, noise);
+    EXPECT_NEAR(pieces.value + rest.value, whole.value, 1e-11 * std::abs(whole.value));
+    EXPECT_LT((pieces.gradient + rest.gradient - whole.gradient).norm(),
+              1e-10 * pieces.gradient.norm());
+    EXPECT_LT((pieces.information + rest.information - whole.information).norm(),
+              1e-10 * pieces.information.norm());
+}
+
+TEST(SideBySideToo, WhatIsNotForgottenIsDoneInOneGo) {
+    const Problem problem = without_speed(long_run(EffectMask{0}));
+    ASSERT_FALSE(pieces_of(problem.runs).empty());
+    EXPECT_FALSE(expect_whole(problem, ordinary_noise()));
+}
+
+TEST(SideBySideToo, RunsOfAnyNumberAndLength) {
+    Problem problem = long_run(EffectMask{0}, 400);
+    const SingleTrack& truth = problem.model;
+    for (unsigned i = 0; i < 20; ++i)
+        problem.runs.push_back(
+            noisy_run(truth, typical_parameters(), 2 + 7 * i, i % 3 == 0 ? 0.02 : 0.04, i));
+    const auto pieces = pieces_of(problem.runs);
+    ASSERT_GT(pieces.size(), 21U);
+    std::size_t at = 0, run = 0;
+    for (const Piece& piece : pieces) {
+        if (piece.run != run) {
+            ASSERT_EQ(at, problem.runs[run].size());
+            run = piece.run;
+            at = 0;
+        }
+        ASSERT_EQ(piece.begin, at);
+        ASSERT_GT(piece.end, piece.begin);
+        at = piece.end;
+    }
+    EXPECT_EQ(run, problem.runs.size() - 1);
+    EXPECT_EQ(at, problem.runs.back().size());
+    expect_whole(problem, ordinary_noise());
+}
+
+}  // namespace
+}  // namespace sysid::test
