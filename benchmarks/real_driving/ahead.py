@@ -85,13 +85,13 @@ def ahead(model: sv.Model, logs: list[sv.Log], seconds: float = 2.0) -> Ahead:
     problem = driving.problem(model)
     rate = driving.mean_rate_hz
     every = round(_BEGIN_S * rate)
-    squares = []
     starts = _starts(driving, round(seconds * rate), every)
     if not len(starts):
         return Ahead(*(float("nan"),) * 5, 0)
-    for lead in np.unique(np.round(np.linspace(0.0, seconds * rate, _STEPS + 1)[1:]).astype(int)):
-        found = problem.look_ahead(model.vector(), _CERTAIN.vector(), int(lead), every)
-        squares.append(found[starts + lead][:, 1:3] ** 2)
+    leads = np.unique(np.round(np.linspace(0.0, seconds * rate, _STEPS + 1)[1:]).astype(int))
+    asked = [(int(lead), every) for lead in leads]
+    found = problem.look_ahead(model.vector(), _CERTAIN.vector(), asked)
+    squares = [e[starts + lead][:, 1:3] ** 2 for e, lead in zip(found, leads, strict=True)]
     spread = np.nanstd(driving.measured[:, 1:3], axis=0)
     with np.errstate(invalid="ignore"):
         last = np.sqrt(squares[-1]) / spread

@@ -64,13 +64,17 @@ void register_identify(py::module_& m) {
                               &to_noise);
     bind_least_squares<FrozenFilter>(bound, kParameterCount, kChannels);
     bound
-        .def(py::init([](const SingleTrack& model) { return Problem{model, {}}; }),
+        .def(py::init([](const SingleTrack& model) {
+                 return Problem{model, {}};
+             }),
              py::arg("model"))
         .def("add_run", &add_run, py::arg("dt"), py::arg("inputs"), py::arg("measurements"),
              py::arg("start") = 0.0, py::arg("name") = "")
         .def(
             "with_model",
-            [](const Problem& self, const SingleTrack& model) { return Problem{model, self.runs}; },
+            [](const Problem& self, const SingleTrack& model) {
+                return Problem{model, self.runs};
+            },
             py::arg("model"))
         .def(
             "signal_sensitivities",
@@ -105,14 +109,17 @@ void register_identify(py::module_& m) {
             py::arg("parameters"), py::arg("noise"), py::arg("smoothed"))
         .def(
             "look_ahead",
-            [](const Problem& self, const Array& p, const Array& noise, std::size_t ahead,
-               std::size_t every) {
+            [](const Problem& self, const Array& p, const Array& noise,
+               const std::vector<std::pair<std::size_t, std::size_t>>& horizons) {
                 const double* values = values_of(p);
                 const Noise n = to_noise(noise);
-                return filled(self.samples(), kChannels,
-                              [&](double* to) { look_ahead(self, values, n, ahead, every, to); });
+                std::vector<Horizon> asked;
+                for (const auto& [ahead, every] : horizons) asked.push_back({ahead, every});
+                Array found = filled(asked.size() * self.samples(), kChannels,
+                                     [&](double* to) { look_ahead(self, values, n, asked, to); });
+                return found.reshape({asked.size(), self.samples(), std::size_t{kChannels}});
             },
-            py::arg("parameters"), py::arg("noise"), py::arg("ahead"), py::arg("every") = 1);
+            py::arg("parameters"), py::arg("noise"), py::arg("horizons"));
 }
 
 }  // namespace sysid::bindings

@@ -78,7 +78,7 @@ TEST(LookAhead, PerfectModelAndDataLeaveNoError) {
         problem.runs = {run, run};
         for (std::size_t ahead : {1U, 20U}) {
             std::vector<double> errors(problem.samples() * kChannels);
-            look_ahead(problem, p.data(), ordinary_noise(), ahead, 1, errors.data());
+            look_ahead(problem, p.data(), ordinary_noise(), {{ahead, 1}}, errors.data());
             for (std::size_t n = 0; n < errors.size(); ++n) {
                 const std::size_t k = n / kChannels % run.size();
                 if (k < ahead) {
@@ -97,16 +97,18 @@ TEST(LookAhead, ErrorOfAWrongModelGrowsWithTheHorizon) {
     p[kBRear] *= 0.7;
     const auto yaw_rate_error = [&](std::size_t ahead) {
         std::vector<double> errors(problem.samples() * kChannels);
-        look_ahead(problem, p.data(), ordinary_noise(), ahead, 1, errors.data());
+        look_ahead(problem, p.data(), ordinary_noise(), {{ahead, 1}}, errors.data());
         double sum = 0.0;
         for (std::size_t k = 60; k < problem.samples(); ++k)
             sum += std::pow(errors[k * kChannels + kYawRate], 2);
         return std::sqrt(sum);
     };
-    // Starting fewer predictions leaves those that are made as they were.
-    std::vector<double> all(problem.samples() * kChannels), few(all.size());
-    look_ahead(problem, p.data(), ordinary_noise(), 30, 1, all.data());
-    look_ahead(problem, p.data(), ordinary_noise(), 30, 7, few.data());
+    // Starting fewer predictions, and reading them on the way, leaves them as they were.
+    std::vector<double> all(problem.samples() * kChannels), both(2 * all.size());
+    look_ahead(problem, p.data(), ordinary_noise(), {{30, 1}}, all.data());
+    look_ahead(problem, p.data(), ordinary_noise(), {{44, 2}, {30, 7}}, both.data());
+    const std::vector<double> few(both.begin() + static_cast<std::ptrdiff_t>(all.size()),
+                                  both.end());
     for (std::size_t k = 0; k < problem.samples(); ++k) {
         const std::size_t n = k * kChannels + kYawRate;
         if (k >= 30 && (k - 30) % 7 == 0)
@@ -114,7 +116,10 @@ TEST(LookAhead, ErrorOfAWrongModelGrowsWithTheHorizon) {
         else
             EXPECT_TRUE(std::isnan(few[n])) << k;
     }
-    EXPECT_THROW(look_ahead(problem, p.data(), ordinary_noise(), 30, 0, all.data()),
+    look_ahead(problem, p.data(), ordinary_noise(), {{44, 2}}, all.data());
+    for (std::size_t n = 0; n < all.size(); ++n)
+        if (!std::isnan(all[n]) || !std::isnan(both[n])) EXPECT_EQ(both[n], all[n]) << n;
+    EXPECT_THROW(look_ahead(problem, p.data(), ordinary_noise(), {{30, 0}}, all.data()),
                  std::invalid_argument);
     EXPECT_GT(yaw_rate_error(30), 1.5 * yaw_rate_error(3));
 }

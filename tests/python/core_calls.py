@@ -48,7 +48,7 @@ def main_job(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
     yield "freeze", (known.freeze, state)
     yield "noise_score", (known.noise_score, state)
     yield "trace", (known.trace, {**state, "smoothed": True})
-    yield "look_ahead", (known.look_ahead, {**state, "ahead": 3, "every": 2})
+    yield "look_ahead", (known.look_ahead, {**state, "horizons": [(3, 2), (5, 1)]})
     frozen = known.freeze(p, noise)
     at = {"parameters": p, "filter": frozen}
     yield "residuals", (known.residuals, at)

@@ -55,7 +55,7 @@ def test_errors_are_in_the_units_of_the_channels(fit: Fit, late: Fit, course: Lo
 def test_blocks_hold_the_errors_of_all_predictions(fit: Fit, course: Log) -> None:
     driving, noise = Driving.of(course), fit.noise.floor()
     whole = look_ahead(fit, noise, driving, 1.0, apart=0.1)[:, 2]
-    found = block_errors(fit, noise, driving, 1.0)[:, PREDICTED.index("yaw_rate_radps")]
+    found = block_errors(fit, noise, driving, (1.0,))[:, 0, PREDICTED.index("yaw_rate_radps")]
     assert len(found) == round(driving.usable_s / 5.0)
     assert np.sqrt(np.mean(found**2)) == pytest.approx(np.sqrt(np.nanmean(whole**2)), rel=0.05)
 

@@ -122,7 +122,7 @@ def test_a_road_that_wanders_is_learned_and_a_level_one_is_not_there(truth: Mode
     assert noise.floor().road == noise.road
     # Seen from one second before, the slope is known.
     ahead = {
-        name: np.nanstd(problem.look_ahead(p, n.floor().vector(), 100, 10)[:, 0])
+        name: np.nanstd(problem.look_ahead(p, n.floor().vector(), [(100, 10)])[0, :, 0])
         for name, n in (("level", level), ("sloping", noise))
     }
     assert ahead["sloping"] < 0.7 * ahead["level"]

@@ -65,6 +65,7 @@ NUMERICAL = {
         "_TOGETHER_S", "_FEWER", "_HOPELESS",
     },
     "diagnose/coherence.py": {"_WINDOW_S", "_LEVEL"},
+    "diagnose/confirm.py": {"_HOPELESS"},
     "diagnose/delay.py": {
         "_BANDS", "_LOWEST_HZ", "_SMALL", "_ROUNDS", "_DRAWS", "_NOTABLE", "_TINY_RAD",
     },

@@ -54,18 +54,24 @@ void trace_run(const Problem& problem, const Run& run, const double* p, const No
 
 template <int NX>
 void look_ahead_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
-                    std::size_t ahead, std::size_t every, double* errors) {
+                    const std::vector<Horizon>& horizons, std::size_t apart, double* errors) {
     const RunSystem<NX> system(problem.model, run, p, noise);
     std::vector<Vec<NX>> means(run.size());
     filter_run<NX>(system,
                    [&](std::size_t k, const FilterStep<NX, kChannels>& s) { means[k] = s.mean; });
-    std::fill(errors, errors + run.size() * kChannels, std::nan(""));
-    if (ahead >= run.size()) return;
-    const std::size_t step = std::min(every, run.size());
     // Forces are not foreseen; the slope of the road fades from where it is known.
     std::array<double, kExternals> external{};
     static_assert(kGravityX == kMotionStates && kExternals == kDisturbances);
-    for (std::size_t k = 0; k < run.size() - ahead; k += step) {
+    std::vector<std::size_t> asked;  // horizons of one start, the nearest first
+    for (std::size_t k = 0; k < run.size(); ++k) {
+        asked.clear();
+        for (std::size_t h = 0; h < horizons.size(); ++h)
+            if (k % horizons[h].every == 0 && horizons[h].ahead < run.size() - k)
+                asked.push_back(h);
+        if (asked.empty()) continue;
+        std::sort(asked.begin(), asked.end(), [&](std::size_t a, std::size_t b) {
+            return horizons[a].ahead < horizons[b].ahead;
+        });
         poll_interrupt();
         ModelState<double> x = system.start();
         for (int i = 0; i < kMotionStates; ++i) x[static_cast<std::size_t>(i)] = means[k][i];
@@ -73,18 +79,20 @@ void look_ahead_run(const Problem& problem, const Run& run, const double* p, con
             x[system.place(i)] = means[k][system.packed(i)];
         for (std::size_t i = kMotionStates; i < system.disturbances(); ++i)
             external[i] = means[k][system.disturbing(i)];
-        for (std::size_t n = k + 1; n <= k + ahead; ++n) {
-            const int substeps = substeps_for(problem.model, p, x[0], run.dt);
-            advance(problem.model, x, external.data(), run.inputs[n - 1], run.inputs[n], p, run.dt,
-                    substeps);
-            for (std::size_t i = kMotionStates; i < system.disturbances(); ++i)
-                external[i] *= system.forget(i);
+        std::size_t n = k;
+        for (const std::size_t h : asked) {
+            for (; n < k + horizons[h].ahead; ++n) {
+                const int substeps = substeps_for(problem.model, p, x[0], run.dt);
+                advance(problem.model, x, external.data(), run.inputs[n], run.inputs[n + 1], p,
+                        run.dt, substeps);
+                for (std::size_t i = kMotionStates; i < system.disturbances(); ++i)
+                    external[i] *= system.forget(i);
+            }
+            const auto y = sense(problem.model, x, external.data(), run.inputs[n], p);
+            double* const to = errors + (h * apart + n) * kChannels;
+            for (std::size_t i = 0; i < kChannels; ++i)
+                to[i] = run.measurements[n][static_cast<int>(i)] - y[i];
         }
-        const std::size_t at = k + ahead;
-        const auto y = sense(problem.model, x, external.data(), run.inputs[at], p);
-        for (int i = 0; i < kChannels; ++i)
-            errors[at * kChannels + static_cast<std::size_t>(i)] =
-                run.measurements[at][i] - y[static_cast<std::size_t>(i)];
     }
 }
 
@@ -99,12 +107,16 @@ Trace trace(const Problem& problem, const double* p, const Noise& noise, bool sm
     return out;
 }
 
-void look_ahead(const Problem& problem, const double* p, const Noise& noise, std::size_t ahead,
-                std::size_t every, double* errors) {
-    if (every == 0) throw std::invalid_argument("every = 0: give one or more");
+void look_ahead(const Problem& problem, const double* p, const Noise& noise,
+                const std::vector<Horizon>& horizons, double* errors) {
+    for (const Horizon& h : horizons)
+        if (h.every == 0) throw std::invalid_argument("every = 0: give one or more");
+    std::size_t samples = 0;
+    for (const Run& run : problem.runs) samples += run.size();
+    std::fill(errors, errors + horizons.size() * samples * kChannels, std::nan(""));
     with_state_size(problem.model.effects, noise, [&](auto nx) {
         for (const Run& run : problem.runs) {
-            look_ahead_run<decltype(nx)::value>(problem, run, p, noise, ahead, every, errors);
+            look_ahead_run<decltype(nx)::value>(problem, run, p, noise, horizons, samples, errors);
             errors += run.size() * kChannels;
         }
     });

@@ -200,29 +200,27 @@ def ridge(X: FloatArray, Y: FloatArray, fold: Whole) -> Law:
     fold : array of int, shape (samples,)
     """
     errors = np.zeros((len(_PENALTIES), Y.shape[1]))
-    for k in np.unique(fold):
-        out = fold == k
+    parts = [fold == k for k in np.unique(fold)]
+    grams = [X[part].T @ X[part] for part in parts]
+    whole = np.sum(grams, axis=0)
+    for out, gram in zip(parts, grams, strict=True):
         if out.all():
             continue
         mean = Y[~out].mean(axis=0)
-        for i, size in enumerate(_sizes(X[~out], Y[~out] - mean)):
-            errors[i] += np.sum((Y[out] - mean - X[out] @ size) ** 2, axis=0)
+        sizes = _sizes(whole - gram, X[~out].T @ (Y[~out] - mean), int((~out).sum()))
+        wrong = (Y[out] - mean) - X[out] @ sizes
+        errors += np.sum(wrong**2, axis=1)
     best = np.argmin(errors, axis=0)
     mean = Y.mean(axis=0)
-    sizes = _sizes(X, Y - mean)
-    return Law(
-        as_float64(mean), as_float64(np.stack([sizes[i][:, k] for k, i in enumerate(best)], axis=1))
-    )
+    size = _sizes(whole, X.T @ (Y - mean), len(X))[best, :, np.arange(Y.shape[1])]
+    return Law(as_float64(mean), as_float64(size.T))
 
 
-def _sizes(X: FloatArray, Y: FloatArray) -> list[FloatArray]:
-    """Coefficients at each penalty, from one eigendecomposition."""
-    value, vector = np.linalg.eigh(X.T @ X)
-    across = vector.T @ (X.T @ Y)
-    return [
-        as_float64(vector @ (across / (value + penalty * len(X))[:, None]))
-        for penalty in _PENALTIES
-    ]
+def _sizes(gram: FloatArray, across: FloatArray, rows: int) -> FloatArray:
+    """Coefficients at each penalty, (penalties, n, m), from one eigendecomposition."""
+    value, vector = np.linalg.eigh(gram)
+    loosened = value + rows * _PENALTIES[:, None]
+    return as_float64(vector @ ((vector.T @ across) / loosened[:, :, None]))
 
 
 def folds(driving: Driving) -> Whole:

@@ -23,7 +23,7 @@ from .._threads import in_parallel
 from ..estimate import MEASURED
 from .delay import HIGHEST_HZ, Delay, delay, pieces_of
 from .evidence import Evidence
-from .omnibus import omnibus_of
+from .omnibus import Omnibus, omnibus_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -114,7 +114,9 @@ class Coherence:
         )
 
 
-def coherence(evidence: Evidence, *, delays: bool = True, seed: int = 0) -> tuple[Coherence, ...]:
+def coherence(
+    evidence: Evidence, *, delays: bool = True, seed: int = 0, omnibus: Omnibus | None = None
+) -> tuple[Coherence, ...]:
     """Coherence with the steering angle and, where it is known, with the wheel force.
 
     Parameters
@@ -124,17 +126,19 @@ def coherence(evidence: Evidence, *, delays: bool = True, seed: int = 0) -> tupl
         Whether to seek delays.
     seed : int
         Of the draws of noise of the inputs, which widens the intervals of delays.
+    omnibus : Omnibus, optional
+        Of the same evidence, where it is known already.
     """
     names = ("steer", "force") if evidence.driving.force_known else ("steer",)
     inputs = evidence.driving.inputs()
     asking = Lock()
-    known: list[bool] = []
+    known = [] if omnibus is None else [omnibus]
 
     def complete() -> bool:
         with asking:
             if not known:
-                known.append(not omnibus_of(evidence).rejects)
-            return known[0]
+                known.append(omnibus_of(evidence))
+            return not known[0].rejects
 
     def one(i: int) -> Coherence:
         rng = generator(seed) if delays else None

@@ -4,6 +4,7 @@ The posterior of `causes.py` is that of scores, linearised at a fit which a larg
 bent: what that effect does beyond first order looks like further effects. The set of the effect
 that is refitted best stands; another one stands if its likeliest effect, refitted beside those
 before it, gains its price, and an unknown force or a clock if anything is left beside all of them.
+Scores beside those before it are asked first: what gains next to nothing there is not refitted.
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..identify import Fit
 from .causes import Causes, CredibleSet
 from .diagnosis import Candidate, Diagnosis
-from .omnibus import omnibus
 from .refits import refitted
+from .reservation import Beside, beside
+from .score import score_board_of
+
+_HOPELESS = 0.25  # of the price that a refit has to gain: a score below is not refitted
 
 
 def confirmed(dx: Diagnosis) -> Causes:
@@ -36,12 +39,16 @@ def confirmed(dx: Diagnosis) -> Causes:
         s: next((e for e in s.effects if e in known), "") for s in proposed.sets if s is not first
     }
     vague = [s for s, effect in told.items() if not effect]
-    fit = best.fit
+    # What the naming of the likeliest effect has asked already is not asked again.
+    left = dx.beside if dx.beside.fit is best.fit else _left(dx, best)
     waiting = {s: effect for s, effect in told.items() if effect}
     # The one that gains most comes first: beside what is still missing any effect gains something.
     while waiting:
+        hopeless = _hopeless(left, [known[e] for e in waiting.values()], price)
         tried = {
-            s: _beside(fit, known[e], dx) for s, e in waiting.items() if e not in fit.model.effects
+            s: _refitted(left, known[e], dx)
+            for s, e in waiting.items()
+            if e not in left.fit.model.effects and e not in hopeless
         }
         waiting = {s: waiting[s] for s, c in tried.items() if c.statistic >= price}
         if not waiting:
@@ -49,16 +56,31 @@ def confirmed(dx: Diagnosis) -> Causes:
         found = max(waiting, key=lambda s: tried[s].statistic)
         kept.append(found)
         del waiting[found]
-        fit = tried[found].fit or fit
-    if vague and omnibus(fit, dx.driving, rules).rejects:
+        left = _left(dx, tried[found])
+    if vague and left.omnibus.rejects:
         kept += vague
     return proposed.only(kept, dx.sizes)
 
 
-def _beside(fit: Fit, c: Candidate, dx: Diagnosis) -> Candidate:
+def _left(dx: Diagnosis, c: Candidate) -> Beside:
+    assert c.fit is not None  # what gains its price is refitted
+    return beside(c.fit, dx.driving, {e.id for e in dx.fit.model.candidates}, dx.rules)
+
+
+def _hopeless(left: Beside, candidates: list[Candidate], price: float) -> set[str]:
+    """Effects that gain far less than the price by their scores beside what is in the model."""
+    few = tuple(c.effect for c in candidates if c.id not in left.fit.model.effects)
+    return {
+        s.effect.id
+        for s in score_board_of(left.evidence, few, left.rules).scores
+        if s.statistic * max(s.variance_ratio, 1.0) < _HOPELESS * price
+    }
+
+
+def _refitted(left: Beside, c: Candidate, dx: Diagnosis) -> Candidate:
     """A candidate refitted beside what is in the model by now."""
     value, std = dx.proposed.sizes[c.id]
-    return refitted(fit, dx.driving, replace(c, value=value, std=std, fit=None))
+    return refitted(left.fit, dx.driving, replace(c, value=value, std=std, fit=None))
 
 
 def _leading(best: Candidate, dx: Diagnosis, proposed: CredibleSet | None) -> CredibleSet:

@@ -41,19 +41,20 @@ class Beside:
     rules: Rules = USUAL
 
     @cached_property
-    def _evidence(self) -> Evidence:
+    def evidence(self) -> Evidence:
+        """The residuals."""
         return Evidence(self.fit, self.driving)
 
     @cached_property
     def omnibus(self) -> Omnibus:
         """Whether anything is left."""
-        return omnibus_of(self._evidence, self.rules)
+        return omnibus_of(self.evidence, self.rules)
 
     @cached_property
     def board(self) -> ScoreBoard:
         """Scores of the other effects."""
         others = tuple(e for e in self.fit.model.candidates if e.id in self.lacked)
-        return score_board_of(self._evidence, others, self.rules)
+        return score_board_of(self.evidence, others, self.rules)
 
     @cached_property
     def _comparison(self) -> Comparison:

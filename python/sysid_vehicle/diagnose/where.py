@@ -16,6 +16,7 @@ from .change_points import ChangePoint, change_points
 from .coherence import Coherence, coherence
 from .evidence import Evidence
 from .force_map import UNITS, ForceMap, force_maps
+from .omnibus import Omnibus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -155,6 +156,7 @@ def where(
     seed: int = 0,
     causes: bool = True,
     name: str = "the model",
+    omnibus: Omnibus | None = None,
 ) -> Where:
     """Find where, when and at which frequencies a fitted model fails.
 
@@ -173,13 +175,15 @@ def where(
         that is known to lack something else may feign them.
     name : str
         What to call the model in words.
+    omnibus : Omnibus, optional
+        Of the model on this driving, where it is known already.
     """
     driving = fit.driving if logs is None else Driving.of(logs)
     evidence = Evidence(fit, driving)
     with Workers() as pool:
         mapped = pool.submit(force_maps, fit, driving)
         changes = pool.submit(change_points, evidence, alpha=alpha, seed=seed) if causes else None
-        coherent = coherence(evidence, delays=causes, seed=seed)
+        coherent = coherence(evidence, delays=causes, seed=seed, omnibus=omnibus)
         maps, steady = mapped.result()
     return Where(
         maps,

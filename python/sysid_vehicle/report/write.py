@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from .._files import write_text
 from .._progress import doing
+from .._threads import in_parallel
 from ..model import Model
 from ..study import Study
 from .markdown import markdown
@@ -35,6 +37,7 @@ def write_report(study: Study, path: str | Path, *, truth: Model | None = None) 
     """
     title = f"Study of {study.model.vehicle.name}"
     with doing("report"):
+        _work_out(study)
         samples = samples_of(study)
         first = first_screen(study, samples)
         made = [(name, make(study, samples, truth)) for name, make in SECTIONS]
@@ -42,3 +45,16 @@ def write_report(study: Study, path: str | Path, *, truth: Model | None = None) 
     told = "" if samples is None else samples.json()
     whole = page(title, [*first, *folded], told)
     write_text(path, markdown(whole) if Path(path).suffix.lower() == ".md" else whole)
+
+
+def _work_out(study: Study) -> None:
+    """Ask the study side by side for what the page tells; it keeps the answers."""
+    asked: tuple[Callable[[], object], ...] = (
+        lambda: (study.where, study.where_baseline),
+        lambda: study.shares,
+        lambda: [dx.causes for dx in study.diagnoses],
+        lambda: study.horizons,
+        lambda: (study.errors_with, study.late),
+        lambda: study.unknown,
+    )
+    in_parallel(lambda ask: ask(), asked)

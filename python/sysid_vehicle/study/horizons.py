@@ -23,7 +23,7 @@ from ..errors import NumericalError
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..identify import Fit
 from ..rules import Change, share_of
-from .waterfall import look_ahead
+from .waterfall import all_ahead
 
 __all__ = [
     "AHEAD",
@@ -158,10 +158,7 @@ def horizons(
     channels = tuple(c for c in _explainable(driving) if c in driving.present)
     columns = [PREDICTED.index(c) for c in channels]
     by_block = np.stack(
-        [
-            np.stack([block_errors(f, noise, driving, h)[:, columns] for h in horizons_s], axis=1)
-            for f in fits
-        ]
+        [block_errors(f, noise, driving, tuple(horizons_s))[:, :, columns] for f in fits]
     )
     with np.errstate(invalid="ignore"):
         low, middle, high = (_quantile(by_block, q) for q in (0.1, 0.5, 0.9))
@@ -228,12 +225,7 @@ def beyond_noise(
     noise = fits[-1].noise.floor()
     sensor = np.array([noise.sensor[MEASURED.index(c)] for c in PREDICTED])
     # Shape (models, blocks, horizons, channels).
-    squares = np.array(
-        [
-            np.stack([block_errors(f, noise, driving, h) for h in horizons_s], axis=1) ** 2
-            for f in fits
-        ]
-    )
+    squares = np.stack([block_errors(f, noise, driving, tuple(horizons_s)) for f in fits]) ** 2
     seen = np.isfinite(squares).any(axis=(0, 1))
     seen &= np.isin(PREDICTED, _explainable(driving))
     if not seen.any():  # too short for any prediction
@@ -264,7 +256,9 @@ def _share(squares: FloatArray) -> float:
 
 # The poorer model of all candidates of a step is the same one.
 @lru_cache(maxsize=64)
-def block_errors(fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float) -> FloatArray:
+def block_errors(
+    fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: tuple[float, ...]
+) -> FloatArray:
     """Root mean square errors of the predicted channels, block by block.
 
     Parameters
@@ -273,24 +267,24 @@ def block_errors(fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float
     noise : NoiseModel
         Of the filter that starts the predictions.
     driving : Driving
-    horizon_s : float
+    horizons_s : tuple of float
 
     Returns
     -------
-    array, shape (blocks, 5)
+    array, shape (blocks, horizons, 5)
         NaN where nothing is predicted, infinite where the model lost the car.
     """
     columns = [MEASURED.index(c) for c in PREDICTED]
     starts = blocks(driving, driving.usable_s / _number_of_blocks(driving))
     try:
-        e = look_ahead(fit, noise, driving, horizon_s, apart=_APART)[:, columns]
+        e = all_ahead(fit, noise, driving, horizons_s, apart=_APART)[:, :, columns]
     except NumericalError:
-        return np.full((len(starts), len(PREDICTED)), np.inf)
+        return np.full((len(starts), len(horizons_s), len(PREDICTED)), np.inf)
     there = np.isfinite(driving.measured[:, columns]) & ~np.isnan(e)
-    squares = np.add.reduceat(np.where(there, e, 0.0) ** 2, starts, axis=0)
-    count = np.add.reduceat(there.astype(float), starts, axis=0)
+    squares = np.add.reduceat(np.where(there, e, 0.0) ** 2, starts, axis=1)
+    count = np.add.reduceat(there.astype(float), starts, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return as_float64(np.where(count > 0.0, np.sqrt(squares / count), np.nan))
+        return as_float64(np.where(count > 0.0, np.sqrt(squares / count), np.nan).swapaxes(0, 1))
 
 
 def typical_error(
@@ -302,8 +296,8 @@ def typical_error(
     """
     columns = [PREDICTED.index(c) for c in LATERAL]
     found = []
-    for h in horizons_s:
-        by_block = block_errors(fit, noise, driving, h)[:, columns]
+    for by_block in block_errors(fit, noise, driving, tuple(horizons_s)).swapaxes(0, 1):
+        by_block = by_block[:, columns]
         known = ~np.isnan(by_block).all(axis=0)
         found += list(np.nanmedian(by_block[:, known], axis=0))
     return float(np.mean(np.log(found))) if found else np.inf
@@ -332,8 +326,9 @@ def changes(
     """
     noise = after.noise.floor()
     found = []
-    for h in horizons_s:
-        one, other = (block_errors(fit, noise, driving, h) for fit in (before, after))
+    both = [block_errors(fit, noise, driving, tuple(horizons_s)) for fit in (before, after)]
+    for i, h in enumerate(horizons_s):
+        one, other = (errors[:, i] for errors in both)
         for channel in LATERAL:
             j = PREDICTED.index(channel)
             known = (one[:, j] > 0.0) & (other[:, j] > 0.0)

@@ -46,6 +46,9 @@ _LOST = 1e3  # standard deviations of the channel: what a model that loses the c
 _LEAST = 1.0 - (1.0 - _VISIBLE) ** 2  # of its square
 _QUANTILES = (0.1, 0.5, 0.9)
 
+_Errors = tuple[npt.NDArray[np.intp], FloatArray]
+"""Samples at which predictions end, and errors there."""
+
 
 @dataclass(frozen=True, eq=False)
 class Shares:
@@ -196,11 +199,14 @@ def shares(
     columns = [CHANNELS.index(c) for c in channels]
     inputs = Inputs.of(final, final.driving, test)
     models = (baseline,) if final is baseline else (baseline, final)
+    drives = (final.driving, test)
+    pairs = [(fit, driving) for fit in models for driving in drives]
+    found = in_parallel(lambda pair: _errors(pair[0], noise, pair[1], horizons_s), pairs)
+    by_horizon = [list(zip(few[::2], few[1::2], strict=True)) for few in zip(*found, strict=True)]
     # Shape (models and ceilings, blocks, horizons, channels).
-    found = in_parallel(
-        lambda h: _squares(models, noise, final.driving, test, inputs, h)[..., columns], horizons_s
+    squares = np.stack(
+        in_parallel(lambda few: _squares(few, drives, inputs)[..., columns], by_horizon), axis=2
     )
-    squares = np.stack(found, axis=2)
     n = len(models)
     deciles = _deciles(np.sqrt(squares))
     # The best regression, and no worse than the final model: it is a function of the driving too.
@@ -253,33 +259,26 @@ def _middle(squares: FloatArray) -> FloatArray:
 
 
 def _squares(
-    models: Sequence[Fit],
-    noise: NoiseModel,
-    train: Driving,
-    test: Driving,
-    inputs: Inputs,
-    horizon_s: float,
+    errors: Sequence[tuple[_Errors, _Errors]], drives: tuple[Driving, Driving], inputs: Inputs
 ) -> FloatArray:
-    """Mean squares by block: of each model, then of each beside its regression; (2n, blocks, 4)."""
-    plain, beside = [], []
-    fold = folds(train)
-    for fit in models:
-        found = []
-        for driving in (train, test):
-            ends, errors = _errors(fit, noise, driving, horizon_s)
-            found.append((ends, errors))
-        (few, known), (there, hidden) = found
-        left = hidden.copy()
-        for k in range(len(CHANNELS)):
-            usable = np.isfinite(known[:, k])
-            if np.count_nonzero(usable) < _FEW:
-                continue
-            rows = few[usable]
-            law = ridge(inputs.train[rows], known[usable, k : k + 1], fold[rows])
-            left[:, k] -= law.mean[0] + inputs.other[there] @ law.size[:, 0]
-        plain.append(_by_block(test, there, hidden))
-        beside.append(_by_block(test, there, left))
-    return as_float64(np.stack([*plain, *beside]))
+    """Mean squares by block: of each model, then of each beside its regression; (2n, blocks, 4).
+
+    `errors` are those of each model on training and validation data, at one horizon.
+    """
+    train, test = drives
+    # Every model predicts the same samples.
+    few, there = (ends for ends, _ in errors[0])
+    known, hidden = (np.hstack([each[i][1] for each in errors]) for i in (0, 1))
+    left, usable = hidden.copy(), np.isfinite(known)
+    for pattern in np.unique(usable, axis=1).T:
+        if np.count_nonzero(pattern) < _FEW:
+            continue
+        own = (usable == pattern[:, None]).all(axis=0)
+        rows = few[pattern]
+        law = ridge(inputs.train[rows], known[pattern][:, own], folds(train)[rows])
+        left[:, own] -= law.mean + inputs.other[there] @ law.size
+    each = [x for both in (hidden, left) for x in np.hsplit(both, len(errors))]
+    return as_float64(np.stack([_by_block(test, there, x) for x in each]))
 
 
 def _by_block(driving: Driving, at: npt.NDArray[np.intp], errors: FloatArray) -> FloatArray:
@@ -296,36 +295,43 @@ def _by_block(driving: Driving, at: npt.NDArray[np.intp], errors: FloatArray) ->
 
 
 def _errors(
-    fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float
-) -> tuple[npt.NDArray[np.intp], FloatArray]:
-    """Samples at which predictions end, and the errors there, shape (predictions, 4)."""
+    fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: Sequence[float]
+) -> list[_Errors]:
+    """At each horizon, samples at which predictions end, and errors, shape (predictions, 4)."""
     problem, p, w = driving.problem(fit.model), fit.model.vector(), noise.vector()
     lateral = [MEASURED.index(c) for c in CHANNELS[:-1]]
     with catch_warnings():
         simplefilter("ignore", RuntimeWarning)  # channels that were not measured
         spread = np.nanstd(driving.measured[:, lateral], axis=0)
-    ends, errors = [], []
+    parts: list[list[_Errors]] = [[] for _ in horizons_s]
     for rate in np.unique(driving.sample_rate_hz):
-        ahead = max(round(horizon_s * rate), 1)
-        every = max(round(max(_LEAST_APART_S, _APART * horizon_s) * rate), 1)
-        half_way = max(ahead // 2, 1)  # for the path
-        first = _starts(driving, float(rate), ahead, every)
+        ahead = [max(round(h * rate), 1) for h in horizons_s]
+        apart = [max(round(max(_LEAST_APART_S, _APART * h) * rate), 1) for h in horizons_s]
+        half_way = [max(n // 2, 1) for n in ahead]  # for the path
         try:
-            middle, last = (problem.look_ahead(p, w, k, every) for k in (half_way, ahead))
+            asked = list(zip((*half_way, *ahead), (*apart, *apart), strict=True))
+            found = problem.look_ahead(p, w, asked)
         except NumericalError:
-            lost = np.broadcast_to(_LOST * spread, (len(first), 3))
-            errors.append(np.column_stack([lost, np.full(len(first), np.nan)]))
-            ends.append(first + ahead)
-            continue
-        half, whole = middle[first + half_way], last[first + ahead]
-        v = driving.channel("vx_mps")[first]
-        errors.append(np.column_stack([whole[:, lateral], _path(half, whole, v, ahead / rate)]))
-        ends.append(first + ahead)
-    at = np.concatenate(ends)
+            found = None
+        for i, (n, half, every) in enumerate(zip(ahead, half_way, apart, strict=True)):
+            first = _starts(driving, float(rate), n, every)
+            if found is None:
+                lost = np.broadcast_to(_LOST * spread, (len(first), 3))
+                errors = np.column_stack([lost, np.full(len(first), np.nan)])
+            else:
+                middle, last = found[i][first + half], found[i + len(ahead)][first + n]
+                v = driving.channel("vx_mps")[first]
+                errors = np.column_stack([last[:, lateral], _path(middle, last, v, n / rate)])
+            parts[i].append((first + n, as_float64(errors)))
+    return [_joined(driving.measured[:, lateral], few) for few in parts]
+
+
+def _joined(measured: FloatArray, parts: list[_Errors]) -> _Errors:
+    """In the order of time, NaN where nothing was measured."""
+    at = np.concatenate([ends for ends, _ in parts])
     order = np.argsort(at)
-    found = np.concatenate(errors)[order]
-    measured = np.isfinite(driving.measured[at[order]][:, lateral])
-    found[:, :-1][~measured] = np.nan
+    found = np.concatenate([errors for _, errors in parts])[order]
+    found[:, :-1][~np.isfinite(measured[at[order]])] = np.nan
     return at[order], as_float64(found)
 
 

@@ -152,7 +152,7 @@ class Study:
     @cached_property
     def where(self) -> Where:
         """Where, when and at which frequencies the final model fails; some seconds at first."""
-        return where(self.fit, name=self._named(self.fit))
+        return where(self.fit, name=self._named(self.fit), omnibus=self.omnibus)
 
     @cached_property
     def where_baseline(self) -> Where:

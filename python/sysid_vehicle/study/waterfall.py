@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, as_float64
 from .._style import AFTER, BEFORE, axes_or_new, tidy
 from .._text import brief, html_table, text_table
 from ..compare import Comparison
@@ -19,7 +19,7 @@ from ..identify import Fit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Waterfall", "look_ahead", "waterfall"]
+__all__ = ["Waterfall", "all_ahead", "look_ahead", "waterfall"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ def waterfall(
         spread = np.array(
             [score.channels[c].noise_floor if c in score.channels else np.nan for c in MEASURED]
         )
-        return np.array([[_error(f, floor, driving, h, spread) for h in horizons] for f in fits])
+        return np.array([_errors(f, floor, driving, horizons, spread) for f in fits])
 
     return Waterfall(tuple(steps), horizons, errors(*train), errors(*test))
 
@@ -121,7 +121,19 @@ def waterfall(
 def look_ahead(
     fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float, *, apart: float = 0.0
 ) -> FloatArray:
-    """Prediction errors so many seconds ahead, at the rate of each log, but one sample at least.
+    """Prediction errors so many seconds ahead, shape (samples, 5); see `all_ahead`."""
+    return as_float64(all_ahead(fit, noise, driving, (horizon_s,), apart=apart)[0])
+
+
+def all_ahead(
+    fit: Fit,
+    noise: NoiseModel,
+    driving: Driving,
+    horizons_s: Sequence[float],
+    *,
+    apart: float = 0.0,
+) -> FloatArray:
+    """Prediction errors some times ahead, at the rate of each log, but one sample at least.
 
     Parameters
     ----------
@@ -129,33 +141,36 @@ def look_ahead(
     noise : NoiseModel
         Of the filter that tells what was known when a prediction begins.
     driving : Driving
-    horizon_s : float
+    horizons_s : sequence of float
     apart : float
         How far predictions begin apart, as a share of the horizon; 0 for one at each sample.
 
     Returns
     -------
-    array, shape (samples, 5)
+    array, shape (horizons, samples, 5)
         NaN where no prediction ends.
     """
     problem = driving.problem(fit.model)
-    errors = np.full((driving.samples, len(MEASURED)), np.nan)
+    errors = np.full((len(horizons_s), driving.samples, len(MEASURED)), np.nan)
     for rate in np.unique(driving.sample_rate_hz):
-        ahead = max(round(horizon_s * rate), 1)
         own = driving.sample_rate_hz == rate
-        every = max(int(apart * ahead), 1)
-        found = problem.look_ahead(fit.model.vector(), noise.vector(), ahead, every)
-        errors[own] = found[own]
+        ahead = [max(round(h * rate), 1) for h in horizons_s]
+        asked = [(n, max(int(apart * n), 1)) for n in ahead]
+        errors[:, own] = problem.look_ahead(fit.model.vector(), noise.vector(), asked)[:, own]
     return errors
 
 
-def _error(
-    fit: Fit, noise: NoiseModel, driving: Driving, horizon_s: float, spread: FloatArray
-) -> float:
+def _errors(
+    fit: Fit,
+    noise: NoiseModel,
+    driving: Driving,
+    horizons_s: Sequence[float],
+    spread: FloatArray,
+) -> list[float]:
     try:
         # Predictions that begin a twentieth of their length apart are wrong alike.
-        e = look_ahead(fit, noise, driving, horizon_s, apart=0.05) / spread
+        e = all_ahead(fit, noise, driving, horizons_s, apart=0.05) / spread
     except NumericalError:
-        return float("inf")
+        return [float("inf")] * len(horizons_s)
     e = np.where(np.isfinite(driving.measured), e, np.nan)
-    return float(np.sqrt(np.nanmean(e**2))) if np.isfinite(e).any() else float("nan")
+    return [float(np.sqrt(np.nanmean(x**2))) if np.isfinite(x).any() else np.nan for x in e]

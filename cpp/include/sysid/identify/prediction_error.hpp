@@ -95,9 +95,16 @@ struct Trace {
 
 Trace trace(const Problem& problem, const double* p, const Noise& noise, bool smoothed);
 
-/// Prediction errors `ahead` samples ahead, from the filtered state and slope of the road: samples
-/// x kChannels. Only one sample in `every` starts a prediction; where none ends, errors are NaN.
-void look_ahead(const Problem& problem, const double* p, const Noise& noise, std::size_t ahead,
-                std::size_t every, double* errors);
+/// Predictions so many samples ahead, of which one sample in `every` starts one.
+struct Horizon {
+    std::size_t ahead = 1;
+    std::size_t every = 1;
+};
+
+/// Prediction errors from the filtered state and slope of the road, for each horizon samples x
+/// kChannels; NaN where no prediction ends. The filter runs once, and predictions that start at one
+/// sample are one prediction, read at each horizon.
+void look_ahead(const Problem& problem, const double* p, const Noise& noise,
+                const std::vector<Horizon>& horizons, double* errors);
 
 }  // namespace sysid
