@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from decimal import Decimal
 from numbers import Integral, Real
 
@@ -12,7 +13,15 @@ import numpy as np
 
 from .errors import InvalidInput
 
-__all__ = ["duration", "expect", "generator", "real", "whole"]
+__all__ = [
+    "check_not_negative",
+    "check_positive",
+    "duration",
+    "expect",
+    "generator",
+    "real",
+    "whole",
+]
 
 
 def real(value: object) -> float | None:
@@ -76,6 +85,38 @@ def generator(seed: object) -> np.random.Generator:
         raise InvalidInput(
             f"seed = {seed!r}; give a whole number from zero up, or a numpy generator"
         ) from None
+
+
+def check_positive(where: str, **values: float | Sequence[float]) -> None:
+    """Refuse arguments that are not positive numbers, or sequences that hold none.
+
+    Raises
+    ------
+    InvalidInput
+        The message names the first such argument.
+    """
+    for name, given in values.items():
+        numbers = np.atleast_1d(np.asarray(given, dtype=float))
+        if numbers.size == 0:
+            raise InvalidInput(f"{where}: {name} is empty; give one value or more")
+        if not ((numbers > 0.0) & (numbers < np.inf)).all():
+            raise InvalidInput(f"{where}: {name} = {given!r}; give positive numbers")
+
+
+def check_not_negative(thing: object, *, finite: bool = False) -> None:
+    """Refuse a dataclass of which a number is below zero, or, if asked, infinite.
+
+    Raises
+    ------
+    InvalidInput
+        The message names the first such field.
+    """
+    for field in fields(thing):  # type: ignore[arg-type]
+        value = getattr(thing, field.name)
+        if isinstance(value, float) and not (value >= 0.0 and (value < math.inf or not finite)):
+            raise InvalidInput(
+                f"{type(thing).__name__}: {field.name} = {value!r}; give zero or a positive number"
+            )
 
 
 # What to do with something that is given where something else is wanted.

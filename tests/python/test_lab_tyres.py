@@ -293,7 +293,7 @@ def test_wrong_input_is_named() -> None:
         identify_tyres(CAR, log, start={"B_frnt": 1.0})
     with pytest.raises(InvalidInput, match="optimiser"):
         identify_tyres(CAR, log, method="magic")
-    with pytest.raises(InvalidInput, match="starts is 0"):
+    with pytest.raises(InvalidInput, match="starts = 0: give"):
         identify_tyres(CAR, log, starts=0)
     u = log.inputs.copy()
     u[120, 1] = np.nan
@@ -303,7 +303,7 @@ def test_wrong_input_is_named() -> None:
     y[:, 2] = np.nan
     with pytest.raises(InvalidInput, match="yaw_rate_radps is missing throughout"):
         TyreLog(0.01, y, log.inputs)
-    with pytest.raises(InvalidInput, match="mass_kg is -1"):
+    with pytest.raises(InvalidInput, match="GreyBoxVehicle: mass_kg = -1"):
         GreyBoxVehicle(-1.0, 1000.0, 1.4, 1.6)
     with pytest.raises(InvalidInput, match="spins or stops at sample"):
         drive_tyres(CAR, TRUTH, weave(0.2), begin=(35.0, 0.0, 0.0))

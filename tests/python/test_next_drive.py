@@ -102,7 +102,7 @@ def test_limits_are_kept(gentle: Fit) -> None:
     )
     with pytest.raises(InvalidInput, match="widen"):
         nowhere.best  # noqa: B018
-    with pytest.raises(InvalidInput, match="speed_mps is -1"):
+    with pytest.raises(InvalidInput, match="DriveLimits: speed_mps = -1"):
         DriveLimits(-1.0)
 
 

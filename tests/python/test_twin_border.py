@@ -144,7 +144,7 @@ def test_laws_and_batches_check_their_places_and_rows() -> None:
         ({"inputs": np.zeros((N, 20))}, r"inputs have shape \(400, 20\); give \(n, 24\)"),
         ({"inputs": "none"}, "no table of real numbers"),
         ({"inputs": np.zeros((N - 1, 24))}, "399 rows of inputs but 400 of readings"),
-        ({"stride": 2.5}, "stride = 2.5; give a whole number"),
+        ({"stride": 2.5}, "stride = 2.5: give a whole number"),
         ({"speed_mps": float("nan")}, "speed_mps = nan"),
         ({"speed_mps": 1e9}, "speed_mps = 1000000000.0"),
         ({"read": Readings(np.zeros((N, 16)), {}, 0.0)}, "dt_s = 0.0; give seconds"),

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import manoeuvres
+from .._arguments import check_positive
 from .._printed import Part, Printed, Table
 from .._progress import with_progress
 from .._text import brief
@@ -57,9 +58,8 @@ class DriveLimits:
     duration_s: float = 120.0
 
     def __post_init__(self) -> None:
-        for name in ("speed_mps", "lateral_mps2", "duration_s"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise InvalidInput(f"{name} is {getattr(self, name)}; give a positive number")
+        limits = {"speed_mps": self.speed_mps, "lateral_mps2": self.lateral_mps2}
+        check_positive("DriveLimits", **limits, duration_s=self.duration_s)
         if self.area_m is not None and not min(self.area_m) > 0.0:
             raise InvalidInput(f"area_m is {self.area_m}; give two positive lengths")
 

@@ -6,21 +6,13 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
+from .._arguments import check_not_negative
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2, Vehicle
 from .observer import ObserverForm
 
 _INF = float("inf")
-
-
-def _refuse_negative(thing: object) -> None:
-    for f in fields(thing):  # type: ignore[arg-type]
-        value = getattr(thing, f.name)
-        if isinstance(value, float) and not value >= 0.0:
-            raise InvalidInput(
-                f"{type(thing).__name__}: {f.name} = {value!r}; give zero or a positive number"
-            )
 
 
 @dataclass(frozen=True)
@@ -161,7 +153,7 @@ class Nominal:
     gravity_mps2: float = GRAVITY_MPS2
 
     def __post_init__(self) -> None:
-        _refuse_negative(self)
+        check_not_negative(self)
         for name in ("mass_kg", "yaw_inertia_kgm2", "lf_m", "stiffness_front"):
             if getattr(self, name) == 0.0:
                 raise InvalidInput(f"Nominal: {name} is zero; the controller divides by it")
@@ -215,7 +207,7 @@ class Controller:
     added_speed_mps: float = 0.0
 
     def __post_init__(self) -> None:
-        _refuse_negative(self)
+        check_not_negative(self)
 
 
 @dataclass(frozen=True)
@@ -292,7 +284,7 @@ class Simulator:
     inputs_linear: bool = False
 
     def __post_init__(self) -> None:
-        _refuse_negative(self)
+        check_not_negative(self)
         if self.inputs_linear and self.late_feedback:
             raise InvalidInput(
                 "Simulator: inputs_linear needs the next command early; switch late_feedback off"

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _core
+from .._arguments import check_positive
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..log import Log
@@ -50,10 +51,8 @@ class GreyBoxVehicle:
     yaw_inertia_tolerance: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m", "air_density_kgpm3"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise InvalidInput(f"{name} is {value}; give a positive number in SI units")
+        names = ("mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m", "air_density_kgpm3")
+        check_positive("GreyBoxVehicle", **{name: getattr(self, name) for name in names})
         if not 0.0 <= self.cg_height_m < 3.0:
             raise InvalidInput(f"cg_height_m is {self.cg_height_m}; give 0 to 3 m above the road")
         for name in ("mass_tolerance", "yaw_inertia_tolerance"):

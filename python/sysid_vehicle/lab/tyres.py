@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .._arguments import whole
 from .._arrays import FloatArray, as_float64
 from .._progress import doing
 from ..errors import InvalidInput, warn
@@ -152,8 +153,7 @@ def _check(logs: tuple[TyreLog, ...], method: str, starts: int) -> None:
         raise InvalidInput("no log was given; pass one TyreLog or a list of them")
     if method not in METHODS:
         raise InvalidInput(f"no optimiser is called '{method}'; there are {', '.join(METHODS)}")
-    if starts < 1:
-        raise InvalidInput(f"starts is {starts}; at least one is needed")
+    whole(starts, "starts", 1)
     blind = [log.name for log in logs if not log.sideslip_measured]
     if blind:
         warn(

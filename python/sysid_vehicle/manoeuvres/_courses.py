@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ._curves import Knots, check_positive
+from .._arguments import check_positive
+from ._curves import Knots
 from ._manoeuvre import Manoeuvre
 
 # Rows: time [s], speed [m/s], lateral acceleration as a share of the highest one. Each course ends

@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import scipy
 
+from .._arguments import check_positive
 from .._arrays import FloatArray
 from ..errors import InvalidInput
-
-
-def check_positive(where: str, **values: float | Sequence[float]) -> None:
-    """Refuse arguments that are not positive numbers, or sequences that hold none.
-
-    Raises
-    ------
-    InvalidInput
-        The message names the first such argument.
-    """
-    for name, given in values.items():
-        numbers = np.atleast_1d(np.asarray(given, dtype=float))
-        if numbers.size == 0:
-            raise InvalidInput(f"{where}: {name} is empty; give one value or more")
-        if not ((numbers > 0.0) & (numbers < np.inf)).all():
-            raise InvalidInput(f"{where}: {name} = {given!r}; give positive numbers")
 
 
 class Curve(Protocol):

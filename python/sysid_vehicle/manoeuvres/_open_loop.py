@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ._curves import Knots, Pulse, Pulses, Sweep, check_positive, constant
+from .._arguments import check_positive
+from ._curves import Knots, Pulse, Pulses, Sweep, constant
 from ._manoeuvre import Manoeuvre
 
 _SPEED_CHANGE_MPS2 = 2.0

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from .._arguments import check_positive
 from .._arrays import FloatArray, as_float64
 from ..lab.excitation import Excitation
-from ..manoeuvres._curves import check_positive
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._arguments import whole
 from .._arrays import FloatArray, as_float64
 from .._printed import Part, Printed, Table
 from .._progress import doing
@@ -144,8 +145,7 @@ def regress_tyres(
         raise InvalidInput(f"no loss is called '{loss}'; there are {', '.join(LOSSES)}")
     if method not in METHODS:
         raise InvalidInput(f"no optimiser is called '{method}'; there are {', '.join(METHODS)}")
-    if starts < 1:
-        raise InvalidInput(f"starts is {starts}; at least one is needed")
+    whole(starts, "starts", 1)
     if loss == "joint" and motion.yaw_acc_radps2 is None:
         raise InvalidInput("the joint loss needs yaw_acc_radps2 in the motion")
     free = list(PARAMETERS[:8]) + (["P1", "P2", "P3"] if residual_terms else [])

@@ -6,17 +6,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from .._arguments import check_not_negative
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
-
-
-def _refuse_negative(thing: object) -> None:
-    for field in fields(thing):  # type: ignore[arg-type]
-        value = getattr(thing, field.name)
-        if not 0.0 <= value < float("inf"):
-            raise InvalidInput(
-                f"{type(thing).__name__}: {field.name} = {value!r}; give zero or a positive number"
-            )
 
 
 @dataclass(frozen=True)
@@ -43,7 +35,7 @@ class SensorNoise:
     steer_rad: float = 2e-4
 
     def __post_init__(self) -> None:
-        _refuse_negative(self)
+        check_not_negative(self, finite=True)
 
     @classmethod
     def none(cls) -> SensorNoise:
@@ -83,7 +75,7 @@ class RoadDisturbance:
     correlation_time_s: float = 0.3
 
     def __post_init__(self) -> None:
-        _refuse_negative(self)
+        check_not_negative(self, finite=True)
         if self.correlation_time_s == 0.0:
             raise InvalidInput("RoadDisturbance: correlation_time_s must be more than zero")
 

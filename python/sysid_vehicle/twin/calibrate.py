@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from .._arguments import generator
+from .._arguments import generator, whole
 from .._arrays import FloatArray
 from .._style import AFTER, MEASURED, axes_or_new, tidy
 from .._text import brief, html_text
@@ -312,8 +312,7 @@ def calibrate(
     NumericalError
         If every trial lost the twin.
     """
-    if trials < 1:
-        raise InvalidInput(f"trials = {trials!r}; give one or more")
+    whole(trials, "trials", 1)
     size = len(box.ranges)
     who = BayesianSearch(size, seed=seed, first=min(20, trials)) if optimiser is None else optimiser
     tried: list[tuple[dict[str, float], float]] = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
 
 import numpy as np
@@ -99,23 +98,6 @@ def checked_step(dt_s: float) -> float:
             f"dt_s = {dt_s!r}; give seconds, more than zero and at most {_LONGEST_STEP_S:g}"
         )
     return float(dt_s)
-
-
-def checked_stride(stride: int) -> int:
-    """Every how many samples something is recorded.
-
-    Raises
-    ------
-    InvalidInput
-        If it is no whole number from one up.
-    """
-    try:
-        whole = operator.index(stride)
-    except TypeError:
-        whole = 0
-    if whole < 1:
-        raise InvalidInput(f"stride = {stride!r}; give a whole number from one up")
-    return whole
 
 
 def _most(name: str) -> float:

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from .. import _core
+from .._arguments import whole
 from .._arrays import FloatArray, as_float64
 from .._style import AFTER, TRUTH, axes_or_new, tidy
 from .._text import brief, html_text
 from ..errors import InvalidInput, NumericalError, warn
 from .car import LOAD_NAMES, Load, TwinCar
-from .checks import checked_rows, checked_step, checked_stride
+from .checks import checked_rows, checked_step
 from .drives import INPUTS, OUTPUTS
 from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, place_of
 from .readings import READINGS, Readings
@@ -245,7 +246,7 @@ def observe(
         raise InvalidInput(
             f"{len(rows)} rows of inputs but {len(values)} of readings; give equally many"
         )
-    stride = checked_stride(stride)
+    stride = whole(stride, "stride", 1)
     twin = car.core(load)
     speed = _first_speed(car, readings) if speed_mps is None else float(speed_mps)
     if not abs(speed) <= _FASTEST_MPS:

@@ -18,11 +18,12 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from .._arguments import whole
 from .._arrays import FloatArray, as_float64
 from .._progress import doing
 from ..errors import InvalidInput, NumericalError
 from .car import LOAD_NAMES
-from .checks import checked_step, checked_stride
+from .checks import checked_step
 from .observer import Observation, Observer, judged
 
 CAPABILITIES = ("parameters", "state", "wrench", "snapshot", "clone")
@@ -128,7 +129,7 @@ def observe_with(
     dt, names = checked_step(twin.dt_s), twin.parameter_names
     inputs = _inputs(twin, inputs, dt)
     n = len(inputs)
-    stride = checked_stride(stride)
+    stride = whole(stride, "stride", 1)
     read = _table(twin, measured, n, dt)
     _check(twin, observer)
     laws = observer.core_laws(names, twin.output_names, dt)

@@ -8,9 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ..._arguments import check_positive
 from ..._arrays import FloatArray, as_float64
 from ...manoeuvres import Knots, Manoeuvre
-from ...manoeuvres._curves import Curve, check_positive
+from ...manoeuvres._curves import Curve
 from ...vehicle import Vehicle
 from ._excitation import Excitation
 from ._multisine import MultiSine

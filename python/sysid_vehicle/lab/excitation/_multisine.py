@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..._arguments import check_positive
 from ..._arrays import FloatArray, as_float64
 from ...errors import InvalidInput
-from ...manoeuvres._curves import check_positive
 
 _ROUNDS = 400
 _SAMPLES_PER_PERIOD = 32  # of the highest line

@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
+from ..._arguments import check_positive
 from ..._arrays import FloatArray, as_float64
 from ...errors import InvalidInput
-from ...manoeuvres._curves import check_positive
 from ._excitation import Excitation
 from ._multisine import MultiSine
 
