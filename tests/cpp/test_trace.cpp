@@ -118,7 +118,9 @@ TEST(LookAhead, ErrorOfAWrongModelGrowsWithTheHorizon) {
     }
     look_ahead(problem, p.data(), ordinary_noise(), {{44, 2}}, all.data());
     for (std::size_t n = 0; n < all.size(); ++n)
-        if (!std::isnan(all[n]) || !std::isnan(both[n])) EXPECT_EQ(both[n], all[n]) << n;
+        if (!std::isnan(all[n]) || !std::isnan(both[n])) {
+            EXPECT_EQ(both[n], all[n]) << n;
+        }
     EXPECT_THROW(look_ahead(problem, p.data(), ordinary_noise(), {{30, 0}}, all.data()),
                  std::invalid_argument);
     EXPECT_GT(yaw_rate_error(30), 1.5 * yaw_rate_error(3));

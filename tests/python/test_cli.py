@@ -324,7 +324,7 @@ def test_warnings_of_a_study_come_once_and_reach_the_json(
     assert main([*argv, "--json", str(path)]) == 0
     out, err = capsys.readouterr()
     collected = json.loads(path.read_text(encoding="utf-8"))["warnings"]
-    assert any("no test log was given" in text for text in collected)
+    assert any("no validation data were given" in text for text in collected)
     assert set(study[0].warnings) <= set(collected)
     for text in collected:
         assert err.count(text) == 1
