@@ -148,6 +148,32 @@ def test_a_stated_unit_counts_more_than_a_usual_size(tmp_path: Path, right: sv.L
     assert factors["yaw_rate_radps"] == pytest.approx(DEG)
 
 
+@pytest.fixture(scope="module")
+def minute(truth: sv.Model) -> sv.Log:
+    return sv.drive(truth, sv.manoeuvres.handling_course(60.0), seed=8, rate_hz=50.0)
+
+
+@pytest.mark.parametrize("gear", [1.0, 11.5, 16.4])
+def test_the_wheelbase_of_the_car_tells_its_steering_gear(
+    minute: sv.Log, truth: sv.Model, gear: float
+) -> None:
+    data = {name: minute[name] for name in minute.channels if name != "steer_rad"}
+    data["Steered Angle"] = -gear * minute["steer_rad"] / DEG
+    proposed = sv.propose_channels(data, vehicle=truth.vehicle).channels["steer_rad"]
+    assert proposed.factor == pytest.approx(-DEG / gear, rel=0.08)
+    assert f"wheelbase of {truth.vehicle.wheelbase_m:.3g} m" in proposed.why
+    assert "turned round" in proposed.why
+
+
+def test_steering_that_is_not_of_this_car_is_told(minute: sv.Log, truth: sv.Model) -> None:
+    """Its name says that it is the angle of the road wheels."""
+    data = {name: minute[name] for name in minute.channels}
+    data["steer_rad"] = 1.7 * data["steer_rad"]
+    proposed = sv.propose_channels(data, vehicle=truth.vehicle).channels["steer_rad"]
+    assert proposed.factor == 1.0
+    assert "times what a wheelbase of 2.6 m asks for: check both" in proposed.why
+
+
 def test_what_is_not_found_is_left_to_fill_in() -> None:
     data = {"time": np.arange(200) * 0.01, "speed": np.full(200, 20.0), "x1": np.zeros(200)}
     proposal = sv.propose_channels(data)
@@ -166,6 +192,16 @@ def test_on_the_command_line(
     assert capsys.readouterr().out == target.read_text("utf-8")
     log = sv.read_log(tmp_path / "run.csv", target)
     np.testing.assert_allclose(abs(log["ay_mps2"]), abs(right["ay_mps2"]), atol=1e-9)
+    car, again = tmp_path / "car.toml", tmp_path / "checked.toml"
+    sv.example_vehicle().to_toml(car)
+    run = ["check", str(tmp_path / "run.csv"), "--vehicle", str(car), "--map", str(again)]
+    assert main(run) == 0
+    assert "vy_mps" in capsys.readouterr().out
+    assert set(sv.ChannelMap.from_toml(again).sources) == set(
+        sv.ChannelMap.from_toml(target).sources
+    )
+    assert main([*run, "--channels", str(target)]) == 2
+    assert "--map, --channels: give one" in capsys.readouterr().err
     assert main(["map", str(tmp_path / "run.csv"), "-o", str(tmp_path / "run.csv")]) == 2
     assert "is also an input" in capsys.readouterr().err
 

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from .._files import write_json, write_text
+from .._files import write_json
 from .._progress import note
 from .._text import text_table
 from ..compare import Comparison, compare
@@ -21,12 +21,13 @@ from ..identify import Fit, identify
 from ..log import Log
 from ..model import Model
 from ..plugins import installed_effects
-from ..read import ChannelMap, propose_channels, read_log
+from ..read import ChannelMap, read_log
 from ..report import RANKING_HEAD, ranking_rows, ranking_title, summary, write_report
 from ..study import Study, improve
 from ..user_effects import load_effects
 from ..vehicle import Vehicle
 from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
+from .log_arguments import written_map
 from .outputs import refuse_unwritable
 
 __all__ = ["COMMANDS"]
@@ -124,15 +125,10 @@ def _effects(args: argparse.Namespace, heard: Warnings) -> None:
 
 
 def _map(args: argparse.Namespace, heard: Warnings) -> None:
-    others = [path for path in (args.log, args.dbc) if path is not None]
+    others = [path for path in (args.log, args.dbc, args.vehicle) if path is not None]
     refuse_unwritable([args.output], inputs=others)
-    found = propose_channels(args.log, dbc=args.dbc)
-    print(found, end="")
-    if args.output is not None:
-        write_text(args.output, found.to_toml())
-        print(f"Channel map: {args.output}", file=sys.stderr)
-    for name in found.missing:
-        warn(f"{name}: no column was found for it; name it in the channel map")
+    vehicle = None if args.vehicle is None else Vehicle.from_toml(args.vehicle)
+    print(written_map(args.log, args.output, args.dbc, vehicle), end="")
 
 
 COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {

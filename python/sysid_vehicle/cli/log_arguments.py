@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
-__all__ = ["LOG_HELP", "add_driving", "add_reading"]
+from .._files import write_text
+from ..errors import warn
+from ..read import Proposal, propose_channels
+from ..vehicle import Vehicle
+
+__all__ = ["LOG_HELP", "add_driving", "add_reading", "written_map"]
 
 LOG_HELP = "log of one run: CSV, MDF, MCAP, ROS bag, .mat, .vbo, CAN log, Parquet, ..."
 
@@ -25,3 +31,14 @@ def add_driving(parser: argparse.ArgumentParser) -> None:
         "--vehicle", type=Path, required=True, metavar="TOML", help="the car's own numbers"
     )
     add_reading(parser)
+
+
+def written_map(log: Path, to: Path | None, dbc: Path | None, vehicle: Vehicle | None) -> Proposal:
+    """Propose the channel map of a log, write it, and tell what it lacks."""
+    found = propose_channels(log, dbc=dbc, vehicle=vehicle)
+    if to is not None:
+        write_text(to, found.to_toml())
+        print(f"Channel map: {to}", file=sys.stderr)
+    for name in found.missing:
+        warn(f"{name}: no column was found for it; name it in the channel map")
+    return found

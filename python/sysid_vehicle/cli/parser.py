@@ -78,6 +78,9 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     mapping.add_argument("log", type=Path, metavar="LOG", help=LOG_HELP)
     mapping.add_argument("-o", "--output", type=Path, metavar="TOML", help="file to write it to")
     mapping.add_argument("--dbc", type=Path, metavar="DBC", help="database of a log of CAN frames")
+    mapping.add_argument(
+        "--vehicle", type=Path, metavar="TOML", help="the car, whose wheelbase tells the gear"
+    )
 
     sideslip.add_parser(commands)
     mu_slip.add_parser(commands)

@@ -1,6 +1,6 @@
 """Driving logs: canonical channels on a uniform grid, checked before they are used."""
 
-from ._against_car import check_car
+from ._against_car import check_car, times_wheelbase
 from ._channels import CHANNELS, Channel
 from ._columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
 from ._held import held_rows
@@ -22,4 +22,5 @@ __all__ = [
     "named_columns",
     "seconds_of_stamps",
     "several_logs",
+    "times_wheelbase",
 ]

@@ -7,6 +7,7 @@ that is not the car's, a length in feet. Identification would put all of that in
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,12 +87,9 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
         The message names key and channel, what the log tells, and the likely remedy.
     """
     columns = {name: log[name] for name in log.channels if name not in log.extras}
-    motion = Motion(columns, log.rate_hz)
-    motion.windows(WINDOW_S)
-    rows = motion.usable & (motion.mean(motion.channels["vx_mps"]) > _MOVING)
-    if np.count_nonzero(rows) < _MIN_WINDOWS:
+    drive = _driven(columns, log.rate_hz)
+    if drive is None:
         return
-    drive = Drive(motion, rows)
     mass = _mass(drive, mass_kg) if log.has("fx_n") else None
     if mass is not None and mass.off(_FORCE_FACTOR, _FORCE_STD):
         likely = _likely(mass, _MASS_SLIPS) or (
@@ -113,6 +111,31 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
             f"{log.name}: steer_rad is {steer.ratio:.3g} times what a wheelbase of "
             f"{wheelbase_m:g} m (lf_m + lr_m) asks for, {steer.place}; {likely}"
         )
+
+
+def times_wheelbase(
+    columns: Mapping[str, FloatArray], rate_hz: float, wheelbase_m: float
+) -> float | None:
+    """Steering angle over the one that a wheelbase asks for at low a_y; None where nothing tells.
+
+    Parameters
+    ----------
+    columns : mapping of ndarray, shape (n,)
+        `time_s`, `vx_mps`, `yaw_rate_radps`, `ay_mps2` and `steer_rad` on a uniform grid.
+    rate_hz : float
+        Rate of the grid.
+    wheelbase_m : float
+    """
+    drive = _driven(columns, rate_hz)
+    told = None if drive is None else _steer(drive, wheelbase_m)
+    return None if told is None else told.ratio
+
+
+def _driven(columns: Mapping[str, FloatArray], rate_hz: float) -> Drive | None:
+    motion = Motion(columns, rate_hz)
+    motion.windows(WINDOW_S)
+    rows = motion.usable & (motion.mean(motion.channels["vx_mps"]) > _MOVING)
+    return Drive(motion, rows) if np.count_nonzero(rows) >= _MIN_WINDOWS else None
 
 
 def _mass(drive: Drive, mass_kg: float) -> _Told | None:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ..log import times_wheelbase
 from ..vehicle import GRAVITY_MPS2
 
 FloatArray = npt.NDArray[np.float64]
@@ -37,6 +38,7 @@ _USUAL = {
     "ay_mps2": (5.0, 0.9),
 }
 _LAW_STD = 0.15
+_UNDERSTEER = 0.002  # that lengthens a wheelbase by K v^2 [s^2/m]
 _WHEELBASE_M, _WHEELBASE_STD = 2.9, 0.35
 _RATIO, _RATIO_STD = 15.0, 0.25  # of steering gears
 _FORCES, _MASS_KG = (1.0, 1e3), 1300.0
@@ -54,7 +56,10 @@ class Scales:
 
 
 def scales(
-    time_s: FloatArray, columns: Mapping[str, FloatArray], stated: Mapping[str, float]
+    time_s: FloatArray,
+    columns: Mapping[str, FloatArray],
+    stated: Mapping[str, float],
+    wheelbase_m: float | None = None,
 ) -> Scales:
     """Find factors and signs of the channels of a drive.
 
@@ -66,6 +71,8 @@ def scales(
         Channels as the file has them, without gaps.
     stated : mapping of float
         Factors of those whose unit is known.
+    wheelbase_m : float, optional
+        Of the car, where it is known.
     """
     drive = _Windows(time_s, columns)
     notes: dict[str, str] = {}
@@ -78,7 +85,8 @@ def scales(
     factors = _likeliest(drive, stated, notes)
     _signs(drive, factors, notes)
     if "steer_rad" in columns:
-        factors["steer_rad"] = _steer(drive, factors, stated.get("steer_rad"), notes)
+        unit = stated.get("steer_rad")
+        factors["steer_rad"] = _steer(drive, factors, unit, wheelbase_m, notes)
     if drive.has("fx_n", "ax_mps2"):
         factors["fx_n"] = _force(drive, factors, stated.get("fx_n"), notes)
     return Scales(factors, notes, swapped)
@@ -93,12 +101,19 @@ class _Windows:
         self._centres = np.arange(self._half, time_s.size - self._half, self._half)
         self._span = 2 * self._half * dt
         self._columns = dict(columns)
+        self._time_s, self._rate_hz = time_s, 1.0 / dt
 
     def swap(self, a: str, b: str) -> None:
         self._columns[a], self._columns[b] = self._columns[b], self._columns[a]
 
     def has(self, *names: str) -> bool:
         return all(name in self._columns for name in names)
+
+    def in_units(self, factors: Mapping[str, float]) -> tuple[dict[str, FloatArray], float]:
+        """Channels times their factors, with the time, and the sampling rate."""
+        known = {n: f * self._columns[n] for n, f in factors.items() if n in self._columns}
+        known.setdefault("ay_mps2", known["vx_mps"] * known["yaw_rate_radps"])
+        return {"time_s": self._time_s, **known}, self._rate_hz
 
     def mean(self, name: str, by: str | None = None) -> FloatArray:
         values = self._columns[name] if by is None else self._columns[name] * self._columns[by]
@@ -223,37 +238,51 @@ def _signs(drive: _Windows, factors: dict[str, float], notes: dict[str, str]) ->
 
 
 def _steer(
-    drive: _Windows, factors: Mapping[str, float], stated: float | None, notes: dict[str, str]
+    drive: _Windows,
+    factors: Mapping[str, float],
+    stated: float | None,
+    wheelbase_m: float | None,
+    notes: dict[str, str],
 ) -> float:
-    """The factor to road wheels: by the wheelbase that would answer so."""
+    """The factor to road wheels: by the car's wheelbase, or by the one that would answer so."""
     own = (1.0, _DEG) if stated is None else (abs(stated),)
     if not drive.has("vx_mps", "yaw_rate_radps"):
         return own[0]
     speed = factors["vx_mps"] * drive.mean("vx_mps")
     yaw = factors["yaw_rate_radps"] * drive.mean("yaw_rate_radps")
     rows = (speed > _MOVING * float(np.median(speed))) & (np.abs(speed * yaw) < _LINEAR_MPS2)
-    curvature, steer = yaw[rows] / np.maximum(speed[rows], 1.0), drive.mean("steer_rad")[rows]
+    speed, steer = np.maximum(speed[rows], 1.0), drive.mean("steer_rad")[rows]
+    curvature = yaw[rows] / speed
     alike = _cosine(curvature, steer)
     if abs(alike) < _FOLLOWS:
         notes["steer_rad"] = "does not turn with the car: check the column"
         return own[0]
     sign = math.copysign(1.0, alike)
-    if sign < 0.0:
-        notes["steer_rad"] = "turned round: it moves against yaw rate and a_y"
-    base = _slope(steer, curvature)
-    # Understeer makes it look longer by K v^2.
-    usual = _WHEELBASE_M + 0.002 * float(np.median(speed[rows])) ** 2
-    ways = [(f, 1.0, _WHEELBASE_STD) for f in own]
-    ways += [(f, _RATIO, math.hypot(_WHEELBASE_STD, _RATIO_STD)) for f in own]
-    factor, ratio, _ = min(
-        ways, key=lambda way: abs(math.log(base * way[0] / way[1] / usual)) / way[2]
-    )
-    if ratio == 1.0:
-        return sign * factor
-    found = base * factor / usual
-    told = (
-        f"angle of the steering wheel; a steering ratio of about {found:.2g} was found: put in "
-        f"the car's"
-    )
-    notes["steer_rad"] = "; ".join(filter(None, [notes.get("steer_rad", ""), told]))
-    return sign * factor / float(f"{found:.3g}")
+    usual = (wheelbase_m or _WHEELBASE_M) + _UNDERSTEER * float(np.median(speed)) ** 2
+    times, std = _slope(steer, curvature) / usual, _WHEELBASE_STD
+    if wheelbase_m is not None:
+        about = {**factors, "steer_rad": sign / times}
+        asked = times_wheelbase(*drive.in_units(about), wheelbase_m)
+        if asked is None:
+            wheelbase_m = None
+        else:
+            times, std = times * asked, _LAW_STD
+    ways = [(f, 1.0, std) for f in own]
+    ways += [(f, _RATIO, math.hypot(std, _RATIO_STD)) for f in own]
+    factor, ratio, _ = min(ways, key=lambda way: abs(math.log(times * way[0] / way[1])) / way[2])
+    found = times * factor
+    said = [] if sign > 0.0 else ["turned round: it moves against yaw rate and a_y"]
+    if ratio != 1.0:
+        size = f"{found:.3g}" if wheelbase_m is not None else f"{found:.2g}"
+        by = "put in the car's" if wheelbase_m is None else f"by a wheelbase of {wheelbase_m:.3g} m"
+        said.append(
+            f"angle of the steering wheel; a steering ratio of about {size} was found: {by}"
+        )
+        factor /= float(f"{found:.3g}")
+    elif wheelbase_m is not None:
+        check = ": check both" if abs(math.log(found)) > 2.0 * _LAW_STD else ""
+        said.append(
+            f"about {found:.2g} times what a wheelbase of {wheelbase_m:.3g} m asks for{check}"
+        )
+    notes["steer_rad"] = "; ".join(said)
+    return sign * factor

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from .._files import as_path
 from ..errors import InvalidInput
 from ..log import CHANNELS, Columns, Log, listed
+from ..vehicle import Vehicle
 from ._channel_map import ChannelMap, Source
 from ._names import rank
 from ._physics import scales
@@ -78,14 +79,17 @@ class Proposal:
 
 
 def propose_channels(
-    source: str | Path | Columns | Log, *, dbc: str | Path | None = None
+    source: str | Path | Columns | Log,
+    *,
+    dbc: str | Path | None = None,
+    vehicle: Vehicle | None = None,
 ) -> Proposal:
     """Propose which column of a log is which channel, in which unit and with which sign.
 
     Columns are found by their names and by the units that the file states. Units that it does not
     state, signs, swapped accelerations and the angle of the steering wheel in place of the road
-    wheels' are found by the laws of motion; an estimated steering ratio is only as good as a usual
-    wheelbase.
+    wheels' are found by the laws of motion. The steering ratio follows from the wheelbase; without
+    a vehicle it is only as good as a usual one.
 
     Parameters
     ----------
@@ -93,6 +97,8 @@ def propose_channels(
         As for `read_log`.
     dbc : str or Path, optional
         Database of the CAN frames that the file holds.
+    vehicle : Vehicle, optional
+        The car, for its wheelbase.
 
     Returns
     -------
@@ -117,7 +123,7 @@ def propose_channels(
             for channel in CHANNELS
             if not (channel == "time_s" and view.has_times) and (found := _ranked(view, channel))
         }
-        return _proposal(view, chosen)
+        return _proposal(view, chosen, None if vehicle is None else vehicle.wheelbase_m)
 
 
 class _View:
@@ -157,7 +163,7 @@ def _ranked(view: _View, channel: str) -> list[str]:
     return [name for _, name in sorted(kept, key=lambda pair: -pair[0])]
 
 
-def _proposal(view: _View, chosen: dict[str, list[str]]) -> Proposal:
+def _proposal(view: _View, chosen: dict[str, list[str]], wheelbase_m: float | None) -> Proposal:
     # A column is one channel: the one that is first in the list of channels.
     first: dict[str, str] = {}
     for channel, names in chosen.items():
@@ -181,7 +187,8 @@ def _proposal(view: _View, chosen: dict[str, list[str]]) -> Proposal:
     even = _even({c: held[n] for c, n in driven.items() if n in held}, factors.get("time_s", 1.0))
     if even is not None:
         # The sign and the gear of the steering are no matter of its unit: they are always sought.
-        found = scales(*even, {c: f for c, f in stated.items() if c in even[1]})
+        known = {c: f for c, f in stated.items() if c in even[1]}
+        found = scales(*even, known, wheelbase_m)
         if found.swapped:
             first["ax_mps2"], first["ay_mps2"] = first["ay_mps2"], first["ax_mps2"]
         factors.update(found.factors)
