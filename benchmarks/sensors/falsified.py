@@ -15,9 +15,10 @@ NOISE = sv.SensorNoise()
 SENSORS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 
 
-def clean(seed: int) -> Channels:
+def clean(seed: int, seconds: float) -> Channels:
     """What perfect sensors would write: laps and handling courses, with wandering forces."""
-    manoeuvre = sv.manoeuvres.lap() if seed % 2 else sv.manoeuvres.handling_course()
+    course = sv.manoeuvres.lap if seed % 2 else sv.manoeuvres.handling_course
+    manoeuvre = course(seconds)
     push = sv.RoadDisturbance(150.0, 200.0, 100.0, 0.3)
     model = sv.Model(sv.example_vehicle())
     noise = sv.SensorNoise.none()
@@ -153,11 +154,11 @@ CASES: dict[str, tuple[Callable[[Channels, np.random.Generator], dict[str, float
 }
 
 
-def falsified(case: str, seed: int) -> tuple[sv.Log, dict[str, float]]:
+def falsified(case: str, seed: int, seconds: float) -> tuple[sv.Log, dict[str, float]]:
     """A log with the fault, and the true values of the faults that are not zero."""
     act, on_readings = CASES[case]
     rng = np.random.default_rng([seed, 2])
-    c = clean(seed)
+    c = clean(seed, seconds)
     if on_readings:
         c = noisy(c, seed)
         truth = act(c, rng)

@@ -329,7 +329,7 @@ def test_names_stand_beside_much_that_is_left_where_errors_fall_throughout() -> 
         (),
         # One channel that is not shown to fall, one horizon at which it does not; falls by chance,
         # and such as matter to nobody.
-        (*falling()[:3], *falling(-0.1)[3:6], *falling()[6:]),
+        (*falling()[:3], *falling(-0.09)[3:6], *falling()[6:]),
         (*falling()[:-1], replace(falling()[-1], log_ratio=0.01)),
         falling(error=0.2),
         falling(-0.04, 0.01),
@@ -340,6 +340,7 @@ def test_names_stand_beside_much_that_is_left_where_errors_fall_throughout() -> 
         assert not verdict(facts).much_left
     for other in (
         replace(mass, changes_in_training=falling(0.01)),
+        replace(mass, changes=falling(error=0.1), changes_in_training=falling(-0.1, 0.1)),
         replace(mass, taken=0.1),
         replace(mass, finding="proxy"),
     ):

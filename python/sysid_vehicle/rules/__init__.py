@@ -14,7 +14,7 @@
    implausible, or differs between pieces of the driving (`spread`).
 8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead,
    leave more than `stays` of the evidence, take up less than is left, or should have explained it.
-   Beside much that is left names stay with which those errors fall in every channel (`fallen`).
+   Beside much that is left names stay with which those errors fall in every channel (`falls`).
 9. The verdict follows from what is left and which names stand (`verdict`).
 10. `Rules` holds every limit with unit, meaning, and the benchmark that chose or judges it.
 

@@ -10,7 +10,9 @@ import numpy as np
 
 from .limits import USUAL, Rules
 
-__all__ = ["Change", "Gain", "Measures", "accept", "bic", "fallen", "worse"]
+__all__ = ["Change", "Gain", "Measures", "accept", "bic", "falls", "worse"]
+
+_LEAST = 1e-3  # standard error of a change, where blocks happen to agree
 
 
 def bic(log_likelihood: float, parameters: int, samples: int) -> float:
@@ -111,7 +113,22 @@ def worse(changes: Sequence[Change], rules: Rules = USUAL) -> tuple[Change, ...]
     return tuple(c for c in changes if c.log_ratio > max(least, rules.grown * c.error))
 
 
-def fallen(changes: Sequence[Change], rules: Rules = USUAL) -> tuple[Change, ...]:
-    """The errors some seconds ahead that are shown to have fallen, by more than it matters."""
-    least = math.log1p(rules.worse)
-    return tuple(c for c in changes if -c.log_ratio > max(least, rules.fallen * c.error))
+def falls(validation: Sequence[Change], training: Sequence[Change], rules: Rules = USUAL) -> bool:
+    """Whether errors some seconds ahead fall in every channel, at every horizon, on all data.
+
+    In each channel one horizon has to show it: validation data clearly and by more than it matters,
+    all data together beyond chance.
+    """
+    everywhere = all(c.log_ratio < 0.0 for c in (*validation, *training))
+    channels = {c.channel for c in validation}
+    shown = {c.channel for c in validation if _fallen(c, training, rules)}
+    return bool(channels) and everywhere and shown == channels
+
+
+def _fallen(here: Change, training: Sequence[Change], rules: Rules) -> bool:
+    there = [c for c in training if (c.channel, c.horizon_s) == (here.channel, here.horizon_s)]
+    errors = np.array([max(c.error, _LEAST) for c in (here, *there)])
+    precision = errors**-2.0
+    fall = -float(precision @ [c.log_ratio for c in (here, *there)]) / float(np.sum(precision))
+    clear = -here.log_ratio > max(math.log1p(rules.worse), rules.clear * here.error)
+    return clear and fall > rules.sure * float(np.sum(precision)) ** -0.5

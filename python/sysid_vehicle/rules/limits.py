@@ -80,19 +80,17 @@ class Rules:
         2.0, "standard errors", "the same where it does not fall, and against an effect", _EFFECTS
     )
     sure: float = _limit(
-        4.5, "standard errors", "of likelihood on validation data, which decide alone", _EFFECTS
+        4.5,
+        "standard errors",
+        "of likelihood on validation data that decide alone, and of errors ahead on all data that "
+        "fall: then a name stands beside much that is left",
+        _EFFECTS,
     )
     worse: float = _limit(
         0.05, "share", "by which no error 1 to 5 s ahead may grow; a smaller fall is none", _EFFECTS
     )
     grown: float = _limit(
         2.0, "standard errors", "by which an error 1 to 5 s ahead is shown to grow", _EFFECTS
-    )
-    fallen: float = _limit(
-        3.0,
-        "standard errors",
-        "by which it is shown to fall in a channel, so that names stand beside much that is left",
-        _OUTSIDE,
     )
     nothing: float = _limit(
         0.5, "probability", "before any data, that one of a sum of effects is none", _NULLS

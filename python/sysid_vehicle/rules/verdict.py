@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from .accept import fallen
+from .accept import falls
 from .facts import Added, Decision, Facts, Tested, Withdrawn
 from .limits import USUAL, Rules
 
@@ -183,10 +183,13 @@ def _withdrawn(
     stands = frozenset(
         a.id
         for a in facts.added
-        if a.named and a.taken >= rules.taken * before and _falls_throughout(a, rules)
+        if a.named
+        and a.taken >= rules.taken * before
+        and falls(a.changes, a.changes_in_training, rules)
     )
     if share < rules.most and stands:
-        # A real road, and what nobody knows of a car, leave much beside the right effect too.
+        # A real road, and what nobody knows of a car, leave much beside the right effect too. What
+        # only stands in for it serves some channels and moments at the price of others.
         because = "with it errors 1 to 5 s ahead are not shown to fall in every channel"
         return [Withdrawn(names - stands, because, names)]
     if share < rules.most:
@@ -202,18 +205,6 @@ def _withdrawn(
     alone = _alone(facts, rules, small)
     because = "were it what is missing, nothing would be left"
     return [first, Withdrawn(alone, because, names)]
-
-
-def _falls_throughout(effect: Added, rules: Rules) -> bool:
-    """Whether errors 1 to 5 s ahead fall in every channel and at every horizon, on all data.
-
-    What only stands in for something else serves some channels and moments at the price of others.
-    In each channel validation data have to show the fall, by more than it matters.
-    """
-    channels = {c.channel for c in effect.changes}
-    shown = {c.channel for c in fallen(effect.changes, rules)}
-    both = (*effect.changes, *effect.changes_in_training)
-    return bool(channels) and shown == channels and all(c.log_ratio < 0.0 for c in both)
 
 
 def _alone(facts: Facts, rules: Rules, small: frozenset[str]) -> frozenset[str]:
