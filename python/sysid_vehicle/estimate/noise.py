@@ -40,7 +40,7 @@ class NoiseModel:
     correlation_time_s : tuple of 3 floats
         Correlation times of the disturbances; one number stands for all three.
     road : tuple of 2 floats
-        Gravity along and across, where the road wanders [m/s2] (Ornstein-Uhlenbeck): it moves the
+        Gravity along and across, where the slope varies [m/s2] (Ornstein-Uhlenbeck): it moves the
         car and no accelerometer feels it. Zeros: a level road, which costs nothing.
     road_time_s : float
         Correlation time of both.
@@ -60,7 +60,7 @@ class NoiseModel:
 
     @property
     def sloping(self) -> bool:
-        """Whether the road wanders."""
+        """Whether the slope of the road varies."""
         return any(self.road)
 
     def vector(self) -> FloatArray:
@@ -83,7 +83,7 @@ class NoiseModel:
     def floor(self) -> NoiseModel:
         """The same noise without the disturbances: what remains if the model explains everything.
 
-        A road that wanders stays: no model of a car knows it.
+        A slope that varies stays: no model of a car knows it.
 
         The motion keeps a least noise of its own. No log can tell how far below that it lies, yet
         the less there is, the longer the filter trusts its model, and the larger the same fault of
@@ -131,7 +131,7 @@ class NoiseModel:
 # Per square root of a second: over one, 5 mm/s and 1 mrad/s.
 _LEAST_MOTION = (5e-3, 5e-3, 1e-3)
 _LEAST_DISTURBANCE = 1e-3  # of the weight
-# Slower forces are what effects are: drag, wind, slopes. A road that wanders has states of its own.
+# Slower forces are what effects are: drag, wind, slopes. A varying road slope has its own states.
 _TIMES_S = (0.01, 1.0)
 _ROAD_TIMES_S = (1.0, 20.0)
 _SMALLEST = np.array([1e-3, 1e-3, 1e-4, 5e-3, 5e-3])

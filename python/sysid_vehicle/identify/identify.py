@@ -25,7 +25,7 @@ from .suspects import explaining
 
 __all__ = ["free_box", "identify", "objective_of", "profile_fit", "refine", "refit"]
 
-_SLOPES_MPS2 = (0.05, 0.2)  # of a road that wanders, to begin with
+_SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts
 _FOLLOWED = 2  # ends of searches that are followed with noise of their own
@@ -312,7 +312,7 @@ def _top(
 
 
 def _on_its_road(fit: Fit) -> Fit:
-    """The same fit where the road is level, another where it wanders."""
+    """The same fit where the road is level, another where its slope varies."""
     model, driving, p = fit.model, fit.driving, fit.model.vector()
     objective = objective_of(model, driving.problem(model), driving)
 

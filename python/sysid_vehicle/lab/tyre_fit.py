@@ -350,16 +350,3 @@ class TyreFit(Printed):
 
     def _parts(self) -> list[Part]:
         return [self._headline(), Table(self._head, self._rows()), self._closing()]
-
-
-def strongest_correlations(fit: TyreFit, count: int = 5) -> Sequence[tuple[str, str, float]]:
-    """The pairs of estimates that the driving tells apart worst.
-
-    Returns
-    -------
-    sequence of (name, name, correlation)
-    """
-    names = [e.name for e in fit.estimates]
-    table = fit.correlation
-    pairs = [(names[i], names[j], float(table[i, j])) for i in range(len(names)) for j in range(i)]
-    return sorted(pairs, key=lambda pair: -abs(pair[2]))[:count]

@@ -22,7 +22,7 @@ struct Run {
     std::size_t size() const { return inputs.size(); }
 };
 
-/// Gravity along and across, where the road wanders.
+/// Gravity along and across, where the slope of the road varies.
 constexpr int kRoadStates = 2;
 
 /// The noise model that fitting, comparing, diagnosing and validating share.
@@ -39,7 +39,7 @@ struct Noise {
     std::array<double, kRoadStates> road{};  // gravity along and across [m/s2]
     double road_time_s = 5.0;
 
-    /// Whether the road wanders; without, its states do not exist.
+    /// Whether the slope of the road varies; without, its states do not exist.
     bool sloping() const { return road[0] > 0.0 || road[1] > 0.0; }
 
     /// Correlation time and standard deviation of F_x, F_y, M_z, gravity along and across.

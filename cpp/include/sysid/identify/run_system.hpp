@@ -9,7 +9,7 @@
 namespace sysid {
 
 /// State: v_x, v_y, r, disturbing F_x, F_y, M_z, then the states of the model's own effects,
-/// gravity along and across where the road wanders; what is left of NX stands still at zero and is
+/// gravity along and across where the slope varies; what is left of NX stands still at zero and is
 /// certain.
 template <int NX>
 class RunSystem {
