@@ -2,6 +2,7 @@
 #include "least_squares.hpp"
 #include "register.hpp"
 #include "sysid/identify/prediction_error.hpp"
+#include "sysid/math/program.hpp"
 
 namespace sysid::bindings {
 
@@ -57,6 +58,7 @@ const double* values_of(const Array& p) { return vector(p, kParameterCount, "par
 void register_identify(py::module_& m) {
     m.attr("NOISE_PARAMETERS") = kNoiseParameters;
     m.attr("PARAMETERS") = kParameterCount;
+    m.attr("LANES") = kLanes;
     m.attr("CHANNELS") = static_cast<int>(kChannels);
     m.attr("EXTERNALS") = static_cast<int>(kExternals);
     py::class_<Problem> bound(m, "Problem");
@@ -76,6 +78,20 @@ void register_identify(py::module_& m) {
                 return Problem{model, self.runs};
             },
             py::arg("model"))
+        .def(
+            "log_likelihoods",
+            [](const Problem& self, const Array& sets, const Array& noise) {
+                const auto count = sets.ndim() == 2 ? sets.shape(0) : 0;
+                const double* values = matrix(sets, count, kParameterCount, "parameters");
+                const Noise n = to_noise(noise);
+                std::vector<const double*> each;
+                for (py::ssize_t i = 0; i < count; ++i)
+                    each.push_back(values + i * kParameterCount);
+                std::vector<double> out(each.size());
+                unlocked([&] { log_likelihoods(self, each, n, out.data()); });
+                return row_of(out);
+            },
+            py::arg("parameters"), py::arg("noise"))
         .def(
             "signal_sensitivities",
             [](const Problem& self, const Array& p, const FrozenFilter& filter,

@@ -128,6 +128,38 @@ TEST_P(SideBySide, NoiseScoresOfRunsAddUp) {
         }
 }
 
+TEST_P(SideBySide, LikelihoodsOfSetsOfParametersAreThoseOfEach) {
+    Problem problem = long_run(kLagging, 60);
+    problem.runs.push_back(noisy_run(problem.model, typical_parameters(), 40, 0.01, 3));
+    std::vector<Parameters> values(18, typical_parameters());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i][kBFront] *= 1.0 + 0.03 * static_cast<double>(i);
+        values[i][parameter_of("steer_lag")] *= 1.0 + 0.1 * static_cast<double>(i);
+    }
+    std::vector<const double*> sets;
+    for (const Parameters& p : values) sets.push_back(p.data());
+    const auto expect_each = [&] {
+        std::vector<double> found(sets.size());
+        log_likelihoods(problem, sets, sloping_noise(), found.data());
+        double off = 0.0;
+        for (std::size_t i = 0; i < sets.size(); ++i) {
+            const double alone = freeze(problem, sets[i], sloping_noise()).log_likelihood;
+            EXPECT_NEAR(found[i], alone, 1e-12 * std::abs(alone)) << i;
+            off += std::abs(found[i] - alone);
+        }
+        return off;
+    };
+    EXPECT_GT(expect_each(), 0.0);  // other roundings: they went together
+    // A lag of nothing takes other steps than the others.
+    values[3][parameter_of("steer_lag")] = 0.0;
+    expect_each();
+    values[3][kBFront] = std::nan("");
+    std::vector<double> found(sets.size());
+    log_likelihoods(problem, sets, sloping_noise(), found.data());
+    EXPECT_EQ(found[3], -std::numeric_limits<double>::infinity());
+    EXPECT_TRUE(std::isfinite(found[2]) && std::isfinite(found[17]));
+}
+
 TEST(SideBySideToo, NoiseScoreOfPiecesIsThatOfTheWholeRun) {
     const Noise noise = ordinary_noise();
     const Problem quick = long_run(kLagging), slow = without_speed(quick);

@@ -47,6 +47,8 @@ def main_job(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
     state = {"parameters": p, "noise": noise}
     yield "freeze", (known.freeze, state)
     yield "noise_score", (known.noise_score, state)
+    sets = {"parameters": np.tile(p, (5, 1)), "noise": noise}
+    yield "log_likelihoods", (known.log_likelihoods, sets)
     yield "trace", (known.trace, {**state, "smoothed": True})
     yield "look_ahead", (known.look_ahead, {**state, "horizons": [(3, 2), (5, 1)]})
     frozen = known.freeze(p, noise)

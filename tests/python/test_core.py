@@ -11,6 +11,7 @@ import pytest
 from sysid_vehicle import Driving, Fit, Log, Model, _core
 from sysid_vehicle._arrays import as_float64
 from sysid_vehicle.errors import NumericalError
+from sysid_vehicle.identify.identify import objective_of
 
 N = 50
 
@@ -69,6 +70,18 @@ def test_wrong_sizes_of_vectors_are_refused(problem: _core.Problem, fit: Fit) ->
     frozen = problem.freeze(p, noise)
     with pytest.raises(ValueError, match=r"signals: expected shape \(50, 1\)"):
         problem.signal_sensitivities(p, frozen, np.zeros((N - 1, 1)), [0])
+
+
+def test_sets_of_parameters_have_the_likelihoods_of_each(fit: Fit) -> None:
+    model = fit.model.with_priors({"D_front": (1.0, 0.1)})
+    objective = objective_of(model, fit.driving.problem(model), fit.driving)
+    noise = fit.noise.vector()
+    sets = np.tile(model.vector(), (6, 1))
+    sets[:, 2] *= np.linspace(0.95, 1.05, 6)
+    each = [objective.log_likelihood(p, noise) for p in sets]
+    np.testing.assert_allclose(objective.log_likelihoods(sets, noise), each, rtol=1e-12)
+    with pytest.raises(ValueError, match="parameters: expected shape"):
+        objective.problem.log_likelihoods(sets[:, :-1], noise)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("column", [-1, _core.PARAMETERS])

@@ -82,7 +82,7 @@ std::vector<int> FrozenFilter::places(const std::vector<int>& of) const {
 FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise) {
     FrozenFilter filter = empty(problem, noise);
     if (const std::vector<Piece> pieces = pieces_of(problem.runs); !pieces.empty()) {
-        LaneFilter walk(problem, p, noise, pieces);
+        LaneFilter walk(problem, {p}, noise, pieces);
         walk.keep = [&](const LaneSample& sample, std::size_t lane, int parts) {
             const std::size_t run = pieces[sample.piece].run;
             walk.write(walk.gain(), lane, filter.gain(run, sample.at));
@@ -103,6 +103,46 @@ FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise)
             freeze_run<decltype(nx)::value>(problem, i, p, filter);
     });
     return filter;
+}
+
+namespace {
+
+/// For sets of parameters in the lanes; false where that cannot be done.
+bool likelihoods_together(const Problem& problem, std::vector<const double*> sets,
+                          const Noise& noise, double* out) {
+    constexpr std::size_t kFewest = 4;  // below, lanes gain nothing
+    const std::size_t count = sets.size();
+    if (count < kFewest) return false;
+    sets.resize(kLanes, sets[0]);
+    std::vector<Piece> pieces;
+    for (std::size_t run = 0; run < problem.runs.size(); ++run)
+        for (std::size_t set = 0; set < kLanes; ++set)
+            pieces.push_back({run, 0, problem.runs[run].size(), set});
+    try {
+        LaneFilter walk(problem, sets, noise, pieces);
+        if (!side_by_side(problem.runs, pieces, walk)) return false;
+        for (std::size_t i = 0; i < count; ++i) out[i] = walk.log_likelihood(i);
+    } catch (const NumericalFailure&) {
+        return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+void log_likelihoods(const Problem& problem, const std::vector<const double*>& sets,
+                     const Noise& noise, double* out) {
+    for (std::size_t first = 0; first < sets.size(); first += kLanes) {
+        const std::size_t last = std::min<std::size_t>(sets.size(), first + kLanes);
+        const std::vector<const double*> some(sets.begin() + static_cast<long>(first),
+                                              sets.begin() + static_cast<long>(last));
+        if (likelihoods_together(problem, some, noise, out + first)) continue;
+        for (std::size_t i = first; i < last; ++i) try {
+                out[i] = freeze(problem, sets[i], noise).log_likelihood;
+            } catch (const NumericalFailure&) {
+                out[i] = -std::numeric_limits<double>::infinity();
+            }
+    }
 }
 
 }  // namespace sysid

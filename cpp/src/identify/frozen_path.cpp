@@ -123,8 +123,8 @@ class PathWalk {
 
     void begin(const Piece& piece, double* to) const {
         const std::size_t at = piece.begin > 0 ? piece.begin - 1 : 0;
-        const auto x =
-            initial_state(model_.model(), problem_.runs[piece.run], model_.parameters(), at);
+        const auto x = initial_state(model_.model(), problem_.runs[piece.run],
+                                     model_.parameters(piece.set), at);
         std::fill_n(to, state_.size(), 0.0);
         to = std::copy_n(x.begin(), kMotionStates, to);
         for (const std::size_t i : model_.own()) *to++ = x[kMotionStates + i];

@@ -4,13 +4,12 @@
 
 namespace sysid {
 
-LaneFilter::LaneFilter(const Problem& problem, const double* p, const Noise& noise,
-                       const std::vector<Piece>& pieces)
+LaneFilter::LaneFilter(const Problem& problem, const std::vector<const double*>& sets,
+                       const Noise& noise, const std::vector<Piece>& pieces)
     : problem_(problem),
       noise_(noise),
       pieces_(pieces),
-      model_(problem.model, p, {}, noise.sloping()),
-      rate_(problem.model.fastest_rate(p, 1.0)),
+      model_(problem.model, sets, {}, noise.sloping()),
       n_(model_.moving()),
       state_(n_ + packed(n_, 0)),
       part_(model_.states() * n_),
@@ -27,6 +26,8 @@ LaneFilter::LaneFilter(const Problem& problem, const double* p, const Noise& noi
       by_state_(part_.size()),
       seen_(observation_.size()) {
     std::fill_n(one_.at, kLanes, 1.0);
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+        rate_[lane] = problem.model.fastest_rate(model_.parameters(lane), 1.0);
     for (std::size_t c = 0; c < kChannels; ++c)
         std::fill_n(sensors_[c].at, kLanes, noise.sensor[c] * noise.sensor[c]);
     for (const Piece& piece : pieces) {
@@ -35,16 +36,20 @@ LaneFilter::LaneFilter(const Problem& problem, const double* p, const Noise& noi
     }
 }
 
-double LaneFilter::log_likelihood() const {
+double LaneFilter::log_likelihood(std::size_t set) const {
     double sum = 0.0;
-    for (const LogDensity& block : density_) sum += block.value();
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+        if (pieces_[i].set != set) continue;
+        const std::size_t blocks = (pieces_[i].size() + kMark - 1) / kMark;
+        for (std::size_t n = 0; n < blocks; ++n) sum += density_[first_block_[i] + n].value();
+    }
     return sum;
 }
 
 void LaneFilter::begin(const Piece& piece, double* to) const {
     const Run& run = problem_.runs[piece.run];
     const std::size_t at = piece.begin > 0 ? piece.begin - 1 : 0;
-    const auto x = initial_state(model_.model(), run, model_.parameters(), at);
+    const auto x = initial_state(model_.model(), run, model_.parameters(piece.set), at);
     std::fill_n(to, state_.size(), 0.0);
     const auto variance = [&](std::size_t i) -> double& { return to[n_ + packed(i, i)]; };
     constexpr auto spreads = effect_state_spreads();
@@ -87,7 +92,7 @@ bool LaneFilter::sample(const LaneSamples& samples) {
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
         const LaneSample& s = samples[lane];
         disturb(lane, *s.run);
-        if (s.at > 0) parts[lane] = substeps_for(rate_, state_[0].at[lane], s.run->dt);
+        if (s.at > 0) parts[lane] = substeps_for(rate_[lane], state_[0].at[lane], s.run->dt);
     }
     by_length(samples, parts, state_, [&](std::size_t like) {
         LaneRow* covariance = state_.data() + n_;

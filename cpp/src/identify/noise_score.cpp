@@ -86,7 +86,7 @@ bool in_pieces(const Problem& problem, const double* p, const Noise& noise, Sum<
     constexpr std::size_t kLongest = 1024;
     const std::vector<Piece> pieces = pieces_of(problem.runs, kLongest);
     if (pieces.empty()) return false;
-    LaneFilter filter(problem, p, noise, pieces);
+    LaneFilter filter(problem, {p}, noise, pieces);
     filter.with_transition = true;
     const std::size_t n = filter.states(), moving = filter.moving();
     const std::size_t wide =
@@ -111,9 +111,9 @@ bool in_pieces(const Problem& problem, const double* p, const Noise& noise, Sum<
         for (std::size_t i = first; i < last; ++i) {
             const Run& run = problem.runs[pieces[i].run];
             if (pieces[i].begin == 0)
-                score.emplace(score_of<L>(
-                    noise, run, static_cast<int>(n), static_cast<int>(moving),
-                    [&](std::size_t d) { return static_cast<int>(moving + d); }));
+                score.emplace(
+                    score_of<L>(noise, run, static_cast<int>(n), static_cast<int>(moving),
+                                [&](std::size_t d) { return static_cast<int>(moving + d); }));
             for (std::size_t k = pieces[i].begin; k < pieces[i].end; ++k) {
                 ScoreSample s;
                 const double* from = place(i, k);

@@ -1,5 +1,7 @@
 #include "sysid/identify/recorded_model.hpp"
 
+#include "sysid/math/errors.hpp"
+
 namespace sysid {
 
 namespace {
@@ -19,6 +21,18 @@ double number_of(const Input& u, std::size_t i) {
     return i == 2 ? u.time_s : u.channels[i - 3];
 }
 
+/// Whether two programs differ in numbers that are the same for all samples alone.
+bool same_steps(const Program& a, const Program& b) {
+    const auto numbered = [](const auto& x, const auto& y) { return x.first == y.first; };
+    return a.rows == b.rows && a.inputs == b.inputs && a.outputs == b.outputs &&
+           a.same_as == b.same_as && a.slots == b.slots &&
+           std::ranges::equal(a.uniform, b.uniform, numbered) &&
+           std::ranges::equal(a.steps, b.steps, [](const ForwardStep& x, const ForwardStep& y) {
+               return x.op == y.op && x.to == y.to && x.a == y.a && x.b == y.b && x.c == y.c &&
+                      x.constant == y.constant;
+           });
+}
+
 }  // namespace
 
 void RecordedModel::Ready::set(std::size_t first, const LaneRow* values, std::size_t count) {
@@ -33,19 +47,24 @@ void RecordedModel::Ready::give(std::size_t which, std::size_t lane, const Input
 
 RecordedModel::RecordedModel(const SingleTrack& model, const double* p,
                              const std::vector<int>& columns, bool all_externals)
+    : RecordedModel(model, std::vector<const double*>{p}, columns, all_externals) {}
+
+RecordedModel::RecordedModel(const SingleTrack& model, const std::vector<const double*>& sets,
+                             const std::vector<int>& columns, bool all_externals)
     : model_(model),
-      p_(p),
+      sets_(sets),
       wanted_(kParameterCount, false),
       own_(active_states(model.effects)),
       states_(kMotionStates + own_.count),
       externals_(all_externals ? kExternals : kMotionStates) {
     for (const int column : columns) wanted_[place(column)] = true;
-    Recorder to;
-    const Moving now = moving(to);
-    const InputFor<Recorded> u = recorded_input(to);
-    const std::vector<Recorded> values = parameters(to);
-    const auto y = sense(model_, now.x, now.external.data(), u, values.data());
-    read_ = ready(to.program({y.begin(), y.end()}), 1);
+    read_ = ready(1, [&](Recorder& to, const double* p) {
+        const Moving now = moving(to);
+        const InputFor<Recorded> u = recorded_input(to);
+        const std::vector<Recorded> values = parameters(to, p);
+        const auto y = sense(model_, now.x, now.external.data(), u, values.data());
+        return std::vector<Recorded>{y.begin(), y.end()};
+    });
 }
 
 RecordedModel::Moving RecordedModel::moving(Recorder& to) const {
@@ -56,11 +75,10 @@ RecordedModel::Moving RecordedModel::moving(Recorder& to) const {
     return now;
 }
 
-std::vector<Recorded> RecordedModel::parameters(Recorder& to) const {
+std::vector<Recorded> RecordedModel::parameters(Recorder& to, const double* p) const {
     std::vector<Recorded> all;
     all.reserve(kParameterCount);
-    for (std::size_t i = 0; i < kParameterCount; ++i)
-        all.push_back(to.parameter(p_[i], wanted_[i]));
+    for (std::size_t i = 0; i < kParameterCount; ++i) all.push_back(to.parameter(p[i], wanted_[i]));
     return all;
 }
 
@@ -70,11 +88,23 @@ std::vector<Recorded> RecordedModel::packed(const ModelState<Recorded>& x) const
     return out;
 }
 
-RecordedModel::Ready RecordedModel::ready(Program program, std::size_t inputs_given) const {
+template <class Record>
+RecordedModel::Ready RecordedModel::ready(std::size_t inputs_given, Record&& record) const {
+    const auto program_of = [&](const double* p) {
+        Recorder to;
+        return to.program(record(to, p));
+    };
     Ready out;
+    Program program = program_of(sets_[0]);
     out.rows.resize(place(program.rows));
     for (const auto& [row, value] : program.uniform)
         std::fill_n(out.rows[place(row)].at, kLanes, value);
+    for (std::size_t lane = 1; lane < sets_.size(); ++lane) {
+        if (sets_[lane] == sets_[0]) continue;
+        const Program other = program_of(sets_[lane]);
+        if (!same_steps(program, other)) throw NumericalFailure("the model takes other steps", 0);
+        for (const auto& [row, value] : other.uniform) out.rows[place(row)].at[lane] = value;
+    }
     out.adjoints.resize(place(program.slots * kSweep));
     out.given.resize(inputs_given);
     for (std::size_t which = 0; which < inputs_given; ++which)
@@ -88,19 +118,25 @@ RecordedModel::Ready RecordedModel::ready(Program program, std::size_t inputs_gi
 RecordedModel::Ready& RecordedModel::step_of(double h) {
     const auto found = steps_.find(h);
     if (found != steps_.end()) return found->second;
-    Recorder to;
-    Moving now = moving(to);
-    const InputFor<Recorded> from = recorded_input(to);
-    const InputFor<Recorded> until = recorded_input(to);
-    const std::vector<Recorded> values = parameters(to);
-    advance(model_, now.x, now.external.data(), from, until, values.data(), h, 1);
-    return steps_.emplace(h, ready(to.program(packed(now.x)), 2)).first->second;
+    return steps_
+        .emplace(h, ready(2,
+                          [&](Recorder& to, const double* p) {
+                              Moving now = moving(to);
+                              const InputFor<Recorded> from = recorded_input(to);
+                              const InputFor<Recorded> until = recorded_input(to);
+                              const std::vector<Recorded> values = parameters(to, p);
+                              advance(model_, now.x, now.external.data(), from, until,
+                                      values.data(), h, 1);
+                              return packed(now.x);
+                          }))
+        .first->second;
 }
 
 RecordedModel::Ready RecordedModel::start_of(const Run& run) const {
-    Recorder to;
-    const std::vector<Recorded> values = parameters(to);
-    return ready(to.program(packed(initial_state<Recorded>(model_, run, values.data()))), 0);
+    return ready(0, [&](Recorder& to, const double* p) {
+        const std::vector<Recorded> values = parameters(to, p);
+        return packed(initial_state<Recorded>(model_, run, values.data()));
+    });
 }
 
 }  // namespace sysid

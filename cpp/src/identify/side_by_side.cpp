@@ -14,7 +14,7 @@ std::vector<Piece> cut(const std::vector<Run>& runs, std::size_t longest) {
     for (std::size_t r = 0; r < runs.size(); ++r) {
         const std::size_t n = runs[r].size(), parts = (n + longest - 1) / longest;
         for (std::size_t i = 0; i < parts; ++i)
-            pieces.push_back({r, n * i / parts, n * (i + 1) / parts});
+            pieces.push_back({r, n * i / parts, n * (i + 1) / parts, 0});
     }
     return pieces;
 }

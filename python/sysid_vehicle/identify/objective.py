@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
+from ..errors import NumericalError
 from ..estimate import maximise_noise
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "Predicting",
     "Problem",
     "Rows",
+    "Together",
     "gaussian_prior",
 ]
 
@@ -65,6 +67,14 @@ class Predicting(Problem, Protocol):
         self, p: FloatArray, noise: FloatArray, /
     ) -> tuple[float, FloatArray, FloatArray]:
         """Log-likelihood, its derivatives by the noise's logarithms, and their information."""
+
+
+@runtime_checkable
+class Together(Protocol):
+    """A problem whose filter runs with several sets of parameters side by side."""
+
+    def log_likelihoods(self, sets: FloatArray, noise: FloatArray, /) -> FloatArray:
+        """Log-likelihoods of sets of parameters, a row each; minus infinity where one fails."""
 
 
 @dataclass(frozen=True)
@@ -181,6 +191,30 @@ class Objective(Penalised):
     def log_likelihood(self, p: FloatArray, noise: FloatArray) -> float:
         """Of the data, less what the priors cost."""
         return float(self.problem.freeze(p, noise).log_likelihood) - self.prior_cost(p)
+
+    def log_likelihoods(self, sets: FloatArray, noise: FloatArray) -> FloatArray:
+        """The same for several sets of parameters, minus infinity where the model fails.
+
+        Parameters
+        ----------
+        sets : array, shape (sets, parameters)
+        noise : array, shape (noises,)
+
+        Returns
+        -------
+        array, shape (sets,)
+        """
+        if isinstance(self.problem, Together):
+            values = self.problem.log_likelihoods(sets, noise)
+            return as_float64(values - [self.prior_cost(p) for p in sets])
+
+        def one(p: FloatArray) -> float:
+            try:
+                return self.log_likelihood(p, noise)
+            except NumericalError:
+                return -np.inf
+
+        return as_float64([one(p) for p in sets])
 
     def learn_noise(
         self, p: FloatArray, noise: FloatArray, *, rounds: int = 12

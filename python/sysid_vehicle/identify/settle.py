@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._threads import in_parallel
 from ..errors import NumericalError
@@ -178,24 +179,21 @@ def climb(
         Priors included; never below that of the start.
     """
 
-    def value_at(trial: FloatArray) -> float:
-        try:
-            return objective.log_likelihood(trial, noise)
-        except NumericalError:
-            return -np.inf
+    def values_at(trials: FloatArray) -> FloatArray:
+        return objective.log_likelihoods(trials, noise)
 
     value, damping = objective.log_likelihood(p, noise), 1e-3
     for _ in range(_CLIMBS):
         _, _, information = objective.normal_equations(p, objective.freeze(p, noise), box.columns)
         x = p[box.columns]
-        slope = _slope(value_at, p, information, box)
+        slope = _slope(values_at, p, information, box)
         if stride(x, slope, information, _SLIGHT, box)[1] < _GAIN:
             break
         gained = 0.0
         for _ in range(10):
             trial = p.copy()
             trial[box.columns], _ = stride(x, slope, information, damping, box)
-            there = value_at(trial)
+            there = float(values_at(trial[None])[0])
             if there > value:
                 p, gained, value = trial, there - value, there
                 damping = max(damping / 8.0, _SLIGHT)
@@ -227,7 +225,10 @@ def to_the_top(
 
 
 def _slope(
-    value_at: Callable[[FloatArray], float], p: FloatArray, information: FloatArray, box: Box
+    values_at: Callable[[FloatArray], FloatArray],
+    p: FloatArray,
+    information: FloatArray,
+    box: Box,
 ) -> FloatArray:
     """Derivatives by central differences, one-sided at a bound; zero where the model fails."""
     step = _NUDGE / np.sqrt(np.maximum(np.diag(information), _TINY))
@@ -236,7 +237,10 @@ def _slope(
     ends = np.array([np.maximum(x - step, box.lower), np.minimum(x + step, box.upper)])
     trials = np.tile(p, (2, len(x), 1))
     trials[:, np.arange(len(x)), box.columns] = ends
-    low, high = np.reshape(in_parallel(value_at, trials.reshape(-1, p.size)), (2, -1))
+    # Sets of parameters go through the filter together, as many as it has lanes.
+    trials = trials.reshape(-1, p.size)
+    together = np.array_split(trials, -(-len(trials) // _core.LANES))
+    low, high = np.reshape(np.concatenate(in_parallel(values_at, together)), (2, -1))
     slope = (high - low) / np.maximum(ends[1] - ends[0], _TINY)
     return as_float64(np.where(np.isfinite(slope), slope, 0.0))
 

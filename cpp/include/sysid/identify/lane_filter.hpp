@@ -15,7 +15,8 @@ class LaneFilter {
   public:
     using Rows = std::vector<LaneRow>;
 
-    LaneFilter(const Problem& problem, const double* p, const Noise& noise,
+    /// `sets` of parameters: one, or one for each lane, which are then those of the pieces.
+    LaneFilter(const Problem& problem, const std::vector<const double*>& sets, const Noise& noise,
                const std::vector<Piece>& pieces);
 
     /// Gets every sample of every piece with the lane in which it was done and the parts of the
@@ -48,7 +49,8 @@ class LaneFilter {
     std::size_t moving() const { return model_.states(); }
     const ActiveStates& own() const { return model_.own(); }
 
-    double log_likelihood() const;
+    /// Of all pieces with a set of parameters.
+    double log_likelihood(std::size_t set = 0) const;
 
     // For `side_by_side`.
     Rows& state() { return state_; }
@@ -74,7 +76,7 @@ class LaneFilter {
     Noise noise_;
     const std::vector<Piece>& pieces_;
     RecordedModel model_;
-    double rate_;
+    std::array<double, kLanes> rate_{};
     std::size_t n_;
     Rows state_, part_, observation_, transition_, gain_, forget_, process_;
     Rows whitener_, innovation_, present_, variance_, sensors_;

@@ -54,6 +54,11 @@ std::vector<int> filter_rows(EffectMask effects, bool sloping);
 
 FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise);
 
+/// Log-likelihoods of sets of parameters, whose filters run side by side; minus infinity where one
+/// fails.
+void log_likelihoods(const Problem& problem, const std::vector<const double*>& sets,
+                     const Noise& noise, double* out);
+
 /// Whitened prediction errors, kChannels per sample, runs one after the other.
 void residuals(const Problem& problem, const double* p, const FrozenFilter& filter, double* out);
 

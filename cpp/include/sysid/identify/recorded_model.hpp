@@ -44,9 +44,13 @@ class RecordedModel {
     /// and by the parameters `columns`.
     RecordedModel(const SingleTrack& model, const double* p, const std::vector<int>& columns,
                   bool all_externals);
+    /// With parameters of its own in each lane. Throws `NumericalFailure` where they lead to other
+    /// steps.
+    RecordedModel(const SingleTrack& model, const std::vector<const double*>& sets,
+                  const std::vector<int>& columns, bool all_externals);
 
     const SingleTrack& model() const { return model_; }
-    const double* parameters() const { return p_; }
+    const double* parameters(std::size_t lane) const { return sets_[sets_.size() > 1 ? lane : 0]; }
     const ActiveStates& own() const { return own_; }
     std::size_t states() const { return states_; }
     std::size_t externals() const { return externals_; }
@@ -92,13 +96,15 @@ class RecordedModel {
     };
 
     Moving moving(Recorder& to) const;
-    std::vector<Recorded> parameters(Recorder& to) const;
+    std::vector<Recorded> parameters(Recorder& to, const double* p) const;
     std::vector<Recorded> packed(const ModelState<Recorded>& x) const;
-    Ready ready(Program program, std::size_t inputs_given) const;
+    /// `record(to, parameters)` gives the outputs.
+    template <class Record>
+    Ready ready(std::size_t inputs_given, Record&& record) const;
 
     SingleTrack model_;
-    const double* p_;
-    std::vector<bool> wanted_;  // of the parameters
+    std::vector<const double*> sets_;  // of parameters: one, or one for each lane
+    std::vector<bool> wanted_;         // of the parameters
     ActiveStates own_;
     std::size_t states_, externals_;
     Ready read_;

@@ -16,9 +16,9 @@
 
 namespace sysid {
 
-/// Samples `begin` to `end` of a run.
+/// Samples `begin` to `end` of a run, with a set of parameters where there are several.
 struct Piece {
-    std::size_t run, begin, end;
+    std::size_t run, begin, end, set = 0;
     std::size_t size() const { return end - begin; }
 };
 
@@ -55,9 +55,7 @@ class LaneGroup {
     std::size_t longest() const { return longest_; }
     const Piece& piece(std::size_t lane) const { return pieces_[first_ + lane]; }
     /// Whether a lane goes on where that before it ends.
-    bool follows(std::size_t lane) const {
-        return first_ + lane > 0 && pieces_[first_ + lane - 1].run == piece(lane).run;
-    }
+    bool follows(std::size_t lane) const { return piece(lane).begin > 0; }
     /// What is handed on before sample `at` of the piece, a multiple of `kMark`, or its end.
     double* mark(std::size_t lane, std::size_t at) {
         return marks_[lane].data() + (at + kMark - 1) / kMark * numbers_;
