@@ -127,3 +127,11 @@ def test_answers_are_in_the_tree(question: str, answer: str) -> None:
     assert (REPO / path).is_file(), path
     assert symbol, "what to look for in the file?"
     assert re.search(rf"\b{symbol}\b", (REPO / path).read_text("utf-8"))
+
+
+def test_binder_brings_extras_that_exist() -> None:
+    script = REPO / ".binder" / "postBuild"
+    assert script.stat().st_mode & 0o100  # it is run as a program
+    (extras,) = re.findall(r"'\.\[(.+)\]'", script.read_text("utf-8"))
+    known = re.findall(r"^(\w+) = \[", (REPO / "pyproject.toml").read_text("utf-8"), re.MULTILINE)
+    assert set(extras.split(",")) <= set(known)
