@@ -100,6 +100,14 @@ TEST_P(SideBySide, OtherParametersAndModelsGoTheSameWay) {
     EXPECT_NE(together.head(alone.size()), alone);  // other roundings: pieces were used
 }
 
+TEST(Pieces, AreNoneWhereTheFilterHoldsTheSpeedForLong) {
+    const Problem problem = long_run(EffectMask{0});
+    Noise noise = ordinary_noise();
+    ASSERT_FALSE(pieces_of(problem.runs, forgets_s(problem.runs, noise)).empty());
+    noise.motion[0] = 1e-4;
+    EXPECT_TRUE(pieces_of(problem.runs, forgets_s(problem.runs, noise)).empty());
+}
+
 struct Score {
     double value;
     Vec<kNoiseParameters> gradient;

@@ -1,13 +1,15 @@
 #include "sysid/identify/side_by_side.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace sysid {
 
 namespace {
 
-constexpr double kForgotten = 4.5;  // seconds in which a filter has forgotten where it began
-constexpr std::size_t kGain = 2;    // steps of all lanes that cost less than so many samples
+constexpr double kForgotten = 4.5;  // seconds in which a filter forgets its beginning at best
+const double kTimesMet = -std::log(kMet);  // time constants until two ways have met
+constexpr std::size_t kGain = 2;           // steps of all lanes that cost less than so many samples
 
 std::vector<Piece> cut(const std::vector<Run>& runs, std::size_t longest) {
     std::vector<Piece> pieces;
@@ -20,14 +22,15 @@ std::vector<Piece> cut(const std::vector<Run>& runs, std::size_t longest) {
 }
 
 /// Steps of all lanes that it takes to walk the pieces.
-std::size_t steps_of(const std::vector<Run>& runs, const std::vector<Piece>& pieces) {
+std::size_t steps_of(const std::vector<Run>& runs, const std::vector<Piece>& pieces,
+                     double forgotten_s) {
     std::size_t steps = 0;
     for (std::size_t first = 0; first < pieces.size(); first += kLanes) {
         std::size_t longest = 0;
         double again = 0.0;
         for (std::size_t i = first; i < pieces.size() && i < first + kLanes; ++i) {
             longest = std::max(longest, pieces[i].size());
-            if (pieces[i].begin > 0) again = std::max(again, kForgotten / runs[pieces[i].run].dt);
+            if (pieces[i].begin > 0) again = std::max(again, forgotten_s / runs[pieces[i].run].dt);
         }
         steps += longest + static_cast<std::size_t>(std::min(again, 1e9));
     }
@@ -36,7 +39,17 @@ std::size_t steps_of(const std::vector<Run>& runs, const std::vector<Piece>& pie
 
 }  // namespace
 
-std::vector<Piece> pieces_of(const std::vector<Run>& runs, std::size_t most) {
+double forgets_s(const std::vector<Run>& runs, const Noise& noise) {
+    // A random walk of q per root of a second, read with r each dt, is known with the time constant
+    // r sqrt(dt) / q.
+    double slowest = 0.0;
+    for (const Run& run : runs)
+        slowest = std::max(slowest, noise.sensor[0] * std::sqrt(run.dt) / noise.motion[0]);
+    return kTimesMet * slowest;
+}
+
+std::vector<Piece> pieces_of(const std::vector<Run>& runs, double forgotten_s, std::size_t most) {
+    forgotten_s = std::max(forgotten_s, kForgotten);
     std::size_t all = 0, longest = 1;
     for (const Run& run : runs) {
         all += run.size();
@@ -53,7 +66,8 @@ std::vector<Piece> pieces_of(const std::vector<Run>& runs, std::size_t most) {
             low = middle + 1;
     }
     std::vector<Piece> parts = cut(runs, std::min(high, most));
-    const std::size_t steps_whole = steps_of(runs, whole), steps_parts = steps_of(runs, parts);
+    const std::size_t steps_whole = steps_of(runs, whole, forgotten_s);
+    const std::size_t steps_parts = steps_of(runs, parts, forgotten_s);
     if (kGain * std::min(steps_whole, steps_parts) >= all) return {};
     return steps_parts < steps_whole ? parts : whole;
 }

@@ -22,9 +22,13 @@ struct Piece {
     std::size_t size() const { return end - begin; }
 };
 
+/// Seconds in which a filter with this noise has forgotten where it began. Speed is what it holds
+/// longest: it hardly moves by itself, and is not read well.
+double forgets_s(const std::vector<Run>& runs, const Noise& noise);
+
 /// How runs are cut so that the lanes are full, into pieces of so many samples at most; nothing
-/// where lanes would gain nothing.
-std::vector<Piece> pieces_of(const std::vector<Run>& runs,
+/// where lanes would gain nothing, because the pieces are not much longer than what is forgotten.
+std::vector<Piece> pieces_of(const std::vector<Run>& runs, double forgotten_s = 0.0,
                              std::size_t most = std::numeric_limits<std::size_t>::max());
 
 /// A sample in a lane. Where it is not to be kept the lane has nothing to do.
