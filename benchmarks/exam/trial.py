@@ -75,7 +75,7 @@ def _told(study: sv.Study) -> Outcome:
     if first.significant:
         leader, group = first.ranking[0].id, first.ranking[0].indistinguishable_from
     if study.added:
-        # After the refits, and with a word from the driving that was held out.
+        # After the refits, and with a word from the validation data.
         leader = study.added[0].id
         group = study.verdicts[leader].group
     return {

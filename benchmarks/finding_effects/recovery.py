@@ -3,7 +3,7 @@
     python benchmarks/finding_effects/recovery.py [EFFECT ...] [--seeds N]
 
 Each effect is hidden in a simulated car that drives a lap with braking in corners (60 s at 100 Hz,
-training) and a handling course (held out), then sought from a baseline with other tyres.
+training) and a handling course (validation data), then sought from a baseline with other tyres.
 """
 
 from __future__ import annotations

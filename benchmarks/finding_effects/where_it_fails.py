@@ -4,7 +4,7 @@
 
 Laps of 30 s with a car that the model describes completely, with grip that changes half way, with
 steering that acts 20 or 40 ms late, and with a side wind that grows with the square of the speed; a
-handling course is held out.
+handling course is the validation data.
 """
 
 from __future__ import annotations
