@@ -14,9 +14,11 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from .objective import Problem
 
-__all__ = ["METHODS", "Box", "Outcome", "minimise", "stride"]
+__all__ = ["HARDER", "METHODS", "Box", "Outcome", "eased", "minimise", "stride"]
 
 _LEAST_DAMPING = 1e-9
+HARDER = 6.0
+"""Factor of the damping after a step that gained nothing."""
 
 
 @dataclass(frozen=True)
@@ -86,16 +88,16 @@ def _gauss_newton(
         gained, begin = 0.0, x
         there = None
         for attempt in range(10):
-            trial, _ = stride(begin, gradient, information, damping, box)
+            trial, promised = stride(begin, gradient, information, damping, box)
             # Most first steps are taken: the derivatives there cost as much again as the value.
             ahead = linearised(trial) if attempt == 0 else None
             trial_cost = cost_of(trial) if ahead is None else ahead[0]
             if trial_cost < cost:
                 gained = cost - trial_cost
                 x, cost, there = trial, trial_cost, ahead
-                damping = max(damping / 8.0, _LEAST_DAMPING)
+                damping = max(eased(damping, gained, promised), _LEAST_DAMPING)
                 break
-            damping *= 6.0
+            damping *= HARDER
         if gained == 0.0:
             return Outcome(x, cost, True)
         if gained < tolerance:
@@ -108,6 +110,16 @@ def _gauss_newton(
             x, cost, damping, there = whole, whole_cost, _LEAST_DAMPING, None
         cost, gradient, information = linearised(x) if there is None else there
     return Outcome(x, cost, False)
+
+
+def eased(damping: float, gained: float, promised: float) -> float:
+    """Damping of the next step: less where this one gained what the quadratic model promised.
+
+    In a bent valley a step gains less than promised. Were the next one longer all the same, every
+    second one would fail. After Nielsen, Damping Parameter in Marquardt's Method (1999).
+    """
+    share = min(max(gained / promised, 0.5), 1.0)
+    return damping * max(1.0 / 8.0, 1.0 - (2.0 * share - 1.0) ** 3)
 
 
 def stride(

@@ -12,7 +12,7 @@ from .._arrays import FloatArray, as_float64
 from .._threads import in_parallel
 from ..errors import NumericalError
 from .objective import Objective
-from .search import Box, minimise, stride
+from .search import HARDER, Box, eased, minimise, stride
 from .valley import down_the_valley
 
 __all__ = ["bottom", "climb", "descend", "risen", "settle", "settle_finely", "to_the_top"]
@@ -192,13 +192,13 @@ def climb(
         gained = 0.0
         for _ in range(10):
             trial = p.copy()
-            trial[box.columns], _ = stride(x, slope, information, damping, box)
+            trial[box.columns], promised = stride(x, slope, information, damping, box)
             there = float(values_at(trial[None])[0])
             if there > value:
                 p, gained, value = trial, there - value, there
-                damping = max(damping / 8.0, _SLIGHT)
+                damping = max(eased(damping, gained, promised), _SLIGHT)
                 break
-            damping *= 6.0
+            damping *= HARDER
         if gained < _GAIN:
             break
     return p, value
