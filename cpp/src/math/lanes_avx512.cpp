@@ -4,6 +4,7 @@
 
 #define SYSID_LANE_BYTES 64
 #include "lanes.inc"
+#include "lanes_back.inc"
 #include "lanes_filter.inc"
 #include "lanes_score.inc"
 #include "lanes_sums.inc"
