@@ -29,7 +29,7 @@ _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts
 _FOLLOWED = 2  # ends of searches that are followed with noise of their own
-_SAME = 1e-3  # of the box: ends no farther apart are one
+_SAME = 1e-2  # of the box: ends no farther apart lie in one valley
 _BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 
 
@@ -140,7 +140,7 @@ def identify(
 
 
 def _apart(ends: FloatArray, values: FloatArray, box: Box) -> list[FloatArray]:
-    """The best few ends of searches that are not at the same place."""
+    """The best few ends of searches, each in a valley of its own."""
     found: list[FloatArray] = []
     for i in np.argsort(-values, kind="stable"):
         x = ends[i][box.columns]
