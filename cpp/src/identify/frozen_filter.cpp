@@ -18,10 +18,12 @@ void freeze_run(const Problem& problem, std::size_t number, const double* p, Fro
     const std::size_t own = system.own().count, n = filter.rows.size();
     std::vector<int> from(n);
     for (std::size_t i = 0; i < n; ++i) {
-        const bool moves = i < kMotionStates + own;
-        from[i] = i < kMotionStates ? static_cast<int>(i)
-                  : moves           ? system.packed(i - kMotionStates)
-                                    : system.disturbing(i - kMotionStates - own);
+        const std::size_t moved = kMotionStates + own;
+        from[i] = static_cast<int>(i);
+        if (i >= moved)
+            from[i] = system.disturbing(i - moved);
+        else if (i >= kMotionStates)
+            from[i] = system.packed(i - kMotionStates);
     }
     std::vector<int>& substeps = filter.runs[number].substeps;
     filter.log_likelihood +=
@@ -62,6 +64,7 @@ FrozenFilter empty(const Problem& problem, const Noise& noise) {
 
 std::vector<int> filter_rows(EffectMask effects, bool sloping) {
     std::vector<int> rows;
+    rows.reserve(kStatesFull + kRoadStates);
     for (int i = 0; i < kMotionStates; ++i) rows.push_back(i);
     for (const std::size_t i : active_states(effects))
         rows.push_back(kStatesPlain + static_cast<int>(i));
@@ -86,8 +89,8 @@ FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise)
         LaneFilter walk(problem, {p}, noise, pieces);
         walk.keep = [&](const LaneSample& sample, std::size_t lane, int parts) {
             const std::size_t run = pieces[sample.piece].run;
-            walk.write(walk.gain(), lane, filter.gain(run, sample.at));
-            walk.write(walk.whitener(), lane, filter.whitener(run, sample.at));
+            LaneFilter::write(walk.gain(), lane, filter.gain(run, sample.at));
+            LaneFilter::write(walk.whitener(), lane, filter.whitener(run, sample.at));
             if (sample.at > 0) filter.runs[run].substeps[sample.at] = parts;
             if (sample.at + 1 < sample.run->size()) return;
             for (std::size_t i = 0; i < filter.rows.size(); ++i)

@@ -90,8 +90,8 @@ bool in_pieces(const Problem& problem, const double* p, const Noise& noise, Sum<
     LaneFilter filter(problem, {p}, noise, pieces);
     filter.with_transition = true;
     const std::size_t n = filter.states(), moving = filter.moving();
-    const std::size_t wide =
-        n * (moving + 2 * kChannels) + kWhitener + kChannels + n + LaneFilter::packed(n, 0);
+    const std::size_t wide = n * (moving + std::size_t{2} * kChannels) + kWhitener + kChannels + n +
+                             LaneFilter::packed(n, 0);
     std::size_t room = 0;
     for (const Piece& piece : pieces) room = std::max(room, piece.size());
     std::vector<double> numbers(std::min<std::size_t>(kLanes, pieces.size()) * room * wide);

@@ -179,7 +179,7 @@ void by_length(const LaneSamples& samples, const std::array<int, kLanes>& parts,
             for (std::size_t i = 0; alike(lane, other) && i < state.size(); ++i)
                 after[i].at[other] = state[i].at[other];
     }
-    state = after;
+    state.swap(after);
 }
 
 /// Moves states and externals `x` over `parts` steps to the sample; `part(ready)` after each of
