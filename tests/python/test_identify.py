@@ -130,7 +130,7 @@ def test_all_methods_end_at_the_same_likelihood(fit: Fit, start: Model, lap: Log
 
 
 def test_ends_in_one_valley_are_followed_once() -> None:
-    """Rear B, C, E of a drive where noise of its own told the second valley to be 14 nats higher."""
+    """Rear B, C, E of a drive where, with noise of its own, the second valley is 14 nats higher."""
     ends = np.array([[7.34, 1.86, 0.86], [7.41, 1.85, 0.85], [9.87, 1.39, 0.08], [8.1, 2.6, 1.0]])
     box = Box([0, 1, 2], np.array([1.0, 0.5, -10.0]), np.array([50.0, 3.0, 1.0]))
     values = np.array([20497.53, 20497.53, 20497.47, 20496.65])
