@@ -27,7 +27,7 @@ from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import METHODS, refine, refit
 from sysid_vehicle.identify.identify import _apart
 from sysid_vehicle.identify.objective import Objective
-from sysid_vehicle.identify.search import Box, minimise
+from sysid_vehicle.identify.search import Box, eased, minimise
 from sysid_vehicle.identify.settle import climb, risen, settle
 
 G = 9.80665
@@ -127,6 +127,12 @@ def test_all_methods_end_at_the_same_likelihood(fit: Fit, start: Model, lap: Log
         assert found.derived[0].value == pytest.approx(fit.derived[0].value, rel=0.01)
     # In nats, of 46 000: far less than one standard error of any of the eight parameters.
     assert max(ends) - min(ends) < 2.0
+
+
+def test_damping_follows_what_was_gained_of_what_was_promised() -> None:
+    assert eased(1.0, 2.0, 2.0) == pytest.approx(1.0 / 8.0)
+    assert eased(1.0, 1.0, 2.0) == pytest.approx(1.0)
+    assert eased(1.0, 1e-9, 0.0) == pytest.approx(1.0 / 8.0)  # at a bound nothing is promised
 
 
 def test_ends_in_one_valley_are_followed_once() -> None:

@@ -118,7 +118,7 @@ def eased(damping: float, gained: float, promised: float) -> float:
     In a bent valley a step gains less than promised. Were the next one longer all the same, every
     second one would fail. After Nielsen, Damping Parameter in Marquardt's Method (1999).
     """
-    share = min(max(gained / promised, 0.5), 1.0)
+    share = min(max(gained / promised, 0.5), 1.0) if promised > 0.0 else 1.0
     return damping * max(1.0 / 8.0, 1.0 - (2.0 * share - 1.0) ** 3)
 
 
