@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.stats import norm
 
 from sysid_vehicle import Fit, Log, Model, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import Causes, Diagnosis, confirm
+from sysid_vehicle.diagnose.causes import CredibleSet
 from sysid_vehicle.diagnose.single_effects import Hypothesis, ScoreModel
 
 Hidden = Callable[[str, float], Fit]
@@ -106,6 +108,22 @@ def test_what_a_large_effect_does_beyond_first_order_is_no_further_cause(
     assert found.causes.inclusion["mass"] > 0.99
     assert found.causes.inclusion["yaw_inertia"] < found.proposed.inclusion["yaw_inertia"]
     assert found.causes.sizes["mass"] == found.sizes["mass"]
+
+
+def test_what_is_scored_over_a_grid_is_refitted_too(
+    hidden_fit: Hidden, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`friction_change` has a column for each moment: the sum of effects states no size of it."""
+    monkeypatch.setattr(confirm, "_HOPELESS", 0.0)
+    some = ["steer_offset", "friction_change"]
+    found = diagnose(hidden_fit("steer_offset.offset_rad", 0.002), candidates=some, refits=1)
+    grid = CredibleSet(("friction_change",), (1.0,), {"friction_change": 1.0})
+    sets = (*found.proposed.sets, grid)
+    with_grid = replace(found, proposed=replace(found.proposed, sets=sets))
+    assert "friction_change" not in with_grid.proposed.sizes
+    causes = confirm.confirmed(with_grid)
+    assert causes.sets[0].effects == ("steer_offset",)
+    assert str(causes)
 
 
 def test_two_that_are_missing_both_stand(start: Model, truth: Model) -> None:

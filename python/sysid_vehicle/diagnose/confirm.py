@@ -79,7 +79,8 @@ def _hopeless(left: Beside, candidates: list[Candidate], price: float) -> set[st
 
 def _refitted(left: Beside, c: Candidate, dx: Diagnosis) -> Candidate:
     """A candidate refitted beside what is in the model by now."""
-    value, std = dx.proposed.sizes[c.id]
+    # One that is scored over a grid has no size among the scores of a sum: its own score has.
+    value, std = dx.proposed.sizes.get(c.id, (c.value, c.std))
     return refitted(left.fit, dx.driving, replace(c, value=value, std=std, fit=None))
 
 
