@@ -66,17 +66,13 @@ void register_identify(py::module_& m) {
                               &to_noise);
     bind_least_squares<FrozenFilter>(bound, kParameterCount, kChannels);
     bound
-        .def(py::init([](const SingleTrack& model) {
-                 return Problem{model, {}};
-             }),
+        .def(py::init([](const SingleTrack& model) { return Problem{model, {}}; }),
              py::arg("model"))
         .def("add_run", &add_run, py::arg("dt"), py::arg("inputs"), py::arg("measurements"),
              py::arg("start") = 0.0, py::arg("name") = "")
         .def(
             "with_model",
-            [](const Problem& self, const SingleTrack& model) {
-                return Problem{model, self.runs};
-            },
+            [](const Problem& self, const SingleTrack& model) { return Problem{model, self.runs}; },
             py::arg("model"))
         .def(
             "log_likelihoods",
@@ -85,6 +81,7 @@ void register_identify(py::module_& m) {
                 const double* values = matrix(sets, count, kParameterCount, "parameters");
                 const Noise n = to_noise(noise);
                 std::vector<const double*> each;
+                each.reserve(static_cast<std::size_t>(count));
                 for (py::ssize_t i = 0; i < count; ++i)
                     each.push_back(values + i * kParameterCount);
                 std::vector<double> out(each.size());
@@ -130,6 +127,7 @@ void register_identify(py::module_& m) {
                 const double* values = values_of(p);
                 const Noise n = to_noise(noise);
                 std::vector<Horizon> asked;
+                asked.reserve(horizons.size());
                 for (const auto& [ahead, every] : horizons) asked.push_back({ahead, every});
                 Array found = filled(asked.size() * self.samples(), kChannels,
                                      [&](double* to) { look_ahead(self, values, n, asked, to); });
