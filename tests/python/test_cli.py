@@ -113,7 +113,8 @@ def test_improve_finds_the_effect_and_writes_json_and_report(
     assert result["ranking"][0]["id"] == "steer_lag"
     assert not {"rear_toe", "gyro_bias"} & {c["id"] for c in result["ranking"]}
     assert set(result["horizons"]["channels"]) >= {"vy_mps", "yaw_rate_radps", "ay_mps2"}
-    assert 0.5 < result["explained"]["low"] <= result["explained"]["share"] <= 1.0
+    assert 0.5 < result["explained"]["share"] <= 1.0
+    assert 0.0 < result["explained"]["low"] < result["explained"]["share"]
     assert set(result["unknown"]["explainable"]) == {"F_y", "M_z"}
     for candidate in result["ranking"]:
         assert set(candidate) >= {
