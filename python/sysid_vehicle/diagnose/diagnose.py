@@ -11,6 +11,7 @@ from .._progress import with_progress
 from .._threads import Workers
 from ..compare import compare
 from ..effects import Effect, effect
+from ..errors import InvalidInput
 from ..estimate import Driving
 from ..identify import Fit, explaining
 from ..log import Log
@@ -71,6 +72,11 @@ def diagnose(
     """
     ends = time.perf_counter() + duration(time_limit_s, "time_limit_s")
     rules = rules.at(alpha)
+    if fit.horizon_s:
+        raise InvalidInput(
+            f"the fit is one to predictions {fit.horizon_s:g} s ahead, and evidence is of the "
+            "likelihood; identify without horizon_s"
+        )
     driving = fit.driving if logs is None else Driving.of(logs)
     possible = considered(fit.model, candidates)
     evidence = Evidence(fit, driving)

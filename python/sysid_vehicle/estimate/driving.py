@@ -206,20 +206,56 @@ class Driving:
         """
         problem = _core.Problem(model.core(force_known=self.force_known))
         for log, where, at in self._pieces(most_samples):
-            if other_inputs is None:
-                inputs = self._inputs(log, where)
-            else:
+            inputs = self._inputs(log, where)
+            if other_inputs is not None:
                 inputs = other_inputs[at : at + where.stop - where.start]
-            if channels_in_use():
-                check_channels(log, where, model.parts)
-                inputs = np.column_stack([inputs, logged_channels(log, where)])
-            y = np.full((len(inputs), len(MEASURED)), np.nan)
-            for i, c in enumerate(MEASURED):
-                if log.has(c) and (self.force_known or c != "ax_mps2"):
-                    y[:, i] = log[c][where]
-            began = where.start / log.rate_hz
-            problem.add_run(1.0 / log.rate_hz, as_float64(inputs), as_float64(y), began, log.name)
+            self._add_run(problem, model, log, where, inputs)
         return problem
+
+    def windows(
+        self, model: Model, windows: Sequence[tuple[int, int]], motion: FloatArray
+    ) -> _core.Problem:
+        """The core's problem whose runs are windows, each from a state that is given.
+
+        Parameters
+        ----------
+        windows : sequence of (int, int)
+            First sample and number of samples; each within one stretch.
+        motion : array, shape (samples, 3 or more)
+            v_x, v_y [m/s], yaw rate [rad/s] with which the windows begin.
+        """
+        problem = _core.Problem(model.core(force_known=self.force_known))
+        firsts = [at for _, _, at in self._pieces(None)]
+        for first, length in windows:
+            number = int(np.searchsorted(firsts, first, side="right")) - 1
+            log, whole, at = self._pieces(None)[number]
+            begin = whole.start + first - at
+            where = slice(begin, begin + length)
+            inputs = self._inputs(log, whole)[first - at : first - at + length]
+            self._add_run(problem, model, log, where, inputs, motion[first, :3])
+        return problem
+
+    def _add_run(
+        self,
+        problem: _core.Problem,
+        model: Model,
+        log: Log,
+        where: slice,
+        inputs: FloatArray,
+        motion: FloatArray | None = None,
+    ) -> None:
+        """Add samples of a log to a problem, which begin with a motion where one is given."""
+        if channels_in_use():
+            check_channels(log, where, model.parts)
+            inputs = np.column_stack([inputs, logged_channels(log, where)])
+        y = np.full((len(inputs), len(MEASURED)), np.nan)
+        for i, c in enumerate(MEASURED):
+            if log.has(c) and (self.force_known or c != "ax_mps2"):
+                y[:, i] = log[c][where]
+        if motion is not None:
+            y[0, : len(motion)] = motion
+        began = where.start / log.rate_hz
+        problem.add_run(1.0 / log.rate_hz, as_float64(inputs), as_float64(y), began, log.name)
 
     def _pieces(self, most_samples: int | None) -> list[tuple[Log, slice, int]]:
         """Logs, samples of them, and the place of the first among all usable samples."""

@@ -1,8 +1,10 @@
 """Identification of parameters and noise from driving."""
 
+from .ahead import predicting_ahead
+from .box import free_box
 from .estimates import Estimate
 from .fit import Fit
-from .identify import free_box, identify, objective_of, profile_fit, refine, refit
+from .identify import identify, objective_of, profile_fit, refine, refit
 from .posterior import Posterior
 from .predictive import Prediction, predict
 from .profile import Profile
@@ -29,6 +31,7 @@ __all__ = [
     "identify_runs",
     "objective_of",
     "predict",
+    "predicting_ahead",
     "profile_fit",
     "refine",
     "refit",

@@ -52,6 +52,9 @@ class Fit:
     profiles : tuple of Profile
         Profile likelihoods of the estimates and of what follows from them; empty where none were
         asked for.
+    horizon_s : float
+        What the parameters predict best: this many seconds ahead; zero for one step, the
+        likelihood.
     """
 
     model: Model
@@ -63,6 +66,7 @@ class Fit:
     starts: Starts
     converged: bool
     profiles: tuple[Profile, ...] = ()
+    horizon_s: float = 0.0
 
     __iter__ = None  # numbers are no names
 
@@ -203,6 +207,8 @@ class Fit:
     def _headline(self) -> str:
         effects = ", ".join(self.model.effects) or "baseline"
         text = f"Fit of {effects} to {self.driving}; log-likelihood {self.log_likelihood:.1f}"
+        if self.horizon_s:
+            text += f" one step ahead, fitted to {self.horizon_s:g} s ahead"
         if len(self.starts):
             text += f"; {int(self.starts.agrees.sum())} of {len(self.starts)} starts agree"
         if not self.converged:

@@ -14,6 +14,8 @@ from ..errors import InvalidInput, NumericalError, warn
 from ..estimate import Driving, NoiseModel, first_guess, noise_range
 from ..log import Log, check_car, check_excitation
 from ..model import Model
+from .ahead import predicting_ahead
+from .box import free_box
 from .estimates import INTERVALS, wald, with_profiles
 from .fit import Fit
 from .objective import Objective, gaussian_prior
@@ -23,7 +25,15 @@ from .settle import risen, settle, settle_finely, to_the_top
 from .starts import Runner, Starts, space_filling
 from .suspects import explaining
 
-__all__ = ["free_box", "identify", "objective_of", "profile_fit", "refine", "refit"]
+__all__ = [
+    "free_box",
+    "identify",
+    "objective_of",
+    "predicting_ahead",
+    "profile_fit",
+    "refine",
+    "refit",
+]
 
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
@@ -44,6 +54,7 @@ def identify(
     bounds: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     priors: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     intervals: str = "information",
+    horizon_s: float = 0.0,
     seed: int = 0,
     workers: int | None = None,
     progress: bool | None = None,
@@ -51,7 +62,9 @@ def identify(
     """Estimate a model's free parameters, and the noise, by maximum likelihood.
 
     The likelihood is that of the one-step-ahead prediction errors of an extended Kalman filter
-    (Ljung, System Identification, 2nd ed., sec. 7.2 and 7.4).
+    (Ljung, System Identification, 2nd ed., sec. 7.2 and 7.4). Statistics need it. Of a model that
+    is not quite the car it may give parameters that predict poorly some seconds ahead; for
+    simulation and control ask for `horizon_s`.
 
     Parameters
     ----------
@@ -72,6 +85,9 @@ def identify(
     intervals : str
         `information`: 95 % intervals from the information matrix. `profile`: from the profile
         likelihood, which follows bent valleys and takes some tens of searches.
+    horizon_s : float
+        Fit parameters to predictions so many seconds ahead, from the maximum of the likelihood on:
+        `predicting_ahead`. Zero for the likelihood itself.
     seed : int
         Of the start points.
     workers : int, optional
@@ -96,6 +112,8 @@ def identify(
         raise InvalidInput(f"no optimiser is called '{method}'; there are {', '.join(METHODS)}")
     if intervals not in INTERVALS:
         raise InvalidInput(f"intervals = '{intervals}'; there are {', '.join(INTERVALS)}")
+    if horizon_s and intervals == "profile":
+        raise InvalidInput("profile intervals are of the likelihood; leave out horizon_s")
     model = _told(model, fixed, bounds, priors)
     driving = Driving.of(logs)
     for log in driving.logs:
@@ -136,7 +154,7 @@ def identify(
     fit = _on_its_road(_top(model, driving, objective, best, table))
     if intervals == "profile":
         return profile_fit(fit, workers=workers, progress=progress)
-    return fit
+    return predicting_ahead(fit, horizon_s) if horizon_s else fit
 
 
 def _apart(ends: FloatArray, values: FloatArray, box: Box) -> list[FloatArray]:
@@ -233,20 +251,6 @@ def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool | None =
         p = better
     estimates = with_profiles(fit.estimates, profiles[: len(fit.estimates)], box)
     return replace(fit, estimates=estimates, profiles=profiles)
-
-
-def free_box(model: Model) -> Box:
-    """The model's free parameters, in the order of their names."""
-    names = list(model.free_names)
-    known = model.parameters
-    bounds = np.array([model.bounds(n) for n in names])
-    lower = bounds[:, 0].copy()
-    for i, n in enumerate(names):
-        # A lag of exactly zero has no derivative; a tenth of its typical size is next to none.
-        part = next((e for e in model.parts if n.startswith(f"{e.id}.")), None)
-        if part is not None and part.scored_at_typical:
-            lower[i] = max(lower[i], 0.1 * known[n].typical)
-    return Box([known[n].column for n in names], lower, bounds[:, 1])
 
 
 # Where tyres lie in practice; the bounds of the search are wider.

@@ -14,6 +14,7 @@ from .._progress import with_progress
 from .._tables import frame, imported
 from .._text import brief, number
 from ..errors import InvalidInput
+from .box import free_box
 
 if TYPE_CHECKING:
     from .fit import Fit
@@ -103,8 +104,6 @@ def posterior(
     progress: bool | None,
 ) -> Posterior:
     """Draw parameters; `Fit.posterior` has the parameters of this call."""
-    from .identify import free_box  # it makes fits, and this belongs to them
-
     count, rng = whole(count, "count", 1), generator(seed)
     box = free_box(fit.model)
     if method == "normal":
@@ -156,7 +155,7 @@ def _ensemble(
 ) -> tuple[FloatArray, FloatArray]:
     """Of the likelihood itself, by the affine-invariant sampler (Goodman & Weare 2010, emcee)."""
     emcee = imported("emcee", "arviz")
-    from .identify import free_box, objective_of
+    from .identify import objective_of
 
     columns = free_box(fit.model).columns
     objective = objective_of(fit.model, fit.driving.problem(fit.model), fit.driving)

@@ -20,8 +20,9 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..estimate import Driving, NoiseModel
 from ..model import Model
+from .box import free_box
 from .fit import Fit
-from .identify import free_box, objective_of
+from .identify import objective_of
 from .objective import Penalised
 from .search import Box, minimise
 

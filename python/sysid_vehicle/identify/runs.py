@@ -23,9 +23,10 @@ from ..errors import InvalidInput, near_names
 from ..estimate import Driving, NoiseModel, noise_range
 from ..log import Log
 from ..model import Model
+from .box import free_box
 from .estimates import Estimate, wald
 from .fit import Fit
-from .identify import free_box, identify
+from .identify import identify
 from .mapped import Copied, Mapped
 from .objective import Objective, gaussian_prior
 from .search import Box

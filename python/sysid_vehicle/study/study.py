@@ -36,6 +36,7 @@ from ..saved import save
 from .added import AddedEffect
 from .horizons import Beyond, Horizons, horizons
 from .next_steps import next_steps
+from .predicting import Predicting, predicting
 from .record import record
 from .shares import Shares, shares
 from .waterfall import Waterfall, waterfall
@@ -239,6 +240,14 @@ class Study:
         named = [a.name for a in self.added]
         return shares(self.fits[0], self.fit, self.validation, named=named)
 
+    @cached_property
+    def predicting(self) -> Predicting | None:
+        """First and last model fitted to predictions of 2 s, seconds at first.
+
+        None where the driving is too short.
+        """
+        return predicting(self)
+
     def with_warnings(self, warnings: Sequence[str]) -> Study:
         """The same study with these warnings; what it has worked out so far it keeps."""
         other = replace(self, warnings=tuple(warnings))
@@ -251,6 +260,7 @@ class Study:
             "horizons",
             "ceiling",
             "shares",
+            "predicting",
         ):
             if slow in self.__dict__:
                 other.__dict__[slow] = self.__dict__[slow]
@@ -307,6 +317,11 @@ class Study:
     @property
     def in_the_end(self) -> str:
         """What is left on the driving of the fit, and on the other, in words."""
+        ahead = "" if self.verdict == "not_testable" else str(self.predicting or "")
+        return f"{self._left} {ahead}" if ahead else self._left
+
+    @property
+    def _left(self) -> str:
         said = f"In the end: {self.omnibus}."
         if self.explained is not None:
             gone = f"Of the error 1 to 5 s ahead, {self.explained} is gone."

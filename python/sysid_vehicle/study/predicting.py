@@ -1,0 +1,121 @@
+"""What becomes of a study where parameters are fitted to predictions of seconds.
+
+The likelihood is that of one step. Where a model lacks something, its maximum may predict poorly
+some seconds ahead, and a part of what an effect takes away then is what other parameters would have
+taken away as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from .._text import number
+from ..estimate import UNITS, Driving
+from ..identify import Fit, predicting_ahead
+from ..rules import Change, Rules
+from .horizons import Horizons, changes, horizons
+
+if TYPE_CHECKING:
+    from .study import Study
+
+__all__ = ["Predicting", "predicting"]
+
+_HORIZON_S = 2.0
+_WORTH = 0.1  # logarithm of the ratio of two errors that differ
+
+
+@dataclass(frozen=True, eq=False)
+class Predicting:
+    """The first and the last model of a study, fitted to predictions some seconds ahead.
+
+    Attributes
+    ----------
+    baseline, final : Fit
+        One and the same where nothing was added.
+    horizon_s : float
+    better : tuple of Change
+        Errors of the final model so far ahead on validation data, against the likelihood's.
+    needed : tuple of Change
+        The same against those of the baseline, both fitted to predictions; empty where nothing was
+        added.
+    errors : Horizons
+        The final model as the likelihood fits it, then as fitted to predictions.
+    """
+
+    baseline: Fit
+    final: Fit
+    horizon_s: float
+    better: tuple[Change, ...]
+    needed: tuple[Change, ...]
+    errors: Horizons
+    rules: Rules
+
+    @property
+    def helps(self) -> bool:
+        """Whether some error falls, and none grows."""
+        return self._falls(self.better)
+
+    @property
+    def explains(self) -> bool:
+        """Whether what was added is needed so far ahead."""
+        return not self.needed or self._falls(self.needed)
+
+    def _falls(self, found: Sequence[Change]) -> bool:
+        sure = [c for c in found if abs(c.log_ratio) > self.rules.grown * c.error]
+        falls = any(c.log_ratio < -_WORTH for c in sure)
+        return falls and not any(c.log_ratio > _WORTH for c in sure)
+
+    def __str__(self) -> str:
+        """Sentences, or nothing where the likelihood predicts as well."""
+        said = []
+        if self.helps:
+            before, after = self.errors.error[0, 0], self.errors.error[-1, 0]
+            told = ", ".join(
+                f"{c} {number(float(a), 2)} {UNITS[c]} for {number(float(b), 2)}"
+                for c, b, a in zip(self.errors.channels, before, after, strict=True)
+            )
+            said.append(
+                f"Fitted to predictions {self.horizon_s:g} s ahead (`study.predicting.final`), the "
+                f"final model errs less there on validation data than as fitted one step ahead: "
+                f"{told}."
+            )
+        if not self.explains and self._falls(self.better):
+            said.append(
+                f"The baseline so fitted errs no more: {self.horizon_s:g} s ahead what was added "
+                "is not needed."
+            )
+        return " ".join(said)
+
+
+def predicting(study: Study, horizon_s: float = _HORIZON_S) -> Predicting | None:
+    """Fit the first and the last model of a study to predictions; None where logs are too short.
+
+    Parameters
+    ----------
+    study : Study
+    horizon_s : float
+    """
+    if min(_longest_s(d) for d in (study.fit.driving, study.validation)) < 2.0 * horizon_s:
+        return None
+    final = predicting_ahead(study.fit, horizon_s)
+    alone = len(study.fits) == 1
+    baseline = final if alone else predicting_ahead(study.fits[0], horizon_s)
+    ahead, elsewhere = (horizon_s,), study.validation
+    return Predicting(
+        baseline,
+        final,
+        horizon_s,
+        changes(study.fit, final, elsewhere, ahead),
+        () if alone else changes(baseline, final, elsewhere, ahead),
+        horizons([study.fit, final], ["one step", f"{horizon_s:g} s ahead"], elsewhere, ahead),
+        study.rules,
+    )
+
+
+def _longest_s(driving: Driving) -> float:
+    lengths = [
+        float(s.where.stop - s.where.start) / driving.logs[s.log].rate_hz for s in driving.stretches
+    ]
+    return max(lengths)

@@ -1,0 +1,120 @@
+"""Parameters fitted to predictions of seconds, beside those of the one-step likelihood."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import (
+    ChannelMap,
+    Fit,
+    InvalidInput,
+    Log,
+    Model,
+    Vehicle,
+    diagnose,
+    identify,
+    read_log,
+)
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.identify import predicting_ahead
+from sysid_vehicle.rules import USUAL, Change
+from sysid_vehicle.study.horizons import changes
+from sysid_vehicle.study.predicting import Predicting
+
+STIFFNESS = ("cornering stiffness front", "cornering stiffness rear")
+
+
+@pytest.fixture(scope="module")
+def ahead(fit: Fit) -> Fit:
+    """The complete model fitted to predictions."""
+    return predicting_ahead(fit)
+
+
+def test_of_the_right_model_both_criteria_tell_the_same_car(
+    fit: Fit, ahead: Fit, truth: Model
+) -> None:
+    true = fit.values_of(truth)
+    for name in STIFFNESS:
+        assert ahead[name].value == pytest.approx(true[name], abs=4.0 * ahead[name].std)
+        assert ahead[name].value == pytest.approx(true[name], rel=0.02)
+        # The likelihood uses all that there is to be known.
+        assert 0.7 * fit[name].std < ahead[name].std < 5.0 * fit[name].std
+    assert ahead.log_likelihood <= fit.log_likelihood
+    assert ahead.horizon_s == 2.0
+    assert "fitted to 2 s ahead" in str(ahead)
+    assert "ahead" not in str(fit)
+
+
+def test_standard_errors_are_those_of_repeated_drives(complete_fits: tuple[Fit, ...]) -> None:
+    fits = [predicting_ahead(f) for f in complete_fits]
+    for name in STIFFNESS:
+        scatter = np.std([f[name].value for f in fits], ddof=1)
+        # Chi-square with three degrees of freedom: between the quantiles of 0.1 and 99.9 %.
+        share = 3.0 * scatter**2 / np.mean([f[name].std ** 2 for f in fits])
+        assert 0.02 < share < 16.3
+
+
+def test_a_car_of_another_simulator_is_predicted_better(shared_data: Path, repo: Path) -> None:
+    folder = repo / "benchmarks" / "real_driving"
+    channels = ChannelMap.from_toml(folder / "carsim_like_handling.channels.toml")
+    car = Vehicle.from_toml(folder / "carsim_like_handling.vehicle.toml")
+    log = read_log(shared_data / "carsim_like_handling" / "handling_course.csv", channels)
+    columns = {c: np.array(log[c]) for c in log.channels if c != "fx_n"}  # it comes late
+    log = Log.from_arrays(columns, name=log.name, check=False)
+    fit = identify(Model(car), log.between(0.0, 75.0), starts=1)
+    other = Driving.of(log.between(75.0, 1e9))
+    for found in changes(fit, predicting_ahead(fit), other, (2.0,)):
+        assert found.log_ratio < np.log(0.5)
+        assert found.log_ratio < -3.0 * found.error
+
+
+def test_what_is_fixed_or_known_beforehand_stays(start: Model, lap: Log, fit: Fit) -> None:
+    held = identify(
+        fit.model, lap, starts=1, horizon_s=1.0, fixed=["E_front"], priors={"D_rear": (1.3, 1e-4)}
+    )
+    assert held.model.value("E_front") == fit.model.value("E_front")
+    assert held["D_rear"].value == pytest.approx(1.3, abs=5e-4)
+    assert held["D_rear"].std < 2e-4
+    assert held.horizon_s == 1.0
+
+
+def test_without_lateral_speed_windows_begin_with_the_smoothed_one(fit: Fit, altered) -> None:
+    log = altered(fit.driving.logs[0], without=["vy_mps"])
+    blind = predicting_ahead(identify(fit.model, log, starts=1))
+    for name in STIFFNESS:
+        assert blind[name].value == pytest.approx(fit[name].value, rel=0.05)
+
+
+def test_what_cannot_be_asked_is_refused(fit: Fit, ahead: Fit, lap: Log, start: Model) -> None:
+    with pytest.raises(InvalidInput, match="horizon_s = 100: no stretch"):
+        predicting_ahead(fit, 100.0)
+    with pytest.raises(InvalidInput, match=r"horizon_s = -1\.0: give a time above zero"):
+        predicting_ahead(fit, -1.0)
+    with pytest.raises(InvalidInput, match="profile intervals are of the likelihood"):
+        identify(start, lap, horizon_s=2.0, intervals="profile")
+    with pytest.raises(InvalidInput, match="2 s ahead, and evidence is of the likelihood"):
+        diagnose(ahead)
+
+
+def _said(better: float, needed: float | None, fit: Fit) -> Predicting:
+    def change(log_ratio: float) -> tuple[Change, ...]:
+        return (Change("vy_mps", 2.0, log_ratio, 0.05),)
+
+    from sysid_vehicle.study.horizons import horizons
+
+    errors = horizons([fit, fit], ["one step", "2 s ahead"], fit.driving, (2.0,))
+    more = () if needed is None else change(needed)
+    return Predicting(fit, fit, 2.0, change(better), more, errors, USUAL)
+
+
+def test_it_is_said_what_predicts_better_and_what_is_not_needed(fit: Fit) -> None:
+    assert str(_said(-0.05, None, fit)) == ""
+    assert "errs less there" in str(_said(-0.5, None, fit))
+    assert "not needed" not in str(_said(-0.5, -0.5, fit))
+    assert "not needed" in str(_said(-0.5, 0.0, fit))
+    # One error that grows is no help.
+    both = replace(_said(-0.5, None, fit))
+    grown = replace(both, better=(*both.better, Change("yaw_rate_radps", 2.0, 0.5, 0.05)))
+    assert str(grown) == ""
