@@ -213,10 +213,6 @@ def design_excitation(
     progress : bool, optional
         Show a progress bar; by default in a terminal or a notebook, after two seconds.
 
-    Returns
-    -------
-    Design
-
     Raises
     ------
     InvalidInput

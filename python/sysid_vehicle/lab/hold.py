@@ -58,10 +58,6 @@ def hold_value(fit: TyreFit, name: str, value: float) -> HeldValue:
         A free parameter, or a combination such as `BCD_front`.
     value : float
 
-    Returns
-    -------
-    HeldValue
-
     Raises
     ------
     InvalidInput

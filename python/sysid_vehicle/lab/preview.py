@@ -219,10 +219,6 @@ def preview(
     seed : int or numpy.random.Generator
         Source of the sensors' randomness.
 
-    Returns
-    -------
-    Preview
-
     Raises
     ------
     InvalidInput

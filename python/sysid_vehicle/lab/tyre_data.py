@@ -176,10 +176,6 @@ class TyreLog:
         load_delay_samples : int
             Samples by which the loads act later than they are logged.
         name : str
-
-        Returns
-        -------
-        TyreLog
         """
         u, f = as_float64(force_and_steer), as_float64(loads)
         if load_delay_samples > 0:
@@ -193,11 +189,6 @@ class TyreLog:
         Axle loads are the columns ``fz_front_n`` and ``fz_rear_n`` where the log has them, else
         those at rest with what the height of the centre of gravity and the longitudinal
         acceleration move between them.
-
-        Parameters
-        ----------
-        log : Log
-        vehicle : GreyBoxVehicle
 
         Returns
         -------

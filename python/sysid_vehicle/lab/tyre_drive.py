@@ -44,10 +44,6 @@ def drive_tyres(
     seed : int or numpy.random.Generator
     name : str
 
-    Returns
-    -------
-    TyreLog
-
     Raises
     ------
     InvalidInput

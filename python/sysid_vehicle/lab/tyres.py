@@ -74,10 +74,6 @@ def identify_tyres(
     progress : bool, optional
         Show a progress bar; by default in a terminal or a notebook, after two seconds.
 
-    Returns
-    -------
-    TyreFit
-
     Raises
     ------
     InvalidInput

@@ -160,10 +160,6 @@ def run_schedule(
     shorten : float
         Part of the drives' customary lengths that is driven, from a twentieth to one.
 
-    Returns
-    -------
-    ScheduleRun
-
     Raises
     ------
     InvalidInput

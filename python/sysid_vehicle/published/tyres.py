@@ -131,10 +131,6 @@ def regress_tyres(
     seed : int
         Of the start points.
 
-    Returns
-    -------
-    TyreRegression
-
     Raises
     ------
     InvalidInput

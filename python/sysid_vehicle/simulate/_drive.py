@@ -99,12 +99,7 @@ def drive_truth(
     name: str | None = None,
     channels: Mapping[str, Channel] | None = None,
 ) -> Drive:
-    """Drive a model through a manoeuvre and keep what no sensor sees; parameters as :func:`drive`.
-
-    Returns
-    -------
-    Drive
-    """
+    """Drive as :func:`drive` does, and keep what no sensor sees."""
     expect(model, Model, "drive")
     expect(manoeuvre, Manoeuvre, "drive")
     rng = generator(seed)

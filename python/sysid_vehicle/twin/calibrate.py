@@ -301,10 +301,6 @@ def calibrate(
         The cost with other seeds than the trials'. The best trial and, if the optimiser has
         ``best_predicted``, the best that its model predicts are judged by them.
 
-    Returns
-    -------
-    Calibration
-
     Raises
     ------
     InvalidInput

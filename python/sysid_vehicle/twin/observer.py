@@ -221,10 +221,6 @@ def observe(
     stride : int
         Every so many samples are recorded.
 
-    Returns
-    -------
-    Observation
-
     Raises
     ------
     InvalidInput
