@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from ._text import html_list, html_paragraph, html_table, text_table
+from ._text import brief, html_list, html_paragraph, html_table, html_text, text_table
 
-__all__ = ["Part", "Printed", "Table"]
+__all__ = ["Part", "Printed", "Table", "Told"]
 
 
 class Table(NamedTuple):
@@ -32,6 +32,16 @@ class Printed:
 
     def _repr_html_(self) -> str:
         return "".join(_html(part) for part in self._parts() if part)
+
+
+class Told:
+    """A result that shows itself in a notebook as it prints, and whose `repr` is the first line.
+
+    A dataclass that derives from it has ``repr=False``.
+    """
+
+    __repr__ = brief
+    _repr_html_ = html_text
 
 
 def _text(part: Part) -> str:

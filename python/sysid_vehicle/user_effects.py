@@ -121,10 +121,6 @@ def state(
         Its value when a run begins, of `d` as `force_x` knows it and `p`. By default it begins
         where it would rest, which a state that only adds up does not have.
 
-    Returns
-    -------
-    State
-
     Raises
     ------
     InvalidInput
@@ -192,10 +188,6 @@ def define_effect(
         For the lists; the equation is that of the functions unless you give another.
     confounded_with : sequence of str
         Effects that act alike in most driving.
-
-    Returns
-    -------
-    Effect
 
     Raises
     ------

@@ -1,6 +1,5 @@
 // Prediction errors with frozen gains, and their derivatives.
-#include "helpers.hpp"
-#include "sysid/identify/prediction_error.hpp"
+#include "residuals.hpp"
 #include "sysid/identify/run_system.hpp"
 
 namespace sysid::test {
@@ -32,13 +31,6 @@ Problem two_runs(EffectMask effects, bool force_known = true) {
         }
     }
     return problem;
-}
-
-Eigen::VectorXd residuals_of(const Problem& problem, const Parameters& p,
-                             const FrozenFilter& filter) {
-    Eigen::VectorXd e(static_cast<int>(problem.samples()) * kChannels);
-    residuals(problem, p.data(), filter, e.data());
-    return e;
 }
 
 Table sensitivities_of(const Problem& problem, const Parameters& p, const FrozenFilter& filter,

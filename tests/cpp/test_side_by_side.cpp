@@ -1,6 +1,5 @@
 // Filters over pieces of driving side by side are those over whole runs.
-#include "helpers.hpp"
-#include "sysid/identify/prediction_error.hpp"
+#include "residuals.hpp"
 #include "sysid/identify/side_by_side.hpp"
 #include "sysid/math/lanes.hpp"
 
@@ -29,13 +28,6 @@ Problem long_run(EffectMask effects, std::size_t samples = 620) {
 Problem without_speed(Problem problem) {
     for (auto& y : problem.runs[0].measurements) y[kVx] = y[kVy] = y[kAx] = std::nan("");
     return problem;
-}
-
-Eigen::VectorXd residuals_of(const Problem& problem, const Parameters& p,
-                             const FrozenFilter& filter) {
-    Eigen::VectorXd e(static_cast<int>(problem.samples()) * kChannels);
-    residuals(problem, p.data(), filter, e.data());
-    return e;
 }
 
 /// The first samples of a run and of its filter: too few to be cut.

@@ -6,10 +6,8 @@ import argparse
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
-from .._files import write_json
 from .._progress import note
 from .._text import text_table
 from ..compare import Comparison, compare
@@ -18,17 +16,15 @@ from ..diagnose import where
 from ..effects import catalogue
 from ..errors import warn
 from ..identify import Fit, identify
-from ..log import Log
 from ..model import Model
 from ..plugins import installed_effects
-from ..read import ChannelMap, read_log
 from ..report import RANKING_HEAD, ranking_rows, ranking_title, summary, write_report
 from ..study import Study, improve
 from ..user_effects import load_effects
 from ..vehicle import Vehicle
 from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
-from .log_arguments import written_map
-from .outputs import refuse_unwritable
+from .log_arguments import read_logs, written_map
+from .outputs import write_figures
 
 __all__ = ["COMMANDS"]
 
@@ -36,7 +32,6 @@ Warnings = list[str]
 
 
 def _demo(args: argparse.Namespace, heard: Warnings) -> None:
-    refuse_unwritable([args.report, args.json], inputs=[])
     shown = run_demo(
         args.hidden,
         seed=args.seed,
@@ -44,34 +39,31 @@ def _demo(args: argparse.Namespace, heard: Warnings) -> None:
         tell=lambda text: print(text, end="\n\n", flush=True),
     )
     if args.json is not None:
-        content = _with_warnings(shown.study, heard).to_dict()
         truth = shown.truth
-        content["hidden"] = {
+        hidden = {
             "id": truth.effects[0],
             "parameters": {n.split(".")[1]: truth.value(n) for n in truth.names if "." in n},
             "found": shown.found,
         }
-        write_json(args.json, content)
+        told = _with_warnings(shown.study, heard).to_dict()
+        write_figures(args.json, {**told, "hidden": hidden}, told["warnings"])
 
 
 def _compare(args: argparse.Namespace, heard: Warnings) -> None:
-    refuse_unwritable([args.json], inputs=_inputs(args))
     _define(args)
     model = Model(Vehicle.from_toml(args.vehicle), args.effects)
-    logs = _read(args.logs, args)
+    logs = read_logs(args.logs, args)
     fit = identify(model, logs)
     comparison = compare(fit, logs)
     failing = where(fit)
     print(comparison)
     print(failing)
     print(fit)
-    if args.json is not None:
-        told = _comparison(comparison, fit, heard)
-        write_json(args.json, {**told, "where": failing.to_dict()})
+    told = {**_comparison(comparison, fit), "where": failing.to_dict()}
+    write_figures(args.json, told, heard)
 
 
 def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
-    refuse_unwritable([args.json], inputs=_inputs(args))
     _define(args)
     study = _study(args, heard)
     print(study.test[0])
@@ -93,7 +85,6 @@ def _diagnose(args: argparse.Namespace, heard: Warnings) -> None:
 
 
 def _improve(args: argparse.Namespace, heard: Warnings) -> None:
-    refuse_unwritable([args.report, args.json], inputs=_inputs(args))
     _define(args)
     study = _study(args, heard)
     # The warnings have gone to the error stream.
@@ -125,8 +116,6 @@ def _effects(args: argparse.Namespace, heard: Warnings) -> None:
 
 
 def _map(args: argparse.Namespace, heard: Warnings) -> None:
-    others = [path for path in (args.log, args.dbc, args.vehicle) if path is not None]
-    refuse_unwritable([args.output], inputs=others)
     vehicle = None if args.vehicle is None else Vehicle.from_toml(args.vehicle)
     print(written_map(args.log, args.output, args.dbc, vehicle), end="")
 
@@ -163,8 +152,8 @@ def _define(args: argparse.Namespace) -> None:
 
 def _study(args: argparse.Namespace, heard: Warnings) -> Study:
     model = Model(Vehicle.from_toml(args.vehicle))
-    train = _read(args.logs, args)
-    test = _read(args.test, args) if args.test else None
+    train = read_logs(args.logs, args)
+    test = read_logs(args.test, args) if args.test else None
     for path in {p.resolve() for p in args.logs} & {p.resolve() for p in args.test}:
         warn(
             f"{path.name} is training and validation data; the validation error then proves nothing"
@@ -190,24 +179,7 @@ def _with_warnings(study: Study, heard: Warnings) -> Study:
     return study.with_warnings(heard)
 
 
-def _read(paths: list[Path], args: argparse.Namespace) -> list[Log]:
-    mapping = None if args.channels is None else ChannelMap.from_toml(args.channels)
-    return [read_log(path, mapping, dbc=args.dbc) for path in paths]
-
-
-def _inputs(args: argparse.Namespace) -> list[Path]:
-    given = [
-        *args.logs,
-        args.vehicle,
-        args.channels,
-        args.dbc,
-        *getattr(args, "test", []),
-        *args.define,
-    ]
-    return [path for path in given if path is not None]
-
-
-def _comparison(c: Comparison, fit: Fit, heard: Warnings) -> dict[str, Any]:
+def _comparison(c: Comparison, fit: Fit) -> dict[str, Any]:
     return {
         "effects": list(fit.model.effects),
         "error": c.error,
@@ -222,5 +194,4 @@ def _comparison(c: Comparison, fit: Fit, heard: Warnings) -> dict[str, Any]:
         ],
         "parameters": {e.name: e.to_dict() for e in (*fit.estimates, *fit.derived)},
         "unrelated": c.unrelated,
-        "warnings": list(heard),
     }

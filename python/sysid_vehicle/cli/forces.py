@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from .._files import write_json, write_text
-from .._style import new_figure, svg
+from .._style import new_figure
 from ..forces import COLOURS, axle_forces
-from ..read import ChannelMap, read_log
 from ..vehicle import Vehicle
-from .log_arguments import add_driving
-from .outputs import refuse_other_suffix, refuse_unwritable
+from .log_arguments import add_driving, read_logs
+from .outputs import add_json, add_output, write_figures, write_picture
 
 __all__ = ["add_parser", "run"]
 
@@ -32,25 +29,17 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--colour", choices=COLOURS, default=COLOURS[0], help="what colours the points"
     )
-    parser.add_argument("--plot", type=Path, metavar="SVG", help="picture to write")
-    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+    add_output(parser, "--plot", kind="SVG", help="picture to write")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Find the forces, print, draw, write."""
-    given = [
-        path for path in (*args.logs, args.vehicle, args.channels, args.dbc) if path is not None
-    ]
-    refuse_other_suffix(args.plot, ".svg")
-    refuse_unwritable([args.plot, args.json], inputs=given)
-    mapping = None if args.channels is None else ChannelMap.from_toml(args.channels)
-    logs = [read_log(path, mapping, dbc=args.dbc) for path in args.logs]
+    logs = read_logs(args.logs, args)
     found = axle_forces(logs, Vehicle.from_toml(args.vehicle), cg_ahead_m=args.cg_ahead)
     print(found)
-    if args.json is not None:
-        write_json(args.json, {**found.to_dict(), "warnings": list(heard)})
+    write_figures(args.json, found.to_dict(), heard)
     if args.plot is not None:
         figure = new_figure(8.5, 3.6)
         found.plot(figure.subplots(1, 2, sharey=True), colour=args.colour)
-        write_text(args.plot, svg(figure).decode())
-        print(f"Picture: {args.plot}")
+        write_picture(args.plot, figure)

@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from .. import published
-from .._files import write_json, write_text
-from .._style import svg
 from ..errors import InvalidInput, near_names
 from ..lab import (
     ClosedLoop,
@@ -28,7 +26,7 @@ from ..lab import (
 from ..model import Model
 from ..vehicle import Vehicle
 from . import lab_em, lab_identify, lab_validate
-from .outputs import refuse_other_suffix, refuse_unwritable
+from .outputs import add_json, add_output, write_figures, write_picture
 
 __all__ = ["add_parser", "run"]
 
@@ -90,15 +88,12 @@ def _run_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the sensors' noise")
     parser.add_argument("--preview", action="store_true", help="also say what it will teach")
-    parser.add_argument("--log", type=Path, metavar="CSV", help="log to write")
-    parser.add_argument("--plot", type=Path, metavar="SVG", help="picture to write")
-    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+    add_output(parser, "--log", kind="CSV", help="log to write")
+    add_output(parser, "--plot", kind="SVG", help="picture to write")
+    add_json(parser)
 
 
 def _run(args: argparse.Namespace, heard: list[str]) -> None:
-    inputs = [args.vehicle] if args.vehicle is not None else []
-    refuse_other_suffix(args.plot, ".svg")
-    refuse_unwritable([args.log, args.plot, args.json], inputs=inputs)
     if args.seed < 0:
         raise InvalidInput(f"--seed {args.seed}: give a whole number from zero up")
     setup = _setup(args)
@@ -120,10 +115,8 @@ def _run(args: argparse.Namespace, heard: list[str]) -> None:
         drive.to_log().to_csv(args.log)
         print(f"Log: {args.log}")
     if args.plot is not None:
-        write_text(args.plot, svg(overview(drive)).decode())
-        print(f"Picture: {args.plot}")
-    if args.json is not None:
-        write_json(args.json, {**_figures(drive, seen), "warnings": heard})
+        write_picture(args.plot, overview(drive))
+    write_figures(args.json, _figures(drive, seen), heard)
 
 
 def _setup(args: argparse.Namespace) -> Setup:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from typing import TYPE_CHECKING
 
-from .._files import write_json, write_text
-from .._style import new_figure, svg
+from .._style import new_figure
 from ..lab import (
     EMResult,
     NoiseStructure,
@@ -17,8 +16,12 @@ from ..lab import (
     StateEstimate,
     learn_observer_noise,
 )
-from .lab_inputs import add_log_arguments, add_vehicle_argument, files_of, logs_of, vehicle_of
-from .outputs import refuse_other_suffix, refuse_unwritable
+from .lab_inputs import add_log_arguments, add_vehicle_argument, vehicle_of
+from .log_arguments import read_logs
+from .outputs import add_json, add_output, write_figures, write_picture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["add_arguments", "run"]
 
@@ -49,21 +52,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="at most so many (default: %(default)s)",
     )
-    parser.add_argument(
-        "--plot", type=Path, metavar="SVG", help="log-likelihood, noise, and forces of each log"
-    )
-    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+    add_output(parser, "--plot", kind="SVG", help="log-likelihood, noise, and forces of each log")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Learn, print, and write what was asked for; `heard` are the warnings so far."""
-    refuse_other_suffix(args.plot, ".svg")
-    refuse_unwritable([args.plot, args.json], inputs=files_of(args))
     vehicle = vehicle_of(args)
     car = ObserverCar.of(vehicle, drag_nspm=args.drag)
     tyres = (vehicle.tyre_front, vehicle.tyre_rear)
     front, rear = args.stiffness or [tyre.cornering_stiffness_per_load for tyre in tyres]
-    records = [ObserverRecord.from_log(log, car, (front, rear)) for log in logs_of(args)]
+    records = [
+        ObserverRecord.from_log(log, car, (front, rear)) for log in read_logs(args.logs, args)
+    ]
     pair = (("yaw_rate_radps", "ay_mps2"),) if args.correlated else ()
     result = learn_observer_noise(
         Observer(car, ObserverNoise.first_guess(records[0], car)),
@@ -78,13 +79,11 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
         print()
         print(estimate)
     if args.plot is not None:
-        write_text(args.plot, _figure(result, estimates))
-        print(f"Picture: {args.plot}")
-    if args.json is not None:
-        write_json(args.json, {**result.to_dict(), "warnings": list(heard)})
+        write_picture(args.plot, _figure(result, estimates))
+    write_figures(args.json, result.to_dict(), heard)
 
 
-def _figure(result: EMResult, estimates: list[StateEstimate]) -> str:
+def _figure(result: EMResult, estimates: list[StateEstimate]) -> Figure:
     rows = 1 + len(estimates)
     figure = new_figure(10.0, 3.2 * rows)
     grid = figure.add_gridspec(rows, 2)
@@ -93,4 +92,4 @@ def _figure(result: EMResult, estimates: list[StateEstimate]) -> str:
     for row, estimate in enumerate(estimates, start=1):
         ax = estimate.plot_forces(ax=figure.add_subplot(grid[row, :]))
         ax.set_title(estimate.name)
-    return svg(figure).decode("utf-8")
+    return figure

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from .._files import write_json, write_text
-from .._style import new_figure, svg
+from .._style import new_figure
 from ..identify import METHODS
 from ..lab import GreyBoxVehicle, TyreLog, identify_tyres
-from .lab_inputs import add_log_arguments, add_vehicle_argument, files_of, logs_of, vehicle_of
-from .outputs import refuse_other_suffix, refuse_unwritable
+from .lab_inputs import add_log_arguments, add_vehicle_argument, vehicle_of
+from .log_arguments import read_logs
+from .outputs import add_json, add_output, write_figures, write_picture
 
 __all__ = ["add_arguments", "run"]
 
@@ -42,16 +41,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fast", action="store_true", help="intervals from the information matrix alone"
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the start points")
-    parser.add_argument("--plot", type=Path, metavar="SVG", help="tyre curves to write")
-    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+    add_output(parser, "--plot", kind="SVG", help="tyre curves to write")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Identify, print, and write what was asked for."""
-    refuse_other_suffix(args.plot, ".svg")
-    refuse_unwritable([args.plot, args.json], inputs=files_of(args))
     car = GreyBoxVehicle.of(vehicle_of(args), mass_tolerance=args.mass_tolerance)
-    logs = [part for log in logs_of(args) for part in TyreLog.from_log(log, car)]
+    logs = [part for log in read_logs(args.logs, args) for part in TyreLog.from_log(log, car)]
     if args.no_sideslip:
         logs = [log.without_sideslip() for log in logs]
     fit = identify_tyres(
@@ -69,7 +66,5 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
         axes = figure.subplots(1, 2, sharey=True)
         for ax, axle in zip(axes, ("front", "rear"), strict=True):
             fit.plot(ax, [axle]).label_outer()
-        write_text(args.plot, svg(figure).decode())
-        print(f"Picture: {args.plot}")
-    if args.json is not None:
-        write_json(args.json, {**fit.to_dict(), "warnings": heard})
+        write_picture(args.plot, figure)
+    write_figures(args.json, fit.to_dict(), heard)

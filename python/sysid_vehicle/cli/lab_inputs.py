@@ -7,12 +7,10 @@ from pathlib import Path
 
 from ..errors import warn
 from ..lab import Setup
-from ..log import Log
-from ..read import read_log
 from ..vehicle import Vehicle
 from .log_arguments import LOG_HELP, add_reading
 
-__all__ = ["add_log_arguments", "add_vehicle_argument", "files_of", "logs_of", "vehicle_of"]
+__all__ = ["add_log_arguments", "add_vehicle_argument", "vehicle_of"]
 
 
 def add_log_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,19 +29,6 @@ def add_vehicle_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--vehicle", type=Path, metavar="TOML", help="the car (default: the published one)"
     )
-
-
-def files_of(args: argparse.Namespace) -> list[Path]:
-    """Every file that is read, none of which may be written to."""
-    others = [args.channels, args.dbc, getattr(args, "vehicle", None)]
-    return [*args.logs, *(path for path in others if path is not None)]
-
-
-def logs_of(args: argparse.Namespace) -> list[Log]:
-    """Read the logs."""
-    return [
-        read_log(path, args.channels, dbc=args.dbc, check=not args.unchecked) for path in args.logs
-    ]
 
 
 def vehicle_of(args: argparse.Namespace) -> Vehicle:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .._files import write_json, write_text
-from .._style import new_figure, svg
+from .._style import new_figure
 from ..lab import IdentifiedCar, TyreLog, validate_tyres
 from ..lab.tyre_data import READINGS
-from .lab_inputs import add_log_arguments, files_of, logs_of
-from .outputs import refuse_other_suffix, refuse_unwritable
+from .lab_inputs import add_log_arguments
+from .log_arguments import read_logs
+from .outputs import add_json, add_output, write_figures, write_picture
 
 __all__ = ["add_arguments", "run"]
 
@@ -32,23 +32,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="how far to look ahead, beside one sample and the whole drive (default: %(default)g)",
     )
-    parser.add_argument("--plot", type=Path, metavar="SVG", help="picture of the first log")
-    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+    add_output(parser, "--plot", kind="SVG", help="picture of the first log")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Predict, print, and write what was asked for."""
-    refuse_other_suffix(args.plot, ".svg")
-    refuse_unwritable([args.plot, args.json], inputs=[*files_of(args), args.tyres])
     car = IdentifiedCar.from_json(args.tyres)
-    logs = [part for log in logs_of(args) for part in TyreLog.from_log(log, car.vehicle)]
+    logs = [
+        part for log in read_logs(args.logs, args) for part in TyreLog.from_log(log, car.vehicle)
+    ]
     found = validate_tyres(car, logs, horizon_s=args.horizon)
     print("\n\n".join(map(str, found)))
     if args.plot is not None:
         figure = new_figure(7.0, 2.2 * len(READINGS))
         for axes, reading in zip(figure.subplots(len(READINGS)), READINGS, strict=True):
             found[0].plot(axes, reading=reading)
-        write_text(args.plot, svg(figure).decode())
-        print(f"Picture: {args.plot}")
-    if args.json is not None:
-        write_json(args.json, {"drives": [v.to_dict() for v in found], "warnings": heard})
+        write_picture(args.plot, figure)
+    write_figures(args.json, {"drives": [v.to_dict() for v in found]}, heard)

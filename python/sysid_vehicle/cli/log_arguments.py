@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from .._files import write_text
 from ..errors import warn
-from ..read import Proposal, propose_channels
+from ..log import Log
+from ..read import ChannelMap, Proposal, propose_channels, read_log
 from ..vehicle import Vehicle
 
-__all__ = ["LOG_HELP", "add_driving", "add_reading", "written_map"]
+__all__ = ["LOG_HELP", "add_driving", "add_reading", "read_logs", "written_map"]
 
 LOG_HELP = "log of one run: CSV, MDF, MCAP, ROS bag, .mat, .vbo, CAN log, Parquet, ..."
 
@@ -31,6 +33,16 @@ def add_driving(parser: argparse.ArgumentParser) -> None:
         "--vehicle", type=Path, required=True, metavar="TOML", help="the car's own numbers"
     )
     add_reading(parser)
+
+
+def read_logs(
+    paths: Sequence[Path], args: argparse.Namespace, mapping: ChannelMap | None = None
+) -> list[Log]:
+    """Read logs as `add_reading` was told, or by a channel map that is known already."""
+    if mapping is None and args.channels is not None:
+        mapping = ChannelMap.from_toml(args.channels)
+    check = not getattr(args, "unchecked", False)
+    return [read_log(path, mapping, dbc=args.dbc, check=check) for path in paths]
 
 
 def written_map(log: Path, to: Path | None, dbc: Path | None, vehicle: Vehicle | None) -> Proposal:

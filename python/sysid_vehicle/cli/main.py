@@ -13,6 +13,7 @@ from .._progress import note
 from .._text import columns, wrapped
 from ..errors import Interrupted, SysidError
 from .commands import COMMANDS
+from .outputs import refuse_outputs
 from .parser import parse
 
 __all__ = ["main"]
@@ -37,6 +38,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         args = parse(argv)
         with _warnings_as_lines() as heard, _lines_that_fit(args.command):
+            refuse_outputs(args)
             COMMANDS[args.command](args, heard)
         sys.stdout.flush()
     except BrokenPipeError:

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .._files import write_json, write_text
-from .._style import new_figure, svg
+from .._style import new_figure
 from ..online import (
     MAGIC_FORMULA,
     TWO_PARAMETER,
@@ -23,7 +22,7 @@ from ..online import (
     mu_slip_overview,
     save_animation,
 )
-from .outputs import refuse_other_suffix, refuse_unwritable
+from .outputs import add_json, add_output, write_figures, write_picture
 
 __all__ = ["add_parser", "run"]
 
@@ -53,31 +52,26 @@ def add_parser(commands: Any) -> None:
         metavar="X",
         help="standard deviation of a mu reading (default: learnt from the readings)",
     )
-    parser.add_argument("--plot", type=Path, metavar="SVG", help="file for the figures")
-    parser.add_argument("--animation", type=Path, metavar="GIF", help="file for the convergence")
-    parser.add_argument(
+    add_output(parser, "--plot", kind="SVG", help="file for the figures")
+    add_output(parser, "--animation", kind="GIF", help="file for the convergence")
+    add_output(
+        parser,
         "--lissajous",
-        type=Path,
-        metavar="SVG",
+        kind="SVG",
         help="file for friction against slip over time, measured and filtered",
     )
-    parser.add_argument(
+    add_output(
+        parser,
         "--over-noise",
-        type=Path,
-        metavar="SVG",
+        kind="SVG",
         help="simulate the recommended curve at the slips of DATA with several levels of noise; "
         "print the errors of every estimator, and draw them into this file",
     )
-    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all numbers")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Estimate with every method, print them, and write what was asked for."""
-    pictures = [args.plot, args.lissajous, args.over_noise]
-    for path in pictures:
-        refuse_other_suffix(path, ".svg")
-    refuse_other_suffix(args.animation, ".gif")
-    refuse_unwritable([*pictures, args.animation, args.json], inputs=[args.data])
     curve = _CURVES[args.curve]
     comparison = compare_mu_slip(MuSlipData.from_csv(args.data, args.noise_std), curve=curve)
     print(comparison)
@@ -85,17 +79,16 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     print(f"Recommended: {comparison.best}")
     filtered = mu_slip_ekf(comparison.data, curve=curve)
     if args.plot is not None:
-        write_text(args.plot, svg(mu_slip_overview(filtered)).decode())
+        write_picture(args.plot, mu_slip_overview(filtered))
     if args.lissajous is not None:
         figure = new_figure(6.5, 4.5)
         draw_mu_slip_lissajous(filtered, figure.subplots())
-        write_text(args.lissajous, svg(figure).decode())
+        write_picture(args.lissajous, figure)
     if args.over_noise is not None:
         _over_noise(comparison, args.over_noise)
     if args.animation is not None:
         save_animation(animate_mu_slip(filtered), args.animation)
-    if args.json is not None:
-        write_json(args.json, _plain(comparison, heard))
+    write_figures(args.json, _plain(comparison), heard)
 
 
 def _over_noise(comparison: MuSlipComparison, path: Path) -> None:
@@ -110,10 +103,10 @@ def _over_noise(comparison: MuSlipComparison, path: Path) -> None:
     figure = new_figure(12.0, 5.0)
     for ax, name in zip(figure.subplots(1, 2), best.curve.parameters[:2], strict=True):
         study.plot(ax, name)
-    write_text(path, svg(figure).decode())
+    write_picture(path, figure)
 
 
-def _plain(comparison: MuSlipComparison, heard: list[str]) -> dict[str, Any]:
+def _plain(comparison: MuSlipComparison) -> dict[str, Any]:
     return {
         "curve": comparison.best.curve.name,
         "noise_std": comparison.data.noise_std,
@@ -129,5 +122,4 @@ def _plain(comparison: MuSlipComparison, heard: list[str]) -> dict[str, Any]:
             }
             for e in comparison.estimates
         ],
-        "warnings": list(heard),
     }

@@ -9,6 +9,7 @@ from .. import _core
 from ..demo import DEFAULT, RANDOM
 from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
 from .log_arguments import LOG_HELP, add_driving
+from .outputs import add_json, add_output
 
 __all__ = ["parse"]
 
@@ -35,14 +36,14 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     demo.add_argument(
         "--seed", type=_seed, default=0, metavar="N", help="of all that is drawn (default: 0)"
     )
-    demo.add_argument(
+    add_output(
+        demo,
         "--report",
-        type=Path,
-        default=Path("report.html"),
-        metavar="HTML",
+        kind="HTML",
         help="report to write (default: %(default)s)",
+        default=Path("report.html"),
     )
-    _json(demo)
+    add_json(demo)
 
     compare = commands.add_parser("compare", help="fit the model to logs, see where it fails")
     _driving(compare)
@@ -53,22 +54,20 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
         metavar="A,B",
         help="effects that the model has from the start",
     )
-    _json(compare)
+    add_json(compare)
 
     diagnose = commands.add_parser("diagnose", help="learn which physical effect is missing")
     _driving(diagnose)
     _validation(diagnose)
     _search(diagnose)
-    _json(diagnose)
+    add_json(diagnose)
 
     improve = commands.add_parser("improve", help="add what is missing, write a report")
     _driving(improve)
     _validation(improve)
     _search(improve)
-    improve.add_argument(
-        "--report", type=Path, required=True, metavar="HTML", help="report to write"
-    )
-    _json(improve)
+    add_output(improve, "--report", kind="HTML", help="report to write", required=True)
+    add_json(improve)
 
     fleet.add_parser(commands)
     next_drive.add_parser(commands)
@@ -76,7 +75,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     forces.add_parser(commands)
     mapping = commands.add_parser("map", help="propose the channel map of a log, to be edited")
     mapping.add_argument("log", type=Path, metavar="LOG", help=LOG_HELP)
-    mapping.add_argument("-o", "--output", type=Path, metavar="TOML", help="file to write it to")
+    add_output(mapping, "-o", "--output", kind="TOML", help="file to write it to")
     mapping.add_argument("--dbc", type=Path, metavar="DBC", help="database of a log of CAN frames")
     mapping.add_argument(
         "--vehicle", type=Path, metavar="TOML", help="the car, whose wheelbase tells the gear"
@@ -148,10 +147,6 @@ def _search(parser: argparse.ArgumentParser) -> None:
         "others have usual sizes): a baseline whose errors 0.5 to 5 s ahead are smaller is "
         "adequate",
     )
-
-
-def _json(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
 
 
 def _seed(text: str) -> int:

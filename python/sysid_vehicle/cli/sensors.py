@@ -5,14 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .._files import write_json, write_text
+from .._files import write_text
 from ..errors import InvalidInput
-from ..read import ChannelMap, read_log
 from ..report import check_page
 from ..sensors import check
 from ..vehicle import Vehicle
-from .log_arguments import LOG_HELP, add_reading, written_map
-from .outputs import refuse_unwritable
+from .log_arguments import LOG_HELP, add_reading, read_logs, written_map
+from .outputs import add_json, add_output, write_figures
 
 __all__ = ["add_parser", "run"]
 
@@ -25,32 +24,27 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help=LOG_HELP)
     parser.add_argument("--vehicle", type=Path, metavar="TOML", help="the car's own numbers")
     add_reading(parser)
-    parser.add_argument(
+    add_output(
+        parser,
         "--map",
-        type=Path,
-        metavar="TOML",
+        kind="TOML",
         help="channel map to write: proposed from the first log, checked here, to be edited",
     )
-    parser.add_argument("--report", type=Path, metavar="HTML", help="report to write")
-    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+    add_output(parser, "--report", kind="HTML", help="report to write")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Check, print, write."""
-    given = [
-        path for path in (*args.logs, args.vehicle, args.channels, args.dbc) if path is not None
-    ]
-    refuse_unwritable([args.map, args.report, args.json], inputs=given)
     if args.map is not None and args.channels is not None:
         raise InvalidInput("--map, --channels: give one; the first is written, the other read")
-    mapping = None if args.channels is None else ChannelMap.from_toml(args.channels)
+    mapping = None
     vehicle = None if args.vehicle is None else Vehicle.from_toml(args.vehicle)
     if args.map is not None:
         mapping = written_map(args.logs[0], args.map, args.dbc, vehicle).channel_map
-    found = check([read_log(path, mapping, dbc=args.dbc) for path in args.logs], vehicle)
+    found = check(read_logs(args.logs, args, mapping), vehicle)
     print(found)
-    if args.json is not None:
-        write_json(args.json, {**found.to_dict(), "warnings": list(heard)})
+    write_figures(args.json, found.to_dict(), heard)
     if args.report is not None:
         write_text(args.report, check_page(found, heard))
         print(f"Report: {args.report}")

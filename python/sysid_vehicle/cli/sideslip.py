@@ -7,13 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from .. import published
-from .._files import write_json, write_text
-from .._style import svg
 from ..online import KINDS, estimate_sideslip, sideslip_overview
-from ..read import read_log
 from ..vehicle import Vehicle
-from .log_arguments import LOG_HELP, add_reading
-from .outputs import refuse_other_suffix, refuse_unwritable
+from .log_arguments import LOG_HELP, add_reading, read_logs
+from .outputs import add_json, add_output, write_figures, write_picture
 
 __all__ = ["add_parser", "run"]
 
@@ -40,24 +37,19 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--kind", choices=sorted(_KINDS), default="dual", help="observer (default: %(default)s)"
     )
-    parser.add_argument("--plot", type=Path, metavar="SVG", help="file for the figures")
-    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all numbers")
+    add_output(parser, "--plot", kind="SVG", help="file for the figures")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Estimate, print, and write what was asked for."""
-    refuse_other_suffix(args.plot, ".svg")
-    others = [path for path in (args.channels, args.dbc) if path is not None]
-    inputs = [args.log, args.vehicle, *others]
-    refuse_unwritable([args.plot, args.json], inputs=inputs)
     vehicle = Vehicle.from_toml(args.vehicle)
-    log = read_log(args.log, args.channels, dbc=args.dbc)
+    (log,) = read_logs([args.log], args)
     if args.kind == "published":
         found = published.estimate_sideslip(vehicle, log)
     else:
         found = estimate_sideslip(vehicle, log, kind=args.kind)
     print(found)
     if args.plot is not None:
-        write_text(args.plot, svg(sideslip_overview(found)).decode())
-    if args.json is not None:
-        write_json(args.json, {**found.to_dict(), "warnings": list(heard)})
+        write_picture(args.plot, sideslip_overview(found))
+    write_figures(args.json, found.to_dict(), heard)

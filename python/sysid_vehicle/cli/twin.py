@@ -11,8 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from .._files import read_text, write_json, write_text
-from .._style import new_figure, svg
+from .._files import read_text
+from .._style import new_figure
 from ..errors import InvalidInput
 from ..published import (
     LoadExperiment,
@@ -31,7 +31,7 @@ from ..published.joint import (
     twin_cost,
 )
 from ..twin import calibrate
-from .outputs import refuse_other_suffix, refuse_unwritable
+from .outputs import add_json, add_output, write_figures, write_picture
 
 __all__ = ["add_parser", "run"]
 
@@ -135,7 +135,6 @@ def add_parser(commands: Any) -> None:
             )
         _common(parser, tuple(_LAWS))
         parser.add_argument("--table", action="store_true", help="every row of the paper's table")
-        parser.add_argument("--plot", type=Path, metavar="SVG", help="file for the figures")
     stages = inner.add_parser("schedule", help="mass, then roll and yaw, then pitch inertia")
     stages.add_argument(
         "--snr", type=float, default=10.0, metavar="X", help="amplitude of signal to noise; inf"
@@ -144,18 +143,15 @@ def add_parser(commands: Any) -> None:
         "--road-noise", type=float, default=0.0, metavar="X", help="relative noise of the road"
     )
     _common(stages, tuple(_LAWS))
-    stages.add_argument("--plot", type=Path, metavar="SVG", help="file for the figures")
     tune = inner.add_parser("calibrate", help="gains by Bayesian optimisation, on a lap")
     _common(tune, ("side-by-side", "published", _BENCHMARK))
     tune.add_argument("--trials", type=int, default=60, metavar="N", help="default: %(default)s")
     tune.add_argument(
         "--fresh", type=int, default=5, metavar="N", help="seeds to judge by (default: %(default)s)"
     )
-    tune.add_argument("--plot", type=Path, metavar="SVG", help="file for the cost over trials")
     check = inner.add_parser("validate", help="mass and sideslip on a lap and in lane changes")
     _common(check, ("side-by-side", "published"))
     check.add_argument("--gains", type=Path, metavar="JSON", help="what `calibrate --json` wrote")
-    check.add_argument("--plot", type=Path, metavar="SVG", help="file for the figures")
 
 
 def _common(parser: argparse.ArgumentParser, laws: Sequence[str]) -> None:
@@ -163,20 +159,16 @@ def _common(parser: argparse.ArgumentParser, laws: Sequence[str]) -> None:
         "--law", choices=laws, default=laws[0], help="what corrects (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the noise")
-    parser.add_argument("--json", type=Path, metavar="JSON", help="file for all figures")
+    add_output(parser, "--plot", kind="SVG", help="file for the figures")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Do the subcommand that was asked for."""
-    given = [args.gains] if getattr(args, "gains", None) is not None else []
-    refuse_unwritable([args.plot, args.json], inputs=given)
-    refuse_other_suffix(args.plot, ".svg")
     if args.seed < 0:
         raise InvalidInput(f"--seed {args.seed}: give a whole number from zero up")
     todo = {"calibrate": _calibrate, "validate": _validate, "schedule": _schedule}
-    figures = todo.get(args.twin_command, _load)(args)
-    if args.json is not None:
-        write_json(args.json, {**figures, "warnings": heard})
+    write_figures(args.json, todo.get(args.twin_command, _load)(args), heard)
 
 
 def _load(args: argparse.Namespace) -> dict[str, Any]:
@@ -222,8 +214,7 @@ def _load(args: argparse.Namespace) -> dict[str, Any]:
                 for noise in _ROAD
             }
         figure = load_figure([done, *others], sweeps, driven=experiment.driven)
-        write_text(args.plot, svg(figure).decode())
-        print(f"Picture: {args.plot}")
+        write_picture(args.plot, figure)
     return figures
 
 
@@ -262,8 +253,7 @@ def _calibrate(args: argparse.Namespace) -> dict[str, Any]:
     if args.plot is not None:
         figure = new_figure(6.0, 3.0)
         found.plot(ax=figure.add_subplot())
-        write_text(args.plot, svg(figure).decode())
-        print(f"Picture: {args.plot}")
+        write_picture(args.plot, figure)
     return {
         "law": args.law,
         "gains": found.gains,
@@ -279,8 +269,7 @@ def _schedule(args: argparse.Namespace) -> dict[str, Any]:
     )
     print(done)
     if args.plot is not None:
-        write_text(args.plot, svg(schedule_figure(done)).decode())
-        print(f"Picture: {args.plot}")
+        write_picture(args.plot, schedule_figure(done))
     return {"law": args.law, **done.to_dict()}
 
 
@@ -306,8 +295,7 @@ def _validate(args: argparse.Namespace) -> dict[str, Any]:
     ]
     print("\n".join(map(str, done)))
     if args.plot is not None:
-        write_text(args.plot, svg(joint_figure(done)).decode())
-        print(f"Picture: {args.plot}")
+        write_picture(args.plot, joint_figure(done))
     return {"courses": [experiment.to_dict() for experiment in done]}
 
 

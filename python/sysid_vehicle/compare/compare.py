@@ -194,10 +194,6 @@ def compare(
     noise : NoiseModel, optional
         Whose sensors and white motion noise are the noise floor; by default the fit's. Models that
         are compared with each other need the same one.
-
-    Returns
-    -------
-    Comparison
     """
     driving = Driving.of(logs)
     problem = driving.problem(fit.model)

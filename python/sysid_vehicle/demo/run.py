@@ -69,10 +69,6 @@ def run_demo(
     progress : bool, optional
         Show progress bars; by default in a terminal or a notebook.
 
-    Returns
-    -------
-    Demonstration
-
     Raises
     ------
     InvalidInput

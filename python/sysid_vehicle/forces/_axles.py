@@ -63,10 +63,6 @@ def axle_forces(
     seed : int
         Of the draws.
 
-    Returns
-    -------
-    AxleForces
-
     Raises
     ------
     InvalidInput

@@ -13,7 +13,15 @@ from .._text import number
 from .profile import Profile
 from .search import Box
 
-__all__ = ["INTERVALS", "Estimate", "box_covariance", "profiled", "wald", "with_profiles"]
+__all__ = [
+    "INTERVALS",
+    "Estimate",
+    "box_covariance",
+    "profiled",
+    "std_of_data",
+    "wald",
+    "with_profiles",
+]
 
 INTERVALS = ("information", "profile")
 """Where intervals come from: the information matrix, or the profile likelihood."""
@@ -79,7 +87,7 @@ def box_covariance(information: FloatArray, box: Box, x: FloatArray) -> FloatArr
     return as_float64(0.5 * (inverse + inverse.T) / np.outer(scale, scale))
 
 
-def _std_of_data(information: FloatArray) -> FloatArray:
+def std_of_data(information: FloatArray) -> FloatArray:
     """Standard errors by the data alone, as if there were no box."""
     scale = np.sqrt(np.diag(information))
     std = np.full(len(scale), np.inf)
@@ -103,7 +111,7 @@ def wald(
     width = box.upper - box.lower
     covariance = box_covariance(information, box, x)
     std = np.sqrt(np.diag(covariance))
-    of_data = _std_of_data(information)
+    of_data = std_of_data(information)
     unknown = of_data > _UNKNOWN * width
     held = (x <= box.lower + _AT_BOUND * width) | (x >= box.upper - _AT_BOUND * width)
     silent = held | np.isinf(of_data)

@@ -20,8 +20,7 @@ from ..manoeuvres import peak_lateral_mps2
 from ..model import Model
 from .excitation import Excitation, Weaving
 from .information import READINGS, TYRES
-from .loop import run_closed_loop
-from .preview import Preview, preview_of, tyre_of
+from .preview import Preview, preview, tyre_of
 from .setup import Setup
 
 if TYPE_CHECKING:
@@ -214,10 +213,6 @@ def design_excitation(
     progress : bool, optional
         Show a progress bar; by default in a terminal or a notebook, after two seconds.
 
-    Returns
-    -------
-    Design
-
     Raises
     ------
     InvalidInput
@@ -343,12 +338,14 @@ class _Designer:
         return cars
 
     def look(self, excitation: Excitation, car: Model) -> Preview:
-        simulator = self.setup.simulator
-        if not simulator.late_feedback:
-            simulator = replace(simulator, inputs_linear=True)
-        assumed = replace(self.setup, plant=car, simulator=simulator)
-        drive = run_closed_loop(excitation, assumed, seed=self.seed)
-        return preview_of(drive, free=self.free, readings=self.readings)
+        return preview(
+            excitation,
+            self.setup,
+            believed=car,
+            free=self.free,
+            readings=self.readings,
+            seed=self.seed,
+        )
 
     def trial(self, excitation: Weaving) -> Trial:
         worst, penalty, broken = 0.0, 0.0, []

@@ -282,10 +282,6 @@ def learn_observer_noise(
         Leaps ahead after every second step, where that gains (Varadhan & Roland, Scand. J.
         Statistics 2008). Variances that tend to zero take very long without it.
 
-    Returns
-    -------
-    EMResult
-
     Raises
     ------
     InvalidInput

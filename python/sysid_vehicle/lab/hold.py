@@ -10,9 +10,8 @@ from .._arrays import FloatArray
 from .._text import number
 from ..errors import InvalidInput, near_names
 from ..identify.profile import LEVEL, lost_at
-from .box import box_of
 from .tyre_fit import TyreFit
-from .tyre_objective import objective_of
+from .tyre_problem import box_of, objective_of
 
 
 @dataclass(frozen=True)
@@ -57,10 +56,6 @@ def hold_value(fit: TyreFit, name: str, value: float) -> HeldValue:
     name : str
         A free parameter, or a combination such as `BCD_front`.
     value : float
-
-    Returns
-    -------
-    HeldValue
 
     Raises
     ------

@@ -1,7 +1,8 @@
-"""Searches for tyres from many starts: quick and rough ones first."""
+"""Searches for tyres from many starts: quick ones first, then along the tyres that look alike."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -9,10 +10,19 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from ..errors import NumericalError
 from ..identify.objective import Objective
-from ..identify.search import Box
+from ..identify.search import Box, minimise
 from ..identify.settle import descend, settle
 from ..identify.starts import SAME_OPTIMUM, Runner, Search, Starts
-from .walk import walk
+from ..identify.tyre_shape import look_alike
+
+_CURVATURES = (-1.0, 0.0, 0.4, 0.8)
+_SIDES = ((0,), (4,), (0, 4))  # where the coefficients of the axles that are moved begin
+_TASTE = 5  # steps that tell whether a valley is worth going down
+_WORTH = 0.1  # nats
+_WALKS = 4
+_HOPELESS = 15.0  # nats above, after the taste
+_TRIED = 4
+_APART = 0.02  # of the box's width
 
 
 def multistart(
@@ -82,3 +92,73 @@ def multistart(
     best = int(np.argmax(values))
     table = Starts(names, begins, as_float64(ends[:, box.columns]), values)
     return ends[best], noise, table, others.get(float(values[best]), [])
+
+
+def looking_alike(p: FloatArray) -> Iterator[FloatArray]:
+    """Points with tyres of other curvature, but of the same stiffness and peak, at either axle."""
+    for sides in _SIDES:
+        for e in _CURVATURES:
+            trial = p.copy()
+            for first in sides:
+                trial[first : first + 4] = look_alike(p[first : first + 4], e)
+            yield trial
+
+
+def walk(
+    objective: Objective, p: FloatArray, value: float, noise: FloatArray, box: Box
+) -> tuple[FloatArray, float, list[FloatArray]]:
+    """Leave a side valley for the best of those that `valleys` finds, again and again.
+
+    Returns
+    -------
+    p : array, shape (parameters,)
+    log_likelihood : float
+    others : list of array
+        The valleys that were found and are not better.
+    """
+    others: list[FloatArray] = []
+    for _ in range(_WALKS):
+        found = valleys(objective, p, noise, box)
+        if not found or found[0][1] < value + _WORTH:
+            return p, value, [end for end, _ in found]
+        others = [p, *(end for end, _ in found[1:])]
+        p, value = found[0]
+    return p, value, others
+
+
+def valleys(
+    objective: Objective, p: FloatArray, noise: FloatArray, box: Box
+) -> list[tuple[FloatArray, float]]:
+    """Other optima among the tyres of the same stiffness and peak but of other curvature.
+
+    Along these the likelihood has several minima that only a small bend of the tyre curve tells
+    apart, too far from each other for a local search.
+
+    Returns
+    -------
+    list of (parameters, log-likelihood)
+        Best first; none that is `p` itself.
+    """
+    gains = objective.freeze(p, noise)
+    here = objective.half_sum_of_squares(p, gains)
+    tasted = []
+    for trial in looking_alike(p):
+        found = minimise(objective, trial, gains, box, rounds=_TASTE)
+        trial[box.columns] = found.x
+        if found.cost < here + _HOPELESS and not _same(trial, p, box):
+            tasted.append((found.cost, trial))
+    ends: list[tuple[FloatArray, float]] = []
+    tried: list[FloatArray] = [p]
+    for _, trial in sorted(tasted, key=lambda one: one[0])[:_TRIED]:
+        if any(_same(trial, other, box) for other in tried):
+            continue
+        there, value = descend(objective, trial, noise, box)
+        if not any(_same(there, other, box) for other in tried):
+            ends.append((there, value))
+        tried += [trial, there]
+    return sorted(ends, key=lambda one: -one[1])
+
+
+def _same(a: FloatArray, b: FloatArray, box: Box) -> bool:
+    apart = np.abs(a - b)[box.columns] / (box.upper - box.lower)
+    return bool(np.all(apart < _APART))

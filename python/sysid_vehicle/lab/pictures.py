@@ -16,10 +16,6 @@ _PANELS = ("vx_mps", "yaw_rate_radps", "steer_rad", "fx_n")
 def overview(drive: ClosedLoop) -> Figure:
     """Draw references and response, inputs, disturbances, slip angles and limits over time.
 
-    Parameters
-    ----------
-    drive : ClosedLoop
-
     Returns
     -------
     matplotlib Figure

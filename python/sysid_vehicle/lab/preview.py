@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._arrays import FloatArray
 from .._printed import Part, Printed, Table
 from .._style import AFTER, BEFORE, FLOOR, MEASURED, axes_or_new, tidy
 from .._text import number
+from ..identify.estimates import std_of_data
 from ..model import Model
 from ..vehicle import Tyre
 from .excitation import Excitation
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 # An E near zero has no size of its own to be compared with.
 _LEAST_SIZE = 0.1
-_SINGULAR = 1e-13
 
 
 @dataclass(frozen=True)
@@ -220,10 +219,6 @@ def preview(
     seed : int or numpy.random.Generator
         Source of the sensors' randomness.
 
-    Returns
-    -------
-    Preview
-
     Raises
     ------
     InvalidInput
@@ -234,29 +229,19 @@ def preview(
     Equations: :mod:`sysid_vehicle.lab.information`.
     """
     setup = setup if setup is not None else Setup.default()
-    believed = believed if believed is not None else setup.plant
     simulator = setup.simulator
     if not simulator.late_feedback:
         simulator = replace(simulator, inputs_linear=True)
-    assumed = replace(setup, plant=believed, simulator=simulator)
+    assumed = replace(setup, plant=believed or setup.plant, simulator=simulator)
     drive = run_closed_loop(excitation, assumed, seed=seed)
-    return preview_of(drive, free=free, readings=readings, motion=motion)
-
-
-def preview_of(
-    drive: ClosedLoop,
-    *,
-    free: Sequence[str] = TYRES,
-    readings: Sequence[str] = READINGS,
-    motion: tuple[float, float, float] = MOTION,
-) -> Preview:
-    """The same for a drive that has been computed; its plant is what is believed."""
-    believed = drive.setup.plant
+    believed = assumed.plant
     values = [believed.value(name) for name in free]
     size = np.array([max(abs(v), _LEAST_SIZE) for v in values])
     found = information(drive, believed, free, readings=readings, motion=motion)
     found = found * np.outer(size, size)
-    std, condition = _spread(found)
+    spread = np.linalg.eigvalsh(found)
+    condition = float(spread[-1] / spread[0]) if spread[0] > 0.0 else float("inf")
+    std = std_of_data(found)
     return Preview(
         tuple(
             Expected(name, value, float(s))
@@ -267,23 +252,6 @@ def preview_of(
         believed,
         drive,
     )
-
-
-def _spread(found: FloatArray) -> tuple[FloatArray, float]:
-    """Standard deviations, infinite where nothing is told, and the condition number."""
-    scale = np.sqrt(np.diag(found))
-    told = scale > 0.0
-    std = np.full(len(found), np.inf)
-    if not told.any():
-        return std, np.inf
-    inner = found[np.ix_(told, told)] / np.outer(scale[told], scale[told])
-    values, vectors = np.linalg.eigh(inner)
-    # What is lost in rounding is not told; each direction spreads to the parameters in it.
-    kept = np.maximum(values, _SINGULAR)
-    std[told] = np.sqrt((vectors**2 / kept).sum(axis=1)) / scale[told]
-    whole = np.linalg.eigvalsh(found)
-    condition = float(whole[-1] / whole[0]) if whole[0] > 0.0 else float("inf")
-    return std, condition
 
 
 def _coverage(drive: ClosedLoop, model: Model, axle: str) -> Coverage:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,8 +19,7 @@ READINGS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2")
 """Predicted readings, in the core's order."""
 
 _INPUTS = ("fx_n", "steer_rad", "fz_front_n", "fz_rear_n")
-_SHORTEST = 100
-_SETTLES_S = 1.0
+SHORTEST = 100
 
 
 @dataclass(frozen=True)
@@ -127,8 +125,8 @@ class TyreLog:
         for what, a in (("measurements", y), ("inputs", u)):
             if a.ndim != 2 or a.shape[1] != 4 or len(a) != len(y):
                 raise InvalidInput(f"{self.name}: {what} has shape {a.shape}; expected (n, 4)")
-        if len(y) < _SHORTEST:
-            raise InvalidInput(f"{self.name}: {len(y)} samples; {_SHORTEST} or more are needed")
+        if len(y) < SHORTEST:
+            raise InvalidInput(f"{self.name}: {len(y)} samples; {SHORTEST} or more are needed")
         bad = ~np.isfinite(u)
         bad[:, 2:] |= u[:, 2:] < 0.0
         if bad.any():
@@ -176,10 +174,6 @@ class TyreLog:
         load_delay_samples : int
             Samples by which the loads act later than they are logged.
         name : str
-
-        Returns
-        -------
-        TyreLog
         """
         u, f = as_float64(force_and_steer), as_float64(loads)
         if load_delay_samples > 0:
@@ -193,11 +187,6 @@ class TyreLog:
         Axle loads are the columns ``fz_front_n`` and ``fz_rear_n`` where the log has them, else
         those at rest with what the height of the centre of gravity and the longitudinal
         acceleration move between them.
-
-        Parameters
-        ----------
-        log : Log
-        vehicle : GreyBoxVehicle
 
         Returns
         -------
@@ -224,10 +213,10 @@ class TyreLog:
         y = np.column_stack([log["vx_mps"], v_y, log["yaw_rate_radps"], log["ay_mps2"]])
         u = np.column_stack([force, log["steer_rad"], *loads])
         # A car at walking pace tells nothing of its tyres, and its slip angles are ill-defined.
-        parts = [s for s in log.stretches() if s.stop - s.start >= _SHORTEST]
+        parts = [s for s in log.stretches() if s.stop - s.start >= SHORTEST]
         if not parts:
             raise InvalidInput(
-                f"{log.name}: no stretch of {_SHORTEST} samples in which the car drives and its "
+                f"{log.name}: no stretch of {SHORTEST} samples in which the car drives and its "
                 "steering and force are known; give a longer log"
             )
         step = 1.0 / log.rate_hz
@@ -293,44 +282,3 @@ class TyreLog:
 
 def _part(name: str, number: int, several: bool) -> str:
     return f"{name}, part {number}" if several else name
-
-
-def tyre_problem(
-    vehicle: GreyBoxVehicle,
-    logs: Sequence[TyreLog],
-    *,
-    most_samples: int | None = None,
-    window_s: float = 5.0,
-) -> _core.TyreProblem:
-    """The core's problem; of about so many samples, if that is asked.
-
-    Half of those are the windows of the hardest cornering, where tyres show their peak, half are
-    spread evenly over the rest.
-    """
-    problem = _core.TyreProblem(vehicle.core())
-    total = sum(log.n for log in logs)
-    for log in logs:
-        windows = [slice(0, log.n)]
-        if most_samples is not None and total > most_samples:
-            length = min(max(int(window_s / log.step_s), _SHORTEST), log.n)
-            windows = _telling(log, length, max(2, round(most_samples * log.n / total / length)))
-        for window in windows:
-            y = log.measurements[window].copy()
-            if not log.sideslip_measured:
-                # The first v_y is anyone's guess, and a filter that starts from a wrong one on
-                # saturated tyres is led astray. A car forgets it within a second.
-                y[: int(_SETTLES_S / log.step_s), 2:] = np.nan
-            problem.add_run(log.step_s, log.inputs[window], as_float64(y))
-    return problem
-
-
-def _telling(log: TyreLog, length: int, count: int) -> list[slice]:
-    tiles = [slice(k, k + length) for k in range(0, log.n - length + 1, length)]
-    if count >= len(tiles):
-        return tiles
-    a_y = np.nan_to_num(np.abs(log.measurements[:, 3]))
-    hard = [-float(np.percentile(a_y[t], 95.0)) for t in tiles]
-    first = [int(i) for i in np.argsort(hard)[: count // 2]]
-    rest = [i for i in range(len(tiles)) if i not in first]
-    spread = np.linspace(0, len(rest) - 1, count - len(first)).round().astype(int)
-    return [tiles[i] for i in sorted({*first, *(rest[k] for k in spread)})]

@@ -10,8 +10,8 @@ from .. import _core
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
-from .box import first_point
 from .tyre_data import READINGS, GreyBoxVehicle, TyreLog
+from .tyre_problem import first_point
 
 _SENSORS = (0.1, 3.16e-3, 3.16e-3, 3.16e-3)  # v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2]
 
@@ -43,10 +43,6 @@ def drive_tyres(
         Standard deviations of the sensors' white noise.
     seed : int or numpy.random.Generator
     name : str
-
-    Returns
-    -------
-    TyreLog
 
     Raises
     ------

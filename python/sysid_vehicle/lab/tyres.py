@@ -12,23 +12,25 @@ from .._arrays import FloatArray, as_float64
 from .._progress import doing
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
-from ..identify.estimates import with_profiles
+from ..identify.estimates import box_covariance, wald, with_profiles
+from ..identify.objective import Objective
 from ..identify.profile import profile_all
-from ..identify.search import METHODS
-from ..identify.settle import descend, settle, settle_finely
-from ..identify.starts import space_filling
-from .box import box_of, first_point
+from ..identify.search import METHODS, Box
+from ..identify.settle import bottom, descend, settle, settle_finely
+from ..identify.starts import Starts, space_filling
 from .motion import TyreMotion
 from .multistart import multistart
 from .regression_search import descend_regression
-from .summary import summary, with_rivals
 from .tyre_data import GreyBoxVehicle, TyreLog
-from .tyre_fit import PARAMETERS, TyreFit
-from .tyre_objective import free_parameters, objective_of
+from .tyre_fit import PARAMETERS, UNITS, Rival, TyreFit
+from .tyre_problem import box_of, first_point, free_parameters, objective_of, tyre_problem
 
 _THINNED = 3200  # samples that decide between starts
 _BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 _KINEMATIC_VY = 0.1  # how far integrated accelerations may be off [m/s]
+_LEVEL_NATS = 1.92  # half the 95 % quantile of chi-square with one degree of freedom
+_HOPELESS = 5.0  # nats that the way to the bottom of a valley does not gain
+_BEYOND = 25.0  # squared distance in standard deviations
 
 
 @doing("identification of the tyres")
@@ -74,10 +76,6 @@ def identify_tyres(
     progress : bool, optional
         Show a progress bar; by default in a terminal or a notebook, after two seconds.
 
-    Returns
-    -------
-    TyreFit
-
     Raises
     ------
     InvalidInput
@@ -120,8 +118,8 @@ def identify_tyres(
     for left in reversed(range(_BETTER_FOUND)):
         passed, noise, _ = settle(whole, p, noise, box, method=method, parameters_first=True)
         p, noise, _ = settle_finely(whole, passed, noise, box)
-        fit = summary(vehicle, several, whole, p, noise, box, free, ends)
-        fit = with_rivals(fit, whole, rivals, box, None if profiles else passed)
+        fit = _summary(vehicle, several, whole, p, noise, box, free, ends)
+        fit = _with_rivals(fit, whole, rivals, box, None if profiles else passed)
         ahead = min(fit.rivals, key=lambda rival: rival.lost, default=None)
         if ahead is not None and ahead.lost < 0.0 and left:
             rivals = [p, *(r.parameters for r in fit.rivals if r is not ahead)]
@@ -146,6 +144,79 @@ def identify_tyres(
             break
         p = better  # a profile came upon it
     return fit
+
+
+def _summary(
+    vehicle: GreyBoxVehicle,
+    logs: tuple[TyreLog, ...],
+    objective: Objective,
+    p: FloatArray,
+    noise: FloatArray,
+    box: Box,
+    free: tuple[str, ...],
+    ends: Starts,
+) -> TyreFit:
+    """Result with the uncertainties that the information matrix gives."""
+    gains = objective.freeze(p, noise)
+    _, _, information = objective.normal_equations(p, gains, box.columns)
+    estimates, covariance = wald(free, UNITS, p[box.columns], information, box)
+    return TyreFit(
+        vehicle,
+        logs,
+        p,
+        estimates,
+        covariance,
+        noise,
+        float(gains.log_likelihood),
+        ends,
+        _driven(vehicle, logs, tyre_problem(vehicle, logs).states(p, gains)),
+    )
+
+
+def _with_rivals(
+    fit: TyreFit,
+    objective: Objective,
+    rivals: Sequence[FloatArray],
+    box: Box,
+    passed: FloatArray | None = None,
+) -> TyreFit:
+    """Add the other optima that the data cannot rule out at 95 %.
+
+    `passed` is a point on the way to the optimum: where the valley bends, the information matrix
+    at its bottom does not reach there. A profile follows the bend and needs no such point.
+    """
+    kept = []
+    best = fit.log_likelihood - objective.prior_cost(fit.parameters)
+
+    def keep(p: FloatArray, value: float) -> None:
+        apart = (p - fit.parameters)[box.columns]
+        # What lies on the same slope is in the interval already.
+        beyond = float(apart @ np.linalg.solve(fit.covariance, apart)) > _BEYOND
+        if value > best - _LEVEL_NATS and beyond:
+            gains = objective.freeze(p, fit.noise)
+            _, _, information = objective.normal_equations(p, gains, box.columns)
+            kept.append(Rival(p, best - value, box_covariance(information, box, p[box.columns])))
+
+    for p in rivals:
+        there, value = descend(objective, p, fit.noise, box)
+        if value > best - _HOPELESS:
+            there, value = bottom(objective, there, fit.noise, box)
+        keep(there, value)
+    if passed is not None:
+        gains = objective.freeze(passed, fit.noise)
+        keep(passed, gains.log_likelihood - objective.prior_cost(passed))
+    return replace(fit, rivals=tuple(kept))
+
+
+def _driven(
+    vehicle: GreyBoxVehicle, logs: Sequence[TyreLog], states: FloatArray
+) -> tuple[float, float]:
+    steer = np.concatenate([log.inputs[:, 1] for log in logs])
+    v_x = np.maximum(states[:, 0], 1.0)
+    front = steer - np.arctan((states[:, 1] + vehicle.lf_m * states[:, 2]) / v_x)
+    rear = -np.arctan((states[:, 1] - vehicle.lr_m * states[:, 2]) / v_x)
+    high = [float(np.percentile(np.abs(a), 99.5)) for a in (front, rear)]
+    return high[0], high[1]
 
 
 def _check(logs: tuple[TyreLog, ...], method: str, starts: int) -> None:

@@ -14,8 +14,8 @@ import scipy
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
+from .._printed import Told
 from .._style import AFTER, MEASURED, axes_or_new, tidy
-from .._text import brief, html_text
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..log import Log
@@ -131,8 +131,8 @@ class CorneringRls:
         return self._core.used
 
 
-@dataclass(frozen=True)
-class CorneringRun:
+@dataclass(frozen=True, repr=False)
+class CorneringRun(Told):
     """The way of the stiffnesses through a log; arrays have shape (n,).
 
     Attributes
@@ -155,9 +155,6 @@ class CorneringRun:
     def excited(self) -> bool:
         """Whether enough samples held slip for the result to mean something."""
         return int(self.used.sum()) >= _ENOUGH
-
-    __repr__ = brief
-    _repr_html_ = html_text
 
     def __str__(self) -> str:
         return (

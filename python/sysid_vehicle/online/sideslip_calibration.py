@@ -11,7 +11,7 @@ import numpy as np
 
 from .._arguments import generator
 from .._arrays import FloatArray
-from .._text import brief, html_text
+from .._printed import Told
 from ..errors import InvalidInput
 from ..identify import Fit
 from ..log import Log
@@ -33,8 +33,8 @@ _LEARNT = (
 _FIRST_STEP, _WIDEN, _NARROW = 0.7, 1.15, 0.96  # of the logarithms
 
 
-@dataclass(frozen=True)
-class SideslipCalibration:
+@dataclass(frozen=True, repr=False)
+class SideslipCalibration(Told):
     """Settings under which the sideslip of a drive is likeliest.
 
     Attributes
@@ -52,9 +52,6 @@ class SideslipCalibration:
     after: SideslipRun
     score_before: float
     score_after: float
-
-    __repr__ = brief
-    _repr_html_ = html_text
 
     def __str__(self) -> str:
         score = f"{self.score_before:.3f} to {self.score_after:.3f} per sample"

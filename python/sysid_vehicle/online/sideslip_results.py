@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._arrays import FloatArray
+from .._printed import Told
 from .._style import AFTER, MEASURED, TRUTH, axes_or_new, new_figure, tidy
-from .._text import brief, html_text, text_table
+from .._text import text_table
 from ..vehicle import Vehicle
 from .sideslip_settings import SideslipSettings
 
@@ -51,8 +52,8 @@ class SideslipError:
         )
 
 
-@dataclass(frozen=True)
-class SideslipRun:
+@dataclass(frozen=True, repr=False)
+class SideslipRun(Told):
     """Estimates over a log of `n` samples; arrays have shape (n,), NaN where nothing is known.
 
     Attributes
@@ -125,9 +126,6 @@ class SideslipRun:
             float(np.mean(np.abs(off) <= 2.0 * self.beta_std_rad[known])),
             tuple(bands),
         )
-
-    __repr__ = brief
-    _repr_html_ = html_text
 
     def __str__(self) -> str:
         beta = np.degrees(self.beta_rad)

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from .._arrays import FloatArray
-from .._text import brief, html_text
+from .._printed import Told
 from ..errors import InvalidInput
 from ..manoeuvres import double_lane_change, lap
 from ..twin.calibrate import Box
@@ -106,8 +106,8 @@ def joint_readings(drive: Drive14, *, seed: int = 0) -> Readings:
     return measure(drive, READINGS[:10], seed=seed, noise=_NOISE)
 
 
-@dataclass(frozen=True, eq=False)
-class JointExperiment:
+@dataclass(frozen=True, eq=False, repr=False)
+class JointExperiment(Told):
     """Mass and sideslip of one drive, by the twin and by the double track.
 
     Attributes
@@ -155,9 +155,6 @@ class JointExperiment:
     def to_dict(self) -> dict[str, Any]:
         """All figures, for a file."""
         return {"course": self.drive.name, **self.figures()}
-
-    __repr__ = brief
-    _repr_html_ = html_text
 
     def __str__(self) -> str:
         lines = [str(self.drive)]

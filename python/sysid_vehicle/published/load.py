@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .._text import brief, html_text
+from .._printed import Told
 from ..errors import InvalidInput
 from ..twin.car import LOAD_NAMES, LOADED_SUV, NOMINAL_SUV, Load, TwinCar
 from ..twin.drives import INPUTS, Drive14, rough_road, swept_steer, urban_cycle
@@ -40,8 +40,8 @@ NOISE_FLOOR = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class LoadExperiment:
+@dataclass(frozen=True, eq=False, repr=False)
+class LoadExperiment(Told):
     """A load that was looked for, and what was found.
 
     Attributes
@@ -94,9 +94,6 @@ class LoadExperiment:
     def plot(self, name: str, *, ax: Axes | None = None) -> Axes:
         """Draw an estimate over time."""
         return self.found.plot(name, truth=getattr(self.true, name), ax=ax)
-
-    __repr__ = brief
-    _repr_html_ = html_text
 
     def __str__(self) -> str:
         lines = [f"{self.name}: {self.drive}"]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._text import brief, html_text
+from .._printed import Told
 from ..errors import InvalidInput
 from ..twin.car import LOADED_SUV, NOMINAL_SUV, Load, TwinCar
 from ..twin.drives import Drive14
@@ -67,8 +67,8 @@ _STAGES = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class ScheduleRun:
+@dataclass(frozen=True, eq=False, repr=False)
+class ScheduleRun(Told):
     """All stages and the load they ended with.
 
     Attributes
@@ -114,9 +114,6 @@ class ScheduleRun:
                 return stage.plot(name, ax=ax)
         raise InvalidInput(f"no stage looked for '{name}'; there are {', '.join(self.rows())}")
 
-    __repr__ = brief
-    _repr_html_ = html_text
-
     def __str__(self) -> str:
         lines = [str(stage.drive) for stage in self.stages]
         lines.append(
@@ -159,10 +156,6 @@ def run_schedule(
         Of noise and road.
     shorten : float
         Part of the drives' customary lengths that is driven, from a twentieth to one.
-
-    Returns
-    -------
-    ScheduleRun
 
     Raises
     ------

@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from .._arrays import FloatArray, as_float64
 from ..identify.objective import LinearRows
+from ..lab.multistart import looking_alike
 from ..lab.projection import Regression
 from ..lab.regression_search import COARSE, EXACT, FINE, ROUGH, RegressionTask
-from ..lab.walk import looking_alike
 
 _PRIOR_WEIGHT = 0.1
 _PRIOR_OF_RESIDUAL_TERMS = 0.1  # relative to that of the tyres

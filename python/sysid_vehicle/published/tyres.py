@@ -15,10 +15,10 @@ from .._text import number
 from ..errors import InvalidInput
 from ..identify.search import METHODS
 from ..identify.starts import Starts, space_filling
-from ..lab.box import BOX, GIVEN, box_of, first_point
 from ..lab.motion import TyreMotion
 from ..lab.tyre_data import GreyBoxVehicle
 from ..lab.tyre_fit import PARAMETERS
+from ..lab.tyre_problem import BOX, GIVEN, box_of, first_point
 from .tyre_search import LossTask, search
 
 LOSSES = {
@@ -130,10 +130,6 @@ def regress_tyres(
         `gauss-newton`, `nlopt` or `scipy`.
     seed : int
         Of the start points.
-
-    Returns
-    -------
-    TyreRegression
 
     Raises
     ------

@@ -53,10 +53,6 @@ def read_log(
     check : bool
         As in :meth:`Log.from_arrays`.
 
-    Returns
-    -------
-    Log
-
     Raises
     ------
     InvalidInput

@@ -100,10 +100,6 @@ def propose_channels(
     vehicle : Vehicle, optional
         The car, for its wheelbase.
 
-    Returns
-    -------
-    Proposal
-
     Raises
     ------
     InvalidInput

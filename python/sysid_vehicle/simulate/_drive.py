@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from .._arguments import expect, generator
 from .._arrays import FloatArray, as_float64
-from .._text import brief, html_text
+from .._printed import Told
 from ..effects import channels_in_use
 from ..errors import InvalidInput, NumericalError
 from ..log import CHANNELS, Log
@@ -29,8 +29,8 @@ Channel = float | FloatArray | Callable[[FloatArray], FloatArray]
 _STOPPED_MPS = 1.0  # where the core's simulator gives up
 
 
-@dataclass(frozen=True, eq=False)
-class Drive:
+@dataclass(frozen=True, eq=False, repr=False)
+class Drive(Told):
     """A finished drive.
 
     Attributes
@@ -65,9 +65,6 @@ class Drive:
     disturbance: FloatArray
     own_states: Mapping[str, FloatArray] = field(default_factory=dict)
 
-    __repr__ = brief
-    _repr_html_ = html_text
-
     def __str__(self) -> str:
         steer, force = np.abs(self.inputs).max(axis=0)
         what = ", ".join(self.model.effects) or "no effect"
@@ -99,12 +96,7 @@ def drive_truth(
     name: str | None = None,
     channels: Mapping[str, Channel] | None = None,
 ) -> Drive:
-    """Drive a model through a manoeuvre and keep what no sensor sees; parameters as :func:`drive`.
-
-    Returns
-    -------
-    Drive
-    """
+    """Drive as :func:`drive` does, and keep what no sensor sees."""
     expect(model, Model, "drive")
     expect(manoeuvre, Manoeuvre, "drive")
     rng = generator(seed)

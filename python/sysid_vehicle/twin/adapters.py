@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,10 +14,48 @@ from .car import LOAD_NAMES, Load, TwinCar
 from .drives import INPUTS, OUTPUTS
 from .observer import STATES
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
 _WRENCH = INPUTS.index("force_x_n")
 
 
-class NativeTwin:
+class _Standing:
+    """What a twin with states and parameters can do with where it stands."""
+
+    _state: FloatArray
+
+    def get_parameters(self) -> dict[str, float]:
+        """Its parameters by name."""
+        raise NotImplementedError
+
+    def set_parameters(self, values: Mapping[str, float]) -> None:
+        """Change some of them."""
+        raise NotImplementedError
+
+    def get_state(self) -> FloatArray:
+        """Its states."""
+        return self._state.copy()
+
+    def set_state(self, state: FloatArray) -> None:
+        """Set its states."""
+        self._state = as_float64(state).copy()
+
+    def snapshot(self) -> tuple[FloatArray, dict[str, float]]:
+        """Remember states and parameters."""
+        return self._state.copy(), self.get_parameters()
+
+    def restore(self, snapshot: tuple[FloatArray, dict[str, float]]) -> None:
+        """Go back there."""
+        self.set_state(snapshot[0])
+        self.set_parameters(snapshot[1])
+
+    def clone(self) -> Self:
+        """Make another that stands here."""
+        return copy.copy(self)
+
+
+class NativeTwin(_Standing):
     """The built-in car as a twin; `observe` runs the same loop faster, without Python in it.
 
     Parameters
@@ -99,32 +137,12 @@ class NativeTwin:
         except ValueError as error:
             raise InvalidInput(f"{self.car.name}: {error}") from error
 
-    def get_state(self) -> FloatArray:
-        """Its states."""
-        return self._state.copy()
-
-    def set_state(self, state: FloatArray) -> None:
-        """Set its states."""
-        self._state = as_float64(state).copy()
-
     def set_wrench(self, force_n: FloatArray, moment_nm: FloatArray) -> None:
         """Push its body."""
         self._wrench = np.concatenate([force_n, moment_nm])
 
-    def snapshot(self) -> tuple[FloatArray, list[float]]:
-        """Remember states and load."""
-        return self._state.copy(), list(self._core.load)
 
-    def restore(self, snapshot: tuple[FloatArray, list[float]]) -> None:
-        """Go back there."""
-        self._state, self._core.load = snapshot[0].copy(), list(snapshot[1])
-
-    def clone(self) -> NativeTwin:
-        """Make another that stands here."""
-        return copy.copy(self)
-
-
-class CallableTwin:
+class CallableTwin(_Standing):
     """A twin made of two functions of state, inputs and parameters.
 
     It pickles if its functions do: functions of a module do, those made in place do not.
@@ -193,35 +211,6 @@ class CallableTwin:
         """Change some of them."""
         self._parameters = {**self._parameters, **values}
 
-    def get_state(self) -> FloatArray:
-        """Its states."""
-        return self._state.copy()
-
-    def set_state(self, state: FloatArray) -> None:
-        """Set its states."""
-        self._state = as_float64(state).copy()
-
     def set_wrench(self, force_n: FloatArray, moment_nm: FloatArray) -> None:
         """Refuse: functions of states take no push."""
         raise InvalidInput("a twin of functions takes no push; its states can be set")
-
-    def snapshot(self) -> tuple[FloatArray, dict[str, float]]:
-        """Remember states and parameters."""
-        return self._state.copy(), dict(self._parameters)
-
-    def restore(self, snapshot: tuple[FloatArray, dict[str, float]]) -> None:
-        """Go back there."""
-        self._state, self._parameters = snapshot[0].copy(), dict(snapshot[1])
-
-    def clone(self) -> CallableTwin:
-        """Make another that stands here."""
-        return CallableTwin(
-            self._step,
-            self._outputs,
-            self._state,
-            dt_s=self.dt_s,
-            input_names=self.input_names,
-            output_names=self.output_names,
-            state_names=self.state_names,
-            parameters=self._parameters,
-        )

@@ -16,8 +16,8 @@ import numpy as np
 
 from .._arguments import generator, whole
 from .._arrays import FloatArray
+from .._printed import Told
 from .._style import AFTER, MEASURED, axes_or_new, tidy
-from .._text import brief, html_text
 from ..errors import InvalidInput, NumericalError
 
 if TYPE_CHECKING:
@@ -209,8 +209,8 @@ class Candidate:
         return f"best {self.how}: cost {self.cost:.4g}{fresh}"
 
 
-@dataclass(frozen=True, eq=False)
-class Calibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Told):
     """Gains that were found.
 
     Attributes
@@ -258,9 +258,6 @@ class Calibration:
         ax.legend(frameon=False)
         return tidy(ax, xlabel="trial", ylabel="cost")
 
-    __repr__ = brief
-    _repr_html_ = html_text
-
     def __str__(self) -> str:
         lines = [f"Cost {self.cost:.4g} after {len(self.tried)} trials, {self.lost} lost the twin"]
         lines += [
@@ -300,10 +297,6 @@ def calibrate(
     fresh : sequence of callable
         The cost with other seeds than the trials'. The best trial and, if the optimiser has
         ``best_predicted``, the best that its model predicts are judged by them.
-
-    Returns
-    -------
-    Calibration
 
     Raises
     ------

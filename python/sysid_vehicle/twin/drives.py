@@ -130,10 +130,6 @@ def drive14(
     name : str
         Name of the drive.
 
-    Returns
-    -------
-    Drive14
-
     Raises
     ------
     NumericalError

@@ -14,8 +14,8 @@ import numpy as np
 from .. import _core
 from .._arguments import whole
 from .._arrays import FloatArray, as_float64
+from .._printed import Told
 from .._style import AFTER, TRUTH, axes_or_new, tidy
-from .._text import brief, html_text
 from ..errors import InvalidInput, NumericalError, warn
 from .car import LOAD_NAMES, Load, TwinCar
 from .checks import checked_rows, checked_step
@@ -117,8 +117,8 @@ class Observer:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Observation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Observation(Told):
     """What an observer found.
 
     Attributes
@@ -178,9 +178,6 @@ class Observation:
         ax.legend(frameon=False)
         return tidy(ax, xlabel="time [s]", ylabel=name)
 
-    __repr__ = brief
-    _repr_html_ = html_text
-
     def __str__(self) -> str:
         lines = [f"Observer over {self.time_s[-1]:.0f} s; parameters from first to last:"]
         for name in self.moved():
@@ -220,10 +217,6 @@ def observe(
         First speed of the twin; by default the first reading of ``vx_mps``, or the front wheels'.
     stride : int
         Every so many samples are recorded.
-
-    Returns
-    -------
-    Observation
 
     Raises
     ------

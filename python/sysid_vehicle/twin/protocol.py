@@ -115,10 +115,6 @@ def observe_with(
     stride : int
         Every so many samples are recorded.
 
-    Returns
-    -------
-    Observation
-
     Raises
     ------
     InvalidInput

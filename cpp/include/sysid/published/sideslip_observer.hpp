@@ -30,31 +30,26 @@ struct PublishedUkf {
     template <class F, class H>
     void step(F&& f, H&& h, const Mat<N, N>& Q, const Vec<M>& y, const Mat<M, M>& R,
               std::size_t sample) {
-        constexpr int n = 2 * N + 1;
         const SigmaWeights w = SigmaWeights::scaled(N, 1e-3, 2.0);
-        const Mat<N, N> L = factor_of<N>(P, sample);
-        Mat<N, n> moved;
-        Mat<M, n> seen;
-        for (int i = 0; i < n; ++i) {
-            moved.col(i) = f(Vec<N>(x + deviation(L, w.spread, i)), i);
-            seen.col(i) = h(Vec<N>(moved.col(i)), i);
-        }
-        Vec<n> means = Vec<n>::Constant(w.other), squares = means;
-        means[0] = w.mean_centre;
-        squares[0] = w.covariance_centre;
-        const Vec<N> predicted = moved * means;
-        const Vec<M> expected = seen * means;
-        moved.colwise() -= predicted;
-        seen.colwise() -= expected;
-        const Mat<N, n> weighed = moved * squares.asDiagonal();
-        const Mat<N, N> spread_x = times_transposed<N, n, N>(weighed, moved);
-        const Mat<M, n> weighed_seen = seen * squares.asDiagonal();
-        Mat<M, M> S = times_transposed<M, n, M>(weighed_seen, seen);
+        int drawn = 0;
+        const auto moved_and_seen = [&](const Vec<N>& point) {
+            // The centre, then both points of each column in turn.
+            const int column = drawn == 0 ? 0 : (drawn + 1) / 2 + (drawn % 2 == 0 ? N : 0);
+            ++drawn;
+            Vec<N + M> out;
+            out.template head<N>() = f(point, column);
+            out.template tail<M>() = h(Vec<N>(out.template head<N>()), column);
+            return out;
+        };
+        const auto t = transform<N + M, N>(moved_and_seen, x, factor_of<N>(P, sample), w);
+        const Mat<N + M, N + M> joint = t.covariance(w);
+        const Mat<N, M> cross = joint.template topRightCorner<N, M>();
+        Mat<M, M> S = joint.template bottomRightCorner<M, M>();
         S += R;
-        const Mat<N, M> cross = times_transposed<N, n, M>(weighed, seen);
         const Mat<N, M> K = solved_by<M, N>(S, cross.transpose()).transpose();
-        x = predicted + K * (y - expected);
-        P = spread_x + Q - K * S * K.transpose();
+        x = t.mean.template head<N>() + K * (y - t.mean.template tail<M>());
+        P = joint.template topLeftCorner<N, N>();
+        P += Q - K * S * K.transpose();
         if (!x.allFinite()) throw NumericalFailure("the state is not finite", sample);
     }
 };

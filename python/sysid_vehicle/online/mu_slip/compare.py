@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ..._printed import Told
 from ..._progress import doing
-from ..._text import brief, html_text, text_table
+from ..._text import text_table
 from ...errors import InvalidInput
 from .curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
 from .data import MuSlipData
@@ -17,8 +18,8 @@ from .results import MuSlipEstimate
 _ITERATIONS = 10
 
 
-@dataclass(frozen=True)
-class MuSlipComparison:
+@dataclass(frozen=True, repr=False)
+class MuSlipComparison(Told):
     """All estimators on the same readings.
 
     Attributes
@@ -39,9 +40,6 @@ class MuSlipComparison:
     def best(self) -> MuSlipEstimate:
         """The recommended one, which is the last."""
         return self.estimates[-1]
-
-    __repr__ = brief
-    _repr_html_ = html_text
 
     def __str__(self) -> str:
         names = self.best.curve.parameters

@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from ..._arguments import generator
 from ..._arrays import FloatArray, as_float64
+from ..._printed import Told
 from ..._progress import doing
 from ..._style import FLOOR, axes_or_new, tidy
-from ..._text import brief, html_text, text_table
+from ..._text import text_table
 from ...errors import InvalidInput
 from .compare import compare_mu_slip
 from .curve import TWO_PARAMETER, MuSlipCurve
@@ -27,8 +28,8 @@ _LEVELS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
 _MARKERS = "os^vDPX*<>"
 
 
-@dataclass(frozen=True, eq=False)
-class MuSlipNoiseStudy:
+@dataclass(frozen=True, eq=False, repr=False)
+class MuSlipNoiseStudy(Told):
     """Errors of every estimator over the noise of the readings; `k` estimators, `m` levels.
 
     Attributes
@@ -79,9 +80,6 @@ class MuSlipNoiseStudy:
             f"{self.curve.name} curve, {truth}: rms error of mu_peak over {self.sets} sets, and "
             f"how many times smaller than the noise of a reading"
         )
-
-    __repr__ = brief
-    _repr_html_ = html_text
 
     def __str__(self) -> str:
         head = ["noise of a reading", *(f"{s:.4g}" for s in self.noise_std)]

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..._arrays import FloatArray
+from ..._printed import Told
 from ..._style import AFTER, MEASURED, axes_or_new, tidy
-from ..._text import brief, html_text, text_table
+from ..._text import text_table
 from .curve import MuSlipCurve, magic_formula_coefficients
 from .data import MuSlipData
 
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-@dataclass(frozen=True)
-class MuSlipEstimate:
+@dataclass(frozen=True, repr=False)
+class MuSlipEstimate(Told):
     """Parameters of a curve with their uncertainty.
 
     Attributes
@@ -51,9 +52,6 @@ class MuSlipEstimate:
         mu, gradient, _ = self.curve.points(slip, self.values)
         variance = np.einsum("ki,ij,kj->k", gradient, self.covariance, gradient)
         return mu, np.sqrt(np.maximum(variance, 0.0))
-
-    __repr__ = brief
-    _repr_html_ = html_text
 
     def __str__(self) -> str:
         rows = [
@@ -95,8 +93,8 @@ def cautions(
     return tuple(notes)
 
 
-@dataclass(frozen=True)
-class MuSlipRun:
+@dataclass(frozen=True, repr=False)
+class MuSlipRun(Told):
     """A filter's way through the readings; `n` readings, `p` parameters.
 
     Attributes
@@ -139,15 +137,12 @@ class MuSlipRun:
         notes = cautions(self.curve, self.data, values, kernels.LOWER, kernels.UPPER)
         return MuSlipEstimate(self.method, self.curve, values, self.covariance[-1], notes)
 
-    __repr__ = brief
-    _repr_html_ = html_text
-
     def __str__(self) -> str:
         return str(self.estimate)
 
 
-@dataclass(frozen=True)
-class MuSlipSmoothed:
+@dataclass(frozen=True, repr=False)
+class MuSlipSmoothed(Told):
     """Parameters at each reading, given all readings.
 
     Attributes
@@ -175,9 +170,6 @@ class MuSlipSmoothed:
         if not self.converged:
             notes = (f"not at rest after {self.rounds} rounds", *notes)
         return MuSlipEstimate("iterated smoother", self.curve, values, self.covariance[-1], notes)
-
-    __repr__ = brief
-    _repr_html_ = html_text
 
     def __str__(self) -> str:
         return str(self.estimate)

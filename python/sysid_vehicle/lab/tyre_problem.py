@@ -1,0 +1,132 @@
+"""What is asked of the data: free parameters, where they are looked for, and the likelihood.
+
+Equations of the likelihood: `cpp/include/sysid/lab/tyre_likelihood.hpp`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from .. import _core
+from .._arrays import FloatArray, as_float64
+from ..errors import InvalidInput, near_names
+from ..identify.objective import Objective, gaussian_prior
+from ..identify.search import Box
+from .tyre_data import SHORTEST, GreyBoxVehicle, TyreLog
+from .tyre_fit import PARAMETERS
+
+_LETTERS = {"B": (1.0, 40.0), "C": (0.5, 3.0), "D": (0.1, 3.0), "E": (-3.0, 1.0)}
+BOX: dict[str, tuple[float, float]] = {
+    **{f"{x}_{axle}": bounds for axle in ("front", "rear") for x, bounds in _LETTERS.items()},
+    "P1": (-0.01, 0.01),
+    "P2": (-1.0, 1.0),
+    "P3": (-10.0, 10.0),
+    "mass_factor": (0.5, 2.0),
+    "yaw_inertia_factor": (0.3, 3.0),
+    "drag_area_m2": (0.0, 10.0),
+}
+"""Where a search looks. Beyond E = 1 the curve would turn back to zero at large slip."""
+
+_TYRE = {"B": 10.0, "C": 1.4, "D": 1.0, "E": 0.0}
+_CAR = {"mass_factor": 1.0, "yaw_inertia_factor": 1.0, "drag_area_m2": 0.5}
+GIVEN = {f"{x}_{axle}": v for axle in ("front", "rear") for x, v in _TYRE.items()} | _CAR
+"""Where a search begins that is told nothing."""
+
+_SETTLES_S = 1.0
+# Of the disturbances: what steps of 10 ms and axles without a width leave out. Beside the true
+# tyres a step is 3e-7 m/s, 3e-6 m/s and 3e-6 rad/s off in a slide: ten times that per root second
+# where each step errs anew, as of v_y and yaw rate, and a hundred times where all of a second err
+# alike, as of v_x. Without that floor a minute of sliding is taken as one calculation, and its
+# coefficients as known to the sixth figure.
+_SMALLEST = np.array([1e-4, 1e-4, 1e-5, 1e-4, 3e-5, 3e-5, 3e-5])
+_LARGEST = np.array([10.0, 10.0, 2.0, 20.0, 5.0, 5.0, 5.0])
+
+
+def first_point(start: Mapping[str, float]) -> FloatArray:
+    """All parameters in the core's order: the given ones, `GIVEN` for the rest."""
+    _refuse_others(start)
+    values = GIVEN | dict(start)
+    return as_float64([values.get(name, 0.0) for name in PARAMETERS])
+
+
+def _refuse_others(names: Iterable[str]) -> None:
+    for name in names:
+        if name not in PARAMETERS:
+            raise InvalidInput(f"there is no parameter '{name}'{near_names(name, PARAMETERS)}")
+
+
+def box_of(free: Sequence[str], bounds: Mapping[str, tuple[float, float]]) -> Box:
+    """Box of the free parameters; `BOX` where `bounds` says nothing."""
+    _refuse_others(bounds)
+    table = np.array([(BOX | dict(bounds))[n] for n in free], dtype=float)
+    if not np.all(table[:, 0] < table[:, 1]):
+        worst = free[int(np.argmin(table[:, 1] - table[:, 0]))]
+        raise InvalidInput(f"bounds of {worst} are {bounds[worst]}; give (lower, upper)")
+    return Box([PARAMETERS.index(n) for n in free], table[:, 0].copy(), table[:, 1].copy())
+
+
+def _tolerances(vehicle: GreyBoxVehicle) -> dict[str, float]:
+    """Factors that are not known exactly, and their standard deviations."""
+    stated = {
+        "mass_factor": vehicle.mass_tolerance,
+        "yaw_inertia_factor": vehicle.yaw_inertia_tolerance,
+    }
+    return {name: tolerance for name, tolerance in stated.items() if tolerance > 0.0}
+
+
+def free_parameters(vehicle: GreyBoxVehicle, *, residual_terms: bool = False) -> tuple[str, ...]:
+    """Names of what is identified: both tyres, what the vehicle is not sure of, the drag."""
+    terms = ("P1", "P2", "P3") if residual_terms else ()
+    return (*PARAMETERS[:8], *terms, *_tolerances(vehicle), "drag_area_m2")
+
+
+def objective_of(
+    vehicle: GreyBoxVehicle, logs: Sequence[TyreLog], most_samples: int | None = None
+) -> Objective:
+    """Likelihood of logs thinned to `most_samples`, with priors where the vehicle is unsure."""
+    problem = tyre_problem(vehicle, logs, most_samples=most_samples)
+    unsure = {PARAMETERS.index(n): (1.0, std) for n, std in _tolerances(vehicle).items()}
+    return Objective(problem, gaussian_prior(len(PARAMETERS), unsure), _SMALLEST, _LARGEST)
+
+
+def tyre_problem(
+    vehicle: GreyBoxVehicle,
+    logs: Sequence[TyreLog],
+    *,
+    most_samples: int | None = None,
+    window_s: float = 5.0,
+) -> _core.TyreProblem:
+    """The core's problem; of about so many samples, if that is asked.
+
+    Half of those are the windows of the hardest cornering, where tyres show their peak, half are
+    spread evenly over the rest.
+    """
+    problem = _core.TyreProblem(vehicle.core())
+    total = sum(log.n for log in logs)
+    for log in logs:
+        windows = [slice(0, log.n)]
+        if most_samples is not None and total > most_samples:
+            length = min(max(int(window_s / log.step_s), SHORTEST), log.n)
+            windows = _telling(log, length, max(2, round(most_samples * log.n / total / length)))
+        for window in windows:
+            y = log.measurements[window].copy()
+            if not log.sideslip_measured:
+                # The first v_y is anyone's guess, and a filter that starts from a wrong one on
+                # saturated tyres is led astray. A car forgets it within a second.
+                y[: int(_SETTLES_S / log.step_s), 2:] = np.nan
+            problem.add_run(log.step_s, log.inputs[window], as_float64(y))
+    return problem
+
+
+def _telling(log: TyreLog, length: int, count: int) -> list[slice]:
+    tiles = [slice(k, k + length) for k in range(0, log.n - length + 1, length)]
+    if count >= len(tiles):
+        return tiles
+    a_y = np.nan_to_num(np.abs(log.measurements[:, 3]))
+    hard = [-float(np.percentile(a_y[t], 95.0)) for t in tiles]
+    first = [int(i) for i in np.argsort(hard)[: count // 2]]
+    rest = [i for i in range(len(tiles)) if i not in first]
+    spread = np.linspace(0, len(rest) - 1, count - len(first)).round().astype(int)
+    return [tiles[i] for i in sorted({*first, *(rest[k] for k in spread)})]
