@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._threads import Workers
 from ..estimate import Driving
+from ..estimate.pieces import DrivingProblem
 from ..identify import Fit
 from .projection import orthonormal_basis, pseudo_inverse, variance_ratio
 
@@ -59,12 +60,12 @@ class Evidence:
     inputs: FloatArray | None = None
 
     @cached_property
-    def problem(self) -> _core.Problem:
+    def problem(self) -> DrivingProblem:
         """The core's problem."""
         return self.driving.problem(self.fit.model, other_inputs=self.inputs)
 
     @cached_property
-    def frozen(self) -> _core.FrozenFilter:
+    def frozen(self) -> Any:
         """The filter at the fit."""
         return self.problem.freeze(self.fit.model.vector(), self.fit.noise.vector())
 

@@ -11,10 +11,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from .. import _core
 from .._arrays import FloatArray
 from ..effects import Effect
 from ..estimate import Driving
+from ..estimate.pieces import DrivingProblem
 from .evidence import Evidence
 
 _AT_ONCE = 24  # columns of one pass: each costs little more, and more are held twice meanwhile
@@ -59,7 +59,7 @@ def sensitivities(evidence: Evidence, candidates: Sequence[Effect]) -> Sensitivi
     out = np.empty((len(evidence.residual), int(ends[-1])))
     p = model.vector(possible)
 
-    def acting(*effects: Effect) -> _core.Problem:
+    def acting(*effects: Effect) -> DrivingProblem:
         return evidence.problem.with_model(
             model.core(force_known=driving.force_known, also=effects)
         )
