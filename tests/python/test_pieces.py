@@ -116,3 +116,22 @@ def test_a_comparison_in_pieces_is_the_same(
     for a, b in ((whole, found), *((whole.channels[c], found.channels[c]) for c in found.channels)):
         told = {k: v for k, v in vars(a).items() if isinstance(v, float)}
         assert {k: vars(b)[k] for k in told} == pytest.approx(told, rel=1e-9)
+
+
+def test_a_diagnosis_in_sections_is_the_same(monkeypatch: pytest.MonkeyPatch, fit: sv.Fit) -> None:
+    """Scores, colour of the residuals, what is left, causes; with slow states and delays."""
+    effects = ("mass", "tyre_temperature", "friction_change", "steer_lag", "tyre_load_sensitivity")
+    whole = sv.diagnose(fit, candidates=effects, refits=0)
+    evidence = import_module("sysid_vehicle.diagnose.evidence")
+    monkeypatch.setattr(evidence, "HELD", fit.driving.samples // 2)
+    found = sv.diagnose(fit, candidates=effects, refits=0)
+    assert len(list(evidence.Evidence(fit, fit.driving).sections())) >= 4
+    assert found.omnibus.strongest == whole.omnibus.strongest
+    assert found.omnibus.statistic == pytest.approx(whole.omnibus.statistic, rel=1e-9)
+    assert list(found.proposed.sizes) == list(whole.proposed.sizes)
+    for a, b in zip(whole.scores, found.scores, strict=True):
+        assert a.effect.id == b.effect.id
+        for name in ("statistic", "p_value", "value", "std", "retained", "variance_ratio"):
+            assert getattr(b, name) == pytest.approx(getattr(a, name), rel=1e-7, abs=1e-9), name
+    assert found.family == pytest.approx(whole.family, rel=1e-7, abs=1e-12)
+    assert found.proposed.inclusion == pytest.approx(whole.proposed.inclusion, rel=1e-7)
