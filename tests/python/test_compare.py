@@ -91,16 +91,17 @@ def test_louder_noise_makes_the_same_error_smaller(fit: Fit, course: Log) -> Non
 def test_the_map_counts_excess_and_leaves_empty_cells_out(fit: Fit, course: Log) -> None:
     driving = Driving.of(course)
     white = np.ones((driving.samples, 5))
+    there = np.full(driving.samples, 5)
     fast = course["vx_mps"] > np.percentile(course["vx_mps"], 70.0)
     white[fast] = 3.0
-    found = FailureMap.of(driving, white)
+    found = FailureMap.of(driving, white**2 @ np.ones(5), there)
     assert found.error.shape == (len(found.speed_mps) - 1, len(found.lateral_mps2) - 1)
     assert np.isnan(found.error).any()
     assert np.nanmin(found.error) == pytest.approx(1.0)
     assert np.nanmax(found.error) == pytest.approx(3.0)
     edge = np.percentile(course["vx_mps"], 70.0)
     assert all(r.speed_mps[1] > edge for r in found.worst())
-    assert FailureMap.of(driving, 0.9 * np.ones((driving.samples, 5))).worst() == ()
+    assert FailureMap.of(driving, 0.81 * there, there).worst() == ()
 
 
 def test_it_prints_and_draws(validation: Comparison, dragged: Comparison) -> None:

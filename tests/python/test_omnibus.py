@@ -8,7 +8,7 @@ import pytest
 from sysid_vehicle import Driving, Fit, Log, Model, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import Omnibus, omnibus
 from sysid_vehicle.diagnose.evidence import Evidence
-from sysid_vehicle.diagnose.omnibus import _virtual
+from sysid_vehicle.diagnose.omnibus import Unknown
 from sysid_vehicle.identify import refine
 
 
@@ -53,7 +53,10 @@ def test_a_gap_inside_a_log_is_no_turn_of_the_wheel(truth: Model) -> None:
     evidence = Evidence(identify(truth, gap, starts=1), Driving.of(gap))
     assert len(evidence.driving.stretches) == 2
     first = turned - 100
-    _, signals, _ = _virtual(evidence)
+    (section,) = evidence.sections()
+    p, noise = evidence.fit.model.vector(), evidence.fit.noise.vector()
+    state = evidence.problem.trace(p, noise, False)["state"]
+    signals = Unknown(evidence).signals(state, section.where)
     assert not signals[first].any(), "nothing was known yet"
     turn = signals[:, 11]  # of the first target: the last of its shapes
     assert turn[first + 1] == 0.0, "the jump over the gap"

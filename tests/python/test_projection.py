@@ -5,6 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from sysid_vehicle.diagnose.projection import (
+    LongRun,
     long_run_ratio,
     long_run_ratios,
     orthonormal_basis,
@@ -56,6 +57,21 @@ def test_many_ratios_at_once_are_those_one_by_one(rng: np.random.Generator) -> N
         long_run_ratio(directions[:, [j]], e - directions @ sizes[:, j]) for j in range(4)
     ]
     assert long_run_ratios(score_terms(directions, e, sizes), squares) == pytest.approx(one_by_one)
+
+
+def test_long_runs_do_not_feel_where_terms_are_cut(rng: np.random.Generator) -> None:
+    terms, naive = lfilter([1.0], [1.0, -0.9], rng.standard_normal((900, 3)), axis=0), np.ones(3)
+    found = LongRun(*terms.shape)
+    for few in np.array_split(terms - terms.mean(axis=0), [1, 5, 40, 300]):
+        found.add(few)
+    assert found.ratios(naive) == pytest.approx(long_run_ratios(terms, naive), rel=1e-12)
+    # The definition: sums over all windows, those that reach beyond the ends as well.
+    centred = terms - terms.mean(axis=0)
+    most = []
+    for lags in (10, 30, 90):
+        sums = np.array([np.convolve(c, np.ones(lags + 1)) for c in centred.T])
+        most.append((sums**2).sum(axis=1) / (lags + 1) / (1 + 2 * np.sqrt(4 * lags / 2700)))
+    assert long_run_ratios(terms, naive) == pytest.approx(np.max(most, axis=0), rel=1e-12)
 
 
 def test_where_no_direction_is_left_there_are_no_terms(rng: np.random.Generator) -> None:

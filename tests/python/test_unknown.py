@@ -22,7 +22,7 @@ from sysid_vehicle import (
 from sysid_vehicle.diagnose import Unknown
 from sysid_vehicle.diagnose.evidence import Evidence
 from sysid_vehicle.diagnose.grammar import Form, forms, unit_of_gain
-from sysid_vehicle.diagnose.shape import _posterior, curves
+from sysid_vehicle.diagnose.shape import _band, _posterior, curves
 from sysid_vehicle.identify import refine
 
 FORCE, MOMENT = 0.6, 0.3  # N and N m, per square of the speed
@@ -190,3 +190,8 @@ def test_a_formula_becomes_an_effect(wind: Unknown, windy: Fit) -> None:
         assert abs(found.value - true) < 4.0 * found.std
         assert found.std < 0.05 * true
     assert fit.log_likelihood > windy.log_likelihood + 100.0
+
+
+def test_a_band_over_no_place_is_empty() -> None:
+    """A log so short that no cell of a surface was visited often enough."""
+    assert _band(np.empty((0, 0)), np.random.default_rng(0)).shape == (0,)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from .._style import axes_or_new
 from .._tables import dataset, frame
 from .._text import brief, html_list, html_paragraph, html_table, number, text_table
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
+from ..estimate.pieces import traces
 from ..identify import Fit, explaining
 from ..log import Log
 from .unrelated import incoherent, unrelated
@@ -20,6 +21,9 @@ from .where import FailureMap, Region
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+TRACED = 1 << 16
+"""Samples of which all that a filter says is held at once."""
 
 
 @dataclass(frozen=True)
@@ -174,10 +178,21 @@ def _running_rms(e: FloatArray, log_number: FloatArray, width: int) -> FloatArra
 
 def one_step_error(fit: Fit, driving: Driving, noise: NoiseModel) -> float:
     """The `error` of a comparison alone; the arguments are those of `compare`."""
-    p = fit.model.vector()
-    trace = driving.problem(fit.model).trace(p, noise.floor().vector(), False)
-    white = np.where(np.isfinite(driving.measured), trace["whitened"], np.nan)
-    return float(np.sqrt(np.nanmean(white**2)))
+    total, number = 0.0, 0
+    for _, squares, count, _ in _told(fit, driving, noise.floor()):
+        total, number = total + float(squares.sum()), number + int(count.sum())
+    return float(np.sqrt(total / number))
+
+
+def _told(
+    fit: Fit, driving: Driving, noise: NoiseModel
+) -> Iterator[tuple[slice, FloatArray, FloatArray, dict[str, Any]]]:
+    """Samples, sum and number of each one's squared whitened residuals, and the filter's trace."""
+    problem = driving.problem(fit.model, longest=TRACED)
+    for own, trace in traces(problem, fit.model.vector(), noise.vector()):
+        there = np.isfinite(driving.measured[own])
+        squares = np.where(there, trace["whitened"] ** 2, 0.0).sum(axis=1)
+        yield own, squares, there.sum(axis=1), trace
 
 
 @explaining
@@ -196,39 +211,41 @@ def compare(
         are compared with each other need the same one.
     """
     driving = Driving.of(logs)
-    problem = driving.problem(fit.model)
-    p = fit.model.vector()
     floor = (fit.noise if noise is None else noise).floor()
-    trace = problem.trace(p, floor.vector(), False)
-    white = np.where(np.isfinite(driving.measured), trace["whitened"], np.nan)
-    normalised = trace["innovation"] / trace["spread"]
+    squares, count = np.empty(driving.samples), np.empty(driving.samples)
+    innovation, spread = (np.empty((driving.samples, len(MEASURED))) for _ in range(2))
+    for own, squares[own], count[own], trace in _told(fit, driving, floor):
+        innovation[own], spread[own] = trace["innovation"], trace["spread"]
     scores = {}
     for i, c in enumerate(MEASURED):
-        there = np.isfinite(normalised[:, i])
+        there = np.isfinite(innovation[:, i])
         if not there.any():
             continue
-        e = trace["innovation"][there, i]
-        spread = float(np.var(driving.measured[there, i]))
+        e, expected = innovation[there, i], spread[there, i]
+        variance = float(np.var(driving.measured[there, i]))
         scores[c] = ChannelScore(
             float(np.sqrt(np.mean(e**2))),
             # Not the mean: the filter's ignorance at the first samples is no noise of the sensor.
-            float(np.median(trace["spread"][there, i])),
-            float(np.sqrt(np.mean(normalised[there, i] ** 2))),
-            float(1.0 - np.mean(e**2) / spread) if spread > 0 else float("nan"),
+            float(np.median(expected)),
+            float(np.sqrt(np.mean((e / expected) ** 2))),
+            float(1.0 - np.mean(e**2) / variance) if variance > 0 else float("nan"),
         )
-    failures = FailureMap.of(driving, white)
-    own = problem.trace(p, fit.noise.vector(), False)
+    failures = FailureMap.of(driving, squares, count)
+    normalised = innovation / spread
+    log_likelihood = 0.0
+    for own, _, _, trace in _told(fit, driving, fit.noise):
+        innovation[own], spread[own] = trace["innovation"], trace["spread"]
+        log_likelihood += trace["log_likelihood"]
     title = f"{', '.join(fit.model.effects) or 'baseline'} on {driving}"
     return Comparison(
         title,
-        float(np.sqrt(np.nanmean(white**2))),
+        float(np.sqrt(squares.sum() / count.sum())),
         scores,
         failures.worst(),
         failures,
         driving.channel("time_s"),
         driving.log_number,
         normalised,
-        float(own["log_likelihood"]),
-        incoherent(driving, fit.model.effects)
-        or unrelated(driving, own["innovation"], own["spread"]),
+        log_likelihood,
+        incoherent(driving, fit.model.effects) or unrelated(driving, innovation, spread),
     )

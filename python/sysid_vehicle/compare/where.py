@@ -54,17 +54,28 @@ class FailureMap:
     excess: FloatArray
 
     @classmethod
-    def of(cls, driving: Driving, white: FloatArray, cells: tuple[int, int] = (8, 9)) -> FailureMap:
-        """The map of whitened residuals (n x 5, NaN where missing)."""
+    def of(
+        cls,
+        driving: Driving,
+        squares: FloatArray,
+        count: FloatArray,
+        cells: tuple[int, int] = (8, 9),
+    ) -> FailureMap:
+        """The map of the squares of whitened residuals, summed over the channels that are there.
+
+        Parameters
+        ----------
+        driving : Driving
+        squares, count : array, shape (n,)
+            Sum and number of the squares of each sample.
+        """
         v = driving.channel("vx_mps")
         a = driving.channel("ay_mps2")
         known = np.isfinite(v) & np.isfinite(a)
-        v, a, white = v[known], a[known], white[known]
+        v, a, squares, count = v[known], a[known], squares[known], count[known]
         edges_v = np.linspace(*_range(v), cells[0] + 1)
         reach = max(abs(x) for x in _range(a))
         edges_a = np.linspace(-reach, reach, cells[1] + 1)
-        squares = np.nansum(white**2, axis=1)
-        count = np.isfinite(white).sum(axis=1)
         where = (v, a)
         edges = (edges_v, edges_a)
         total = np.histogram2d(*where, bins=edges, weights=squares)[0]

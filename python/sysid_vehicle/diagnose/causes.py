@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,10 +15,10 @@ from .._text import brief, with_error
 from ..effects import Effect
 from ..rules import USUAL, Rules
 from .clocks import CLOCKS, clock_scores
+from .directions import Directions
 from .evidence import Evidence
-from .omnibus import unknown_directions
+from .omnibus import Unknown, not_copied
 from .possible import Size
-from .projection import variance_ratio
 from .score import ScoreBoard
 from .single_effects import Hypothesis, Posterior, ScoreModel, Subset
 
@@ -196,7 +195,7 @@ def causes_of(
     Parameters
     ----------
     board : ScoreBoard
-        Scores of all candidates.
+        Scores of all candidates, and beside them the `Unknown` and the `Shifts`.
     evidence : Evidence
         The same residuals.
     rules : Rules
@@ -206,19 +205,25 @@ def causes_of(
     if not board.scores:
         return Causes({}, (), {})
     scale, hypotheses, ratio = _candidates(board)
-    directions, named, more = _unknown(evidence)
-    clocks = clock_scores(evidence, rules)
-    directions = np.hstack([directions, *(c.direction for c in clocks)])
-    across = np.hstack(list(board.directions.values())).T @ directions
-    n, m = across.shape
-    information = np.block([[board.information, across], [across.T, directions.T @ directions]])
+    projected = board.projected
+    unknown, named, more = _unknown(projected)
+    clocks = clock_scores(projected, rules)
+    n, m = len(board.gradient), unknown.shape[1] + len(clocks)
+    # What turns all columns into the directions that compete.
+    turns = np.zeros((len(projected.score), n + m))
+    turns[board.columns, np.arange(n)] = 1.0
+    turns[:, n : n + unknown.shape[1]] = unknown
+    turns[[c.column for c in clocks], np.arange(n + unknown.shape[1], n + m)] = 1.0
+    information = turns.T @ projected.information @ turns
     typical = [abs(c.clock.typical_s) for c in clocks]
     vague = np.full(m - len(clocks), np.sqrt(evidence.driving.samples))
     scale = np.concatenate([scale, vague, typical])
     more = np.concatenate([more, [c.ratio for c in clocks]])
-    score = np.concatenate([board.gradient, directions.T @ evidence.left])
+    score = turns.T @ projected.score
     start = n
     for name, width in named:
+        own = slice(start, start + width)
+        information[own, own] = np.eye(width)  # to the last digit
         columns = tuple(range(start, start + width))
         hypotheses.append(Hypothesis(_UNKNOWN + name, columns, (0.0,) * width, 1.0))
         start += width
@@ -243,8 +248,8 @@ def _candidates(board: ScoreBoard) -> tuple[FloatArray, list[Hypothesis], FloatA
     scored = {s.effect.id: s for s in board.scores}
     scale, ratio = np.empty(len(board.gradient)), np.empty(len(board.gradient))
     hypotheses: list[Hypothesis] = []
-    ends = np.cumsum([0, *(R.shape[1] for R in board.directions.values())])
-    for name, (a, b) in zip(board.directions, pairwise(ends), strict=True):
+    for name, own in board.places.items():
+        a, b = own.start, own.stop
         effect = scored[name].effect
         ratio[a:b] = max(scored[name].variance_ratio, 1.0)
         first = effect.parameters[0]
@@ -281,16 +286,23 @@ def _side(effect: Effect, i: int) -> float:
     return float(np.sign(p.typical - p.null_value)) if p.one_sided else 0.0
 
 
-def _unknown(evidence: Evidence) -> tuple[FloatArray, list[tuple[str, int]], FloatArray]:
-    """Orthonormal directions of unknown forces and readings, their targets, variance ratios."""
-    e = evidence.left
-    bases, named, ratios = [], [], []
-    for target, basis in unknown_directions(evidence):
-        along = basis @ (basis.T @ e)
-        bases.append(basis)
-        named.append((target, basis.shape[1]))
-        ratios.append(np.full(basis.shape[1], variance_ratio(along, e - along)))
-    return np.hstack(bases), named, np.concatenate(ratios)
+def _unknown(projected: Directions) -> tuple[FloatArray, list[tuple[str, int]], FloatArray]:
+    """Orthonormal directions of unknown forces and readings, their targets, variance ratios.
+
+    Directions are columns by which all that was projected is added up.
+    """
+    unknown = next(s for s in projected.sources if isinstance(s, Unknown))
+    place = projected.place(unknown)
+    spans = [(g, turns) for g, turns in projected.spans(not_copied(projected)) if turns.shape[1]]
+    ends = np.cumsum([0, *(turns.shape[1] for _, turns in spans)])
+    whole = np.zeros((len(projected.score), int(ends[-1])))
+    for (group, turns), a, b in zip(spans, ends, ends[1:], strict=False):
+        whole[group, a:b] = turns
+    along = whole[place] * (whole.T @ projected.score)
+    explained = np.add.reduceat(along, ends[:-1], axis=1)
+    ratios = np.maximum(projected.long_run(unknown, explained, explained)[0], 1.0)
+    named = [(unknown.names[g.start - place.start], turns.shape[1]) for g, turns in spans]
+    return whole, named, np.repeat(ratios, np.diff(ends))
 
 
 def _told(

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..effects import effect
+from ..estimate.pieces import DrivingProblem
 from .coordinates import running_time
 from .evidence import FORCES, Evidence
 from .shape import known
@@ -83,7 +83,7 @@ def beginning(evidence: Evidence, kind: Kind, samples: list[int]) -> list[FloatA
 
 
 def _of_grip(
-    evidence: Evidence, kind: Kind, changing: _core.Problem, at: list[int], sample: int
+    evidence: Evidence, kind: Kind, changing: DrivingProblem, at: list[int], sample: int
 ) -> FloatArray:
     """Direction of more grip from a sample on, exact in the stretch in which it lies."""
     driving, begin = evidence.driving, 0

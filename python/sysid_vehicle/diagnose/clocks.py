@@ -7,14 +7,17 @@ before the log says so, and only a log can be wrong in that way.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from .. import _core
 from .._arrays import FloatArray
+from ..estimate.pieces import DrivingProblem
 from ..rules import Rules
 from .delay import delayed, pieces_of
-from .evidence import Evidence
-from .projection import variance_ratio
+from .directions import Directions
+from .evidence import Evidence, Section
 
 
 @dataclass(frozen=True)
@@ -55,36 +58,65 @@ class ClockScore:
 
     Attributes
     ----------
-    direction : array, shape (5 n, 1)
-        Sensitivity per second, projected off the fitted parameters.
+    column : int
+        Its direction among all that were projected: the sensitivity per second.
     ratio : float
         Long-run over naive variance of its score, at least 1.
     """
 
     clock: Clock
-    direction: FloatArray
+    column: int
     ratio: float
 
 
-def clock_scores(evidence: Evidence, rules: Rules) -> list[ClockScore]:
-    """Score the clocks that this driving can show, by a step to their typical sizes."""
-    driving, fit, e = evidence.driving, evidence.fit, evidence.left
-    inputs = driving.inputs() if evidence.inputs is None else evidence.inputs
-    found = []
-    for clock in CLOCKS:
-        if clock.channel == "fx_n" and not driving.force_known:
-            continue
-        moved = inputs.copy()
-        for begin, end, rate in pieces_of(driving):
-            moved[begin:end, clock.column] = delayed(
-                inputs[begin:end, clock.column], rate, clock.typical_s
-            )
-        problem = driving.problem(fit.model, other_inputs=moved)
-        after = problem.residuals(fit.model.vector(), evidence.frozen).ravel()
-        G = ((evidence.residual - after) / clock.typical_s)[:, None]
-        R = evidence.project(G)
-        if np.linalg.norm(R) > rules.retained * np.linalg.norm(G):
-            along = R[:, 0]
-            size = float(along @ e) / float(along @ along)
-            found.append(ClockScore(clock, R, variance_ratio(along, e - size * along)))
-    return found
+class Shifts:
+    """Sensitivities to the clocks that a driving can show, by a step to their typical sizes."""
+
+    groups = ()
+
+    def __init__(self, evidence: Evidence) -> None:
+        self.evidence = evidence
+        driving = evidence.driving
+        self.clocks = [c for c in CLOCKS if c.channel != "fx_n" or driving.force_known]
+        self._moved: list[DrivingProblem] = []
+        inputs = driving.inputs() if evidence.inputs is None else evidence.inputs
+        for clock in self.clocks:
+            moved = inputs.copy()
+            for begin, end, rate in pieces_of(driving):
+                moved[begin:end, clock.column] = delayed(
+                    inputs[begin:end, clock.column], rate, clock.typical_s
+                )
+            self._moved.append(evidence.problem_of(moved))
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.clocks)
+
+    def of(self, section: Section) -> FloatArray:
+        """Those of a section's residuals."""
+        p = self.evidence.fit.model.vector()
+
+        def work(problem: _core.Problem, gains: Any, at: slice) -> FloatArray:
+            here = problem.residuals(p, gains).ravel()
+            there = [
+                self.evidence.section_of(moved, at).residuals(p, gains).ravel()
+                for moved in self._moved
+            ]
+            return np.column_stack([here - t for t in there]) / [c.typical_s for c in self.clocks]
+
+        return section.rows(work)
+
+
+def clock_scores(projected: Directions, rules: Rules) -> list[ClockScore]:
+    """Score the clocks of which something is left beside the fitted parameters."""
+    shifts = next(s for s in projected.sources if isinstance(s, Shifts))
+    place = projected.place(shifts)
+    after, before = np.diag(projected.information)[place], projected.before[place]
+    sizes = np.diag(projected.score[place] / np.maximum(after, 1e-300))
+    ratios = projected.long_run(shifts, None, sizes)[0]
+    return [
+        ClockScore(clock, place.start + i, max(float(ratios[i]), 1.0))
+        for i, clock in enumerate(shifts.clocks)
+        if np.sqrt(after[i]) > rules.retained * np.sqrt(before[i])
+    ]

@@ -90,11 +90,13 @@ def begins(driving: Driving) -> npt.NDArray[np.intp]:
     return np.cumsum([0, *lengths[:-1]])
 
 
-def late(driving: Driving, signal: FloatArray, first: float = 0.0) -> FloatArray:
+def late(
+    signal: FloatArray, begins: npt.NDArray[np.intp], first: float | FloatArray = 0.0
+) -> FloatArray:
     """The signal one sample later: noise of a measurement must not enter its own prediction.
 
     The first sample of a stretch, of which nothing was known, gets `first`.
     """
     out = np.concatenate([signal[:1], signal[:-1]])
-    out[begins(driving)] = first
+    out[begins] = first
     return as_float64(out)

@@ -18,9 +18,10 @@ from ..log import Log
 from ..model import Model
 from ..rules import USUAL, Rules, bic
 from .causes import causes_of
+from .clocks import Shifts
 from .diagnosis import Candidate, Diagnosis
 from .evidence import Evidence
-from .omnibus import omnibus_of
+from .omnibus import Unknown, omnibus_of
 from .refits import finished as finished_of
 from .refits import in_time, refitted
 from .score import Score, ScoreBoard, score_board_of
@@ -80,8 +81,8 @@ def diagnose(
     driving = fit.driving if logs is None else Driving.of(logs)
     possible = considered(fit.model, candidates)
     evidence = Evidence(fit, driving)
-    board = score_board_of(evidence, possible, rules)
-    left = omnibus_of(evidence, rules)
+    board = score_board_of(evidence, possible, rules, Unknown(evidence), Shifts(evidence))
+    left = omnibus_of(evidence, rules, board.projected)
     proposed = causes_of(board, evidence, rules)
     family = board.family_p_values(seed=seed)
     ranked = [

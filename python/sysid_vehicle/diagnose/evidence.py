@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._threads import Workers
 from ..estimate import Driving
+from ..estimate.pieces import DrivingProblem, Part, PiecewiseProblem, Work
 from ..identify import Fit
 from .projection import orthonormal_basis, pseudo_inverse, variance_ratio
 
@@ -19,6 +22,8 @@ FORCES = {"F_x": 0, "F_y": 1, "M_z": 2}
 READINGS = {"r": 7, "a_x": 8, "a_y": 9}
 TARGETS = {**FORCES, **READINGS}
 _AT_ONCE = 16  # columns of one pass
+HELD = 1 << 16
+"""Samples of which all sensitivities are held; longer driving is cut into halves of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,12 +64,17 @@ class Evidence:
     inputs: FloatArray | None = None
 
     @cached_property
-    def problem(self) -> _core.Problem:
+    def problem(self) -> DrivingProblem:
         """The core's problem."""
-        return self.driving.problem(self.fit.model, other_inputs=self.inputs)
+        return self.problem_of(self.inputs)
+
+    def problem_of(self, inputs: FloatArray | None) -> DrivingProblem:
+        """The problem with other inputs than the driving's own."""
+        longest = HELD if self.driving.samples <= HELD else HELD // 2
+        return self.driving.problem(self.fit.model, other_inputs=inputs, longest=longest)
 
     @cached_property
-    def frozen(self) -> _core.FrozenFilter:
+    def frozen(self) -> Any:
         """The filter at the fit."""
         return self.problem.freeze(self.fit.model.vector(), self.fit.noise.vector())
 
@@ -87,6 +97,20 @@ class Evidence:
     def left(self) -> FloatArray:
         """Residuals without what the free parameters can do."""
         return self.project(self.residual)
+
+    def sections(self) -> Iterator[Section]:
+        """All samples: at once, or of long driving some after the others, which are then gone."""
+        if not isinstance(self.problem, PiecewiseProblem):
+            yield Section(self, slice(0, self.driving.samples))
+            return
+        for part in self.problem.parts(self.frozen):
+            yield Section(self, slice(part.piece.begin, part.piece.end), part)
+
+    def section_of(self, problem: DrivingProblem, at: slice) -> _core.Problem:
+        """Samples of a problem of the same driving."""
+        if isinstance(problem, PiecewiseProblem):
+            return problem.build(problem.model, at.start, at.stop)
+        return problem
 
     def project(self, columns: FloatArray) -> FloatArray:
         """Take out what the free parameters can do."""
@@ -123,6 +147,64 @@ class Evidence:
         """Those of some targets that this driving can show."""
         blind = set() if self.driving.force_known else {"F_x", "a_x"}
         return [t for t in (among or TARGETS) if t not in blind]
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Some of the samples, with what their residuals need.
+
+    Attributes
+    ----------
+    evidence : Evidence
+    where : slice
+        Which samples.
+    part : Part, optional
+        None where they are all.
+    """
+
+    evidence: Evidence
+    where: slice
+    part: Part | None = None
+
+    @property
+    def whole(self) -> bool:
+        """Whether these are all samples."""
+        return self.part is None
+
+    def rows(self, work: Work) -> FloatArray:
+        """Rows for each sample, of a problem, its gains and the samples it has."""
+        if self.part is not None:
+            return self.part.rows(work)
+        evidence = self.evidence
+        assert isinstance(evidence.problem, _core.Problem)
+        return work(evidence.problem, evidence.frozen, self.where)
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Whitened residuals, shape (5 n,)."""
+        if self.whole:
+            return self.evidence.residual
+        p = self.evidence.fit.model.vector()
+        return self.rows(lambda q, gains, _: q.residuals(p, gains)).ravel()
+
+    @cached_property
+    def fitted(self) -> FloatArray:
+        """Sensitivities to the free parameters."""
+        if self.whole:
+            return self.evidence.fitted
+        model = self.evidence.fit.model
+        columns = [model.parameters[n].column for n in model.free_names]
+        return self.rows(lambda q, gains, _: q.sensitivities(model.vector(), gains, columns))
+
+    @cached_property
+    def basis(self) -> FloatArray:
+        """Orthonormal directions that hold those."""
+        return self.evidence.basis if self.whole else as_float64(np.linalg.qr(self.fitted)[0])
+
+    @property
+    def left(self) -> FloatArray:
+        """Residuals: without what the parameters can do, where these are all samples."""
+        return self.evidence.left if self.whole else self.residual
 
 
 def solve(R: FloatArray, e: FloatArray) -> Solution:

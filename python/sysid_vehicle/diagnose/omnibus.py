@@ -9,20 +9,27 @@ a measurement must not enter its own prediction.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
-from .._arrays import FloatArray
+from .. import _core
+from .._arrays import FloatArray, as_float64
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import USUAL, Rules
 from ..vehicle import GRAVITY_MPS2
 from .coordinates import begins, late
-from .evidence import Evidence
-from .projection import orthonormal_basis, pseudo_inverse, variance_ratio
+from .directions import Directions
+from .evidence import Evidence, Section
+from .projection import pseudo_inverse
 
 # Targets in the core's order: external F_x, F_y, M_z, then accelerations, then sensor readings.
+_FORCE_SHAPES, _FEW_SHAPES = 12, 4  # signals that act on each force, and on each of the others
+_COPIED = 1e-3  # of its size, below which the fitted parameters can copy a signal
 _TARGETS = {"F_x": 0, "F_y": 1, "M_z": 2, "dv_x/dt": 3, "dv_y/dt": 4}
 _SENSORS = {"r": 7, "a_x": 8, "a_y": 9}
 
@@ -78,76 +85,108 @@ def omnibus(fit: Fit, driving: Driving, rules: Rules = USUAL) -> Omnibus:
     return omnibus_of(Evidence(fit, driving), rules)
 
 
-def omnibus_of(evidence: Evidence, rules: Rules = USUAL) -> Omnibus:
-    """The same of residuals that may be known already."""
-    names, R = _directions(evidence)
-    e = evidence.left
-    information, S = R.T @ R, R.T @ e
-
-    def of(columns: list[int]) -> tuple[float, int]:
+def omnibus_of(
+    evidence: Evidence, rules: Rules = USUAL, projected: Directions | None = None
+) -> Omnibus:
+    """The same of residuals that may be known already, and of `Unknown` directions of them."""
+    if projected is None:
+        projected = Directions(evidence, Unknown(evidence))
+    unknown = next(s for s in projected.sources if isinstance(s, Unknown))
+    place = projected.place(unknown)
+    information, S = projected.information[place, place], projected.score[place]
+    kept = np.flatnonzero(not_copied(projected)[place])
+    names = [unknown.names[i] for i in kept]
+    targets = list(dict.fromkeys(names))
+    tested = [kept, *(kept[[n == t for n in names]] for t in targets)]
+    values, ranks = np.zeros((len(S), len(tested))), []
+    for value, columns in zip(values.T, tested, strict=True):
         inverse, rank = pseudo_inverse(information[np.ix_(columns, columns)])
-        value = np.zeros(len(names))
         value[columns] = inverse @ S[columns]
-        along = R @ value
-        return float(S @ value) / variance_ratio(along, e - along), rank
-
-    statistic, degrees = of(list(range(len(names))))
-    by_target = {t: of([i for i, n in enumerate(names) if n == t])[0] for t in dict.fromkeys(names)}
+        ranks.append(rank)
+    ratios = np.maximum(projected.long_run(unknown, values, values)[0], 1.0)
+    statistics = S @ values / ratios
     return Omnibus(
-        statistic,
-        degrees,
-        float(scipy.stats.chi2.sf(statistic, degrees)),
-        max(by_target, key=lambda t: by_target[t]),
+        float(statistics[0]),
+        ranks[0],
+        float(scipy.stats.chi2.sf(statistics[0], ranks[0])),
+        targets[int(np.argmax(statistics[1:]))],
         rules,
     )
 
 
-def unknown_directions(evidence: Evidence) -> list[tuple[str, FloatArray]]:
-    """Orthonormal directions of each unknown force, moment or reading, by its name."""
-    names, R = _directions(evidence)
-    of = np.array(names)
-    return [(t, orthonormal_basis(R[:, of == t])) for t in dict.fromkeys(names)]
+def not_copied(projected: Directions) -> npt.NDArray[np.bool_]:
+    """Of which directions the fitted parameters leave something."""
+    after, before = np.diag(projected.information), np.maximum(projected.before, 1e-300)
+    return np.asarray(np.sqrt(after) > _COPIED * np.sqrt(before))
 
 
-def _directions(evidence: Evidence) -> tuple[list[str], FloatArray]:
-    """Targets and sensitivities of the virtual signals that the free parameters cannot copy."""
-    names, signals, targets = _virtual(evidence)
-    p = evidence.fit.model.vector()
-    G = evidence.problem.signal_sensitivities(p, evidence.frozen, signals, targets)
-    R = evidence.project(G)
-    kept = np.linalg.norm(R, axis=0) > 1e-3 * np.maximum(np.linalg.norm(G, axis=0), 1e-300)
-    return [n for n, k in zip(names, kept, strict=True) if k], R[:, kept]
+class Unknown:
+    """Virtual signals of the driving that act as forces, moments, accelerations, sensor shifts.
 
+    Attributes
+    ----------
+    names : list of str
+        What each column acts on.
+    """
 
-def _virtual(evidence: Evidence) -> tuple[list[str], FloatArray, list[int]]:
-    """Signals and what they act on: names of the targets, signals as columns, their numbers."""
-    fit, driving = evidence.fit, evidence.driving
-    trace = evidence.problem.trace(fit.model.vector(), fit.noise.vector(), False)
-    state = trace["state"]
-    v, r = state[:, 0], state[:, 2]
-    a = v * r / GRAVITY_MPS2
-    steer = driving.channel("steer_rad")
-    pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
-    pull = pull / max(float(np.nanstd(pull)), 1e-9)
-    w = v / 20.0
-    one = np.ones_like(v)
-    shapes = [one, w**2, a, a**3, a * w**2, a**2, pull, pull * a, pull * np.abs(a), pull**2, r]
-    turn = steer - late(driving, steer)
-    turn[begins(driving)] = 0.0  # what lay between two stretches is no turn of the wheel
-    shapes.append(turn / max(float(np.std(turn)), 1e-9))
-    force = np.column_stack(shapes)
-    few = np.column_stack([one, w**2, a, pull])
-    # Known one sample earlier; the first sample of a stretch knows nothing.
-    force, few = late(driving, force), late(driving, few)
-    names: list[str] = []
-    targets: list[int] = []
-    blocks: list[FloatArray] = []
-    heavy = set() if driving.force_known else {"F_x"}
-    for target, number in {**_TARGETS, **_SENSORS}.items():
-        if target in heavy or (target == "a_x" and not driving.force_known):
-            continue
-        block = force if number <= 2 else few
-        blocks.append(block)
-        names += [target] * block.shape[1]
-        targets += [number] * block.shape[1]
-    return names, np.hstack(blocks), targets
+    def __init__(self, evidence: Evidence) -> None:
+        self.evidence = evidence
+        driving = evidence.driving
+        self._steer = driving.channel("steer_rad")
+        turn = self._turned(self._steer, begins(driving))
+        self._turn_std = max(float(np.std(turn)), 1e-9)
+        self._pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
+        self._pull_std = max(float(np.nanstd(self._pull)), 1e-9)
+        self.targets: list[int] = []
+        self.names: list[str] = []
+        heavy = set() if driving.force_known else {"F_x", "a_x"}
+        for target, number in {**_TARGETS, **_SENSORS}.items():
+            if target not in heavy:
+                count = _FORCE_SHAPES if number <= 2 else _FEW_SHAPES
+                self.names += [target] * count
+                self.targets += [number] * count
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.names)
+
+    @property
+    def groups(self) -> list[slice]:
+        """The columns of each target."""
+        firsts = [i for i, n in enumerate(self.names) if n not in self.names[:i]]
+        return [slice(a, b) for a, b in pairwise([*firsts, self.width])]
+
+    def of(self, section: Section) -> FloatArray:
+        """Sensitivities of a section's residuals."""
+        fit = self.evidence.fit
+        p, noise = fit.model.vector(), fit.noise.vector()
+
+        def work(problem: _core.Problem, gains: Any, at: slice) -> FloatArray:
+            state = problem.trace(p, noise, False)["state"]
+            return problem.signal_sensitivities(p, gains, self.signals(state, at), self.targets)
+
+        return section.rows(work)
+
+    def signals(self, state: FloatArray, at: slice) -> FloatArray:
+        """Signals as columns, from the filter's states at some samples."""
+        every = begins(self.evidence.driving)
+        # The first sample of a stretch knows nothing.
+        first = np.union1d([0], every[(every > at.start) & (every < at.stop)] - at.start)
+        v, r = state[:, 0], state[:, 2]
+        a = v * r / GRAVITY_MPS2
+        pull = self._pull[at] / self._pull_std
+        w = v / 20.0
+        one = np.ones_like(v)
+        shapes = [one, w**2, a, a**3, a * w**2, a**2, pull, pull * a, pull * np.abs(a), pull**2, r]
+        shapes.append(self._turned(self._steer[at], first) / self._turn_std)
+        # Known one sample earlier.
+        force, few = (late(np.column_stack(c), first) for c in (shapes, [one, w**2, a, pull]))
+        found = [force if self.targets[g.start] <= 2 else few for g in self.groups]
+        return as_float64(np.hstack(found))
+
+    @staticmethod
+    def _turned(steer: FloatArray, first: npt.NDArray[np.intp]) -> FloatArray:
+        turn = steer - late(steer, first)
+        turn[first] = 0.0  # what lay between two stretches is no turn of the wheel
+        return as_float64(turn)

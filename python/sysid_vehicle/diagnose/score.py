@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import scipy
@@ -26,12 +25,13 @@ from ..estimate import Driving
 from ..identify import Fit
 from ..rules import USUAL, Rules
 from .coordinates import blocks
+from .directions import Columns, Directions
 from .evidence import Evidence
-from .projection import long_run_ratios, pseudo_inverse, score_terms
-from .sensitivity import duration, sensitivities
+from .projection import pseudo_inverse
+from .sensitivity import Sensitivities, duration, sensitivities
 
 _BLOCK_S, _FEWEST_BLOCKS = 0.5, 24
-_ROWS = 5 * 512  # of residuals at once
+_DRAWN = 1 << 22  # random numbers at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,39 +68,42 @@ class ScoreBoard:
 
     Attributes
     ----------
-    directions : dict of str to array
-        Projected sensitivities R_j by effect id.
-    residual : array
-        Whitened residuals, projected off the fitted parameters.
+    columns : tuple of int
+        Which columns of `sensitivities` are scored.
+    places : dict of str to slice
+        By effect, where its directions stand among those.
     gradient, information : array, shape (n,), (n, n)
-        S and I of all directions together, in the order of `directions`.
+        S and I of all directions together.
     blocks : array, shape (blocks, n)
         What stretches of the driving add to the gradient by chance, over the root of each effect's
         variance ratio.
     """
 
     scores: tuple[Score, ...]
-    directions: dict[str, FloatArray]
-    residual: FloatArray
+    columns: tuple[int, ...]
+    places: dict[str, slice]
     gradient: FloatArray
     information: FloatArray
     blocks: FloatArray
+    sensitivities: Sensitivities
+    projected: Directions
 
-    @cached_property
-    def _places(self) -> dict[str, slice]:
-        ends = np.cumsum([0, *(R.shape[1] for R in self.directions.values())])
-        return {n: slice(a, b) for n, (a, b) in zip(self.directions, pairwise(ends), strict=True)}
+    @property
+    def directions(self) -> dict[str, FloatArray]:
+        """Projected sensitivities R_j by effect id, shape (5 n, parameters)."""
+        whole = np.concatenate([R for _, R, _ in self.projected.rows(self.sensitivities)])
+        return {n: whole[:, self.columns[own]] for n, own in self.places.items()}
 
     @cached_property
     def _alone(self) -> dict[str, float]:
-        return {n: self._joint(n) for n in self.directions}
+        return {n: self._joint(n) for n in self.places}
 
     def joint_statistic(self, *names: str) -> float:
         """T of several effects together."""
         return self._alone[names[0]] if len(names) == 1 else self._joint(*names)
 
     def _joint(self, *names: str) -> float:
-        where = np.concatenate([np.r_[self._places[n]] for n in names])
+        where = np.concatenate([np.r_[self.places[n]] for n in names])
         S = self.gradient[where]
         return float(S @ pseudo_inverse(self.information[np.ix_(where, where)])[0] @ S)
 
@@ -117,10 +120,16 @@ class ScoreBoard:
         # In units of their own: rounding at the largest would drown the smallest.
         scale = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
         covariance = self.information / np.outer(scale, scale)
-        turned = generator(seed).standard_normal((draws, len(self.blocks)))
-        normal = turned @ (self.blocks / scale)
+        rng, blocks = generator(seed), self.blocks / scale
+        some = max(_DRAWN // max(len(blocks), 1), 1)
+        normal = np.vstack(
+            [
+                rng.standard_normal((min(some, draws - first), len(blocks))) @ blocks
+                for first in range(0, draws, some)
+            ]
+        )
         smallest = _smallest_p_values(
-            [(s.effect, self._places[s.effect.id]) for s in self.scores], normal, covariance
+            [(s.effect, self.places[s.effect.id]) for s in self.scores], normal, covariance
         )
         smallest.sort()
         alone = np.array([s.p_value for s in self.scores])
@@ -148,24 +157,20 @@ def score_board(
 
 
 def score_board_of(
-    evidence: Evidence, candidates: tuple[Effect, ...], rules: Rules = USUAL
+    evidence: Evidence,
+    candidates: tuple[Effect, ...],
+    rules: Rules = USUAL,
+    *others: Columns,
 ) -> ScoreBoard:
-    """The same of residuals that may be known already."""
-    found = sensitivities(evidence, candidates)
-    e = evidence.left
-    if not found.candidates:
-        return ScoreBoard((), {}, e, np.empty(0), np.empty((0, 0)), np.empty((0, 0)))
-    # In place and by pieces that stay in the cache: most of the work is in passing over as many
-    # numbers.
-    R = found.columns
-    copied = evidence.basis.T @ R
-    information = np.zeros((R.shape[1], R.shape[1]))
-    for first in range(0, len(R), _ROWS):
-        piece = R[first : first + _ROWS]
-        piece -= evidence.basis[first : first + _ROWS] @ copied
-        information += piece.T @ piece
-    after = np.diag(information)
-    before = after + np.einsum("ij,ij->j", copied, copied)
+    """The same of residuals that may be known already.
+
+    `others` are gone through together with the effects, and stand behind them in `projected`.
+    """
+    found = sensitivities(evidence, tuple(candidates))
+    projected = Directions(evidence, found, *others)
+    every = projected.place(found)
+    after = np.diag(projected.information)[every]
+    before = projected.before[every]
     visible: list[tuple[Effect, float, slice]] = []
     kept: list[int] = []
     for effect in found.candidates:
@@ -174,24 +179,20 @@ def score_board_of(
         if retained >= rules.retained:
             visible.append((effect, retained, slice(len(kept), len(kept) + own.stop - own.start)))
             kept += list(range(own.start, own.stop))
-    if len(kept) < R.shape[1]:
-        for first in range(0, len(R), _ROWS):
-            piece = R[first : first + _ROWS]
-            piece[:, : len(kept)] = piece[:, kept]
-        R, information = R[:, : len(kept)], information[np.ix_(kept, kept)]
-    S = R.T @ e
+    information = projected.information[np.ix_(kept, kept)]
+    S = projected.score[kept]
     covariance = np.zeros_like(information)
     for *_, own in visible:
         covariance[own, own] = pseudo_inverse(information[own, own])[0]
     # Each effect's own explanation is taken out before its residuals are asked for their colour.
-    sizes = np.zeros_like(information)
+    sizes = np.zeros_like(projected.information[every, every])
     for *_, own in visible:
-        sizes[own, own] = np.repeat(
-            (covariance[own, own] @ S[own])[:, None], own.stop - own.start, 1
-        )
-    terms = score_terms(R, e, sizes)
-    ratios = long_run_ratios(terms, np.diag(information))
+        at = slice(kept[own.start], kept[own.stop - 1] + 1)
+        sizes[at, at] = np.repeat((covariance[own, own] @ S[own])[:, None], own.stop - own.start, 1)
     seconds = duration(evidence.driving)
+    block_s = min(_BLOCK_S, evidence.driving.usable_s / _FEWEST_BLOCKS)
+    ratios, added = projected.long_run(found, None, sizes, blocks(evidence.driving, block_s))
+    ratios, added = ratios[kept], added[:, kept]
     scores = [
         _score(
             effect,
@@ -205,18 +206,19 @@ def score_board_of(
         for effect, retained, own in visible
     ]
     scores.sort(key=lambda s: (s.p_value, -s.statistic))
-    directions = {effect.id: R[:, own] for effect, _, own in visible}
     more = np.ones(len(kept))
     for *_, own in visible:
         more[own] = max(float(ratios[own].max()), 1.0)
-    blocks = _by_block(terms, evidence.driving) / np.sqrt(more)
-    return ScoreBoard(tuple(scores), directions, e, S, information, blocks)
-
-
-def _by_block(terms: FloatArray, driving: Driving) -> FloatArray:
-    """Sums over blocks of half a second, or shorter ones where there would be too few."""
-    starts = blocks(driving, min(_BLOCK_S, driving.usable_s / _FEWEST_BLOCKS))
-    return as_float64(np.add.reduceat(terms, starts, axis=0))
+    return ScoreBoard(
+        tuple(scores),
+        tuple(kept),
+        {effect.id: own for effect, _, own in visible},
+        S,
+        information,
+        added / np.sqrt(more),
+        found,
+        projected,
+    )
 
 
 def _score(

@@ -8,14 +8,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from .. import _core
-from .._arrays import FloatArray
+from .._arrays import FloatArray, as_float64
+from .._threads import in_parallel
 from ..effects import Effect
 from ..estimate import Driving
-from .evidence import Evidence
+from .evidence import Evidence, Section
 
 _AT_ONCE = 24  # columns of one pass: each costs little more, and more are held twice meanwhile
 
@@ -26,21 +28,75 @@ class Sensitivities:
 
     Attributes
     ----------
+    evidence : Evidence
     candidates : tuple of Effect
         Those that this driving can show at all.
-    columns : array, shape (5 n, parameters of all of them)
-        By their parameters, at the null values; sample by sample, channel by channel.
     places : dict of str to slice
         Which columns belong to which effect.
     """
 
+    evidence: Evidence
     candidates: tuple[Effect, ...]
-    columns: FloatArray
     places: dict[str, slice]
+    groups = ()
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return max((own.stop for own in self.places.values()), default=0)
+
+    @property
+    def columns(self) -> FloatArray:
+        """By their parameters, at the null values, shape (5 n, width)."""
+        return np.concatenate([self.of(section) for section in self.evidence.sections()])
+
+    def of(self, section: Section) -> FloatArray:
+        """The same of a section of the residuals."""
+        # In place: most of the work is in passing over so many numbers.
+        out = np.empty((len(section.residual), self.width))
+        model, known = self.evidence.fit.model, self.evidence.driving.force_known
+        p, base = model.vector(self.candidates), model.vector()
+        seconds = duration(self.evidence.driving)
+
+        def together(few: tuple[Effect, ...]) -> None:
+            columns = [i for c in few for i in c.columns]
+            core = model.core(force_known=known, also=few)
+            found = section.rows(lambda q, g, _: q.with_model(core).sensitivities(p, g, columns))
+            at = 0
+            for c in few:
+                out[:, self.places[c.id]] = found[:, at : at + len(c.columns)]
+                at += len(c.columns)
+
+        unmoved = {(section.where.start, section.where.stop): section.residual}
+
+        def stepped(c: Effect) -> None:
+            core = model.core(force_known=known, also=(c,))
+            for i, (there, step) in enumerate(_steps(c, p, seconds)):
+
+                def moved(
+                    q: _core.Problem,
+                    g: Any,
+                    at: slice,
+                    there: FloatArray = there,
+                    step: float = step,
+                ) -> FloatArray:
+                    here = unmoved.get((at.start, at.stop))
+                    if here is None:
+                        here = q.residuals(base, g).ravel()
+                        unmoved[at.start, at.stop] = here
+                    after = q.with_model(core).residuals(there, g).ravel()
+                    return as_float64((here - after) / step)
+
+                out[:, self.places[c.id].start + i] = section.rows(moved)
+
+        groups = _groups([c for c in self.candidates if _regular(c)])
+        in_parallel(together, groups)
+        in_parallel(stepped, [c for c in self.candidates if not _regular(c)])
+        return out
 
 
 def sensitivities(evidence: Evidence, candidates: Sequence[Effect]) -> Sensitivities:
-    """Differentiate the residuals of a fit by effects that its model lacks.
+    """Those of the residuals of a fit to effects that its model lacks.
 
     Parameters
     ----------
@@ -48,36 +104,13 @@ def sensitivities(evidence: Evidence, candidates: Sequence[Effect]) -> Sensitivi
     candidates : sequence of Effect
     """
     driving = evidence.driving
-    model = evidence.fit.model
-    possible = model.seated(e for e in candidates if driving.shows(e))
+    possible = evidence.fit.model.seated(e for e in candidates if driving.shows(e))
     long = duration(driving)
     ends = np.cumsum([0, *(_width(e, long) for e in possible)])
     places = {
         e.id: slice(int(a), int(b)) for e, (a, b) in zip(possible, pairwise(ends), strict=True)
     }
-    # In place: most of the work is in passing over so many numbers.
-    out = np.empty((len(evidence.residual), int(ends[-1])))
-    p = model.vector(possible)
-
-    def acting(*effects: Effect) -> _core.Problem:
-        return evidence.problem.with_model(
-            model.core(force_known=driving.force_known, also=effects)
-        )
-
-    for few in _groups([c for c in possible if _regular(c)]):
-        columns = [i for c in few for i in c.columns]
-        found = acting(*few).sensitivities(p, evidence.frozen, columns)
-        at = 0
-        for c in few:
-            out[:, places[c.id]] = found[:, at : at + len(c.columns)]
-            at += len(c.columns)
-    for c in possible:
-        if not _regular(c):
-            own, one = out[:, places[c.id]], acting(c)
-            for i, (there, step) in enumerate(_steps(c, p, long)):
-                moved = one.residuals(there, evidence.frozen).ravel()
-                own[:, i] = (evidence.residual - moved) / step
-    return Sensitivities(possible, out, places)
+    return Sensitivities(evidence, possible, places)
 
 
 def _regular(effect: Effect) -> bool:

@@ -28,7 +28,7 @@ from .._arrays import FloatArray, as_float64
 from .._style import AFTER, axes_or_new, tidy
 from .._text import brief
 from ..vehicle import GRAVITY_MPS2
-from .coordinates import COORDINATES, Coordinate, coordinates, late
+from .coordinates import COORDINATES, Coordinate, begins, coordinates, late
 from .evidence import FORCES, Evidence
 from .force_map import UNITS
 from .projection import variance_ratio
@@ -200,9 +200,9 @@ def known(evidence: Evidence) -> dict[str, FloatArray]:
     """Coordinates of every sample as they were known one sample earlier."""
     fit, driving = evidence.fit, evidence.driving
     trace = evidence.problem.trace(fit.model.vector(), fit.noise.vector(), False)
-    now = coordinates(fit, driving, trace["state"])
+    now, first = coordinates(fit, driving, trace["state"]), begins(driving)
     return {
-        name: late(driving, x, float(np.median(x))) for name, x in now.items() if name != "time_s"
+        name: late(x, first, float(np.median(x))) for name, x in now.items() if name != "time_s"
     }
 
 
@@ -266,6 +266,8 @@ def _posterior(
 
 def _band(V: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Half the width of the band that holds all of a normal vector with 95 %."""
+    if not len(V):
+        return np.empty(0)  # no place was visited often enough
     values, vectors = np.linalg.eigh(V)
     std = np.sqrt(np.maximum(np.diag(V), 1e-300))
     draws = rng.standard_normal((_DRAWS, len(V))) @ (vectors * np.sqrt(np.maximum(values, 0.0))).T

@@ -16,13 +16,18 @@ from ..errors import InvalidInput
 from ..log import Log, several_logs
 from ..model import Model
 from ..sensors import quantum
+from . import pieces
 from .channels import check_channels, has_channels, logged_channels
 from .inputs import quiet
+from .pieces import DrivingProblem, PiecewiseProblem, cut
 
 MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 """Measured channels, in the core's order."""
 
 UNITS = dict(zip(MEASURED, ("m/s", "m/s", "rad/s", "m/s2", "m/s2"), strict=True))
+
+_Part = tuple[Log, slice, int]
+"""Log, samples of it, and the place of the first among all usable samples."""
 
 
 @dataclass(frozen=True)
@@ -154,8 +159,14 @@ class Driving:
 
     def inputs(self) -> FloatArray:
         """Steering angle and wheel force (or acceleration) without their noise, samples x 2."""
-        whole = [(self.logs[s.log], s.where) for s in self.stretches]
-        return as_float64(np.vstack([self._inputs(log, where) for log, where in whole]))
+        return as_float64(np.vstack([self._inputs(log, where) for log, where, _ in self._whole]))
+
+    @cached_property
+    def _whole_inputs(self) -> FloatArray:
+        """The same, without a copy where there is one stretch."""
+        if len(self._whole) == 1:
+            return self._inputs(*self._whole[0][:2])
+        return self.inputs()
 
     def _inputs(self, log: Log, where: slice) -> FloatArray:
         """The inputs of some samples; every problem of this driving needs them."""
@@ -189,7 +200,8 @@ class Driving:
         *,
         most_samples: int | None = None,
         other_inputs: FloatArray | None = None,
-    ) -> _core.Problem:
+        longest: int | None = None,
+    ) -> DrivingProblem:
         """The core's problem for a model.
 
         Parameters
@@ -198,24 +210,35 @@ class Driving:
             Of at most so many samples.
         other_inputs : array, shape (samples, 2), optional
             In place of `inputs()`.
+        longest : int, optional
+            Samples that are worked on at once; usually `pieces.LONGEST`.
 
         Raises
         ------
         InvalidInput
             A log lacks a column that an effect of the model reads.
         """
-        problem = _core.Problem(model.core(force_known=self.force_known))
-        for log, where, at in self._pieces(most_samples):
-            inputs = self._inputs(log, where)
-            if other_inputs is not None:
-                inputs = other_inputs[at : at + where.stop - where.start]
-            self._add_run(problem, model, log, where, inputs)
-        return problem
+        if channels_in_use():
+            for s in self.stretches:
+                check_channels(self.logs[s.log], s.where, model.parts)
+        core = model.core(force_known=self.force_known)
+        longest = pieces.LONGEST if longest is None else longest
+        if most_samples is not None or self.samples <= longest:
+            return self._problem(core, self._pieces(most_samples), other_inputs)
+        # Noise is taken out of the whole signal: a cut is no corner.
+        inputs = self._whole_inputs if other_inputs is None else other_inputs
+        channels = self.channels() if channels_in_use() else None
+
+        def some(core: _core.SingleTrack, begin: int, end: int) -> _core.Problem:
+            return self._problem(core, self._between(begin, end), inputs, channels)
+
+        runs = [(at, at + where.stop - where.start, log.rate_hz) for log, where, at in self._whole]
+        return PiecewiseProblem(some, core, cut(runs, longest))
 
     def windows(
         self, model: Model, windows: Sequence[tuple[int, int]], motion: FloatArray
     ) -> _core.Problem:
-        """The core's problem whose runs are windows, each from a state that is given.
+        """The core's problem whose runs are windows, each from a motion that is given.
 
         Parameters
         ----------
@@ -224,50 +247,64 @@ class Driving:
         motion : array, shape (samples, 3 or more)
             v_x, v_y [m/s], yaw rate [rad/s] with which the windows begin.
         """
-        problem = _core.Problem(model.core(force_known=self.force_known))
-        firsts = [at for _, _, at in self._pieces(None)]
-        for first, length in windows:
-            number = int(np.searchsorted(firsts, first, side="right")) - 1
-            log, whole, at = self._pieces(None)[number]
-            begin = whole.start + first - at
-            where = slice(begin, begin + length)
-            inputs = self._inputs(log, whole)[first - at : first - at + length]
-            self._add_run(problem, model, log, where, inputs, motion[first, :3])
+        core = model.core(force_known=self.force_known)
+        parts = [part for first, size in windows for part in self._between(first, first + size)]
+        channels = self.channels() if channels_in_use() else None
+        return self._problem(core, parts, self._whole_inputs, channels, motion)
+
+    def _problem(
+        self,
+        core: _core.SingleTrack,
+        parts: list[_Part],
+        other_inputs: FloatArray | None,
+        channels: FloatArray | None = None,
+        motion: FloatArray | None = None,
+    ) -> _core.Problem:
+        """Runs of the core, each of which begins with a motion where one is given."""
+        problem = _core.Problem(core)
+        for log, where, at in parts:
+            own = slice(at, at + where.stop - where.start)
+            inputs = self._inputs(log, where) if other_inputs is None else other_inputs[own]
+            if channels_in_use():
+                more = logged_channels(log, where) if channels is None else channels[own]
+                inputs = np.column_stack([inputs, more])
+            y = np.full((len(inputs), len(MEASURED)), np.nan)
+            for i, c in enumerate(MEASURED):
+                if log.has(c) and (self.force_known or c != "ax_mps2"):
+                    y[:, i] = log[c][where]
+            if motion is not None:
+                y[0, :3] = motion[at, :3]
+            began = where.start / log.rate_hz
+            problem.add_run(1.0 / log.rate_hz, as_float64(inputs), as_float64(y), began, log.name)
         return problem
 
-    def _add_run(
-        self,
-        problem: _core.Problem,
-        model: Model,
-        log: Log,
-        where: slice,
-        inputs: FloatArray,
-        motion: FloatArray | None = None,
-    ) -> None:
-        """Add samples of a log to a problem, which begin with a motion where one is given."""
-        if channels_in_use():
-            check_channels(log, where, model.parts)
-            inputs = np.column_stack([inputs, logged_channels(log, where)])
-        y = np.full((len(inputs), len(MEASURED)), np.nan)
-        for i, c in enumerate(MEASURED):
-            if log.has(c) and (self.force_known or c != "ax_mps2"):
-                y[:, i] = log[c][where]
-        if motion is not None:
-            y[0, : len(motion)] = motion
-        began = where.start / log.rate_hz
-        problem.add_run(1.0 / log.rate_hz, as_float64(inputs), as_float64(y), began, log.name)
+    @cached_property
+    def _whole(self) -> list[_Part]:
+        """Log, samples and place among all usable samples of each stretch."""
+        lengths = [s.where.stop - s.where.start for s in self.stretches]
+        ends = np.cumsum([0, *lengths])
+        return [
+            (self.logs[s.log], s.where, int(at))
+            for s, at in zip(self.stretches, ends, strict=False)
+        ]
 
-    def _pieces(self, most_samples: int | None) -> list[tuple[Log, slice, int]]:
+    def _between(self, begin: int, end: int) -> list[_Part]:
+        """What lies between two of all usable samples."""
+        found: list[_Part] = []
+        for log, where, at in self._whole:
+            first, last = max(begin - at, 0), min(end - at, where.stop - where.start)
+            if first < last:
+                some = slice(where.start + first, where.start + last)
+                found.append((log, some, at + first))
+        return found
+
+    def _pieces(self, most_samples: int | None) -> list[_Part]:
         """Logs, samples of them, and the place of the first among all usable samples."""
-        whole = []
-        at = 0
-        for s in self.stretches:
-            whole.append((self.logs[s.log], s.where, at))
-            at += s.where.stop - s.where.start
+        whole = self._whole
         if most_samples is None or self.samples <= most_samples:
             return whole
         # Windows of some seconds, evenly spread, keep every kind of driving in.
-        pieces: list[tuple[Log, slice, int]] = []
+        pieces: list[_Part] = []
         share = most_samples / self.samples
         for log, where, at in whole:
             length = int(4.0 * log.rate_hz)

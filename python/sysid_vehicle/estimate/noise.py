@@ -8,13 +8,13 @@ from typing import Protocol
 
 import numpy as np
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._text import html_text
 from ..errors import NumericalError
 from ..vehicle import GRAVITY_MPS2, Vehicle
 from .driving import MEASURED, UNITS, Driving
 from .inputs import white_noise_std
+from .pieces import DrivingProblem
 
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
@@ -193,7 +193,7 @@ def generous(sensor: Sequence[float], vehicle: Vehicle) -> NoiseModel:
 
 
 def learn_noise(
-    problem: _core.Problem, p: FloatArray, start: NoiseModel, vehicle: Vehicle, *, rounds: int = 8
+    problem: DrivingProblem, p: FloatArray, start: NoiseModel, vehicle: Vehicle, *, rounds: int = 8
 ) -> tuple[NoiseModel, float]:
     """Noise of maximum likelihood at fixed model parameters, and the log-likelihood."""
     found, value = maximise_noise(problem, p, start.vector(), *noise_range(vehicle), rounds=rounds)

@@ -12,6 +12,7 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError, warn
 from ..estimate import Driving, NoiseModel, first_guess, noise_range
+from ..estimate.pieces import DrivingProblem
 from ..log import Log, check_car, check_excitation
 from ..model import Model
 from .ahead import predicting_ahead
@@ -184,7 +185,7 @@ def _told(
     return model
 
 
-def objective_of(model: Model, problem: _core.Problem, driving: Driving) -> Objective:
+def objective_of(model: Model, problem: DrivingProblem, driving: Driving) -> Objective:
     """The likelihood of a problem with the priors of a model's free parameters."""
     known = model.parameters
     stated = {known[n].column: prior for n, prior in model.priors.items()}

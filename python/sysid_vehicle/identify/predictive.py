@@ -13,12 +13,13 @@ Association 1986). Where the fitted driving determines every parameter, p is p^.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..estimate import Driving, NoiseModel
+from ..estimate.pieces import DrivingProblem
 from ..model import Model
 from .box import free_box
 from .fit import Fit
@@ -66,7 +67,7 @@ class _Remembered:
         slopes[:, self.box.columns] = self.root / self.units(x)
         return as_float64(-self.root @ off), slopes
 
-    def occam(self, problem: _core.Problem, p: FloatArray, frozen: _core.FrozenFilter) -> float:
+    def occam(self, problem: DrivingProblem, p: FloatArray, frozen: Any) -> float:
         """Half the log of by how much the other driving narrows the parameters down."""
         _, _, learnt = problem.normal_equations(p, frozen, self.box.columns)
         units = self.units(p[self.box.columns])
