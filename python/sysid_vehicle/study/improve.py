@@ -197,8 +197,8 @@ def _changes(
     """How errors 1 to 5 s ahead change with each effect, on validation and on training data."""
     return {
         name: (
-            changes_ahead(before, after, test),
-            changes(before, after, after.driving, AHEAD),
+            changes_ahead(before, after, test, reach=True),
+            changes(before, after, after.driving, AHEAD, reach=True),
         )
         for before, after in pairwise(fits)
         for name in set(after.model.effects) - set(before.model.effects)
