@@ -1,7 +1,9 @@
-"""Threads that do not outlast the call that started them."""
+"""Threads that do not outlast the call that started them, and work that ends in time."""
 
+import math
 import os
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -40,6 +42,52 @@ def shared_cores() -> Iterator[None]:
         _here.shared = before
 
 
+class TimeUp(Exception):
+    """The time that work was given is over (`before`)."""
+
+
+def before(ends: float, work: Callable[[], R], otherwise: R) -> R:
+    """What work gives, or something else if it is not done in time.
+
+    Searches ask between two passes over the data whether it is time to stop (`check_time`), those
+    in pools that the work opens too.
+
+    Parameters
+    ----------
+    ends : float
+        By `time.perf_counter`.
+    work : callable
+    otherwise : object
+    """
+    outer = _ends()
+    _here.ends = min(ends, outer)
+    try:
+        check_time()
+        return work()
+    except TimeUp:
+        if time.perf_counter() > outer:
+            raise  # the work that this one is a part of has no time left either
+        return otherwise
+    finally:
+        _here.ends = outer
+
+
+def check_time() -> None:
+    """Go on, or end what `before` gave its time to.
+
+    Raises
+    ------
+    TimeUp
+    """
+    if time.perf_counter() > _ends():
+        raise TimeUp
+
+
+def _ends() -> float:
+    found: float = getattr(_here, "ends", math.inf)
+    return found
+
+
 class Workers(ThreadPoolExecutor):
     """A pool of threads for a `with` block that ends with the block.
 
@@ -58,12 +106,12 @@ class Workers(ThreadPoolExecutor):
     """
 
     def __init__(self, count: int | None = None) -> None:
-        self._stop = _core.Stop()
+        self._stop, self._ends = _core.Stop(), _ends()
         threads = usual_count() if count is None else whole(count, "workers", 1)
         super().__init__(threads, initializer=self._begin)
 
     def _begin(self) -> None:
-        _here.shared = True
+        _here.shared, _here.ends = True, self._ends
         self._stop.follow()
 
     def __exit__(

@@ -174,3 +174,19 @@ def test_parameters_that_serve_one_step_at_the_price_of_seconds_are_not_taken(
 
 def test_an_error_that_grows_is_not_called_gone() -> None:
     assert str(Beyond((1.0, 7.9), -6.9, -200.0, 0.03)) == "0 % (0 to 3)"
+
+
+def test_how_far_an_error_could_fall(fit: Fit, late: Fit, course: Log) -> None:
+    """A lag of the steering moves most of the error of yaw rate, a bias of a_y none of it."""
+    driving = Driving.of(course)
+    told = changes(late, fit, driving, (1.0,), reach=True)
+    found = {c.channel: c for c in told}
+    yaw = found["yaw_rate_radps"]
+    # What was moved was error: it falls by about as much.
+    assert -yaw.log_ratio == pytest.approx(yaw.reach, rel=0.3)
+    biased = fit.model.add("accelerometer_bias").with_values({"accelerometer_bias.ay_mps2": 0.3})
+    moved = changes(fit, replace(fit, model=biased), driving, (1.0,), reach=True)
+    assert [c.channel for c in moved if c.reach > np.log(1.05)] == ["ay_mps2"]
+    assert all(c.reach == np.inf for c in changes(fit, late, driving, (1.0,)))
+    broken = replace(fit, model=fit.model.with_values({"B_front": float("nan")}))
+    assert all(c.reach == np.inf for c in changes(fit, broken, driving, (1.0,), reach=True))

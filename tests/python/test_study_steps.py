@@ -7,7 +7,6 @@ import pytest
 
 from sysid_vehicle import Diagnosis, Fit, Log, Model, compare, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import possible
-from sysid_vehicle.diagnose.refits import in_time
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
@@ -214,19 +213,13 @@ def test_what_was_refitted_when_the_time_is_over_is_added(
     monkeypatch.setattr("time.perf_counter", lambda: next(clock, 2.0))
     monkeypatch.setattr(Search, "_diagnosis", lambda _, fit: replace(dx, fit=fit))
     for refits in ("_with_subset", "_with_others"):
-        monkeypatch.setattr(f"sysid_vehicle.study.steps.{refits}", None)
+        monkeypatch.setattr(f"sysid_vehicle.study.steps.{refits}", pytest.fail)
     trail = Trail([baseline])
     replace(search(driving[1], 4, []), ends=1.0).follow(trail)
     held = first_that_holds(dx, baseline, driving[1])
     assert held is not None
     assert [f.model.effects for f in trail.fits] == [(), held[1].model.effects]
     assert set(trail.stopped) == {c.id for c in dx.significant}
-
-
-def test_no_refit_begins_after_the_time_limit(dx: Diagnosis) -> None:
-    c = dx.ranking[0]
-    assert in_time(lambda c: replace(c, statistic=-1.0), np.inf)(c).statistic == -1.0
-    assert in_time(lambda c: replace(c, statistic=-1.0), 0.0)(c) is c
 
 
 def test_the_story_leads_over_every_effect_of_its_end(
@@ -241,6 +234,7 @@ def test_the_story_leads_over_every_effect_of_its_end(
     assert [len(f.model.effects) for f in story] == [0, 1, 2]
     assert "head_wind" not in story[1].model.effects
     assert way([baseline]) == [baseline]
+    assert way([baseline, windy, final], 0.0) == [baseline, final]
 
 
 def test_what_is_not_there_is_dropped_and_what_is_needed_stays(dx: Diagnosis) -> None:

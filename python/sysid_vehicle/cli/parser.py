@@ -137,7 +137,7 @@ def _search(parser: argparse.ArgumentParser) -> None:
         "--time-limit",
         type=_seconds,
         metavar="S",
-        help="begin no further step after S seconds and judge what was found until then",
+        help="end refits after S seconds and judge what was found until then",
     )
     parser.add_argument(
         "--matters",

@@ -69,7 +69,8 @@ def diagnose(
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
     time_limit_s : float, optional
-        After so many seconds no further refit begins; the best effect is refitted in any case.
+        After so many seconds refits end: what was not refitted by then is ranked by its score,
+        and not named.
     """
     ends = time.perf_counter() + duration(time_limit_s, "time_limit_s")
     rules = rules.at(alpha)
@@ -101,7 +102,7 @@ def diagnose(
     few = _worth_refitting([c for c in ranked if c.p_value < rules.alpha], refits)
     if few:
         # What the best one gains tells which of the others cannot come near it.
-        first = refitted(fit, driving, few[0])
+        first = in_time(lambda c: refitted(fit, driving, c), ends)(few[0])
         best = max(first.statistic, few[0].statistic)
         others = [
             c
@@ -122,6 +123,8 @@ def diagnose(
             top = max(c.statistic for c in tried)
             near = [c for c in tried if c.statistic > 0.4 * top]
             finished = list(pool.map(in_time(lambda c: finished_of(fit, c), ends), near))
+        if any(c is begun and c.fit for c, begun in zip(finished, near, strict=True)):
+            finished = near  # with noise of their own only some would seem the likelier ones
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         finished = [_with_refit_rivals(c, finished, 2.0 * rules.apart) for c in finished]
         done = {c.id for c in finished}

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from .._threads import before
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refine, refit
@@ -38,8 +38,8 @@ def refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
 def in_time(
     work: Callable[[Candidate], Candidate], ends: float
 ) -> Callable[[Candidate], Candidate]:
-    """The same, but what would begin after `ends`, by `time.perf_counter`, is left as it is."""
-    return lambda c: work(c) if time.perf_counter() < ends else c
+    """The same, but what is not done at `ends`, by `time.perf_counter`, is left as it is."""
+    return lambda c: before(ends, lambda: work(c), c)
 
 
 def finished(fit: Fit, c: Candidate) -> Candidate:

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from .._text import html_text
+from .._threads import check_time
 from ..errors import NumericalError
 from ..vehicle import GRAVITY_MPS2, Vehicle
 from .driving import MEASURED, UNITS, Driving
@@ -249,6 +250,7 @@ def maximise_noise(
     value, gradient, information = problem.noise_score(p, noise_of(eta))
     damping = 1e-2
     for _ in range(rounds):
+        check_time()
         # At a bound, only steps back inside count.
         free = ~(((eta <= low) & (gradient < 0)) | ((eta >= high) & (gradient > 0)))
         free &= (np.diag(information) > 1e-9) & there_is

@@ -74,8 +74,8 @@ def _row(job: Job, study: Study, seconds: float) -> Row:
         job.car,
         verdict=study.verdict,
         effects=tuple(
-            _effect(a, {c: g[0] for c, g in ahead.gains(i + 1).items()})
-            for i, a in enumerate(study.added)
+            _effect(a, {c: g[0] for c, g in ahead.gains(study.step_of(a.id)).items()})
+            for a in study.added
         ),
         error_before=study.test[0].error,
         error_after=study.test[-1].error,

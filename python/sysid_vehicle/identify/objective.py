@@ -14,6 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
+from .._threads import check_time
 from ..errors import NumericalError
 from ..estimate import maximise_noise
 
@@ -147,6 +148,7 @@ class Penalised:
 
     def half_sum_of_squares(self, p: FloatArray, gains: Any = None) -> float:
         """Half the sum of squares alone."""
+        check_time()
         return self.problem.half_sum_of_squares(p, gains) + self.prior_cost(p)
 
     def sensitivities(self, p: FloatArray, gains: Any, columns: list[int]) -> FloatArray:
@@ -158,6 +160,7 @@ class Penalised:
         self, p: FloatArray, gains: Any, columns: list[int]
     ) -> tuple[float, FloatArray, FloatArray]:
         """Half the sum of squares, direction of descent, Gauss-Newton matrix."""
+        check_time()
         cost, descent, information = self.problem.normal_equations(p, gains, columns)
         for rows in self.prior:
             errors, slopes = rows(p)
@@ -186,11 +189,12 @@ class Objective(Penalised):
 
     def freeze(self, p: FloatArray, noise: FloatArray) -> Any:
         """Gains of the filter; their log-likelihood is that of the data alone."""
+        check_time()
         return self.problem.freeze(p, noise)
 
     def log_likelihood(self, p: FloatArray, noise: FloatArray) -> float:
         """Of the data, less what the priors cost."""
-        return float(self.problem.freeze(p, noise).log_likelihood) - self.prior_cost(p)
+        return float(self.freeze(p, noise).log_likelihood) - self.prior_cost(p)
 
     def log_likelihoods(self, sets: FloatArray, noise: FloatArray) -> FloatArray:
         """The same for several sets of parameters, minus infinity where the model fails.
@@ -204,6 +208,7 @@ class Objective(Penalised):
         -------
         array, shape (sets,)
         """
+        check_time()
         if isinstance(self.problem, Together):
             values = self.problem.log_likelihoods(sets, noise)
             return as_float64(values - [self.prior_cost(p) for p in sets])

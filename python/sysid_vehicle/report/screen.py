@@ -90,7 +90,7 @@ def _which(study: Study) -> str:
 
 
 def _added(study: Study) -> str:
-    told = [_effect(study, i, a) for i, a in enumerate(study.added)]
+    told = [_effect(study, a) for a in study.added]
     parts = [bullets(told)] if told else [paragraph(summary(study)[1])]
     sets = study.diagnoses[0].causes.sets
     if sets:
@@ -98,14 +98,14 @@ def _added(study: Study) -> str:
     return panel("4 Added", [*parts, paragraph(study.in_the_end)], 4)
 
 
-def _effect(study: Study, i: int, added: AddedEffect) -> str:
+def _effect(study: Study, added: AddedEffect) -> str:
     sizes = ", ".join(
         f"{e.name.split('.')[1]} {quantity(e.value)}{unit(e.unit)} (95 %: {interval(e)})"
         for e in added.parameters
     )
     at = study.horizons.horizons_s.index(_AHEAD_S)
     gains = []
-    for channel, by_horizon in study.horizons.gains(i + 1).items():
+    for channel, by_horizon in study.horizons.gains(study.step_of(added.id)).items():
         gain, shown = by_horizon[at], shown_in(channel)
         if gain is not None and channel in _SHOWN:
             gains.append(f"{number(shown.factor * gain, 2)} {shown.unit} of {shown.name}")

@@ -14,7 +14,8 @@
    implausible, or differs between pieces of the driving (`spread`).
 8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead,
    leave more than `stays` of the evidence, take up less than is left, or should have explained it.
-   Beside much that is left names stay with which those errors fall in every channel (`falls`).
+   Beside much that is left names stay with which those errors fall wherever they move them
+   (`falls`), if nothing that was added beside them and does not stay moves the same channels.
 9. The verdict follows from what is left and which names stand (`verdict`).
 10. `Rules` holds every limit with unit, meaning, and the benchmark that chose or judges it.
 

@@ -52,12 +52,15 @@ class Change:
     horizon_s : float
     log_ratio, error : float
         Logarithm of the error after over that before, and its standard error.
+    reach : float
+        By how much the logarithm would fall were all that the effect moves an error before.
     """
 
     channel: str
     horizon_s: float
     log_ratio: float
     error: float
+    reach: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -114,15 +117,22 @@ def worse(changes: Sequence[Change], rules: Rules = USUAL) -> tuple[Change, ...]
 
 
 def falls(validation: Sequence[Change], training: Sequence[Change], rules: Rules = USUAL) -> bool:
-    """Whether errors some seconds ahead fall in every channel, at every horizon, on all data.
+    """Whether errors some seconds ahead fall in every channel that an effect moves, on all data.
 
-    In each channel one horizon has to show it: validation data clearly and by more than it matters,
-    all data together beyond chance.
+    It moves a channel whose error would fall by more than matters were all that it moves explained.
+    There the error must fall at every horizon, and one horizon has to show it: validation data
+    clearly and by more than it matters, all data together beyond chance. Elsewhere none may grow.
     """
-    everywhere = all(c.log_ratio < 0.0 for c in (*validation, *training))
-    channels = {c.channel for c in validation}
+    least = math.log1p(rules.worse)
+    channels = {c.channel for c in validation if c.reach > least}
+    moved = [c for c in (*validation, *training) if c.channel in channels]
     shown = {c.channel for c in validation if _fallen(c, training, rules)}
-    return bool(channels) and everywhere and shown == channels
+    return (
+        bool(channels)
+        and channels <= shown
+        and all(c.log_ratio < 0.0 for c in moved)
+        and not worse((*validation, *training), rules)
+    )
 
 
 def _fallen(here: Change, training: Sequence[Change], rules: Rules) -> bool:

@@ -180,17 +180,13 @@ def _withdrawn(
     """Names that are not safe beside something that is left."""
     before, after = facts.missing
     share = share_of(before, after)
-    stands = frozenset(
-        a.id
-        for a in facts.added
-        if a.named
-        and a.taken >= rules.taken * before
-        and falls(a.changes, a.changes_in_training, rules)
-    )
-    if share < rules.most and stands:
+    stands = _standing(facts, rules) if share < rules.most else frozenset()
+    if stands:
         # A real road, and what nobody knows of a car, leave much beside the right effect too. What
         # only stands in for it serves some channels and moments at the price of others.
-        because = "with it errors 1 to 5 s ahead are not shown to fall in every channel"
+        because = (
+            "with it errors 1 to 5 s ahead are not shown to fall in every channel that it moves"
+        )
         return [Withdrawn(names - stands, because, names)]
     if share < rules.most:
         because = f"takes up only {max(100 * share, 0.0):.0f} % of the error 1 to 5 s ahead"
@@ -205,6 +201,23 @@ def _withdrawn(
     alone = _alone(facts, rules, small)
     because = "were it what is missing, nothing would be left"
     return [first, Withdrawn(alone, because, names)]
+
+
+def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
+    """Effects with which the errors ahead fall wherever they move them, though much is left.
+
+    What does not stand tells that something is missing which moves the same: where an effect moves
+    a channel that such a one moves, it may be a part of that itself.
+    """
+    standing = {
+        a.id
+        for a in facts.added
+        if a.named
+        and a.taken >= rules.taken * facts.missing[0]
+        and falls(a.changes, a.changes_in_training, rules)
+    }
+    unsure = {c for a in facts.added if a.id not in standing for c in a.moves}
+    return frozenset(a.id for a in facts.added if a.id in standing and not a.moves & unsure)
 
 
 def _alone(facts: Facts, rules: Rules, small: frozenset[str]) -> frozenset[str]:

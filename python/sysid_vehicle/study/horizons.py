@@ -274,17 +274,48 @@ def block_errors(
     array, shape (blocks, horizons, 5)
         NaN where nothing is predicted, infinite where the model lost the car.
     """
+    return _by_block(_ahead(fit, noise, driving, horizons_s), driving)
+
+
+def _ahead(
+    fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: tuple[float, ...]
+) -> FloatArray:
+    """Errors of the predicted channels, (horizons, samples, 5), infinite where the model fails."""
     columns = [MEASURED.index(c) for c in PREDICTED]
-    starts = blocks(driving, driving.usable_s / _number_of_blocks(driving))
     try:
         e = all_ahead(fit, noise, driving, horizons_s, apart=_APART)[:, :, columns]
     except NumericalError:
-        return np.full((len(starts), len(horizons_s), len(PREDICTED)), np.inf)
-    there = np.isfinite(driving.measured[:, columns]) & ~np.isnan(e)
+        return np.full((len(horizons_s), driving.samples, len(PREDICTED)), np.inf)
+    return as_float64(np.where(np.isfinite(driving.measured[:, columns]), e, np.nan))
+
+
+def _by_block(e: FloatArray, driving: Driving) -> FloatArray:
+    """Root mean squares, shape (blocks, horizons, channels)."""
+    starts = blocks(driving, driving.usable_s / _number_of_blocks(driving))
+    there = ~np.isnan(e)
     squares = np.add.reduceat(np.where(there, e, 0.0) ** 2, starts, axis=1)
     count = np.add.reduceat(there.astype(float), starts, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return as_float64(np.where(count > 0.0, np.sqrt(squares / count), np.nan).swapaxes(0, 1))
+
+
+def _moved(
+    before: Fit, after: Fit, noise: NoiseModel, driving: Driving, horizons_s: tuple[float, ...]
+) -> FloatArray:
+    """Root mean squares of what a model predicts otherwise, shape (blocks, horizons, channels)."""
+    one, other = (_ahead(fit, noise, driving, horizons_s) for fit in (before, after))
+    with np.errstate(invalid="ignore"):
+        return _by_block(as_float64(other - one), driving)
+
+
+def _reach(moved: FloatArray, error: FloatArray) -> float:
+    """By how much the logarithm of an error falls if what is moved was a part of it.
+
+    What is right to be taken off is no part of what stays: squares fall by its square.
+    """
+    finite = np.isfinite(moved) & np.isfinite(error)
+    share = float(np.median(moved[finite] / error[finite])) if finite.any() else np.inf
+    return -0.5 * float(np.log1p(-(share**2))) if share < 1.0 else np.inf
 
 
 def typical_error(
@@ -308,7 +339,7 @@ def _number_of_blocks(driving: Driving) -> int:
 
 
 def changes(
-    before: Fit, after: Fit, driving: Driving, horizons_s: Sequence[float]
+    before: Fit, after: Fit, driving: Driving, horizons_s: Sequence[float], *, reach: bool = False
 ) -> tuple[Change, ...]:
     """How the errors of the lateral channels change from one model to another.
 
@@ -318,6 +349,8 @@ def changes(
         The noise floor of the latter starts the predictions of both.
     driving : Driving
     horizons_s : sequence of float
+    reach : bool
+        Whether to work out how far each error could fall.
 
     Returns
     -------
@@ -327,6 +360,7 @@ def changes(
     noise = after.noise.floor()
     found = []
     both = [block_errors(fit, noise, driving, tuple(horizons_s)) for fit in (before, after)]
+    moved = _moved(before, after, noise, driving, tuple(horizons_s)) if reach else None
     for i, h in enumerate(horizons_s):
         one, other = (errors[:, i] for errors in both)
         for channel in LATERAL:
@@ -342,6 +376,12 @@ def changes(
             middle = float(np.median(ratio))
             scatter = _NORMAL * float(np.median(np.abs(ratio - middle)))
             found.append(
-                Change(channel, h, middle, _OF_MEDIAN * scatter / float(np.sqrt(len(ratio))))
+                Change(
+                    channel,
+                    h,
+                    middle,
+                    _OF_MEDIAN * scatter / float(np.sqrt(len(ratio))),
+                    np.inf if moved is None else _reach(moved[known, i, j], one[known, j]),
+                )
             )
     return tuple(found)

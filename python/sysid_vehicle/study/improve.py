@@ -84,8 +84,9 @@ def improve(
         considered. Without one only what the likelihood cannot hold is taken out: delays of one
         channel against another, low-passes of sensors, and vibration; with False not even that.
     time_limit_s : float, optional
-        After so many seconds no further refit begins; of what was refitted by then the best is
-        added if validation data confirm it, the model is judged, and a warning tells.
+        After so many seconds refits end, wherever they are; of what was refitted by then the best
+        is added if validation data confirm it, the model is judged, and a warning tells what was
+        left out. The baseline is fitted in any case.
     matters : mapping, optional
         Errors that matter, such as ``{"yaw_rate": "0.5deg/s"}`` (`sizes_that_matter`); those not
         given have usual sizes. A baseline whose errors 0.5 to 5 s ahead on validation data are all
@@ -132,7 +133,7 @@ def improve(
         )
         search.follow(found)
         fit, diagnoses = found.fit, found.diagnoses
-        fits = way(found.fits)
+        fits = way(found.fits, ends)
         floor = fit.noise
         on_train = [compare(f, train_driving, noise=floor) for f in fits]
         on_test = [compare(f, test_driving, noise=floor) for f in fits]
@@ -196,8 +197,8 @@ def _changes(
     """How errors 1 to 5 s ahead change with each effect, on validation and on training data."""
     return {
         name: (
-            changes_ahead(before, after, test),
-            changes(before, after, after.driving, AHEAD),
+            changes_ahead(before, after, test, reach=True),
+            changes(before, after, after.driving, AHEAD, reach=True),
         )
         for before, after in pairwise(fits)
         for name in set(after.model.effects) - set(before.model.effects)

@@ -24,7 +24,7 @@ def record(study: Study) -> dict[str, Any]:
     return {
         "verdict": study.verdict,
         "effects": [
-            {**a.to_dict(), "gains": study.horizons.gains(i + 1)} for i, a in enumerate(study.added)
+            {**a.to_dict(), "gains": study.horizons.gains(study.step_of(a.id))} for a in study.added
         ],
         "horizons": study.horizons.to_dict(),
         "shares": study.shares.to_dict(),

@@ -112,7 +112,7 @@ class Search:
     test : Driving
         Validation data, which every step must predict better.
     ends : float
-        When no further refit begins, by `time.perf_counter`.
+        When refits end, by `time.perf_counter`.
     rules : Rules
     """
 
@@ -135,7 +135,9 @@ class Search:
                 trail.stopped = tuple(c.id for c in dx.significant)
                 return
             # What was refitted is not lost; what takes further refits waits for another study.
-            step = first_that_holds(dx, trail.fit, self.test) if self.most_effects else None
+            step = None
+            if self.most_effects:
+                step = first_that_holds(dx, trail.fit, self.test, self.ends)
             single = None if step is None else step[1]
             several = first_together(dx, self.test, single, self.most_effects, self.ends)
             if step is None and several is None and time.perf_counter() < self.ends:
@@ -181,7 +183,7 @@ class Search:
         if len(first.fit.model.effects) >= self.most_effects:
             return None
         beside = self._diagnosis(first.fit)
-        step = first_that_holds(beside, trail.fit, self.test)
+        step = first_that_holds(beside, trail.fit, self.test, self.ends)
         if step is None or first.id not in step[1].model.effects:
             return None
         if omnibus(step[1], step[1].driving, self.rules).rejects:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from .._threads import before
 from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter
 from ..errors import NumericalError
@@ -31,12 +32,15 @@ __all__ = [
 _ALTERNATIVES = 2  # tried in place of one effect
 
 
-def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate, Fit] | None:
+def first_that_holds(
+    dx: Diagnosis, fit: Fit, test: Driving, ends: float = np.inf
+) -> tuple[Candidate, Fit] | None:
     """The likeliest candidate that fits better and predicts the validation data better.
 
     One with a value that a car can have comes before one that only acts like something else. Among
     those that the training data cannot tell apart the validation data have a say too. With it
-    comes its fit, without what is not significant then.
+    comes its fit, without what is not significant then; where that takes longer than `ends`, by
+    `time.perf_counter`, the candidate is not judged.
     """
     rules = dx.rules
     likely = sorted(dx.significant, key=lambda c: not _can_be(c, rules))
@@ -49,8 +53,10 @@ def first_that_holds(dx: Diagnosis, fit: Fit, test: Driving) -> tuple[Candidate,
             continue
         if c.fit is None or not _sound(c, rules):
             continue
-        lean = without_insignificant(c.fit, rules)
-        if c.id not in lean.model.effects:
+        lean: Fit | None = c.fit
+        if _insignificant(c.fit, rules):
+            lean = before(ends, partial(without_insignificant, c.fit, rules), None)
+        if lean is None or c.id not in lean.model.effects:
             continue
         found = _measures(fit, c.fit, _can_be(c, rules), test)
         if accept(found, rules) and accept(
@@ -89,13 +95,11 @@ def first_together(
     most_effects : int
         That the model may have.
     ends : float
-        When no further refit begins, by `time.perf_counter`.
+        When refits end, by `time.perf_counter`.
     """
     rules, fit = dx.rules, dx.fit
     for names in _leading_subsets(dx, most_effects - len(fit.model.effects)):
-        if time.perf_counter() > ends:
-            break
-        found = _with_subset(dx, names)
+        found = before(ends, partial(_with_subset, dx, names), None)
         if found is None or not set(names) <= set(found.model.effects):
             continue
         if not all(_real(found, name, rules) for name in names):
@@ -213,7 +217,7 @@ def exchanged(
         That the model may have.
     rules : Rules
     ends : float
-        When no further refit begins, by `time.perf_counter`.
+        When refits end, by `time.perf_counter`.
 
     Returns
     -------
@@ -227,9 +231,7 @@ def exchanged(
             for others in dict.fromkeys([*((c,) for c in near), tuple(near)]):
                 if not others or len(fit.model.effects) - 1 + len(others) > most_effects:
                     continue
-                if time.perf_counter() > ends:
-                    return best
-                trial = _with_others(fit, name, others, rules)
+                trial = before(ends, partial(_with_others, fit, name, others, rules), None)
                 if trial is None or frozenset(trial.model.effects) in seen:
                     continue
                 if better(trial, best, test, rules):
@@ -306,14 +308,10 @@ def without_insignificant(fit: Fit, rules: Rules = USUAL) -> Fit:
     """
     kept: set[str] = set()
     while True:
-        insignificant = [
-            e.id
-            for e in fit.model.parts
-            if e.id not in kept and _strength(fit, e.id) < rules.insignificant
-        ]
+        insignificant = _insignificant(fit, rules) - kept
         if not insignificant:
             return fit
-        weakest = min(insignificant, key=lambda name: _strength(fit, name))
+        weakest = min(sorted(insignificant), key=lambda name: _strength(fit, name))
         without = refine(fit.model.drop(weakest), fit.driving, fit.noise)
         if _merit(without) + rules.apart < _merit(fit):
             kept.add(weakest)
@@ -321,22 +319,31 @@ def without_insignificant(fit: Fit, rules: Rules = USUAL) -> Fit:
             fit = without
 
 
-def way(fits: Sequence[Fit]) -> list[Fit]:
+def way(fits: Sequence[Fit], ends: float = np.inf) -> list[Fit]:
     """The fits of a story that leads to the last one: one effect more each time.
 
     Effects that were dropped or exchanged on the way are no part of it; where one was, the steps
-    after it are fitted anew.
+    after it are fitted anew. Those that take longer than `ends`, by `time.perf_counter`, are left
+    out: the next step has several effects more.
     """
     baseline, final = fits[0], fits[-1]
     known = {frozenset(f.model.effects): f for f in fits}
-    story = [final]
-    while len(story[0].model.effects) > len(baseline.model.effects):
+    story, earlier = [final], final.model
+    while len(earlier.effects) > len(baseline.model.effects):
         later = story[0]
-        last = later.model.effects[-1]
-        earlier = later.model.drop(last)
+        earlier = earlier.drop(earlier.effects[-1])
         found = known.get(frozenset(earlier.effects))
-        story.insert(0, found or refine(earlier, later.driving, later.noise))
+        if found is None:
+            found = before(ends, partial(refine, earlier, later.driving, later.noise), None)
+        if found is not None:
+            story.insert(0, found)
+            earlier = found.model
     return story if story[0] is baseline else [baseline, *story]
+
+
+def _insignificant(fit: Fit, rules: Rules) -> set[str]:
+    """Effects of the model that cannot be told from nothing."""
+    return {e.id for e in fit.model.parts if _strength(fit, e.id) < rules.insignificant}
 
 
 def _merit(fit: Fit) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -130,6 +131,8 @@ class Study:
     @property
     def meaning(self) -> str:
         """The verdict in words."""
+        if self.verdict == "unknown" and self.stopped:
+            return "something is missing; the time limit ended the search for what explains it"
         if self.verdict == "unknown" and self.added and self.explained is not None:
             return (
                 f"something is missing; what was added takes up {self.explained} of the error 1 to "
@@ -147,8 +150,15 @@ class Study:
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """The baseline and what was added, in order."""
-        return ("baseline", *(f"+ {a.name}" for a in self.added))
+        """The baseline and what each fit has more, in order."""
+        names = {a.id: a.name for a in self.added}
+        fits = [f.model.effects for f in self.fits]
+        new = [[e for e in now if e not in last] for last, now in pairwise(fits)]
+        return ("baseline", *(f"+ {' + '.join(names.get(e, e) for e in few)}" for few in new))
+
+    def step_of(self, effect: str) -> int:
+        """Which of `fits` is the first with an effect that was added."""
+        return next(i for i, fit in enumerate(self.fits) if effect in fit.model.effects)
 
     @cached_property
     def where(self) -> Where:

@@ -149,10 +149,12 @@ def _with_error(difference: FloatArray, test: Driving) -> Gain:
     )
 
 
-def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[Change, ...]:
+def changes_ahead(
+    poorer: Fit, richer: Fit, test: Driving, *, reach: bool = False
+) -> tuple[Change, ...]:
     """How errors 1 to 5 s ahead change, both models with the parameters of `at_its_best`."""
     one, other = (at_its_best(fit, test) for fit in (poorer, richer))
-    return changes(one, other, test, AHEAD)
+    return changes(one, other, test, AHEAD, reach=reach)
 
 
 def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
