@@ -53,7 +53,7 @@ NUMERICAL = {
     "diagnose/ceiling.py": {
         "_RATE_HZ", "_LAGS_S", "_BLOCK_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",
     },
-    "study/predicting.py": {"_HORIZON_S", "_WORTH"},
+    "study/predicting.py": {"_WORTH"},
     "diagnose/change_directions.py": {"_BLEND_S", "_SMALL"},
     "diagnose/change_points.py": {
         "_STEP_S", "_MOST_STEPS", "_LEAST_S", "_INTERVAL", "_NEAR_S", "_FINE", "_MOST",

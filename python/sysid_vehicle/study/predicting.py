@@ -12,17 +12,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from .._text import number
-from ..estimate import UNITS, Driving
-from ..identify import Fit, predicting_ahead
+from ..estimate import UNITS
+from ..identify import Fit
 from ..rules import Change, Rules
 from .horizons import Horizons, changes, horizons
+from .validation import AHEAD_S, fitted_ahead, longest_s
 
 if TYPE_CHECKING:
     from .study import Study
 
 __all__ = ["Predicting", "predicting"]
 
-_HORIZON_S = 2.0
 _WORTH = 0.1  # logarithm of the ratio of two errors that differ
 
 
@@ -89,33 +89,25 @@ class Predicting:
         return " ".join(said)
 
 
-def predicting(study: Study, horizon_s: float = _HORIZON_S) -> Predicting | None:
-    """Fit the first and the last model of a study to predictions; None where logs are too short.
+def predicting(study: Study) -> Predicting | None:
+    """Fit the first and the last model of a study to predictions; None where that cannot be done.
 
     Parameters
     ----------
     study : Study
-    horizon_s : float
     """
-    if min(_longest_s(d) for d in (study.fit.driving, study.validation)) < 2.0 * horizon_s:
+    if longest_s(study.validation) < 2.0 * AHEAD_S:
         return None
-    final = predicting_ahead(study.fit, horizon_s)
-    alone = len(study.fits) == 1
-    baseline = final if alone else predicting_ahead(study.fits[0], horizon_s)
-    ahead, elsewhere = (horizon_s,), study.validation
+    final, baseline = fitted_ahead(study.fit), fitted_ahead(study.fits[0])
+    if final is None or baseline is None:
+        return None
+    ahead, elsewhere = (AHEAD_S,), study.validation
     return Predicting(
         baseline,
         final,
-        horizon_s,
+        AHEAD_S,
         changes(study.fit, final, elsewhere, ahead),
-        () if alone else changes(baseline, final, elsewhere, ahead),
-        horizons([study.fit, final], ["one step", f"{horizon_s:g} s ahead"], elsewhere, ahead),
+        changes(baseline, final, elsewhere, ahead) if len(study.fits) > 1 else (),
+        horizons([study.fit, final], ["one step", f"{AHEAD_S:g} s ahead"], elsewhere, ahead),
         study.rules,
     )
-
-
-def _longest_s(driving: Driving) -> float:
-    lengths = [
-        float(s.where.stop - s.where.start) / driving.logs[s.log].rate_hz for s in driving.stretches
-    ]
-    return max(lengths)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 
@@ -12,20 +13,23 @@ from .._arrays import FloatArray
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
 from ..estimate import Driving
-from ..identify import Fit, Prediction, predict
+from ..identify import Fit, Prediction, predict, predicting_ahead
 from ..log import Log, several_logs
 from ..rules import Change, Gain
 from .horizons import Beyond, beyond_noise, changes, typical_error
 
 __all__ = [
     "AHEAD",
+    "AHEAD_S",
     "as_sure",
     "at_its_best",
     "beyond_noise_ahead",
     "changes_ahead",
     "error_falls",
     "fall_in_error",
+    "fitted_ahead",
     "gain_in_log_likelihood",
+    "longest_s",
     "serving",
     "set_aside",
 ]
@@ -34,6 +38,8 @@ _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6
 _TRIMMED = 0.1  # of the pieces, at either end
 AHEAD = (1.0, 2.0, 5.0)
+AHEAD_S = 2.0
+"""What parameters are fitted to predict, beside one step [s]."""
 _NONE = Gain(-np.inf, 0.0, -np.inf, 0.0)
 
 
@@ -165,18 +171,41 @@ def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
 # One object for each fit: errors ahead are remembered by it.
 @lru_cache(maxsize=16)
 def at_its_best(fit: Fit, test: Driving) -> Fit:
-    """The fit, or the same model with parameters that serve validation data too (`serving`).
+    """The fit, or the same model with the parameters that predict validation data best.
 
-    Which of them predicts better 1 to 5 s ahead. Tyres that were not fitted at their peak err
-    there whatever effect is in the model; but parameters which the fit left open may serve the
-    errors of one step, which disturbances share, at the price of those some seconds ahead.
+    Of three: the fit's own; those that serve validation data too (`serving`), as tyres which were
+    not fitted at their peak err there whatever effect is in the model; and those fitted to
+    predictions of seconds, as parameters of the likelihood serve the errors of one step, which
+    disturbances share, at the price of those some seconds ahead. What an effect takes away is then
+    nothing that other parameters would have taken away.
     """
-    try:
-        served = replace(fit, model=_prediction(fit, test, fit).model)
-    except (NumericalError, np.linalg.LinAlgError):
-        return fit
+    found = [fit]
+    with suppress(NumericalError, np.linalg.LinAlgError):
+        found.append(replace(fit, model=_prediction(fit, test, fit).model))
+    ahead = fitted_ahead(fit)
+    if ahead is not None:
+        found.append(ahead)
     noise = fit.noise.floor()
-    return min((fit, served), key=lambda f: typical_error(f, noise, test, AHEAD))
+    return min(found, key=lambda f: typical_error(f, noise, test, AHEAD))
+
+
+@lru_cache(maxsize=16)
+def fitted_ahead(fit: Fit) -> Fit | None:
+    """The same model fitted to predictions of `AHEAD_S`; None where its driving is too short."""
+    if longest_s(fit.driving) < 2.0 * AHEAD_S:
+        return None
+    try:
+        return predicting_ahead(fit, AHEAD_S)
+    except (NumericalError, np.linalg.LinAlgError):
+        return None
+
+
+def longest_s(driving: Driving) -> float:
+    """Duration of the longest stretch [s]."""
+    lengths = [
+        float(s.where.stop - s.where.start) / driving.logs[s.log].rate_hz for s in driving.stretches
+    ]
+    return max(lengths)
 
 
 def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:
