@@ -1,5 +1,6 @@
 // The closed loop: its settings as plain classes, and the run.
 #include "arrays.hpp"
+#include "fields.hpp"
 #include "register.hpp"
 #include "sysid/lab/closed_loop.hpp"
 
@@ -84,31 +85,20 @@ py::dict run(const LabLoop& settings, const SingleTrack& model, const Array& par
 void register_lab_loop(py::module_& m) {
     using lab::AdrcData;
     using lab::NominalCar;
-    py::class_<NominalCar>(m, "LabCar")
-        .def_readwrite("mass_kg", &NominalCar::mass_kg)
-        .def_readwrite("yaw_inertia_kgm2", &NominalCar::yaw_inertia_kgm2)
-        .def_readwrite("lf_m", &NominalCar::lf_m)
-        .def_readwrite("lr_m", &NominalCar::lr_m)
-        .def_readwrite("cg_height_m", &NominalCar::cg_height_m)
-        .def_readwrite("gravity_mps2", &NominalCar::gravity_mps2)
-        .def_readwrite("drag_nspm", &NominalCar::drag_nspm)
-        .def_readwrite("stiffness_front", &NominalCar::stiffness_front)
-        .def_readwrite("stiffness_rear", &NominalCar::stiffness_rear);
-    py::class_<AdrcData>(m, "LabController")
-        .def_readwrite("speed_gain_ps", &AdrcData::speed_gain_ps)
-        .def_readwrite("yaw_rate_gain_ps", &AdrcData::yaw_rate_gain_ps)
-        .def_readwrite("heading_gain_ps", &AdrcData::heading_gain_ps)
-        .def_readwrite("yaw_rate_limit_radps", &AdrcData::yaw_rate_limit_radps)
-        .def_readwrite("yaw_acceleration_limit_radps2", &AdrcData::yaw_acceleration_limit_radps2)
-        .def_readwrite("lateral_limit_mps2", &AdrcData::lateral_limit_mps2)
-        .def_readwrite("slip_limit_rad", &AdrcData::slip_limit_rad)
-        .def_readwrite("rear_slip_limit_rad", &AdrcData::rear_slip_limit_rad)
-        .def_readwrite("rear_slip_gain_ps", &AdrcData::rear_slip_gain_ps)
-        .def_readwrite("brakes_from_mps2", &AdrcData::brakes_from_mps2)
-        .def_readwrite("feed_forward", &AdrcData::feed_forward)
-        .def_readwrite("coupling", &AdrcData::coupling)
-        .def_readwrite("lowest_speed_mps", &AdrcData::lowest_speed_mps)
-        .def_readwrite("added_speed_mps", &AdrcData::added_speed_mps);
+    fields(py::class_<NominalCar>(m, "LabCar"), SYSID_FIELD(NominalCar, mass_kg),
+           SYSID_FIELD(NominalCar, yaw_inertia_kgm2), SYSID_FIELD(NominalCar, lf_m),
+           SYSID_FIELD(NominalCar, lr_m), SYSID_FIELD(NominalCar, cg_height_m),
+           SYSID_FIELD(NominalCar, gravity_mps2), SYSID_FIELD(NominalCar, drag_nspm),
+           SYSID_FIELD(NominalCar, stiffness_front), SYSID_FIELD(NominalCar, stiffness_rear));
+    fields(py::class_<AdrcData>(m, "LabController"), SYSID_FIELD(AdrcData, speed_gain_ps),
+           SYSID_FIELD(AdrcData, yaw_rate_gain_ps), SYSID_FIELD(AdrcData, heading_gain_ps),
+           SYSID_FIELD(AdrcData, yaw_rate_limit_radps),
+           SYSID_FIELD(AdrcData, yaw_acceleration_limit_radps2),
+           SYSID_FIELD(AdrcData, lateral_limit_mps2), SYSID_FIELD(AdrcData, slip_limit_rad),
+           SYSID_FIELD(AdrcData, rear_slip_limit_rad), SYSID_FIELD(AdrcData, rear_slip_gain_ps),
+           SYSID_FIELD(AdrcData, brakes_from_mps2), SYSID_FIELD(AdrcData, feed_forward),
+           SYSID_FIELD(AdrcData, coupling), SYSID_FIELD(AdrcData, lowest_speed_mps),
+           SYSID_FIELD(AdrcData, added_speed_mps));
     py::class_<LabLoop>(m, "LabLoop")
         .def(py::init<>())
         .def_property_readonly("car", [](LabLoop& s) { return &s.loop.car; })

@@ -1,3 +1,4 @@
+#include "fields.hpp"
 #include "least_squares.hpp"
 #include "register.hpp"
 #include "sysid/lab/tyre_fit.hpp"
@@ -86,15 +87,11 @@ void register_loss(py::module_& m) {
 }  // namespace
 
 void register_lab_tyres(py::module_& m) {
-    py::class_<GreyBoxCar>(m, "GreyBoxCar")
-        .def(py::init<>())
-        .def_readwrite("mass_kg", &GreyBoxCar::mass_kg)
-        .def_readwrite("yaw_inertia_kgm2", &GreyBoxCar::yaw_inertia_kgm2)
-        .def_readwrite("lf_m", &GreyBoxCar::lf_m)
-        .def_readwrite("lr_m", &GreyBoxCar::lr_m)
-        .def_readwrite("air_density_kgpm3", &GreyBoxCar::air_density_kgpm3)
-        .def_readwrite("cg_height_m", &GreyBoxCar::cg_height_m)
-        .def_readwrite("slowest_mps", &GreyBoxCar::slowest_mps);
+    fields(py::class_<GreyBoxCar>(m, "GreyBoxCar").def(py::init<>()),
+           SYSID_FIELD(GreyBoxCar, mass_kg), SYSID_FIELD(GreyBoxCar, yaw_inertia_kgm2),
+           SYSID_FIELD(GreyBoxCar, lf_m), SYSID_FIELD(GreyBoxCar, lr_m),
+           SYSID_FIELD(GreyBoxCar, air_density_kgpm3), SYSID_FIELD(GreyBoxCar, cg_height_m),
+           SYSID_FIELD(GreyBoxCar, slowest_mps));
     register_problem(m);
     register_loss(m);
 }

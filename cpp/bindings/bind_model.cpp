@@ -1,5 +1,6 @@
 // The model: vehicle data, the catalogue of effects, one evaluation.
 #include "arrays.hpp"
+#include "fields.hpp"
 #include "register.hpp"
 #include "sysid/dynamics/step.hpp"
 
@@ -184,18 +185,13 @@ py::dict formula_parts() {
 }  // namespace
 
 void register_model(py::module_& m) {
-    py::class_<VehicleData>(m, "VehicleData")
-        .def(py::init<>())
-        .def_readwrite("mass_kg", &VehicleData::mass_kg)
-        .def_readwrite("lf_m", &VehicleData::lf_m)
-        .def_readwrite("lr_m", &VehicleData::lr_m)
-        .def_readwrite("cg_height_m", &VehicleData::cg_height_m)
-        .def_readwrite("track_front_m", &VehicleData::track_front_m)
-        .def_readwrite("track_rear_m", &VehicleData::track_rear_m)
-        .def_readwrite("drag_area_m2", &VehicleData::drag_area_m2)
-        .def_readwrite("air_density_kgpm3", &VehicleData::air_density_kgpm3)
-        .def_readwrite("brake_front_share", &VehicleData::brake_front_share)
-        .def_readwrite("drive_front_share", &VehicleData::drive_front_share);
+    fields(py::class_<VehicleData>(m, "VehicleData").def(py::init<>()),
+           SYSID_FIELD(VehicleData, mass_kg), SYSID_FIELD(VehicleData, lf_m),
+           SYSID_FIELD(VehicleData, lr_m), SYSID_FIELD(VehicleData, cg_height_m),
+           SYSID_FIELD(VehicleData, track_front_m), SYSID_FIELD(VehicleData, track_rear_m),
+           SYSID_FIELD(VehicleData, drag_area_m2), SYSID_FIELD(VehicleData, air_density_kgpm3),
+           SYSID_FIELD(VehicleData, brake_front_share),
+           SYSID_FIELD(VehicleData, drive_front_share));
     py::class_<SingleTrack>(m, "SingleTrack")
         .def(py::init([](const VehicleData& car, EffectMask effects, bool force_known,
                          const std::vector<User>& user) {

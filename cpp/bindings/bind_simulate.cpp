@@ -1,4 +1,5 @@
 #include "arrays.hpp"
+#include "fields.hpp"
 #include "register.hpp"
 #include "sysid/simulate/simulator.hpp"
 
@@ -13,20 +14,13 @@ void check_driver(const Driver& d, double dt) {
 }
 
 void register_simulate(py::module_& m) {
-    py::class_<Driver>(m, "Driver")
-        .def(py::init<>())
-        .def_readwrite("reaction_s", &Driver::reaction_s)
-        .def_readwrite("yaw_rate_gain", &Driver::yaw_rate_gain)
-        .def_readwrite("yaw_rate_integral_ps", &Driver::yaw_rate_integral_ps)
-        .def_readwrite("understeer_radps2pm", &Driver::understeer_radps2pm)
-        .def_readwrite("speed_gain_ps", &Driver::speed_gain_ps)
-        .def_readwrite("steer_limit_rad", &Driver::steer_limit_rad)
-        .def_readwrite("steer_rate_limit_radps", &Driver::steer_rate_limit_radps)
-        .def_readwrite("drive_limit_n", &Driver::drive_limit_n)
-        .def_readwrite("brake_limit_n", &Driver::brake_limit_n)
-        .def_readwrite("power_limit_w", &Driver::power_limit_w)
-        .def_readwrite("force_rate_limit_nps", &Driver::force_rate_limit_nps)
-        .def_readwrite("tracks_path", &Driver::tracks_path);
+    fields(py::class_<Driver>(m, "Driver").def(py::init<>()), SYSID_FIELD(Driver, reaction_s),
+           SYSID_FIELD(Driver, yaw_rate_gain), SYSID_FIELD(Driver, yaw_rate_integral_ps),
+           SYSID_FIELD(Driver, understeer_radps2pm), SYSID_FIELD(Driver, speed_gain_ps),
+           SYSID_FIELD(Driver, steer_limit_rad), SYSID_FIELD(Driver, steer_rate_limit_radps),
+           SYSID_FIELD(Driver, drive_limit_n), SYSID_FIELD(Driver, brake_limit_n),
+           SYSID_FIELD(Driver, power_limit_w), SYSID_FIELD(Driver, force_rate_limit_nps),
+           SYSID_FIELD(Driver, tracks_path));
     m.def(
         "simulate",
         [](const SingleTrack& model, const Array& p, double dt, const Array& references,

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "arrays.hpp"
+#include "fields.hpp"
 #include "register.hpp"
 #include "sysid/published/double_track.hpp"
 #include "sysid/twin/drive14.hpp"
@@ -47,43 +48,29 @@ State14 state_of(const Array& a) {
 }
 
 void register_data(py::module_& m) {
-    const auto fields = [](auto& bound, auto... pairs) {
-        (bound.def_readwrite(pairs.first, pairs.second), ...);
-    };
     py::class_<TyreData> tyre(m, "TwinTyre");
     tyre.def(py::init<>());
-    fields(tyre, std::pair{"nominal_load_n", &TyreData::nominal_load_n},
-           std::pair{"friction_x", &TyreData::friction_x},
-           std::pair{"friction_y", &TyreData::friction_y},
-           std::pair{"friction_slope", &TyreData::friction_slope},
-           std::pair{"slip_stiffness", &TyreData::slip_stiffness},
-           std::pair{"cornering_stiffness", &TyreData::cornering_stiffness},
-           std::pair{"load_at_peak_stiffness", &TyreData::load_at_peak_stiffness},
-           std::pair{"shape", &TyreData::shape}, std::pair{"curvature", &TyreData::curvature},
-           std::pair{"relaxation_m", &TyreData::relaxation_m});
+    fields(tyre, SYSID_FIELD(TyreData, nominal_load_n), SYSID_FIELD(TyreData, friction_x),
+           SYSID_FIELD(TyreData, friction_y), SYSID_FIELD(TyreData, friction_slope),
+           SYSID_FIELD(TyreData, slip_stiffness), SYSID_FIELD(TyreData, cornering_stiffness),
+           SYSID_FIELD(TyreData, load_at_peak_stiffness), SYSID_FIELD(TyreData, shape),
+           SYSID_FIELD(TyreData, curvature), SYSID_FIELD(TyreData, relaxation_m));
     py::class_<AxleData> axle(m, "TwinAxle");
     axle.def(py::init<>());
-    fields(axle, std::pair{"track_m", &AxleData::track_m},
-           std::pair{"spring_npm", &AxleData::spring_npm},
-           std::pair{"bump_damping_nspm", &AxleData::bump_damping_nspm},
-           std::pair{"rebound_damping_nspm", &AxleData::rebound_damping_nspm},
-           std::pair{"anti_roll_npm", &AxleData::anti_roll_npm},
-           std::pair{"travel_m", &AxleData::travel_m}, std::pair{"stop_npm", &AxleData::stop_npm},
-           std::pair{"roll_centre_m", &AxleData::roll_centre_m},
-           std::pair{"anti_slope", &AxleData::anti_slope},
-           std::pair{"unsprung_kg", &AxleData::unsprung_kg},
-           std::pair{"tyre_npm", &AxleData::tyre_npm},
-           std::pair{"tyre_damping_nspm", &AxleData::tyre_damping_nspm},
-           std::pair{"radius_m", &AxleData::radius_m},
-           std::pair{"wheel_inertia_kgm2", &AxleData::wheel_inertia_kgm2},
-           std::pair{"rolling_resistance", &AxleData::rolling_resistance},
-           std::pair{"lift_area_m2", &AxleData::lift_area_m2}, std::pair{"tyre", &AxleData::tyre});
+    fields(axle, SYSID_FIELD(AxleData, track_m), SYSID_FIELD(AxleData, spring_npm),
+           SYSID_FIELD(AxleData, bump_damping_nspm), SYSID_FIELD(AxleData, rebound_damping_nspm),
+           SYSID_FIELD(AxleData, anti_roll_npm), SYSID_FIELD(AxleData, travel_m),
+           SYSID_FIELD(AxleData, stop_npm), SYSID_FIELD(AxleData, roll_centre_m),
+           SYSID_FIELD(AxleData, anti_slope), SYSID_FIELD(AxleData, unsprung_kg),
+           SYSID_FIELD(AxleData, tyre_npm), SYSID_FIELD(AxleData, tyre_damping_nspm),
+           SYSID_FIELD(AxleData, radius_m), SYSID_FIELD(AxleData, wheel_inertia_kgm2),
+           SYSID_FIELD(AxleData, rolling_resistance), SYSID_FIELD(AxleData, lift_area_m2),
+           SYSID_FIELD(AxleData, tyre));
     py::class_<CarData> car(m, "TwinCar");
     car.def(py::init<>());
-    fields(car, std::pair{"wheelbase_m", &CarData::wheelbase_m},
-           std::pair{"drag_area_m2", &CarData::drag_area_m2},
-           std::pair{"air_density_kgpm3", &CarData::air_density_kgpm3},
-           std::pair{"front", &CarData::front}, std::pair{"rear", &CarData::rear});
+    fields(car, SYSID_FIELD(CarData, wheelbase_m), SYSID_FIELD(CarData, drag_area_m2),
+           SYSID_FIELD(CarData, air_density_kgpm3), SYSID_FIELD(CarData, front),
+           SYSID_FIELD(CarData, rear));
     car.def_property(
         "design", [](const CarData& c) { return to_vector(c.design); },
         [](CarData& c, const LoadVector& v) { c.design = to_load(v); });
@@ -168,11 +155,8 @@ void register_vehicle(py::module_& m) {
 }
 
 void register_laws(py::module_& m) {
-    py::class_<ParameterLaw>(m, "ParameterLaw")
-        .def(py::init<>())
-        .def_readwrite("parameter", &ParameterLaw::parameter)
-        .def_readwrite("channel", &ParameterLaw::channel)
-        .def_readwrite("differentiate", &ParameterLaw::differentiate)
+    py::class_<ParameterLaw> law(m, "ParameterLaw");
+    law.def(py::init<>())
         .def_property(
             "by_gradient", [](const ParameterLaw& l) { return l.kind == LawKind::kGradient; },
             [](ParameterLaw& l, bool yes) { l.kind = yes ? LawKind::kGradient : LawKind::kSign; })
@@ -180,19 +164,15 @@ void register_laws(py::module_& m) {
             "sign_measured", [](const ParameterLaw& l) { return l.sign == SignSource::kMeasured; },
             [](ParameterLaw& l, bool yes) {
                 l.sign = yes ? SignSource::kMeasured : SignSource::kTwin;
-            })
-        .def_readwrite("literal_sign", &ParameterLaw::literal_sign)
-        .def_readwrite("gain", &ParameterLaw::gain)
-        .def_readwrite("gain_start", &ParameterLaw::gain_start)
-        .def_readwrite("gain_time_s", &ParameterLaw::gain_time_s)
-        .def_readwrite("deadband", &ParameterLaw::deadband)
-        .def_readwrite("floor", &ParameterLaw::floor)
-        .def_readwrite("averaging_s", &ParameterLaw::averaging_s)
-        .def_readwrite("lower", &ParameterLaw::lower)
-        .def_readwrite("upper", &ParameterLaw::upper)
-        .def_readwrite("yaw_rate_below", &ParameterLaw::yaw_rate_below)
-        .def_readwrite("yaw_rate_above", &ParameterLaw::yaw_rate_above)
-        .def_readwrite("stage", &ParameterLaw::stage);
+            });
+    fields(law, SYSID_FIELD(ParameterLaw, parameter), SYSID_FIELD(ParameterLaw, channel),
+           SYSID_FIELD(ParameterLaw, differentiate), SYSID_FIELD(ParameterLaw, literal_sign),
+           SYSID_FIELD(ParameterLaw, gain), SYSID_FIELD(ParameterLaw, gain_start),
+           SYSID_FIELD(ParameterLaw, gain_time_s), SYSID_FIELD(ParameterLaw, deadband),
+           SYSID_FIELD(ParameterLaw, floor), SYSID_FIELD(ParameterLaw, averaging_s),
+           SYSID_FIELD(ParameterLaw, lower), SYSID_FIELD(ParameterLaw, upper),
+           SYSID_FIELD(ParameterLaw, yaw_rate_below), SYSID_FIELD(ParameterLaw, yaw_rate_above),
+           SYSID_FIELD(ParameterLaw, stage));
     py::class_<ParameterLaws>(m, "ParameterLaws")
         .def(py::init([](std::vector<ParameterLaw> laws, double dt, std::size_t yaw_rate_channel,
                          double derivative_hz, const std::array<double, 3>& schedule) {
