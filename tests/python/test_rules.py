@@ -38,7 +38,7 @@ NUMERICAL = {
     },
     "diagnose/refits.py": {"_BEYOND"},
     "diagnose/score.py": {"_BLOCK_S", "_DRAWN", "_FEWEST_BLOCKS"},
-    "diagnose/sensitivity.py": {"_AT_ONCE"},
+    "diagnose/sensitivity.py": {"_AT_ONCE", "_BOUNDED", "_SHARES"},
     "diagnose/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},
     "study/validation.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
     "study/horizons.py": {"_BLOCK_S", "_FEWEST", "_DRAWS", "_APART", "_NORMAL", "_LOST"},

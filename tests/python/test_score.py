@@ -1,6 +1,8 @@
 """Scores of effects a model lacks: fair without one, near the truth with a small one."""
 
+import warnings
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from scipy.stats import chi2, kstest
 from sysid_vehicle import Driving, Fit, Log, Model, catalogue, drive, effect, identify, manoeuvres
 from sysid_vehicle.diagnose.evidence import Evidence
 from sysid_vehicle.diagnose.score import Score, ScoreBoard, score_board, score_board_of
+from sysid_vehicle.diagnose.sensitivity import sensitivities
 from sysid_vehicle.identify import refit
 
 Hidden = Callable[[str, float], Fit]
@@ -178,3 +181,20 @@ def test_a_score_of_few_effects_is_theirs_in_the_score_of_all(fit: Fit) -> None:
     for s in few.scores:
         assert s.statistic == pytest.approx(everything[s.effect.id].statistic, rel=1e-9, abs=1e-9)
     assert score_board(fit, fit.driving, ()).family_p_values() == {}
+
+
+def test_a_delay_that_a_fast_filter_cannot_follow_is_tried_shorter(fit: Fit) -> None:
+    """Gains that trust the sensors wholly oscillate with readings that come late, ever more."""
+    sure = replace(
+        fit.noise,
+        sensor=(1e-3, 1e-3, 1e-4, 5e-3, 5e-3),
+        motion=(1.0, 1.0, 1.0),
+        disturbance=(5e3, 5e3, 5e3),
+    )
+    late = [effect("sensor_delay")]
+    evidence = Evidence(replace(fit, noise=sure), fit.driving)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = sensitivities(evidence, late).columns
+    assert np.all(np.isfinite(found))
+    assert np.all(np.abs(found).max(axis=0) > 0.0)
