@@ -189,10 +189,6 @@ class TyreLog:
         those at rest with what the height of the centre of gravity and the longitudinal
         acceleration move between them.
 
-        Returns
-        -------
-        tuple of TyreLog
-
         Raises
         ------
         InvalidInput
