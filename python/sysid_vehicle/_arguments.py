@@ -16,6 +16,7 @@ from .errors import InvalidInput
 __all__ = [
     "check_not_negative",
     "check_positive",
+    "check_positive_fields",
     "duration",
     "expect",
     "generator",
@@ -101,6 +102,11 @@ def check_positive(where: str, **values: float | Sequence[float]) -> None:
             raise InvalidInput(f"{where}: {name} is empty; give one value or more")
         if not ((numbers > 0.0) & (numbers < np.inf)).all():
             raise InvalidInput(f"{where}: {name} = {given!r}; give positive numbers")
+
+
+def check_positive_fields(thing: object, *names: str) -> None:
+    """Refuse a dataclass of which a named field is not positive, as `check_positive` does."""
+    check_positive(type(thing).__name__, **{name: getattr(thing, name) for name in names})
 
 
 def check_not_negative(thing: object, *, finite: bool = False) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from sysid_vehicle import example_vehicle, read_log
 from sysid_vehicle.cli import main
-from sysid_vehicle.cli.lab_inputs import vehicle_of
+from sysid_vehicle.cli.lab_logs import vehicle_of
 
 
 def test_it_drives_previews_and_writes_all_that_was_asked_for(

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import InvalidInput, Model, NumericalError, Vehicle, drive, manoeuvres, published
-from sysid_vehicle.cli import lab_em
+from sysid_vehicle.cli import lab_logs
+from sysid_vehicle.cli.outputs import refuse_outputs
 from sysid_vehicle.cli.parser import parse
 from sysid_vehicle.lab import (
     EMResult,
@@ -359,7 +360,7 @@ class TestCommand:
         out, figure = tmp_path / "em.json", tmp_path / "em.svg"
         given = [str(log), "--vehicle", str(vehicle), "--correlated"]
         wanted = ["--json", str(out), "--plot", str(figure), "--iterations", "40"]
-        lab_em.run(parsed([*given, *wanted]), ["heard before"])
+        lab_logs.em(parsed([*given, *wanted]), ["heard before"])
         printed = capsys.readouterr().out
         assert "sensor ay_mps2" in printed
         assert "smoothed state" in printed
@@ -379,9 +380,9 @@ class TestCommand:
         (tmp_path / "coasting.csv").write_text(text, encoding="utf-8")
         given = [str(tmp_path / "coasting.csv"), "--vehicle", str(vehicle)]
         with pytest.raises(InvalidInput, match="no fx_n; the observer needs the wheel force"):
-            lab_em.run(parsed(given), [])
+            lab_logs.em(parsed(given), [])
         with pytest.raises(InvalidInput, match="also an input"):
-            lab_em.run(parsed([*given, "--json", str(vehicle)]), [])
+            refuse_outputs(parsed([*given, "--json", str(vehicle)]))
 
 
 def parsed(argv: list[str]) -> argparse.Namespace:

@@ -1,13 +1,10 @@
-"""`sysid-vehicle lab`: the closed-loop laboratory from the command line.
-
-A subcommand is a `Subcommand` in `SUBCOMMANDS`.
-"""
+"""`sysid-vehicle lab`: the closed-loop laboratory from the command line."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +22,7 @@ from ..lab import (
 )
 from ..model import Model
 from ..vehicle import Vehicle
-from . import lab_em, lab_identify, lab_validate
+from . import lab_logs
 from .outputs import add_json, add_output, write_figures, write_picture
 
 __all__ = ["add_parser", "run"]
@@ -34,27 +31,17 @@ _DESIGNED = "designed"
 _PRESETS = {"default": Setup.default, "published": published.setup}
 
 
-@dataclass(frozen=True)
-class Subcommand:
-    """One subcommand of `lab`: its name, its line of help, its arguments, and what it does."""
-
-    name: str
-    help: str
-    arguments: Callable[[argparse.ArgumentParser], None]
-    run: Callable[[argparse.Namespace, list[str]], None]
-
-
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add `lab` and its subcommands to the program's commands."""
     lab = commands.add_parser("lab", help="drive a simulated car in closed loop to learn its tyres")
     inner = lab.add_subparsers(dest="lab_command", required=True, metavar="SUBCOMMAND")
-    for sub in SUBCOMMANDS:
-        sub.arguments(inner.add_parser(sub.name, help=sub.help))
+    for name, (text, arguments, _) in _SUBCOMMANDS.items():
+        arguments(inner.add_parser(name, help=text))
 
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Do the subcommand that was asked for."""
-    next(sub for sub in SUBCOMMANDS if sub.name == args.lab_command).run(args, heard)
+    _SUBCOMMANDS[args.lab_command][2](args, heard)
 
 
 def _run_arguments(parser: argparse.ArgumentParser) -> None:
@@ -179,24 +166,27 @@ def _figures(drive: ClosedLoop, seen: Preview | None) -> dict[str, Any]:
     return figures
 
 
-SUBCOMMANDS: tuple[Subcommand, ...] = (
-    Subcommand("run", "drive an excitation, write its log", _run_arguments, _run),
-    Subcommand(
-        "em",
+_Subcommand = tuple[
+    str,
+    Callable[[argparse.ArgumentParser], None],
+    Callable[[argparse.Namespace, list[str]], None],
+]
+# By name: the line of help, what may be typed, what it does.
+_SUBCOMMANDS: dict[str, _Subcommand] = {
+    "run": ("drive an excitation, write its log", _run_arguments, _run),
+    "em": (
         "learn the noise of sensors and disturbances, estimate the unexplained forces",
-        lab_em.add_arguments,
-        lab_em.run,
+        lab_logs.em_arguments,
+        lab_logs.em,
     ),
-    Subcommand(
-        "identify",
+    "identify": (
         "identify the tyres of both axles from logs",
-        lab_identify.add_arguments,
-        lab_identify.run,
+        lab_logs.identify_arguments,
+        lab_logs.identify,
     ),
-    Subcommand(
-        "validate",
+    "validate": (
         "predict driving that was not used with the tyres identified",
-        lab_validate.add_arguments,
-        lab_validate.run,
+        lab_logs.validate_arguments,
+        lab_logs.validate,
     ),
-)
+}

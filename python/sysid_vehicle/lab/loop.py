@@ -177,10 +177,6 @@ class ClosedLoop(Printed):
             A name of `reference`, `truth`, `estimate` or `inputs`; every group that has it is
             drawn.
 
-        Returns
-        -------
-        matplotlib Axes
-
         Raises
         ------
         InvalidInput

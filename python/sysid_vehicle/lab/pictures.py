@@ -14,12 +14,7 @@ _PANELS = ("vx_mps", "yaw_rate_radps", "steer_rad", "fx_n")
 
 
 def overview(drive: ClosedLoop) -> Figure:
-    """Draw references and response, inputs, disturbances, slip angles and limits over time.
-
-    Returns
-    -------
-    matplotlib Figure
-    """
+    """Draw references and response, inputs, disturbances, slip angles and limits over time."""
     figure = new_figure(9.0, 12.0)
     axes = figure.subplots(len(_PANELS) + 3, 1, sharex=True)
     for ax, what in zip(axes, _PANELS, strict=False):

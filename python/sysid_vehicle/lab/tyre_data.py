@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _core
-from .._arguments import check_positive
+from .._arguments import check_positive_fields
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..log import Log
@@ -49,8 +49,9 @@ class GreyBoxVehicle:
     yaw_inertia_tolerance: float = 0.0
 
     def __post_init__(self) -> None:
-        names = ("mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m", "air_density_kgpm3")
-        check_positive("GreyBoxVehicle", **{name: getattr(self, name) for name in names})
+        check_positive_fields(
+            self, "mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m", "air_density_kgpm3"
+        )
         if not 0.0 <= self.cg_height_m < 3.0:
             raise InvalidInput(f"cg_height_m is {self.cg_height_m}; give 0 to 3 m above the road")
         for name in ("mass_tolerance", "yaw_inertia_tolerance"):
@@ -187,10 +188,6 @@ class TyreLog:
         Axle loads are the columns ``fz_front_n`` and ``fz_rear_n`` where the log has them, else
         those at rest with what the height of the centre of gravity and the longitudinal
         acceleration move between them.
-
-        Returns
-        -------
-        tuple of TyreLog
 
         Raises
         ------

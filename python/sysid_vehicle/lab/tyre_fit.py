@@ -288,10 +288,6 @@ class TyreFit(Printed):
         ax : matplotlib Axes, optional
         axles : sequence of str
             ``front``, ``rear``, or both.
-
-        Returns
-        -------
-        matplotlib Axes
         """
         ax = axes_or_new(ax, 6.0, 3.8)
         for axle in axles:

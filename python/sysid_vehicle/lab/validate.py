@@ -148,10 +148,6 @@ class Validation(Printed):
         reading : str
             One of `READINGS`.
 
-        Returns
-        -------
-        matplotlib Axes
-
         Raises
         ------
         InvalidInput

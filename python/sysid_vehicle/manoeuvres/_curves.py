@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import scipy
 
-from .._arguments import check_positive
+from .._arguments import check_positive, check_positive_fields
 from .._arrays import FloatArray
 from ..errors import InvalidInput
 
@@ -80,7 +80,7 @@ class Sweep:
     to_hz: float
 
     def __post_init__(self) -> None:
-        check_positive("Sweep", duration_s=self.duration_s, from_hz=self.from_hz, to_hz=self.to_hz)
+        check_positive_fields(self, "duration_s", "from_hz", "to_hz")
 
     @classmethod
     def of_whole_periods(

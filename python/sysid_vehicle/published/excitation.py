@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from .._arguments import check_positive
+from .._arguments import check_positive_fields
 from .._arrays import FloatArray, as_float64
 from ..lab.excitation import Excitation
 
@@ -48,13 +48,8 @@ class Identification(Excitation):
     heading_speed_mps: float = 10.0
 
     def __post_init__(self) -> None:
-        check_positive(
-            "Identification",
-            duration_s=self.duration_s,
-            chirp_s=self.chirp_s,
-            period_s=self.period_s,
-            lowest_mps=self.lowest_mps,
-            heading_speed_mps=self.heading_speed_mps,
+        check_positive_fields(
+            self, "duration_s", "chirp_s", "period_s", "lowest_mps", "heading_speed_mps"
         )
 
     def speed_mps(self, time_s: FloatArray) -> FloatArray:
@@ -112,14 +107,7 @@ class Oval(Excitation):
     beside_m: float = 2.0
 
     def __post_init__(self) -> None:
-        check_positive(
-            "Oval",
-            duration_s=self.duration_s,
-            length_m=self.length_m,
-            width_m=self.width_m,
-            radius_m=self.radius_m,
-            lowest_mps=self.lowest_mps,
-        )
+        check_positive_fields(self, "duration_s", "length_m", "width_m", "radius_m", "lowest_mps")
 
     @property
     def start(self) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +44,7 @@ def table_of_text(text: str, *, units_row: bool | None = None) -> Table:
     names = tuple(name.strip() for name in cells)
     if not any(names):
         raise InvalidInput("the first line is empty; it must hold the column names")
-    if all(_is_number(name) for name in names):
+    if all(is_number(name) for name in names):
         raise InvalidInput(
             f"the first line holds numbers ({', '.join(names[:3])}, ...); put a line with the "
             f"column names before it"
@@ -70,7 +70,7 @@ def _split(text: str) -> tuple[str, str, int]:
     if 0 < at < len(lines):
         named = lines[at - 1].lstrip("# ")
         delimiter = max(",;\t", key=header.count)
-        numbers = all(_is_number(cell) for cell in header.split(delimiter) if cell.strip())
+        numbers = all(is_number(cell) for cell in header.split(delimiter) if cell.strip())
         if numbers and header.strip() and named.count(delimiter) == header.count(delimiter):
             header, at = named, at - 1
     rest = lines[at + 1 :]
@@ -90,22 +90,19 @@ def _units_row(
         return {}, body, first_line
     told = [cell.strip() for cell in cells if cell.strip()]
     known = 2 * sum(is_unit(cell) for cell in told) > len(told) if told_so is None else told_so
-    if len(cells) != len(names) or any(map(_is_number, told)) or not known:
+    if len(cells) != len(names) or any(map(is_number, told)) or not known:
         return {}, body, first_line
     units = {name: cell.strip() for name, cell in zip(names, cells, strict=True) if cell.strip()}
     return units, rest, first_line + 1
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Whether a cell holds a number."""
     try:
         float(text)
     except ValueError:
         return False
     return True
-
-
-def _unique(names: tuple[str, ...]) -> Collection[str]:
-    return dict.fromkeys(names)
 
 
 def _read_fast(
@@ -121,7 +118,7 @@ def _read_fast(
     if values.shape[1] != len(names):
         return None
     first = {name: k for k, name in reversed(list(enumerate(names)))}
-    columns = {name: np.ascontiguousarray(values[:, first[name]]) for name in _unique(names)}
+    columns = {name: np.ascontiguousarray(values[:, first[name]]) for name in dict.fromkeys(names)}
     return Table(names, columns, {}, values.shape[0], units)
 
 
@@ -162,7 +159,7 @@ def _read_slow(
         try:
             values = np.array([float(cell) if cell.strip() else np.nan for cell in cells])
         except ValueError:
-            first = next(k for k, c in enumerate(cells) if c.strip() and not _is_number(c))
+            first = next(k for k, c in enumerate(cells) if c.strip() and not is_number(c))
             not_numbers[name] = BadCell(cells[first].strip(), first, lines[first])
             stamps = seconds_of_stamps(cells)
             if stamps is not None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidInput
+from ._csv import is_number
 from ._formats import read_text_table
 from ._table import BadCell, Table
 from ._units import is_unit
@@ -39,7 +40,7 @@ def read(path: Path, dbc: Path | None) -> Table:
         try:
             columns[name] = np.array([cells[k] for _, cells in rows], dtype=np.float64)
         except ValueError:
-            sample = next(i for i, (_, cells) in enumerate(rows) if not _is_number(cells[k]))
+            sample = next(i for i, (_, cells) in enumerate(rows) if not is_number(cells[k]))
             bad[name] = BadCell(rows[sample][1][k], sample, rows[sample][0])
     if _TIME in columns:
         columns["time_s"] = _since_midnight(columns.pop(_TIME))
@@ -88,11 +89,3 @@ def _since_midnight(clock: np.ndarray) -> np.ndarray:
     days = np.cumsum(np.diff(time_s, prepend=time_s[:1]) < -0.5 * _DAY_S)
     result: np.ndarray = np.round(time_s + _DAY_S * days, 6)
     return result
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -30,7 +30,13 @@ _MOST = (
 
 
 def checked_rows(
-    values: npt.ArrayLike, names: Sequence[str], what: str, dt_s: float, *, missing: bool = False
+    values: npt.ArrayLike,
+    names: Sequence[str],
+    what: str,
+    dt_s: float,
+    *,
+    missing: bool = False,
+    any_size: bool = False,
 ) -> FloatArray:
     """Rows of numbers with one column per name, none of them absurd.
 
@@ -46,6 +52,8 @@ def checked_rows(
         Step, for messages.
     missing : bool
         Whether NaN stands for what was not read; without it NaN is refused.
+    any_size : bool
+        Whether numbers may be of any size: names of other simulators do not tell units.
 
     Raises
     ------
@@ -67,7 +75,7 @@ def checked_rows(
     # Extremes of columns first: they show what is wrong without a table of the size of the rows.
     largest, smallest = (np.fmax, np.fmin) if missing else (np.maximum, np.minimum)
     high, low = largest.reduce(rows, axis=0), smallest.reduce(rows, axis=0)
-    most = np.array([_most(name) for name in names])
+    most = np.array([np.finfo(float).max if any_size else _most(name) for name in names])
     if np.all((np.isnan(high) & missing) | ((high <= most) & (low >= -most))):
         return rows
     bad = np.isinf(rows) if missing else ~np.isfinite(rows)

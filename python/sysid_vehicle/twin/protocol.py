@@ -23,7 +23,7 @@ from .._arrays import FloatArray, as_float64
 from .._progress import doing
 from ..errors import InvalidInput, NumericalError
 from .car import LOAD_NAMES
-from .checks import checked_step
+from .checks import checked_rows, checked_step
 from .observer import Observation, Observer, judged
 
 CAPABILITIES = ("parameters", "state", "wrench", "snapshot", "clone")
@@ -123,7 +123,7 @@ def observe_with(
         If an output of the twin is no number any more; the message names the time.
     """
     dt, names = checked_step(twin.dt_s), twin.parameter_names
-    inputs = _inputs(twin, inputs, dt)
+    inputs = checked_rows(inputs, twin.input_names, "inputs", dt, any_size=True)
     n = len(inputs)
     stride = whole(stride, "stride", 1)
     read = _table(twin, measured, n, dt)
@@ -196,25 +196,6 @@ def _named(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
     return dict(zip(names, values, strict=False))
 
 
-def _inputs(twin: Twin, inputs: FloatArray, dt: float) -> FloatArray:
-    try:
-        rows = as_float64(inputs)
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(f"inputs are no table of real numbers: {error}") from error
-    if rows.ndim != 2 or rows.shape[1] != len(twin.input_names) or len(rows) == 0:
-        raise InvalidInput(
-            f"inputs have shape {rows.shape}; the twin takes (n, {len(twin.input_names)}), n at "
-            f"least one"
-        )
-    if not np.all(np.isfinite(rows)):
-        k, column = map(int, np.argwhere(~np.isfinite(rows))[0])
-        raise InvalidInput(
-            f"inputs: {twin.input_names[column]} is {rows[k, column]} at sample {k}, "
-            f"t = {k * dt:.6g} s; fill gaps before"
-        )
-    return rows
-
-
 def _table(twin: Twin, measured: Mapping[str, FloatArray], n: int, dt: float) -> FloatArray:
     read = np.full((n, len(twin.output_names)), np.nan)
     for name, values in measured.items():
@@ -222,15 +203,8 @@ def _table(twin: Twin, measured: Mapping[str, FloatArray], n: int, dt: float) ->
             continue  # a sensor that the twin has no counterpart of teaches nothing
         if len(values) != n:
             raise InvalidInput(f"measured '{name}' has {len(values)} samples; the inputs have {n}")
-        column = as_float64(values)
-        if np.isinf(column).any():
-            k = int(np.argmax(np.isinf(column)))
-            raise InvalidInput(
-                f"measured '{name}' is {column[k]} at sample {k}, t = {k * dt:.6g} s; put NaN "
-                f"where nothing was read"
-            )
-        read[:, twin.output_names.index(name)] = column
-    return read
+        read[:, twin.output_names.index(name)] = as_float64(values)
+    return checked_rows(read, twin.output_names, "measured", dt, missing=True, any_size=True)
 
 
 def _check(twin: Twin, observer: Observer) -> None:

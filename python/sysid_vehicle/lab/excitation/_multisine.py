@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..._arguments import check_positive
+from ..._arguments import check_positive_fields
 from ..._arrays import FloatArray, as_float64
 from ...errors import InvalidInput
 
@@ -49,13 +49,7 @@ class MultiSine:
     _size: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        check_positive(
-            "MultiSine",
-            peak=self.peak,
-            period_s=self.period_s,
-            from_hz=self.from_hz,
-            to_hz=self.to_hz,
-        )
+        check_positive_fields(self, "peak", "period_s", "from_hz", "to_hz")
         if self.harmonics.size == 0:
             raise InvalidInput(
                 f"MultiSine: a period of {self.period_s:g} s has no line from {self.from_hz:g} to "

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..._arguments import check_positive
+from ..._arguments import check_positive_fields
 from ..._arrays import FloatArray, as_float64
 from ...errors import InvalidInput
 from ._excitation import Excitation
@@ -50,14 +50,8 @@ class Weaving(Excitation):
     duration_s: float = 60.0
 
     def __post_init__(self) -> None:
-        check_positive(
-            "Weaving",
-            lateral_mps2=self.lateral_mps2,
-            from_hz=self.from_hz,
-            to_hz=self.to_hz,
-            period_s=self.period_s,
-            swing_period_s=self.swing_period_s,
-            duration_s=self.duration_s,
+        check_positive_fields(
+            self, "lateral_mps2", "from_hz", "to_hz", "period_s", "swing_period_s", "duration_s"
         )
         if not self.mean_mps - abs(self.swing_mps) >= 3.0:
             raise InvalidInput(
