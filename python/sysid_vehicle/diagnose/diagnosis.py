@@ -50,6 +50,9 @@ class Candidate:
         Effects that this driving cannot tell from it.
     fit : Fit or None
         The model with the effect, where it was refitted.
+    finished : bool
+        Whether noise was learned with it; else it was refitted under the noise of the model without
+        the effect.
     """
 
     effect: Effect
@@ -62,6 +65,7 @@ class Candidate:
     error: float = float("nan")
     indistinguishable_from: tuple[str, ...] = ()
     fit: Fit | None = None
+    finished: bool = False
 
     @property
     def id(self) -> str:

@@ -46,7 +46,8 @@ def finished(fit: Fit, c: Candidate) -> Candidate:
     """The candidate with noise of its own."""
     if c.fit is None:
         return c
-    return _with_fit(fit, c, refine(c.fit.model, c.fit.driving, c.fit.noise))
+    found = _with_fit(fit, c, refine(c.fit.model, c.fit.driving, c.fit.noise))
+    return replace(found, finished=True)
 
 
 def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:

@@ -202,7 +202,7 @@ class ScoreModel:
         if begin is not None:
             few = [h for h in self.hypotheses if set(h.columns) <= set(begin.columns)]
             few = [h for h in few if not any(set(h.columns) < set(o.columns) for o in few)][:most]
-            size = iter(self._joint(few)[1])
+            size = iter(self._joint([few])[1][0])
             for row, h in zip(mixtures, few, strict=False):
                 row[list(h.columns)] = [next(size) for _ in h.columns]
         for _ in range(_ROUNDS):
@@ -223,23 +223,27 @@ class ScoreModel:
         prior = dict(zip(self.hypotheses, self._log_prior, strict=True))
         best: dict[frozenset[str], tuple[float, float, tuple[int, ...]]] = {}
 
-        def note(few: tuple[Hypothesis, ...]) -> float:
-            log_odds = self._joint(few)[0] + float(sum(prior[h] for h in few))
-            names = frozenset(h.name for h in few)
-            # Forms of the same effects: their odds add up.
-            sum_, top, columns = best.get(names, (-np.inf, -np.inf, ()))
-            if log_odds > top:
-                top, columns = log_odds, tuple(c for h in few for c in h.columns)
-            best[names] = float(np.logaddexp(sum_, log_odds)), top, columns
-            return log_odds
+        def noted(tried: list[tuple[Hypothesis, ...]]) -> list[float]:
+            found = []
+            for few, log_bf in zip(tried, self._log_factors(tried), strict=True):
+                log_odds = float(log_bf) + sum(prior[h] for h in few)
+                names = frozenset(h.name for h in few)
+                # Forms of the same effects: their odds add up.
+                sum_, top, columns = best.get(names, (-np.inf, -np.inf, ()))
+                if log_odds > top:
+                    top, columns = log_odds, tuple(c for h in few for c in h.columns)
+                best[names] = float(np.logaddexp(sum_, log_odds)), top, columns
+                found.append(log_odds)
+            return found
 
-        alone = {h: note((h,)) for h in self.hypotheses}
-        place = {h: i for i, h in enumerate(sorted(alone, key=lambda h: -alone[h]))}
+        alone = noted([(h,) for h in self.hypotheses])
+        ranked = sorted(zip(self.hypotheses, alone, strict=True), key=lambda k: -k[1])
+        place = {h: i for i, (h, _) in enumerate(ranked)}
         tried: list[tuple[Hypothesis, ...]] = [
             pair for pair in combinations(place, 2) if pair[0].name != pair[1].name
         ]
         for size in range(2, most + 1):
-            leading = sorted(((note(few), few) for few in tried), key=lambda k: -k[0])
+            leading = sorted(zip(noted(tried), tried, strict=True), key=lambda k: -k[0])
             if size < most:
                 more = (
                     tuple(sorted((*few, h), key=place.__getitem__))
@@ -251,23 +255,35 @@ class ScoreModel:
         order = sorted(best.items(), key=lambda k: -k[1][0])
         return tuple(Subset(tuple(sorted(n)), odds, columns) for n, (odds, _, columns) in order)
 
-    def _joint(self, few: Sequence[Hypothesis]) -> tuple[float, FloatArray]:
-        """Log Bayes factor of hypotheses together against nothing, and the mean of their columns.
+    def _log_factors(self, sets: Sequence[Sequence[Hypothesis]]) -> FloatArray:
+        """Log Bayes factor of each set of hypotheses against nothing."""
+        out = np.empty(len(sets))
+        by_width: dict[int, list[int]] = {}
+        for i, few in enumerate(sets):
+            by_width.setdefault(sum(len(h.columns) for h in few), []).append(i)
+        for alike in by_width.values():
+            out[alike] = self._joint([sets[i] for i in alike])[0]
+        return out
 
-        Each adds what the ones before it leave, over its own variance ratio.
+    def _joint(self, sets: Sequence[Sequence[Hypothesis]]) -> tuple[FloatArray, FloatArray]:
+        """Log Bayes factors of sets of hypotheses against nothing, and the means of their columns.
+
+        Each hypothesis adds what the ones before it leave, over its own variance ratio. The sets
+        have as many columns.
         """
-        where = np.array([c for h in few for c in h.columns], dtype=np.intp)
-        sides = np.array([s for h in few for s in h.sides])
+        where = np.array([[c for h in few for c in h.columns] for few in sets], dtype=np.intp)
+        sides = np.array([[s for h in few for s in h.sides] for few in sets])
         ratio = self._ratios[where]
-        block = self.information[np.ix_(where, where)] + np.diag(ratio)
+        block = self.information[where[:, :, None], where[:, None, :]]
+        block = block + ratio[:, :, None] * np.eye(where.shape[1])
         root = np.linalg.inv(np.linalg.cholesky(block))
-        added = root @ self.score[where]
-        mean = root.T @ added
-        log_bf = 0.5 * float(np.sum(added**2 / ratio) + np.sum(np.log(ratio * np.diag(root) ** 2)))
-        if sides.any():
-            std = np.sqrt(ratio * np.sum(root**2, axis=0))
-            log_bf += float(_on_side(mean, std, sides)[0].sum())
-        return log_bf, as_float64(mean)
+        added = np.einsum("nij,nj->ni", root, self.score[where])
+        mean = np.einsum("nij,ni->nj", root, added)
+        own = np.diagonal(root, axis1=1, axis2=2)
+        log_bf = 0.5 * np.sum(added**2 / ratio + np.log(ratio * own**2), axis=1)
+        std = np.sqrt(ratio * np.sum(root**2, axis=1))
+        log_bf += _on_side(mean, std, sides)[0].sum(axis=1)
+        return as_float64(log_bf), as_float64(mean)
 
 
 def _on_side(

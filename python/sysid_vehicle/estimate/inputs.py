@@ -17,7 +17,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import scipy
 
 from .._arrays import FloatArray, as_float64
 
@@ -70,4 +69,6 @@ def quiet(y: FloatArray) -> FloatArray:
 
 @lru_cache
 def _weights(half: int) -> FloatArray:
-    return as_float64(scipy.signal.savgol_coeffs(2 * half + 1, _DEGREE))
+    """Of the value in the middle of a polynomial by least squares (Savitzky & Golay, 1964)."""
+    powers = np.vander(np.linspace(-1.0, 1.0, 2 * half + 1), _DEGREE + 1)
+    return as_float64(np.linalg.pinv(powers)[-1])

@@ -251,6 +251,11 @@ def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules)
     for c in others:
         values = zip(c.effect.parameters, c.value, strict=True)
         model = model.add(c.effect).with_values({f"{c.id}.{p.name}": v for p, v in values})
+    # The first of all effects was tried against the same ones before it was chosen.
+    known = next((c.fit for c in others if c.finished and c.fit is not None), None)
+    same = known is not None and set(known.model.effects) == set(model.effects)
+    if known is not None and same and known.driving is fit.driving:
+        return without_insignificant(known, rules)
     try:
         return without_insignificant(refine(model, fit.driving, fit.noise), rules)
     except (NumericalError, np.linalg.LinAlgError):
