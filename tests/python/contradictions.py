@@ -4,7 +4,9 @@ import re
 
 _NONE = "no sign of anything left that depends on the driving"
 _SOME = "something is left that depends on the driving"
-_WHY = ("stand-ins", "There is evidence for", "Something else is wrong", _SOME)
+_STILL = "A function of the driving still predicts"
+_DISTURBANCE = "no function of the driving predicts"
+_WHY = ("stand-ins", "There is evidence for", "Something else is wrong", _SOME, _STILL)
 
 
 def contradictions(text: str) -> list[str]:
@@ -29,6 +31,28 @@ def contradictions(text: str) -> list[str]:
         found.append(f"{verdict}, and something is left")
     if verdict in ("unknown", "partly_explained") and not any(why in text for why in _WHY):
         found.append(f"{verdict}, and no word of what is left")
+    if (
+        verdict in ("adequate", "explained")
+        and _STILL in text
+        and "than the errors that" not in text
+    ):
+        found.append(f"{verdict}, and a function of the driving predicts what is left")
+    if _STILL in text and (_NONE in text or _DISTURBANCE in text):
+        found.append("a function of the driving predicts what is left, and none does")
+    if _DISTURBANCE in text and _SOME in text:
+        found.append("what is left is disturbance, and depends on the driving")
+    if re.search(r"explains? (-|nan)", text) or re.search(r"takes up (-|nan)", text):
+        found.append("a share below nothing is explained")
+    if "takes nothing off the error" in text and re.search(r"takes up (only )?[1-9]", text):
+        found.append("what was added takes a part off the error, and nothing")
+    if "no effect of the catalogue explains it" in text and "more time" in text:
+        found.append("no effect explains it, and some were not tried")
+    if verdict == "explained" and ("only stands in" in text or "; alias" in text):
+        found.append("explained by what only stands in for something else")
+    if "Named physics explains" in text and verdict not in ("explained", "partly_explained"):
+        found.append(f"{verdict}, and named physics explains a share")
+    if verdict == "adequate" and "Next: " in text:
+        found.append("adequate, and something is to be done")
     if verdict == "unknown" and "; confirmed" in text:
         found.append("unknown, and an effect is confirmed")
     if _NONE in text and "a function of steering, speed and acceleration history explains" in text:

@@ -9,6 +9,8 @@ from sysid_vehicle import Fit, Log, Model, RoadDisturbance, ceiling, drive, mano
 from sysid_vehicle.diagnose import Ceiling, Explainable
 from sysid_vehicle.diagnose.ceiling import _ago, _features, _share, ridge
 from sysid_vehicle.estimate import Driving
+from sysid_vehicle.rules import USUAL
+from sysid_vehicle.study.structure import structure
 
 
 def test_a_wrong_answer_to_the_steering_can_be_explained(fit: Fit, course: Log) -> None:
@@ -36,6 +38,32 @@ def test_disturbances_of_the_road_are_not_explainable(truth: Model, fit: Fit) ->
     assert all(f.rms > 100.0 for f in found.forces)
     assert all(f.share < 0.15 for f in found.forces)
     assert found.structure == ()
+
+
+def test_what_depends_on_the_driving_is_shown_on_both_data_sets(fit: Fit, course: Log) -> None:
+    driving = Driving.of(course)
+    right = structure(fit, driving)
+    assert "missing F_y" in right.train.keys() & right.test.keys()
+    assert right.anywhere < USUAL.explainable
+    late = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.15})
+    wrong = structure(replace(fit, model=late), driving)
+    assert USUAL.explainable < wrong.everywhere <= wrong.anywhere < 1.0
+    assert wrong.strongest.endswith("on validation data")
+    assert wrong.to_dict()["test"]["missing M_z"][0] == wrong.test["missing M_z"].share
+    # What one data set shows alone is not shown everywhere.
+    assert (
+        replace(right, test=wrong.test).everywhere < 0.1 < replace(right, test=wrong.test).anywhere
+    )
+    lost = replace(fit, model=fit.model.with_values({"B_front": float("nan")}))
+    assert structure(lost, driving).everywhere == 0.0
+
+
+def test_what_disturbs_at_random_has_no_structure(truth: Model, fit: Fit) -> None:
+    rough = RoadDisturbance(fy_n=400.0, mz_nm=200.0)
+    logs = [drive(truth, manoeuvres.lap(40.0), seed=s, disturbance=rough) for s in (5, 6)]
+    train, test = map(Driving.of, logs)
+    found = structure(replace(fit, driving=train), test)
+    assert found.everywhere < 0.05
 
 
 def test_measured_lateral_motion_is_no_regressor(

@@ -1,12 +1,22 @@
-"""What a study says is to be done next."""
+"""What a study says, and what is to be done next."""
 
+import random
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from contradictions import contradictions
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from sysid_vehicle import Model, Study, drive, improve, manoeuvres
+from sysid_vehicle.diagnose import Omnibus
+from sysid_vehicle.diagnose.ceiling import Explainable
+from sysid_vehicle.rules import Added, Change, Facts, Share, grade, share_of, verdict
 from sysid_vehicle.study import AddedEffect
+from sysid_vehicle.study.horizons import Beyond
 from sysid_vehicle.study.next_steps import next_steps
+from sysid_vehicle.study.structure import Structure
 
 
 @pytest.fixture(scope="module")
@@ -63,3 +73,105 @@ def test_what_is_confounded_is_to_be_told_apart(unknown: Study) -> None:
     first, second, *_ = next_steps(replace(unknown, added=(drag, proxy)))
     assert first.startswith("tell aero_drag from head_wind: `sysid-vehicle next-drive`")
     assert second.startswith("do not take the size of mass for a property of the car")
+
+
+P = (1e-60, 1e-7, 5e-5, 5e-4, 0.004, 0.02, 0.07, 0.6)
+SQUARES = (0.0, 0.05, 0.5, 1.0, 3.0)
+EFFECTS = ("tyre_load_sensitivity", "steer_lag")
+FINDINGS = ("missing", "one of a group", "negligible", "proxy")
+
+
+def drawn_test(rng: random.Random) -> Omnibus:
+    return Omnibus(rng.choice((9.0, 30.0, 900.0)), 9, rng.choice(P), "M_z")
+
+
+def changed(rng: random.Random) -> tuple[Change, ...]:
+    by = rng.choice((-0.4, 0.0, 0.3))
+    return tuple(Change(c, 1.0, by, 0.02) for c in ("vy_mps", "yaw_rate_radps", "ay_mps2"))
+
+
+def said(base: Study, rng: random.Random) -> str:
+    """What a study prints that measured something, and what is decided on it."""
+    added = tuple(
+        Added(
+            e,
+            finding := rng.choice(FINDINGS),
+            ("mass",) if finding == "one of a group" else (),
+            rng.choice((frozenset({"yaw_rate_radps"}), frozenset({"ay_mps2"}))),
+            rng.choice(SQUARES),
+            changed(rng),
+            changed(rng),
+        )
+        for e in EFFECTS[: rng.randrange(3)]
+    )
+    low, high = (rng.choice((-0.5, 0.05, 0.3, 0.9)) for _ in range(2))
+    told = [
+        {"error of v_y 1 s ahead": Explainable("", x + 0.05, x, x + 0.1, 1.0)} for x in (low, high)
+    ]
+    structure = Structure(*told)
+    validation = drawn_test(rng) if added else None
+    candidates = rng.choice(P), rng.choice(P)
+    missing = (rng.choice(SQUARES), rng.choice(SQUARES)) if added else (0.0, 0.0)
+    unrelated = {"ay_mps2": "ay_mps2 is turned round"} if rng.random() < 0.2 else {}
+    facts = Facts(
+        drawn_test(rng),
+        drawn_test(rng),
+        validation,
+        min(candidates),
+        missing,
+        added,
+        tuple(unrelated.values()),
+        excited=rng.random() < 0.8,
+        structure=(structure.anywhere, structure.everywhere),
+        small=rng.random() < 0.5,
+    )
+    decision = verdict(facts)
+    gone = {e: w.because for w in decision.withdrawn for e in w.effects}
+    names = [a.id for a in added]
+    fits = [base.fits[0]]
+    for name in names:
+        fits.append(replace(base.fits[0], model=fits[-1].model.add(name)))
+    own = tuple(
+        AddedEffect(
+            a.id,
+            (),
+            2.0,
+            1.0,
+            1e-9,
+            a.group,
+            because := "it acts alike" if a.finding == "proxy" else gone.get(a.id, ""),
+            grade(a.finding, "proxy" if because else a.finding, much_left=decision.much_left),
+        )
+        for a in added
+    )
+    last = base.diagnoses[-1]
+    ranking = [replace(last.ranking[0], p_value=p, fit=None) for p in candidates]
+    share = share_of(*missing)
+    study = replace(
+        base,
+        verdict=decision.verdict,
+        fits=tuple(fits),
+        train=tuple(replace(base.train[-1], unrelated=unrelated) for _ in fits),
+        test=tuple(base.test[-1] for _ in fits),
+        diagnoses=(replace(last, ranking=tuple(ranking)),),
+        omnibus=facts.fitted,
+        omnibus_validation=validation,
+        added=own,
+        explained=Beyond(missing, share, share - 0.1, min(share + 0.1, 1.0)) if added else None,
+        structure=structure,
+        stopped=("mass",) if rng.random() < 0.3 and min(candidates) < 0.01 else (),
+    )
+    whole = rng.choice((-0.4, 0.02, 0.95, np.nan))
+    study.__dict__["shares"] = replace(
+        base.shares, whole=Share(whole, whole - 0.1, whole + 0.1), named=tuple(names)
+    )
+    return str(study)
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.randoms(use_true_random=False))
+def test_nothing_that_a_study_says_contradicts_another_statement(
+    adequate: Study, rng: random.Random
+) -> None:
+    text = said(adequate, rng)
+    assert contradictions(text) == [], text

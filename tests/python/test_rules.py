@@ -49,6 +49,7 @@ NUMERICAL = {
         "_VISIBLE", "_LOST", "_LEAST", "_QUANTILES",
     },
     "study/steps.py": {"_ALTERNATIVES"},
+    "study/structure.py": {"_AHEAD_S", "_APART", "_FEW"},
     # Descriptions of the unknown, of biases, and of the next drive.
     "diagnose/ceiling.py": {
         "_RATE_HZ", "_LAGS_S", "_BLOCK_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",

@@ -139,7 +139,7 @@ def ceiling(
     """
     train, other = fit.driving if logs is None else Driving.of(logs), Driving.of(test)
     rng = generator(seed)
-    few, there = _thinned(train), _thinned(other)
+    few, there = thinned(train), thinned(other)
     inputs = Inputs.of(fit, train, other)
     known, hidden = (missing_forces(fit, d) for d in (train, other))
     piece = np.unique(_block_numbers(other)[there], return_inverse=True)[1]
@@ -223,12 +223,46 @@ def _sizes(gram: FloatArray, across: FloatArray, rows: int) -> FloatArray:
     return as_float64(vector @ ((vector.T @ across) / loosened[:, :, None]))
 
 
+def left_out(
+    target: str, X: FloatArray, y: FloatArray, fold: Whole, piece: Whole, *, seed: int = 0
+) -> Explainable | None:
+    """What of a signal's square is predicted in folds that the regression did not see.
+
+    Parameters
+    ----------
+    X : array, shape (samples, n)
+    y : array, shape (samples,)
+    fold, piece : array of int, shape (samples,)
+        Of cross-validation, and the blocks that are drawn anew for the interval.
+
+    Returns
+    -------
+    Explainable or None
+        None where there is one fold only.
+    """
+    parts = [fold == k for k in np.unique(fold)]
+    if len(parts) == 1:
+        return None
+    error = np.empty_like(y)
+    for part in parts:
+        law = ridge(X[~part], y[~part, None], fold[~part])
+        error[part] = y[part] - law.mean - X[part] @ law.size[:, 0]
+    return _share(target, y, error, piece, generator(seed))
+
+
+def pieces(driving: Driving, rows: Whole) -> tuple[Whole, Whole]:
+    """Fold of cross-validation, and number of the block, of these samples."""
+    block = _block_numbers(driving)[rows]
+    return block % _FOLDS, np.unique(block, return_inverse=True)[1]
+
+
 def folds(driving: Driving) -> Whole:
     """To which fold of cross-validation each sample belongs."""
     return _block_numbers(driving) % _FOLDS
 
 
-def _thinned(driving: Driving) -> Whole:
+def thinned(driving: Driving) -> Whole:
+    """Samples that tell all of what is smooth."""
     every = max(round(driving.mean_rate_hz / _RATE_HZ), 1)
     return np.arange(0, driving.samples, every)
 

@@ -9,7 +9,9 @@
    accepted effect gives way to others of its kind (`near`) that lead by `apart`, or are simpler.
 5. An effect within `insignificant` standard errors of nothing is dropped unless BIC needs it.
 6. When nothing is added any more, the final model is tested for anything left: at `level` on the
-   training data, at `elsewhere` on validation data, and for one effect more.
+   training data, at `elsewhere` on validation data, and for one effect more. What the driving
+   predicts on all data by more than `explainable` is left too; where it predicts nothing, only
+   evidence below `strict` counts.
 7. Nothing left: what was added explains it. An added effect is not named if its value is physically
    implausible, or differs between pieces of the driving (`spread`).
 8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead,

@@ -42,7 +42,10 @@ class Rules:
         0.01, "probability", "below which a single test of a complete model rejects it", _NULLS
     )
     strict: float = _limit(
-        1e-3, "probability", "below which what is left makes names uncertain", _OUTSIDE
+        1e-3,
+        "probability",
+        "below which what is left makes names uncertain, and is no disturbance",
+        _OUTSIDE,
     )
     elsewhere: float = _limit(
         1e-4,
@@ -113,7 +116,7 @@ class Rules:
     explainable: float = _limit(
         0.1,
         "share",
-        "of a missing force that the driving predicts, from which it has structure",
+        "of a missing force, or of an error ahead, that the driving predicts: it has structure",
         _OUTSIDE,
     )
     taken: float = _limit(

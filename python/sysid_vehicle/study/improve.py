@@ -27,6 +27,7 @@ from .horizons import changes, horizons
 from .matters import sizes_that_matter, within
 from .search import Search, Trail, kept
 from .steps import way
+from .structure import structure
 from .study import Study
 from .validation import AHEAD, beyond_noise_ahead, changes_ahead, serving, set_aside
 from .verdict import facts_of, in_the_light_of
@@ -156,6 +157,7 @@ def improve(
             settled=True,
             untried=found.stopped,
         )
+        pattern = structure(fit, test_driving)
         facts = facts_of(
             fits,
             told,
@@ -166,6 +168,7 @@ def improve(
             validation=validation,
             candidate=min((c.p_value for c in last.ranking), default=1.0),
             excited=_excited(train_driving),
+            structure=(pattern.anywhere, pattern.everywhere),
             changes=_changes(fits, test_driving) if much_left else {},
             small=sizes is not None and within(horizons([fit], [""], test_driving), sizes),
         )
@@ -186,6 +189,7 @@ def improve(
             seconds=time.perf_counter() - began,
             rules=rules,
             explained=explained,
+            structure=pattern,
             stopped=found.stopped,
             checked=bool(sensors),
         )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from .said import disturbance
+
 if TYPE_CHECKING:
     from .study import Study
 
@@ -45,8 +47,8 @@ def _of_names(study: Study) -> list[str]:
     aliases = [a.id for a in study.added if a.stands_in]
     if aliases:
         found.append(
-            f"do not take the size of {', '.join(aliases)} for a property of the car: the model "
-            "predicts better with it, and what is missing may be something else"
+            f"do not take the size of {', '.join(aliases)} for a property of the car: what is "
+            "missing may be something else"
         )
     return found
 
@@ -66,8 +68,8 @@ def _of_what_is_left(study: Study) -> list[str]:
     ]
     if open_:
         found.append(
-            f"drive nearer the limit of the tyres: {_few(open_)} are not determined, and tyres "
-            "that are open hide what is missing"
+            f"drive nearer the limit of the tyres: not determined: {_few(open_)}; tyres that are "
+            "open hide what is missing"
         )
     if not study.fit.driving.force_known:
         found.append(
@@ -78,7 +80,7 @@ def _of_what_is_left(study: Study) -> list[str]:
         dict.fromkeys(
             o.strongest
             for o in (study.omnibus, study.omnibus_validation)
-            if o is not None and o.rejects
+            if o is not None and o.rejects and not disturbance(study)
         )
     )
     if where:

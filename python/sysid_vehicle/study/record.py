@@ -54,6 +54,7 @@ def record(study: Study) -> dict[str, Any]:
             "strongest": study.omnibus.strongest,
             **_validation(study.omnibus_validation),
             "explainable": study.ceiling.to_dict(),
+            "structure": None if study.structure is None else study.structure.to_dict(),
             **({} if study.unknown is None else study.unknown.to_dict()),
         },
         "errors": {

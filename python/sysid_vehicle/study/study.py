@@ -39,7 +39,9 @@ from .horizons import Beyond, Horizons, horizons
 from .next_steps import next_steps
 from .predicting import Predicting, predicting
 from .record import record
+from .said import disturbance, in_the_end, structured
 from .shares import Shares, shares
+from .structure import Structure
 from .waterfall import Waterfall, waterfall
 
 __all__ = ["AddedEffect", "Study", "Verdict"]
@@ -85,6 +87,8 @@ class Study:
     explained : Beyond or None
         Of the errors 1 to 5 s ahead on validation data, beyond the noise of the sensors, what the
         added effects take away together; None where nothing was added.
+    structure : Structure, optional
+        What of that which the final model leaves depends on the driving.
     stopped : tuple of str
         Effects with evidence that the time limit left untried.
     checked : bool
@@ -105,6 +109,7 @@ class Study:
     seconds: float
     rules: Rules = USUAL
     explained: Beyond | None = None
+    structure: Structure | None = None
     stopped: tuple[str, ...] = ()
     checked: bool = False
 
@@ -144,7 +149,10 @@ class Study:
                 f"what was added takes up {beyond} of the error 1 to 5 s ahead; the rest is "
                 "disturbance, and something else that is missing"
             )
-        if self.verdict == "adequate" and (self.omnibus.rejects or self.diagnoses[-1].significant):
+        seen = self.omnibus.rejects or self.diagnoses[-1].significant or structured(self)
+        if self.verdict == "adequate" and seen:
+            if disturbance(self):
+                return "what is left is disturbance: no function of the driving predicts it"
             return "what is left is smaller, 0.5 to 5 s ahead, than the errors that matter"
         return _MEANING[self.verdict]
 
@@ -327,39 +335,7 @@ class Study:
     @property
     def in_the_end(self) -> str:
         """What is left on the driving of the fit, and on the other, in words."""
-        ahead = "" if self.verdict == "not_testable" else str(self.predicting or "")
-        return f"{self._left} {ahead}" if ahead else self._left
-
-    @property
-    def _left(self) -> str:
-        said = f"In the end: {self.omnibus}."
-        if self.explained is not None:
-            gone = f"Of the error 1 to 5 s ahead, {self.explained} is gone."
-            if not self.explained.share > 0.0:
-                gone = "What was added takes nothing off the error 1 to 5 s ahead."
-            said = f"{gone} {said}"
-        beyond = self.omnibus_validation
-        more = beyond is not None and beyond.p_value < self.rules.elsewhere
-        if beyond is not None and beyond.rejects and not more:
-            said += (
-                " On the validation data: no more than parameters may leave that the fit knows "
-                f"only in part (p = {beyond.p_value:.2g})."
-            )
-        elif beyond is not None:
-            said += f" On the validation data: {beyond}."
-        if self.train[-1].unrelated:
-            wrong = "; ".join(self.train[-1].unrelated.values())
-            return f"{said} Something else is wrong: {wrong}."
-        if self.verdict not in ("unknown", "partly_explained") or more or self.omnibus.rejects:
-            return said
-        # Nothing is left, yet something is missing: what took it up is not what is missing.
-        stand_ins = [a.id for a in self.added if a.stands_in]
-        if stand_ins:
-            said += f" What is missing was taken up by stand-ins: {', '.join(stand_ins)}."
-        elif self.diagnoses[-1].significant:
-            some = ", ".join(c.id for c in self.diagnoses[-1].significant[:3])
-            said += f" There is evidence for {some}, which predict validation data no better."
-        return said
+        return in_the_end(self)
 
     @property
     def next_steps(self) -> tuple[str, ...]:

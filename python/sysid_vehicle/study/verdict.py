@@ -26,6 +26,7 @@ def facts_of(
     candidate: float,
     excited: bool,
     small: bool = False,
+    structure: tuple[float, float] = (1.0, 0.0),
     changes: Mapping[str, tuple[tuple[Change, ...], tuple[Change, ...]]] = MappingProxyType({}),
 ) -> Facts:
     """Collect what is known of a final model.
@@ -40,7 +41,7 @@ def facts_of(
         Of the last fit with what it was fitted to.
     explained : Beyond or None
         What every fit leaves of the errors ahead; None where nothing was added.
-    before, fitted, validation, candidate, excited, small
+    before, fitted, validation, candidate, excited, small, structure
         As in `Facts`.
     changes : mapping
         By effect, those on validation and on training data, as in `Added`.
@@ -68,6 +69,7 @@ def facts_of(
         ),
         tuple(on_train.unrelated.values()),
         excited,
+        structure,
         small,
     )
 

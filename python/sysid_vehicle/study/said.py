@@ -1,0 +1,111 @@
+"""What a study leaves unexplained, in words that agree with its verdict."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .study import Study
+
+__all__ = ["disturbance", "in_the_end", "structured"]
+
+
+def disturbance(study: Study) -> bool:
+    """Whether lesser evidence that something is left counts for nothing (`rules.something_left`).
+
+    No function of the driving predicts what is left.
+    """
+    found = study.structure
+    strict, candidates = study.rules.strict, study.diagnoses[-1].ranking
+    return (
+        found is not None
+        and found.anywhere <= study.rules.explainable
+        and study.omnibus.p_value > strict
+        and not _more(study)
+        and all(c.p_value > strict for c in candidates)
+    )
+
+
+def in_the_end(study: Study) -> str:
+    """What is explained, what is left on either data, and what a fit to predictions gains.
+
+    Parameters
+    ----------
+    study : Study
+    """
+    ahead = "" if study.verdict == "not_testable" else str(study.predicting or "")
+    return f"{_left(study)} {ahead}".rstrip()
+
+
+def _left(study: Study) -> str:
+    left = _on_train(study)
+    if study.structure is not None and structured(study):
+        left += f" A function of the driving still predicts {study.structure.strongest}."
+    said = " ".join([*_explained(study), f"In the end: {left}", *_on_validation(study)])
+    if study.train[-1].unrelated:
+        wrong = "; ".join(study.train[-1].unrelated.values())
+        return f"{said} Something else is wrong: {wrong}."
+    seen = study.omnibus.rejects and not disturbance(study)
+    told = seen or structured(study) or _more(study)
+    if study.verdict not in ("unknown", "partly_explained") or told:
+        return said
+    # Nothing is left, yet something is missing: what took it up is not what is missing.
+    stand_ins = [a.id for a in study.added if a.stands_in]
+    if stand_ins:
+        said += f" What is missing was taken up by stand-ins: {', '.join(stand_ins)}."
+    elif study.diagnoses[-1].significant:
+        some = ", ".join(c.id for c in study.diagnoses[-1].significant[:3])
+        said += f" There is evidence for {some}, which predict validation data no better."
+    return said
+
+
+def _explained(study: Study) -> list[str]:
+    """The share of the errors ahead, and of what any function of the driving could explain."""
+    if study.explained is None:
+        return []
+    if not study.explained.share > 0.0:
+        return ["What was added takes nothing off the error 1 to 5 s ahead."]
+    said = [f"Of the error 1 to 5 s ahead, {study.explained} is gone."]
+    whole = study.shares.whole
+    if whole.known and whole.value > 0.0:
+        sure = study.verdict in ("explained", "partly_explained")
+        who = "Named physics" if sure else "What was added"
+        said.append(
+            f"{who} explains {whole} of what any function of the driving could explain of it."
+        )
+    return said
+
+
+def structured(study: Study) -> bool:
+    """Whether a function of the driving is shown to predict a part of what is left."""
+    found = study.structure
+    return found is not None and found.everywhere > study.rules.explainable
+
+
+def _on_train(study: Study) -> str:
+    test = study.omnibus
+    if test.rejects and disturbance(study):
+        return (
+            f"a test for anything left finds p = {test.p_value:.2g}, but no function of the "
+            "driving predicts what is left: it is disturbance."
+        )
+    if not test.rejects and structured(study):
+        return f"the test of unknown forces sees nothing (p = {test.p_value:.2g})."
+    return f"{test}."
+
+
+def _on_validation(study: Study) -> list[str]:
+    beyond = study.omnibus_validation
+    if beyond is None or (not beyond.rejects and structured(study)):
+        return []
+    if beyond.rejects and not _more(study):
+        p = f"p = {beyond.p_value:.2g}"
+        what = "no more than parameters may leave that the fit knows only in part"
+        return [f"On the validation data: {what} ({p})."]
+    return [f"On the validation data: {beyond}."]
+
+
+def _more(study: Study) -> bool:
+    """Whether more is left on validation data than parameters that are known in part may leave."""
+    beyond = study.omnibus_validation
+    return beyond is not None and beyond.p_value < study.rules.elsewhere
