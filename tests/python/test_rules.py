@@ -236,3 +236,13 @@ def test_what_grows_clearly_and_by_more_than_matters() -> None:
     assert worse((replace(grown, log_ratio=0.03, error=0.001),)) == ()
     assert worse((replace(grown, log_ratio=-0.5),)) == ()
     assert worse((grown,), replace(USUAL, worse=0.2)) == ()
+
+
+def test_what_follows_from_a_limit_is_none_of_its_own() -> None:
+    assert USUAL.interval == pytest.approx(1.96, abs=1e-3)
+    assert USUAL.bound == pytest.approx(1.645, abs=1e-3)
+    assert replace(USUAL, credible=0.99).interval == pytest.approx(2.576, abs=1e-3)
+    with pytest.raises(InvalidInput, match=r"credible = 1\.0"):
+        replace(USUAL, credible=1.0)
+    assert USUAL.explainable == USUAL.taken == pytest.approx(1.0 - USUAL.most)
+    assert len(fields(Rules)) == len(USUAL.to_dict()) == 22

@@ -113,7 +113,7 @@ def accept(measures: Measures, rules: Rules = USUAL) -> bool:
 def worse(changes: Sequence[Change], rules: Rules = USUAL) -> tuple[Change, ...]:
     """The errors some seconds ahead that are shown to have grown, by more than it matters."""
     least = math.log1p(rules.worse)
-    return tuple(c for c in changes if c.log_ratio > max(least, rules.grown * c.error))
+    return tuple(c for c in changes if c.log_ratio > max(least, rules.clear * c.error))
 
 
 def falls(validation: Sequence[Change], training: Sequence[Change], rules: Rules = USUAL) -> bool:

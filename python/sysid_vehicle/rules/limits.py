@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -62,8 +63,6 @@ class Rules:
     lasts: float = _limit(
         5.0, "s", "of usable training data that each effect of a model takes", _EFFECTS
     )
-    interval: float = _limit(1.96, "standard errors", "of a 95 % interval", _CONVENTION)
-    bound: float = _limit(1.645, "standard errors", "of a 95 % bound, one side", _CONVENTION)
     implausible: float = _limit(
         5.0, "typical sizes", "beyond which a value is physically implausible", _OUTSIDE
     )
@@ -80,7 +79,10 @@ class Rules:
         1.0, "standard errors", "by which measures speak for an effect whose error falls", _EFFECTS
     )
     clear: float = _limit(
-        2.0, "standard errors", "the same where it does not fall, and against an effect", _EFFECTS
+        2.0,
+        "standard errors",
+        "the same where it does not fall, and against an effect: errors ahead that grow",
+        _EFFECTS,
     )
     sure: float = _limit(
         4.5,
@@ -92,14 +94,14 @@ class Rules:
     worse: float = _limit(
         0.05, "share", "by which no error 1 to 5 s ahead may grow; a smaller fall is none", _EFFECTS
     )
-    grown: float = _limit(
-        2.0, "standard errors", "by which an error 1 to 5 s ahead is shown to grow", _EFFECTS
-    )
     nothing: float = _limit(
         0.5, "probability", "before any data, that one of a sum of effects is none", _NULLS
     )
     credible: float = _limit(
-        0.95, "probability", "that a credible set holds a missing effect", _CONVENTION
+        0.95,
+        "probability",
+        "that a credible set holds a missing effect, an interval or a bound a parameter",
+        _CONVENTION,
     )
     insignificant: float = _limit(
         2.6, "standard errors", "from nothing, within which an effect may be needless", _EFFECTS
@@ -113,17 +115,12 @@ class Rules:
     near: float = _limit(
         0.6, "share", "of the evidence for the best, with which another may replace it", _EFFECTS
     )
-    explainable: float = _limit(
-        0.1,
-        "share",
-        "of a missing force, or of an error ahead, that the driving predicts: it has structure",
-        _OUTSIDE,
-    )
-    taken: float = _limit(
-        0.1, "share", "of the error, which the only name beside much evidence takes up", _OUTSIDE
-    )
     most: float = _limit(
-        0.9, "share", "of the error that names take up beside which something is left", _OUTSIDE
+        0.9,
+        "share",
+        "of the error that names take up beside which something is left; less than the rest of it "
+        "is no part worth a name, and no structure",
+        _OUTSIDE,
     )
     stays: float = _limit(
         0.6, "share", "of the evidence against the baseline that right names may leave", _OUTSIDE
@@ -133,10 +130,31 @@ class Rules:
         for f in fields(self):
             value = real(getattr(self, f.name))
             most = 1.0 if f.metadata["unit"] in ("probability", "share") else np.inf
-            if value is None or not 0.0 < value <= most or np.isinf(value):
+            certain = f.name == "credible" and value == 1.0  # no interval is certain
+            if value is None or not 0.0 < value <= most or np.isinf(value) or certain:
                 wanted = "between 0 and 1" if most == 1.0 else "above 0, finite"
                 raise InvalidInput(f"{f.name} = {getattr(self, f.name)!r}: give a number {wanted}")
             object.__setattr__(self, f.name, value)
+
+    @property
+    def interval(self) -> float:
+        """Half the interval of a normal variable that is `credible` [standard errors]."""
+        return NormalDist().inv_cdf(0.5 + 0.5 * self.credible)
+
+    @property
+    def bound(self) -> float:
+        """The same of a bound on one side [standard errors]."""
+        return NormalDist().inv_cdf(self.credible)
+
+    @property
+    def explainable(self) -> float:
+        """Share of a missing force, or of an error ahead, that the driving predicts: structure."""
+        return 1.0 - self.most
+
+    @property
+    def taken(self) -> float:
+        """Share of the error that a name takes up, where much evidence is left beside it."""
+        return 1.0 - self.most
 
     def at(self, alpha: float | None) -> Rules:
         """The same with another rate of false claims; None leaves it as it is."""
