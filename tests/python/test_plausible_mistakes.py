@@ -166,6 +166,15 @@ def test_the_steering_ratio_is_told(truth: sv.Model, manoeuvre: str) -> None:
         check_car(wrong, mass_kg=truth.vehicle.mass_kg, wheelbase_m=truth.vehicle.wheelbase_m)
 
 
+def test_what_a_locked_differential_asks_for_is_warned_of(truth: sv.Model) -> None:
+    log = sv.drive(truth, sv.manoeuvres.handling_course(), seed=4, rate_hz=50.0)
+    data = {name: np.array(log[name]) for name in log.channels}
+    data["steer_rad"] *= 2.6
+    more = sv.Log.from_arrays(data, check=False)
+    with pytest.warns(sv.SysidWarning, match=r"the steering ratio is about 2\."):
+        check_car(more, mass_kg=truth.vehicle.mass_kg, wheelbase_m=truth.vehicle.wheelbase_m)
+
+
 @pytest.mark.parametrize(
     ("file", "car"),
     [

@@ -126,6 +126,7 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
         "horizons",
         "next_steps",
         "parameters",
+        "predicting",
         "ranking",
         "regions",
         "shares",
@@ -192,7 +193,12 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     assert told["channels"]["after"]["test"]["ay_mps2"]["nrmse"] < 1.1
     # Where the verdict does not ask for it, the shape of the unknown is not sought.
     assert study.unknown is None
-    assert sorted(told["unknown"]) == ["explainable", "p_value", "strongest", "validation"]
+    assert sorted(told["unknown"]) == [
+        *("explainable", "p_value", "strongest", "structure", "validation"),
+    ]
+    assert told["predicting"]["horizon_s"] == 2.0
+    assert told["predicting"]["added_is_needed"]
+    assert set(told["predicting"]["parameters"]) < set(told["parameters"])
     assert sorted(told["unknown"]["validation"]) == ["p_value", "strongest"]
     assert told["unknown"]["validation"]["p_value"] > 1e-4
     # The final model has the lag: beside it there is no delay, without it there is.

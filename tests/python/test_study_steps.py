@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Diagnosis, Fit, Log, Model, compare, diagnose, drive, identify, manoeuvres
+from sysid_vehicle import Diagnosis, Fit, Model, compare, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
 from sysid_vehicle.rules import USUAL, share_explained
-from sysid_vehicle.study.improve import _room
 from sysid_vehicle.study.search import Search, Trail, _more
 from sysid_vehicle.study.steps import (
     _distance,
@@ -375,13 +374,6 @@ def test_a_group_with_a_value_that_no_car_has_is_not_added(truth: Model, start: 
     assert found is not None
     assert found.model.effects == both
     assert first_together(dx, test, None, 2) is None
-
-
-def test_short_driving_leaves_room_for_few_effects(truth: Model, lap: Log) -> None:
-    assert _room(truth, Driving.of(lap.between(0.0, 8.0)), USUAL) == 1
-    assert _room(truth, Driving.of(lap.between(0.0, 3.0)), USUAL) == 1
-    assert _room(truth.add("aero_drag"), Driving.of(lap.between(0.0, 8.0)), USUAL) == 2
-    assert _room(truth, Driving.of(lap), USUAL) > 4
 
 
 def test_what_came_with_a_step_is_told(dx: Diagnosis) -> None:

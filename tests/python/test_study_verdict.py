@@ -5,6 +5,9 @@ from dataclasses import replace
 import pytest
 
 from sysid_vehicle import Fit, Log, Model, drive, improve, manoeuvres
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.rules import USUAL
+from sysid_vehicle.study.improve import _room
 from sysid_vehicle.study.verdict import _taken_up
 
 
@@ -35,3 +38,10 @@ def test_tyres_that_the_fit_never_saw_do_not_speak_against_the_right_effect(
     assert study.verdict == "explained"
     assert study.omnibus_validation is not None
     assert not study.omnibus_validation.rejects
+
+
+def test_short_driving_leaves_room_for_few_effects(truth: Model, lap: Log) -> None:
+    assert _room(truth, Driving.of(lap.between(0.0, 8.0)), USUAL) == 1
+    assert _room(truth, Driving.of(lap.between(0.0, 3.0)), USUAL) == 1
+    assert _room(truth.add("aero_drag"), Driving.of(lap.between(0.0, 8.0)), USUAL) == 2
+    assert _room(truth, Driving.of(lap), USUAL) > 4

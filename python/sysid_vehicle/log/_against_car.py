@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InvalidInput
+from ..errors import InvalidInput, warn
 from ..vehicle import GRAVITY_MPS2
 from ._channels import FloatArray
 from ._laws import EXCITED, WINDOW_S, Drive, size_of, spread_of
@@ -31,6 +31,7 @@ _COHERENT = 0.6
 # compliance and by tyres.
 _FORCE_STD, _FORCE_FACTOR = 0.45, 1.7
 _STEER_STD, _STEER_FACTOR = 0.2, 2.0
+_STEER_NEVER = 2.8  # whatever the differential
 _UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003  # rad of road wheels per m/s2
 _UNDERSTEER_MOST = 0.008  # rad per m/s2 either way: 4.5 deg/g, more than cars have
 _OFFSET = 0.3  # of the steering angle, as a share of its size
@@ -81,6 +82,9 @@ class _Told:
 def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
     """Refuse a log that is not one of this car: by its mass, by its wheelbase.
 
+    Of a steering angle that is off by less than a steering ratio or a unit it is warned: a locked
+    differential asks for twice the angle as well.
+
     Raises
     ------
     InvalidInput
@@ -107,10 +111,13 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
             f"{steer.ratio:.2g} times the one that was taken: put factor = {1.0 / steer.ratio:.3g} "
             f"times the present one in the channel map; else check lf_m and lr_m"
         )
-        raise InvalidInput(
+        said = (
             f"{log.name}: steer_rad is {steer.ratio:.3g} times what a wheelbase of "
             f"{wheelbase_m:g} m (lf_m + lr_m) asks for, {steer.place}; {likely}"
         )
+        if abs(math.log(steer.ratio)) > math.log(_STEER_NEVER):
+            raise InvalidInput(said)
+        warn(said)
 
 
 def times_wheelbase(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .._text import number
 from ..estimate import UNITS
@@ -63,9 +63,19 @@ class Predicting:
         return not self.needed or self._falls(self.needed)
 
     def _falls(self, found: Sequence[Change]) -> bool:
-        sure = [c for c in found if abs(c.log_ratio) > self.rules.grown * c.error]
+        sure = [c for c in found if abs(c.log_ratio) > self.rules.clear * c.error]
         falls = any(c.log_ratio < -_WORTH for c in sure)
         return falls and not any(c.log_ratio > _WORTH for c in sure)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Parameters of the final model, and what they change, ready for JSON."""
+        return {
+            "horizon_s": self.horizon_s,
+            "parameters": {e.name: e.to_dict() for e in self.final.estimates},
+            "helps": self.helps,
+            "added_is_needed": self.explains,
+            "errors": self.errors.to_dict(),
+        }
 
     def __str__(self) -> str:
         """Sentences, or nothing where the likelihood predicts as well."""

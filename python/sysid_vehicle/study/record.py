@@ -62,6 +62,7 @@ def record(study: Study) -> dict[str, Any]:
             "test": [c.error for c in study.test],
         },
         "parameters": {e.name: e.to_dict() for e in (*study.fit.estimates, *study.fit.derived)},
+        "predicting": None if study.predicting is None else study.predicting.to_dict(),
         "warnings": list(study.warnings),
         "next_steps": list(study.next_steps),
     }
