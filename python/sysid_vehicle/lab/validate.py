@@ -17,7 +17,8 @@ from .._progress import doing
 from .._style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
 from .._text import number
 from ..errors import InvalidInput
-from .tyre_data import READINGS, GreyBoxVehicle, TyreLog
+from .observed import READINGS
+from .tyre_data import GreyBoxVehicle, TyreLog
 from .tyre_fit import NOISES, PARAMETERS, TyreFit
 from .tyre_problem import tyre_problem
 
