@@ -1,4 +1,4 @@
-"""Identified tyres on driving that was not used: one step, one second and a whole drive ahead."""
+"""Identified tyres on validation data: one step, one second and a whole drive ahead."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def validate_tyres(
     ----------
     car : TyreFit or IdentifiedCar
     logs : TyreLog or sequence of TyreLog
-        Drives that the identification did not use.
+        Validation data: other drives of the car.
     horizon_s : float
 
     Returns
