@@ -273,8 +273,11 @@ class TestSmoothing:
             {"steer_rad": lambda u: np.where(np.arange(len(u)) == 250, np.nan, u)},
             "sample 250 .2.50",
         ),
-        ({"stiffness_front_nprad": lambda u: 0.0 * u}, "stiffness_front_nprad = 0.0 at sample 0"),
-        ({"readings": lambda y: np.where(y == y[7, 2], np.inf, y)}, "yaw_rate_radps = inf at samp"),
+        ({"stiffness_front_nprad": lambda u: 0.0 * u}, "stiffness_front_nprad is 0.0 at sample 0"),
+        (
+            {"readings": lambda y: np.where(y == y[7, 2], np.inf, y)},
+            "yaw_rate_radps is inf at samp",
+        ),
         ({"readings": lambda y: y[:, :3]}, "samples x 4"),
         ({"readings": lambda y: y * [np.nan, 1, 1, 1]}, "no reading of vx_mps"),
         ({"force_x_n": lambda u: u[:-1]}, "force_x_n has shape"),

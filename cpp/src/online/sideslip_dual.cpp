@@ -134,10 +134,10 @@ void SideslipDual::start(double dt, const SensorSample& s) {
     const double speed = std::max(or_zero(s.vx_mps), kSlowestMps);
     const double r = or_zero(s.yaw_rate_radps), ay = or_zero(s.ay_mps2), ax = or_zero(s.ax_mps2);
     const double share = c.lr_m / car_.wheelbase_m(), weight = c.mass_kg * kGravity;
-    Vec<5> a, a_doubt;
+    Vec<5> a, deviation;
     a << speed, r, share * c.mass_kg * ay, (1.0 - share) * c.mass_kg * ay, c.mass_kg * ax;
-    a_doubt << 0.5, 0.1, 0.3 * weight, 0.3 * weight, 0.3 * weight;
-    forces_.restart(a, a_doubt.cwiseAbs2().asDiagonal());
+    deviation << 0.5, 0.1, 0.3 * weight, 0.3 * weight, 0.3 * weight;
+    forces_.restart(a, deviation.cwiseAbs2().asDiagonal());
     input_ = {};
     input_.loads = axle_forces(car_, ax, speed);
     input_.steer = s.steer_rad;

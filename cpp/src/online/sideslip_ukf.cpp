@@ -171,11 +171,11 @@ void SideslipUkf<method>::start(const SensorSample& s) {
     const AxleForces loads = axle_forces(car_, ax, 0.0);
     const double slip_r = vx * r / (kGravity * slope(car_.rear));
     const double beta = std::clamp(car_.data.lr_m * r / vx - slip_r, -0.5, 0.5);
-    const double doubt =
+    const double deviation =
         std::isnan(s.yaw_rate_radps) ? 0.1 : std::max(0.03, 0.5 * std::abs(slip_r));
     const double weight = car_.data.mass_kg * kGravity;
     filter_.restart(Vec<3>(beta, loads.fx_f, loads.fx_r),
-                    Vec<3>(doubt, 0.2 * weight, 0.2 * weight).cwiseAbs2().asDiagonal());
+                    Vec<3>(deviation, 0.2 * weight, 0.2 * weight).cwiseAbs2().asDiagonal());
     input_ = {};
     input_.steer = s.steer_rad;
     input_.vx = vx;

@@ -146,7 +146,7 @@ void TyreObserver::start(double dt, const SensorSample& s, const TyreModel::Inpu
     const double slip_f = share * c.mass_kg * ay / (slope(car_.front) * input_.loads.fz_f);
     const double slip_r = (1.0 - share) * c.mass_kg * ay / (slope(car_.rear) * input_.loads.fz_r);
     const bool first = filter_.samples() == 0 || refuted();
-    Vec<15> b = filter_.state().mean, doubt;
+    Vec<15> b = filter_.state().mean, deviation;
     if (first) b.setZero();
     constexpr int at = TyreModel::kLearnt, learnt = TyreModel::kLearntStates;
     const Mat<learnt, learnt> known = filter_.state().covariance.block<learnt, learnt>(at, at);
@@ -162,13 +162,13 @@ void TyreObserver::start(double dt, const SensorSample& s, const TyreModel::Inpu
     const double stiff = settings_.stiffness_prior, grip = settings_.friction_prior;
     const bool blind = std::isnan(s.yaw_rate_radps) || std::isnan(s.ay_mps2);
     const double unseen = blind ? kBlindSideslip : 0.0;
-    doubt << 0.01 + std::abs(slip_r) + unseen, blind ? kBlindYawRate : 0.1,
+    deviation << 0.01 + std::abs(slip_r) + unseen, blind ? kBlindYawRate : 0.1,
         0.005 + std::abs(slip_f), 0.005 + std::abs(slip_r), stiff, stiff, grip, grip,
         settings_.relaxation_std, settings_.roll_share, settings_.road_mps2, 1.0, 1.0, 1.0, 0.5;
-    Mat<15, 15> P = doubt.cwiseAbs2().asDiagonal();
+    Mat<15, 15> P = deviation.cwiseAbs2().asDiagonal();
     if (!first) P.block<learnt, learnt>(at, at) = known;
-    // An error of beta is one of both slip angles, which are doubtful by themselves as well.
-    const double shared = squared(doubt[TyreModel::kBeta]);
+    // An error of beta is one of both slip angles, which have errors of their own as well.
+    const double shared = squared(deviation[TyreModel::kBeta]);
     for (const int i : {TyreModel::kSlipF, TyreModel::kSlipR}) {
         P(i, TyreModel::kBeta) = P(TyreModel::kBeta, i) = -shared;
         P(i, i) += shared;
@@ -203,7 +203,7 @@ void TyreObserver::step(const TyreModel::Input& common, const SensorSample& s) {
     u.error_r_n = error(u.loads.fz_r, u.loads.fx_r, rear, car_.rear.D);
     u.drive_nm =
         settings_.error_drive * std::abs(u.loads.fx_f + u.loads.fx_r) * 0.5 * car_.wheelbase_m();
-    // Stiffness is doubted anew where readings are farther off than the model allows.
+    // The stiffness is uncertain again where readings are farther off than the model allows.
     const double walk = settings_.stiffness_walk +
                         kContradicted * std::max(std::sqrt(contradiction_) - kTolerated, 0.0);
     const double use_f = std::abs(front) / u.loads.fz_f, use_r = std::abs(rear) / u.loads.fz_r;

@@ -185,7 +185,7 @@ _SUBCOMMANDS: dict[str, _Subcommand] = {
         lab_logs.identify,
     ),
     "validate": (
-        "predict driving that was not used with the tyres identified",
+        "predict validation data with the tyres identified",
         lab_logs.validate_arguments,
         lab_logs.validate,
     ),

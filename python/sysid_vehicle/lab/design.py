@@ -19,7 +19,8 @@ from ..errors import InvalidInput, NumericalError
 from ..manoeuvres import peak_lateral_mps2
 from ..model import Model
 from .excitation import Excitation, Weaving
-from .information import READINGS, TYRES
+from .information import TYRES
+from .observed import READINGS
 from .preview import Preview, preview, tyre_of
 from .setup import Setup
 

@@ -20,12 +20,10 @@ from ..estimate import NoiseModel
 from ..estimate.driving import MEASURED
 from ..model import Model
 from .loop import ClosedLoop
+from .observed import READINGS
 
 TYRES = tuple(f"{letter}_{axle}" for axle in ("front", "rear") for letter in "BCDE")
 """The eight tyre coefficients."""
-
-READINGS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2")
-"""Readings that identification uses, unless told otherwise."""
 
 MOTION = (5e-3, 5e-3, 1e-3)
 """White disturbance of v_x, v_y [m/s per root second] and yaw rate [rad/s per root second] that is

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from .._arrays import FloatArray
 from .._printed import Part, Printed, Table
@@ -32,6 +33,18 @@ _LABELS = {
     "xi_psi_nm": "unexplained yaw moment [N m]",
 }
 _HEAD = ("state", "rms", "mean std")
+
+
+def refuse(
+    bad: npt.NDArray[np.bool_], values: FloatArray, what: str, step_s: float, remedy: str
+) -> None:
+    """Raise :class:`InvalidInput` that names the first sample that is bad, if there is one."""
+    if bad.any():
+        k = int(np.argmax(bad))
+        others = f" and {bad.sum() - 1} others" if bad.sum() > 1 else ""
+        raise InvalidInput(
+            f"{what} is {values[k]} at sample {k} ({k * step_s:.2f} s){others}; {remedy}"
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,9 @@ from ..identify.estimates import std_of_data
 from ..model import Model
 from ..vehicle import Tyre
 from .excitation import Excitation
-from .information import MOTION, READINGS, TYRES, information
+from .information import MOTION, TYRES, information
 from .loop import ClosedLoop, run_closed_loop
+from .observed import READINGS
 from .setup import Setup
 
 if TYPE_CHECKING:

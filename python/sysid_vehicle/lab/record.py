@@ -12,7 +12,7 @@ from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..log import Log
 from ..vehicle import GRAVITY_MPS2, Vehicle
-from .observed import READINGS
+from .observed import READINGS, refuse
 
 
 @dataclass(frozen=True)
@@ -131,10 +131,11 @@ class ObserverRecord:
             bad = ~np.isfinite(u)
             if key.startswith("stiffness"):
                 bad |= ~(u > 0.0)
-            _refuse(bad, u, key, name, rate_hz, "fill or cut it: the observer needs every input")
+            remedy = "fill or cut it: the observer needs every input"
+            refuse(bad, u, f"{name}: {key}", 1.0 / rate_hz, remedy)
         for i, key in enumerate(READINGS):
             remedy = "mark a missing reading by NaN"
-            _refuse(np.isinf(y[:, i]), y[:, i], key, name, rate_hz, remedy)
+            refuse(np.isinf(y[:, i]), y[:, i], f"{name}: {key}", 1.0 / rate_hz, remedy)
         if not np.isfinite(y[:, 0]).any():
             raise InvalidInput(f"{name}: no reading of vx_mps; the observer needs the speed")
         return cls(rate_hz=float(rate_hz), readings=y, name=name, **inputs)
@@ -203,14 +204,3 @@ class ObserverRecord:
                 raise InvalidInput(f"no reading {channel!r}; there are {', '.join(READINGS)}")
             y[:, READINGS.index(channel)] = np.nan
         return dataclasses.replace(self, readings=y)
-
-
-def _refuse(
-    bad: npt.NDArray[np.bool_], u: FloatArray, key: str, name: str, rate_hz: float, remedy: str
-) -> None:
-    if bad.any():
-        k = int(np.argmax(bad))
-        raise InvalidInput(
-            f"{name}: {key} = {u[k]} at sample {k} ({k / rate_hz:.2f} s) and {bad.sum() - 1} "
-            f"others; {remedy}"
-        )

@@ -14,9 +14,7 @@ from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..log import Log
 from ..vehicle import GRAVITY_MPS2, Vehicle
-
-READINGS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ay_mps2")
-"""Predicted readings, in the core's order."""
+from .observed import READINGS, refuse
 
 _INPUTS = ("fx_n", "steer_rad", "fz_front_n", "fz_rear_n")
 SHORTEST = 100
@@ -130,19 +128,12 @@ class TyreLog:
             raise InvalidInput(f"{self.name}: {len(y)} samples; {SHORTEST} or more are needed")
         bad = ~np.isfinite(u)
         bad[:, 2:] |= u[:, 2:] < 0.0
-        if bad.any():
-            k, i = map(int, np.argwhere(bad)[0])
-            raise InvalidInput(
-                f"{self.name}: {_INPUTS[i]} is {u[k, i]} at sample {k} ({k * self.step_s:.2f} s); "
-                "cut the log there or fill the gap"
-            )
-        infinite = np.isinf(y)
-        if infinite.any():
-            k, i = map(int, np.argwhere(infinite)[0])
-            raise InvalidInput(
-                f"{self.name}: {READINGS[i]} is infinite at sample {k} ({k * self.step_s:.2f} s); "
-                "put NaN where a reading is missing"
-            )
+        remedies = ("cut the log there or fill the gap", "put NaN where a reading is missing")
+        for names, a, wrong, remedy in zip(
+            (_INPUTS, READINGS), (u, y), (bad, np.isinf(y)), remedies, strict=True
+        ):
+            for i, channel in enumerate(names):
+                refuse(wrong[:, i], a[:, i], f"{self.name}: {channel}", self.step_s, remedy)
         there = np.asarray(np.isfinite(y).any(axis=0))
         for i in (0, 2, 3):
             if not there[i]:

@@ -10,7 +10,8 @@ from .. import _core
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
-from .tyre_data import READINGS, GreyBoxVehicle, TyreLog
+from .observed import READINGS
+from .tyre_data import GreyBoxVehicle, TyreLog
 from .tyre_problem import first_point
 
 _SENSORS = (0.1, 3.16e-3, 3.16e-3, 3.16e-3)  # v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2]

@@ -1,4 +1,4 @@
-"""Identified tyres on driving that was not used: one step, one second and a whole drive ahead."""
+"""Identified tyres on validation data: one step, one second and a whole drive ahead."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from .._progress import doing
 from .._style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
 from .._text import number
 from ..errors import InvalidInput
-from .tyre_data import READINGS, GreyBoxVehicle, TyreLog
+from .observed import READINGS
+from .tyre_data import GreyBoxVehicle, TyreLog
 from .tyre_fit import NOISES, PARAMETERS, TyreFit
 from .tyre_problem import tyre_problem
 
@@ -177,7 +178,7 @@ def validate_tyres(
     ----------
     car : TyreFit or IdentifiedCar
     logs : TyreLog or sequence of TyreLog
-        Drives that the identification did not use.
+        Validation data: other drives of the car.
     horizon_s : float
 
     Returns
