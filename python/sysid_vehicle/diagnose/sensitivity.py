@@ -87,7 +87,7 @@ class Sensitivities:
                     after = q.with_model(core).residuals(there, g).ravel()
                     return as_float64((here - after) / step)
 
-                out[:, self.places[c.id].start + i] = section.rows(moved)
+                out[:, self.places[c.id].start + i] = section.rows(moved, f"{c.id} {i}")
 
         groups = _groups([c for c in self.candidates if _regular(c)])
         in_parallel(together, groups)
