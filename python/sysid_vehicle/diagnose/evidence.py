@@ -138,7 +138,7 @@ class Evidence:
             G = problem.signal_sensitivities(p, frozen, as_float64(signals[:, few]), numbers[few])
             out[:, few] = G - basis @ (basis.T @ G) if projected else G
 
-        with Workers(2) as pool:
+        with Workers() as pool:
             list(pool.map(some, range(0, len(numbers), _AT_ONCE)))
         return out
 
