@@ -27,19 +27,54 @@ def cores() -> int:
 
 
 def usual_count() -> int:
-    """Threads of a pool that is told no number: all cores, or one where others share them."""
-    return 1 if getattr(_here, "shared", False) else cores()
+    """Threads of a pool that is told no number: all cores, or fewer where somebody said so."""
+    return getattr(_here, "most", None) or cores()
 
 
 @contextmanager
-def shared_cores() -> Iterator[None]:
-    """Pools that this thread opens inside have one thread: the cores are busy with others."""
-    before = getattr(_here, "shared", False)
-    _here.shared = True
+def at_most(threads: int | None) -> Iterator[None]:
+    """Pools that this thread opens inside and that are told no number have so many threads."""
+    before = getattr(_here, "most", None)
+    _here.most = before if threads is None else threads
     try:
         yield
     finally:
-        _here.shared = before
+        _here.most = before
+
+
+class _SmallMatrices:
+    """Linear algebra has one thread inside; see `small_matrices`."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._owner: int | None = None
+        self._inside = 0
+
+    def __enter__(self) -> None:
+        here = threading.get_ident()
+        with self._lock:
+            if self._owner is None:
+                import scipy.linalg  # noqa: F401 - a library that is not loaded has no limit
+                from threadpoolctl import ThreadpoolController
+
+                self._owner = here
+                self._limit = ThreadpoolController().limit(limits=1, user_api="blas")
+            self._inside += self._owner == here
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= self._owner == threading.get_ident()
+            if self._inside == 0 and self._owner == threading.get_ident():
+                self._limit.restore_original_limits()
+                self._owner = None
+
+
+small_matrices = _SmallMatrices()
+"""For `with`: on small matrices threads of linear algebra wait for each other most of the time.
+
+Their number is one of the whole process. The thread that sets it brings back what it was, as
+OpenBLAS heeds no other one; those that come meanwhile leave it alone.
+"""
 
 
 class TimeUp(Exception):
@@ -111,7 +146,7 @@ class Workers(ThreadPoolExecutor):
         super().__init__(threads, initializer=self._begin)
 
     def _begin(self) -> None:
-        _here.shared, _here.ends = True, self._ends
+        _here.most, _here.ends = 1, self._ends
         self._stop.follow()
 
     def __exit__(

@@ -6,10 +6,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from sysid_vehicle import Fit, Log, Model, Vehicle, compare, diagnose, drive, identify
 from sysid_vehicle import manoeuvres as drives
-from sysid_vehicle._threads import Workers, cores, in_parallel, shared_cores
+from sysid_vehicle._threads import Workers, at_most, cores, in_parallel, small_matrices
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.online import SideslipObserver, estimate_sideslip
 
@@ -45,9 +46,49 @@ def test_a_pool_has_all_cores_or_one_where_others_share_them() -> None:
 
     assert inside(None) == cores() >= 1
     assert in_parallel(inside, [None, 3], workers=2) == [1, 3]
-    with shared_cores():
+    with at_most(1):
         assert inside(None) == 1
+        with at_most(None):
+            assert inside(None) == 1
+        with at_most(3):
+            assert inside(None) == 3
     assert inside(None) == cores()
+
+
+def test_linear_algebra_has_one_thread_until_who_set_it_leaves() -> None:
+    def threads() -> set[int]:
+        return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
+
+    def inside() -> set[int]:
+        with small_matrices:
+            return threads()
+
+    with threadpool_limits(2, user_api="blas"), ThreadPoolExecutor(1) as pool:
+        assert threads() == {2}
+        with small_matrices:
+            assert inside() == {1}
+            assert pool.submit(inside).result() == {1}
+            assert threads() == {1}
+        assert threads() == {2}
+
+
+def test_a_public_function_holds_all_its_threads_to_what_was_said(
+    fit: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of the scores too, which are told no number of their own."""
+    opened: list[int] = []
+    plain = ThreadPoolExecutor.__init__
+
+    def noted(self: ThreadPoolExecutor, count: int, **kwargs: object) -> None:
+        opened.append(count)
+        assert {one["num_threads"] for one in threadpool_info() if "blas" in one["user_api"]} == {1}
+        plain(self, count, **kwargs)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(ThreadPoolExecutor, "__init__", noted)
+    for workers in (1, 3):
+        opened.clear()
+        diagnose(fit, candidates=["mass", "steer_lag"], refits=0, workers=workers)
+        assert set(opened) == {workers}
 
 
 def test_parallel_results_stand_in_order_and_the_first_error_is_raised() -> None:

@@ -17,7 +17,7 @@ from ..rules import USUAL, Rules
 from .clocks import CLOCKS, clock_scores
 from .directions import Directions
 from .evidence import Evidence
-from .omnibus import Unknown, not_copied
+from .omnibus import Unknown
 from .possible import Size
 from .score import ScoreBoard
 from .single_effects import Hypothesis, Posterior, ScoreModel, Subset
@@ -292,17 +292,12 @@ def _unknown(projected: Directions) -> tuple[FloatArray, list[tuple[str, int]], 
     Directions are columns by which all that was projected is added up.
     """
     unknown = next(s for s in projected.sources if isinstance(s, Unknown))
-    place = projected.place(unknown)
-    spans = [(g, turns) for g, turns in projected.spans(not_copied(projected)) if turns.shape[1]]
-    ends = np.cumsum([0, *(turns.shape[1] for _, turns in spans)])
-    whole = np.zeros((len(projected.score), int(ends[-1])))
-    for (group, turns), a, b in zip(spans, ends, ends[1:], strict=False):
-        whole[group, a:b] = turns
-    along = whole[place] * (whole.T @ projected.score)
-    explained = np.add.reduceat(along, ends[:-1], axis=1)
-    ratios = np.maximum(projected.long_run(unknown, explained, explained)[0], 1.0)
-    named = [(unknown.names[g.start - place.start], turns.shape[1]) for g, turns in spans]
-    return whole, named, np.repeat(ratios, np.diff(ends))
+    named, turns, explained = unknown.spanned(projected)
+    told = projected.answer(unknown).ratios
+    ratios = np.maximum(told[len(told) - explained.shape[1] :], 1.0)
+    whole = np.zeros((len(projected.score), turns.shape[1]))
+    whole[projected.place(unknown)] = turns
+    return whole, named, np.repeat(ratios, [width for _, width in named])
 
 
 def _told(

@@ -16,7 +16,7 @@ from .._arrays import FloatArray
 from ..estimate.pieces import DrivingProblem
 from ..rules import Rules
 from .delay import delayed, pieces_of
-from .directions import Directions
+from .directions import Ask, Directions
 from .evidence import Evidence, Section
 
 
@@ -93,6 +93,12 @@ class Shifts:
         """Number of columns."""
         return len(self.clocks)
 
+    def asks(self, projected: Directions) -> Ask:
+        """The colour along each, without what it explains itself."""
+        place = projected.place(self)
+        after = np.maximum(np.diag(projected.information)[place], 1e-300)
+        return Ask(None, np.diag(projected.score[place] / after))
+
     def of(self, section: Section) -> FloatArray:
         """Those of a section's residuals."""
         p = self.evidence.fit.model.vector()
@@ -113,8 +119,7 @@ def clock_scores(projected: Directions, rules: Rules) -> list[ClockScore]:
     shifts = next(s for s in projected.sources if isinstance(s, Shifts))
     place = projected.place(shifts)
     after, before = np.diag(projected.information)[place], projected.before[place]
-    sizes = np.diag(projected.score[place] / np.maximum(after, 1e-300))
-    ratios = projected.long_run(shifts, None, sizes)[0]
+    ratios = projected.answer(shifts).ratios
     return [
         ClockScore(clock, place.start + i, max(float(ratios[i]), 1.0))
         for i, clock in enumerate(shifts.clocks)

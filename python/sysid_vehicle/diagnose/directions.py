@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Protocol
 
@@ -40,6 +41,64 @@ class Columns(Protocol):
 
     def of(self, section: Section) -> FloatArray:
         """Those of a section's residuals, shape (5 n, width)."""
+
+    def asks(self, projected: Directions) -> Ask | None:
+        """Along which of their sums the colour of the residuals will be asked for, if it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ask:
+    """How white the residuals are in some directions.
+
+    Attributes
+    ----------
+    along : array, shape (width, k), or None
+        Directions as sums of columns; else each column alone.
+    sizes : array, shape (width, k)
+        What is taken off the residuals before the score along each direction.
+    starts : array of int, optional
+        First samples of blocks.
+    """
+
+    along: FloatArray | None
+    sizes: FloatArray
+    starts: npt.NDArray[np.intp] | None = None
+
+
+class Answer:
+    """Long-run over naive variance of scores, and their sums over blocks, without the mean.
+
+    Attributes
+    ----------
+    ratios : array, shape (k,)
+    blocks : array, shape (blocks, k)
+    """
+
+    def __init__(self, ask: Ask, information: FloatArray, score: FloatArray, samples: int) -> None:
+        self._ask = ask
+        A = np.eye(len(score)) if ask.along is None else ask.along
+        taken = np.einsum("ij,ij->j", A, information @ ask.sizes)
+        self._mean = (A.T @ score - taken) / samples
+        self._naive = np.einsum("ij,ij->j", A, information @ A)
+        self._found = LongRun(samples, A.shape[1])
+        self._first = np.empty(0, dtype=np.intp) if ask.starts is None else ask.starts
+        self.blocks = np.zeros((len(self._first), A.shape[1]))
+
+    def add(self, where: slice, R: FloatArray, e: FloatArray) -> None:
+        """Go on with the next samples."""
+        terms = score_terms(R, e, self._ask.sizes, self._ask.along)
+        terms -= self._mean
+        self._found.add(terms)
+        if len(self._first):
+            at = int(np.searchsorted(self._first, where.start, "right")) - 1
+            inside = (self._first > where.start) & (self._first < where.stop)
+            cuts = np.concatenate([[0], self._first[inside] - where.start])
+            self.blocks[at : at + len(cuts)] += np.add.reduceat(terms, cuts, axis=0)
+
+    @cached_property
+    def ratios(self) -> FloatArray:
+        """After the last samples."""
+        return self._found.ratios(self._naive)
 
 
 @dataclass(frozen=True)
@@ -78,6 +137,7 @@ class Directions:
             for g in s.groups
         ]
         self._held: list[FloatArray] | None = None
+        self._answers: dict[Columns, Answer] = {}
         n = int(ends[-1])
         self.information, self.score, self.before = np.zeros((n, n)), np.zeros(n), np.zeros(n)
         factors: list[list[FloatArray]] = [[] for _ in groups]
@@ -147,59 +207,37 @@ class Directions:
             found.append((group, turns))
         return found
 
-    def rows(self, source: Columns) -> Iterator[tuple[slice, FloatArray, FloatArray]]:
-        """Samples of each section, the projected columns of a source, the residuals left."""
+    def rows(self, *sources: Columns) -> Iterator[tuple[slice, tuple[FloatArray, ...], FloatArray]]:
+        """Samples of each section, projected columns of each source, residuals left."""
         if self._held is not None:
             every = slice(0, self.evidence.driving.samples)
-            yield every, self._held[self.sources.index(source)], self.evidence.left
+            held = tuple(self._held[self.sources.index(s)] for s in sources)
+            yield every, held, self.evidence.left
             return
-        copied = self._copied[:, self.place(source)]
         for section in self.evidence.sections():
             F = section.fitted
-            yield section.where, source.of(section) - F @ copied, section.left - F @ self._explained
+            found = tuple(s.of(section) - F @ self._copied[:, self.place(s)] for s in sources)
+            yield section.where, found, section.left - F @ self._explained
 
-    def long_run(
-        self,
-        source: Columns,
-        along: FloatArray | None,
-        sizes: FloatArray,
-        starts: npt.NDArray[np.intp] | None = None,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Long-run over naive variance of scores, and their sums over blocks, without the mean.
+    def answer(self, source: Columns, ask: Ask | None = None) -> Answer:
+        """How white the residuals are along what a source asks for, or along something else.
 
-        Parameters
-        ----------
-        source : Columns
-        along : array, shape (width, k), optional
-            Directions as sums of the columns; else each column alone.
-        sizes : array, shape (width, k)
-            What is taken off the residuals before the score along each direction.
-        starts : array of int, optional
-            First samples of the blocks.
-
-        Returns
-        -------
-        ratios : array, shape (k,)
-        blocks : array, shape (blocks, k)
+        What the other sources ask for is answered on the way.
         """
-        own = self.place(source)
-        information, score = self.information[own, own], self.score[own]
-        A = np.eye(len(score)) if along is None else along
+        if ask is None and source in self._answers:
+            return self._answers[source]
+        asked = {s: told for s in self.sources if (told := s.asks(self)) is not None}
+        asked = {s: told for s, told in asked.items() if s not in self._answers}
+        if ask is not None:
+            asked[source] = ask
         samples = self.evidence.driving.samples
-        mean = (A.T @ score - np.einsum("ij,ij->j", A, information @ sizes)) / samples
-        found = LongRun(samples, A.shape[1])
-        first = np.empty(0, dtype=np.intp) if starts is None else starts
-        blocks = np.zeros((len(first), A.shape[1]))
-        for where, R, e in self.rows(source):
-            terms = score_terms(R, e, sizes, along)
-            terms -= mean
-            found.add(terms)
-            if len(first):
-                at = int(np.searchsorted(first, where.start, "right")) - 1
-                inside = first[(first > where.start) & (first < where.stop)] - where.start
-                cuts = np.concatenate([[0], inside])
-                blocks[at : at + len(cuts)] += np.add.reduceat(terms, cuts, axis=0)
-        return found.ratios(np.einsum("ij,ij->j", A, information @ A)), blocks
+        for s, one in asked.items():
+            own = self.place(s)
+            self._answers[s] = Answer(one, self.information[own, own], self.score[own], samples)
+        for where, columns, e in self.rows(*asked):
+            for s, R in zip(asked, columns, strict=True):
+                self._answers[s].add(where, R, e)
+        return self._answers[source]
 
 
 def _factor(columns: FloatArray) -> FloatArray:

@@ -23,7 +23,7 @@ READINGS = {"r": 7, "a_x": 8, "a_y": 9}
 TARGETS = {**FORCES, **READINGS}
 _AT_ONCE = 16  # columns of one pass
 HELD = 1 << 16
-"""Samples of which all sensitivities are held; longer driving is cut into halves of it."""
+"""Samples of which all sensitivities are held at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +70,7 @@ class Evidence:
 
     def problem_of(self, inputs: FloatArray | None) -> DrivingProblem:
         """The problem with other inputs than the driving's own."""
-        longest = HELD if self.driving.samples <= HELD else HELD // 2
-        return self.driving.problem(self.fit.model, other_inputs=inputs, longest=longest)
+        return self.driving.problem(self.fit.model, other_inputs=inputs, longest=HELD)
 
     @cached_property
     def frozen(self) -> Any:
@@ -139,7 +138,7 @@ class Evidence:
             G = problem.signal_sensitivities(p, frozen, as_float64(signals[:, few]), numbers[few])
             out[:, few] = G - basis @ (basis.T @ G) if projected else G
 
-        with Workers(2) as pool:
+        with Workers() as pool:
             list(pool.map(some, range(0, len(numbers), _AT_ONCE)))
         return out
 
@@ -171,10 +170,10 @@ class Section:
         """Whether these are all samples."""
         return self.part is None
 
-    def rows(self, work: Work) -> FloatArray:
+    def rows(self, work: Work, name: str = "") -> FloatArray:
         """Rows for each sample, of a problem, its gains and the samples it has."""
         if self.part is not None:
-            return self.part.rows(work)
+            return self.part.rows(work, name or None)
         evidence = self.evidence
         assert isinstance(evidence.problem, _core.Problem)
         return work(evidence.problem, evidence.frozen, self.where)

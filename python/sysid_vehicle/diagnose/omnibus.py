@@ -23,7 +23,7 @@ from ..identify import Fit
 from ..rules import USUAL, Rules
 from ..vehicle import GRAVITY_MPS2
 from .coordinates import begins, late
-from .directions import Directions
+from .directions import Ask, Directions
 from .evidence import Evidence, Section
 from .projection import pseudo_inverse
 
@@ -92,19 +92,9 @@ def omnibus_of(
     if projected is None:
         projected = Directions(evidence, Unknown(evidence))
     unknown = next(s for s in projected.sources if isinstance(s, Unknown))
-    place = projected.place(unknown)
-    information, S = projected.information[place, place], projected.score[place]
-    kept = np.flatnonzero(not_copied(projected)[place])
-    names = [unknown.names[i] for i in kept]
-    targets = list(dict.fromkeys(names))
-    tested = [kept, *(kept[[n == t for n in names]] for t in targets)]
-    values, ranks = np.zeros((len(S), len(tested))), []
-    for value, columns in zip(values.T, tested, strict=True):
-        inverse, rank = pseudo_inverse(information[np.ix_(columns, columns)])
-        value[columns] = inverse @ S[columns]
-        ranks.append(rank)
-    ratios = np.maximum(projected.long_run(unknown, values, values)[0], 1.0)
-    statistics = S @ values / ratios
+    targets, values, ranks = unknown.tested(projected)
+    ratios = np.maximum(projected.answer(unknown).ratios[: len(ranks)], 1.0)
+    statistics = projected.score[projected.place(unknown)] @ values / ratios
     return Omnibus(
         float(statistics[0]),
         ranks[0],
@@ -156,6 +146,50 @@ class Unknown:
         """The columns of each target."""
         firsts = [i for i, n in enumerate(self.names) if n not in self.names[:i]]
         return [slice(a, b) for a, b in pairwise([*firsts, self.width])]
+
+    def tested(self, projected: Directions) -> tuple[list[str], FloatArray, list[int]]:
+        """Targets of which something is left; least squares along all and along each, their ranks.
+
+        The second has a column for all of them and one for each.
+        """
+        place = projected.place(self)
+        information, S = projected.information[place, place], projected.score[place]
+        kept = np.flatnonzero(not_copied(projected)[place])
+        names = [self.names[i] for i in kept]
+        targets = list(dict.fromkeys(names))
+        tested = [kept, *(kept[[n == t for n in names]] for t in targets)]
+        values, ranks = np.zeros((len(S), len(tested))), []
+        for value, columns in zip(values.T, tested, strict=True):
+            inverse, rank = pseudo_inverse(information[np.ix_(columns, columns)])
+            value[columns] = inverse @ S[columns]
+            ranks.append(rank)
+        return targets, values, ranks
+
+    def spanned(
+        self, projected: Directions
+    ) -> tuple[list[tuple[str, int]], FloatArray, FloatArray]:
+        """Targets and how many directions each has; these, orthonormal; what they explain.
+
+        The second and the third are sums of the columns: of a direction, and of a target.
+        """
+        place = projected.place(self)
+        spans = [
+            (slice(g.start - place.start, g.stop - place.start), turns)
+            for g, turns in projected.spans(not_copied(projected))
+            if turns.shape[1]
+        ]
+        ends = np.cumsum([0, *(turns.shape[1] for _, turns in spans)])
+        whole = np.zeros((self.width, int(ends[-1])))
+        for (group, turns), a, b in zip(spans, ends, ends[1:], strict=False):
+            whole[group, a:b] = turns
+        along = whole * (whole.T @ projected.score[place])
+        explained = np.add.reduceat(along, ends[:-1], axis=1)
+        return [(self.names[g.start], t.shape[1]) for g, t in spans], whole, explained
+
+    def asks(self, projected: Directions) -> Ask:
+        """The colour along all that is tested, then along all that is spanned."""
+        along = np.hstack([self.tested(projected)[1], self.spanned(projected)[2]])
+        return Ask(along, along)
 
     def of(self, section: Section) -> FloatArray:
         """Sensitivities of a section's residuals."""

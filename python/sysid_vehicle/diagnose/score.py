@@ -25,7 +25,7 @@ from ..estimate import Driving
 from ..identify import Fit
 from ..rules import USUAL, Rules
 from .coordinates import blocks
-from .directions import Columns, Directions
+from .directions import Ask, Columns, Directions
 from .evidence import Evidence
 from .projection import pseudo_inverse
 from .sensitivity import Sensitivities, duration, sensitivities
@@ -91,7 +91,7 @@ class ScoreBoard:
     @property
     def directions(self) -> dict[str, FloatArray]:
         """Projected sensitivities R_j by effect id, shape (5 n, parameters)."""
-        whole = np.concatenate([R for _, R, _ in self.projected.rows(self.sensitivities)])
+        whole = np.concatenate([R for _, (R,), _ in self.projected.rows(self.sensitivities)])
         return {n: whole[:, self.columns[own]] for n, own in self.places.items()}
 
     @cached_property
@@ -191,8 +191,8 @@ def score_board_of(
         sizes[at, at] = np.repeat((covariance[own, own] @ S[own])[:, None], own.stop - own.start, 1)
     seconds = duration(evidence.driving)
     block_s = min(_BLOCK_S, evidence.driving.usable_s / _FEWEST_BLOCKS)
-    ratios, added = projected.long_run(found, None, sizes, blocks(evidence.driving, block_s))
-    ratios, added = ratios[kept], added[:, kept]
+    told = projected.answer(found, Ask(None, sizes, blocks(evidence.driving, block_s)))
+    ratios, added = told.ratios[kept], told.blocks[:, kept]
     scores = [
         _score(
             effect,

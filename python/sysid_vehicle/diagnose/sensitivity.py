@@ -53,6 +53,9 @@ class Sensitivities:
         """By their parameters, at the null values, shape (5 n, width)."""
         return np.concatenate([self.of(section) for section in self.evidence.sections()])
 
+    def asks(self, _: object) -> None:
+        """Nothing: which of them are scored is told later."""
+
     def of(self, section: Section) -> FloatArray:
         """The same of a section of the residuals."""
         # In place: most of the work is in passing over so many numbers.
@@ -95,7 +98,7 @@ class Sensitivities:
                         return as_float64((here - after) / far)
 
                     with np.errstate(invalid="ignore", over="ignore"):
-                        found = section.rows(moved)
+                        found = section.rows(moved, f"{c.id} {i} {share}")
                     if np.abs(found).max() < _BOUNDED:
                         column[:] = found
                         break

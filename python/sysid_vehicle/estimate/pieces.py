@@ -1,15 +1,16 @@
 """The likelihood of driving too long to be held at once: worked on piece by piece.
 
-A filter forgets where it began. Each piece begins some seconds before its own samples, its lead,
-whose results are dropped: as long as it takes until a lead twice as long changes nothing by more
-than 1e-9. Sums over a piece are those with the lead less those of the lead alone. Nothing is kept
-from piece to piece, gains neither: they are found again where they are needed.
+A filter forgets where it began, exponentially. Each piece begins some seconds before its own
+samples, its lead, whose results are dropped. With three quarters of the lead nothing may change by
+more than (1e-10)^(3/4): with all of it results are those of the whole to 1e-9. Sums over a piece
+are those with the lead less those of the lead alone. Nothing is kept from piece to piece, gains
+neither: they are found again where they are needed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, TypeAlias
@@ -24,7 +25,8 @@ LONGEST = 1 << 18
 """Samples of a problem that is held at once."""
 
 _LEAD_S = 8.0  # at first
-_MET = 1e-9  # of the largest value, up to which results with leads of two lengths agree
+_MET = 1e-10  # of the largest value, up to which a lead may change results
+_TRIED = 0.75  # of the lead, with which it is compared
 _SEEN = 64  # samples on which they are compared
 
 
@@ -68,6 +70,7 @@ class Gains:
     leads: tuple[int, ...]
     log_likelihood: float
     observed: int
+    slow: dict[Hashable, int] = field(default_factory=dict)
 
 
 class Part:
@@ -81,6 +84,8 @@ class Part:
         Of the filter.
     lead : int, optional
         Samples; else as many as the residuals need.
+    leads : dict, optional
+        By name of some work the lead that it needed in earlier pieces.
     """
 
     def __init__(
@@ -91,14 +96,15 @@ class Part:
         p: FloatArray,
         noise: FloatArray,
         lead: int | None = None,
+        leads: dict[Hashable, int] | None = None,
     ) -> None:
         self._build, self.piece = build, piece
         self._model, self._p, self._noise = model, p, noise
         self._most = piece.begin - piece.run
-        self._made: dict[tuple[int, int], tuple[_core.Problem, _core.FrozenFilter]] = {}
+        self._leads = {} if leads is None else leads
         self.lead = min(self._most, round(_LEAD_S * piece.rate_hz)) if lead is None else lead
         if lead is None:
-            self.lead = self._enough(lambda q, g, _: q.residuals(p, g), np.ones(1))
+            self.lead = self._enough(lambda q, g, _: q.residuals(p, g), self.lead, None)
 
     @property
     def where(self) -> slice:
@@ -115,48 +121,74 @@ class Part:
         """The same of the lead alone; None where there is none."""
         return self._frozen(self.lead, self.piece.begin) if self.lead else None
 
-    def rows(self, work: Work) -> FloatArray:
+    @cached_property
+    def _shorter(self) -> tuple[_core.Problem, _core.FrozenFilter]:
+        return self._frozen(self._tried(self.lead), self._seen)
+
+    def rows(self, work: Work, name: Hashable = None) -> FloatArray:
         """What is worked out for each of its samples.
 
-        Effects with slow states of their own need a longer lead than the filter.
+        Effects with slow states of their own need a longer lead than the filter; with a `name`,
+        that of earlier pieces is remembered.
         """
-        out = self._own(work(*self.filtered, self.where), self.lead, self.piece.end)
-        if self.lead < self._most:
+        lead = min(max(self.lead, self._leads.get(name, 0)), self._most)
+        while True:
+            out = self._some(work, lead, self.piece.end)
             scale = np.maximum(np.abs(out.reshape(len(out), -1)).max(axis=0), 1e-300)
-            lead = self._enough(work, scale)
-            if lead > self.lead:
-                where = slice(self.piece.begin - lead, self.piece.end)
-                found = work(*self._frozen(lead, self.piece.end), where)
-                out = self._own(found, lead, self.piece.end)
+            longer = self._enough(work, lead, out, scale)
+            if longer == lead:
+                break
+            lead = longer
+        if name is not None and lead > self.lead:
+            self._leads[name] = lead
         return out
+
+    def _enough(
+        self,
+        work: Work,
+        lead: int,
+        found: FloatArray | None,
+        scale: FloatArray | float = 1.0,
+    ) -> int:
+        """A lead that is long enough for some work, of which what was `found` with this one.
+
+        What is forgotten falls exponentially with the lead.
+        """
+        while lead < self._most:
+            far = self._some(work, lead, self._seen) if found is None else found
+            near = self._some(work, self._tried(lead), self._seen)
+            off = np.abs(near - far[: len(near)]).reshape(len(near), -1) / scale
+            worst = float(off.max(initial=0.0))
+            if worst <= _MET**_TRIED:
+                break
+            needed = np.log(_MET) / np.log(worst) if worst < 0.5 else np.inf
+            lead = min(self._most, max(int(1.1 * _TRIED * lead * min(needed, 2.0)), 5 * lead // 4))
+            found = None
+        return lead
+
+    @property
+    def _seen(self) -> int:
+        return min(self.piece.begin + _SEEN, self.piece.end)
+
+    @staticmethod
+    def _tried(lead: int) -> int:
+        return max(round(_TRIED * lead), 2)
 
     def _frozen(self, lead: int, end: int) -> tuple[_core.Problem, _core.FrozenFilter]:
         problem = self._build(self._model, self.piece.begin - lead, end)
         return problem, problem.freeze(self._p, self._noise)
 
-    def _own(self, rows: FloatArray, lead: int, end: int) -> FloatArray:
-        each = len(rows) // (end - self.piece.begin + lead)
-        return rows[each * lead :]
-
-    def _enough(self, work: Work, scale: FloatArray) -> int:
-        """A lead that is long enough for some work."""
-        lead, end = self.lead, min(self.piece.begin + _SEEN, self.piece.end)
-        before: FloatArray | None = None
-        while lead < self._most:
-            longer = min(2 * lead, self._most)
-            near = self._short(work, lead, end) if before is None else before
-            before = self._short(work, longer, end)
-            off = np.abs(near - before).reshape(len(near), -1)
-            if np.all(off <= _MET * scale):
-                break
-            lead = longer
-        return lead
-
-    def _short(self, work: Work, lead: int, end: int) -> FloatArray:
-        if (lead, end) not in self._made:
-            self._made[lead, end] = self._frozen(lead, end)
-        where = slice(self.piece.begin - lead, end)
-        return self._own(work(*self._made[lead, end], where), lead, end)
+    def _some(self, work: Work, lead: int, end: int) -> FloatArray:
+        """Rows of the samples from the piece's first on, worked out with some lead."""
+        if (lead, end) == (self.lead, self.piece.end):
+            known = self.filtered
+        elif (lead, end) == (self._tried(self.lead), self._seen):
+            known = self._shorter
+        else:
+            known = self._frozen(lead, end)
+        begin = self.piece.begin - lead
+        rows = work(*known, slice(begin, end))
+        return rows[len(rows) // (end - begin) * lead :]
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +218,7 @@ class PiecewiseProblem:
     def parts(self, gains: Gains) -> Iterator[Part]:
         """Pieces with their gains, which are gone when the next one comes."""
         for piece, lead in zip(self.pieces, gains.leads, strict=True):
-            yield Part(self.build, piece, gains.model, gains.p, gains.noise, lead)
+            yield Part(self.build, piece, gains.model, gains.p, gains.noise, lead, gains.slow)
 
     def _filtered(self, p: FloatArray, noise: FloatArray) -> Iterator[Part]:
         for piece in self.pieces:

@@ -22,7 +22,7 @@ Car = Vehicle | Model | str | Path
 Drive = Log | str | Path
 Options = Mapping[str, Any]
 
-_OURS = ("model", "train", "test", "sensors", "progress", "tell")
+_OURS = ("model", "train", "test", "sensors", "workers", "progress", "tell")
 
 
 @dataclass(frozen=True)

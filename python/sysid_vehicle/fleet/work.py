@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from .._threads import shared_cores
+from .._threads import at_most
 from ..errors import SysidError
 from ..log import Log
 from ..read import read_log
@@ -36,7 +36,7 @@ def do(job: Job) -> Outcome:
     try:
         _define(job.define)
         # Other studies have the other cores.
-        with shared_cores():
+        with at_most(1):
             train, validation = (_logs(job, drives) for drives in (job.train, job.validation))
             study = improve(job.model, train, validation or None, progress=False, **job.options)
             row = _row(job, study, time.perf_counter() - began)

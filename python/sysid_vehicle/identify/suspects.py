@@ -11,6 +11,7 @@ import numpy as np
 
 from .._arguments import expect, whole
 from .._progress import doing
+from .._threads import at_most, small_matrices
 from ..errors import explained
 from ..estimate import Driving
 from ..log import Log
@@ -60,7 +61,7 @@ def explaining(function: Callable[_P, _T]) -> Callable[_P, _T]:
 
     Checked are a leading `Fit` or `Model`, and whatever is called `seed`, `starts` or `workers`.
     Numerical failures name the suspects among all arguments. Where somebody watches, a call that
-    takes long says that it goes on.
+    takes long says that it goes on. All its threads are those of `workers`.
     """
     told = signature(function)
     first = next(iter(told.parameters.values()))
@@ -76,7 +77,10 @@ def explaining(function: Callable[_P, _T]) -> Callable[_P, _T]:
                 whole(by_name[name], name, least)
         given = (*args, *kwargs.values())
         shown = None if by_name.get("progress") is not False else False
+        threads: object = by_name.get("workers")
         with (
+            at_most(threads if isinstance(threads, int) else None),
+            small_matrices,
             doing(function.__name__.replace("_", " "), shown),
             explained(
                 lambda: ", ".join(log.name for log in _logs(given)),

@@ -53,6 +53,7 @@ def improve(
     matters: Mapping[str, float | str] | None = None,
     starts: int = 8,
     seed: int = 0,
+    workers: int | None = None,
     progress: bool | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> Study:
@@ -92,6 +93,8 @@ def improve(
         Errors that matter, such as ``{"yaw_rate": "0.5deg/s"}`` (`sizes_that_matter`); those not
         given have usual sizes. A baseline whose errors 0.5 to 5 s ahead on validation data are all
         smaller is adequate, whatever is left. By default whatever is shown to be left counts.
+    workers : int, optional
+        Threads; by default as many as there are cores. The result is the same for any number.
     progress : bool, optional
         Show progress; by default in a terminal or a notebook.
     tell : callable, optional
