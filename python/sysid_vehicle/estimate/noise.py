@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+import scipy
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
@@ -15,6 +16,8 @@ from ..errors import NumericalError
 from ..vehicle import GRAVITY_MPS2, Vehicle
 from .driving import MEASURED, UNITS, Driving
 from .inputs import white_noise_std
+
+_FAR = 1.5  # of a logarithm, in one step
 
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
@@ -259,7 +262,7 @@ def maximise_noise(
             scale = np.diag(information)[free]
             system = information[np.ix_(free, free)] + np.diag(damping * scale + 1e-3)
             step = np.zeros_like(eta)
-            step[free] = np.clip(np.linalg.solve(system, gradient[free]), -1.5, 1.5)
+            step[free] = np.clip(np.linalg.solve(system, gradient[free]), -_FAR, _FAR)
             trial = np.clip(eta + step, low, high)
             try:
                 there = problem.noise_score(p, noise_of(trial))
@@ -274,3 +277,32 @@ def maximise_noise(
         if gained < 0.05:
             break
     return noise_of(eta), float(value)
+
+
+def promised_by_noise(
+    problem: _Scored,
+    p: FloatArray,
+    noise: FloatArray,
+    lowest: FloatArray,
+    highest: FloatArray,
+) -> float:
+    """What a step of Fisher scoring within the range promises to gain [nats].
+
+    Parameters
+    ----------
+    problem : object with `noise_score`
+    p : array, shape (parameters,)
+    noise, lowest, highest : array, shape (noises,)
+        Noise, of which what is zero is not there, and its range.
+    """
+    _, gradient, information = problem.noise_score(p, noise)
+    free = (np.diag(information) > 1e-9) & (noise > 0.0)
+    eta, gradient = np.log(noise[free]), gradient[free]
+    size = np.sqrt(np.diag(information)[free])
+    scaled = information[np.ix_(free, free)] / np.outer(size, size)
+    root = np.linalg.cholesky(scaled + 1e-3 * np.eye(len(size))).T
+    low = np.clip(np.log(lowest[free]) - eta, -_FAR, -1e-12) * size
+    high = np.clip(np.log(highest[free]) - eta, 1e-12, _FAR) * size
+    aim = np.linalg.solve(root.T, gradient / size)
+    step = scipy.optimize.lsq_linear(root, aim, bounds=(low, high), method="bvls").x
+    return float(gradient / size @ step - 0.5 * step @ scaled @ step)

@@ -19,7 +19,7 @@ from .fit import Fit
 from .objective import Objective, gaussian_prior
 from .profile import profile_all
 from .search import METHODS, Box, minimise
-from .settle import risen, settle, settle_finely, to_the_top
+from .settle import risen, rivalled, settle, settle_finely, to_the_top
 from .starts import Runner, Starts, space_filling
 from .suspects import explaining
 
@@ -129,10 +129,10 @@ def identify(
     )
     # Which end is the best is told by the noise as it then is, not by that of the start.
     objective, few = _objectives(model, driving)
-    settled = [
-        settle(objective, end, noise.vector(), box, thin=few) for end in _apart(ends, values, box)
-    ]
-    best = max(settled, key=lambda end: objective.log_likelihood(end[0], end[1]))
+    first, *others = _apart(ends, values, box)
+    best = settle(objective, first, noise.vector(), box, thin=few)
+    for end in others:
+        best = rivalled(objective, best, end, box)
     fit = _on_its_road(_top(model, driving, objective, best, table))
     if intervals == "profile":
         return profile_fit(fit, workers=workers, progress=progress)

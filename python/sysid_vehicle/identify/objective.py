@@ -15,7 +15,7 @@ import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from ..errors import NumericalError
-from ..estimate import maximise_noise
+from ..estimate import maximise_noise, promised_by_noise
 
 __all__ = [
     "LinearRows",
@@ -221,3 +221,7 @@ class Objective(Penalised):
     ) -> tuple[FloatArray, float]:
         """Noise of maximum likelihood at fixed parameters, and the log-likelihood of the data."""
         return maximise_noise(self.problem, p, noise, self.lowest, self.highest, rounds=rounds)
+
+    def noise_promises(self, p: FloatArray, noise: FloatArray) -> float:
+        """What a step of the noise promises to gain at fixed parameters [nats]."""
+        return promised_by_noise(self.problem, p, noise, self.lowest, self.highest)

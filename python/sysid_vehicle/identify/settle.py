@@ -15,11 +15,21 @@ from .objective import Objective
 from .search import HARDER, Box, eased, minimise, stride
 from .valley import down_the_valley
 
-__all__ = ["bottom", "climb", "descend", "risen", "settle", "settle_finely", "to_the_top"]
+__all__ = [
+    "bottom",
+    "climb",
+    "descend",
+    "risen",
+    "rivalled",
+    "settle",
+    "settle_finely",
+    "to_the_top",
+]
 
 _STANDS = 0.5  # nats
 _STILL = 3e-4  # nats
 _GAIN = 0.05  # nats
+_TWICE = 2.0  # times what a score promises
 _REFREEZES = 8
 _ROUNDS = 12
 _CLIMBS = 40  # steps
@@ -153,6 +163,42 @@ def settle(
         x = minimise(objective, p, gains, box, method=method, rounds=8, tolerance=0.05).x
         p, gains = risen(objective, p, gains, x, noise, box)
     return p, noise, False
+
+
+def rivalled(
+    objective: Objective,
+    best: tuple[FloatArray, FloatArray, bool],
+    p: FloatArray,
+    box: Box,
+) -> tuple[FloatArray, FloatArray, bool]:
+    """What `settle` found, or what it finds from other parameters, where that is likelier.
+
+    Those move first, under the noise that was found. What noise of their own could add there is
+    told by its score: where that is next to nothing they are settled too, and where it is far less
+    than what they lack they are not followed.
+
+    Parameters
+    ----------
+    objective : Objective
+    best : tuple
+        Parameters, noise, and whether the search came to a stand.
+    p : array, shape (parameters,)
+    box : Box
+    """
+    found, noise, converged = best
+    value = objective.log_likelihood(found, noise)
+    try:
+        gains = objective.freeze(p, noise)
+        x = minimise(objective, p, gains, box, tolerance=0.05).x
+        p, gains = risen(objective, p, gains, x, noise, box)
+        there = gains.log_likelihood - objective.prior_cost(p)
+        more = objective.noise_promises(p, noise)
+        if there + _TWICE * more + _STANDS < value:
+            return best
+        rival = settle(objective, p, noise, box) if more > _STANDS else (p, noise, converged)
+        return rival if objective.log_likelihood(*rival[:2]) > value else best
+    except (NumericalError, np.linalg.LinAlgError):
+        return best
 
 
 def climb(
