@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from .. import _core
@@ -17,7 +18,7 @@ from ..vehicle import GRAVITY_MPS2, Vehicle
 from .driving import MEASURED, UNITS, Driving
 from .inputs import white_noise_std
 
-_FAR = 1.5  # of a logarithm, in one step
+_FAR, _TINY = 1.5, 1e-12  # of a logarithm, in one step
 
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
@@ -217,6 +218,7 @@ def maximise_noise(
     highest: FloatArray,
     *,
     rounds: int,
+    enough: float = 0.01,
 ) -> tuple[FloatArray, float]:
     """Noise of maximum likelihood at fixed parameters of any model.
 
@@ -232,6 +234,8 @@ def maximise_noise(
         Where to begin, and the range that is searched.
     rounds : int
         Most steps.
+    enough : float
+        What a step has to promise [nats].
 
     Notes
     -----
@@ -252,6 +256,8 @@ def maximise_noise(
     value, gradient, information = problem.noise_score(p, noise_of(eta))
     damping = 1e-2
     for _ in range(rounds):
+        if _promised(gradient, information, low - eta, high - eta, there_is) < enough:
+            break
         # At a bound, only steps back inside count.
         free = ~(((eta <= low) & (gradient < 0)) | ((eta >= high) & (gradient > 0)))
         free &= (np.diag(information) > 1e-9) & there_is
@@ -296,13 +302,27 @@ def promised_by_noise(
         Noise, of which what is zero is not there, and its range.
     """
     _, gradient, information = problem.noise_score(p, noise)
-    free = (np.diag(information) > 1e-9) & (noise > 0.0)
-    eta, gradient = np.log(noise[free]), gradient[free]
+    there_is = noise > 0.0
+    eta = np.log(np.where(there_is, noise, lowest))
+    return _promised(gradient, information, np.log(lowest) - eta, np.log(highest) - eta, there_is)
+
+
+def _promised(
+    gradient: FloatArray,
+    information: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    there_is: npt.NDArray[np.bool_],
+) -> float:
+    """Maximum of the quadratic model over the box of steps."""
+    free = (np.diag(information) > 1e-9) & there_is
+    if not free.any():
+        return 0.0
     size = np.sqrt(np.diag(information)[free])
+    slope = gradient[free] / size
     scaled = information[np.ix_(free, free)] / np.outer(size, size)
     root = np.linalg.cholesky(scaled + 1e-3 * np.eye(len(size))).T
-    low = np.clip(np.log(lowest[free]) - eta, -_FAR, -1e-12) * size
-    high = np.clip(np.log(highest[free]) - eta, 1e-12, _FAR) * size
-    aim = np.linalg.solve(root.T, gradient / size)
-    step = scipy.optimize.lsq_linear(root, aim, bounds=(low, high), method="bvls").x
-    return float(gradient / size @ step - 0.5 * step @ scaled @ step)
+    bounds = (np.clip(low[free], -_FAR, -_TINY) * size, np.clip(high[free], _TINY, _FAR) * size)
+    aim = np.linalg.solve(root.T, slope)
+    step = scipy.optimize.lsq_linear(root, aim, bounds=bounds, method="bvls").x
+    return float(slope @ step - 0.5 * step @ scaled @ step)

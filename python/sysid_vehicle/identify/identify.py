@@ -203,7 +203,7 @@ def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3)
         p, gains = risen(objective, p, gains, found.x, noise.vector(), box)
         if np.all(np.abs(p[box.columns] - before) < 1e-4 * (box.upper - box.lower)):
             break
-    return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True)
+    return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True, gains)
 
 
 def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool | None = None) -> Fit:
@@ -322,10 +322,10 @@ def _on_its_road(fit: Fit) -> Fit:
         except NumericalError:
             return -np.inf
 
-    best = max(
-        (replace(fit.noise, road=(slope, slope)) for slope in _SLOPES_MPS2), key=log_likelihood
-    )
-    if log_likelihood(best) < fit.log_likelihood + _HINT:
+    sloping = [replace(fit.noise, road=(slope, slope)) for slope in _SLOPES_MPS2]
+    values = [log_likelihood(noise) for noise in sloping]
+    best = sloping[int(np.argmax(values))]
+    if max(values) < fit.log_likelihood + _HINT:
         return fit
     learned, value = objective.learn_noise(p, best.vector(), rounds=6)
     if value < fit.log_likelihood + _SHOWN:
@@ -345,7 +345,8 @@ def _summary(
     frozen: _core.FrozenFilter | None = None,
 ) -> Fit:
     box, names = free_box(model), model.free_names
-    frozen = objective.freeze(p, noise.vector())
+    if frozen is None:
+        frozen = objective.freeze(p, noise.vector())
     _, _, information = objective.normal_equations(p, frozen, box.columns)
     x = p[box.columns]
     units = {n: parameter.unit for n, parameter in model.parameters.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -224,13 +225,22 @@ def climb(
     log_likelihood : float
         Priors included; never below that of the start.
     """
+    p, _, reached = _climbed_from(objective, p, noise, box)
+    return p, reached
+
+
+def _climbed_from(
+    objective: Objective, p: FloatArray, noise: FloatArray, box: Box
+) -> tuple[FloatArray, float, float]:
+    """Parameters, and the likelihoods of the start and there."""
 
     def values_at(trials: FloatArray) -> FloatArray:
         return objective.log_likelihoods(trials, noise)
 
-    value, damping = objective.log_likelihood(p, noise), 1e-3
+    gains, damping = objective.freeze(p, noise), 1e-3
+    begin = value = gains.log_likelihood - objective.prior_cost(p)
     for _ in range(_CLIMBS):
-        _, _, information = objective.normal_equations(p, objective.freeze(p, noise), box.columns)
+        _, _, information = objective.normal_equations(p, gains, box.columns)
         x = p[box.columns]
         slope = _slope(values_at, p, information, box)
         if stride(x, slope, information, _SLIGHT, box)[1] < _GAIN:
@@ -239,15 +249,17 @@ def climb(
         for _ in range(10):
             trial = p.copy()
             trial[box.columns], promised = stride(x, slope, information, damping, box)
-            there = float(values_at(trial[None])[0])
-            if there > value:
-                p, gained, value = trial, there - value, there
-                damping = max(eased(damping, gained, promised), _SLIGHT)
-                break
+            with suppress(NumericalError):
+                there = objective.freeze(trial, noise)
+                reached = there.log_likelihood - objective.prior_cost(trial)
+                if reached > value:
+                    p, gains, gained, value = trial, there, reached - value, reached
+                    damping = max(eased(damping, gained, promised), _SLIGHT)
+                    break
             damping *= HARDER
         if gained < _GAIN:
             break
-    return p, value
+    return p, begin, value
 
 
 def to_the_top(
@@ -260,13 +272,12 @@ def to_the_top(
     p : array, shape (parameters,)
     noise : array, shape (noises,)
     """
-    value = objective.log_likelihood(p, noise)
     for _ in range(_CLIMBED):
-        p, reached = climb(objective, p, noise, box)
-        noise, _ = objective.learn_noise(p, noise, rounds=1 if reached < value + _STANDS else 3)
-        if reached < value + _STANDS:
+        p, begin, reached = _climbed_from(objective, p, noise, box)
+        stands = reached < begin + _STANDS
+        noise, _ = objective.learn_noise(p, noise, rounds=1 if stands else 3)
+        if stands:
             break
-        value = objective.log_likelihood(p, noise)
     return p, noise
 
 
@@ -334,7 +345,7 @@ def settle_finely(
     value = objective.log_likelihood(p, noise)
     for _ in range(_ROUNDS):
         p, _ = bottom(objective, p, noise, box)
-        noise, _ = objective.learn_noise(p, noise)
+        noise, _ = objective.learn_noise(p, noise, enough=_STILL)
         before = value
         value = objective.log_likelihood(p, noise)
         if value < before + _STILL:
