@@ -27,7 +27,7 @@ from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import METHODS, refine, refit
 from sysid_vehicle.identify.objective import Objective
 from sysid_vehicle.identify.search import Box, minimise
-from sysid_vehicle.identify.settle import climb, risen, settle
+from sysid_vehicle.identify.settle import climb, risen, rivalled, settle
 
 G = 9.80665
 WHATS = ("cornering stiffness", "peak friction", "slip at the peak")
@@ -358,6 +358,54 @@ def test_the_likelihood_is_climbed_where_frozen_gains_see_no_slope() -> None:
     assert reached == objective.log_likelihood(p, noise)
     assert reached > highest - 0.05
     assert p[1] == box.upper[1]
+
+
+class Valleys:
+    """Two values that fit alike but for three nats, and noise that may be worth some as well."""
+
+    slope = 0.0
+
+    def freeze(self, p: np.ndarray, noise: np.ndarray) -> SimpleNamespace:
+        if p[0] > 1.9:
+            raise NumericalError("the car spins")
+        return SimpleNamespace(log_likelihood=3.0 * (p[0] > 0.0) - self.half_sum_of_squares(p, 0))
+
+    def half_sum_of_squares(self, p: np.ndarray, _: object) -> float:
+        return 50.0 * float(p[0] ** 2 - 1.0) ** 2
+
+    def normal_equations(
+        self, p: np.ndarray, gains: object, _: object
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        by = -20.0 * p[:1]
+        gradient = by * 10.0 * (p[0] ** 2 - 1.0)
+        return self.half_sum_of_squares(p, gains), gradient, np.outer(by, by)
+
+    def noise_score(self, p: np.ndarray, noise: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        return self.freeze(p, noise).log_likelihood, np.array([self.slope]), np.eye(1)
+
+
+def test_another_end_is_followed_as_far_as_it_may_be_the_better_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem, noise, box = Valleys(), np.ones(1), Box([0], np.array([-2.0]), np.array([2.0]))
+    objective = Objective(problem, (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
+    low, high = (np.array([-1.0]), noise, True), (np.array([1.0]), noise, True)
+    assert rivalled(objective, low, np.array([0.8]), box)[0] == pytest.approx(1.0, abs=0.01)
+    assert rivalled(objective, low, np.array([1.95]), box) is low
+    asked: list[float] = []
+
+    def seen(_: object, p: np.ndarray, *rest: object) -> tuple[np.ndarray, np.ndarray, bool]:
+        asked.append(float(p[0]))
+        return p, noise, True
+
+    monkeypatch.setitem(rivalled.__globals__, "settle", seen)
+    assert rivalled(objective, high, np.array([-0.8]), box) is high
+    problem.slope = 2.0  # for which twice a nat is promised: less than is lacking
+    assert rivalled(objective, high, np.array([-0.8]), box) is high
+    assert not asked
+    problem.slope = 5.0
+    assert rivalled(objective, high, np.array([-0.8]), box) is high
+    assert asked == [pytest.approx(-1.0, abs=0.01)]
 
 
 def test_parameters_move_only_where_the_likelihood_rises() -> None:

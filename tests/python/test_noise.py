@@ -15,7 +15,14 @@ from sysid_vehicle import (
     drive,
     manoeuvres,
 )
-from sysid_vehicle.estimate import Driving, first_guess, learn_noise, noise_range
+from sysid_vehicle.estimate import (
+    Driving,
+    first_guess,
+    learn_noise,
+    maximise_noise,
+    noise_range,
+    promised_by_noise,
+)
 from sysid_vehicle.simulate import drive_truth
 
 SOME = NoiseModel(
@@ -69,6 +76,39 @@ def test_learning_raises_the_likelihood(fit: Fit) -> None:
         values.append(value)
     assert values == sorted(values)
     assert values[-1] > before + 100.0
+
+
+def test_noise_is_not_tried_where_its_score_promises_nothing() -> None:
+    """The likelihood is a parabola of the logarithms, whose top lies beyond the range of one."""
+
+    class Parabola:
+        asked = 0
+        top, information = np.log([2.0, 9.0]), np.array([[40.0, 6.0], [6.0, 5.0]])
+
+        def noise_score(
+            self, _: np.ndarray, noise: np.ndarray
+        ) -> tuple[float, np.ndarray, np.ndarray]:
+            self.asked += 1
+            slope = self.information @ (self.top - np.log(noise))
+            off = self.top - np.log(noise)
+            return -0.5 * float(off @ self.information @ off), slope, self.information
+
+    problem, low, high = Parabola(), np.array([0.1, 0.1]), np.array([50.0, 3.0])
+    # At the bound of the second one the first gives way.
+    best = np.array([np.exp(np.log(2.0) + 6.0 / 40.0 * np.log(3.0)), 3.0])
+    at_best = problem.noise_score(best, best)[0]
+    for start in (best, np.array([1.0, 3.0])):
+        below = at_best - problem.noise_score(start, start)[0]
+        promised = promised_by_noise(problem, start, start, low, high)
+        assert promised == pytest.approx(below, rel=0.01, abs=1e-9)
+    problem.asked = 0
+    assert maximise_noise(problem, best, best, low, high, rounds=9)[0] == pytest.approx(best)
+    assert problem.asked == 1
+    found, value = maximise_noise(
+        problem, best, np.array([0.3, 0.5]), low, high, rounds=9, enough=1e-6
+    )
+    assert found == pytest.approx(best, rel=1e-2)
+    assert value > at_best - 1e-3
 
 
 def test_twice_the_sensor_noise_is_learned(truth: Model) -> None:

@@ -10,6 +10,7 @@ from .noise import (
     learn_noise,
     maximise_noise,
     noise_range,
+    promised_by_noise,
 )
 
 __all__ = [
@@ -30,5 +31,6 @@ __all__ = [
     "nees_check",
     "nis_check",
     "noise_range",
+    "promised_by_noise",
     "whiteness_check",
 ]

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
+import scipy
 
 from .._arrays import FloatArray, as_float64
 from .._text import html_text
@@ -16,6 +18,8 @@ from ..vehicle import GRAVITY_MPS2, Vehicle
 from .driving import MEASURED, UNITS, Driving
 from .inputs import white_noise_std
 from .pieces import DrivingProblem
+
+_FAR, _TINY = 1.5, 1e-12  # of a logarithm, in one step
 
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
@@ -215,6 +219,7 @@ def maximise_noise(
     highest: FloatArray,
     *,
     rounds: int,
+    enough: float = 0.01,
 ) -> tuple[FloatArray, float]:
     """Noise of maximum likelihood at fixed parameters of any model.
 
@@ -230,6 +235,8 @@ def maximise_noise(
         Where to begin, and the range that is searched.
     rounds : int
         Most steps.
+    enough : float
+        What a step has to promise [nats].
 
     Notes
     -----
@@ -251,6 +258,8 @@ def maximise_noise(
     damping = 1e-2
     for _ in range(rounds):
         check_time()
+        if _promised(gradient, information, low - eta, high - eta, there_is) < enough:
+            break
         # At a bound, only steps back inside count.
         free = ~(((eta <= low) & (gradient < 0)) | ((eta >= high) & (gradient > 0)))
         free &= (np.diag(information) > 1e-9) & there_is
@@ -261,7 +270,7 @@ def maximise_noise(
             scale = np.diag(information)[free]
             system = information[np.ix_(free, free)] + np.diag(damping * scale + 1e-3)
             step = np.zeros_like(eta)
-            step[free] = np.clip(np.linalg.solve(system, gradient[free]), -1.5, 1.5)
+            step[free] = np.clip(np.linalg.solve(system, gradient[free]), -_FAR, _FAR)
             trial = np.clip(eta + step, low, high)
             try:
                 there = problem.noise_score(p, noise_of(trial))
@@ -276,3 +285,46 @@ def maximise_noise(
         if gained < 0.05:
             break
     return noise_of(eta), float(value)
+
+
+def promised_by_noise(
+    problem: _Scored,
+    p: FloatArray,
+    noise: FloatArray,
+    lowest: FloatArray,
+    highest: FloatArray,
+) -> float:
+    """What a step of Fisher scoring within the range promises to gain [nats].
+
+    Parameters
+    ----------
+    problem : object with `noise_score`
+    p : array, shape (parameters,)
+    noise, lowest, highest : array, shape (noises,)
+        Noise, of which what is zero is not there, and its range.
+    """
+    _, gradient, information = problem.noise_score(p, noise)
+    there_is = noise > 0.0
+    eta = np.log(np.where(there_is, noise, lowest))
+    return _promised(gradient, information, np.log(lowest) - eta, np.log(highest) - eta, there_is)
+
+
+def _promised(
+    gradient: FloatArray,
+    information: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    there_is: npt.NDArray[np.bool_],
+) -> float:
+    """Maximum of the quadratic model over the box of steps."""
+    free = (np.diag(information) > 1e-9) & there_is
+    if not free.any():
+        return 0.0
+    size = np.sqrt(np.diag(information)[free])
+    slope = gradient[free] / size
+    scaled = information[np.ix_(free, free)] / np.outer(size, size)
+    root = np.linalg.cholesky(scaled + 1e-3 * np.eye(len(size))).T
+    bounds = (np.clip(low[free], -_FAR, -_TINY) * size, np.clip(high[free], _TINY, _FAR) * size)
+    aim = np.linalg.solve(root.T, slope)
+    step = scipy.optimize.lsq_linear(root, aim, bounds=bounds, method="bvls").x
+    return float(slope @ step - 0.5 * step @ scaled @ step)

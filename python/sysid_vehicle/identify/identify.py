@@ -22,7 +22,7 @@ from .fit import Fit
 from .objective import Objective, gaussian_prior
 from .profile import profile_all
 from .search import METHODS, Box, minimise
-from .settle import risen, settle, settle_finely, to_the_top
+from .settle import risen, rivalled, settle, settle_finely, to_the_top
 from .starts import Runner, Starts, space_filling
 from .suspects import explaining
 
@@ -148,10 +148,10 @@ def identify(
     )
     # Which end is the best is told by the noise as it then is, not by that of the start.
     objective, few = _objectives(model, driving)
-    settled = [
-        settle(objective, end, noise.vector(), box, thin=few) for end in _apart(ends, values, box)
-    ]
-    best = max(settled, key=lambda end: objective.log_likelihood(end[0], end[1]))
+    first, *others = _apart(ends, values, box)
+    best = settle(objective, first, noise.vector(), box, thin=few)
+    for end in others:
+        best = rivalled(objective, best, end, box)
     fit = _on_its_road(_top(model, driving, objective, best, table))
     if intervals == "profile":
         return profile_fit(fit, workers=workers, progress=progress)
@@ -222,7 +222,7 @@ def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3)
         p, gains = risen(objective, p, gains, found.x, noise.vector(), box)
         if np.all(np.abs(p[box.columns] - before) < 1e-4 * (box.upper - box.lower)):
             break
-    return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True)
+    return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True, gains)
 
 
 def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool | None = None) -> Fit:
@@ -327,10 +327,10 @@ def _on_its_road(fit: Fit) -> Fit:
         except NumericalError:
             return -np.inf
 
-    best = max(
-        (replace(fit.noise, road=(slope, slope)) for slope in _SLOPES_MPS2), key=log_likelihood
-    )
-    if log_likelihood(best) < fit.log_likelihood + _HINT:
+    sloping = [replace(fit.noise, road=(slope, slope)) for slope in _SLOPES_MPS2]
+    values = [log_likelihood(noise) for noise in sloping]
+    best = sloping[int(np.argmax(values))]
+    if max(values) < fit.log_likelihood + _HINT:
         return fit
     learned, value = objective.learn_noise(p, best.vector(), rounds=6)
     if value < fit.log_likelihood + _SHOWN:
@@ -350,7 +350,8 @@ def _summary(
     frozen: _core.FrozenFilter | None = None,
 ) -> Fit:
     box, names = free_box(model), model.free_names
-    frozen = objective.freeze(p, noise.vector())
+    if frozen is None:
+        frozen = objective.freeze(p, noise.vector())
     _, _, information = objective.normal_equations(p, frozen, box.columns)
     x = p[box.columns]
     units = {n: parameter.unit for n, parameter in model.parameters.items()}

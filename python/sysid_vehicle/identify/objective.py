@@ -16,7 +16,7 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from .._threads import check_time
 from ..errors import NumericalError
-from ..estimate import maximise_noise
+from ..estimate import maximise_noise, promised_by_noise
 
 __all__ = [
     "LinearRows",
@@ -222,7 +222,12 @@ class Objective(Penalised):
         return as_float64([one(p) for p in sets])
 
     def learn_noise(
-        self, p: FloatArray, noise: FloatArray, *, rounds: int = 12
+        self, p: FloatArray, noise: FloatArray, *, rounds: int = 12, enough: float = 0.01
     ) -> tuple[FloatArray, float]:
         """Noise of maximum likelihood at fixed parameters, and the log-likelihood of the data."""
-        return maximise_noise(self.problem, p, noise, self.lowest, self.highest, rounds=rounds)
+        within = (self.lowest, self.highest)
+        return maximise_noise(self.problem, p, noise, *within, rounds=rounds, enough=enough)
+
+    def noise_promises(self, p: FloatArray, noise: FloatArray) -> float:
+        """What a step of the noise promises to gain at fixed parameters [nats]."""
+        return promised_by_noise(self.problem, p, noise, self.lowest, self.highest)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,21 @@ from .objective import Objective
 from .search import HARDER, Box, eased, minimise, stride
 from .valley import down_the_valley
 
-__all__ = ["bottom", "climb", "descend", "risen", "settle", "settle_finely", "to_the_top"]
+__all__ = [
+    "bottom",
+    "climb",
+    "descend",
+    "risen",
+    "rivalled",
+    "settle",
+    "settle_finely",
+    "to_the_top",
+]
 
 _STANDS = 0.5  # nats
 _STILL = 3e-4  # nats
 _GAIN = 0.05  # nats
+_TWICE = 2.0  # times what a score promises
 _REFREEZES = 8
 _ROUNDS = 12
 _CLIMBS = 40  # steps
@@ -155,6 +166,42 @@ def settle(
     return p, noise, False
 
 
+def rivalled(
+    objective: Objective,
+    best: tuple[FloatArray, FloatArray, bool],
+    p: FloatArray,
+    box: Box,
+) -> tuple[FloatArray, FloatArray, bool]:
+    """What `settle` found, or what it finds from other parameters, where that is likelier.
+
+    Those move first, under the noise that was found. What noise of their own could add there is
+    told by its score: where that is next to nothing they are settled too, and where it is far less
+    than what they lack they are not followed.
+
+    Parameters
+    ----------
+    objective : Objective
+    best : tuple
+        Parameters, noise, and whether the search came to a stand.
+    p : array, shape (parameters,)
+    box : Box
+    """
+    found, noise, converged = best
+    value = objective.log_likelihood(found, noise)
+    try:
+        gains = objective.freeze(p, noise)
+        x = minimise(objective, p, gains, box, tolerance=0.05).x
+        p, gains = risen(objective, p, gains, x, noise, box)
+        there = gains.log_likelihood - objective.prior_cost(p)
+        more = objective.noise_promises(p, noise)
+        if there + _TWICE * more + _STANDS < value:
+            return best
+        rival = settle(objective, p, noise, box) if more > _STANDS else (p, noise, converged)
+        return rival if objective.log_likelihood(*rival[:2]) > value else best
+    except (NumericalError, np.linalg.LinAlgError):
+        return best
+
+
 def climb(
     objective: Objective, p: FloatArray, noise: FloatArray, box: Box
 ) -> tuple[FloatArray, float]:
@@ -178,13 +225,22 @@ def climb(
     log_likelihood : float
         Priors included; never below that of the start.
     """
+    p, _, reached = _climbed_from(objective, p, noise, box)
+    return p, reached
+
+
+def _climbed_from(
+    objective: Objective, p: FloatArray, noise: FloatArray, box: Box
+) -> tuple[FloatArray, float, float]:
+    """Parameters, and the likelihoods of the start and there."""
 
     def values_at(trials: FloatArray) -> FloatArray:
         return objective.log_likelihoods(trials, noise)
 
-    value, damping = objective.log_likelihood(p, noise), 1e-3
+    gains, damping = objective.freeze(p, noise), 1e-3
+    begin = value = gains.log_likelihood - objective.prior_cost(p)
     for _ in range(_CLIMBS):
-        _, _, information = objective.normal_equations(p, objective.freeze(p, noise), box.columns)
+        _, _, information = objective.normal_equations(p, gains, box.columns)
         x = p[box.columns]
         slope = _slope(values_at, p, information, box)
         if stride(x, slope, information, _SLIGHT, box)[1] < _GAIN:
@@ -193,15 +249,17 @@ def climb(
         for _ in range(10):
             trial = p.copy()
             trial[box.columns], promised = stride(x, slope, information, damping, box)
-            there = float(values_at(trial[None])[0])
-            if there > value:
-                p, gained, value = trial, there - value, there
-                damping = max(eased(damping, gained, promised), _SLIGHT)
-                break
+            with suppress(NumericalError):
+                there = objective.freeze(trial, noise)
+                reached = there.log_likelihood - objective.prior_cost(trial)
+                if reached > value:
+                    p, gains, gained, value = trial, there, reached - value, reached
+                    damping = max(eased(damping, gained, promised), _SLIGHT)
+                    break
             damping *= HARDER
         if gained < _GAIN:
             break
-    return p, value
+    return p, begin, value
 
 
 def to_the_top(
@@ -214,13 +272,12 @@ def to_the_top(
     p : array, shape (parameters,)
     noise : array, shape (noises,)
     """
-    value = objective.log_likelihood(p, noise)
     for _ in range(_CLIMBED):
-        p, reached = climb(objective, p, noise, box)
-        noise, _ = objective.learn_noise(p, noise, rounds=1 if reached < value + _STANDS else 3)
-        if reached < value + _STANDS:
+        p, begin, reached = _climbed_from(objective, p, noise, box)
+        stands = reached < begin + _STANDS
+        noise, _ = objective.learn_noise(p, noise, rounds=1 if stands else 3)
+        if stands:
             break
-        value = objective.log_likelihood(p, noise)
     return p, noise
 
 
@@ -288,7 +345,7 @@ def settle_finely(
     value = objective.log_likelihood(p, noise)
     for _ in range(_ROUNDS):
         p, _ = bottom(objective, p, noise, box)
-        noise, _ = objective.learn_noise(p, noise)
+        noise, _ = objective.learn_noise(p, noise, enough=_STILL)
         before = value
         value = objective.log_likelihood(p, noise)
         if value < before + _STILL:
