@@ -212,8 +212,13 @@ def compare(
     """
     driving = Driving.of(logs)
     floor = (fit.noise if noise is None else noise).floor()
-    squares, count = np.empty(driving.samples), np.empty(driving.samples)
     innovation, spread = (np.empty((driving.samples, len(MEASURED))) for _ in range(2))
+    log_likelihood = 0.0
+    for own, _, _, trace in _told(fit, driving, fit.noise):
+        innovation[own], spread[own] = trace["innovation"], trace["spread"]
+        log_likelihood += trace["log_likelihood"]
+    wrong = incoherent(driving, fit.model.effects) or unrelated(driving, innovation, spread)
+    squares, count = np.empty(driving.samples), np.empty(driving.samples)
     for own, squares[own], count[own], trace in _told(fit, driving, floor):
         innovation[own], spread[own] = trace["innovation"], trace["spread"]
     scores = {}
@@ -231,11 +236,7 @@ def compare(
             float(1.0 - np.mean(e**2) / variance) if variance > 0 else float("nan"),
         )
     failures = FailureMap.of(driving, squares, count)
-    normalised = innovation / spread
-    log_likelihood = 0.0
-    for own, _, _, trace in _told(fit, driving, fit.noise):
-        innovation[own], spread[own] = trace["innovation"], trace["spread"]
-        log_likelihood += trace["log_likelihood"]
+    innovation /= spread  # long driving has no room for both
     title = f"{', '.join(fit.model.effects) or 'baseline'} on {driving}"
     return Comparison(
         title,
@@ -245,7 +246,7 @@ def compare(
         failures,
         driving.channel("time_s"),
         driving.log_number,
-        normalised,
+        innovation,
         log_likelihood,
-        incoherent(driving, fit.model.effects) or unrelated(driving, innovation, spread),
+        wrong,
     )

@@ -146,10 +146,10 @@ class Directions:
             parts = [s.of(section) for s in sources]
             Q, e = section.basis, section.left
             copied = [Q.T @ G for G in parts]
+            for G, c in zip(parts, copied, strict=True):
+                _take_off(G, Q, c)
             for first in range(0, len(e), _ROWS):
                 rows = slice(first, first + _ROWS)
-                for G, c in zip(parts, copied, strict=True):
-                    G[rows] -= Q[rows] @ c
                 piece = parts[0][rows] if len(parts) == 1 else np.hstack([G[rows] for G in parts])
                 self.information += piece.T @ piece
                 self.score += piece.T @ e[rows]
@@ -216,7 +216,9 @@ class Directions:
             return
         for section in self.evidence.sections():
             F = section.fitted
-            found = tuple(s.of(section) - F @ self._copied[:, self.place(s)] for s in sources)
+            found = tuple(s.of(section) for s in sources)
+            for s, G in zip(sources, found, strict=True):
+                _take_off(G, F, self._copied[:, self.place(s)])
             yield section.where, found, section.left - F @ self._explained
 
     def answer(self, source: Columns, ask: Ask | None = None) -> Answer:
@@ -243,3 +245,10 @@ class Directions:
 def _factor(columns: FloatArray) -> FloatArray:
     """The triangular factor of columns."""
     return as_float64(np.linalg.qr(columns, "r"))
+
+
+def _take_off(columns: FloatArray, known: FloatArray, sizes: FloatArray) -> None:
+    """`columns -= known @ sizes` without room for the product of all rows."""
+    for first in range(0, len(columns), _ROWS):
+        rows = slice(first, first + _ROWS)
+        columns[rows] -= known[rows] @ sizes
