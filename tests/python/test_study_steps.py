@@ -16,7 +16,6 @@ from sysid_vehicle.study.steps import (
     _distance,
     _leading_subsets,
     _mattering,
-    _with_others,
     _with_subset,
     alternatives,
     better,
@@ -76,19 +75,6 @@ def test_a_head_wind_gives_way_to_drag_and_rolling_resistance(
     one = exchanged(windy, {"head_wind": near}, driving[1], most_effects=1)
     assert len(one.model.effects) == 1
     assert exchanged(windy, {}, driving[1], most_effects=4) is windy
-
-
-def test_an_effect_that_was_tried_against_the_same_ones_is_not_refitted(
-    dx: Diagnosis, driving: tuple[Driving, Driving], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (drag,) = (replace(c, finished=True) for c in dx.ranking if c.id == "aero_drag")
-    assert drag.fit is not None
-    windy = by_id(dx, "head_wind")
-    monkeypatch.setattr("sysid_vehicle.study.steps.refine", None)
-    assert _with_others(windy, "head_wind", (drag,), USUAL) is drag.fit
-    for other in (replace(drag, finished=False), replace(drag, fit=None)):
-        with pytest.raises(TypeError):
-            _with_others(windy, "head_wind", (other,), USUAL)
 
 
 def test_what_fits_to_the_last_digit_alike_is_no_alternative(dx: Diagnosis) -> None:

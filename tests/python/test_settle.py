@@ -1,0 +1,123 @@
+"""Searches that work the gains out anew: the climb, steps that rise, a second end."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sysid_vehicle.errors import NumericalError
+from sysid_vehicle.identify.objective import Objective
+from sysid_vehicle.identify.search import Box
+from sysid_vehicle.identify.settle import climb, risen, rivalled, settle
+
+
+class Ridge:
+    """A product that is known, and a filter whose spread alone tells its two factors apart.
+
+    With frozen gains each pair of factors is nearly as good as any other. The likelihood has its
+    maximum where one of them is at its bound.
+    """
+
+    def errors(self, p: np.ndarray) -> np.ndarray:
+        return np.array([30.0 * np.log(p[0] * p[1]), 1e-3 * np.log(p[0] / p[1])])
+
+    def freeze(self, p: np.ndarray, noise: np.ndarray) -> SimpleNamespace:
+        spread = 20.0 * np.tanh(0.25 * np.log(p[1] / p[0]))
+        return SimpleNamespace(log_likelihood=spread - self.half_sum_of_squares(p, None))
+
+    def half_sum_of_squares(self, p: np.ndarray, _: object) -> float:
+        return 0.5 * float(self.errors(p) @ self.errors(p))
+
+    def normal_equations(
+        self, p: np.ndarray, gains: object, _: object
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        by = -np.array([[30.0, 30.0], [1e-3, -1e-3]]) / p
+        return self.half_sum_of_squares(p, gains), by.T @ self.errors(p), by.T @ by
+
+    def noise_score(self, p: np.ndarray, noise: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        return self.freeze(p, noise).log_likelihood, np.zeros(1), np.eye(1)
+
+
+def test_the_likelihood_is_climbed_where_frozen_gains_see_no_slope() -> None:
+    noise, box = np.ones(1), Box([0, 1], np.array([0.2, 0.2]), np.array([5.0, 3.0]))
+    objective = Objective(Ridge(), (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
+    highest = objective.log_likelihood(np.array([1.0 / 3.0, 3.0]), noise)
+    p, _, converged = settle(objective, np.array([1.3, 0.8]), noise, box)
+    assert converged
+    assert objective.log_likelihood(p, noise) < highest - 10.0
+    p, reached = climb(objective, p, noise, box)
+    assert reached == objective.log_likelihood(p, noise)
+    assert reached > highest - 0.05
+    assert p[1] == box.upper[1]
+
+
+class Valleys:
+    """Two values that fit alike but for three nats, and noise that may be worth some as well."""
+
+    slope = 0.0
+
+    def freeze(self, p: np.ndarray, noise: np.ndarray) -> SimpleNamespace:
+        if p[0] > 1.9:
+            raise NumericalError("the car spins")
+        return SimpleNamespace(log_likelihood=3.0 * (p[0] > 0.0) - self.half_sum_of_squares(p, 0))
+
+    def half_sum_of_squares(self, p: np.ndarray, _: object) -> float:
+        return 50.0 * float(p[0] ** 2 - 1.0) ** 2
+
+    def normal_equations(
+        self, p: np.ndarray, gains: object, _: object
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        by = -20.0 * p[:1]
+        gradient = by * 10.0 * (p[0] ** 2 - 1.0)
+        return self.half_sum_of_squares(p, gains), gradient, np.outer(by, by)
+
+    def noise_score(self, p: np.ndarray, noise: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        return self.freeze(p, noise).log_likelihood, np.array([self.slope]), np.eye(1)
+
+
+def test_another_end_is_followed_as_far_as_it_may_be_the_better_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem, noise, box = Valleys(), np.ones(1), Box([0], np.array([-2.0]), np.array([2.0]))
+    objective = Objective(problem, (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
+    low, high = (np.array([-1.0]), noise, True), (np.array([1.0]), noise, True)
+    assert rivalled(objective, low, np.array([0.8]), box)[0] == pytest.approx(1.0, abs=0.01)
+    assert rivalled(objective, low, np.array([1.95]), box) is low
+    asked: list[float] = []
+
+    def seen(_: object, p: np.ndarray, *rest: object) -> tuple[np.ndarray, np.ndarray, bool]:
+        asked.append(float(p[0]))
+        return p, noise, True
+
+    monkeypatch.setitem(rivalled.__globals__, "settle", seen)
+    assert rivalled(objective, high, np.array([-0.8]), box) is high
+    problem.slope = 2.0  # for which twice a nat is promised: less than is lacking
+    assert rivalled(objective, high, np.array([-0.8]), box) is high
+    assert not asked
+    problem.slope = 5.0
+    assert rivalled(objective, high, np.array([-0.8]), box) is high
+    assert asked == [pytest.approx(-1.0, abs=0.01)]
+
+
+def test_parameters_move_only_where_the_likelihood_rises() -> None:
+    """The search holds the gains of its start; with gains of its own its end may be worse."""
+
+    class Peaked:
+        def __init__(self) -> None:
+            self.asked: list[float] = []
+
+        def freeze(self, p: np.ndarray, _: object) -> SimpleNamespace:
+            self.asked.append(float(p[1]))
+            if p[1] > 0.9:
+                raise NumericalError("the car spins")
+            return SimpleNamespace(log_likelihood=-float((p[1] - 0.2) ** 2))
+
+    peaked, box = Peaked(), Box([1], np.zeros(1), np.ones(1))
+    objective = Objective(peaked)  # type: ignore[arg-type]
+    p, noise = np.array([7.0, 0.0]), np.empty(0)
+    begin = peaked.freeze(p, None)
+    reached, there = risen(objective, p, begin, np.array([1.0]), noise, box)
+    assert peaked.asked == [0.0, 1.0, 0.5, 0.25]
+    assert list(reached) == [7.0, 0.25]
+    assert there.log_likelihood > begin.log_likelihood
+    assert risen(objective, reached, there, np.array([0.8]), noise, box) == (reached, there)
