@@ -39,19 +39,12 @@ std::size_t steps_of(const std::vector<Run>& runs, const std::vector<Piece>& pie
 
 }  // namespace
 
-double forgets_s(const Problem& problem, const Noise& noise) {
+double forgets_s(const std::vector<Run>& runs, const Noise& noise) {
     // A random walk of q per root of a second, read with r each dt, is known with the time constant
-    // r sqrt(dt) / q. An acceleration with a correlation time of tau is in the long run a walk of
-    // its standard deviation times sqrt(2 tau).
-    double q = noise.motion[0] * noise.motion[0];
-    const auto pushed = [&](double std_mps2, double time_s) {
-        q += 2.0 * time_s * std_mps2 * std_mps2;
-    };
-    pushed(noise.disturbance[0] / problem.model.car.mass_kg, noise.time_of(0));
-    if (noise.sloping()) pushed(noise.road[0], noise.road_time_s);
+    // r sqrt(dt) / q.
     double slowest = 0.0;
-    for (const Run& run : problem.runs)
-        slowest = std::max(slowest, noise.sensor[0] * std::sqrt(run.dt / q));
+    for (const Run& run : runs)
+        slowest = std::max(slowest, noise.sensor[0] * std::sqrt(run.dt) / noise.motion[0]);
     return kTimesMet * slowest;
 }
 
