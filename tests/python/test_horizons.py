@@ -15,13 +15,14 @@ from sysid_vehicle.study.horizons import (
     LATERAL,
     PREDICTED,
     Beyond,
+    _few,
     beyond_noise,
     block_errors,
     changes,
     horizons,
 )
 from sysid_vehicle.study.matters import sizes_that_matter, within
-from sysid_vehicle.study.validation import at_its_best, changes_ahead
+from sysid_vehicle.study.validation import AHEAD, at_its_best
 from sysid_vehicle.study.waterfall import look_ahead
 
 
@@ -87,8 +88,8 @@ def test_a_spin_does_not_decide(
     few = slice(len(yaw) // 2, len(yaw) // 2 + 200)
     yaw[few] += 3.0
     driving = Driving.of(altered(course, yaw_rate_radps=yaw))
-    assert worse(changes_ahead(fit, late, driving))
-    assert not worse(changes_ahead(late, fit, driving))
+    assert worse(changes(fit, late, driving, AHEAD))
+    assert not worse(changes(late, fit, driving, AHEAD))
 
 
 def test_the_share_of_the_error_ahead_that_a_model_takes_away(
@@ -190,3 +191,8 @@ def test_how_far_an_error_could_fall(fit: Fit, late: Fit, course: Log) -> None:
     assert all(c.reach == np.inf for c in changes(fit, late, driving, (1.0,)))
     broken = replace(fit, model=fit.model.with_values({"B_front": float("nan")}))
     assert all(c.reach == np.inf for c in changes(fit, broken, driving, (1.0,), reach=True))
+
+
+def test_few_blocks_tell_less_than_many() -> None:
+    assert _few(5) == pytest.approx(2.776 / 1.960, rel=1e-3)
+    assert _few(6) > _few(12) > _few(100) > 1.0

@@ -127,8 +127,8 @@ def test_what_lies_between_stretches_is_no_step(truth: Model) -> None:
     first = begins(driving)
     assert list(first) == [0, 400]
     signal = np.arange(float(driving.samples))
-    moved = late(driving, signal)
+    moved = late(signal, first)
     assert list(moved[first]) == [0.0, 0.0]
-    both = late(driving, np.column_stack([signal, signal]))
+    both = late(np.column_stack([signal, signal]), first)
     np.testing.assert_array_equal(both[:, 1], moved)
     np.testing.assert_array_equal(moved[1:400], signal[:399])

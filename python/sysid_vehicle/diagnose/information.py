@@ -25,7 +25,7 @@ from ..identify import Fit
 from .evidence import Evidence
 from .sensitivity import sensitivities
 
-_COPIED = 1e-9  # share of a column's square that others leave, below which it is their copy
+_COPIED = 1e-12  # share of a column's square that others leave, below which it is their copy
 
 
 @dataclass(frozen=True, eq=False)

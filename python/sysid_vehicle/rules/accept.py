@@ -51,7 +51,8 @@ class Change:
     channel : str
     horizon_s : float
     log_ratio, error : float
-        Logarithm of the error after over that before, and its standard error.
+        Logarithm of the error after over that before, and its standard error; of few blocks it is
+        larger, so that as many of them hold the true value with the same probability.
     reach : float
         By how much the logarithm would fall were all that the effect moves an error before.
     """
