@@ -16,10 +16,12 @@ import io
 import json
 import re
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
+TEMPORARY = re.compile(re.escape(tempfile.gettempdir()) + r"/tmp\w+/")
 NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 RELATIVE = 0.05
 LAST_DIGITS = 2.0
@@ -68,6 +70,8 @@ def tidied(book: Notebook) -> Notebook:
         cell["execution_count"] = count
         kept = [o for o in cell["outputs"] if o.get("name") != "stderr"]
         for output in kept:
+            if output["output_type"] == "stream":
+                output["text"] = [TEMPORARY.sub("", line) for line in output["text"]]
             if "execution_count" in output:
                 output["execution_count"] = count
             output.pop("transient", None)
@@ -100,7 +104,7 @@ def outputs(cell: Notebook) -> tuple[str, list[str]]:
     for output in cell.get("outputs", []):
         if output["output_type"] == "stream":
             if output["name"] == "stdout":
-                text.append("".join(output["text"]))
+                text.append(TEMPORARY.sub("", "".join(output["text"])))
             continue
         data = output.get("data", {})
         images = [kind for kind in sorted(data) if kind.startswith("image/")]
