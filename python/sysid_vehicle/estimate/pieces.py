@@ -21,8 +21,8 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import NumericalError
 
-LONGEST = 1 << 18
-"""Samples of a problem that is held at once."""
+LONGEST = 1 << 20
+"""Samples of a problem that is held at once; a search asks for the gains of pieces at each pass."""
 
 _LEAD_S = 8.0  # at first
 _MET = 1e-10  # of the largest value, up to which a lead may change results
