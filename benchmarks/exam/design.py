@@ -61,6 +61,7 @@ KINEMATIC = (
     "speed_sensor_lever_arm",
     "speed_sensor_misalignment",
     "imu_lever_arm",
+    "ins_lever_arm",
     "body_attitude",
     "accelerometer_bias",
     "gyro_scale",

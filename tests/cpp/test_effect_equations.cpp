@@ -186,6 +186,20 @@ TEST(EffectEquation, ImuLeverArm) {
     EXPECT_EQ(it.on.rate, it.off.rate);
 }
 
+TEST(EffectEquation, InsLeverArmIsThatOfBothSensors) {
+    const Pair it("ins_lever_arm", {0.5, 0.3}, kCornering, kDriving);
+    const Pair inertial("imu_lever_arm", {0.5, 0.3}, kCornering, kDriving);
+    EXPECT_EQ(it.on.y[kAx], inertial.on.y[kAx]);
+    EXPECT_EQ(it.on.y[kAy], inertial.on.y[kAy]);
+    EXPECT_NEAR(it.on.y[kVx], 25.0 - 0.3 * 0.35, 1e-12);
+    EXPECT_NEAR(it.on.y[kVy], 0.5 + 0.5 * 0.35, 1e-12);
+    EXPECT_EQ(it.on.rate, it.off.rate);
+    const Input measured{0.06, 2.0};
+    const Pair taken_off("ins_lever_arm", {0.5, 0.3}, kCornering, measured, false);
+    const Pair alike("imu_lever_arm", {0.5, 0.3}, kCornering, measured, false);
+    EXPECT_EQ(taken_off.on.w.a_x, alike.on.w.a_x);
+}
+
 TEST(EffectEquation, SensorErrors) {
     const Pair bias("accelerometer_bias", {0.15, 0.25}, kCornering, kDriving);
     EXPECT_NEAR(bias.on.y[kAx], bias.off.y[kAx] + 0.15, 1e-14);

@@ -19,7 +19,8 @@ from sysid_vehicle.twin import FMUTwin, FMUVariables
 
 SENSORS = {
     *("accelerometer_bias", "accelerometer_scale", "body_attitude", "gyro_bias", "gyro_scale"),
-    *("imu_lever_arm", "sensor_delay", "speed_sensor_lever_arm", "speed_sensor_misalignment"),
+    *("imu_lever_arm", "ins_lever_arm", "sensor_delay", "speed_sensor_lever_arm"),
+    "speed_sensor_misalignment",
 }
 ALL = tuple(e for e in _ACTS if e not in SENSORS)
 

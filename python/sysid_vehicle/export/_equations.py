@@ -61,6 +61,7 @@ _ACTS: dict[str, Stages] = {
         "body": ["force_x = force_x - 0.5 * air_density * drag * (p0 * (2.0 * v_x + p0))"]
     },
     "imu_lever_arm": {},
+    "ins_lever_arm": {},
     "lateral_load_transfer": {
         "grip": [
             "grip_f = grip_f * (1.0 - p0 * (v_x * r / gravity) * (v_x * r / gravity))",

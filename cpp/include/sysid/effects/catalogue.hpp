@@ -28,8 +28,8 @@ using Catalogue =
                SteerOffset, SteerRatio, SteerNonlinearity, SteerDelay, SteerLag, SteerCompliance,
                RoadBank, RoadGrade, SideWind, Mass, YawInertia, CgPosition, LockedDifferential,
                LimitedSlipDifferential, DriveYawMoment, SensorDelay, SpeedSensorLeverArm,
-               SpeedSensorMisalignment, ImuLeverArm, BodyAttitude, AccelerometerBias, GyroScale,
-               GyroBias, AccelerometerScale>;
+               SpeedSensorMisalignment, ImuLeverArm, InsLeverArm, BodyAttitude, AccelerometerBias,
+               GyroScale, GyroBias, AccelerometerScale>;
 
 constexpr std::size_t kEffectCount = std::tuple_size_v<Catalogue>;
 

@@ -66,7 +66,9 @@ struct CgPosition : Effect {
         .excited_by = "a ramp to the limit and a sweep; axle scales settle it",
         .moves = "yaw_rate_radps, vy_mps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "aligning_moment, imu_lever_arm, speed_sensor_lever_arm",
+        .confounded_with =
+            "aligning_moment, imu_lever_arm, ins_lever_arm, "
+            "speed_sensor_lever_arm",
         .parameters = {{.name = "shift_rearward_m",
                         .unit = "m",
                         .typical = 0.08,

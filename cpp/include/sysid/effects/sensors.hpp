@@ -69,7 +69,7 @@ struct SpeedSensorLeverArm : Effect {
         .excited_by = "tight circles in both directions, sweeps",
         .moves = "vy_mps, vx_mps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps, vy_mps",
-        .confounded_with = "cg_position",
+        .confounded_with = "cg_position, ins_lever_arm",
         .parameters = {{.name = "forward_m",
                         .unit = "m",
                         .typical = 0.8,
@@ -132,7 +132,7 @@ struct ImuLeverArm : Effect {
         .excited_by = "sweeps and tight circles",
         .moves = "ay_mps2, ax_mps2",
         .needs = "ay_mps2, yaw_rate_radps",
-        .confounded_with = "cg_position",
+        .confounded_with = "cg_position, ins_lever_arm",
         .parameters = {{.name = "forward_m",
                         .unit = "m",
                         .typical = 0.5,
@@ -158,6 +158,49 @@ struct ImuLeverArm : Effect {
     static void sensors(const T* p, const Workings<S>& w, const S* /*state*/, S* y) {
         y[kAx] = y[kAx] - (p[0] * (w.r * w.r) + p[1] * w.r_dot);
         y[kAy] += p[0] * w.r_dot - p[1] * (w.r * w.r);
+    }
+};
+
+/// An inertial navigation system reports all motion of one point, its own or one it was told, which
+/// is not the centre of gravity. Its speeds and accelerations agree with each other, so that
+/// kinematics cannot tell where it is.
+struct InsLeverArm : Effect {
+    static constexpr EffectInfo info{
+        .id = "ins_lever_arm",
+        .title = "all motion measured away from the centre of gravity",
+        .equation =
+            "v_x' = v_x - l_y r, v_y' = v_y + l_x r, a_x -= l_x r^2 + l_y dr/dt, "
+            "a_y += l_x dr/dt - l_y r^2",
+        .source = "Klein & Morelli, Aircraft System Identification, ch. 10",
+        .excited_by = "sweeps and tight circles",
+        .moves = "vy_mps, ay_mps2",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps, vy_mps, ay_mps2",
+        .confounded_with = "cg_position, speed_sensor_lever_arm, imu_lever_arm",
+        .parameters = {{.name = "forward_m",
+                        .unit = "m",
+                        .typical = 0.8,
+                        .matters = 0.1,
+                        .bounds = {-4.0, 4.0},
+                        .usual = {0.1, 1.5}},
+                       {.name = "left_m",
+                        .unit = "m",
+                        .typical = 0.4,
+                        .matters = 0.1,
+                        .bounds = {-2.0, 2.0},
+                        .usual = {0.1, 0.8},
+                        .mirrored = true}},
+    };
+
+    static constexpr bool reads_yaw_acceleration = true;
+
+    template <class T, class S>
+    static void input(const T* p, Workings<S>& w) {
+        ImuLeverArm::input(p, w);
+    }
+    template <class T, class S>
+    static void sensors(const T* p, const Workings<S>& w, const S* state, S* y) {
+        SpeedSensorLeverArm::sensors(p, w, state, y);
+        ImuLeverArm::sensors(p, w, state, y);
     }
 };
 
