@@ -42,6 +42,7 @@ from .record import record
 from .said import disturbance, in_the_end, structured
 from .shares import Shares, shares
 from .structure import Structure
+from .validation import at_its_best
 from .waterfall import Waterfall, waterfall
 
 __all__ = ["AddedEffect", "Study", "Verdict"]
@@ -254,9 +255,14 @@ class Study:
 
     @cached_property
     def shares(self) -> Shares:
-        """Errors ahead by channel: baseline, with the effects, ceiling, noise; some seconds."""
+        """Errors ahead by channel: baseline, with the effects, ceiling, noise; some seconds.
+
+        Both models have the parameters that predict best, as in `explained`: what other parameters
+        would have taken away is nothing that effects explain.
+        """
         named = [a.name for a in self.added]
-        return shares(self.fits[0], self.fit, self.validation, named=named)
+        first, last = (at_its_best(f, self.validation) for f in (self.fits[0], self.fit))
+        return shares(first, last, self.validation, named=named)
 
     @cached_property
     def predicting(self) -> Predicting | None:
