@@ -14,7 +14,9 @@ from sysid_vehicle import (
     Model,
     Vehicle,
     diagnose,
+    drive,
     identify,
+    manoeuvres,
     read_log,
 )
 from sysid_vehicle.estimate import Driving
@@ -68,6 +70,21 @@ def test_a_car_of_another_simulator_is_predicted_better(shared_data: Path, repo:
     for found in changes(fit, predicting_ahead(fit), other, (2.0,)):
         assert found.log_ratio < np.log(0.5)
         assert found.log_ratio < -3.0 * found.error
+
+
+def test_a_window_counts_alike_at_any_rate(truth: Model, start: Model) -> None:
+    gripping = truth.with_values({"B_front": 1.4 * truth.value("B_front")})
+    logs = [drive(car, manoeuvres.lap(20.0), seed=61) for car in (truth, gripping)]
+    coarse = [
+        Log.from_arrays({c: log[c][::5] for c in log.channels if log.has(c)}, name=log.name)
+        for log in logs
+    ]
+    found = [
+        identify(start, pair, starts=1, horizon_s=2.0)[STIFFNESS[0]].value
+        for pair in ((logs[0], coarse[1]), (coarse[0], logs[1]))
+    ]
+    alone = [identify(start, log, starts=1, horizon_s=2.0)[STIFFNESS[0]].value for log in logs]
+    assert abs(found[1] - found[0]) < 0.15 * abs(alone[1] - alone[0])
 
 
 def test_what_is_fixed_or_known_beforehand_stays(start: Model, lap: Log, fit: Fit) -> None:

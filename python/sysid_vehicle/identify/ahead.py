@@ -10,7 +10,10 @@ model is the car, both give the same car within their uncertainty, and the likel
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +22,7 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..estimate import Driving
+from ..model import Model
 from .box import free_box
 from .estimates import wald
 from .fit import Fit
@@ -39,34 +43,51 @@ _BLIND = 1e4  # standard deviations of a channel: a sensor that corrects nothing
 _STILL = 1e-6  # noise and disturbance of a motion that is certain
 
 
+_Gains = tuple[_core.FrozenFilter, ...]
+
+
 @dataclass(frozen=True)
 class _Windows:
-    """Prediction errors over windows, whose mean square over a window and channel is near one."""
+    """Prediction errors over windows, whose mean square over a window and channel is near one.
 
-    problem: _core.Problem
-    unit: float
+    Logs have rates of their own: a window counts as one observation of each channel, however many
+    samples it has.
+    """
+
+    problems: tuple[_core.Problem, ...]  # one for each length of windows
+    units: tuple[float, ...]
 
     @property
     def samples(self) -> int:
-        return self.problem.samples
+        return sum(problem.samples for problem in self.problems)
 
-    def residuals(self, p: FloatArray, gains: _core.FrozenFilter) -> FloatArray:
-        return as_float64(self.problem.residuals(p, gains) / self.unit)
+    def freeze(self, p: FloatArray, noise: FloatArray) -> _Gains:
+        return tuple(problem.freeze(p, noise) for problem in self.problems)
 
-    def sensitivities(
-        self, p: FloatArray, gains: _core.FrozenFilter, columns: list[int]
-    ) -> FloatArray:
-        return as_float64(self.problem.sensitivities(p, gains, columns) / self.unit)
+    def _each(self, gains: _Gains) -> Iterator[tuple[_core.Problem, float, _core.FrozenFilter]]:
+        return zip(self.problems, self.units, gains, strict=True)
 
-    def half_sum_of_squares(self, p: FloatArray, gains: _core.FrozenFilter) -> float:
-        return self.problem.half_sum_of_squares(p, gains) / self.unit**2
+    def residuals(self, p: FloatArray, gains: _Gains) -> FloatArray:
+        return np.vstack([one.residuals(p, g) / unit for one, unit, g in self._each(gains)])
+
+    def sensitivities(self, p: FloatArray, gains: _Gains, columns: list[int]) -> FloatArray:
+        each = self._each(gains)
+        return np.vstack([one.sensitivities(p, g, columns) / unit for one, unit, g in each])
+
+    def half_sum_of_squares(self, p: FloatArray, gains: _Gains) -> float:
+        return sum(one.half_sum_of_squares(p, g) / unit**2 for one, unit, g in self._each(gains))
 
     def normal_equations(
-        self, p: FloatArray, gains: _core.FrozenFilter, columns: list[int]
+        self, p: FloatArray, gains: _Gains, columns: list[int]
     ) -> tuple[float, FloatArray, FloatArray]:
-        cost, descent, information = self.problem.normal_equations(p, gains, columns)
-        square = self.unit**2
-        return cost / square, as_float64(descent / square), as_float64(information / square)
+        cost, descent = 0.0, np.zeros(len(columns))
+        information = np.zeros((len(columns), len(columns)))
+        for one, unit, g in self._each(gains):
+            own = one.normal_equations(p, g, columns)
+            cost += own[0] / unit**2
+            descent += own[1] / unit**2
+            information += own[2] / unit**2
+        return cost, descent, information
 
 
 def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
@@ -112,13 +133,10 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
         every = driving.windows(model, windows, motion)
         squares = _squares(every.residuals(p, every.freeze(p, noise)), windows)
         most = max(_LOST**2 * float(np.median(squares)), float(np.quantile(squares, _KEPT)))
-        counted = [w for w, square in zip(windows, squares, strict=True) if square <= most]
-        some = driving.windows(model, counted, motion)
-        gains = some.freeze(p, noise)
-        # Each window counts as one observation of each channel.
-        length = float(np.median([size for _, size in counted]))
-        unit = float(np.sqrt(max(np.median(squares) * length, _TINY)))
-        errors = _Windows(some, unit)
+        kept = [w for w, square in zip(windows, squares, strict=True) if square <= most]
+        counted = sorted(kept, key=lambda window: window[::-1])
+        errors = _counting(driving, model, counted, motion, float(np.median(squares)))
+        gains = errors.freeze(p, noise)
         found = minimise(
             Penalised(errors, prior), p, gains, box, rounds=_ROUNDS, tolerance=_SETTLED
         )
@@ -144,6 +162,21 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
         converged=found.settled,
         profiles=(),
         horizon_s=float(horizon_s),
+    )
+
+
+def _counting(
+    driving: Driving,
+    model: Model,
+    windows: list[tuple[int, int]],
+    motion: FloatArray,
+    square: float,
+) -> _Windows:
+    """Windows, sorted by their length, of which the typical mean square is known."""
+    alike = [(length, list(few)) for length, few in groupby(windows, key=itemgetter(1))]
+    return _Windows(
+        tuple(driving.windows(model, few, motion) for _, few in alike),
+        tuple(float(np.sqrt(max(square * length, _TINY))) for length, _ in alike),
     )
 
 
