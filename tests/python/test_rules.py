@@ -230,12 +230,21 @@ def test_one_spin_neither_confirms_nor_refuses() -> None:
 def test_what_grows_clearly_and_by_more_than_matters() -> None:
     grown = Change("vy_mps", 2.0, 0.10, 0.02)
     assert worse((grown,)) == (grown,)
-    assert worse((replace(grown, error=0.06),)) == ()
+    assert worse((replace(grown, error=0.11),)) == ()
     # Errors of v_y 2 s ahead that grow by 15 %, by two standard errors: none that is kept.
     assert worse((Change("vy_mps", 2.0, float(np.log(1.15)), 0.068),))
     assert worse((replace(grown, log_ratio=0.03, error=0.001),)) == ()
     assert worse((replace(grown, log_ratio=-0.5),)) == ()
     assert worse((grown,), replace(USUAL, worse=0.2)) == ()
+
+
+def test_what_a_channel_leans_to_at_all_its_horizons_has_grown() -> None:
+    leaning = [Change("vy_mps", h, g, 0.08) for h, g in ((1.0, 0.10), (2.0, 0.13), (5.0, 0.04))]
+    assert worse(leaning) == tuple(leaning[:2])
+    # One horizon of a channel whose errors do not grow on the whole is chance.
+    assert worse([*leaning[:1], replace(leaning[1], log_ratio=-0.1), leaning[2]]) == ()
+    elsewhere = [replace(c, channel="yaw_rate_radps", log_ratio=-0.5) for c in leaning]
+    assert worse([*leaning, *elsewhere]) == tuple(leaning[:2])
 
 
 def test_what_follows_from_a_limit_is_none_of_its_own() -> None:

@@ -76,12 +76,16 @@ class Rules:
         2.0, "BIC penalties", "of one parameter that the likelihood ratio of a refit covers", _NULLS
     )
     lean: float = _limit(
-        1.0, "standard errors", "by which measures speak for an effect whose error falls", _EFFECTS
+        1.0,
+        "standard errors",
+        "by which measures speak for an effect whose error falls, and, in the mean over horizons, "
+        "errors ahead of a channel against it",
+        _EFFECTS,
     )
     clear: float = _limit(
         2.0,
         "standard errors",
-        "the same where it does not fall, and against an effect: errors ahead that grow",
+        "the same where it does not fall, and against an effect: errors at one horizon",
         _EFFECTS,
     )
     sure: float = _limit(
