@@ -30,6 +30,7 @@ NUMERICAL = {
     "diagnose/directions.py": {"_ROWS"},
     "diagnose/evidence.py": {"_AT_ONCE"},
     "diagnose/information.py": {"_COPIED"},
+    "diagnose/instead.py": {"_COPIED", "_MEMORIES_S", "_SHAPES_REMEMBERED"},
     "diagnose/possible.py": {"_AT_BOUND"},
     "diagnose/omnibus.py": {"_COPIED", "_FEW_SHAPES", "_FORCE_SHAPES"},
     "diagnose/projection.py": {"_SINGULAR", "_LAGS", "_ROWS", "_TERMS"},

@@ -12,6 +12,7 @@ from .diagnosis import Candidate, Diagnosis
 from .evidence import Evidence
 from .force_map import ForceMap
 from .hiding import Bias, BiasReport, bias_report
+from .instead import Instead, instead
 from .next_drive import DriveLimits, NextDrive, separations, suggest_manoeuvre
 from .omnibus import Omnibus, omnibus
 from .possible import Size, possible
@@ -41,6 +42,7 @@ __all__ = [
     "Evidence",
     "Explainable",
     "ForceMap",
+    "Instead",
     "NextDrive",
     "Omnibus",
     "Proposal",
@@ -57,6 +59,7 @@ __all__ = [
     "considered",
     "constancy",
     "diagnose",
+    "instead",
     "judge",
     "omnibus",
     "possible",

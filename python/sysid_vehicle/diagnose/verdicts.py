@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -223,6 +224,7 @@ def judge(
     refitted: Mapping[str, Size] | None = None,
     settled: bool = False,
     untried: Collection[str] = (),
+    away: Mapping[str, str] = MappingProxyType({}),
 ) -> Verdicts:
     """Judge every effect beside those of the final model.
 
@@ -249,6 +251,8 @@ def judge(
         explanation: with it, driving that no fit saw is not predicted better.
     untried : collection of str
         Effects that time did not suffice for: of these nobody knows whether they hold.
+    away : mapping
+        By effect of the final model, something unknown that explains it away (`instead`).
     """
     if scored is None:
         lacking = tuple(e for e in final.model.candidates if e.id in lacked)
@@ -266,6 +270,9 @@ def judge(
     for i, v in enumerate(found):
         if v.effect.id in kept and not kept[v.effect.id].holds:
             because = f"not with one value ({kept[v.effect.id].span})"
+            found[i] = replace(v, finding="proxy", group=(), because=because)
+        elif v.effect.id in away and v.finding in _NAMED:
+            because = f"an unknown {away[v.effect.id]} explains what it does, and more"
             found[i] = replace(v, finding="proxy", group=(), because=because)
     missing = [v.effect.id for v in found if v.finding in _NAMED]
     for effect in final.model.candidates:

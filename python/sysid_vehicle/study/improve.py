@@ -13,7 +13,7 @@ import numpy as np
 from .._arguments import duration, whole
 from .._progress import teller
 from ..compare import Comparison, compare
-from ..diagnose import Verdicts, considered, judge, omnibus
+from ..diagnose import Verdicts, considered, instead, judge, omnibus
 from ..effects import effect
 from ..errors import SysidWarning, warn
 from ..estimate import Driving
@@ -144,8 +144,11 @@ def improve(
         last = diagnoses[-1]
         fitted = last.omnibus if last.fit is fit else omnibus(fit, train_driving, rules)
         validation = explained = None
+        away: dict[str, str] = {}
         if len(fits) > 1:
-            validation = omnibus(serving(fit, test_driving), test_driving, rules)
+            served = serving(fit, test_driving)
+            validation = omnibus(served, test_driving, rules)
+            away = instead(served, _together(train_driving, test_driving), _new(fits), rules).away
             explained = beyond_noise_ahead(fits, test_driving)
         much_left = explained is not None and explained.share < rules.most
         told = judge(
@@ -159,6 +162,7 @@ def improve(
             refitted=found.sizes,
             settled=True,
             untried=found.stopped,
+            away=away,
         )
         pattern = structure(fit, test_driving)
         facts = facts_of(
@@ -210,6 +214,17 @@ def _changes(
         for before, after in pairwise(fits)
         for name in set(after.model.effects) - set(before.model.effects)
     }
+
+
+def _together(train: Driving, test: Driving) -> Driving:
+    """All driving; the training data where one of the two lacks the wheel force."""
+    same = train.force_known == test.force_known
+    return Driving.of([*train.logs, *test.logs]) if same else train
+
+
+def _new(fits: Sequence[Fit]) -> tuple[str, ...]:
+    """Effects that the last model has and the baseline lacks."""
+    return tuple(e for e in fits[-1].model.effects if e not in fits[0].model.effects)
 
 
 def _room(model: Model, driving: Driving, rules: Rules) -> int:
