@@ -47,7 +47,9 @@ def contradictions(text: str) -> list[str]:
         found.append("what was added takes a part off the error, and nothing")
     if "no effect of the catalogue explains it" in text and "more time" in text:
         found.append("no effect explains it, and some were not tried")
-    if verdict == "explained" and ("only stands in" in text or "; alias" in text):
+    if verdict == "explained" and (
+        "stands in for" in text or "may stand in" in text or "; alias" in text
+    ):
         found.append("explained by what only stands in for something else")
     if "Named physics explains" in text and verdict not in ("explained", "partly_explained"):
         found.append(f"{verdict}, and named physics explains a share")

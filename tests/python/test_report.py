@@ -281,11 +281,13 @@ def test_what_cannot_be_told_apart_is_named_together(study: sv.Study, tmp_path: 
 
 def test_a_stand_in_is_not_said_to_be_missing(study: sv.Study) -> None:
     """Nothing is left, and still something is missing: the text says how both can be."""
-    stand_in = replace(study.added[0], stands_in="no car has such a value")
+    stand_in = replace(study.added[0], stands_in="no car has such a value", grade="alias")
     unknown = replace(study, verdict="unknown", added=(stand_in,))
     assert "no sign of anything left" in unknown.in_the_end
     assert "taken up by stand-ins: tyre_load_sensitivity" in unknown.in_the_end
     assert "it only stands in for something else: no car has such a value" in str(unknown)
+    unsure = replace(unknown, added=(replace(stand_in, grade="plausible"),))
+    assert "it may stand in for something else: no car" in str(unsure)
     assert "most likely missing" not in ranking_title(unknown)
     assert "most likely missing" in ranking_title(study)
 

@@ -54,7 +54,12 @@ class AddedEffect:
             others = ", ".join(self.confounded_with)
             said.append(f"or else {others}, which this driving cannot tell from it")
         if self.stands_in:
-            said.append(f"it only stands in for something else: {self.stands_in}")
+            # By itself it is wrong, or it is not sure beside what is left.
+            sure = self.grade == "alias"
+            what = (
+                "only stands in for something else" if sure else "may stand in for something else"
+            )
+            said.append(f"it {what}: {self.stands_in}")
         return "; ".join(said)
 
     def __str__(self) -> str:
