@@ -25,11 +25,7 @@ from sysid_vehicle import (
 from sysid_vehicle.rules import Gain, share_explained
 from sysid_vehicle.study.horizons import Beyond
 from sysid_vehicle.study.shares import shares
-from sysid_vehicle.study.validation import (
-    error_falls,
-    gain_in_log_likelihood,
-    set_aside,
-)
+from sysid_vehicle.study.validation import error_falls, gain_in_log_likelihood, set_aside
 
 LAG = "steer_lag.time_constant_s", 0.06
 LOOKS_LIKE_LAG = {
