@@ -49,7 +49,8 @@ _RENAMED: dict[str, dict[str, str]] = {
     },
     "study.study:Study": {
         "held_out": "validation",
-        "omnibus_held_out": "omnibus_validation",
+        "omnibus_held_out": "omnibus_together",
+        "omnibus_validation": "omnibus_together",
     },
 }
 

@@ -155,7 +155,7 @@ def said(base: Study, rng: random.Random) -> str:
         test=tuple(base.test[-1] for _ in fits),
         diagnoses=(replace(last, ranking=tuple(ranking)),),
         omnibus=facts.fitted,
-        omnibus_validation=validation,
+        omnibus_together=validation,
         added=own,
         explained=Beyond(missing, share, share - 0.1, min(share + 0.1, 1.0)) if added else None,
         structure=structure,

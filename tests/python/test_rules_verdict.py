@@ -29,15 +29,15 @@ DRAG = Added("aero_drag", "missing", moves=frozenset({"vx_mps"}), taken=1.0)
 WHOLE = Facts(BEFORE, NONE, NONE, missing=(8.0, 0.0), added=(MASS,))
 
 
-def test_what_is_left_on_validation_data_takes_more_evidence() -> None:
+def test_what_is_left_on_all_data_takes_more_evidence() -> None:
     assert not something_left(WHOLE)
-    assert not something_left(replace(WHOLE, validation=of(0.001)))
-    assert something_left(replace(WHOLE, validation=of(1e-5)))
+    assert not something_left(replace(WHOLE, together=of(0.002)))
+    assert something_left(replace(WHOLE, together=of(5e-4)))
     assert something_left(replace(WHOLE, fitted=of(0.005)))
     assert something_left(replace(WHOLE, candidate=0.005))
     # One effect more takes more evidence than the first one.
     assert not something_left(replace(WHOLE, candidate=0.03))
-    assert something_left(replace(WHOLE, candidate=0.03, validation=None, added=()))
+    assert something_left(replace(WHOLE, candidate=0.03, together=None, added=()))
 
 
 def test_of_lesser_evidence_the_ceiling_has_the_last_word() -> None:
@@ -46,18 +46,18 @@ def test_of_lesser_evidence_the_ceiling_has_the_last_word() -> None:
     for evidence in ({"fitted": of(0.005)}, {"candidate": 0.005}):
         assert something_left(replace(WHOLE, **evidence))
         assert not something_left(replace(silent, **evidence))
-        alone = replace(silent, added=(), validation=None, **evidence)
+        alone = replace(silent, added=(), together=None, **evidence)
         assert verdict(alone).verdict == "adequate"
         assert verdict(replace(alone, structure=(0.2, 0.0))).verdict == "unknown"
     # It does not speak against evidence beyond doubt.
-    for evidence in ({"fitted": of(5e-4)}, {"candidate": 5e-4}, {"validation": of(1e-5)}):
+    for evidence in ({"fitted": of(5e-4)}, {"candidate": 5e-4}, {"together": of(5e-4)}):
         assert something_left(replace(silent, **evidence))
     # What is predicted on all data is left, whatever the tests of forces say.
     shown = replace(WHOLE, structure=(0.5, 0.3))
     assert something_left(shown)
-    assert something_left(replace(shown, added=(), validation=None))
-    assert verdict(replace(shown, added=(), validation=None)).verdict == "unknown"
-    assert verdict(replace(shown, added=(), validation=None, small=True)).verdict == "adequate"
+    assert something_left(replace(shown, added=(), together=None))
+    assert verdict(replace(shown, added=(), together=None)).verdict == "unknown"
+    assert verdict(replace(shown, added=(), together=None, small=True)).verdict == "adequate"
     assert not something_left(replace(WHOLE, structure=(0.5, 0.05)))
 
 
@@ -160,8 +160,8 @@ def test_an_effect_named_alone_should_have_explained_what_is_left() -> None:
     assert withdrawn(beside).get("mass") is None
     turning = replace(beside, fitted=of(1e-9, 209.0, "M_z"))
     assert withdrawn(turning)["mass"] == alone
-    elsewhere = replace(beside, fitted=of(0.005, 209.0, "F_x"), validation=of(1e-5))
-    assert withdrawn(elsewhere)["mass"] == alone
+    on_all = replace(beside, fitted=of(0.005, 209.0, "F_x"), together=of(5e-4))
+    assert withdrawn(on_all)["mass"] == alone
 
 
 def test_grades_of_names() -> None:

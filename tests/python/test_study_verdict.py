@@ -36,8 +36,8 @@ def test_tyres_that_the_fit_never_saw_do_not_speak_against_the_right_effect(
     assert [a.id for a in study.added] == ["accelerometer_scale"]
     assert study.test[-1].error > 2.0  # the lap is beyond what the fit knows of the tyres
     assert study.verdict == "explained"
-    assert study.omnibus_validation is not None
-    assert not study.omnibus_validation.rejects
+    assert study.omnibus_together is not None
+    assert not study.omnibus_together.rejects
 
 
 def test_short_driving_leaves_room_for_few_effects(truth: Model, lap: Log) -> None:

@@ -11,7 +11,7 @@ Statistical Science 1999: the choice between them is by what each adds to the ot
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -28,7 +28,7 @@ from ..vehicle import GRAVITY_MPS2
 from .coordinates import begins, late
 from .directions import Ask, Directions
 from .evidence import FORCES, READINGS, Evidence, Section
-from .omnibus import Unknown
+from .omnibus import Omnibus, Unknown
 from .projection import pseudo_inverse
 
 _SLIPS_RAD = 0.01 * 2.0 ** np.arange(5)  # knots of the curves over slip angles
@@ -44,17 +44,14 @@ class Instead:
 
     Attributes
     ----------
-    p_value : float
-        Of the most significant unknown beside all effects, corrected for testing many.
-    unknown : str
-        It, in words.
+    omnibus : Omnibus
+        The most significant unknown beside all effects; its p-value is corrected for testing many.
     away : dict of str to str
         By effect that is explained away, the most significant unknown that does so.
     """
 
-    p_value: float = 1.0
-    unknown: str = ""
-    away: dict[str, str] = field(default_factory=dict)
+    omnibus: Omnibus
+    away: dict[str, str]
 
 
 def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = USUAL) -> Instead:
@@ -70,8 +67,6 @@ def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = U
     rules : Rules
     """
     names = [n for n in fit.model.free_names if n.split(".")[0] in effects]
-    if not names:
-        return Instead()
     # What the effects do is no nuisance here: their parameters compete.
     bare = replace(fit, model=fit.model.with_fixed(names))
     rivals = _Rivals(Evidence(bare, driving), tuple(names))
@@ -89,7 +84,9 @@ def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = U
             others = [i for i in every if i not in own]
             if own and found.gain([*others, *rivals.hypotheses[what]], own)[0] < price:
                 away.setdefault(effect, _kind(what))
-    return Instead(min(told[first], 1.0), _kind(first), away)
+    statistic, degrees, _ = found.gain(every, rivals.hypotheses[first])
+    strongest = rivals.targets[_kind(first)]
+    return Instead(Omnibus(statistic, degrees, min(told[first], 1.0), strongest, rules), away)
 
 
 def _kind(what: str) -> str:
@@ -102,7 +99,9 @@ class _Rivals:
     Attributes
     ----------
     hypotheses : dict of str to list of int
-        Columns of each unknown; forces alone and all of one kind together.
+        Columns of each unknown; one by one and all of one kind together.
+    targets : dict of str to str
+        By kind, what it acts on most.
     """
 
     groups = ()
@@ -114,16 +113,19 @@ class _Rivals:
         several = _SHAPES_REMEMBERED * len(_MEMORIES_S)
         self._remembered = [FORCES[f] for f in forces for _ in range(several)]
         self.hypotheses: dict[str, list[int]] = {}
+        self.targets: dict[str, str] = {}
         self.width = len(names)
         for group in self._flexible.groups:
             target = self._flexible.names[group.start]
-            self._note(f"error of {target}" if target in READINGS else target, group)
+            what = f"error of {target}" if target in READINGS else target
+            self._note(what, target, group)
         for axle in ("front", "rear"):
-            self._note(f"side force of the {axle} axle", slice(0, len(_SLIPS_RAD)))
+            self._note(f"side force of the {axle} axle", "F_y", slice(0, len(_SLIPS_RAD)))
         for force in forces:
-            self._note(f"{force} that remembers the driving", slice(0, several))
+            self._note(f"{force} that remembers the driving", force, slice(0, several))
 
-    def _note(self, what: str, columns: slice) -> None:
+    def _note(self, what: str, target: str, columns: slice) -> None:
+        self.targets[what] = target
         several = list(range(self.width, self.width + columns.stop - columns.start))
         self.hypotheses[what] = several
         self.hypotheses |= {f"{what}{_ONE_OF}{i}": [c] for i, c in enumerate(several)}
@@ -236,9 +238,10 @@ class _Competition:
         told = {w: len(found) * _tail(t, degrees) for w, (t, degrees, _) in found.items()}
         few = [what for what, p_value in told.items() if p_value < level]
         if few:
-            information = self._projected.information[np.ix_(given, given)]
             sizes = -self._off
-            sizes[given] += pseudo_inverse(information)[0] @ self._score[given]
+            if given:
+                information = self._projected.information[np.ix_(given, given)]
+                sizes[given] += pseudo_inverse(information)[0] @ self._score[given]
             along = np.column_stack([found[what][2] for what in few])
             ratios = self._projected.answer(
                 self._rivals, Ask(as_float64(along), as_float64(along + sizes[:, None]))

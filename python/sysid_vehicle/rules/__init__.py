@@ -9,11 +9,12 @@
    accepted effect gives way to others of its kind (`near`) that lead by `apart`, or are simpler.
 5. An effect within `insignificant` standard errors of nothing is dropped unless BIC needs it.
 6. When nothing is added any more, the final model is tested for anything left: at `level` on the
-   training data, at `elsewhere` on validation data, and for one effect more. What the driving
-   predicts on all data by more than `explainable` is left too; where it predicts nothing, only
-   evidence below `strict` counts.
+   training data, for one effect more, and at `strict` for anything unknown on all data together.
+   What the driving predicts on all data by more than `explainable` is left too; where it predicts
+   nothing, only evidence below `strict` counts.
 7. Nothing left: what was added explains it. An added effect is not named if its value is physically
-   implausible, or differs between pieces of the driving (`spread`).
+   implausible, or differs between pieces of the driving (`spread`), or if something unknown does
+   all that it does and more.
 8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead,
    leave more than `stays` of the evidence, take up less than is left, or should have explained it.
    Beside much that is left names stay with which those errors fall wherever they move them

@@ -73,8 +73,9 @@ class Facts:
     ----------
     before, fitted : Tested
         For anything left by the baseline and by the final model, on the training data.
-    validation : Tested or None
-        The latter on validation data; None where nothing was added.
+    together : Tested or None
+        For anything unknown beside what was added, on training and validation data together; None
+        where nothing was added.
     candidate : float
         Smallest p-value of an effect that the final model lacks.
     missing : (float, float)
@@ -93,7 +94,7 @@ class Facts:
 
     before: Tested
     fitted: Tested
-    validation: Tested | None = None
+    together: Tested | None = None
     candidate: float = 1.0
     missing: tuple[float, float] = (0.0, 0.0)
     added: tuple[Added, ...] = ()

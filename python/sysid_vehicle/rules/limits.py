@@ -48,12 +48,6 @@ class Rules:
         "below which what is left makes names uncertain, and is no disturbance",
         _OUTSIDE,
     )
-    elsewhere: float = _limit(
-        1e-4,
-        "probability",
-        "the same on validation data, where tyres known only in part go on otherwise",
-        _NULLS,
-    )
     retained: float = _limit(
         1e-3,
         "share",

@@ -138,9 +138,9 @@ def something_left(facts: Facts, rules: Rules = USUAL) -> bool:
     disturbance.
     """
     anywhere, everywhere = facts.structure
-    if everywhere > rules.explainable or _on_validation(facts, rules):
+    if everywhere > rules.explainable or _together(facts, rules):
         return True
-    one_more = rules.alpha if facts.validation is None else min(rules.alpha, rules.level)
+    one_more = rules.alpha if facts.together is None else min(rules.alpha, rules.level)
     evidence = (facts.fitted.p_value, rules.level), (facts.candidate, one_more)
     if not all(p > min(rules.strict, level) for p, level in evidence):
         return True
@@ -151,7 +151,7 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     """The verdict on the whole, and the names that cannot be told beside what is left.
 
     What was added may explain all, a part, or only stand in for what is missing. Its residuals
-    tell: on the training data, and on validation data, where a stand-in leaves what the right
+    tell: on the training data, and on all data together, where a stand-in leaves what the right
     effect does not. An uneven road or a coloured sensor keeps the error of the true car above its
     noise floor: what does not depend on the driving is no effect's to explain.
     """
@@ -234,8 +234,8 @@ def _alone(facts: Facts, rules: Rules, small: frozenset[str]) -> frozenset[str]:
     it moves what the effect moves.
     """
     tests = [facts.fitted] if facts.fitted.p_value < rules.strict else []
-    if facts.validation is not None and _on_validation(facts, rules):
-        tests.append(facts.validation)
+    if facts.together is not None and _together(facts, rules):
+        tests.append(facts.together)
     named = [a for a in facts.added if a.named and a.id not in small]
     if len(named) != 1:
         return frozenset()
@@ -261,8 +261,8 @@ def smaller_than(
         uncertain |= more
 
 
-def _on_validation(facts: Facts, rules: Rules) -> bool:
-    return facts.validation is not None and facts.validation.p_value < rules.elsewhere
+def _together(facts: Facts, rules: Rules) -> bool:
+    return facts.together is not None and facts.together.p_value < rules.strict
 
 
 def _falls(effect: Added, withdrawn: Sequence[Withdrawn]) -> bool:

@@ -143,12 +143,10 @@ def improve(
         on_test = [compare(f, test_driving, noise=floor) for f in fits]
         last = diagnoses[-1]
         fitted = last.omnibus if last.fit is fit else omnibus(fit, train_driving, rules)
-        validation = explained = None
-        away: dict[str, str] = {}
+        rivals = explained = None
         if len(fits) > 1:
-            served = serving(fit, test_driving)
-            validation = omnibus(served, test_driving, rules)
-            away = instead(served, _together(train_driving, test_driving), _new(fits), rules).away
+            every = _together(train_driving, test_driving)
+            rivals = instead(serving(fit, test_driving), every, _new(fits), rules)
             explained = beyond_noise_ahead(fits, test_driving)
         much_left = explained is not None and explained.share < rules.most
         told = judge(
@@ -162,7 +160,7 @@ def improve(
             refitted=found.sizes,
             settled=True,
             untried=found.stopped,
-            away=away,
+            away={} if rivals is None else rivals.away,
         )
         pattern = structure(fit, test_driving)
         facts = facts_of(
@@ -172,7 +170,7 @@ def improve(
             explained,
             before=diagnoses[0].omnibus,
             fitted=fitted,
-            validation=validation,
+            together=None if rivals is None else rivals.omnibus,
             candidate=min((c.p_value for c in last.ranking), default=1.0),
             excited=_excited(train_driving),
             structure=(pattern.anywhere, pattern.everywhere),
@@ -190,7 +188,7 @@ def improve(
             validation=test_driving,
             added=_added(fits, on_test, found, told, alone, decision),
             omnibus=fitted,
-            omnibus_validation=validation,
+            omnibus_together=None if rivals is None else rivals.omnibus,
             verdicts=told,
             warnings=_warnings(fit, train_driving, found),
             seconds=time.perf_counter() - began,

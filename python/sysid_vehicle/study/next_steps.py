@@ -79,7 +79,7 @@ def _of_what_is_left(study: Study) -> list[str]:
     where = " and ".join(
         dict.fromkeys(
             o.strongest
-            for o in (study.omnibus, study.omnibus_validation)
+            for o in (study.omnibus, study.omnibus_together)
             if o is not None and o.rejects and not disturbance(study)
         )
     )

@@ -52,7 +52,7 @@ def record(study: Study) -> dict[str, Any]:
         "unknown": {
             "p_value": study.omnibus.p_value,
             "strongest": study.omnibus.strongest,
-            **_validation(study.omnibus_validation),
+            **_together(study.omnibus_together),
             "explainable": study.ceiling.to_dict(),
             "structure": None if study.structure is None else study.structure.to_dict(),
             **({} if study.unknown is None else study.unknown.to_dict()),
@@ -74,10 +74,10 @@ def _where(study: Study) -> dict[str, Any]:
     return {**told, "delays_without_lags": late} if late else told
 
 
-def _validation(o: Omnibus | None) -> dict[str, Any]:
+def _together(o: Omnibus | None) -> dict[str, Any]:
     if o is None:
         return {}
-    return {"validation": {"p_value": o.p_value, "strongest": o.strongest}}
+    return {"together": {"p_value": o.p_value, "strongest": o.strongest}}
 
 
 def _candidate(

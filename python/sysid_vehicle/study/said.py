@@ -27,7 +27,7 @@ def disturbance(study: Study) -> bool:
 
 
 def in_the_end(study: Study) -> str:
-    """What is explained, what is left on either data, and what a fit to predictions gains.
+    """What is explained, what is left, and what a fit to predictions gains.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def _left(study: Study) -> str:
     left = _on_train(study)
     if study.structure is not None and structured(study):
         left += f" A function of the driving still predicts {study.structure.strongest}."
-    said = " ".join([*_explained(study), f"In the end: {left}", *_on_validation(study)])
+    said = " ".join([*_explained(study), f"In the end: {left}", *_on_all(study)])
     if study.train[-1].unrelated:
         wrong = "; ".join(study.train[-1].unrelated.values())
         return f"{said} Something else is wrong: {wrong}."
@@ -94,18 +94,17 @@ def _on_train(study: Study) -> str:
     return f"{test}."
 
 
-def _on_validation(study: Study) -> list[str]:
-    beyond = study.omnibus_validation
+def _on_all(study: Study) -> list[str]:
+    beyond = study.omnibus_together
     if beyond is None or (not beyond.rejects and structured(study)):
         return []
     if beyond.rejects and not _more(study):
         p = f"p = {beyond.p_value:.2g}"
-        what = "no more than parameters may leave that the fit knows only in part"
-        return [f"On the validation data: {what} ({p})."]
-    return [f"On the validation data: {beyond}."]
+        return [f"On all data together: no more than a disturbance may leave ({p})."]
+    return [f"On all data together: {beyond}."]
 
 
 def _more(study: Study) -> bool:
-    """Whether more is left on validation data than parameters that are known in part may leave."""
-    beyond = study.omnibus_validation
-    return beyond is not None and beyond.p_value < study.rules.elsewhere
+    """Whether more is left on all data together than a disturbance may leave."""
+    beyond = study.omnibus_together
+    return beyond is not None and beyond.p_value < study.rules.strict

@@ -76,9 +76,10 @@ class Study:
     validation : Driving
         The validation data.
     added : tuple of AddedEffect
-    omnibus, omnibus_validation : Omnibus
-        Whether the final model leaves anything that depends on the driving it was fitted to, or on
-        the validation data; the latter are not asked where nothing was added.
+    omnibus, omnibus_together : Omnibus
+        Whether the final model leaves anything that depends on the driving it was fitted to, and
+        whether anything unknown is left beside what was added on training and validation data
+        together; None where nothing was added.
     verdicts : Verdicts
         What is to be said of every effect that the baseline lacks.
     seconds : float
@@ -104,7 +105,7 @@ class Study:
     validation: Driving
     added: tuple[AddedEffect, ...]
     omnibus: Omnibus
-    omnibus_validation: Omnibus | None
+    omnibus_together: Omnibus | None
     verdicts: Verdicts
     warnings: tuple[str, ...]
     seconds: float

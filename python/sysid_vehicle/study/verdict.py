@@ -22,7 +22,7 @@ def facts_of(
     *,
     before: Omnibus,
     fitted: Omnibus,
-    validation: Omnibus | None,
+    together: Omnibus | None,
     candidate: float,
     excited: bool,
     small: bool = False,
@@ -41,7 +41,7 @@ def facts_of(
         Of the last fit with what it was fitted to.
     explained : Beyond or None
         What every fit leaves of the errors ahead; None where nothing was added.
-    before, fitted, validation, candidate, excited, small, structure
+    before, fitted, together, candidate, excited, small, structure
         As in `Facts`.
     changes : mapping
         By effect, those on validation and on training data, as in `Added`.
@@ -52,7 +52,7 @@ def facts_of(
     return Facts(
         before,
         fitted,
-        validation,
+        together,
         candidate,
         (missing[0], missing[-1]),
         tuple(
