@@ -9,13 +9,13 @@ import pytest
 
 from sysid_vehicle import Fit, InvalidInput, Log
 from sysid_vehicle.estimate import Driving
+from sysid_vehicle.identify.ahead import of_few
 from sysid_vehicle.rules import worse
 from sysid_vehicle.study import validation
 from sysid_vehicle.study.horizons import (
     LATERAL,
     PREDICTED,
     Beyond,
-    _few,
     beyond_noise,
     block_errors,
     changes,
@@ -194,5 +194,5 @@ def test_how_far_an_error_could_fall(fit: Fit, late: Fit, course: Log) -> None:
 
 
 def test_few_blocks_tell_less_than_many() -> None:
-    assert _few(5) == pytest.approx(2.776 / 1.960, rel=1e-3)
-    assert _few(6) > _few(12) > _few(100) > 1.0
+    assert of_few(5) == pytest.approx(2.776 / 1.960, rel=1e-3)
+    assert of_few(6) > of_few(12) > of_few(100) > 1.0

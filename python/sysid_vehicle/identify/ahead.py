@@ -12,11 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import groupby
 from operator import itemgetter
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
@@ -221,19 +223,26 @@ def _blocks(driving: Driving, windows: list[tuple[int, int]]) -> npt.NDArray[np.
     return np.unique([int(first / length) for first, _ in windows], return_inverse=True)[1]
 
 
+@lru_cache
+def of_few(blocks: int) -> float:
+    """How much wider Student's 95 % interval of so many blocks is than that of many."""
+    return float(scipy.special.stdtrit(max(blocks - 1, 1), 0.975) / scipy.special.ndtri(0.975))
+
+
 def _information(
     slope: FloatArray, residual: FloatArray, blocks: npt.NDArray[np.intp]
 ) -> FloatArray:
     """Inverse of the sandwich covariance, H J^-1 H.
 
     Blocks are hardly more than parameters. The scatter of their scores is drawn towards that of
-    blocks which differ in nothing but how many alike samples one of them counts for.
+    blocks which differ in nothing but how many alike samples one of them counts for. It is itself
+    known from few blocks (`of_few`).
     """
     H = slope.T @ slope
     count = int(blocks.max()) + 1
     scores = np.zeros((count, H.shape[0]))
     np.add.at(scores, blocks, slope * residual[:, None])
-    J = scores.T @ scores * (count / max(count - 1, 1))
+    J = scores.T @ scores * (count / max(count - 1, 1) * of_few(count) ** 2)
     felt = np.sqrt(np.maximum(np.diag(H), 1e-300))
     alike = float(np.trace(np.linalg.pinv(H / np.outer(felt, felt)) @ (J / np.outer(felt, felt))))
     own = count / (count + len(H))

@@ -14,7 +14,6 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
@@ -23,6 +22,7 @@ from ..diagnose import blocks
 from ..errors import NumericalError
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..identify import Fit
+from ..identify.ahead import of_few
 from ..rules import Change, share_of
 from .waterfall import all_ahead
 
@@ -335,12 +335,6 @@ def typical_error(
     return float(np.mean(np.log(found))) if found else np.inf
 
 
-@lru_cache
-def _few(blocks: int) -> float:
-    """How much wider Student's 95 % interval of so many blocks is than that of many."""
-    return float(scipy.special.stdtrit(blocks - 1, 0.975) / scipy.special.ndtri(0.975))
-
-
 def _number_of_blocks(driving: Driving) -> int:
     return max(round(driving.usable_s / _BLOCK_S), _FEWEST)
 
@@ -387,7 +381,7 @@ def changes(
                     channel,
                     h,
                     middle,
-                    _OF_MEDIAN * scatter * _few(len(ratio)) / float(np.sqrt(len(ratio))),
+                    _OF_MEDIAN * scatter * of_few(len(ratio)) / float(np.sqrt(len(ratio))),
                     np.inf if moved is None else _reach(moved[known, i, j], one[known, j]),
                 )
             )
