@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from sysid_vehicle import Model, Study, drive, improve, manoeuvres
 from sysid_vehicle.diagnose import Omnibus
 from sysid_vehicle.diagnose.ceiling import Explainable
+from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import Added, Change, Facts, Share, grade, share_of, verdict
 from sysid_vehicle.study import AddedEffect
+from sysid_vehicle.study.disagree import disagreements
 from sysid_vehicle.study.horizons import Beyond
 from sysid_vehicle.study.next_steps import next_steps
 from sysid_vehicle.study.structure import Structure
@@ -65,6 +67,25 @@ def test_only_what_the_driving_leaves_open_asks_for_harder_driving(unknown: Stud
     (said,) = (t for t in next_steps(replace(unknown, fits=(fit,))) if "limit of the tyres" in t)
     assert first.name in said
     assert second.name not in said
+
+
+def test_drives_that_tell_another_car_are_said_to(unknown: Study, truth: Model) -> None:
+    gripping = truth.with_values({"B_front": 1.4 * truth.value("B_front")})
+    other = Driving.of(drive(gripping, manoeuvres.lap(20.0), seed=65))
+    found = replace(unknown, validation=other)
+    first = found.disagreements[0]
+    assert first.train.name == "cornering stiffness front"
+    assert 1.2 < first.validation.value / first.train.value < 1.6
+    (said,) = (t for t in found.next_steps if "differs between the drives" in t)
+    assert str(first) in said
+    assert found.to_dict()["disagreements"][0]["standard_errors_apart"] > found.rules.sure
+    assert replace(found, verdict="adequate").disagreements == ()
+
+
+def test_drives_of_one_car_agree(adequate: Study, truth: Model) -> None:
+    for seed in (66, 67, 68):
+        other = Driving.of(drive(truth, manoeuvres.handling_course(20.0), seed=seed))
+        assert disagreements(adequate.fit, other) == ()
 
 
 def test_what_is_confounded_is_to_be_told_apart(unknown: Study) -> None:
@@ -162,6 +183,7 @@ def said(base: Study, rng: random.Random) -> str:
         stopped=("mass",) if rng.random() < 0.3 and min(candidates) < 0.01 else (),
     )
     whole = rng.choice((-0.4, 0.02, 0.95, np.nan))
+    study.__dict__["disagreements"] = ()
     study.__dict__["shares"] = replace(
         base.shares, whole=Share(whole, whole - 0.1, whole + 0.1), named=tuple(names)
     )

@@ -125,7 +125,7 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     study.to_json(path)
     told = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse_constant)
     assert sorted(told) == [
-        *("causes", "channels", "effects", "errors", "explained"),
+        *("causes", "channels", "disagreements", "effects", "errors", "explained"),
         *("horizons", "next_steps", "parameters", "predicting", "ranking", "regions"),
         *("shares", "unknown", "verdict", "verdicts", "warnings", "where", "where_baseline"),
     ]
@@ -186,7 +186,7 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     # Where the verdict does not ask for it, the shape of the unknown is not sought.
     assert study.unknown is None
     assert sorted(told["unknown"]) == [
-        *("explainable", "p_value", "strongest", "structure", "validation"),
+        *("explainable", "p_value", "strongest", "structure", "together"),
     ]
     assert told["predicting"]["horizon_s"] == 2.0
     assert told["predicting"]["added_is_needed"]

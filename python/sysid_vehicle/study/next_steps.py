@@ -63,6 +63,11 @@ def _of_what_is_left(study: Study) -> list[str]:
             "`sysid-vehicle check`; scales, biases and places of sensors act like "
             "effects of the car"
         )
+    apart = "; ".join(str(d) for d in study.disagreements[:_SHOWN])
+    if apart:
+        found.append(
+            f"find out what differs between the drives (speed, load, tyres, road, sensors): {apart}"
+        )
     open_ = [
         e.name for e in study.fit.estimates if e.note == "not determined" and "." not in e.name
     ]

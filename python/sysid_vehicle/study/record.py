@@ -63,6 +63,7 @@ def record(study: Study) -> dict[str, Any]:
         },
         "parameters": {e.name: e.to_dict() for e in (*study.fit.estimates, *study.fit.derived)},
         "predicting": None if study.predicting is None else study.predicting.to_dict(),
+        "disagreements": [d.to_dict() for d in study.disagreements],
         "warnings": list(study.warnings),
         "next_steps": list(study.next_steps),
     }

@@ -35,6 +35,7 @@ from ..model import Model
 from ..rules import USUAL, Rules, Verdict
 from ..saved import save
 from .added import AddedEffect
+from .disagree import Disagreement, disagreements
 from .horizons import Beyond, Horizons, horizons
 from .next_steps import next_steps
 from .predicting import Predicting, predicting
@@ -266,6 +267,13 @@ class Study:
         return shares(first, last, self.validation, named=named)
 
     @cached_property
+    def disagreements(self) -> tuple[Disagreement, ...]:
+        """What validation data tell differently, if something is left; some seconds."""
+        if self.verdict not in ("unknown", "partly_explained"):
+            return ()
+        return disagreements(self.fit, self.validation, self.rules)
+
+    @cached_property
     def predicting(self) -> Predicting | None:
         """First and last model fitted to predictions of 2 s, seconds at first.
 
@@ -286,6 +294,7 @@ class Study:
             "ceiling",
             "shares",
             "predicting",
+            "disagreements",
         ):
             if slow in self.__dict__:
                 other.__dict__[slow] = self.__dict__[slow]
