@@ -95,9 +95,10 @@ TEST_P(SideBySide, OtherParametersAndModelsGoTheSameWay) {
 TEST(Pieces, AreNoneWhereTheFilterHoldsTheSpeedForLong) {
     const Problem problem = long_run(EffectMask{0});
     Noise noise = ordinary_noise();
-    ASSERT_FALSE(pieces_of(problem.runs, forgets_s(problem.runs, noise)).empty());
+    ASSERT_FALSE(pieces_of(problem.runs, forgets_s(problem, noise)).empty());
     noise.motion[0] = 1e-4;
-    EXPECT_TRUE(pieces_of(problem.runs, forgets_s(problem.runs, noise)).empty());
+    noise.disturbance[0] = 1.0;
+    EXPECT_TRUE(pieces_of(problem.runs, forgets_s(problem, noise)).empty());
 }
 
 struct Score {
@@ -172,6 +173,60 @@ TEST(SideBySideToo, NoiseScoreOfPiecesIsThatOfTheWholeRun) {
               1e-10 * pieces.gradient.norm());
     EXPECT_LT((pieces.information + rest.information - whole.information).norm(),
               1e-10 * pieces.information.norm());
+}
+
+struct Equations {
+    double cost = 0.0;
+    Vec<4> slope;
+    Mat<4, 4> information;
+};
+Equations equations_of(const Problem& problem, const Noise& noise) {
+    const Parameters p = typical_parameters();
+    const FrozenFilter filter = freeze(problem, p.data(), noise);
+    Equations out;
+    out.cost = normal_equations(problem, p.data(), filter, {kBFront, kBRear, kDFront, kERear},
+                                out.slope.data(), out.information.data());
+    return out;
+}
+
+/// Noise whose white part is next to nothing, on driving that the model explains.
+Noise hardly_any(double force_n, double time_s, double road_mps2 = 0.0) {
+    Noise noise = ordinary_noise();
+    noise.motion = {1e-4, 1e-4, 1e-5};
+    noise.disturbance = {force_n, force_n, 0.7 * force_n};
+    noise.correlation_time_s = {time_s, time_s, time_s};
+    noise.road = {road_mps2, road_mps2};
+    noise.road_time_s = 10.0;
+    return noise;
+}
+
+TEST(SideBySideToo, AForceMakesTheFilterForgetWhereNoWhiteNoiseDoes) {
+    const std::vector<Noise> pushed = {hardly_any(300.0, 0.3), hardly_any(600.0, 0.03),
+                                       hardly_any(1000.0, 5.0), hardly_any(1.0, 0.01, 0.3)};
+    for (std::size_t i = 0; i < pushed.size(); ++i) {
+        SCOPED_TRACE(i);
+        const Noise& noise = pushed[i];
+        const Problem quick = long_run(i % 2 == 0 ? EffectMask{0} : kLagging);
+        const Problem slow = without_speed(quick);
+        ASSERT_FALSE(pieces_of(quick.runs, forgets_s(quick, noise)).empty());
+        EXPECT_TRUE(expect_whole(quick, noise));
+        Problem both = quick;  // all in one go, for the sake of the second run
+        both.runs.push_back(slow.runs[0]);
+        ASSERT_FALSE(expect_whole(both, noise));
+        const Equations pieces = equations_of(quick, noise), rest = equations_of(slow, noise);
+        const Equations whole = equations_of(both, noise);
+        EXPECT_NEAR(pieces.cost + rest.cost, whole.cost, 1e-11 * whole.cost);
+        EXPECT_LT((pieces.slope + rest.slope - whole.slope).norm(), 1e-10 * whole.slope.norm());
+        EXPECT_LT((pieces.information + rest.information - whole.information).norm(),
+                  1e-10 * whole.information.norm());
+        const Score score = score_of(quick, noise), left = score_of(slow, noise);
+        const Score all = score_of(both, noise);
+        EXPECT_NEAR(score.value + left.value, all.value, 1e-11 * std::abs(all.value));
+        EXPECT_LT((score.gradient + left.gradient - all.gradient).norm(),
+                  1e-10 * all.gradient.norm());
+        EXPECT_LT((score.information + left.information - all.information).norm(),
+                  1e-10 * all.information.norm());
+    }
 }
 
 TEST(SideBySideToo, WhatIsNotForgottenIsDoneInOneGo) {

@@ -84,7 +84,7 @@ std::vector<int> FrozenFilter::places(const std::vector<int>& of) const {
 
 FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise) {
     FrozenFilter filter = empty(problem, noise);
-    const double forgotten_s = forgets_s(problem.runs, noise);
+    const double forgotten_s = forgets_s(problem, noise);
     if (const std::vector<Piece> pieces = pieces_of(problem.runs, forgotten_s); !pieces.empty()) {
         LaneFilter walk(problem, {p}, noise, pieces);
         walk.keep = [&](const LaneSample& sample, std::size_t lane, int parts) {

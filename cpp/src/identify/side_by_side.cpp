@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace sysid {
 
@@ -39,12 +40,24 @@ std::size_t steps_of(const std::vector<Run>& runs, const std::vector<Piece>& pie
 
 }  // namespace
 
-double forgets_s(const std::vector<Run>& runs, const Noise& noise) {
+double forgets_s(const Problem& problem, const Noise& noise) {
     // A random walk of q per root of a second, read with r each dt, is known with the time constant
-    // r sqrt(dt) / q.
+    // r sqrt(dt) / q. An acceleration with a correlation time tau is in the long run a walk of its
+    // standard deviation times sqrt(2 tau); where tau is longer than that time constant, the filter
+    // follows it with the geometric mean of both.
+    std::vector<std::pair<double, double>> pushed{
+        {noise.disturbance[0] / problem.model.car.mass_kg, noise.time_of(0)}};
+    if (noise.sloping()) pushed.emplace_back(noise.road[0], noise.road_time_s);
     double slowest = 0.0;
-    for (const Run& run : runs)
-        slowest = std::max(slowest, noise.sensor[0] * std::sqrt(run.dt) / noise.motion[0]);
+    for (const Run& run : problem.runs) {
+        const double read = noise.sensor[0] * std::sqrt(run.dt);
+        double quickest = read / noise.motion[0];
+        for (const auto& [std_mps2, time_s] : pushed) {
+            const double walk = read / (std_mps2 * std::sqrt(2.0 * time_s));
+            quickest = std::min(quickest, std::max(walk, std::sqrt(walk * time_s)));
+        }
+        slowest = std::max(slowest, quickest);
+    }
     return kTimesMet * slowest;
 }
 

@@ -24,7 +24,7 @@ struct Piece {
 
 /// Seconds in which a filter with this noise has forgotten where it began. Speed is what it holds
 /// longest: it hardly moves by itself, and is not read well.
-double forgets_s(const std::vector<Run>& runs, const Noise& noise);
+double forgets_s(const Problem& problem, const Noise& noise);
 
 /// How runs are cut so that the lanes are full, into pieces of so many samples at most; nothing
 /// where lanes would gain nothing, because the pieces are not much longer than what is forgotten.
