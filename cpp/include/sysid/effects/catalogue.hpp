@@ -19,17 +19,17 @@
 namespace sysid {
 
 /// The order matters within a stage: what the grip is comes before what the friction ellipse leaves
-/// of it, errors of the logged angle before its delay and lag, the lean of an accelerometer before
-/// its own errors.
+/// of it, errors of the logged angle before its delay and lag, where sensors are before how they
+/// are turned, the lean of an accelerometer before its own errors.
 using Catalogue =
     std::tuple<AeroDownforce, AeroDrag, RollingResistance, HeadWind, TyreLoadSensitivity,
                LateralLoadTransfer, LongitudinalLoadTransfer, FrictionChange, TyreTemperature,
                ForceGain, ForceSplit, CombinedSlip, AligningMoment, RearToe, TyreRelaxation,
                SteerOffset, SteerRatio, SteerNonlinearity, SteerDelay, SteerLag, SteerCompliance,
-               RoadBank, RoadGrade, SideWind, Mass, YawInertia, CgPosition, LockedDifferential,
-               LimitedSlipDifferential, DriveYawMoment, SensorDelay, SpeedSensorLeverArm,
-               SpeedSensorMisalignment, ImuLeverArm, InsLeverArm, BodyAttitude, AccelerometerBias,
-               GyroScale, GyroBias, AccelerometerScale>;
+               RoadBank, RoadGrade, SideWind, Mass, YawInertia, LockedDifferential,
+               LimitedSlipDifferential, DriveYawMoment, SensorDelay, CgPosition,
+               SpeedSensorLeverArm, SpeedSensorMisalignment, ImuLeverArm, InsLeverArm, BodyAttitude,
+               AccelerometerBias, GyroScale, GyroBias, AccelerometerScale>;
 
 constexpr std::size_t kEffectCount = std::tuple_size_v<Catalogue>;
 
