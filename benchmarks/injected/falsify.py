@@ -128,12 +128,23 @@ def _cg_back(car: sv.Vehicle) -> sv.Vehicle:
     return car.replace(lf_m=car.lf_m + 0.12, lr_m=car.lr_m - 0.12)
 
 
+def _sensors_back(c: Channels) -> None:
+    """Readings where the falsified file has the CG: places in the body were measured right."""
+    r, dr = _yaw(c)
+    c["ay_mps2"] = c["ay_mps2"] - 0.12 * dr
+    for channel, change in (("ax_mps2", 0.12 * r**2), ("vy_mps", -0.12 * r)):
+        if channel in c:
+            c[channel] = c[channel] + change
+
+
 DYNAMIC = (
     Falsified("steering 8 mrad off", "steer_offset.offset_rad", -0.008, _add("steer_rad", 0.008)),
     Falsified("steering ratio 10 %", "steer_ratio.ratio_error", 1.0 / 1.1 - 1.0,
               _scale("steer_rad", 1.1)),
     Falsified("steering 60 ms early", "steer_delay.delay_s", 0.06, _late("steer_rad", -0.06)),
+    Falsified("steering 40 ms late", "steer_delay.delay_s", -0.04, _late("steer_rad", 0.04)),
     Falsified("yaw inertia 25 % low", "yaw_inertia.relative_error", 1.0 / 0.75 - 1.0,
               car=_low_inertia),
-    Falsified("CG 0.12 m back", "cg_position.shift_rearward_m", -0.12, car=_cg_back),
+    Falsified("CG 0.12 m back", "cg_position.shift_rearward_m", -0.12, _sensors_back,
+              car=_cg_back),
 )  # fmt: skip

@@ -9,7 +9,8 @@ namespace sysid::bindings {
 namespace {
 
 void add_run(Problem& problem, double dt, const Array& inputs, const Array& measurements,
-             double start, const std::string& name) {
+             double start, const std::string& name, const std::vector<double>& steer_before,
+             const std::vector<double>& steer_after) {
     const auto n = inputs.ndim() == 2 ? inputs.shape(0) : 0;
     const auto width =
         std::clamp<py::ssize_t>(inputs.ndim() == 2 ? inputs.shape(1) : 0, 2, 2 + kUserChannels);
@@ -21,6 +22,8 @@ void add_run(Problem& problem, double dt, const Array& inputs, const Array& meas
     Run run;
     run.dt = dt;
     run.name = name;
+    run.steer_before = steer_before;
+    run.steer_after = steer_after;
     run.inputs.resize(static_cast<std::size_t>(n));
     run.measurements.resize(static_cast<std::size_t>(n));
     for (std::size_t k = 0; k < run.size(); ++k, u += width) {
@@ -69,7 +72,9 @@ void register_identify(py::module_& m) {
         .def(py::init([](const SingleTrack& model) { return Problem{model, {}}; }),
              py::arg("model"))
         .def("add_run", &add_run, py::arg("dt"), py::arg("inputs"), py::arg("measurements"),
-             py::arg("start") = 0.0, py::arg("name") = "")
+             py::arg("start") = 0.0, py::arg("name") = "",
+             py::arg("steer_before") = std::vector<double>{},
+             py::arg("steer_after") = std::vector<double>{})
         .def(
             "with_model",
             [](const Problem& self, const SingleTrack& model) { return Problem{model, self.runs}; },

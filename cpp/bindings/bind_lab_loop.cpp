@@ -61,6 +61,10 @@ py::dict run(const LabLoop& settings, const SingleTrack& model, const Array& par
         r = {w[0], w[1], w[2], w[3], w[4]};
         w += 5;
     }
+    if (steer_delay(model, values) < 0.0)
+        throw std::invalid_argument(
+            "steer_delay.delay_s: below zero it is of a log, and the loop has none; give 0 or "
+            "more");
     SingleTrack car = model;
     car.car.gravity_mps2 = settings.gravity_mps2;
     const lab::LoopRecord record = unlocked([&] {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "sysid/estimate/kalman.hpp"
-#include "sysid/identify/problem.hpp"
+#include "sysid/identify/in_time.hpp"
 
 namespace sysid::test {
 
@@ -103,13 +103,17 @@ inline Evaluation evaluate(const SingleTrack& model, const ModelState<double>& x
 /// Steering and force of a lively but smooth drive at time `t`.
 inline Input lively(double t) {
     return {0.04 * std::sin(3.0 * t) + 0.01 * std::sin(11.0 * t) + 0.004,
-            1500.0 * std::cos(1.7 * t) + 500.0, t};
+            1500.0 * std::cos(1.7 * t) + 500.0, t,
+            0.12 * std::cos(3.0 * t) + 0.11 * std::cos(11.0 * t)};
 }
 
 /// The readings along `inputs`, free of noise.
 inline std::vector<Vec<kChannels>> drive(const SingleTrack& model, const Parameters& p,
-                                         const std::vector<Input>& inputs, double dt,
+                                         const std::vector<Input>& logged, double dt,
                                          double speed) {
+    const Problem problem{model, {{dt, logged, {}, "", {}, {}}}};
+    const InTime in_time(problem, p.data());
+    const std::vector<Input>& inputs = (*in_time).runs[0].inputs;
     ModelState<double> x{};
     x[0] = speed;
     settle_auxiliary(model, x, kCalm.data(), inputs.front(), p.data());

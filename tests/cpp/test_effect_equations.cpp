@@ -103,6 +103,19 @@ TEST(EffectEquation, CgPosition) {
     for (std::size_t i = 0; i < kMotionStates; ++i)
         EXPECT_NEAR(it.on.rate[i], shifted.rate[i], 1e-12);
     EXPECT_GT(std::abs(it.on.rate[2] - it.off.rate[2]), 0.01);
+    // Sensors stay in the body: on that car they have lever arms, forward by what it was shifted.
+    Parameters p = plain_parameters();
+    p[parameter_of("imu_lever_arm")] = p[parameter_of("speed_sensor_lever_arm")] = 0.08;
+    const EffectMask arms = mask_of({"imu_lever_arm", "speed_sensor_lever_arm"});
+    for (bool force_known : {true, false}) {
+        const Input u = force_known ? kDriving : Input{0.06, 2.0};
+        const Pair moved("cg_position", {0.08}, kCornering, u, force_known);
+        const auto wanted = evaluate({car, arms, force_known}, kCornering, u, p);
+        for (std::size_t i = 0; i < kMotionStates; ++i)
+            EXPECT_NEAR(moved.on.rate[i], wanted.rate[i], 1e-12);
+        for (std::size_t i = 0; i < kChannels; ++i) EXPECT_NEAR(moved.on.y[i], wanted.y[i], 1e-12);
+        EXPECT_GT(std::abs(wanted.y[kVy] - moved.off.y[kVy]), 0.02);
+    }
 }
 
 TEST(EffectEquation, DriveYawMoment) {

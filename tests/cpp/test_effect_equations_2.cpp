@@ -117,24 +117,6 @@ TEST(EffectEquation, BodyAttitudeAndGyroScale) {
     EXPECT_NEAR(gyro.on.y[kYawRate], 0.35 * 1.015, 1e-15);
 }
 
-TEST(EffectEquation, ASineThroughTheSteeringDelayComesLateAndWhole) {
-    Parameters p = plain_parameters();
-    const double delay = 0.04;
-    p[parameter_of("steer_delay")] = delay;
-    const SingleTrack model{saloon(), mask_of({"steer_delay"})};
-    const double omega = 2.0 * 3.14159265358979 * 2.0;  // 2 Hz
-    const auto steer = [&](double t) { return Input{0.02 * std::sin(omega * t), 0.0, t}; };
-    ModelState<double> x{20.0};
-    const double dt = 0.002;
-    for (int k = 0; k < 1000; ++k) {
-        advance(model, x, kCalm.data(), steer(k * dt), steer((k + 1) * dt), p.data(), dt, 2);
-        const double t = (k + 1) * dt;
-        const auto e = evaluate(model, x, steer(t), p);
-        if (t < 0.5) continue;
-        EXPECT_NEAR(e.w.delta, 0.02 * std::sin(omega * (t - delay)), 1e-4);
-    }
-}
-
 TEST(EffectEquation, SensorsThatAreLateReadWhatWas) {
     Parameters p = plain_parameters();
     p[parameter_of("sensor_delay", 0)] = 0.06;

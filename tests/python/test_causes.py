@@ -10,7 +10,7 @@ from matplotlib import pyplot
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from sysid_vehicle import Fit, Log, Model, diagnose, drive, identify, manoeuvres
+from sysid_vehicle import Fit, Log, Model, Vehicle, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import Causes, Diagnosis, confirm
 from sysid_vehicle.diagnose.causes import CredibleSet
 from sysid_vehicle.diagnose.single_effects import Hypothesis, ScoreModel
@@ -154,18 +154,37 @@ def test_confounded_effects_share_a_set(hidden_fit: Hidden) -> None:
     assert causes.of("yaw_inertia") is None
 
 
-def test_steering_that_is_logged_late_is_no_effect_of_the_car(start: Model, truth: Model) -> None:
-    """A delay of the steering has one sign in the catalogue; a clock may have the other."""
+def test_a_centre_of_gravity_that_is_off_is_one_fact(start: Model, car: Vehicle) -> None:
+    """Sensors stay in the body: they do not move with what the vehicle file says of the car."""
+    off = {"imu_lever_arm.forward_m": 0.12, "speed_sensor_lever_arm.forward_m": 0.12}
+    behind = Model(car.replace(lf_m=car.lf_m + 0.12, lr_m=car.lr_m - 0.12))
+    mounted = behind.add(*(n.split(".")[0] for n in off)).with_values(off)
+    log = drive(mounted, manoeuvres.lap(30.0), seed=71)
+    fit = identify(start, log, starts=1)
+    causes = diagnose(fit, refits=0).causes
+    assert [s.effects[0] for s in causes.sets] == ["cg_position"]
+    found = identify(fit.model.add("cg_position"), log, starts=1)
+    told = found["cg_position.shift_rearward_m"]
+    assert abs(told.value - 0.12) < 4.0 * told.std
+    assert told.std < 0.01
+    assert diagnose(found, refits=0).causes.sets == ()
+
+
+def test_the_clock_of_the_steering_has_a_sign(start: Model, truth: Model) -> None:
     log = drive(truth, manoeuvres.step_steer((20.0,), (3.0, 5.0)), seed=5)
     t = log["time_s"]
     # The log tells 30 ms too late what the wheels do: the car answers before.
     late = np.interp(t - 0.03, t, log["steer_rad"])
     shifted = Log.from_arrays({**{c: log[c] for c in log.channels}, "steer_rad": late})
-    causes = diagnose(identify(start, shifted, starts=1), refits=0).causes
-    assert next(iter(causes.inclusion)) == "clock of steer_rad"
-    (value,), (std,) = causes.sizes["clock of steer_rad"]
-    assert abs(value + 0.03) < 0.006
+    fit = identify(start, shifted, starts=1)
+    causes = diagnose(fit, refits=0).causes
+    assert next(iter(causes.inclusion)) == "steer_delay"
+    (value,), (std,) = causes.sizes["steer_delay"]
+    assert abs(value + 0.03) < 0.01  # by the slope of steps, to first order
     assert std < 0.003
+    found = identify(fit.model.add("steer_delay"), shifted, starts=1)["steer_delay.delay_s"]
+    assert abs(found.value + 0.03) < 4.0 * found.std
+    assert found.std < 0.001
 
 
 def test_it_prints_and_draws(found: Diagnosis) -> None:

@@ -61,7 +61,7 @@ def test_a_scanned_parameter_is_tried_over_the_log_or_its_range() -> None:
     assert slow.grid(80.0)[[0, -1]] == pytest.approx([slow.typical_low, slow.typical_high])
     assert effect("mass").scanned is None
     assert "grid of at_s" in effect("friction_change").form
-    assert "step" in effect("steer_delay").form
+    assert "step" in effect("steer_lag").form
 
 
 def test_an_effect_is_found_by_name() -> None:

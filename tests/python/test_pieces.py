@@ -8,16 +8,22 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
+from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving, first_guess
 from sysid_vehicle.estimate.pieces import DrivingProblem, PiecewiseProblem
 
+COLUMNS = [*range(9), *effect("steer_delay").columns]
 LONGEST = 700  # samples; the logs below become pieces of whole runs and of parts of runs
 
 
 @pytest.fixture(scope="module")
 def model() -> sv.Model:
-    values = {"tyre_relaxation.relaxation_length_m": 0.4, "tyre_load_sensitivity.sensitivity": 0.2}
-    model = sv.Model(sv.example_vehicle()).add("tyre_relaxation", "tyre_load_sensitivity")
+    values = {
+        "tyre_relaxation.relaxation_length_m": 0.4,
+        "tyre_load_sensitivity.sensitivity": 0.2,
+        "steer_delay.delay_s": -0.033,  # what a piece needs of the steering lies beyond its end
+    }
+    model = sv.Model(sv.example_vehicle()).add(*(name.split(".")[0] for name in values))
     return model.with_values(values)
 
 
@@ -47,12 +53,12 @@ TOLD = ("innovation", "spread", "whitened", "state", "state_std", "log_likelihoo
 QUESTIONS: dict[str, Callable[[DrivingProblem, Any, Any, Any], Any]] = {
     "residuals": lambda q, p, g, n: q.residuals(1.01 * p, g),
     "half sum": lambda q, p, g, n: q.half_sum_of_squares(1.01 * p, g),
-    "sensitivities": lambda q, p, g, n: q.sensitivities(p, g, list(range(9))),
+    "sensitivities": lambda q, p, g, n: q.sensitivities(p, g, COLUMNS),
     "signals": lambda q, p, g, n: q.signal_sensitivities(p, g, np.ones((q.samples, 2)), [1, 9]),
     "log-likelihood": lambda q, p, g, n: [g.log_likelihood, g.observed],
     "log-likelihoods": lambda q, p, g, n: q.log_likelihoods(np.array([p, 1.01 * p]), n),
     "ahead": lambda q, p, g, n: q.look_ahead(p, n, [(25, 5), (50, 10)]),
-    "normal equations": lambda q, p, g, n: q.normal_equations(p, g, list(range(9))),
+    "normal equations": lambda q, p, g, n: q.normal_equations(p, g, COLUMNS),
     "noise score": lambda q, p, g, n: q.noise_score(p, n),
     "filtered": lambda q, p, g, n: tuple(q.trace(p, n, False)[name] for name in TOLD),
     "smoothed": lambda q, p, g, n: tuple(q.trace(p, n, True)[name] for name in TOLD),

@@ -237,3 +237,21 @@ def test_the_example_understeers() -> None:
     car = example_vehicle()
     assert manoeuvres.understeer_gradient(car) > 5e-4
     assert car.drive_front_share == 0.0
+
+
+@pytest.mark.parametrize("delay_s", [0.03, -0.03])
+def test_steering_acts_after_the_log_says_so_or_before(delay_s: float) -> None:
+    """Of the driver's angle the car and the log have one in time, the other 30 ms later."""
+    course = manoeuvres.sine_sweep()
+    quiet = SensorNoise.none()
+    prompt = drive_truth(hidden({}), course, seed=1, noise=quiet)
+    shifted = drive_truth(hidden({"steer_delay.delay_s": delay_s}), course, seed=1, noise=quiet)
+    steer, before = shifted.log["steer_rad"], prompt.log["steer_rad"]
+    if delay_s > 0.0:
+        # The force follows the speed that the driver sees, so the car is the same but for that.
+        np.testing.assert_array_equal(steer, before)
+        np.testing.assert_allclose(shifted.states[3:, 2], prompt.states[:-3, 2], atol=2e-3)
+        assert np.abs(shifted.states[:, 2] - prompt.states[:, 2]).max() > 0.02
+    else:
+        np.testing.assert_array_equal(shifted.states, prompt.states)
+        np.testing.assert_allclose(steer[3:], before[:-3], atol=1e-12)

@@ -2,7 +2,9 @@
 // side.
 #include <algorithm>
 
+#include "sysid/dynamics/steer_delay.hpp"
 #include "sysid/estimate/frozen.hpp"
+#include "sysid/identify/in_time.hpp"
 #include "sysid/identify/lane_filter.hpp"
 #include "sysid/identify/prediction_error.hpp"
 #include "sysid/identify/run_system.hpp"
@@ -82,7 +84,9 @@ std::vector<int> FrozenFilter::places(const std::vector<int>& of) const {
     return out;
 }
 
-FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise) {
+FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise) {
+    const InTime in_time(logged, p);
+    const Problem& problem = *in_time;
     FrozenFilter filter = empty(problem, noise);
     const double forgotten_s = forgets_s(problem, noise);
     if (const std::vector<Piece> pieces = pieces_of(problem.runs, forgotten_s); !pieces.empty()) {
@@ -112,11 +116,16 @@ FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise)
 namespace {
 
 /// For sets of parameters in the lanes; false where that cannot be done.
-bool likelihoods_together(const Problem& problem, std::vector<const double*> sets,
+bool likelihoods_together(const Problem& logged, std::vector<const double*> sets,
                           const Noise& noise, double* out) {
     constexpr std::size_t kFewest = 4;  // below, lanes gain nothing
     const std::size_t count = sets.size();
     if (count < kFewest) return false;
+    const auto late = [&](const double* p) { return steer_delay(logged.model, p); };
+    for (const double* p : sets)
+        if (late(p) != late(sets[0])) return false;
+    const InTime in_time(logged, sets[0]);
+    const Problem& problem = *in_time;
     sets.resize(kLanes, sets[0]);
     std::vector<Piece> pieces;
     for (std::size_t run = 0; run < problem.runs.size(); ++run)

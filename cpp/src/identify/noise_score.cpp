@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "sysid/identify/in_time.hpp"
 #include "sysid/identify/lane_filter.hpp"
 #include "sysid/identify/prediction_error.hpp"
 #include "sysid/identify/run_system.hpp"
@@ -152,8 +153,10 @@ double score_all(const Problem& problem, const double* p, const Noise& noise, do
 
 }  // namespace
 
-double noise_score(const Problem& problem, const double* p, const Noise& noise, double* gradient,
+double noise_score(const Problem& logged, const double* p, const Noise& noise, double* gradient,
                    double* information) {
+    const InTime in_time(logged, p);
+    const Problem& problem = *in_time;
     return noise.sloping()
                ? score_all<kNoiseParameters>(problem, p, noise, gradient, information)
                : score_all<kPlainNoiseParameters>(problem, p, noise, gradient, information);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "sysid/identify/frozen_path.hpp"
+#include "sysid/identify/in_time.hpp"
 #include "sysid/identify/local_model.hpp"
 #include "sysid/math/interrupt.hpp"
 #include "sysid/math/lanes.hpp"
@@ -177,19 +178,22 @@ void write(Derivatives& derivatives, std::size_t columns, double* out) {
 }  // namespace
 
 void residuals(const Problem& problem, const double* p, const FrozenFilter& filter, double* out) {
-    const FrozenPath path = frozen_path(problem, p, filter, false);
+    const InTime in_time(problem, p);
+    const FrozenPath path = frozen_path(*in_time, p, filter, false);
     std::copy(path.whitened.begin(), path.whitened.end(), out);
 }
 
 double half_sum_of_squares(const Problem& problem, const double* p, const FrozenFilter& filter) {
+    const InTime in_time(problem, p);
     double sum = 0.0;
-    for (const double e : frozen_path(problem, p, filter, false).whitened) sum += e * e;
+    for (const double e : frozen_path(*in_time, p, filter, false).whitened) sum += e * e;
     return 0.5 * sum;
 }
 
 void sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,
                    const std::vector<int>& columns, double* out) {
-    Derivatives derivatives(problem, p, filter, columns);
+    const InTime in_time(problem, p);
+    Derivatives derivatives(*in_time, p, filter, columns);
     write(derivatives, columns.size(), out);
 }
 
@@ -197,7 +201,8 @@ double normal_equations(const Problem& problem, const double* p, const FrozenFil
                         const std::vector<int>& columns, double* gradient, double* information) {
     const std::size_t n = columns.size();
     if (n == 0) return half_sum_of_squares(problem, p, filter);
-    Derivatives derivatives(problem, p, filter, columns);
+    const InTime in_time(problem, p);
+    Derivatives derivatives(*in_time, p, filter, columns);
     const std::size_t width = derivatives.width();
     std::vector<double> slope(width, 0.0), squares(width * width, 0.0);
     double sum = 0.0;
@@ -215,7 +220,8 @@ double normal_equations(const Problem& problem, const double* p, const FrozenFil
 void signal_sensitivities(const Problem& problem, const double* p, const FrozenFilter& filter,
                           const double* signals, const std::vector<int>& targets, double* out) {
     const Signals all{signals, &targets};
-    Derivatives derivatives(problem, p, filter, {}, &all);
+    const InTime in_time(problem, p);
+    Derivatives derivatives(*in_time, p, filter, {}, &all);
     write(derivatives, targets.size(), out);
 }
 

@@ -10,7 +10,8 @@ std::size_t place(int i) { return static_cast<std::size_t>(i); }
 
 InputFor<Recorded> recorded_input(Recorder& to) {
     InputFor<Recorded> u;
-    for (Recorded* x : {&u.steer_rad, &u.longitudinal, &u.time_s}) *x = to.input(false);
+    for (Recorded* x : {&u.steer_rad, &u.longitudinal, &u.time_s, &u.steer_rate_radps})
+        *x = to.input(false);
     for (Recorded& x : u.channels) x = to.input(false);
     return u;
 }
@@ -18,7 +19,8 @@ InputFor<Recorded> recorded_input(Recorder& to) {
 double number_of(const Input& u, std::size_t i) {
     if (i == 0) return u.steer_rad;
     if (i == 1) return u.longitudinal;
-    return i == 2 ? u.time_s : u.channels[i - 3];
+    if (i == 2) return u.time_s;
+    return i == 3 ? u.steer_rate_radps : u.channels[i - 4];
 }
 
 /// Whether two programs differ in numbers that are the same for all samples alone.

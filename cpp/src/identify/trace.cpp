@@ -2,6 +2,7 @@
 #include <stdexcept>
 
 #include "sysid/estimate/smoother.hpp"
+#include "sysid/identify/in_time.hpp"
 #include "sysid/identify/prediction_error.hpp"
 #include "sysid/identify/run_system.hpp"
 #include "sysid/math/interrupt.hpp"
@@ -98,7 +99,9 @@ void look_ahead_run(const Problem& problem, const Run& run, const double* p, con
 
 }  // namespace
 
-Trace trace(const Problem& problem, const double* p, const Noise& noise, bool smoothed) {
+Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smoothed) {
+    const InTime in_time(logged, p);
+    const Problem& problem = *in_time;
     Trace out;
     with_state_size(problem.model.effects, noise, [&](auto nx) {
         for (const Run& run : problem.runs)
@@ -107,8 +110,10 @@ Trace trace(const Problem& problem, const double* p, const Noise& noise, bool sm
     return out;
 }
 
-void look_ahead(const Problem& problem, const double* p, const Noise& noise,
+void look_ahead(const Problem& logged, const double* p, const Noise& noise,
                 const std::vector<Horizon>& horizons, double* errors) {
+    const InTime in_time(logged, p);
+    const Problem& problem = *in_time;
     for (const Horizon& h : horizons)
         if (h.every == 0) throw std::invalid_argument("every = 0: give one or more");
     std::size_t samples = 0;

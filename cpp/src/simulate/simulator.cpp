@@ -1,7 +1,9 @@
 #include "sysid/simulate/simulator.hpp"
 
+#include <algorithm>
 #include <cmath>
 
+#include "sysid/dynamics/steer_delay.hpp"
 #include "sysid/math/interrupt.hpp"
 
 namespace sysid {
@@ -39,6 +41,10 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
             at.channels[i] = logged.values[k * logged.width + i];
     };
     read_channels(0, u);
+    // What acts is the command of a while ago, or what is logged is.
+    const double late = steer_delay(model, p) / dt;
+    std::vector<double> commanded{u.steer_rad};
+    Input acting = u;
     std::array<double, kExternals> external{};
     settle_auxiliary(model, x, external.data(), u, p);
     const std::size_t last = references.size() - 1;
@@ -46,10 +52,11 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
     const int fewest = active_states(model.effects).count > 0 ? kSubstepsWithLags : kSubsteps;
     for (std::size_t k = 0; k < references.size(); ++k) {
         poll_interrupt(k);
-        u.time_s = beginning.time_s + static_cast<double>(k) * dt;
+        u.time_s = acting.time_s = beginning.time_s + static_cast<double>(k) * dt;
         for (std::size_t i = 0; i < kMotionStates; ++i) external[i] = disturbance[3 * k + i];
-        const auto y = sense(model, x, external.data(), u, p);
-        out.inputs.insert(out.inputs.end(), {u.steer_rad, u.longitudinal});
+        const auto y = sense(model, x, external.data(), acting, p);
+        const double written = earlier(commanded, std::max(-late, 0.0));
+        out.inputs.insert(out.inputs.end(), {written, u.longitudinal});
         out.states.insert(out.states.end(), x.begin(), x.end());
         out.outputs.insert(out.outputs.end(), y.begin(), y.end());
         // Written so that a state that is not a number counts as lost.
@@ -69,8 +76,12 @@ Drive simulate(const SingleTrack& model, const double* p, double dt,
         next.time_s = u.time_s + dt;
         read_channels(std::min(k + 1, last), next);
         const int substeps = std::max(fewest, substeps_for(model, p, x[0], dt));
-        advance(model, x, external.data(), u, next, p, dt, substeps);
+        commanded.push_back(next.steer_rad);
+        Input then_acting = next;
+        then_acting.steer_rad = earlier(commanded, std::max(late, 0.0));
+        advance(model, x, external.data(), acting, then_acting, p, dt, substeps);
         u = next;
+        acting = then_acting;
     }
     return out;
 }

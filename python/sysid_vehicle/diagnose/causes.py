@@ -228,8 +228,7 @@ def causes_of(
         hypotheses.append(Hypothesis(_UNKNOWN + name, columns, (0.0,) * width, 1.0))
         start += width
     for c in clocks:
-        side = 0.0 if c.clock.either else float(np.sign(c.clock.typical_s))
-        hypotheses.append(Hypothesis(c.clock.name, (start,), (side,), 1.0))
+        hypotheses.append(Hypothesis(c.clock.name, (start,), (0.0,), 1.0))
         start += 1
     model = ScoreModel(
         tuple(hypotheses),

@@ -1,7 +1,6 @@
-"""Clocks of inputs: what the car does comes later than the log says, or has to be advanced.
+"""Clocks of inputs that no effect of the catalogue shifts: the wheel force acts later or before.
 
-A delay of the catalogue has one sign. Steering that was logged late has the other: the car acts
-before the log says so, and only a log can be wrong in that way.
+The clock of the steering is an effect of its own, `steer_delay`.
 """
 
 from __future__ import annotations
@@ -30,15 +29,12 @@ class Clock:
     column : int
         Among the inputs of a driving.
     typical_s : float
-        Usual time by which the car acts later than the log says; negative where it acts before.
-    either : bool
-        Whether the time may have either sign.
+        Usual time by which the car acts later than the log says, or before.
     """
 
     channel: str
     column: int
     typical_s: float
-    either: bool = False
 
     @property
     def name(self) -> str:
@@ -46,10 +42,7 @@ class Clock:
         return f"clock of {self.channel}"
 
 
-CLOCKS = (
-    Clock("steer_rad", 0, -0.04),  # that the wheels act late is an effect of the catalogue
-    Clock("fx_n", 1, 0.1, either=True),
-)
+CLOCKS = (Clock("fx_n", 1, 0.1),)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._text import brief
-from ..effects import Effect, channels_in_use
+from ..effects import Effect, channels_in_use, effect
 from ..errors import InvalidInput
 from ..log import Log, several_logs
 from ..model import Model
@@ -25,6 +25,9 @@ MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 """Measured channels, in the core's order."""
 
 UNITS = dict(zip(MEASURED, ("m/s", "m/s", "rad/s", "m/s2", "m/s2"), strict=True))
+
+_REACH_S = effect("steer_delay").parameters[0].upper  # either way
+_TAPS = 8  # on either side, by which the core interpolates
 
 _Part = tuple[Log, slice, int]
 """Log, samples of it, and the place of the first among all usable samples."""
@@ -275,8 +278,32 @@ class Driving:
             if motion is not None:
                 y[0, :3] = motion[at, :3]
             began = where.start / log.rate_hz
-            problem.add_run(1.0 / log.rate_hz, as_float64(inputs), as_float64(y), began, log.name)
+            problem.add_run(
+                1.0 / log.rate_hz,
+                as_float64(inputs),
+                as_float64(y),
+                began,
+                log.name,
+                *self._steering_around(log, where, other_inputs),
+            )
         return problem
+
+    def _steering_around(
+        self, log: Log, where: slice, other_inputs: FloatArray | None
+    ) -> tuple[list[float], list[float]]:
+        """Steering before and after some samples of a stretch, as far as a delay can reach."""
+        whole, at = next(
+            (w, at)
+            for stretch, w, at in self._whole
+            if stretch is log and w.start <= where.start and where.stop <= w.stop
+        )
+        if where == whole:
+            return [], []
+        begin, end, size = (x - whole.start for x in (where.start, where.stop, whole.stop))
+        inputs = self._inputs(log, whole) if other_inputs is None else other_inputs[at : at + size]
+        reach = round(_REACH_S * log.rate_hz) + _TAPS
+        steer = inputs[:, 0]
+        return steer[max(begin - reach, 0) : begin].tolist(), steer[end : end + reach].tolist()
 
     @cached_property
     def _whole(self) -> list[_Part]:

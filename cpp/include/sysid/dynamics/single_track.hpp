@@ -22,8 +22,9 @@ namespace sysid {
 template <class V>
 struct InputOf {
     V steer_rad{};
-    V longitudinal{};  // total wheel force [N], or measured a_x [m/s2] where that is unknown
-    V time_s{};        // since the log began
+    V longitudinal{};      // total wheel force [N], or measured a_x [m/s2] where that is unknown
+    V time_s{};            // since the log began
+    V steer_rate_radps{};  // where a model asks for it
     std::array<V, kUserChannels> channels{};  // that users' effects read
 };
 using Input = InputOf<double>;
@@ -143,6 +144,7 @@ struct SingleTrack {
         w.v_y = motion[1];
         w.r = motion[2];
         w.delta = S(u.steer_rad);
+        w.steer_rate = u.steer_rate_radps;
         w.fx = force_known ? S(u.longitudinal) : S(0.0);
         w.ax_input = force_known ? S(0.0) : S(u.longitudinal);
         w.grip_f = w.grip_r = S(1.0);

@@ -28,6 +28,7 @@ InputOf<V> between(const InputOf<V>& a, const InputOf<V>& b, double part) {
         mix(a.steer_rad, b.steer_rad),
         mix(a.longitudinal, b.longitudinal),
         mix(a.time_s, b.time_s),
+        mix(a.steer_rate_radps, b.steer_rate_radps),
     };
     for (std::size_t i = 0; i < kUserChannels; ++i)
         mixed.channels[i] = mix(a.channels[i], b.channels[i]);

@@ -19,17 +19,17 @@
 namespace sysid {
 
 /// The order matters within a stage: what the grip is comes before what the friction ellipse leaves
-/// of it, errors of the logged angle before its delay and lag, the lean of an accelerometer before
-/// its own errors.
+/// of it, errors of the logged angle before its lag, where sensors are before how they
+/// are turned, the lean of an accelerometer before its own errors.
 using Catalogue =
     std::tuple<AeroDownforce, AeroDrag, RollingResistance, HeadWind, TyreLoadSensitivity,
                LateralLoadTransfer, LongitudinalLoadTransfer, FrictionChange, TyreTemperature,
                ForceGain, ForceSplit, CombinedSlip, AligningMoment, RearToe, TyreRelaxation,
-               SteerOffset, SteerRatio, SteerNonlinearity, SteerDelay, SteerLag, SteerCompliance,
-               RoadBank, RoadGrade, SideWind, Mass, YawInertia, CgPosition, LockedDifferential,
-               LimitedSlipDifferential, DriveYawMoment, SensorDelay, SpeedSensorLeverArm,
-               SpeedSensorMisalignment, ImuLeverArm, InsLeverArm, BodyAttitude, AccelerometerBias,
-               GyroScale, GyroBias, AccelerometerScale>;
+               SteerDelay, SteerOffset, SteerRatio, SteerNonlinearity, SteerLag, SteerCompliance,
+               RoadBank, RoadGrade, SideWind, Mass, YawInertia, LockedDifferential,
+               LimitedSlipDifferential, DriveYawMoment, SensorDelay, CgPosition,
+               SpeedSensorLeverArm, SpeedSensorMisalignment, ImuLeverArm, InsLeverArm, BodyAttitude,
+               AccelerometerBias, GyroScale, GyroBias, AccelerometerScale>;
 
 constexpr std::size_t kEffectCount = std::tuple_size_v<Catalogue>;
 
@@ -51,6 +51,21 @@ constexpr std::array<EffectInfo, kEffectCount> collect_infos(std::index_sequence
 
 constexpr std::array<EffectInfo, kEffectCount> kEffectInfos =
     detail::collect_infos(std::make_index_sequence<kEffectCount>{});
+
+namespace detail {
+
+template <class E, std::size_t... I>
+constexpr std::size_t place_of(std::index_sequence<I...> /*unused*/) {
+    return ((std::is_same_v<E, std::tuple_element_t<I, Catalogue>> ? I : 0) + ...);
+}
+
+}  // namespace detail
+
+/// Where an effect stands in the catalogue.
+template <class E>
+constexpr std::size_t effect_place() {
+    return detail::place_of<E>(std::make_index_sequence<kEffectCount>{});
+}
 
 /// Where the parameters of effect `index` begin in the concatenation of all effects' parameters.
 constexpr std::size_t effect_offset(std::size_t index) {

@@ -56,13 +56,19 @@ struct YawInertia : Effect {
     }
 };
 
-/// The centre of gravity lies further back than the vehicle file says.
+/// The centre of gravity lies further back than the vehicle file says. Sensors are mounted in the
+/// body, and their lever arms count from the centre of gravity of the vehicle file: they stay where
+/// they are, which is `d` further ahead of the true one.
 struct CgPosition : Effect {
     static constexpr EffectInfo info{
         .id = "cg_position",
         .title = "centre of gravity further back than in the vehicle file",
-        .equation = "l_f += d, l_r -= d",
-        .source = "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 5",
+        .equation =
+            "l_f += d, l_r -= d; v_y' = v_y + d r, a_x -= d r^2, a_y += d dr/dt: sensors stay in "
+            "the body",
+        .source =
+            "Milliken & Milliken, Race Car Vehicle Dynamics, ch. 5; Klein & Morelli, Aircraft "
+            "System Identification, ch. 10",
         .excited_by = "a ramp to the limit and a sweep; axle scales settle it",
         .moves = "yaw_rate_radps, vy_mps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
@@ -81,6 +87,16 @@ struct CgPosition : Effect {
     static void vehicle(const T* p, Workings<S>& w) {
         w.l_f += p[0];
         w.l_r -= p[0];
+    }
+    template <class T, class S>
+    static void input(const T* p, Workings<S>& w) {
+        w.ax_input += p[0] * (w.r * w.r);
+    }
+    template <class T, class S>
+    static void sensors(const T* p, const Workings<S>& w, const S* /*state*/, S* y) {
+        y[kVy] += p[0] * w.r;
+        y[kAx] = y[kAx] - p[0] * (w.r * w.r);
+        y[kAy] += p[0] * w.r_dot;
     }
 };
 

@@ -59,7 +59,7 @@ struct SensorDelay : Effect {
     }
 };
 
-/// The speed sensor is not at the centre of gravity.
+/// The speed sensor is not at the centre of gravity of the vehicle file.
 struct SpeedSensorLeverArm : Effect {
     static constexpr EffectInfo info{
         .id = "speed_sensor_lever_arm",
@@ -122,7 +122,7 @@ struct SpeedSensorMisalignment : Effect {
     }
 };
 
-/// The accelerometer is not at the centre of gravity.
+/// The accelerometer is not at the centre of gravity of the vehicle file.
 struct ImuLeverArm : Effect {
     static constexpr EffectInfo info{
         .id = "imu_lever_arm",

@@ -5,6 +5,36 @@
 
 namespace sysid {
 
+/// The road wheels act after the log says so, or before where the angle was logged late: a dead
+/// time is a shift of the input in time, and the clock of a logged channel errs in either
+/// direction. The shift itself is done where the log is at hand, exactly (`identify/in_time.hpp`);
+/// what is left for the equations is its derivative.
+struct SteerDelay : Effect {
+    static constexpr EffectInfo info{
+        .id = "steer_delay",
+        .title = "dead time between the logged and the acting steering angle",
+        .equation = "delta'(t) = delta(t - T); T < 0: logged late",
+        .source =
+            "Rajamani, Vehicle Dynamics and Control, ch. 2; Klein & Morelli, Aircraft System "
+            "Identification, ch. 10",
+        .excited_by = "fast sweeps and steps of the steering",
+        .moves = "yaw_rate_radps, ay_mps2",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "tyre_relaxation, steer_lag, sensor_delay",
+        .parameters = {{.name = "delay_s",
+                        .unit = "s",
+                        .typical = 0.04,
+                        .matters = 0.008,
+                        .bounds = {-0.5, 0.5},
+                        .usual = {-0.04, 0.06}}},
+    };
+
+    template <class T, class S>
+    static void steering(const T* p, Workings<S>& w, Lags<S> /*lags*/) {
+        w.delta = w.delta - w.steer_rate * (p[0] - value_of(p[0]));
+    }
+};
+
 /// The logged steering angle is not zero when the wheels point straight ahead.
 struct SteerOffset : Effect {
     static constexpr EffectInfo info{
@@ -78,39 +108,6 @@ struct SteerNonlinearity : Effect {
     template <class T, class S>
     static void steering(const T* p, Workings<S>& w, Lags<S> /*lags*/) {
         w.delta *= 1.0 + p[0] * (w.delta * w.delta);
-    }
-};
-
-/// The road wheels follow the logged steering angle after a dead time, here two all-pass lags in a
-/// row: the gain is one, and up to omega T = 1 the time is right to 2 %.
-struct SteerDelay : Effect {
-    static constexpr EffectInfo info{
-        .id = "steer_delay",
-        .title = "dead time between the logged and the acting steering angle",
-        .equation = "delta'(t) = delta(t - T), (1 - s T/4)^2 / (1 + s T/4)^2",
-        .source =
-            "Rajamani, Vehicle Dynamics and Control, ch. 2; Pade approximation of first order, "
-            "twice",
-        .excited_by = "fast sweeps and steps of the steering",
-        .moves = "yaw_rate_radps, ay_mps2",
-        .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "tyre_relaxation, steer_lag, sensor_delay",
-        .parameters = {{.name = "delay_s",
-                        .unit = "s",
-                        .typical = 0.04,
-                        .matters = 0.008,
-                        .bounds = {0.0, 0.5},
-                        .usual = {0.01, 0.06}}},
-        .scored_at_typical = true,
-    };
-    static constexpr std::size_t state_count = 2;
-
-    template <class T, class S>
-    static void steering(const T* p, Workings<S>& w, Lags<S> lags) {
-        if (!(value_of(p[0]) > 0.0)) return;
-        const S rate(lag_rate(T(0.25 * p[0])));
-        for (std::size_t i = 0; i < state_count; ++i)
-            w.delta = 2.0 * lags.follow(i, w.delta, rate) - w.delta;
     }
 };
 

@@ -17,8 +17,9 @@ namespace sysid {
 struct Run {
     double dt = 0.01;
     std::vector<Input> inputs;
-    std::vector<Vec<kChannels>> measurements;  // NaN where missing
-    std::string name;                          // of the log, for messages
+    std::vector<Vec<kChannels>> measurements;       // NaN where missing
+    std::string name;                               // of the log, for messages
+    std::vector<double> steer_before, steer_after;  // logged steering around it, as far as known
     std::size_t size() const { return inputs.size(); }
 };
 
@@ -93,7 +94,7 @@ ModelState<S> initial_state(const SingleTrack& model, const Run& run, const T* p
     x[2] = S(first(kYawRate, 0.0));
     const std::array<S, kExternals> calm{};
     const Input& u = run.inputs[begin];
-    InputFor<S> input{u.steer_rad, u.longitudinal, u.time_s};
+    InputFor<S> input{u.steer_rad, u.longitudinal, u.time_s, u.steer_rate_radps};
     std::copy(u.channels.begin(), u.channels.end(), input.channels.begin());
     settle_auxiliary(model, x, calm.data(), input, p);
     return x;

@@ -87,7 +87,7 @@ class RecordedModel {
         }
     }
 
-    static constexpr std::size_t kGiven = 3 + kUserChannels;  // numbers of an `Input`
+    static constexpr std::size_t kGiven = 4 + kUserChannels;  // numbers of an `Input`
 
   private:
     struct Moving {

@@ -115,7 +115,7 @@ class ClosedLoop {
                 believed_ = observer_.state();
             }
             if (data_.late_feedback || k == 0) decide(wanted[k], k);
-            const Input acts = next_.acts;
+            const Input acts = felt();
             measure(x, outside, normal + k * kSensorCount, k, out);
             if (lost(x)) {
                 out.lost_at = k;
@@ -123,7 +123,7 @@ class ClosedLoop {
             }
             if (!data_.late_feedback && k + 1 < wanted.size()) decide(wanted[k + 1], k + 1);
             try {
-                plant_.advance(x, acts, data_.inputs_linear ? next_.acts : acts, outside, data_.dt);
+                plant_.advance(x, acts, data_.inputs_linear ? felt() : acts, outside, data_.dt);
             } catch (const NumericalFailure&) {
                 out.lost_at = k;
                 break;
@@ -161,6 +161,14 @@ class ClosedLoop {
         next_.yaw_rate_radps = wanted.yaw_rate_radps;
         // Without a prediction there is nothing to act on before the first reading.
         if (k > 0 || data_.late_feedback) command(next_);
+        steered_.push_back(next_.acts.steer_rad);
+    }
+
+    /// What acts on the car: its steering after the dead time of the plant.
+    Input felt() const {
+        Input u = next_.acts;
+        if (!steered_.empty()) u.steer_rad = earlier(steered_, plant_.steer_delay_s() / data_.dt);
+        return u;
     }
 
     void command(Decision& d) {
@@ -208,8 +216,8 @@ class ClosedLoop {
 
     Readings readings(const PlantState& x, const Plant::Externals& external) const {
         const Input& u = next_.acts;
-        const auto y = plant_.sensed(x, u, external);
-        const PlantTruth t = plant_.look(x, u, external);
+        const auto y = plant_.sensed(x, felt(), external);
+        const PlantTruth t = plant_.look(x, felt(), external);
         return {
             y[kVx],     y[kVy],     y[kYawRate],  y[kAx],      y[kAy],         x[kHeading],
             x[kPlaceX], x[kPlaceY], t.load_front, t.load_rear, u.longitudinal, u.steer_rad,
@@ -219,7 +227,7 @@ class ClosedLoop {
     void record(const PlantState& x, const Plant::Externals& external, const Readings& y,
                 LoopRecord& out) const {
         const Decision& d = next_;
-        const PlantTruth t = plant_.look(x, d.acts, external);
+        const PlantTruth t = plant_.look(x, felt(), external);
         const auto add = [](std::vector<double>& to, std::initializer_list<double> values) {
             to.insert(to.end(), values);
         };
@@ -255,6 +263,7 @@ class ClosedLoop {
     Axles<double> loads_;
     Decision next_;
     Input known_;
+    std::vector<double> steered_;  // by the actuator, since the loop began
 };
 
 /// The loop around the extended-state observer.

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "sysid/dynamics/steer_delay.hpp"
 #include "sysid/dynamics/step.hpp"
 
 namespace sysid::lab {
@@ -63,6 +64,7 @@ class Plant {
 
     const VehicleData& car() const { return model_.car; }
     double yaw_inertia() const { return parameters_[kYawInertia]; }
+    double steer_delay_s() const { return steer_delay(model_, parameters_.data()); }
 
     /// Starts straight on at a speed, at (0, 0) heading along x, with settled auxiliary states.
     PlantState at_rest(double speed_mps) const {
