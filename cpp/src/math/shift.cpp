@@ -10,24 +10,30 @@ namespace sysid {
 
 namespace {
 
-constexpr int kReach = 8;  // samples on either side
+constexpr int kReach = 10;  // samples on either side
 constexpr int kTaps = 2 * kReach;
+constexpr std::array<double, 4> kWindow{0.355768, 0.487396, 0.144232, 0.012604};
 
 struct Taps {
     std::array<double, kTaps> value{}, slope{};
 };
 
 /// Weights of the samples number 1 - kReach to kReach for the place `part` after number 0, and
-/// their derivatives. The window (Hann) and its derivative end at zero: values and slopes are
-/// continuous in the shift.
+/// their derivatives. The window and its derivative end at zero: values and slopes are
+/// continuous in the shift (A. H. Nuttall, IEEE Trans. ASSP 29, 1981).
 Taps taps_at(double part) {
     constexpr double pi = std::numbers::pi;
     Taps taps;
     double sum = 0.0, sum_slope = 0.0;
     for (std::size_t i = 0; i < taps.value.size(); ++i) {
         const double t = part - (static_cast<double>(i) + 1.0 - kReach);
-        const double window = 0.5 + 0.5 * std::cos(pi * t / kReach);
-        const double window_slope = -0.5 * pi / kReach * std::sin(pi * t / kReach);
+        const double turn = pi * t / kReach;
+        double window = kWindow[0], window_slope = 0.0;
+        for (std::size_t m = 1; m < kWindow.size(); ++m) {
+            const double often = static_cast<double>(m);
+            window += kWindow[m] * std::cos(often * turn);
+            window_slope -= kWindow[m] * often * pi / kReach * std::sin(often * turn);
+        }
         double wave = 1.0, wave_slope = 0.0;
         if (std::abs(t) > 1e-9) {
             wave = std::sin(pi * t) / (pi * t);

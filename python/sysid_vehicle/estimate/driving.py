@@ -27,7 +27,7 @@ MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 UNITS = dict(zip(MEASURED, ("m/s", "m/s", "rad/s", "m/s2", "m/s2"), strict=True))
 
 _REACH_S = effect("steer_delay").parameters[0].upper  # either way
-_TAPS = 8  # on either side, by which the core interpolates
+_TAPS = 10  # on either side, by which the core interpolates
 
 _Part = tuple[Log, slice, int]
 """Log, samples of it, and the place of the first among all usable samples."""
