@@ -20,7 +20,16 @@ from .errors import InvalidInput
 from .saved import save
 from .vehicle import Tyre, Vehicle
 
-__all__ = ["Model", "Setting", "vehicle_data"]
+__all__ = ["NUISANCES", "Model", "Setting", "vehicle_data"]
+
+NUISANCES = (
+    "steer_offset",
+    "speed_sensor_misalignment",
+    "accelerometer_bias",
+    "gyro_bias",
+    "road_bank",
+)
+"""Offsets that measured logs have, crossfall of the road among them."""
 
 _YAW_INERTIA = "yaw_inertia_kgm2"
 
@@ -139,6 +148,33 @@ class Model:
     def with_priors(self, priors: Mapping[str, tuple[float, float]]) -> Model:
         """The same model with some parameters roughly known: (mean, standard deviation)."""
         return self._with_settings({n: {"prior": pair} for n, pair in priors.items()})
+
+    def with_nuisances(self, names: Iterable[str] = NUISANCES) -> Model:
+        """The same model with effects that are known to be there, about as large as usual.
+
+        They are marginalised: each of their parameters has a normal prior about its null value
+        whose standard deviation is the typical size in the catalogue, every fit has them, and a
+        study neither names nor drops them.
+        """
+        several = [names] if isinstance(names, str) else list(names)
+        model = self.add(*(n for n in several if n not in self.effects))
+        return model.with_priors(
+            {
+                f"{e.id}.{p.name}": (p.null_value, abs(p.typical - p.null_value))
+                for e in model.parts
+                if e.id in several
+                for p in e.parameters
+            }
+        )
+
+    @property
+    def nuisances(self) -> tuple[str, ...]:
+        """Effects of which every parameter has a prior about its null value."""
+        priors = self.priors
+        about = {n for n, (mean, _) in priors.items() if mean == self.parameters[n].null_value}
+        return tuple(
+            e.id for e in self.parts if all(f"{e.id}.{p.name}" in about for p in e.parameters)
+        )
 
     def _with_settings(self, changes: Mapping[str, Mapping[str, Any]]) -> Model:
         told = dict(self.settings)

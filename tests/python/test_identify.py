@@ -76,6 +76,18 @@ def test_what_a_fit_means_is_worked_out_for_a_car_without_its_effects(
     assert found["cornering stiffness rear"] == pytest.approx(rear)
 
 
+def test_nuisances_cost_next_to_no_information(fit: Fit) -> None:
+    found = refine(fit.model.with_nuisances(), fit.driving, fit.noise)
+    base = [i for i, e in enumerate(found.estimates) if "." not in e.name]
+    information = np.linalg.inv(found.covariance)
+    alone = np.linalg.inv(information[np.ix_(base, base)])
+    wider = np.sqrt(np.diag(found.covariance)[base] / np.diag(alone))
+    assert np.all((wider > 1.0) & (wider < 1.05))
+    for name, (mean, std) in found.model.priors.items():
+        assert found[name].std < std  # the driving has told of each
+        assert abs(found[name].value - mean) < SPREAD * found[name].std
+
+
 def test_the_cornering_stiffness_is_found(fit: Fit, car: Vehicle, start: Model) -> None:
     assert fit.converged
     assert_stiffness_found(fit, car)

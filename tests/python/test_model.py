@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import InvalidInput, Model, Vehicle, catalogue
+from sysid_vehicle.model import NUISANCES
 
 TYRES = tuple(f"{letter}_{axle}" for axle in ("front", "rear") for letter in "BCDE")
 
@@ -74,6 +75,22 @@ def test_free_parameters_come_back_from_a_vector(truth: Model) -> None:
     assert back.value("steer_offset.offset_rad") == 0.004
     assert back.value("C_front") == 1.7
     assert back.value("yaw_inertia_kgm2") == truth.value("yaw_inertia_kgm2")
+
+
+def test_nuisances_have_priors_of_their_typical_sizes(truth: Model) -> None:
+    model = truth.add("mass", "gyro_bias").with_nuisances()
+    assert model.effects[:2] == ("mass", "gyro_bias")
+    assert set(model.nuisances) == set(NUISANCES)
+    assert "mass" not in model.nuisances
+    assert model.priors["gyro_bias.bias_radps"] == (0.0, 0.006)
+    assert model.vector().tolist() == truth.vector().tolist()
+    # Known to be something is no nuisance, nor is an effect of which a part is unknown.
+    told = truth.add("mass", "side_wind").with_priors(
+        {"mass.relative_error": (0.1, 0.02), "side_wind.side_force_n": (0.0, 100.0)}
+    )
+    assert told.nuisances == ()
+    with pytest.raises(InvalidInput, match="no effect is called 'gyro_bais'"):
+        truth.with_nuisances(["gyro_bais"])
 
 
 def test_mirrored_steering_mirrors_the_answer(truth: Model) -> None:

@@ -257,6 +257,13 @@ def test_what_is_at_a_bound_stays_only_where_it_is_needed(
     assert without_insignificant(refine(late, fit.driving, fit.noise)).model.effects == (
         "aero_drag",
     )
+    # What is marginalised is no finding: nothing asks whether it is there.
+    for model, kept in (
+        (fit.model.add("gyro_bias"), ()),
+        (fit.model.with_nuisances(["gyro_bias"]), ("gyro_bias",)),
+    ):
+        left = without_insignificant(refine(model, fit.driving, fit.noise)).model.effects
+        assert left == ("aero_drag", *kept)
     # A resistance at the end of its range is significant, though no error of it is known.
     bounded = identify(fit.model.drop("aero_drag").add("rolling_resistance"), fit.driving, starts=1)
     assert not np.isfinite(bounded["rolling_resistance.per_speed_spm"].std)

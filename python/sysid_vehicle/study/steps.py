@@ -348,7 +348,8 @@ def way(fits: Sequence[Fit], ends: float = np.inf) -> list[Fit]:
 
 def _insignificant(fit: Fit, rules: Rules) -> set[str]:
     """Effects of the model that cannot be told from nothing."""
-    return {e.id for e in fit.model.parts if _strength(fit, e.id) < rules.insignificant}
+    sought = (e.id for e in fit.model.parts if e.id not in fit.model.nuisances)
+    return {name for name in sought if _strength(fit, name) < rules.insignificant}
 
 
 def _merit(fit: Fit) -> float:
