@@ -179,13 +179,13 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     # Where the verdict does not ask for it, the shape of the unknown is not sought.
     assert study.unknown is None
     assert sorted(told["unknown"]) == [
-        *("explainable", "p_value", "strongest", "structure", "validation"),
+        *("explainable", "p_value", "strongest", "structure", "together"),
     ]
     assert told["predicting"]["horizon_s"] == 2.0
     assert told["predicting"]["added_is_needed"]
     assert set(told["predicting"]["parameters"]) < set(told["parameters"])
-    assert sorted(told["unknown"]["validation"]) == ["p_value", "strongest"]
-    assert told["unknown"]["validation"]["p_value"] > 1e-4
+    assert sorted(told["unknown"]["together"]) == ["p_value", "strongest"]
+    assert told["unknown"]["together"]["p_value"] > 1e-4
     # The final model has the lag: beside it there is no delay, without it there is.
     delay = told["where"]["delays"]["steer"]
     assert abs(delay["delay_s"]) < 3.0 * delay["std_s"]
