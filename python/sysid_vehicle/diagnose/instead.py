@@ -72,21 +72,19 @@ def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = U
     rivals = _Rivals(Evidence(bare, driving), tuple(names))
     found = _Competition(Directions(rivals.evidence, rivals), rivals, bare)
     every = list(range(len(names)))
-    told = found.p_values(every, rivals.hypotheses, rules.level)
-    first = min(told, key=lambda what: told[what])
+    told = found.tested(every, rivals.hypotheses, rules)
+    first = next(iter(told))
     price = rules.price * float(np.log(driving.samples))
     away: dict[str, str] = {}
-    for what in sorted(told, key=lambda what: told[what]):
-        if told[what] > rules.level:
+    for what, test in told.items():
+        if not test.rejects:
             break
         for effect in effects:
             own = [i for i in every if names[i].split(".")[0] == effect]
             others = [i for i in every if i not in own]
             if own and found.gain([*others, *rivals.hypotheses[what]], own)[0] < price:
                 away.setdefault(effect, _kind(what))
-    statistic, degrees, _ = found.gain(every, rivals.hypotheses[first])
-    strongest = rivals.targets[_kind(first)]
-    return Instead(Omnibus(statistic, degrees, min(told[first], 1.0), strongest, rules), away)
+    return Instead(told[first], away)
 
 
 def _kind(what: str) -> str:
@@ -227,30 +225,31 @@ class _Competition:
         direction[given] = -copy[:, few] @ direction[few]
         return float(S[kept] @ direction[few]), rank, direction
 
-    def p_values(
-        self, given: list[int], hypotheses: Mapping[str, list[int]], level: float
-    ) -> dict[str, float]:
-        """Of nothing along the columns of each hypothesis beside others, for all of them.
+    def tested(
+        self, given: list[int], hypotheses: Mapping[str, list[int]], rules: Rules
+    ) -> dict[str, Omnibus]:
+        """All hypotheses beside some columns, p-values corrected for so many, the smallest first.
 
         How white the residuals are is asked only where it could decide.
         """
         found = {what: self.gain(given, columns) for what, columns in hypotheses.items()}
-        told = {w: len(found) * _tail(t, degrees) for w, (t, degrees, _) in found.items()}
-        few = [what for what, p_value in told.items() if p_value < level]
+        ratio = dict.fromkeys(found, 1.0)
+
+        def test(what: str) -> Omnibus:
+            statistic, degrees = found[what][0] / ratio[what], found[what][1]
+            p_value = float(scipy.stats.chi2.sf(statistic, degrees)) if degrees else 1.0
+            target = self._rivals.targets[_kind(what)]
+            return Omnibus(statistic, degrees, min(len(found) * p_value, 1.0), target, rules)
+
+        few = [what for what in found if test(what).rejects]
         if few:
             sizes = -self._off
             if given:
                 information = self._projected.information[np.ix_(given, given)]
                 sizes[given] += pseudo_inverse(information)[0] @ self._score[given]
-            along = np.column_stack([found[what][2] for what in few])
-            ratios = self._projected.answer(
-                self._rivals, Ask(as_float64(along), as_float64(along + sizes[:, None]))
-            ).ratios
-            for what, ratio in zip(few, ratios, strict=True):
-                t, degrees, _ = found[what]
-                told[what] = len(found) * _tail(t / max(float(ratio), 1.0), degrees)
-        return told
-
-
-def _tail(statistic: float, degrees: int) -> float:
-    return float(scipy.stats.chi2.sf(statistic, degrees)) if degrees else 1.0
+            along = as_float64(np.column_stack([found[what][2] for what in few]))
+            ask = Ask(along, as_float64(along + sizes[:, None]))
+            ratios = np.maximum(self._projected.answer(self._rivals, ask).ratios, 1.0)
+            ratio |= dict(zip(few, map(float, ratios), strict=True))
+        told = {what: test(what) for what in found}
+        return dict(sorted(told.items(), key=lambda pair: pair[1].p_value))
