@@ -1,5 +1,6 @@
 """Searches that work the gains out anew: the climb, steps that rise, a second end."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -97,6 +98,49 @@ def test_another_end_is_followed_as_far_as_it_may_be_the_better_one(
     problem.slope = 5.0
     assert rivalled(objective, high, np.array([-0.8]), box) is high
     assert asked == [pytest.approx(-1.0, abs=0.01)]
+
+
+def test_an_end_that_lacks_too_much_on_few_samples_is_not_followed_on_all() -> None:
+    noise, box = np.ones(1), Box([0], np.array([-2.0]), np.array([2.0]))
+    few, every = (
+        Objective(Valleys(), (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
+        for _ in range(2)
+    )
+    low, high = (np.array([-1.0]), noise, True), (np.array([1.0]), noise, True)
+    reached = rivalled(every, low, np.array([0.8]), box, few)
+    assert reached[0] == pytest.approx(1.0, abs=0.01)
+    refused = replace(every, problem=Refusing())  # type: ignore[arg-type]
+    assert rivalled(refused, high, np.array([-0.8]), box, few) is high
+    with pytest.raises(AssertionError, match="asked"):
+        rivalled(refused, low, np.array([0.8]), box, few)
+
+
+class Refusing(Valleys):
+    """All samples, which nobody is to ask."""
+
+    def freeze(self, p: np.ndarray, noise: np.ndarray) -> SimpleNamespace:
+        raise AssertionError("asked")
+
+
+def test_gains_that_were_asked_for_last_are_kept() -> None:
+    class Counting:
+        asked = 0
+
+        def freeze(self, p: np.ndarray, noise: np.ndarray) -> SimpleNamespace:
+            self.asked += 1
+            return SimpleNamespace(log_likelihood=p[0] + noise[0])
+
+    counting, p, noise = Counting(), np.ones(2), np.ones(1)
+    objective = Objective(counting)  # type: ignore[arg-type]
+    gains = objective.freeze(p, noise)
+    assert objective.freeze(p.copy(), noise.copy()) is gains
+    assert counting.asked == 1
+    p[0] = 3.0  # the array itself is not what is remembered
+    assert objective.freeze(p, noise).log_likelihood == 4.0
+    assert objective.freeze(p, 2.0 * noise).log_likelihood == 5.0
+    other = replace(objective, problem=Counting())  # type: ignore[arg-type]
+    assert other.freeze(p, 2.0 * noise) is not objective.freeze(p, 2.0 * noise)
+    assert counting.asked == 3
 
 
 def test_parameters_move_only_where_the_likelihood_rises() -> None:

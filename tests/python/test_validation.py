@@ -1,11 +1,16 @@
 """Validation data: what is set aside, what it says of two models, and how surely."""
 
+import threading
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from sysid_vehicle import Log
+from sysid_vehicle import Fit, Log
+from sysid_vehicle._threads import at_most
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.estimate import Driving
+from sysid_vehicle.study import validation
 from sysid_vehicle.study.validation import _with_error, set_aside
 
 
@@ -74,3 +79,32 @@ def test_logs_given_are_taken_as_they_are(lap: Log, course: Log) -> None:
     assert (train.logs, test.logs) == ((lap,), (course,))
     with pytest.raises(InvalidInput, match="no log was given"):
         set_aside([], None)
+
+
+def test_two_models_are_judged_side_by_side(
+    course: Log, fit: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    test, begin = Driving.of(course.between(0.0, 10.0)), threading.Barrier(2)
+
+    def waiting(one: object, *rest: object) -> object:
+        begin.wait(timeout=30.0)  # in a loop the first one would wait for the second for ever
+        return one
+
+    for name in ("at_its_best", "_prediction"):
+        monkeypatch.setattr(validation, name, waiting)
+    for name in ("changes", "beyond_noise"):
+        monkeypatch.setattr(validation, name, lambda *told, **_: told)
+    richer = replace(fit)
+    with at_most(2):
+        assert validation.changes_ahead(fit, richer, test)[:2] == (fit, richer)
+        assert validation.beyond_noise_ahead([fit, richer], test)[0] == [fit, richer]
+        with pytest.raises(AttributeError, match="sureness"):
+            validation.as_sure(fit, richer, test)
+    monkeypatch.undo()
+    told = []
+    for threads in (1, 2):
+        validation._prediction.cache_clear()
+        with at_most(threads):
+            told.append(validation.gain_in_log_likelihood(fit, richer, test))
+            told.append(validation.fall_in_error(fit, richer, test))
+    assert told[:2] == told[2:]

@@ -151,7 +151,7 @@ def identify(
     first, *others = _apart(ends, values, box)
     best = settle(objective, first, noise.vector(), box, thin=few)
     for end in others:
-        best = rivalled(objective, best, end, box)
+        best = rivalled(objective, best, end, box, few if few.samples < objective.samples else None)
     fit = _on_its_road(_top(model, driving, objective, best, table))
     if intervals == "profile":
         return profile_fit(fit, workers=workers, progress=progress)

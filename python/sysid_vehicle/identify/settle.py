@@ -161,9 +161,23 @@ def settle(
         if value < best + _STANDS:
             return p, noise, True
         best = value
-        x = minimise(objective, p, gains, box, method=method, rounds=8, tolerance=0.05).x
-        p, gains = risen(objective, p, gains, x, noise, box)
+        p, gains = _moved(objective, p, noise, box, method=method, rounds=8)
     return p, noise, False
+
+
+def _moved(
+    objective: Objective,
+    p: FloatArray,
+    noise: FloatArray,
+    box: Box,
+    *,
+    method: str = "gauss-newton",
+    rounds: int = 25,
+) -> tuple[FloatArray, Any]:
+    """The end of a search, as far as the likelihood rises, and the gains there."""
+    gains = objective.freeze(p, noise)
+    found = minimise(objective, p, gains, box, method=method, rounds=rounds, tolerance=_GAIN)
+    return risen(objective, p, gains, found.x, noise, box)
 
 
 def rivalled(
@@ -171,6 +185,7 @@ def rivalled(
     best: tuple[FloatArray, FloatArray, bool],
     p: FloatArray,
     box: Box,
+    few: Objective | None = None,
 ) -> tuple[FloatArray, FloatArray, bool]:
     """What `settle` found, or what it finds from other parameters, where that is likelier.
 
@@ -185,21 +200,34 @@ def rivalled(
         Parameters, noise, and whether the search came to a stand.
     p : array, shape (parameters,)
     box : Box
+    few : Objective, optional
+        The same on fewer samples: what lacks too much there is not followed on all.
     """
     found, noise, converged = best
-    value = objective.log_likelihood(found, noise)
     try:
-        gains = objective.freeze(p, noise)
-        x = minimise(objective, p, gains, box, tolerance=0.05).x
-        p, gains = risen(objective, p, gains, x, noise, box)
-        there = gains.log_likelihood - objective.prior_cost(p)
-        more = objective.noise_promises(p, noise)
-        if there + _TWICE * more + _STANDS < value:
+        if few is not None:
+            near, gains = _moved(few, found, noise, box)
+            p, there = _moved(few, p, noise, box)
+            if _hopeless(few, gains.log_likelihood - few.prior_cost(near), p, there, noise)[0]:
+                return best
+        value = objective.log_likelihood(found, noise)
+        p, gains = _moved(objective, p, noise, box)
+        hopeless, more = _hopeless(objective, value, p, gains, noise)
+        if hopeless:
             return best
         rival = settle(objective, p, noise, box) if more > _STANDS else (p, noise, converged)
         return rival if objective.log_likelihood(*rival[:2]) > value else best
     except (NumericalError, np.linalg.LinAlgError):
         return best
+
+
+def _hopeless(
+    objective: Objective, value: float, p: FloatArray, gains: Any, noise: FloatArray
+) -> tuple[bool, float]:
+    """Whether parameters lack more than noise of their own can add, and what it can add."""
+    more = objective.noise_promises(p, noise)
+    there = gains.log_likelihood - objective.prior_cost(p)
+    return there + _TWICE * more + _STANDS < value, more
 
 
 def climb(

@@ -12,6 +12,7 @@ import numpy as np
 
 from .._arguments import duration, whole
 from .._progress import teller
+from .._threads import in_parallel
 from ..compare import Comparison, compare
 from ..diagnose import Verdicts, considered, instead, judge, omnibus
 from ..effects import effect
@@ -139,8 +140,8 @@ def improve(
         fit, diagnoses = found.fit, found.diagnoses
         fits = way(found.fits, ends)
         floor = fit.noise
-        on_train = [compare(f, train_driving, noise=floor) for f in fits]
-        on_test = [compare(f, test_driving, noise=floor) for f in fits]
+        on_train = in_parallel(lambda f: compare(f, train_driving, noise=floor), fits)
+        on_test = in_parallel(lambda f: compare(f, test_driving, noise=floor), fits)
         last = diagnoses[-1]
         fitted = last.omnibus if last.fit is fit else omnibus(fit, train_driving, rules)
         rivals = explained = None

@@ -9,7 +9,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, as_float64
+from .._threads import in_parallel
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
 from ..estimate import Driving
@@ -75,8 +76,8 @@ def gain_in_log_likelihood(
     validation data gains minus infinity.
     """
     try:
-        before = _prediction(poorer, test, poorer)
-        after = _prediction(richer, test, poorer if same_noise else richer)
+        asked = ((poorer, poorer), (richer, poorer if same_noise else richer))
+        before, after = in_parallel(lambda of: _prediction(of[0], test, of[1]), asked)
     except (NumericalError, np.linalg.LinAlgError):
         return _NONE
     return _with_error(after.log_density - before.log_density, test)
@@ -88,7 +89,7 @@ def as_sure(poorer: Fit, richer: Fit, test: Driving) -> bool:
     What such a model gains does not come from having learnt larger noise.
     """
     try:
-        before, after = (_prediction(fit, test, fit) for fit in (poorer, richer))
+        before, after = in_parallel(lambda fit: _prediction(fit, test, fit), (poorer, richer))
     except (NumericalError, np.linalg.LinAlgError):
         return False
     return after.sureness >= before.sureness
@@ -120,14 +121,16 @@ def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> Gain:
     Where a model fails there is no fall.
     """
     floor = richer.noise.floor().vector()
-    squares = []
-    for fit in (poorer, richer):
-        try:
-            trace = test.problem(fit.model).trace(fit.model.vector(), floor, False)
-        except NumericalError:
-            return _NONE
-        squares.append(np.sum(trace["whitened"] ** 2, axis=1))
-    return _with_error(squares[0] - squares[1], test)
+
+    def squares(fit: Fit) -> FloatArray:
+        trace = test.problem(fit.model).trace(fit.model.vector(), floor, False)
+        return as_float64(np.sum(trace["whitened"] ** 2, axis=1))
+
+    try:
+        before, after = in_parallel(squares, (poorer, richer))
+    except NumericalError:
+        return _NONE
+    return _with_error(as_float64(before - after), test)
 
 
 def _with_error(difference: FloatArray, test: Driving) -> Gain:
@@ -159,13 +162,13 @@ def changes_ahead(
     poorer: Fit, richer: Fit, test: Driving, *, reach: bool = False
 ) -> tuple[Change, ...]:
     """How errors 1 to 5 s ahead change, both models with the parameters of `at_its_best`."""
-    one, other = (at_its_best(fit, test) for fit in (poorer, richer))
+    one, other = in_parallel(lambda fit: at_its_best(fit, test), (poorer, richer))
     return changes(one, other, test, AHEAD, reach=reach)
 
 
 def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
     """Errors 1 to 5 s ahead beyond the noise, of models with the parameters of `at_its_best`."""
-    return beyond_noise([at_its_best(fit, test) for fit in fits], test, AHEAD)
+    return beyond_noise(in_parallel(lambda fit: at_its_best(fit, test), fits), test, AHEAD)
 
 
 # One object for each fit: errors ahead are remembered by it.
