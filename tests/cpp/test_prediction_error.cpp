@@ -13,11 +13,13 @@ const auto kLagging =
     kPlain | mask_of({"steer_lag", "tyre_relaxation", "steer_ratio", "steer_compliance"});
 
 /// Two runs of a car whose parameters differ from those asked about, with gaps in the data.
-Problem two_runs(EffectMask effects, bool force_known = true) {
-    const SingleTrack truth{saloon(), effects};
+Problem two_runs(EffectMask effects, bool force_known = true, bool held = false) {
+    SingleTrack truth{saloon(), effects};
+    truth.loads_known = truth.inputs_held = held;
     Parameters p = typical_parameters();
     p[kBFront] *= 1.1;
-    Problem problem{{saloon(), effects, force_known}, {}};
+    Problem problem{truth, {}};
+    problem.model.force_known = force_known;
     problem.runs.push_back(noisy_run(truth, p, 80, 0.01, 1));
     problem.runs.push_back(noisy_run(truth, p, 60, 0.02, 2));
     for (Run& run : problem.runs) {
@@ -96,20 +98,22 @@ TEST(PredictionError, ObservationHasNoPlaceThatNothingWrites) {
     EXPECT_TRUE(H.allFinite());
 }
 
-class Sensitivities : public testing::TestWithParam<std::pair<EffectMask, bool>> {};
+struct Case {
+    const char* name;
+    EffectMask effects;
+    bool force_known = true, held = false;
+};
+class Sensitivities : public testing::TestWithParam<Case> {};
 INSTANTIATE_TEST_SUITE_P(Models, Sensitivities,
-                         testing::Values(std::pair{kPlain, true}, std::pair{kLagging, true},
-                                         std::pair{kPlain, false}, std::pair{kAllEffects, true}),
-                         [](const auto& it) {
-                             return (it.param.first == kPlain     ? std::string("Motion")
-                                     : it.param.first == kLagging ? std::string("Lagging")
-                                                                  : std::string("All")) +
-                                    (it.param.second ? "ByForce" : "ByAcceleration");
-                         });
+                         testing::Values(Case{"Motion", kPlain}, Case{"Lagging", kLagging},
+                                         Case{"MotionByAcceleration", kPlain, false},
+                                         Case{"All", kAllEffects},
+                                         Case{"HeldWithLoads", kPlain, true, true}),
+                         [](const auto& it) { return it.param.name; });
 
 TEST_P(Sensitivities, AreTheDerivativesOfTheResiduals) {
-    const auto [effects, force_known] = GetParam();
-    const Problem problem = two_runs(effects, force_known);
+    const Case& asked = GetParam();
+    const Problem problem = two_runs(asked.effects, asked.force_known, asked.held);
     Parameters p = typical_parameters();
     // At the round values of the delays the number of integration steps changes: no derivative, and
     // differences that straddle it.

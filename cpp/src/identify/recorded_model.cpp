@@ -10,7 +10,9 @@ std::size_t place(int i) { return static_cast<std::size_t>(i); }
 
 InputFor<Recorded> recorded_input(Recorder& to) {
     InputFor<Recorded> u;
-    for (Recorded* x : {&u.steer_rad, &u.longitudinal, &u.time_s}) *x = to.input(false);
+    for (Recorded* x :
+         {&u.steer_rad, &u.longitudinal, &u.time_s, &u.loads_n.front, &u.loads_n.rear})
+        *x = to.input(false);
     for (Recorded& x : u.channels) x = to.input(false);
     return u;
 }
@@ -18,7 +20,9 @@ InputFor<Recorded> recorded_input(Recorder& to) {
 double number_of(const Input& u, std::size_t i) {
     if (i == 0) return u.steer_rad;
     if (i == 1) return u.longitudinal;
-    return i == 2 ? u.time_s : u.channels[i - 3];
+    if (i == 2) return u.time_s;
+    if (i == 3) return u.loads_n.front;
+    return i == 4 ? u.loads_n.rear : u.channels[i - 5];
 }
 
 /// Whether two programs differ in numbers that are the same for all samples alone.
@@ -115,20 +119,22 @@ RecordedModel::Ready RecordedModel::ready(std::size_t inputs_given, Record&& rec
     return out;
 }
 
-RecordedModel::Ready& RecordedModel::step_of(double h) {
-    const auto found = steps_.find(h);
+RecordedModel::Ready& RecordedModel::step_of(double dt, int parts) {
+    const int apart = programs(parts), together = parts / apart;
+    const std::pair<double, int> of{dt / apart, together};
+    const auto found = steps_.find(of);
     if (found != steps_.end()) return found->second;
     return steps_
-        .emplace(h, ready(2,
-                          [&](Recorder& to, const double* p) {
-                              Moving now = moving(to);
-                              const InputFor<Recorded> from = recorded_input(to);
-                              const InputFor<Recorded> until = recorded_input(to);
-                              const std::vector<Recorded> values = parameters(to, p);
-                              advance(model_, now.x, now.external.data(), from, until,
-                                      values.data(), h, 1);
-                              return packed(now.x);
-                          }))
+        .emplace(of, ready(2,
+                           [&](Recorder& to, const double* p) {
+                               Moving now = moving(to);
+                               const InputFor<Recorded> from = recorded_input(to);
+                               const InputFor<Recorded> until = recorded_input(to);
+                               const std::vector<Recorded> values = parameters(to, p);
+                               advance(model_, now.x, now.external.data(), from, until,
+                                       values.data(), dt / apart, together);
+                               return packed(now.x);
+                           }))
         .first->second;
 }
 
