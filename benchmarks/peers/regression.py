@@ -36,9 +36,10 @@ class Data:
         return cls(np.column_stack([*columns, *loads]), some.normal(size=(samples, 2)))
 
     def core(self) -> Work:
-        car = _core.GreyBoxCar()
-        car.mass_kg, car.yaw_inertia_kgm2, car.lf_m, car.lr_m = MASS_KG, INERTIA_KGM2, LF_M, LR_M
-        loss = _core.TyreLoss(car, False, self.motion, self.readings, np.ones_like(self.readings))
+        car = _core.VehicleData()
+        car.mass_kg, car.lf_m, car.lr_m = MASS_KG, LF_M, LR_M
+        ones = np.ones_like(self.readings)
+        loss = _core.TyreLoss(car, INERTIA_KGM2, False, self.motion, self.readings, ones)
         p = np.array([*P, 0, 0, 0, 1, 1, 0])
         return lambda: loss.normal_equations(p, None, list(range(8)))
 

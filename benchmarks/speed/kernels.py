@@ -64,14 +64,15 @@ def likelihood(model: sv.Model, driving: Driving) -> None:
 
 def regression(samples: int = 20000) -> None:
     """Prints the row of the tyre regression: residuals, derivatives and normal equations."""
-    car = _core.GreyBoxCar()
-    car.mass_kg, car.yaw_inertia_kgm2, car.lf_m, car.lr_m = 1500.0, 2500.0, 1.2, 1.5
+    car = _core.VehicleData()
+    car.mass_kg, car.lf_m, car.lr_m = 1500.0, 1.2, 1.5
     some = np.random.default_rng(0)
     motion = np.column_stack(
         [some.normal(c, w, samples) for c, w in ((25, 5), (0, 0.5), (0, 0.3), (0, 0.05))]
         + [some.uniform(5000.0, 9000.0, samples) for _ in range(2)]
     )
-    loss = _core.TyreLoss(car, True, motion, some.normal(size=(samples, 2)), np.ones((samples, 2)))
+    readings = some.normal(size=(samples, 2))
+    loss = _core.TyreLoss(car, 2500.0, True, motion, readings, np.ones((samples, 2)))
     p = np.array([10.0, 1.4, 1.0, 0.1, 11.0, 1.4, 1.0, 0.1, 0, 0, 0, 1, 1, 0])
     print(f"{samples} samples, tyre regression")
     for name, work in (

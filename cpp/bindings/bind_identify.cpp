@@ -12,8 +12,9 @@ void add_run(Problem& problem, double dt, const Array& inputs, const Array& meas
              double start, const std::string& name, const std::vector<double>& steer_before,
              const std::vector<double>& steer_after) {
     const auto n = inputs.ndim() == 2 ? inputs.shape(0) : 0;
+    const py::ssize_t own = problem.model.loads_known ? 4 : 2;
     const auto width =
-        std::clamp<py::ssize_t>(inputs.ndim() == 2 ? inputs.shape(1) : 0, 2, 2 + kUserChannels);
+        std::clamp<py::ssize_t>(inputs.ndim() == 2 ? inputs.shape(1) : 0, own, own + kUserChannels);
     const double* u = matrix(inputs, n, width, "inputs");
     const double* y = matrix(measurements, n, kChannels, "measurements");
     if (n < 2) throw std::invalid_argument("inputs: expected two samples or more");
@@ -31,8 +32,13 @@ void add_run(Problem& problem, double dt, const Array& inputs, const Array& meas
         // Channels that the log lacks are no numbers, for whatever model should read them.
         auto& channels = run.inputs[k].channels;
         channels.fill(std::nan(""));
-        std::copy(u + 2, u + width, channels.begin());
-        if (!std::isfinite(u[0]) || !std::isfinite(u[1]))
+        std::copy(u + own, u + width, channels.begin());
+        if (problem.model.loads_known) {
+            Axles<double>& most = problem.model.most_n;
+            run.inputs[k].loads_n = {u[2], u[3]};
+            most = {std::max(most.front, u[2]), std::max(most.rear, u[3])};
+        }
+        if (!std::all_of(u, u + own, [](double x) { return std::isfinite(x); }))
             throw std::invalid_argument(log + "inputs: not finite at sample " + std::to_string(k));
         run.measurements[k] = Eigen::Map<const Vec<kChannels>>(y + kChannels * k);
         if (run.measurements[k].array().isInf().any())
@@ -77,7 +83,11 @@ void register_identify(py::module_& m) {
              py::arg("steer_after") = std::vector<double>{})
         .def(
             "with_model",
-            [](const Problem& self, const SingleTrack& model) { return Problem{model, self.runs}; },
+            [](const Problem& self, const SingleTrack& model) {
+                Problem other{model, self.runs};
+                other.model.most_n = self.model.most_n;
+                return other;
+            },
             py::arg("model"))
         .def(
             "log_likelihoods",
@@ -128,17 +138,27 @@ void register_identify(py::module_& m) {
         .def(
             "look_ahead",
             [](const Problem& self, const Array& p, const Array& noise,
-               const std::vector<std::pair<std::size_t, std::size_t>>& horizons) {
+               const std::vector<std::pair<std::size_t, std::size_t>>& horizons, bool readings) {
                 const double* values = values_of(p);
                 const Noise n = to_noise(noise);
                 std::vector<Horizon> asked;
                 asked.reserve(horizons.size());
                 for (const auto& [ahead, every] : horizons) asked.push_back({ahead, every});
-                Array found = filled(asked.size() * self.samples(), kChannels,
-                                     [&](double* to) { look_ahead(self, values, n, asked, to); });
+                Array found = filled(asked.size() * self.samples(), kChannels, [&](double* to) {
+                    look_ahead(self, values, n, asked, to, readings);
+                });
                 return found.reshape({asked.size(), self.samples(), std::size_t{kChannels}});
             },
-            py::arg("parameters"), py::arg("noise"), py::arg("horizons"));
+            py::arg("parameters"), py::arg("noise"), py::arg("horizons"),
+            py::arg("readings") = false)
+        .def(
+            "free_run",
+            [](const Problem& self, const Array& p) {
+                const double* values = values_of(p);
+                return filled(self.samples(), kChannels,
+                              [&](double* to) { free_run(self, values, to); });
+            },
+            py::arg("parameters"));
 }
 
 }  // namespace sysid::bindings

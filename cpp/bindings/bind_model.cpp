@@ -194,7 +194,7 @@ void register_model(py::module_& m) {
            SYSID_FIELD(VehicleData, drive_front_share));
     py::class_<SingleTrack>(m, "SingleTrack")
         .def(py::init([](const VehicleData& car, EffectMask effects, bool force_known,
-                         const std::vector<User>& user) {
+                         const std::vector<User>& user, bool loads_known, bool inputs_held) {
                  if (effects >> kEffectCount != 0)
                      throw std::invalid_argument(
                          "effects: the mask names effects there are none of");
@@ -202,11 +202,14 @@ void register_model(py::module_& m) {
                  model.car = car;
                  model.effects = effects;
                  model.force_known = force_known;
+                 model.loads_known = loads_known;
+                 model.inputs_held = inputs_held;
                  set_user_effects(model, user);
                  return model;
              }),
              py::arg("car"), py::arg("effects"), py::arg("force_known"),
-             py::arg("user") = std::vector<User>{})
+             py::arg("user") = std::vector<User>{}, py::arg("loads_known") = false,
+             py::arg("inputs_held") = false)
         .def("evaluate", &evaluate, py::arg("parameters"), py::arg("motion"), py::arg("steer"),
              py::arg("longitudinal"));
     m.def("base_parameters", &base_parameters);

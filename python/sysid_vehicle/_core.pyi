@@ -98,6 +98,8 @@ class SingleTrack(metaclass=_Bound):
         effects: int,
         force_known: bool,
         user: Sequence[_User] = ...,
+        loads_known: bool = False,
+        inputs_held: bool = False,
     ) -> None: ...
     def evaluate(
         self, parameters: _Array, motion: _Array, steer: float, longitudinal: float
@@ -142,8 +144,13 @@ class Problem(metaclass=_Bound):
     def noise_score(self, parameters: _Array, noise: _Array) -> tuple[float, _Array, _Array]: ...
     def trace(self, parameters: _Array, noise: _Array, smoothed: bool) -> _Trace: ...
     def look_ahead(
-        self, parameters: _Array, noise: _Array, horizons: Sequence[tuple[int, int]]
+        self,
+        parameters: _Array,
+        noise: _Array,
+        horizons: Sequence[tuple[int, int]],
+        readings: bool = False,
     ) -> _Array: ...
+    def free_run(self, parameters: _Array) -> _Array: ...
 
 class Driver(metaclass=_Bound):
     reaction_s: float
@@ -337,46 +344,11 @@ def learn_observer_noise(
 ) -> _ObserverEm: ...
 
 # --- lab tyres
-class GreyBoxCar(metaclass=_Bound):
-    mass_kg: float
-    yaw_inertia_kgm2: float
-    lf_m: float
-    lr_m: float
-    air_density_kgpm3: float
-    cg_height_m: float
-    slowest_mps: float
-    def __init__(self) -> None: ...
-
-class FrozenGains(metaclass=_Bound):
-    # Only `TyreProblem.freeze` makes one.
-    def __init__(self, *args: NoReturn, **kwargs: NoReturn) -> None: ...
-    @property
-    def log_likelihood(self) -> float: ...
-    @property
-    def observed(self) -> int: ...
-
-class TyreProblem(metaclass=_Bound):
-    def __init__(self, car: GreyBoxCar) -> None: ...
-    @property
-    def samples(self) -> int: ...
-    def add_run(self, dt: float, inputs: _Array, measurements: _Array) -> None: ...
-    def freeze(self, parameters: _Array, noise: _Array) -> FrozenGains: ...
-    def residuals(self, parameters: _Array, filter: FrozenGains) -> _Array: ...
-    def half_sum_of_squares(self, parameters: _Array, filter: FrozenGains) -> float: ...
-    def sensitivities(
-        self, parameters: _Array, filter: FrozenGains, columns: Sequence[int]
-    ) -> _Array: ...
-    def normal_equations(
-        self, parameters: _Array, filter: FrozenGains, columns: Sequence[int]
-    ) -> tuple[float, _Array, _Array]: ...
-    def noise_score(self, parameters: _Array, noise: _Array) -> tuple[float, _Array, _Array]: ...
-    def states(self, parameters: _Array, filter: FrozenGains) -> _Array: ...
-    def look_ahead(self, parameters: _Array, filter: FrozenGains, ahead: int) -> _Array: ...
-
 class TyreLoss(metaclass=_Bound):
     def __init__(
         self,
-        car: GreyBoxCar,
+        car: VehicleData,
+        yaw_inertia_kgm2: float,
         projects_steer: bool,
         motion: _Array,
         targets: _Array,

@@ -155,6 +155,8 @@ inline Run noisy_run(const SingleTrack& model, const Parameters& p, std::size_t 
     for (std::size_t k = 0; k < samples; ++k) {
         run.inputs.push_back(lively(static_cast<double>(k) * dt));
         run.inputs.back().steer_rad *= steer_part;
+        const double moved = 300.0 * std::sin(2.0 * run.inputs.back().time_s);
+        run.inputs.back().loads_n = {8000.0 + moved, 6500.0 - moved};
     }
     run.measurements = drive(model, p, run.inputs, dt, 20.0);
     std::mt19937 generator(seed);

@@ -2,7 +2,6 @@
 #include "covariances.hpp"
 #include "sysid/identify/run_system.hpp"
 #include "sysid/lab/lab_em.hpp"
-#include "sysid/lab/tyre_likelihood.hpp"
 
 namespace sysid::test {
 namespace {
@@ -55,46 +54,6 @@ TEST(Covariances, OfTheLaboratoryObserver) {
             if (worth_a_look(k) &&
                 !positive(Eigen::Map<const Mat<6, 6>>(found.covariance.data() + 36 * k)))
                 ++lost;
-        EXPECT_EQ(lost, 0U);
-    }
-}
-
-TEST(Covariances, OfTheLaboratorysGreyBox) {
-    // The filter keeps no covariance to look at: where it is lost, variances of innovations are no
-    // numbers any more.
-    const lab::GreyBoxCar car{1500.0, 2500.0, 1.2, 1.4};
-    lab::TyreRun run;
-    std::mt19937 generator(5);
-    std::normal_distribution<double> normal;
-    for (std::size_t k = 0; k < kSteps; ++k) {
-        const double t = 0.01 * static_cast<double>(k);
-        lab::GreyBoxInput u{};
-        u.steer_rad = 0.02 * std::sin(t);
-        u.sin_steer = std::sin(u.steer_rad);
-        u.cos_steer = std::cos(u.steer_rad);
-        u.fz_front_n = u.fz_rear_n = 7000.0;
-        run.inputs.push_back(u);
-        run.measurements.emplace_back(20.0 + 0.05 * normal(generator), 0.05 * normal(generator),
-                                      0.15 * std::sin(t), 3.0 * std::sin(t));
-    }
-    const lab::TyreProblem problem{car, {run}};
-    // Tyres, what the drag is made of, then factors of mass and inertia.
-    const std::array<double, lab::kTyreParameters> p{10.0, 1.4, 1.0, 0.0, 11.0, 1.4, 1.0,
-                                                     0.0,  0.0, 0.0, 0.0, 1.0,  1.0, 1.0};
-    for (const double ratio : kRatios) {
-        SCOPED_TRACE(ratio);
-        std::array<double, lab::kGreyNoises> noise{0.05, 0.05, 0.005, 0.1, 0.5, 0.5, 0.1};
-        for (std::size_t i = 0; i < noise.size(); ++i)
-            noise[i] *= i < lab::kGreyChannels ? std::min(1.0, 1.0 / ratio) : std::min(1.0, ratio);
-        const auto gains = freeze(problem, p.data(), noise.data());
-        std::size_t lost = 0;
-        for (const auto& g : gains.runs[0])
-            for (int c = 0; c < lab::kGreyChannels; ++c) {
-                // No innovation is surer than its sensor.
-                const double per_std = g.whitener(c, c);
-                const double most = (1.0 + 1e-9) / noise[static_cast<std::size_t>(c)];
-                if (!(per_std > 0.0 && per_std <= most)) ++lost;
-            }
         EXPECT_EQ(lost, 0U);
     }
 }

@@ -13,11 +13,13 @@ const auto kLagging =
     kPlain | mask_of({"steer_lag", "tyre_relaxation", "steer_ratio", "steer_compliance"});
 
 /// Two runs of a car whose parameters differ from those asked about, with gaps in the data.
-Problem two_runs(EffectMask effects, bool force_known = true) {
-    const SingleTrack truth{saloon(), effects};
+Problem two_runs(EffectMask effects, bool force_known = true, bool held = false) {
+    SingleTrack truth{saloon(), effects};
+    truth.loads_known = truth.inputs_held = held;
     Parameters p = typical_parameters();
     p[kBFront] *= 1.1;
-    Problem problem{{saloon(), effects, force_known}, {}};
+    Problem problem{truth, {}};
+    problem.model.force_known = force_known;
     problem.runs.push_back(noisy_run(truth, p, 80, 0.01, 1));
     problem.runs.push_back(noisy_run(truth, p, 60, 0.02, 2));
     for (Run& run : problem.runs) {
@@ -86,6 +88,42 @@ TEST(PredictionError, ResidualsAreTheFiltersWhitenedInnovations) {
     }
 }
 
+TEST(PredictionError, DisturbancesThatAreNotThereChangeNothing) {
+    // Without them the filter has three states less.
+    const Problem problem = two_runs(kPlain);
+    const Parameters p = typical_parameters();
+    Noise none = ordinary_noise();
+    none.disturbance = {0.0, 0.0, 0.0};
+    Noise small = none;
+    small.disturbance = {1e-7, 1e-7, 1e-7};
+    ASSERT_TRUE(none.white() && !small.white());
+    const FrozenFilter three = freeze(problem, p.data(), none);
+    const FrozenFilter six = freeze(problem, p.data(), small);
+    EXPECT_EQ(three.rows.size(), 3U);
+    EXPECT_EQ(six.rows.size(), 6U);
+    EXPECT_NEAR(three.log_likelihood, six.log_likelihood, 1e-7);
+    EXPECT_LT((residuals_of(problem, p, three) - residuals_of(problem, p, six)).norm(), 1e-6);
+    const std::vector<int> columns{kBFront, kYawInertia, column_of("mass")};
+    EXPECT_LT(
+        (sensitivities_of(problem, p, three, columns) - sensitivities_of(problem, p, six, columns))
+            .norm(),
+        1e-6 * sensitivities_of(problem, p, six, columns).norm());
+    using All = std::array<double, kNoiseParameters>;
+    All score{}, other{};
+    std::array<double, std::size_t{kNoiseParameters} * kNoiseParameters> information{};
+    noise_score(problem, p.data(), none, score.data(), information.data());
+    noise_score(problem, p.data(), small, other.data(), information.data());
+    for (std::size_t i = 0; i < score.size(); ++i)
+        EXPECT_NEAR(score[i], other[i], 1e-6 * (1.0 + std::abs(other[i]))) << i;
+    const Trace filtered = trace(problem, p.data(), none, true);
+    const Trace full = trace(problem, p.data(), small, true);
+    for (std::size_t i = 0; i < filtered.state.size(); ++i) {
+        if (!std::isnan(full.state[i])) {
+            EXPECT_NEAR(filtered.state[i], full.state[i], 1e-6) << i;
+        }
+    }
+}
+
 TEST(PredictionError, ObservationHasNoPlaceThatNothingWrites) {
     const Problem problem = two_runs(kAllEffects);
     const Parameters p = typical_parameters();
@@ -96,20 +134,22 @@ TEST(PredictionError, ObservationHasNoPlaceThatNothingWrites) {
     EXPECT_TRUE(H.allFinite());
 }
 
-class Sensitivities : public testing::TestWithParam<std::pair<EffectMask, bool>> {};
+struct Case {
+    const char* name;
+    EffectMask effects;
+    bool force_known = true, held = false;
+};
+class Sensitivities : public testing::TestWithParam<Case> {};
 INSTANTIATE_TEST_SUITE_P(Models, Sensitivities,
-                         testing::Values(std::pair{kPlain, true}, std::pair{kLagging, true},
-                                         std::pair{kPlain, false}, std::pair{kAllEffects, true}),
-                         [](const auto& it) {
-                             return (it.param.first == kPlain     ? std::string("Motion")
-                                     : it.param.first == kLagging ? std::string("Lagging")
-                                                                  : std::string("All")) +
-                                    (it.param.second ? "ByForce" : "ByAcceleration");
-                         });
+                         testing::Values(Case{"Motion", kPlain}, Case{"Lagging", kLagging},
+                                         Case{"MotionByAcceleration", kPlain, false},
+                                         Case{"All", kAllEffects},
+                                         Case{"HeldWithLoads", kPlain, true, true}),
+                         [](const auto& it) { return it.param.name; });
 
 TEST_P(Sensitivities, AreTheDerivativesOfTheResiduals) {
-    const auto [effects, force_known] = GetParam();
-    const Problem problem = two_runs(effects, force_known);
+    const Case& asked = GetParam();
+    const Problem problem = two_runs(asked.effects, asked.force_known, asked.held);
     Parameters p = typical_parameters();
     // At the round values of the delays the number of integration steps changes: no derivative, and
     // differences that straddle it.

@@ -11,8 +11,9 @@ constexpr double kClose = 2e-11;  // of whitened residuals
 const auto kLagging = mask_of({"tyre_relaxation", "steer_lag", "aero_drag", "side_wind"});
 
 /// Steps of 50 ms have several parts, more of them where the car is slow.
-Problem long_run(EffectMask effects, std::size_t samples = 620) {
-    const SingleTrack truth{saloon(), effects};
+Problem long_run(EffectMask effects, std::size_t samples = 620, bool held = false) {
+    SingleTrack truth{saloon(), effects};
+    truth.loads_known = truth.inputs_held = held;
     Parameters p = typical_parameters();
     p[kBFront] *= 1.1;
     Problem problem{truth, {noisy_run(truth, p, samples, 0.05, 1)}};
@@ -75,6 +76,7 @@ TEST_P(SideBySide, FiltersAreThoseOfWholeRuns) {
             cut = expect_whole(problem, noise) || cut;
         }
     EXPECT_TRUE(cut);
+    EXPECT_TRUE(expect_whole(long_run(kLagging, 620, true), ordinary_noise()));
 }
 
 TEST_P(SideBySide, OtherParametersAndModelsGoTheSameWay) {

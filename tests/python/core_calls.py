@@ -43,6 +43,16 @@ def main_job(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
 
     run = {"dt": 0.02, "inputs": rows(2), "measurements": rows(_core.CHANNELS, 20.0), "start": 0.0}
     yield "add_run", (add_run, run)
+
+    def add_run_with_loads(**given: Any) -> _core.Problem:
+        found = _core.Problem(
+            _core.SingleTrack(vehicle_data(vehicle), 0, True, loads_known=True, inputs_held=True)
+        )
+        found.add_run(**given)
+        found.freeze(p, noise)
+        return found
+
+    yield "add_run with loads", (add_run_with_loads, {**run, "inputs": rows(4, 15.0)})
     known = problem()
     state = {"parameters": p, "noise": noise}
     yield "freeze", (known.freeze, state)
@@ -51,6 +61,7 @@ def main_job(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
     yield "log_likelihoods", (known.log_likelihoods, sets)
     yield "trace", (known.trace, {**state, "smoothed": True})
     yield "look_ahead", (known.look_ahead, {**state, "horizons": [(3, 2), (5, 1)]})
+    yield "free_run", (known.free_run, {"parameters": p})
     frozen = known.freeze(p, noise)
     at = {"parameters": p, "filter": frozen}
     yield "residuals", (known.residuals, at)
@@ -184,26 +195,10 @@ def laboratory(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
     yield "learn_observer_noise", (_core.learn_observer_noise, learned)
 
     grey = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6).core()
-
-    def tyres(dt: float, inputs: Any, measurements: Any, parameters: Any, noise: Any) -> Any:
-        problem = _core.TyreProblem(grey)
-        problem.add_run(dt, inputs, measurements)
-        gains = problem.freeze(parameters, noise)
-        columns = [0, 5]
-        return (
-            problem.residuals(parameters, gains),
-            problem.normal_equations(parameters, gains, columns),
-            problem.look_ahead(parameters, gains, 3),
-            problem.noise_score(parameters, noise),
-        )
-
     tyre = np.array([10.0, 1.4, 1.0, 0.0, 10.0, 1.4, 1.0, 0.0, *[0.1] * 6])
-    drive = {"dt": 0.01, "inputs": np.tile([100.0, 0.01, 4e3, 4e3], (N, 1))}
-    rest = {"measurements": rows(4, 15.0), "parameters": tyre, "noise": np.full(7, 0.1)}
-    yield "TyreProblem", (tyres, {**drive, **rest})
 
     def loss(motion: Any, targets: Any, weights: Any, parameters: Any, columns: Any) -> Any:
-        found = _core.TyreLoss(grey, True, motion, targets, weights)
+        found = _core.TyreLoss(grey, 1000.0, True, motion, targets, weights)
         return found.residuals(parameters, None), found.normal_equations(parameters, None, columns)
 
     flat = {"motion": rows(6, 15.0), "targets": rows(2), "weights": np.ones((N, 2))}

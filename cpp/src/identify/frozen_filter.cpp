@@ -46,11 +46,12 @@ void freeze_run(const Problem& problem, std::size_t number, const double* p, Fro
         });
 }
 
-/// A filter with room for all samples.
-FrozenFilter empty(const Problem& problem, const Noise& noise) {
+/// A filter with room for all samples, and for gains of so many rows.
+FrozenFilter empty(const Problem& problem, const Noise& noise, std::size_t rows) {
     FrozenFilter filter;
     filter.noise = noise;
     filter.rows = filter_rows(problem.model.effects, noise.sloping());
+    filter.rows.resize(std::min(rows, filter.rows.size()));
     filter.deviations.assign(filter.rows.size(), 0.0);
     filter.runs.resize(problem.runs.size());
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
@@ -87,7 +88,7 @@ std::vector<int> FrozenFilter::places(const std::vector<int>& of) const {
 FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise) {
     const InTime in_time(logged, p);
     const Problem& problem = *in_time;
-    FrozenFilter filter = empty(problem, noise);
+    FrozenFilter filter = empty(problem, noise, kStatesFull + kRoadStates);
     const double forgotten_s = forgets_s(problem, noise);
     if (const std::vector<Piece> pieces = pieces_of(problem.runs, forgotten_s); !pieces.empty()) {
         LaneFilter walk(problem, {p}, noise, pieces);
@@ -104,9 +105,9 @@ FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise) 
             filter.log_likelihood = walk.log_likelihood();
             return filter;
         }
-        filter = empty(problem, noise);
     }
     with_state_size(problem.model.effects, noise, [&](auto nx) {
+        filter = empty(problem, noise, nx);
         for (std::size_t i = 0; i < problem.runs.size(); ++i)
             freeze_run<decltype(nx)::value>(problem, i, p, filter);
     });

@@ -66,10 +66,11 @@ void LocalModel::read(const PathSample* samples, std::size_t count, double* out)
 void LocalModel::step(const PathSample* samples, const std::size_t* which, std::size_t count,
                       double* out) {
     const int parts = samples[which[0]].substeps;
-    Ready& ready = model_.step_of(samples[which[0]].run->dt / parts);
+    Ready& ready = model_.step_of(samples[which[0]].run->dt, parts);
+    const int programs = model_.programs(parts);
     std::vector<LaneRow> now(states());
     std::vector<std::vector<double>> later;
-    for (int n = 0; n < parts; ++n) {
+    for (int n = 0; n < programs; ++n) {
         for (std::size_t i = 0; n > 0 && i < states(); ++i) now[i] = ready.output(i);
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
             const PathSample& s = samples[which[std::min(lane, count - 1)]];
@@ -78,8 +79,8 @@ void LocalModel::step(const PathSample* samples, const std::size_t* which, std::
             for (std::size_t i = 0; i < externals(); ++i)
                 ready.set(states() + i, lane, s.pushed[i]);
             const Input &from = s.run->inputs[s.at - 1], &to = s.run->inputs[s.at];
-            ready.give(0, lane, between(from, to, static_cast<double>(n) / parts));
-            ready.give(1, lane, between(from, to, (n + 1.0) / parts));
+            ready.give(0, lane, between(from, to, static_cast<double>(n) / programs));
+            ready.give(1, lane, between(from, to, (n + 1.0) / programs));
         }
         ready.run();
         if (n == 0) {

@@ -27,7 +27,8 @@ constexpr int time_lane(std::size_t i) {
 template <int L, class Disturbing>
 NoiseScore<kChannels, L> score_of(const Noise& noise, const Run& run, int n, int moving,
                                   Disturbing&& disturbing) {
-    const std::size_t disturbances = noise.sloping() ? kDisturbances : kMotionStates;
+    std::size_t disturbances = noise.sloping() ? kDisturbances : kMotionStates;
+    if (n == kMotionStates) disturbances = 0;
     Vec<kChannels> sensor;
     for (int i = 0; i < kChannels; ++i) {
         const double s = noise.sensor[static_cast<std::size_t>(i)];

@@ -10,7 +10,8 @@ std::size_t place(int i) { return static_cast<std::size_t>(i); }
 
 InputFor<Recorded> recorded_input(Recorder& to) {
     InputFor<Recorded> u;
-    for (Recorded* x : {&u.steer_rad, &u.longitudinal, &u.time_s, &u.steer_rate_radps})
+    for (Recorded* x : {&u.steer_rad, &u.longitudinal, &u.time_s, &u.steer_rate_radps,
+                        &u.loads_n.front, &u.loads_n.rear})
         *x = to.input(false);
     for (Recorded& x : u.channels) x = to.input(false);
     return u;
@@ -20,7 +21,9 @@ double number_of(const Input& u, std::size_t i) {
     if (i == 0) return u.steer_rad;
     if (i == 1) return u.longitudinal;
     if (i == 2) return u.time_s;
-    return i == 3 ? u.steer_rate_radps : u.channels[i - 4];
+    if (i == 3) return u.steer_rate_radps;
+    if (i == 4) return u.loads_n.front;
+    return i == 5 ? u.loads_n.rear : u.channels[i - 6];
 }
 
 /// Whether two programs differ in numbers that are the same for all samples alone.
@@ -117,20 +120,22 @@ RecordedModel::Ready RecordedModel::ready(std::size_t inputs_given, Record&& rec
     return out;
 }
 
-RecordedModel::Ready& RecordedModel::step_of(double h) {
-    const auto found = steps_.find(h);
+RecordedModel::Ready& RecordedModel::step_of(double dt, int parts) {
+    const int apart = programs(parts), together = parts / apart;
+    const std::pair<double, int> of{dt / apart, together};
+    const auto found = steps_.find(of);
     if (found != steps_.end()) return found->second;
     return steps_
-        .emplace(h, ready(2,
-                          [&](Recorder& to, const double* p) {
-                              Moving now = moving(to);
-                              const InputFor<Recorded> from = recorded_input(to);
-                              const InputFor<Recorded> until = recorded_input(to);
-                              const std::vector<Recorded> values = parameters(to, p);
-                              advance(model_, now.x, now.external.data(), from, until,
-                                      values.data(), h, 1);
-                              return packed(now.x);
-                          }))
+        .emplace(of, ready(2,
+                           [&](Recorder& to, const double* p) {
+                               Moving now = moving(to);
+                               const InputFor<Recorded> from = recorded_input(to);
+                               const InputFor<Recorded> until = recorded_input(to);
+                               const std::vector<Recorded> values = parameters(to, p);
+                               advance(model_, now.x, now.external.data(), from, until,
+                                       values.data(), dt / apart, together);
+                               return packed(now.x);
+                           }))
         .first->second;
 }
 

@@ -16,6 +16,7 @@ double filter_run(const RunSystem<NX>& system, const KeepStep<NX>& keep) {
     }
 }
 
+template double filter_run(const RunSystem<kMotionStates>&, const KeepStep<kMotionStates>&);
 template double filter_run(const RunSystem<kStatesPlain>&, const KeepStep<kStatesPlain>&);
 template double filter_run(const RunSystem<kStatesFew>&, const KeepStep<kStatesFew>&);
 template double filter_run(const RunSystem<kStatesSome>&, const KeepStep<kStatesSome>&);

@@ -21,7 +21,9 @@ void store_state(const RunSystem<NX>& system, Trace& out, const Vec<NX>& mean,
         out.state[begin + to] = mean[from];
         out.state_std[begin + to] = std::sqrt(std::max(covariance(from, from), 0.0));
     };
-    for (int i = 0; i < kStatesPlain; ++i) store(static_cast<std::size_t>(i), i);
+    std::fill_n(out.state.begin() + static_cast<long>(begin), kStatesPlain, 0.0);
+    std::fill_n(out.state_std.begin() + static_cast<long>(begin), kStatesPlain, 0.0);
+    for (int i = 0; i < std::min(NX, kStatesPlain); ++i) store(static_cast<std::size_t>(i), i);
     for (std::size_t i = 0; i < system.own().count; ++i)
         store(kMotionStates + system.place(i), system.packed(i));
 }
@@ -55,7 +57,8 @@ void trace_run(const Problem& problem, const Run& run, const double* p, const No
 
 template <int NX>
 void look_ahead_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
-                    const std::vector<Horizon>& horizons, std::size_t apart, double* errors) {
+                    const std::vector<Horizon>& horizons, std::size_t apart, double* errors,
+                    bool readings) {
     const RunSystem<NX> system(problem.model, run, p, noise);
     std::vector<Vec<NX>> means(run.size());
     filter_run<NX>(system,
@@ -92,7 +95,7 @@ void look_ahead_run(const Problem& problem, const Run& run, const double* p, con
             const auto y = sense(problem.model, x, external.data(), run.inputs[n], p);
             double* const to = errors + (h * apart + n) * kChannels;
             for (std::size_t i = 0; i < kChannels; ++i)
-                to[i] = run.measurements[n][static_cast<int>(i)] - y[i];
+                to[i] = readings ? y[i] : run.measurements[n][static_cast<int>(i)] - y[i];
         }
     }
 }
@@ -111,7 +114,7 @@ Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smo
 }
 
 void look_ahead(const Problem& logged, const double* p, const Noise& noise,
-                const std::vector<Horizon>& horizons, double* errors) {
+                const std::vector<Horizon>& horizons, double* errors, bool readings) {
     const InTime in_time(logged, p);
     const Problem& problem = *in_time;
     for (const Horizon& h : horizons)
@@ -121,10 +124,28 @@ void look_ahead(const Problem& logged, const double* p, const Noise& noise,
     std::fill(errors, errors + horizons.size() * samples * kChannels, std::nan(""));
     with_state_size(problem.model.effects, noise, [&](auto nx) {
         for (const Run& run : problem.runs) {
-            look_ahead_run<decltype(nx)::value>(problem, run, p, noise, horizons, samples, errors);
+            look_ahead_run<decltype(nx)::value>(problem, run, p, noise, horizons, samples, errors,
+                                                readings);
             errors += run.size() * kChannels;
         }
     });
+}
+
+void free_run(const Problem& logged, const double* p, double* readings) {
+    const InTime in_time(logged, p);
+    const Problem& problem = *in_time;
+    const std::array<double, kExternals> calm{};
+    for (const Run& run : problem.runs) {
+        ModelState<double> x = initial_state(problem.model, run, p);
+        for (std::size_t k = 0; k < run.size(); ++k) {
+            poll_interrupt(k);
+            if (k > 0)
+                advance(problem.model, x, calm.data(), run.inputs[k - 1], run.inputs[k], p, run.dt,
+                        substeps_for(problem.model, p, x[0], run.dt));
+            const auto y = sense(problem.model, x, calm.data(), run.inputs[k], p);
+            readings = std::copy(y.begin(), y.end(), readings);
+        }
+    }
 }
 
 }  // namespace sysid

@@ -4,25 +4,21 @@
 #include <array>
 #include <cmath>
 
-#include "sysid/identify/least_squares.hpp"
+#include "sysid/math/dual.hpp"
+#include "sysid/model/kinematics.hpp"
 
 namespace sysid::lab {
 
 namespace {
 
-constexpr Passes<8, kP3 + 1> kPasses{kTyreParameters};  // both tyres; P_1, P_2, P_3 as well
-
-auto walk_of(const TyreLoss& loss) {
-    return [&loss](const auto* p, auto&& keep) { loss.walk(p, keep); };
-}
-
+constexpr double kSlowest = 1.0;  // slip angles are those at this speed below it [m/s]
 }  // namespace
 
 void TyreLoss::add(const TyreSample& s) {
-    const double speed = std::max(s.v_x, car_.slowest_mps);
+    const double speed = std::max(s.v_x, kSlowest);
     const double cosine = projects_steer_ ? std::cos(s.steer_rad) : 1.0;
     const double per_mass = s.a_y_weight / car_.mass_kg;
-    const double per_inertia = s.yaw_weight / car_.yaw_inertia_kgm2;
+    const double per_inertia = s.yaw_weight / yaw_inertia_kgm2_;
     const double front = cosine * s.fz_front_n;
     const Axles<double> alpha = slip_angles(speed, s.v_y, s.r, car_.lf_m, car_.lr_m, s.steer_rad);
     const std::size_t i = samples_++ % kLanes;
@@ -42,7 +38,7 @@ void TyreLoss::add(const TyreSample& s) {
 }
 
 void residuals(const TyreLoss& loss, const double* p, std::nullptr_t /*filter*/, double* out) {
-    residuals_of(walk_of(loss), p, out);
+    loss.walk(p, [&](const auto& errors) { out = std::copy(errors.begin(), errors.end(), out); });
 }
 
 double half_sum_of_squares(const TyreLoss& loss, const double* p, std::nullptr_t /*filter*/) {
@@ -51,7 +47,15 @@ double half_sum_of_squares(const TyreLoss& loss, const double* p, std::nullptr_t
 
 void sensitivities(const TyreLoss& loss, const double* p, std::nullptr_t /*filter*/,
                    const std::vector<int>& columns, double* out) {
-    kPasses.sensitivities(walk_of(loss), p, columns, out);
+    using D = Dual<kCurveParameters>;
+    std::array<D, kCurveParameters> wide;
+    for (int i = 0; i < kCurveParameters; ++i)
+        wide[static_cast<std::size_t>(i)] = D::seeded(p[i], i);
+    loss.walk(wide.data(), [&](const std::array<D, 2>& errors) {
+        for (const D& e : errors)
+            for (const int c : columns)
+                *out++ = c < kCurveParameters ? -e.d[static_cast<std::size_t>(c)] : 0.0;
+    });
 }
 
 double normal_equations(const TyreLoss& loss, const double* p, std::nullptr_t /*filter*/,

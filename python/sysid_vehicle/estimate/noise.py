@@ -229,7 +229,7 @@ def maximise_noise(
     Parameters
     ----------
     problem : object with `noise_score`
-        Such as `_core.Problem` and `_core.TyreProblem`.
+        Such as `_core.Problem`.
     p : array, shape (parameters,)
     start, lowest, highest : array, shape (noises,)
         Where to begin, and the range that is searched.

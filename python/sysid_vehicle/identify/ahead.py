@@ -25,10 +25,10 @@ from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..estimate import Driving
 from ..model import Model
-from .box import free_box
+from .box import free_box, free_prior
 from .estimates import wald
 from .fit import Fit
-from .objective import Penalised, gaussian_prior
+from .objective import Penalised
 from .search import minimise
 
 __all__ = ["predicting_ahead"]
@@ -123,9 +123,7 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     windows = _windows_of(driving, horizon_s)
     noise = _blind_noise(driving)
     known = model.parameters
-    prior = gaussian_prior(
-        _core.PARAMETERS, {known[n].column: told for n, told in model.priors.items()}
-    )
+    prior = free_prior(model)
     whole = driving.problem(model)
     p = model.vector()
     p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)

@@ -1,13 +1,15 @@
-"""Where the free parameters of a model may lie."""
+"""Where the free parameters of a model may lie, and what is known of them beforehand."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from .. import _core
 from ..model import Model
+from .objective import LinearRows, gaussian_prior
 from .search import Box
 
-__all__ = ["free_box"]
+__all__ = ["free_box", "free_prior"]
 
 
 def free_box(model: Model) -> Box:
@@ -22,3 +24,9 @@ def free_box(model: Model) -> Box:
         if part is not None and part.scored_at_typical:
             lower[i] = max(lower[i], 0.1 * known[n].typical)
     return Box([known[n].column for n in names], lower, bounds[:, 1])
+
+
+def free_prior(model: Model) -> tuple[LinearRows, ...]:
+    """The priors of the model's free parameters."""
+    known = model.parameters
+    return gaussian_prior(_core.PARAMETERS, {known[n].column: p for n, p in model.priors.items()})

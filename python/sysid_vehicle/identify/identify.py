@@ -16,10 +16,10 @@ from ..estimate.pieces import DrivingProblem
 from ..log import Log, check_car, check_excitation
 from ..model import Model
 from .ahead import predicting_ahead
-from .box import free_box
+from .box import free_box, free_prior
 from .estimates import INTERVALS, wald, with_profiles
 from .fit import Fit
-from .objective import Objective, gaussian_prior
+from .objective import Objective
 from .profile import profile_all
 from .search import METHODS, Box, minimise
 from .settle import risen, rivalled, settle, settle_finely, to_the_top
@@ -187,10 +187,7 @@ def _told(
 
 def objective_of(model: Model, problem: DrivingProblem, driving: Driving) -> Objective:
     """The likelihood of a problem with the priors of a model's free parameters."""
-    known = model.parameters
-    stated = {known[n].column: prior for n, prior in model.priors.items()}
-    prior = gaussian_prior(_core.PARAMETERS, stated)
-    return Objective(problem, prior, *noise_range(model.vehicle, driving))
+    return Objective(problem, free_prior(model), *noise_range(model.vehicle, driving))
 
 
 def refine(

@@ -1,8 +1,7 @@
 """What every search minimises: whitened residuals of data, and of what is known beforehand.
 
-The grey-box model of the main job (`_core.Problem`), the laboratory's car with logged axle loads
-(`_core.TyreProblem`) and its regressions on a known motion are problems of one form. Priors, and
-the wish that a quantity have a certain value, are further residuals.
+The grey-box model (`_core.Problem`) and the laboratory's regressions on a known motion are problems
+of one form. Priors, and the wish that a quantity have a certain value, are further residuals.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ def hold_value(fit: TyreFit, name: str, value: float) -> HeldValue:
             )
     elif not np.isfinite(value):
         raise InvalidInput(f"{name} = {value} is not a number")
-    objective = objective_of(fit.vehicle, fit.logs)
+    objective = objective_of(fit.vehicle, fit.logs, residual_terms="P1" in names)
     gains = objective.freeze(fit.parameters, fit.noise)
     best = objective.half_sum_of_squares(fit.parameters, gains)
     valleys = [

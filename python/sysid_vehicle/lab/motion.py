@@ -114,6 +114,7 @@ class TyreMotion:
         rate = self.yaw_acc_radps2 if self.yaw_acc_radps2 is not None else np.zeros(self.n)
         return _core.TyreLoss(
             vehicle.core(),
+            vehicle.yaw_inertia_kgm2,
             projects_steer,
             self.motion,
             as_float64(np.column_stack([self.ay_mps2, rate])),

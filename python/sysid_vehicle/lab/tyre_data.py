@@ -78,12 +78,12 @@ class GreyBoxVehicle:
             0.1 if known is None else 0.0,
         )
 
-    def core(self) -> _core.GreyBoxCar:
-        """For the compiled core."""
-        car = _core.GreyBoxCar()
-        for name in ("mass_kg", "yaw_inertia_kgm2", "lf_m", "lr_m", "air_density_kgpm3"):
+    def core(self) -> _core.VehicleData:
+        """For the compiled core; the wheel force acts along the car."""
+        car = _core.VehicleData()
+        for name in ("mass_kg", "lf_m", "lr_m", "air_density_kgpm3", "cg_height_m"):
             setattr(car, name, getattr(self, name))
-        car.cg_height_m = self.cg_height_m
+        car.brake_front_share = car.drive_front_share = 0.0
         return car
 
 

@@ -6,13 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .. import _core
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from .observed import READINGS
 from .tyre_data import GreyBoxVehicle, TyreLog
-from .tyre_problem import first_point
+from .tyre_problem import TyreProblem, first_point
 
 _SENSORS = (0.1, 3.16e-3, 3.16e-3, 3.16e-3)  # v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2]
 
@@ -53,11 +52,9 @@ def drive_tyres(
     u = as_float64(inputs)
     told = np.full((len(u), 4), np.nan)
     told[0, :3] = begin
-    problem = _core.TyreProblem(vehicle.core())
+    problem = TyreProblem.of(vehicle, residual_terms=True)
     problem.add_run(step_s, u, told)
-    p = first_point(tyres)
-    gains = problem.freeze(p, as_float64([1e-6, 1e-6, 1e-6, 1.0, 1e-6, 1e-6, 1e-6]))
-    y = problem.look_ahead(p, gains, 0)
+    y = problem.free_run(first_point(tyres))
     lost = ~np.isfinite(y).all(axis=1) | (y[:, 0] < 1.0) | (np.abs(y[:, 1]) > y[:, 0])
     if lost.any():
         k = int(np.argmax(lost))

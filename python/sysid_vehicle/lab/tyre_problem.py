@@ -1,19 +1,28 @@
 """What is asked of the data: free parameters, where they are looked for, and the likelihood.
 
-Equations of the likelihood: `cpp/include/sysid/lab/tyre_likelihood.hpp`.
+The likelihood is that of the main job, of a model whose inputs are held from sample to sample and
+whose axle loads are logged. Factors of mass and yaw inertia and the drag are effects of it, P1, P2
+and P3 an effect of its own: a lateral force m (P1 v_x^2 + P2 v_y + P3 r) of the stated mass.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
+from ..effects import effect
 from ..errors import InvalidInput, near_names
+from ..estimate import NoiseModel
+from ..estimate.driving import MEASURED
+from ..formula import TARGETS, trace
 from ..identify.objective import Objective, gaussian_prior
 from ..identify.search import Box
+from .observed import READINGS
 from .tyre_data import SHORTEST, GreyBoxVehicle, TyreLog
 from .tyre_fit import PARAMETERS
 
@@ -42,6 +51,23 @@ _SETTLES_S = 1.0
 # coefficients as known to the sixth figure.
 _SMALLEST = np.array([1e-4, 1e-4, 1e-5, 1e-4, 3e-5, 3e-5, 3e-5])
 _LARGEST = np.array([10.0, 10.0, 2.0, 20.0, 5.0, 5.0, 5.0])
+
+
+_FACTORS = ("mass", "yaw_inertia", "aero_drag")  # of the last three parameters
+_TERMS = ("P1", "P2", "P3")
+_COLUMNS = np.array(  # of all parameters in the core's vector
+    [
+        *range(8),
+        *(_core.USER_OFFSET + i for i in range(len(_TERMS))),
+        *(effect(name).columns[0] for name in _FACTORS),
+    ]
+)
+_NULL = np.array([0.0] * (len(PARAMETERS) - 3) + [1.0, 1.0, 0.0])
+_YAW_INERTIA = 8  # place in the core's vector
+_CHANNELS = [MEASURED.index(name) for name in READINGS]
+# Of the core's noise parameters those that are learned: sensors, and what disturbs the motion.
+_LEARNED = [*_CHANNELS, *range(len(MEASURED), len(MEASURED) + 3)]
+_NO_NOISE = NoiseModel((1.0,) * len(MEASURED), (0.0,) * 3, (0.0,) * 3, (0.5,) * 3).vector()
 
 
 def first_point(start: Mapping[str, float]) -> FloatArray:
@@ -82,11 +108,114 @@ def free_parameters(vehicle: GreyBoxVehicle, *, residual_terms: bool = False) ->
     return (*PARAMETERS[:8], *terms, *_tolerances(vehicle), "drag_area_m2")
 
 
+@dataclass(frozen=True, eq=False)
+class TyreProblem:
+    """The main job's likelihood by the parameters and noises of tyre identification (`Predicting`).
+
+    Parameters
+    ----------
+    problem : _core.Problem
+    yaw_inertia_kgm2 : float
+    """
+
+    problem: _core.Problem
+    yaw_inertia_kgm2: float
+
+    @classmethod
+    def of(cls, vehicle: GreyBoxVehicle, *, residual_terms: bool) -> TyreProblem:
+        """Without runs; P1, P2, P3 act only in a problem with `residual_terms`."""
+        terms = trace(
+            lambda d, p: vehicle.mass_kg * (p.P1 * d.v_x**2 + p.P2 * d.v_y + p.P3 * d.r),
+            _TERMS,
+            "force_y",
+            "P1 to P3",
+        )
+        mask = 0
+        for name in _FACTORS:
+            mask |= effect(name).bit
+        own: tuple[Any, ...] = (0, [], ((TARGETS.index("force_y"), terms.steps),), [])
+        users = [own] if residual_terms else []
+        model = _core.SingleTrack(vehicle.core(), mask, True, users, True, True)
+        return cls(_core.Problem(model), vehicle.yaw_inertia_kgm2)
+
+    def add_run(self, step_s: float, inputs: FloatArray, measurements: FloatArray) -> None:
+        """Add a drive: inputs as in `TyreLog`, and `READINGS`."""
+        y = np.full((len(measurements), len(MEASURED)), np.nan)
+        y[:, _CHANNELS] = measurements
+        self.problem.add_run(step_s, as_float64(inputs[:, [1, 0, 2, 3]]), y)
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return self.problem.samples
+
+    def _values(self, p: FloatArray) -> FloatArray:
+        values = np.zeros((*p.shape[:-1], _core.PARAMETERS))
+        values[..., _YAW_INERTIA] = self.yaw_inertia_kgm2
+        values[..., _COLUMNS] = p - _NULL
+        return values
+
+    def freeze(self, p: FloatArray, noise: FloatArray) -> _core.FrozenFilter:
+        """Gains of the filter."""
+        return self.problem.freeze(self._values(p), _noise(noise))
+
+    def log_likelihoods(self, sets: FloatArray, noise: FloatArray) -> FloatArray:
+        """Log-likelihoods of sets of parameters, a row each."""
+        return self.problem.log_likelihoods(self._values(sets), _noise(noise))
+
+    def noise_score(self, p: FloatArray, noise: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Log-likelihood, its derivatives by the noise's logarithms, and their information."""
+        value, slope, information = self.problem.noise_score(self._values(p), _noise(noise))
+        return value, slope[_LEARNED], as_float64(information[np.ix_(_LEARNED, _LEARNED)])
+
+    def residuals(self, p: FloatArray, gains: Any) -> FloatArray:
+        """Whitened residuals."""
+        return self.problem.residuals(self._values(p), gains)
+
+    def half_sum_of_squares(self, p: FloatArray, gains: Any) -> float:
+        """Half the sum of their squares."""
+        return self.problem.half_sum_of_squares(self._values(p), gains)
+
+    def sensitivities(self, p: FloatArray, gains: Any, columns: list[int]) -> FloatArray:
+        """Minus the derivatives of the residuals, one row each."""
+        return self.problem.sensitivities(self._values(p), gains, _COLUMNS[columns].tolist())
+
+    def normal_equations(
+        self, p: FloatArray, gains: Any, columns: list[int]
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """Half the sum of squares, direction of descent, Gauss-Newton matrix."""
+        return self.problem.normal_equations(self._values(p), gains, _COLUMNS[columns].tolist())
+
+    def motion(self, p: FloatArray, noise: FloatArray) -> FloatArray:
+        """Filtered v_x, v_y, r of every sample."""
+        told = self.problem.trace(self._values(p), _noise(noise), False)
+        return as_float64(told["state"][:, :3])
+
+    def predicted(self, p: FloatArray, noise: FloatArray, ahead: int) -> FloatArray:
+        """`READINGS` predicted so many samples ahead, shape (samples, 4)."""
+        told = self.problem.look_ahead(self._values(p), _noise(noise), [(ahead, 1)], True)
+        return as_float64(told[0][:, _CHANNELS])
+
+    def free_run(self, p: FloatArray) -> FloatArray:
+        """`READINGS` of runs simulated from their first ones, shape (samples, 4)."""
+        return as_float64(self.problem.free_run(self._values(p))[:, _CHANNELS])
+
+
+def _noise(learned: FloatArray) -> FloatArray:
+    noise = _NO_NOISE.copy()
+    noise[_LEARNED] = learned
+    return noise
+
+
 def objective_of(
-    vehicle: GreyBoxVehicle, logs: Sequence[TyreLog], most_samples: int | None = None
+    vehicle: GreyBoxVehicle,
+    logs: Sequence[TyreLog],
+    most_samples: int | None = None,
+    *,
+    residual_terms: bool = False,
 ) -> Objective:
     """Likelihood of logs thinned to `most_samples`, with priors where the vehicle is unsure."""
-    problem = tyre_problem(vehicle, logs, most_samples=most_samples)
+    problem = tyre_problem(vehicle, logs, most_samples=most_samples, residual_terms=residual_terms)
     unsure = {PARAMETERS.index(n): (1.0, std) for n, std in _tolerances(vehicle).items()}
     return Objective(problem, gaussian_prior(len(PARAMETERS), unsure), _SMALLEST, _LARGEST)
 
@@ -97,13 +226,14 @@ def tyre_problem(
     *,
     most_samples: int | None = None,
     window_s: float = 5.0,
-) -> _core.TyreProblem:
-    """The core's problem; of about so many samples, if that is asked.
+    residual_terms: bool = False,
+) -> TyreProblem:
+    """The likelihood of logs; of about so many samples, if that is asked.
 
     Half of those are the windows of the hardest cornering, where tyres show their peak, half are
     spread evenly over the rest.
     """
-    problem = _core.TyreProblem(vehicle.core())
+    problem = TyreProblem.of(vehicle, residual_terms=residual_terms)
     total = sum(log.n for log in logs)
     for log in logs:
         windows = [slice(0, log.n)]

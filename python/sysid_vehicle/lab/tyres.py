@@ -92,8 +92,8 @@ def identify_tyres(
     begins = space_filling(given, box.lower, box.upper, starts, seed, list(range(8)))
     told = [g if g.sideslip_measured else g.with_kinematic_sideslip() for g in several]
     p, noise, ends, others = multistart(
-        objective_of(vehicle, several, _THINNED),
-        objective_of(vehicle, told, _THINNED),
+        objective_of(vehicle, several, _THINNED, residual_terms=residual_terms),
+        objective_of(vehicle, told, _THINNED, residual_terms=residual_terms),
         _regression(vehicle, told),
         p,
         box,
@@ -104,7 +104,7 @@ def identify_tyres(
         workers=workers,
         progress=progress,
     )
-    whole = objective_of(vehicle, several)
+    whole = objective_of(vehicle, several, residual_terms=residual_terms)
     p, noise, _ = settle(whole, p, noise, box, method=method, parameters_first=True)
     value = whole.log_likelihood(p, noise)
     rivals: list[FloatArray] = []
@@ -160,6 +160,7 @@ def _summary(
     gains = objective.freeze(p, noise)
     _, _, information = objective.normal_equations(p, gains, box.columns)
     estimates, covariance = wald(free, UNITS, p[box.columns], information, box)
+    driven = tyre_problem(vehicle, logs, residual_terms="P1" in free)
     return TyreFit(
         vehicle,
         logs,
@@ -169,7 +170,7 @@ def _summary(
         noise,
         float(gains.log_likelihood),
         ends,
-        _driven(vehicle, logs, tyre_problem(vehicle, logs).states(p, gains)),
+        _driven(vehicle, logs, driven.motion(p, noise)),
     )
 
 

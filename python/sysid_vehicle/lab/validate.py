@@ -205,8 +205,8 @@ def _validation(car: IdentifiedCar, log: TyreLog, horizon_s: float) -> Validatio
             f"{log.name}: {horizon_s:g} s ahead in a drive of {log.n * log.step_s:g} s, sampled "
             f"every {log.step_s:g} s; choose a horizon in between"
         )
-    problem = tyre_problem(car.vehicle, [log])
-    gains = problem.freeze(car.parameters, car.noise)
-    predicted = np.stack([problem.look_ahead(car.parameters, gains, n) for n in (1, ahead, 0)])
+    problem = tyre_problem(car.vehicle, [log], residual_terms=bool(np.any(car.parameters[8:11])))
+    near = [problem.predicted(car.parameters, car.noise, n) for n in (1, ahead)]
+    predicted = np.stack([*near, problem.free_run(car.parameters)])
     horizons = ("one sample", f"{horizon_s:g} s", "the whole drive")
     return Validation(log, horizons, predicted, as_float64(car.noise[: len(READINGS)]))

@@ -26,6 +26,7 @@ struct InputOf {
     V time_s{};            // since the log began
     V steer_rate_radps{};  // where a model asks for it
     std::array<V, kUserChannels> channels{};  // that users' effects read
+    Axles<V> loads_n{};                       // that the tyres feel, of a model with `loads_known`
 };
 using Input = InputOf<double>;
 template <class S>
@@ -34,26 +35,37 @@ using InputFor = InputOf<Given<S>>;
 /// What disturbs the motion: forces and a moment, and accelerations that no accelerometer feels.
 enum External : int { kForceX, kForceY, kMomentZ, kGravityX, kGravityY, kExternals };
 
-/// Axle loads that the tyres feel instead of those of the motion: a simulator that closes the
-/// loop between force and load over a sample has them from the sample before.
-struct HeldLoads {
+/// What the axle loads of an input that is held move from within its sample:
+///   F_zf = F_zf(0) - h/L (m a_x - m a_x(0)) + A_f (v_x^2/v_x(0)^2 - 1),                     (6)
+///   F_zr = F_zr(0) + h/L (m a_x - m a_x(0)) + A_r (v_x^2/v_x(0)^2 - 1),
+/// where A is what F_z(0) is beyond (5): the air's part. At 10 ms that is a thousandth of the
+/// force, which a drive beyond the peak resolves.
+template <class S>
+struct LoadsSince {
     bool on = false;
-    double front_n = 0.0, rear_n = 0.0;
+    S pull{};           // m a_x(0)
+    S speed_squared{};  // v_x(0)^2
 };
 
 /// A car with its effects; the parameters' values stay outside, so that they can carry derivatives.
 struct SingleTrack {
     VehicleData car;
     EffectMask effects = 0;
-    bool force_known = true;  // false: `Input::longitudinal` is the measured acceleration
-    HeldLoads held{};
+    bool force_known = true;     // false: `Input::longitudinal` is the measured acceleration
     UserEffects user = nullptr;  // those that act; `effects` has no bits of theirs
+    bool loads_known = false;    // tyres feel the loads of the input in place of (5)
+    bool inputs_held = false;    // from sample to sample, as a digital controller does
+    Axles<double> most_n{};      // largest of these loads, where they are known
+
+    /// Whether loads move by (6); with no height of the centre of gravity they are held as well.
+    bool loads_move() const { return loads_known && inputs_held && car.cg_height_m > 0.0; }
 
     /// Evaluates (1) to (5). `motion` = v_x, v_y, r; `external` = disturbance, see `External`;
     /// `lags` = how the auxiliary states move; `rate` receives the derivatives of the motion.
     template <class S, class T>
     Workings<S> evaluate(const S* motion, const S* external, const Lags<S>& lags,
-                         const InputFor<S>& u, const T* p, S* rate) const;
+                         const InputFor<S>& u, const T* p, S* rate,
+                         const LoadsSince<S>& since = {}) const;
 
     /// The same with the derivatives of the auxiliary states `aux`.
     template <class S, class T>
@@ -67,13 +79,15 @@ struct SingleTrack {
     template <class S, class T>
     void sense(const Workings<S>& w, const T* p, const S* aux, S* y) const;
 
-    /// Fastest rate [1/s] of the motion, for choosing integration steps.
+    /// Fastest rate [1/s] of the motion, for choosing integration steps. Inputs that jump at every
+    /// sample excite it at every sample: it counts three times.
     double fastest_rate(const double* p, double v_x) const {
-        const double load = car.mass_kg * car.gravity_mps2 / (car.lf_m + car.lr_m);
-        const double c_f = p[kBFront] * p[kCFront] * p[kDFront] * load * car.lr_m;
-        const double c_r = p[kBRear] * p[kCRear] * p[kDRear] * load * car.lf_m;
+        Axles<double> load = static_loads(car.mass_kg * car.gravity_mps2, car.lf_m, car.lr_m);
+        if (most_n.front > 0.0) load = most_n;
+        const double c_f = p[kBFront] * p[kCFront] * p[kDFront] * load.front;
+        const double c_r = p[kBRear] * p[kCRear] * p[kDRear] * load.rear;
         const double yaw = (c_f * car.lf_m * car.lf_m + c_r * car.lr_m * car.lr_m) / p[kYawInertia];
-        return std::max(yaw, (c_f + c_r) / car.mass_kg) / v_x;
+        return (inputs_held ? 3.0 : 1.0) * std::max(yaw, (c_f + c_r) / car.mass_kg) / v_x;
     }
 
   private:
@@ -89,7 +103,7 @@ struct SingleTrack {
     // `w.r_dot` is the yaw acceleration as far as it is known.
     template <class S, class T>
     void once(Workings<S>& w, const S* motion, const S* external, const Lags<S>& lags,
-              const InputFor<S>& u, const T* p) const {
+              const InputFor<S>& u, const T* p, const LoadsSince<S>& since) const {
         begin(w, motion, u, p);
         w.user_states = lags.states() + kCatalogueStates;
         const T* q = p + kBaseParameterCount;
@@ -109,11 +123,11 @@ struct SingleTrack {
         each([&](auto e, const T* own, At at) { return e.slip(own, w, lags.from(at)); });
         const S mu_f = magic_formula(w.alpha_f, front_tyre(p));
         const S mu_r = magic_formula(w.alpha_r, rear_tyre(p));
-        axle_loads(w, mu_f);
+        const Axles<S> known = axle_loads(w, mu_f, u, since);
         each([&](auto e, const T* own, At) { return e.loads(own, w); });
         each([&](auto e, const T* own, At at) { return e.grip(own, w, lags.from(at).states()); });
-        w.fy_f = (held.on ? S(held.front_n) : w.fz_f) * mu_f * w.grip_f;
-        w.fy_r = (held.on ? S(held.rear_n) : w.fz_r) * mu_r * w.grip_r;
+        w.fy_f = (loads_known ? known.front : w.fz_f) * mu_f * w.grip_f;
+        w.fy_r = (loads_known ? known.rear : w.fz_r) * mu_r * w.grip_r;
         each([&](auto e, const T* own, At) { return e.forces(own, w); });
         user_forces(user, q, w);
         balance(w);
@@ -160,9 +174,11 @@ struct SingleTrack {
     }
 
     // The front load depends on a_x, which depends on the front lateral force, which is
-    // proportional to the front load: (1) and (5) are solved together for F_zf.
+    // proportional to the front load: (1) and (5), or (6), are solved together for F_zf. Returns
+    // the loads of the input.
     template <class S>
-    void axle_loads(Workings<S>& w, const S& mu_f) const {
+    Axles<S> axle_loads(Workings<S>& w, const S& mu_f, const InputFor<S>& u,
+                        const LoadsSince<S>& since) const {
         using std::cos;
         using std::sin;
         const S wheelbase = w.l_f + w.l_r;
@@ -173,16 +189,28 @@ struct SingleTrack {
         const S c = cos(w.delta);
         const S s = sin(w.delta);
         const S lever = w.h / wheelbase;
+        Axles<S> told{S(u.loads_n.front), S(u.loads_n.rear)};
+        if (since.on) {
+            const S& squared = since.speed_squared;
+            const S growth = (w.v_x * w.v_x - squared) / if_below(squared, 1.0, S(1.0), squared);
+            told.front += growth * (told.front - w.fz0_f + lever * since.pull);
+            told.rear += growth * (told.rear - w.fz0_r - lever * since.pull);
+        }
         S pull;  // m a_x
         if (force_known) {
             split_force(w);
             const S known = w.fx_f * c + w.fx_r + w.force_x;
-            const S front =
-                held.on ? S(held.front_n) : (w.fz0_f - lever * known) / (1.0 - lever * (mu_f * s));
+            S front;
+            if (since.on)
+                front = (told.front - lever * (known - since.pull)) / (1.0 - lever * (mu_f * s));
+            else if (loads_known)
+                front = told.front;
+            else
+                front = (w.fz0_f - lever * known) / (1.0 - lever * (mu_f * s));
             pull = known - front * (mu_f * s);
         } else {
             pull = w.m * w.ax_input;
-            const S front = w.fz0_f - lever * pull;
+            const S front = loads_known ? told.front : w.fz0_f - lever * pull;
             const S along = pull - w.force_x + front * (mu_f * s);  // F_xf cos(delta) + F_xr
             const S share = front_share(w, along);
             w.fx = along / (share * c + (1.0 - share));
@@ -190,6 +218,11 @@ struct SingleTrack {
         }
         w.fz_f = w.fz0_f - lever * pull;
         w.fz_r = w.fz0_r + lever * pull;
+        if (since.on) {
+            told.front -= lever * (pull - since.pull);
+            told.rear += lever * (pull - since.pull);
+        }
+        return told;
     }
 
     template <class S>
@@ -221,14 +254,15 @@ struct SingleTrack {
 
 template <class S, class T>
 Workings<S> SingleTrack::evaluate(const S* motion, const S* external, const Lags<S>& lags,
-                                  const InputFor<S>& u, const T* p, S* rate) const {
+                                  const InputFor<S>& u, const T* p, S* rate,
+                                  const LoadsSince<S>& since) const {
     // An accelerometer beside the centre of gravity makes the measured a_x, which stands for
     // the force, depend on the yaw acceleration it brings about. Each pass shrinks the error
     // by l_y dr/dt per a_x, a few hundredths.
     const int passes = !force_known && (effects & kReadYawAcceleration) != 0 ? 4 : 1;
     Workings<S> w;
     w.r_dot = S(0.0);
-    for (int i = 0; i < passes; ++i) once(w, motion, external, lags, u, p);
+    for (int i = 0; i < passes; ++i) once(w, motion, external, lags, u, p, since);
     rate[0] = w.a_x + w.v_y * w.r + w.gravity_x;
     rate[1] = w.a_y - w.v_x * w.r + w.gravity_y;
     rate[2] = w.r_dot;

@@ -32,6 +32,7 @@ InputOf<V> between(const InputOf<V>& a, const InputOf<V>& b, double part) {
     };
     for (std::size_t i = 0; i < kUserChannels; ++i)
         mixed.channels[i] = mix(a.channels[i], b.channels[i]);
+    mixed.loads_n = {mix(a.loads_n.front, b.loads_n.front), mix(a.loads_n.rear, b.loads_n.rear)};
     return mixed;
 }
 
@@ -90,18 +91,20 @@ struct NoLags {
 };
 
 /// One Runge-Kutta step of the motion. Lags move by their exact solution between the targets of its
-/// stages, slow states with the motion.
+/// stages, slow states with the motion. The first step of a sample fills in `since`.
 template <class S, class T, class Memory>
 void model_step(const SingleTrack& model, ModelState<S>& x, const S* external,
                 const InputFor<S>& from, const InputFor<S>& to, const T* p, double h,
-                const ActiveStates& own, Memory& memory) {
+                const ActiveStates& own, Memory& memory, LoadsSince<S>& since) {
     const LagStep<S> lags = memory.begin(x, h);
     const std::array<InputFor<S>, 3> input{from, between(from, to, 0.5), to};
     const auto rate = [&](std::size_t stage, const ModelState<S>& at, ModelState<S>& k) {
         S* own_rate = k.data() + kMotionStates;
-        model.evaluate(at.data(), external,
-                       Lags<S>(kLagStages[stage], at.data() + kMotionStates, own_rate, lags),
-                       input[(stage + 1) / 2], p, k.data());
+        const auto w =
+            model.evaluate(at.data(), external,
+                           Lags<S>(kLagStages[stage], at.data() + kMotionStates, own_rate, lags),
+                           input[(stage + 1) / 2], p, k.data(), since);
+        if (model.loads_move() && !since.on) since = {true, w.m * w.a_x, w.v_x * w.v_x};
     };
     runge_kutta_step(x, h, rate, [&](auto&& use) {
         for (std::size_t i = 0; i < kMotionStates; ++i) use(i);
@@ -121,10 +124,13 @@ template <class S, class T>
 void advance(const SingleTrack& model, ModelState<S>& x, const S* external, const InputFor<S>& from,
              const InputFor<S>& to, const T* p, double dt, int substeps) {
     const ActiveStates own = active_states(model.effects);
+    const InputFor<S>& until = model.inputs_held ? from : to;
+    LoadsSince<S> since;
     const auto steps = [&](auto&& memory) {
         for (int n = 0; n < substeps; ++n)
-            model_step(model, x, external, between(from, to, static_cast<double>(n) / substeps),
-                       between(from, to, (n + 1.0) / substeps), p, dt / substeps, own, memory);
+            model_step(model, x, external, between(from, until, static_cast<double>(n) / substeps),
+                       between(from, until, (n + 1.0) / substeps), p, dt / substeps, own, memory,
+                       since);
     };
     if (own.count == 0)
         steps(NoLags<S>{});
@@ -169,7 +175,8 @@ constexpr int kStatePass = 6, kWideStatePass = 9;
 // NOLINTBEGIN(bugprone-macro-parentheses): types take none
 #define SYSID_COMPILED_MODEL(PREFIX, S, T)                                                         \
     PREFIX template Workings<S> SingleTrack::evaluate(const S*, const S*, const Lags<S>&,          \
-                                                      const InputFor<S>&, const T*, S*) const;     \
+                                                      const InputFor<S>&, const T*, S*,            \
+                                                      const LoadsSince<S>&) const;                 \
     PREFIX template void SingleTrack::sense(const Workings<S>&, const T*, const S*, S*) const;     \
     PREFIX template void advance(const SingleTrack&, ModelState<S>&, const S*, const InputFor<S>&, \
                                  const InputFor<S>&, const T*, double, int);                       \
@@ -180,6 +187,7 @@ constexpr int kStatePass = 6, kWideStatePass = 9;
 // NOLINTEND(bugprone-macro-parentheses)
 
 SYSID_COMPILED_MODEL(extern, double, double)
+SYSID_COMPILED_MODEL(extern, Dual<kMotionStates>, double)
 SYSID_COMPILED_MODEL(extern, Dual<kStatePass>, double)
 SYSID_COMPILED_MODEL(extern, Dual<kWideStatePass>, double)
 SYSID_COMPILED_MODEL(extern, Recorded, Recorded)

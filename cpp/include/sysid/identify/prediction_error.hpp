@@ -108,8 +108,11 @@ struct Horizon {
 
 /// Prediction errors from the filtered state and slope of the road, for each horizon samples x
 /// kChannels; NaN where no prediction ends. The filter runs once, and predictions that start at one
-/// sample are one prediction, read at each horizon.
+/// sample are one prediction, read at each horizon. `readings`: what is predicted itself.
 void look_ahead(const Problem& problem, const double* p, const Noise& noise,
-                const std::vector<Horizon>& horizons, double* errors);
+                const std::vector<Horizon>& horizons, double* errors, bool readings = false);
+
+/// Readings of each run, kChannels per sample, simulated from where it starts with no filter.
+void free_run(const Problem& problem, const double* p, double* readings);
 
 }  // namespace sysid

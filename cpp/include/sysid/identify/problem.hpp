@@ -42,6 +42,11 @@ struct Noise {
 
     /// Whether the slope of the road varies; without, its states do not exist.
     bool sloping() const { return road[0] > 0.0 || road[1] > 0.0; }
+    /// Whether nothing but white noise disturbs the motion.
+    bool white() const {
+        return !sloping() && std::all_of(disturbance.begin(), disturbance.end(),
+                                         [](double s) { return s == 0.0; });
+    }
 
     /// Correlation time and standard deviation of F_x, F_y, M_z, gravity along and across.
     double time_of(std::size_t i) const {

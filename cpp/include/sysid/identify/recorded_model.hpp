@@ -58,8 +58,11 @@ class RecordedModel {
     std::size_t moving() const { return states_ + externals_; }
 
     Ready& reading() { return read_; }
-    /// A step over `h` seconds.
-    Ready& step_of(double h);
+    /// In how many programs a step of `parts` is done: where inputs are held its parts belong
+    /// together.
+    int programs(int parts) const { return model_.inputs_held ? 1 : parts; }
+    /// One of these, of a step over `dt` seconds.
+    Ready& step_of(double dt, int parts);
     /// The states with which a run begins; inputs are the parameters.
     Ready start_of(const Run& run) const;
 
@@ -87,7 +90,7 @@ class RecordedModel {
         }
     }
 
-    static constexpr std::size_t kGiven = 4 + kUserChannels;  // numbers of an `Input`
+    static constexpr std::size_t kGiven = 6 + kUserChannels;  // numbers of an `Input`
 
   private:
     struct Moving {
@@ -108,7 +111,7 @@ class RecordedModel {
     ActiveStates own_;
     std::size_t states_, externals_;
     Ready read_;
-    std::map<double, Ready> steps_;  // by the length of a step
+    std::map<std::pair<double, int>, Ready> steps_;  // by length and number of parts
 };
 
 }  // namespace sysid

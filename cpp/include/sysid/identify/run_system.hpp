@@ -20,7 +20,9 @@ class RunSystem {
           p_(p),
           own_(active_states(model.effects)),
           start_(initial_state(model, run, p)),
-          disturbances_(noise.sloping() ? kDisturbances : kMotionStates) {
+          disturbances_(NX == kMotionStates ? 0
+                        : noise.sloping()   ? kDisturbances
+                                            : kMotionStates) {
         process_.setZero();
         for (int i = 0; i < kMotionStates; ++i) {
             const auto n = static_cast<std::size_t>(i);
@@ -113,7 +115,9 @@ class RunSystem {
 
   private:
     // So many directions at once: the model is compiled for few widths.
-    static constexpr int kPass = NX % kWideStatePass == 0 ? kWideStatePass : kStatePass;
+    static constexpr int kPass = NX == kMotionStates        ? kMotionStates
+                                 : NX % kWideStatePass == 0 ? kWideStatePass
+                                                            : kStatePass;
     static_assert(NX % kPass == 0);
     using D = Dual<kPass>;
 
@@ -155,7 +159,8 @@ class RunSystem {
     Mat<kChannels, kChannels> sensors_;
 };
 
-/// State sizes for models without states of the effects' own, with a few, with some, and with all.
+/// State sizes for models without states of the effects' own, with a few, with some, and with all;
+/// `kMotionStates` where white noise alone disturbs the first of these.
 constexpr int kStatesFew = kStatesPlain + 3;
 constexpr int kStatesSome = kStatesPlain + 6;
 constexpr int kStatesMost =
@@ -166,6 +171,7 @@ constexpr int kStatesMost =
 template <class Use>
 auto with_state_size(EffectMask effects, const Noise& noise, Use&& use) {
     const std::size_t own = active_states(effects).count + (noise.sloping() ? kRoadStates : 0);
+    if (own == 0 && noise.white()) return use(std::integral_constant<int, kMotionStates>{});
     if (own == 0) return use(std::integral_constant<int, kStatesPlain>{});
     if (own <= 3) return use(std::integral_constant<int, kStatesFew>{});
     if (own <= 6) return use(std::integral_constant<int, kStatesSome>{});
@@ -179,6 +185,7 @@ using KeepStep = std::function<void(std::size_t, const FilterStep<NX, kChannels>
 template <int NX>
 double filter_run(const RunSystem<NX>& system, const KeepStep<NX>& keep);
 
+extern template double filter_run(const RunSystem<kMotionStates>&, const KeepStep<kMotionStates>&);
 extern template double filter_run(const RunSystem<kStatesPlain>&, const KeepStep<kStatesPlain>&);
 extern template double filter_run(const RunSystem<kStatesFew>&, const KeepStep<kStatesFew>&);
 extern template double filter_run(const RunSystem<kStatesSome>&, const KeepStep<kStatesSome>&);

@@ -187,17 +187,18 @@ void by_length(const LaneSamples& samples, const std::array<int, kLanes>& parts,
 template <class Part>
 void move_lanes(RecordedModel& model, const LaneSamples& samples, double dt, int parts, LaneRow* x,
                 Part&& part) {
-    RecordedModel::Ready& ready = model.step_of(dt / parts);
-    for (int n = 0; n < parts; ++n) {
+    RecordedModel::Ready& ready = model.step_of(dt, parts);
+    const int programs = model.programs(parts);
+    for (int n = 0; n < programs; ++n) {
         ready.set(0, x, model.moving());
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
             const Input &from = samples[lane].input_before(), &to = samples[lane].input();
-            if (parts == 1) {
+            if (programs == 1) {
                 ready.give(0, lane, from);
                 ready.give(1, lane, to);
             } else {
-                ready.give(0, lane, between(from, to, static_cast<double>(n) / parts));
-                ready.give(1, lane, between(from, to, (n + 1.0) / parts));
+                ready.give(0, lane, between(from, to, static_cast<double>(n) / programs));
+                ready.give(1, lane, between(from, to, (n + 1.0) / programs));
             }
         }
         ready.run();

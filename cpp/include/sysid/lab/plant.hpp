@@ -58,7 +58,8 @@ class Plant {
             const Input still;
             const Externals calm{};
             const Workings<double> w = workings(origin, still, calm);
-            model_.held = {true, w.fz0_f, w.fz0_r};
+            loads_ = {w.fz0_f, w.fz0_r};
+            model_.loads_known = true;
         }
     }
 
@@ -99,10 +100,10 @@ class Plant {
     /// Moves `x` over one sample, the inputs going evenly from `from` to `to`.
     void advance(PlantState& x, const Input& from, const Input& to, const Externals& external,
                  double dt) {
-        HeldLoads next = model_.held;
+        Axles<double> next = loads_;
         if (options_.late_loads) {
             const Workings<double> w = workings(x, from, external);
-            next = {true, w.fz_f, w.fz_r};
+            next = {w.fz_f, w.fz_r};
         }
         const auto rate = [&](double part, const PlantState& at) {
             return derivative(at, between(from, to, part), external);
@@ -121,7 +122,7 @@ class Plant {
                         for (std::size_t j = 0; j < kPlantStates; ++j) use(j);
                     });
         }
-        model_.held = next;
+        loads_ = next;
     }
 
   private:
@@ -144,8 +145,9 @@ class Plant {
         return evaluate(x, u, external, ignored);
     }
 
-    Workings<double> evaluate(const PlantState& x, const Input& u, Externals external,
+    Workings<double> evaluate(const PlantState& x, Input u, Externals external,
                               PlantState& rate) const {
+        u.loads_n = loads_;
         const double sideways =
             options_.air_speed_of_both ? 0.5 * model_.car.air_density_kgpm3 * x[1] * x[1] : 0.0;
         external[kForceX] -= sideways * model_.car.drag_area_m2;
@@ -176,6 +178,7 @@ class Plant {
     SingleTrack model_;
     Parameters parameters_{};
     PlantOptions options_;
+    Axles<double> loads_{};  // late ones: those of the sample before
 };
 
 }  // namespace sysid::lab

@@ -10,10 +10,15 @@
 #include <cstddef>
 #include <vector>
 
-#include "sysid/lab/grey_box.hpp"
 #include "sysid/math/lanes.hpp"
+#include "sysid/model/tyre.hpp"
+#include "sysid/model/vehicle.hpp"
 
 namespace sysid::lab {
+
+/// Both tyres and the terms of a_y, then what a known motion tells nothing of: factors of mass and
+/// yaw inertia, the drag area.
+enum TyreParameter : int { kP1 = 8, kP2, kP3, kTyreParameters = kP3 + 4 };
 
 /// One sample of a motion that is taken as known, and what the forces must explain.
 struct TyreSample {
@@ -29,8 +34,8 @@ struct TyreSample {
 class TyreLoss {
   public:
     /// `projects_steer`: the front force acts along its wheel's axle and enters with cos(delta).
-    TyreLoss(const GreyBoxCar& car, bool projects_steer)
-        : car_(car), projects_steer_(projects_steer) {}
+    TyreLoss(const VehicleData& car, double yaw_inertia_kgm2, bool projects_steer)
+        : car_(car), yaw_inertia_kgm2_(yaw_inertia_kgm2), projects_steer_(projects_steer) {}
 
     void add(const TyreSample& sample);
     std::size_t samples() const { return samples_; }
@@ -42,8 +47,7 @@ class TyreLoss {
                                             information);
     }
 
-    /// Weighted errors of a_y and of the yaw acceleration of each sample, as
-    /// `identify/least_squares.hpp` takes them.
+    /// Calls `keep` with the weighted errors of a_y and of the yaw acceleration of each sample.
     template <class S, class Keep>
     void walk(const S* p, Keep&& keep) const {
         const TyreCoefficients<S> front{p[0], p[1], p[2], p[3]};
@@ -63,14 +67,16 @@ class TyreLoss {
     }
 
   private:
-    GreyBoxCar car_;
+    VehicleData car_;
+    double yaw_inertia_kgm2_;
     bool projects_steer_;
     // Front and rear; a_y and the yaw acceleration, weighted; zero beyond the last sample.
     std::vector<CurveSamples> blocks_;
     std::size_t samples_ = 0;
 };
 
-/// As in `tyre_likelihood.hpp`; no filter has a part in it, and nullptr stands for its gains.
+/// As in `identify/prediction_error.hpp`; no filter has a part in it, and nullptr stands for its
+/// gains.
 void residuals(const TyreLoss& loss, const double* p, std::nullptr_t, double* out);
 double half_sum_of_squares(const TyreLoss& loss, const double* p, std::nullptr_t);
 void sensitivities(const TyreLoss& loss, const double* p, std::nullptr_t,
