@@ -34,8 +34,18 @@ def test_what_stands_in_for_a_wrong_gyro_is_explained_away(
     found = instead(replace(fit, model=fit.model.add(*effects)), driving, effects)
     assert set(found.away) == away
     assert (found.omnibus.p_value < 1e-6) == bool(away)
-    assert found.omnibus.strongest in ("r", "F_y", "M_z")
     assert all(what == "error of r" for what in found.away.values())
+
+
+def test_what_is_missing_beside_an_effect_does_not_take_its_place(fit: Fit, truth: Model) -> None:
+    """A drag is no part of what a wrong gyro does."""
+    values = {"gyro_bias.bias_radps": 0.004, "aero_drag.drag_area_m2": 0.45}
+    car = truth.add("gyro_bias", "aero_drag").with_values(values)
+    driving = Driving.of(drive(car, manoeuvres.lap(20.0), seed=5, rate_hz=50.0))
+    found = instead(replace(fit, model=fit.model.add("gyro_bias")), driving, ["gyro_bias"])
+    assert found.omnibus.p_value < 1e-6
+    assert found.omnibus.strongest in ("F_x", "dv_x/dt")
+    assert found.away == {}
 
 
 def test_signals_of_unknown_forces() -> None:

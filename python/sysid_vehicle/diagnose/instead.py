@@ -4,8 +4,9 @@ An effect that stands in for a cause outside the catalogue takes up much of it, 
 directions together may see the rest. So forces and readings that no effect has compete for its
 place one by one and target by target: those of the omnibus test, curves of either axle's side force
 over its slip angle, and forces that remember the driving. One that is significant beside the
-effect, while the effect beside it is not worth its price, explains the effect away (Hoeting et al.,
-Statistical Science 1999: the choice between them is by what each adds to the other).
+effect, and takes over what speaks for it until the rest is not worth its price, explains it away:
+the choice between the two is by what each adds to the other (Davidson & MacKinnon, Econometrica
+1981).
 """
 
 from __future__ import annotations
@@ -72,23 +73,25 @@ def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = U
     rivals = _Rivals(Evidence(bare, driving), tuple(names))
     found = _Competition(Directions(rivals.evidence, rivals), rivals, bare)
     every = list(range(len(names)))
-    told = found.tested(every, rivals.hypotheses, rules)
-    first = next(iter(told))
     price = rules.price * float(np.log(driving.samples))
     away: dict[str, str] = {}
-    for what, test in told.items():
+    tests: list[Omnibus] = []
+    known: list[int] = []
+    # The most significant first, then what is significant beside it: much leaks into the others.
+    while len(tests) <= len(effects):
+        what, test = found.strongest([*every, *known], rivals.hypotheses, rules)
+        tests.append(test)
         if not test.rejects:
             break
+        columns = rivals.hypotheses[what]
         for effect in effects:
             own = [i for i in every if names[i].split(".")[0] == effect]
-            others = [i for i in every if i not in own]
-            if own and found.gain([*others, *rivals.hypotheses[what]], own)[0] < price:
-                away.setdefault(effect, _kind(what))
-    return Instead(told[first], away)
-
-
-def _kind(what: str) -> str:
-    return what.split(_ONE_OF)[0]
+            others = [i for i in (*every, *known) if i not in own]
+            alone = found.gain(others, own)[0]
+            if found.gain([*others, *columns], own)[0] < min(price, rules.taken * alone):
+                away.setdefault(effect, what.split(_ONE_OF)[0])
+        known += [c for c in columns if c not in known]
+    return Instead(tests[0], away)
 
 
 class _Rivals:
@@ -199,7 +202,10 @@ class _Competition:
     def __init__(self, projected: Directions, rivals: _Rivals, fit: Fit) -> None:
         self._projected, self._rivals = projected, rivals
         known = fit.model.parameters
-        off = [fit.model.value(n) - known[n].null_value for n in rivals.names]
+        # The time or place of what has no size yet means nothing.
+        off = [
+            0.0 if known[n].scan else fit.model.value(n) - known[n].null_value for n in rivals.names
+        ]
         self._off = np.concatenate([off, np.zeros(rivals.width - len(off))])
         self._score = projected.score + projected.information @ self._off
 
@@ -225,10 +231,10 @@ class _Competition:
         direction[given] = -copy[:, few] @ direction[few]
         return float(S[kept] @ direction[few]), rank, direction
 
-    def tested(
+    def strongest(
         self, given: list[int], hypotheses: Mapping[str, list[int]], rules: Rules
-    ) -> dict[str, Omnibus]:
-        """All hypotheses beside some columns, p-values corrected for so many, the smallest first.
+    ) -> tuple[str, Omnibus]:
+        """The most significant hypothesis beside some columns, corrected for so many.
 
         How white the residuals are is asked only where it could decide.
         """
@@ -238,7 +244,7 @@ class _Competition:
         def test(what: str) -> Omnibus:
             statistic, degrees = found[what][0] / ratio[what], found[what][1]
             p_value = float(scipy.stats.chi2.sf(statistic, degrees)) if degrees else 1.0
-            target = self._rivals.targets[_kind(what)]
+            target = self._rivals.targets[what.split(_ONE_OF)[0]]
             return Omnibus(statistic, degrees, min(len(found) * p_value, 1.0), target, rules)
 
         few = [what for what in found if test(what).rejects]
@@ -252,4 +258,4 @@ class _Competition:
             ratios = np.maximum(self._projected.answer(self._rivals, ask).ratios, 1.0)
             ratio |= dict(zip(few, map(float, ratios), strict=True))
         told = {what: test(what) for what in found}
-        return dict(sorted(told.items(), key=lambda pair: pair[1].p_value))
+        return min(told.items(), key=lambda pair: (pair[1].p_value, -pair[1].statistic))
