@@ -7,8 +7,9 @@ is part of this project. Checks the sensors, puts the logs right, and prints wha
 errors of 2 s of prediction on validation data before and after (`ahead.py`), the effects added,
 and the verdicts that name something. What the data's authors know of their cars, and whether it
 agrees, is in README.md beside this file. "As logged" is the baseline fitted to logs whose sensors
-were not put right, "before" the one fitted to logs that were; "fitted ahead" says that parameters
-were fitted to predictions of 2 s.
+were not put right, "before" the one fitted to logs that were, with the offsets that every measured
+log has (`Model.with_nuisances`); "fitted ahead" says that parameters were fitted to predictions of
+2 s.
 """
 
 from __future__ import annotations
@@ -33,8 +34,9 @@ def one(name: str, args: argparse.Namespace) -> dict[str, object]:
     faults = ", ".join(f"{f.name} {f.value:.3g} +- {f.std:.2g}" for f in check.found)
     print(f"  sensors: {faults or 'no fault'} ({time.perf_counter() - began:.0f} s)", flush=True)
     motion = motion_logs(check, validation)
+    model = sv.Model(car) if args.no_nuisances else sv.Model(car).with_nuisances()
     study = sv.improve(
-        sv.Model(car),
+        model,
         train,
         validation,
         sensors=None if args.raw else check,
@@ -73,6 +75,7 @@ def main() -> None:
     parser.add_argument("sets", nargs="*", metavar="SET", help=", ".join(NAMES))
     parser.add_argument("--fetched", type=Path, metavar="FOLDER", help="logs without a licence")
     parser.add_argument("--raw", action="store_true", help="do not put the sensors right")
+    parser.add_argument("--no-nuisances", action="store_true", help="without offsets of the logs")
     parser.add_argument("--time-limit", type=float, metavar="SECONDS", help="of each search")
     parser.add_argument("--save", type=Path, metavar="FOLDER", help="where studies go")
     parser.add_argument("--report", type=Path, metavar="FOLDER", help="where reports go")

@@ -121,6 +121,32 @@ TEST(TwinBatch, TwinsThatStepOftenerThanTheCarIsReadBelieveNoMore) {
     EXPECT_NEAR(spread(10) / spread(1), 1.0, 0.1);
 }
 
+TEST(TwinBatch, TheOrderOfTheChannelsDoesNotMatter) {
+    // Two readings tell the same mass; wild ones, which are limited, come in one of them.
+    const auto found = [](bool swapped) {
+        const std::size_t first = swapped ? 1 : 0;
+        BatchEstimator batch({{kMass, 20.0, 300.0, 0.0, 1000.0, 3000.0}},
+                             {{first, 0.05, 0.0}, {1 - first, 0.05, 0.0}}, kDt);
+        Estimates estimate = start();
+        std::mt19937 generator(3);
+        std::normal_distribution<double> noise(0.0, 0.05);
+        for (int k = 0; k < 6000; ++k) {
+            const double t = k * kDt;
+            const double wild = k % 2000 == 1999 ? 5.0 : 0.0;
+            const double car[2] = {read(2000.0, t) + noise(generator) + wild,
+                                   2.0 * read(2000.0, t) + noise(generator)};
+            const double one = read(batch.of_twin(0, estimate)[kMass], t);
+            const double other = read(batch.of_twin(1, estimate)[kMass], t);
+            const double twins[4] = {one, 2.0 * one, other, 2.0 * other};
+            batch.update(car, twins, 2, estimate);
+        }
+        return std::pair{estimate[kMass], batch.spread()[0]};
+    };
+    const auto one = found(false), other = found(true);
+    EXPECT_NEAR(one.first, other.first, 1e-9);
+    EXPECT_NEAR(one.second, other.second, 1e-12);
+}
+
 TEST(TwinBatch, WithoutExcitationNothingIsClaimed) {
     BatchEstimator batch({{kMass, 20.0, 300.0, 0.0, 1000.0, 3000.0}}, {{0, 0.05, 0.0}}, kDt);
     Estimates estimate = start();

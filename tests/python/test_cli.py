@@ -347,6 +347,22 @@ def test_a_log_that_is_in_training_and_validation_data_is_noticed(
     assert err[1] == "sysid-vehicle: error: far enough"
 
 
+@pytest.mark.parametrize("asked_for", [False, True])
+def test_offsets_of_measured_logs_are_in_the_model_on_demand(
+    arguments: list[str], monkeypatch: pytest.MonkeyPatch, asked_for: bool
+) -> None:
+    models: list[sv.Model] = []
+
+    def stop(model: sv.Model, *_: Any, **__: Any) -> None:
+        models.append(model)
+        raise sv.NumericalError("far enough")
+
+    monkeypatch.setattr(commands, "improve", stop)
+    assert main(["diagnose", *arguments, *(["--nuisances"] if asked_for else [])]) == 2
+    assert ("gyro_bias" in models[0].nuisances) is asked_for
+    assert models[0].effects == models[0].nuisances
+
+
 def test_ctrl_c_is_status_130(
     arguments: list[str],
     tmp_path: Path,

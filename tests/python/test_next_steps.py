@@ -47,6 +47,9 @@ def test_what_no_effect_explains_is_to_be_looked_at(unknown: Study) -> None:
     assert "define an effect" in said
     assert "sysid-vehicle check" in said
     assert "fx_n" not in said  # it is logged
+    assert "--nuisances" in said
+    offsets = replace(unknown.fit, model=unknown.model.with_nuisances())
+    assert not any("--nuisances" in t for t in next_steps(replace(unknown, fits=(offsets,))))
     assert str(unknown).count("Next: ") == len(unknown.next_steps)
     assert unknown.to_dict()["next_steps"] == list(unknown.next_steps)
     assert "<li>Next: " in unknown._repr_html_()

@@ -47,7 +47,8 @@ void freeze_run(const Problem& problem, std::size_t number, const double* p, Fro
 }
 
 /// A filter with room for all samples, and for gains of so many rows.
-FrozenFilter empty(const Problem& problem, const Noise& noise, std::size_t rows) {
+FrozenFilter empty(const Problem& problem, const Noise& noise,
+                   std::size_t rows = kStatesFull + kRoadStates) {
     FrozenFilter filter;
     filter.noise = noise;
     filter.rows = filter_rows(problem.model.effects, noise.sloping());
@@ -88,7 +89,7 @@ std::vector<int> FrozenFilter::places(const std::vector<int>& of) const {
 FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise) {
     const InTime in_time(logged, p);
     const Problem& problem = *in_time;
-    FrozenFilter filter = empty(problem, noise, kStatesFull + kRoadStates);
+    FrozenFilter filter = empty(problem, noise);
     const double forgotten_s = forgets_s(problem, noise);
     if (const std::vector<Piece> pieces = pieces_of(problem.runs, forgotten_s); !pieces.empty()) {
         LaneFilter walk(problem, {p}, noise, pieces);

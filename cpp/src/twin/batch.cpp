@@ -144,16 +144,21 @@ const Eigen::VectorXd& BatchEstimator::update(const double* car, const double* t
         }
     }
     const double early = std::max(1.0, settings_.gentle_s / learning_s);
+    const auto variance = [&](std::size_t c) {
+        return early * early * std::max(power_[at(c)], channels_[c].noise * channels_[c].noise);
+    };
+    // All are limited before any corrects: what is learnt does not depend on their order.
+    for (std::size_t c = 0; c < channels_.size(); ++c) {
+        if (std::isnan(residual_[at(c)])) continue;
+        const double limit = settings_.clip * std::sqrt(variance(c));
+        residual_[at(c)] = std::clamp(residual_[at(c)], -limit, limit);
+        score_.noalias() += slopes_.row(at(c)).transpose() * (residual_[at(c)] / variance(c));
+    }
     for (std::size_t c = 0; c < channels_.size(); ++c) {
         if (std::isnan(residual_[at(c)])) continue;
         slope_ = slopes_.row(at(c));
-        const double variance =
-            early * early * std::max(power_[at(c)], channels_[c].noise * channels_[c].noise);
-        const double limit = settings_.clip * std::sqrt(variance);
-        const double e = std::clamp(residual_[at(c)], -limit, limit);
-        score_.noalias() += slope_.transpose() * (e / variance);
         // Channels follow one another: the next sees what this one has already corrected.
-        learn(c, e, variance, estimate);
+        learn(c, residual_[at(c)], variance(c), estimate);
     }
     if (learning_s - block_began_s_ >= settings_.block_s) {
         block_began_s_ = learning_s;

@@ -152,6 +152,8 @@ def _define(args: argparse.Namespace) -> None:
 
 def _study(args: argparse.Namespace, heard: Warnings) -> Study:
     model = Model(Vehicle.from_toml(args.vehicle))
+    if args.nuisances:
+        model = model.with_nuisances()
     train = read_logs(args.logs, args)
     test = read_logs(args.test, args) if args.test else None
     for path in {p.resolve() for p in args.logs} & {p.resolve() for p in args.test}:

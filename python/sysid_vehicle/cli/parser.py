@@ -120,6 +120,12 @@ def _validation(parser: argparse.ArgumentParser) -> None:
 
 def _search(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
+        "--nuisances",
+        action="store_true",
+        help="fit offsets that every measured log has (biases, turn of the speed sensor, steering "
+        "offset, crossfall) without naming them",
+    )
+    parser.add_argument(
         "--exclude",
         type=_names,
         default=(),

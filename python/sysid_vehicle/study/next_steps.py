@@ -63,6 +63,11 @@ def _of_what_is_left(study: Study) -> list[str]:
             "`sysid-vehicle check`; scales, biases and places of sensors act like "
             "effects of the car"
         )
+    if not study.fit.model.nuisances:
+        found.append(
+            "give the model the offsets that every measured log has (biases, a turned speed "
+            "sensor, crossfall): `model.with_nuisances()`, or `--nuisances`"
+        )
     apart = "; ".join(str(d) for d in study.disagreements[:_SHOWN])
     if apart:
         found.append(
