@@ -170,6 +170,16 @@ def test_a_centre_of_gravity_that_is_off_is_one_fact(start: Model, car: Vehicle)
     assert diagnose(found, refits=0).causes.sets == ()
 
 
+def test_causes_of_a_log_without_wheel_force(
+    hidden_fit: Hidden, start: Model, altered: Callable[..., Log]
+) -> None:
+    """No clock competes: the steering's is an effect, and that of the force needs the force."""
+    (log,) = hidden_fit("steer_offset.offset_rad", 0.002).driving.logs
+    fit = identify(start, altered(log, without=["fx_n"]), starts=1)
+    causes = diagnose(fit, candidates=["steer_offset", "steer_delay"], refits=0).causes
+    assert next(iter(causes.inclusion)) == "steer_offset"
+
+
 def test_the_clock_of_the_steering_has_a_sign(start: Model, truth: Model) -> None:
     log = drive(truth, manoeuvres.step_steer((20.0,), (3.0, 5.0)), seed=5)
     t = log["time_s"]

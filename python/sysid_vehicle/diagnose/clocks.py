@@ -62,15 +62,20 @@ class ClockScore:
     ratio: float
 
 
+def shifts(evidence: Evidence) -> tuple[Shifts, ...]:
+    """Sensitivities to the clocks that the driving can show; nothing where there are none."""
+    clocks = [c for c in CLOCKS if c.channel != "fx_n" or evidence.driving.force_known]
+    return (Shifts(evidence, clocks),) if clocks else ()
+
+
 class Shifts:
-    """Sensitivities to the clocks that a driving can show, by a step to their typical sizes."""
+    """Sensitivities to clocks, by a step to their typical sizes."""
 
     groups = ()
 
-    def __init__(self, evidence: Evidence) -> None:
-        self.evidence = evidence
+    def __init__(self, evidence: Evidence, clocks: list[Clock]) -> None:
+        self.evidence, self.clocks = evidence, clocks
         driving = evidence.driving
-        self.clocks = [c for c in CLOCKS if c.channel != "fx_n" or driving.force_known]
         self._moved: list[DrivingProblem] = []
         inputs = driving.inputs() if evidence.inputs is None else evidence.inputs
         for clock in self.clocks:
@@ -109,7 +114,9 @@ class Shifts:
 
 def clock_scores(projected: Directions, rules: Rules) -> list[ClockScore]:
     """Score the clocks of which something is left beside the fitted parameters."""
-    shifts = next(s for s in projected.sources if isinstance(s, Shifts))
+    shifts = next((s for s in projected.sources if isinstance(s, Shifts)), None)
+    if shifts is None:
+        return []
     place = projected.place(shifts)
     after, before = np.diag(projected.information)[place], projected.before[place]
     ratios = projected.answer(shifts).ratios

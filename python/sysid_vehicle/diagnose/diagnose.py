@@ -18,7 +18,7 @@ from ..log import Log
 from ..model import Model
 from ..rules import USUAL, Rules, bic
 from .causes import causes_of
-from .clocks import Shifts
+from .clocks import shifts
 from .diagnosis import Candidate, Diagnosis
 from .evidence import Evidence
 from .omnibus import Unknown, omnibus_of
@@ -82,7 +82,7 @@ def diagnose(
     driving = fit.driving if logs is None else Driving.of(logs)
     possible = considered(fit.model, candidates)
     evidence = Evidence(fit, driving)
-    board = score_board_of(evidence, possible, rules, Unknown(evidence), Shifts(evidence))
+    board = score_board_of(evidence, possible, rules, Unknown(evidence), *shifts(evidence))
     left = omnibus_of(evidence, rules, board.projected)
     proposed = causes_of(board, evidence, rules)
     family = board.family_p_values(seed=seed)
