@@ -207,6 +207,8 @@ def _validation(car: IdentifiedCar, log: TyreLog, horizon_s: float) -> Validatio
         )
     problem = tyre_problem(car.vehicle, [log], residual_terms=bool(np.any(car.parameters[8:11])))
     near = [problem.predicted(car.parameters, car.noise, n) for n in (1, ahead)]
-    predicted = np.stack([*near, problem.free_run(car.parameters)])
+    whole = problem.free_run(car.parameters)
+    whole[0] = np.nan  # it begins with these readings, and with their noise
+    predicted = np.stack([*near, whole])
     horizons = ("one sample", f"{horizon_s:g} s", "the whole drive")
     return Validation(log, horizons, predicted, as_float64(car.noise[: len(READINGS)]))
