@@ -114,7 +114,7 @@ TEST(SteerDelay, ManySetsOfParametersAreWorkedOutAsOneIs) {
         std::vector<Parameters> sets(5, plain_parameters());
         std::vector<const double*> all;
         for (std::size_t i = 0; i < sets.size(); ++i) {
-            const double size = static_cast<double>(i);
+            const auto size = static_cast<double>(i);
             sets[i][kDFront] += 0.01 * size;
             sets[i][parameter_of("steer_delay")] = alike ? 0.013 : -0.02 + 0.011 * size;
             all.push_back(sets[i].data());

@@ -30,7 +30,7 @@ Taps taps_at(double part) {
         const double turn = pi * t / kReach;
         double window = kWindow[0], window_slope = 0.0;
         for (std::size_t m = 1; m < kWindow.size(); ++m) {
-            const double often = static_cast<double>(m);
+            const auto often = static_cast<double>(m);
             window += kWindow[m] * std::cos(often * turn);
             window_slope -= kWindow[m] * often * pi / kReach * std::sin(often * turn);
         }

@@ -52,7 +52,7 @@ struct FrozenFilter {
 /// They are places among `kStatesFull`; gravity along and across stand behind these.
 std::vector<int> filter_rows(EffectMask effects, bool sloping);
 
-FrozenFilter freeze(const Problem& problem, const double* p, const Noise& noise);
+FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise);
 
 /// Log-likelihoods of sets of parameters, whose filters run side by side; minus infinity where one
 /// fails.
@@ -84,7 +84,7 @@ void signal_sensitivities(const Problem& problem, const double* p, const FrozenF
 /// Derivatives of the log-likelihood with respect to the logarithms of the noise parameters
 /// (sensor, motion, disturbance, correlation times, road and its time; without a road the last
 /// three are zero), and their expected information (row-major).
-double noise_score(const Problem& problem, const double* p, const Noise& noise, double* gradient,
+double noise_score(const Problem& logged, const double* p, const Noise& noise, double* gradient,
                    double* information);
 
 /// Everything the filter, or the smoother, says of each sample.
@@ -98,7 +98,7 @@ struct Trace {
     double log_likelihood = 0.0;
 };
 
-Trace trace(const Problem& problem, const double* p, const Noise& noise, bool smoothed);
+Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smoothed);
 
 /// Predictions so many samples ahead, of which one sample in `every` starts one.
 struct Horizon {
@@ -109,10 +109,10 @@ struct Horizon {
 /// Prediction errors from the filtered state and slope of the road, for each horizon samples x
 /// kChannels; NaN where no prediction ends. The filter runs once, and predictions that start at one
 /// sample are one prediction, read at each horizon. `readings`: what is predicted itself.
-void look_ahead(const Problem& problem, const double* p, const Noise& noise,
+void look_ahead(const Problem& logged, const double* p, const Noise& noise,
                 const std::vector<Horizon>& horizons, double* errors, bool readings = false);
 
 /// Readings of each run, kChannels per sample, simulated from where it starts with no filter.
-void free_run(const Problem& problem, const double* p, double* readings);
+void free_run(const Problem& logged, const double* p, double* readings);
 
 }  // namespace sysid

@@ -20,9 +20,7 @@ class RunSystem {
           p_(p),
           own_(active_states(model.effects)),
           start_(initial_state(model, run, p)),
-          disturbances_(NX == kMotionStates ? 0
-                        : noise.sloping()   ? kDisturbances
-                                            : kMotionStates) {
+          disturbances_(number_of_disturbances(noise)) {
         process_.setZero();
         for (int i = 0; i < kMotionStates; ++i) {
             const auto n = static_cast<std::size_t>(i);
@@ -115,11 +113,17 @@ class RunSystem {
 
   private:
     // So many directions at once: the model is compiled for few widths.
-    static constexpr int kPass = NX == kMotionStates        ? kMotionStates
-                                 : NX % kWideStatePass == 0 ? kWideStatePass
-                                                            : kStatePass;
+    static constexpr int kPass = [] {
+        if (NX == kMotionStates) return static_cast<int>(kMotionStates);
+        return NX % kWideStatePass == 0 ? kWideStatePass : kStatePass;
+    }();
     static_assert(NX % kPass == 0);
     using D = Dual<kPass>;
+
+    static std::size_t number_of_disturbances(const Noise& noise) {
+        if (NX == kMotionStates) return 0;
+        return noise.sloping() ? kDisturbances : kMotionStates;
+    }
 
     /// Calls `use` with every state in turn as a direction; `keep` stores a row of what results.
     template <class Use>
