@@ -186,7 +186,7 @@ def said(base: Study, rng: random.Random) -> str:
         stopped=("mass",) if rng.random() < 0.3 and min(candidates) < 0.01 else (),
     )
     whole = rng.choice((-0.4, 0.02, 0.95, np.nan))
-    study.__dict__["disagreements"] = ()
+    study.__dict__.update(disagreements=(), predicting=base.predicting)
     study.__dict__["shares"] = replace(
         base.shares, whole=Share(whole, whole - 0.1, whole + 0.1), named=tuple(names)
     )
