@@ -9,7 +9,7 @@ from contradictions import contradictions
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sysid_vehicle import Model, Study, drive, improve, manoeuvres
+from sysid_vehicle import Model, Study, drive, identify, improve, manoeuvres
 from sysid_vehicle.diagnose import Omnibus
 from sysid_vehicle.diagnose.ceiling import Explainable
 from sysid_vehicle.estimate import Driving
@@ -89,6 +89,19 @@ def test_drives_of_one_car_agree(adequate: Study, truth: Model) -> None:
     for seed in (66, 67, 68):
         other = Driving.of(drive(truth, manoeuvres.handling_course(20.0), seed=seed))
         assert disagreements(adequate.fit, other) == ()
+
+
+def test_offsets_that_differ_from_log_to_log_are_no_disagreement(truth: Model) -> None:
+    biased = truth.add("accelerometer_bias")
+    logs = [
+        drive(
+            biased.with_values({"accelerometer_bias.ay_mps2": bias}), manoeuvres.lap(20.0), seed=69
+        )
+        for bias in (0.25, -0.25)
+    ]
+    fit = identify(truth.with_nuisances(), logs[0], starts=1)
+    assert fit["accelerometer_bias.ay_mps2"].value > 0.2
+    assert disagreements(fit, Driving.of(logs[1])) == ()
 
 
 def test_what_is_confounded_is_to_be_told_apart(unknown: Study) -> None:

@@ -76,7 +76,10 @@ def disagreements(fit: Fit, test: Driving, rules: Rules = USUAL) -> tuple[Disagr
     except (NumericalError, np.linalg.LinAlgError):
         return ()
     told = {e.name for e in (*fit.estimates, *fit.derived)}
-    names = [n for n in _STIFFNESS if n in told] + [e.name for e in fit.estimates if "." in e.name]
+    # Offsets differ from log to log, and tell nothing of the car.
+    own = {e.id for e in fit.model.parts} - set(fit.model.nuisances)
+    names = [n for n in _STIFFNESS if n in told]
+    names += [e.name for e in fit.estimates if e.name.split(".")[0] in own]
     found = (Disagreement(fit[n], other[n]) for n in names)
     return tuple(
         sorted((d for d in found if d.apart > rules.sure), key=lambda d: d.apart, reverse=True)
