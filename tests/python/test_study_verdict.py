@@ -40,8 +40,19 @@ def test_tyres_that_the_fit_never_saw_do_not_speak_against_the_right_effect(
     assert not study.omnibus_together.rejects
 
 
-def test_short_driving_leaves_room_for_few_effects(truth: Model, lap: Log) -> None:
-    assert _room(truth, Driving.of(lap.between(0.0, 8.0)), USUAL) == 1
-    assert _room(truth, Driving.of(lap.between(0.0, 3.0)), USUAL) == 1
-    assert _room(truth.add("aero_drag"), Driving.of(lap.between(0.0, 8.0)), USUAL) == 2
-    assert _room(truth, Driving.of(lap), USUAL) > 4
+def test_short_driving_leaves_room_for_few_effects(lap: Log) -> None:
+    assert _room(Driving.of(lap.between(0.0, 8.0)), USUAL) == 1
+    assert _room(Driving.of(lap.between(0.0, 3.0)), USUAL) == 1
+    assert _room(Driving.of(lap), USUAL) > 4
+
+
+def test_effects_of_the_model_take_no_room_of_those_that_may_be_added(
+    truth: Model, start: Model
+) -> None:
+    lagging = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.06})
+    logs = [drive(lagging, manoeuvres.lap(20.0), seed=seed) for seed in (71, 72)]
+    offsets = start.with_nuisances()
+    found = improve(offsets, *logs, candidates=["steer_lag"], most_effects=1, starts=1)
+    assert [a.id for a in found.added] == ["steer_lag"]
+    assert set(found.model.effects) == {"steer_lag", *offsets.nuisances}
+    assert found.verdict == "explained"

@@ -72,7 +72,8 @@ def improve(
         What to fit to, and validation data. Without `test` the last log, or
         the last 30 % of the only one, are validation data.
     most_effects : int
-        Stop after so many, or where the training data are too short for more (`Rules.lasts`).
+        Stop after so many, beside those of the model, or where the training data are too short for
+        more (`Rules.lasts`).
     alpha : float
         Rate of false claims accepted, over all effects together, per step; by default that of the
         rules.
@@ -129,7 +130,7 @@ def improve(
         search = Search(
             test_driving,
             candidates=candidates,
-            most_effects=min(most_effects, _room(model, train_driving, rules)),
+            most_effects=len(model.effects) + min(most_effects, _room(train_driving, rules)),
             ends=ends,
             rules=rules,
             seed=seed,
@@ -226,9 +227,9 @@ def _new(fits: Sequence[Fit]) -> tuple[str, ...]:
     return tuple(e for e in fits[-1].model.effects if e not in fits[0].model.effects)
 
 
-def _room(model: Model, driving: Driving, rules: Rules) -> int:
-    """How many effects the driving is long enough for, one at least beside those of the model."""
-    return len(model.effects) + max(int(driving.usable_s / rules.lasts), 1)
+def _room(driving: Driving, rules: Rules) -> int:
+    """How many effects the driving is long enough for, one at least."""
+    return max(int(driving.usable_s / rules.lasts), 1)
 
 
 def _excited(driving: Driving) -> bool:
