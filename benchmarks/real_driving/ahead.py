@@ -17,6 +17,7 @@ import sysid_vehicle as sv
 from sysid_vehicle.diagnose.coordinates import begins
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.forces._motion import Places, smoothed
+from sysid_vehicle.identify import driving_of
 
 _BEGIN_S = 0.5  # between windows
 _STEPS = 20  # in a window
@@ -79,9 +80,19 @@ def motion_logs(check: sv.SensorCheck, logs: list[sv.Log]) -> list[sv.Log]:
     return out
 
 
-def ahead(model: sv.Model, logs: list[sv.Log], seconds: float = 2.0) -> Ahead:
-    """Predict windows of so many seconds of the logs that `motion_logs` gave."""
-    driving = Driving.of(logs)
+def ahead(
+    fit: sv.Fit, logs: list[sv.Log], seconds: float = 2.0, logged: Driving | None = None
+) -> Ahead:
+    """Predict windows of so many seconds of the logs that `motion_logs` gave.
+
+    `logged`: the logs themselves, by which nuisances of the model are found for each.
+    """
+    model, driving = fit.model, Driving.of(logs)
+    if logged is not None and model.nuisances:
+        own = driving_of(fit, logged)
+        by_name = {log.name: o for log, o in zip(own.logs, own.offsets, strict=False)}
+        offsets = tuple(by_name.get(log.name.rpartition(", stretch ")[0], {}) for log in logs)
+        driving = Driving(driving.logs, driving.force_known, offsets)
     problem = driving.problem(model)
     rate = driving.mean_rate_hz
     every = round(_BEGIN_S * rate)

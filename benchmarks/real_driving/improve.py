@@ -60,7 +60,7 @@ def one(name: str, args: argparse.Namespace) -> dict[str, object]:
         fits["after, fitted ahead"] = study.predicting.final
     for word, fit in fits.items():
         for seconds in (2.0, 4.0):
-            error = ahead(fit.model, motion, seconds)
+            error = ahead(fit, motion, seconds, study.validation)
             told[f"{word} {seconds:g} s"] = vars(error)
             print(f"  {word}, {seconds:g} s ahead: {error}", flush=True)
     if args.report is not None:

@@ -1,16 +1,19 @@
 // The prediction errors of a problem, their derivatives, the noise score, filter and smoother.
 #include "least_squares.hpp"
 #include "register.hpp"
-#include "sysid/identify/prediction_error.hpp"
+#include "sysid/identify/logwise.hpp"
 #include "sysid/math/program.hpp"
 
 namespace sysid::bindings {
 
 namespace {
 
-void add_run(Problem& problem, double dt, const Array& inputs, const Array& measurements,
+void add_run(LogwiseProblem& logwise, double dt, const Array& inputs, const Array& measurements,
              double start, const std::string& name, const std::vector<double>& steer_before,
-             const std::vector<double>& steer_after) {
+             const std::vector<double>& steer_after, const std::vector<double>& shift) {
+    if (!shift.empty() && shift.size() != kParameterCount)
+        throw std::invalid_argument("shift: expected one number for each parameter, or none");
+    Problem& problem = logwise.shifted(shift);
     const auto n = inputs.ndim() == 2 ? inputs.shape(0) : 0;
     const py::ssize_t own = problem.model.loads_known ? 4 : 2;
     const auto width =
@@ -70,28 +73,22 @@ void register_identify(py::module_& m) {
     m.attr("LANES") = kLanes;
     m.attr("CHANNELS") = static_cast<int>(kChannels);
     m.attr("EXTERNALS") = static_cast<int>(kExternals);
-    py::class_<Problem> bound(m, "Problem");
-    bind_filter<FrozenFilter>(m, "FrozenFilter", bound, kParameterCount, kNoiseParameters,
-                              &to_noise);
-    bind_least_squares<FrozenFilter>(bound, kParameterCount, kChannels);
+    py::class_<LogwiseProblem> bound(m, "Problem");
+    bind_filter<LogwiseFilter>(m, "FrozenFilter", bound, kParameterCount, kNoiseParameters,
+                               &to_noise);
+    bind_least_squares<LogwiseFilter>(bound, kParameterCount, kChannels);
     bound
-        .def(py::init([](const SingleTrack& model) { return Problem{model, {}}; }),
+        .def(py::init([](const SingleTrack& model) { return LogwiseProblem(model); }),
              py::arg("model"))
         .def("add_run", &add_run, py::arg("dt"), py::arg("inputs"), py::arg("measurements"),
              py::arg("start") = 0.0, py::arg("name") = "",
              py::arg("steer_before") = std::vector<double>{},
-             py::arg("steer_after") = std::vector<double>{})
-        .def(
-            "with_model",
-            [](const Problem& self, const SingleTrack& model) {
-                Problem other{model, self.runs};
-                other.model.most_n = self.model.most_n;
-                return other;
-            },
-            py::arg("model"))
+             py::arg("steer_after") = std::vector<double>{},
+             py::arg("shift") = std::vector<double>{})
+        .def("with_model", &LogwiseProblem::with_model, py::arg("model"))
         .def(
             "log_likelihoods",
-            [](const Problem& self, const Array& sets, const Array& noise) {
+            [](const LogwiseProblem& self, const Array& sets, const Array& noise) {
                 const auto count = sets.ndim() == 2 ? sets.shape(0) : 0;
                 const double* values = matrix(sets, count, kParameterCount, "parameters");
                 const Noise n = to_noise(noise);
@@ -106,7 +103,7 @@ void register_identify(py::module_& m) {
             py::arg("parameters"), py::arg("noise"))
         .def(
             "signal_sensitivities",
-            [](const Problem& self, const Array& p, const FrozenFilter& filter,
+            [](const LogwiseProblem& self, const Array& p, const LogwiseFilter& filter,
                const Array& signals, const std::vector<int>& targets) {
                 check_runs(self, filter);
                 check_numbers(targets, kExternals + kChannels, "targets");
@@ -120,7 +117,7 @@ void register_identify(py::module_& m) {
             py::arg("parameters"), py::arg("filter"), py::arg("signals"), py::arg("targets"))
         .def(
             "trace",
-            [](const Problem& self, const Array& p, const Array& noise, bool smoothed) {
+            [](const LogwiseProblem& self, const Array& p, const Array& noise, bool smoothed) {
                 const double* values = values_of(p);
                 const Noise n = to_noise(noise);
                 const Trace t = unlocked([&] { return trace(self, values, n, smoothed); });
@@ -137,7 +134,7 @@ void register_identify(py::module_& m) {
             py::arg("parameters"), py::arg("noise"), py::arg("smoothed"))
         .def(
             "look_ahead",
-            [](const Problem& self, const Array& p, const Array& noise,
+            [](const LogwiseProblem& self, const Array& p, const Array& noise,
                const std::vector<std::pair<std::size_t, std::size_t>>& horizons, bool readings) {
                 const double* values = values_of(p);
                 const Noise n = to_noise(noise);
@@ -153,7 +150,7 @@ void register_identify(py::module_& m) {
             py::arg("readings") = false)
         .def(
             "free_run",
-            [](const Problem& self, const Array& p) {
+            [](const LogwiseProblem& self, const Array& p) {
                 const double* values = values_of(p);
                 return filled(self.samples(), kChannels,
                               [&](double* to) { free_run(self, values, to); });

@@ -176,6 +176,12 @@ class Model:
             e.id for e in self.parts if all(f"{e.id}.{p.name}" in about for p in e.parameters)
         )
 
+    @property
+    def nuisance_names(self) -> tuple[str, ...]:
+        """Full names of the parameters of those effects."""
+        nuisances = set(self.nuisances)
+        return tuple(n for n in self.free_names if n.split(".")[0] in nuisances)
+
     def _with_settings(self, changes: Mapping[str, Mapping[str, Any]]) -> Model:
         told = dict(self.settings)
         for name, change in changes.items():

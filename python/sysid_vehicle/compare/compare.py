@@ -14,7 +14,7 @@ from .._tables import dataset, frame
 from .._text import brief, html_list, html_paragraph, html_table, number, text_table
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..estimate.pieces import traces
-from ..identify import Fit, explaining
+from ..identify import Fit, driving_of, explaining
 from ..log import Log
 from .unrelated import incoherent, unrelated
 from .where import FailureMap, Region
@@ -179,7 +179,7 @@ def _running_rms(e: FloatArray, log_number: FloatArray, width: int) -> FloatArra
 def one_step_error(fit: Fit, driving: Driving, noise: NoiseModel) -> float:
     """The `error` of a comparison alone; the arguments are those of `compare`."""
     total, number = 0.0, 0
-    for _, squares, count, _ in _told(fit, driving, noise.floor()):
+    for _, squares, count, _ in _told(fit, driving_of(fit, driving), noise.floor()):
         total, number = total + float(squares.sum()), number + int(count.sum())
     return float(np.sqrt(total / number))
 
@@ -210,7 +210,7 @@ def compare(
         Whose sensors and white motion noise are the noise floor; by default the fit's. Models that
         are compared with each other need the same one.
     """
-    driving = Driving.of(logs)
+    driving = driving_of(fit, logs)
     floor = (fit.noise if noise is None else noise).floor()
     innovation, spread = (np.empty((driving.samples, len(MEASURED))) for _ in range(2))
     log_likelihood = 0.0

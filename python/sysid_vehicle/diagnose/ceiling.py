@@ -20,7 +20,7 @@ from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._text import html_text
 from ..estimate import Driving
-from ..identify import Fit, explaining
+from ..identify import Fit, driving_of, explaining
 from ..log import Log
 from ..rules import USUAL, Rules
 from .coordinates import begins, blocks
@@ -137,7 +137,7 @@ def ceiling(
     -------
     Ceiling
     """
-    train, other = fit.driving if logs is None else Driving.of(logs), Driving.of(test)
+    train, other = fit.driving if logs is None else driving_of(fit, logs), driving_of(fit, test)
     rng = generator(seed)
     few, there = thinned(train), thinned(other)
     inputs = Inputs.of(fit, train, other)

@@ -13,7 +13,7 @@ from ..compare import compare
 from ..effects import Effect, effect
 from ..errors import InvalidInput
 from ..estimate import Driving
-from ..identify import Fit, explaining
+from ..identify import Fit, driving_of, explaining
 from ..log import Log
 from ..model import Model
 from ..rules import USUAL, Rules, bic
@@ -79,7 +79,7 @@ def diagnose(
             f"the fit is one to predictions {fit.horizon_s:g} s ahead, and evidence is of the "
             "likelihood; identify without horizon_s"
         )
-    driving = fit.driving if logs is None else Driving.of(logs)
+    driving = fit.driving if logs is None else driving_of(fit, logs)
     possible = considered(fit.model, candidates)
     evidence = Evidence(fit, driving)
     board = score_board_of(evidence, possible, rules, Unknown(evidence), *shifts(evidence))

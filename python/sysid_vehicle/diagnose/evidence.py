@@ -89,8 +89,18 @@ class Evidence:
 
     @cached_property
     def basis(self) -> FloatArray:
-        """Orthonormal directions of all that the free parameters can do."""
-        return orthonormal_basis(self.fitted)
+        """Orthonormal directions of all that the free parameters can do, and offsets of logs."""
+        return orthonormal_basis(np.hstack([self.fitted, self._own]))
+
+    @property
+    def _own(self) -> FloatArray:
+        """Sensitivities to the nuisances of each log but the last, which differ from their mean."""
+        names = self.fit.model.free_names
+        places = [names.index(n) for n in self.fit.model.nuisance_names]
+        logs = np.repeat(self.driving.log_number, _core.CHANNELS)
+        apart = range(len(self.driving.logs) - 1 if self.driving.offsets else 0)
+        own = [np.where((logs == i)[:, None], self.fitted[:, places], 0.0) for i in apart]
+        return as_float64(np.hstack([np.empty((len(logs), 0)), *own]))
 
     @cached_property
     def left(self) -> FloatArray:

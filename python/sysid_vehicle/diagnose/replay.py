@@ -267,7 +267,8 @@ class Replay:
             here = slice(at, at + where.stop - where.start)
             start_s = where.start / log.rate_hz
             problem = _core.Problem(fit.model.core(force_known=driving.force_known))
-            problem.add_run(1.0 / log.rate_hz, inputs[here], measured[here], start_s)
+            shift = driving.shift(fit.model, log)
+            problem.add_run(1.0 / log.rate_hz, inputs[here], measured[here], start_s, shift=shift)
             motion = problem.trace(fit.model.vector(), fit.noise.vector(), True)["state"][:, :3]
             every = _every(log)
             parts = np.arange(0, len(motion), every)

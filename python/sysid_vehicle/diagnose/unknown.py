@@ -12,7 +12,7 @@ import numpy as np
 from .._arrays import FloatArray
 from .._text import brief
 from ..estimate import Driving
-from ..identify import Fit, explaining
+from ..identify import Fit, driving_of, explaining
 from ..log import Log
 from .evidence import Evidence
 from .force_map import force_maps
@@ -114,12 +114,12 @@ def unknown(
     seed : int
         Of the draws that make the bands.
     """
-    driving = fit.driving if logs is None else Driving.of(logs)
+    driving = fit.driving if logs is None else driving_of(fit, logs)
     evidence = Evidence(fit, driving)
     maps, _ = force_maps(fit, driving)
     best = next(m.coordinates for m in maps if len(m.coordinates) == 2)
     return Unknown(
         curves(evidence, seed),
         surface(evidence, (best[0], best[1]), seed),
-        propose(evidence, Evidence(fit, Driving.of(test))),
+        propose(evidence, Evidence(fit, driving_of(fit, test))),
     )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .._text import brief
 from .._threads import Workers
 from ..estimate import Driving
-from ..identify import Fit, explaining
+from ..identify import Fit, driving_of, explaining
 from ..log import Log
 from .change_points import ChangePoint, change_points
 from .coherence import Coherence, coherence
@@ -178,7 +178,7 @@ def where(
     omnibus : Omnibus, optional
         Of the model on this driving, where it is known already.
     """
-    driving = fit.driving if logs is None else Driving.of(logs)
+    driving = fit.driving if logs is None else driving_of(fit, logs)
     evidence = Evidence(fit, driving)
     with Workers() as pool:
         mapped = pool.submit(force_maps, fit, driving)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -52,10 +52,13 @@ class Driving:
     force_known : bool
         Whether the total wheel force was logged in all of them. If not, the measured longitudinal
         acceleration stands in for it and is no longer a measurement to predict.
+    offsets : tuple of mapping of str to float, optional
+        By log, how much parameters of a model differ there from their values, by full name.
     """
 
     logs: tuple[Log, ...]
     force_known: bool
+    offsets: tuple[Mapping[str, float], ...] = ()
 
     @classmethod
     def of(cls, logs: Log | Sequence[Log] | Driving) -> Driving:
@@ -77,6 +80,22 @@ class Driving:
             )
         return found
 
+    @classmethod
+    def joined(cls, parts: Iterable[Driving]) -> Driving:
+        """The logs of several, with the offsets that they have there."""
+        every = tuple(parts)
+        logs = tuple(log for part in every for log in part.logs)
+        offsets = tuple(own for part in every for own in part.offsets or ({},) * len(part.logs))
+        return cls(logs, all(part.force_known for part in every), offsets)
+
+    def each_log(self) -> tuple[Driving, ...]:
+        """Its logs one by one, with the offsets that they have."""
+        offsets = self.offsets or ({},) * len(self.logs)
+        return tuple(
+            replace(self, logs=(log,), offsets=(own,))
+            for log, own in zip(self.logs, offsets, strict=True)
+        )
+
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
         """The usable stretches, in the order in which the core's results come."""
@@ -86,7 +105,7 @@ class Driving:
 
     def only(self, stretch: Stretch) -> Driving:
         """One stretch, or a part of one, alone."""
-        alone = Driving(self.logs, self.force_known)
+        alone = replace(self)
         vars(alone)["stretches"] = (stretch,)
         return alone
 
@@ -227,13 +246,13 @@ class Driving:
         core = model.core(force_known=self.force_known)
         longest = pieces.LONGEST if longest is None else longest
         if most_samples is not None or self.samples <= longest:
-            return self._problem(core, self._pieces(most_samples), other_inputs)
+            return self._problem(model, core, self._pieces(most_samples), other_inputs)
         # Noise is taken out of the whole signal: a cut is no corner.
         inputs = self._whole_inputs if other_inputs is None else other_inputs
         channels = self.channels() if channels_in_use() else None
 
         def some(core: _core.SingleTrack, begin: int, end: int) -> _core.Problem:
-            return self._problem(core, self._between(begin, end), inputs, channels)
+            return self._problem(model, core, self._between(begin, end), inputs, channels)
 
         runs = [(at, at + where.stop - where.start, log.rate_hz) for log, where, at in self._whole]
         return PiecewiseProblem(some, core, cut(runs, longest))
@@ -253,10 +272,11 @@ class Driving:
         core = model.core(force_known=self.force_known)
         parts = [part for first, size in windows for part in self._between(first, first + size)]
         channels = self.channels() if channels_in_use() else None
-        return self._problem(core, parts, self._whole_inputs, channels, motion)
+        return self._problem(model, core, parts, self._whole_inputs, channels, motion)
 
     def _problem(
         self,
+        model: Model,
         core: _core.SingleTrack,
         parts: list[_Part],
         other_inputs: FloatArray | None,
@@ -285,8 +305,20 @@ class Driving:
                 began,
                 log.name,
                 *self._steering_around(log, where, other_inputs),
+                self.shift(model, log),
             )
         return problem
+
+    def shift(self, model: Model, log: Log) -> list[float]:
+        """By how much the core's parameters differ in a log; nothing where none does."""
+        own = self.offsets[self.logs.index(log)] if self.offsets else {}
+        columns = {n: p.column for n, p in model.parameters.items() if own.get(n, 0.0) != 0.0}
+        if not columns:
+            return []
+        shift = np.zeros(_core.PARAMETERS)
+        for name, column in columns.items():
+            shift[column] = own[name]
+        return [float(x) for x in shift]
 
     def _steering_around(
         self, log: Log, where: slice, other_inputs: FloatArray | None

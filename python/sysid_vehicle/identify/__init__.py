@@ -5,6 +5,7 @@ from .box import free_box
 from .estimates import Estimate
 from .fit import Fit
 from .identify import identify, objective_of, profile_fit, refine, refit
+from .offsets import driving_of
 from .posterior import Posterior
 from .predictive import Prediction, predict
 from .profile import Profile
@@ -25,6 +26,7 @@ __all__ = [
     "RunsFit",
     "Start",
     "Starts",
+    "driving_of",
     "explaining",
     "free_box",
     "identify",

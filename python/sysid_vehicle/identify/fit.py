@@ -10,7 +10,7 @@ import numpy as np
 
 from .._arrays import FloatArray
 from .._tables import frame
-from .._text import brief, html_paragraph, html_table, number, text_table
+from .._text import brief, html_list, html_paragraph, html_table, number, text_table
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
@@ -91,6 +91,17 @@ class Fit:
     def undetermined(self) -> tuple[str, ...]:
         """Parameters that this driving does not determine."""
         return tuple(e.name for e in self.estimates if e.note)
+
+    @property
+    def offsets(self) -> dict[str, dict[str, float]]:
+        """Nuisances of the model in each log, by the log's name; of one log, its values."""
+        logs = self.driving.logs
+        at = {n: self.model.value(n) for n in self.model.nuisance_names}
+        own = self.driving.offsets or ({},) * len(logs)
+        return {
+            log.name: {n: value + apart.get(n, 0.0) for n, value in at.items()}
+            for log, apart in zip(logs, own, strict=True)
+        }
 
     @property
     def derived(self) -> tuple[Estimate, ...]:
@@ -218,11 +229,22 @@ class Fit:
     __repr__ = brief
 
     def __str__(self) -> str:
-        return f"{self._headline()}\n{text_table(self._head, self._rows())}\nNoise\n{self.noise}"
+        table = text_table(self._head, self._rows())
+        return "\n".join([self._headline(), table, *self._by_log(), "Noise", str(self.noise)])
+
+    def _by_log(self) -> list[str]:
+        """Lines on the logs whose nuisances differ; the table has their means."""
+        if not self.driving.offsets:
+            return []
+        return [
+            f"{log}: {', '.join(f'{n} {number(v, 3)}' for n, v in own.items())}"
+            for log, own in self.offsets.items()
+        ]
 
     def _repr_html_(self) -> str:
         return (
             html_paragraph(self._headline())
             + html_table(self._head, self._rows())
+            + (html_list(self._by_log()) if self.driving.offsets else "")
             + self.noise._repr_html_()
         )

@@ -20,6 +20,7 @@ from .box import free_box, free_prior
 from .estimates import INTERVALS, wald, with_profiles
 from .fit import Fit
 from .objective import Objective
+from .offsets import centred, marginal_information
 from .profile import profile_all
 from .search import METHODS, Box, minimise
 from .settle import risen, rivalled, settle, settle_finely, to_the_top
@@ -41,6 +42,7 @@ _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts
 _FOLLOWED = 2  # ends of searches that are followed with noise of their own
 _SAME = 1e-2  # of the box: ends no farther apart lie in one valley
+_OFFSETS = 2  # times that offsets of logs and what they share are found in turn
 _BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 
 
@@ -153,9 +155,19 @@ def identify(
     for end in others:
         best = rivalled(objective, best, end, box, few if few.samples < objective.samples else None)
     fit = _on_its_road(_top(model, driving, objective, best, table))
+    if fit.model.nuisances and len(driving.logs) > 1:
+        fit = _log_by_log(fit)
     if intervals == "profile":
         return profile_fit(fit, workers=workers, progress=progress)
     return predicting_ahead(fit, horizon_s) if horizon_s else fit
+
+
+def _log_by_log(fit: Fit) -> Fit:
+    """The same fit where each log has nuisances of its own."""
+    for _ in range(_OFFSETS):
+        model, driving = centred(fit)
+        fit = replace(refine(model, driving, fit.noise), starts=fit.starts)
+    return fit
 
 
 def _apart(ends: FloatArray, values: FloatArray, box: Box) -> list[FloatArray]:
@@ -349,7 +361,10 @@ def _summary(
     box, names = free_box(model), model.free_names
     if frozen is None:
         frozen = objective.freeze(p, noise.vector())
-    _, _, information = objective.normal_equations(p, frozen, box.columns)
+    if driving.offsets:
+        information = marginal_information(model, driving, p, noise)
+    else:
+        _, _, information = objective.normal_equations(p, frozen, box.columns)
     x = p[box.columns]
     units = {n: parameter.unit for n, parameter in model.parameters.items()}
     estimates, covariance = wald(names, units, x, information, box)

@@ -26,6 +26,7 @@ from .box import free_box
 from .fit import Fit
 from .identify import objective_of
 from .objective import Penalised
+from .offsets import driving_of
 from .search import Box, minimise
 
 __all__ = ["Prediction", "predict"]
@@ -123,7 +124,7 @@ def predict(fit: Fit, driving: Driving, noise: NoiseModel) -> Prediction:
     """
     remembered = _remembered(fit)
     box, p = remembered.box, fit.model.vector()
-    problem = driving.problem(fit.model)
+    problem = driving_of(fit, driving).problem(fit.model)
     other = Penalised(problem, (remembered,))
     frozen = problem.freeze(p, noise.vector())
     best = frozen.log_likelihood

@@ -16,7 +16,7 @@ import numpy as np
 from .._text import with_error
 from ..errors import NumericalError
 from ..estimate import Driving
-from ..identify import Estimate, Fit, refine
+from ..identify import Estimate, Fit, driving_of, refine
 from ..rules import USUAL, Rules
 
 __all__ = ["Disagreement", "disagreements"]
@@ -72,7 +72,7 @@ def disagreements(fit: Fit, test: Driving, rules: Rules = USUAL) -> tuple[Disagr
         `sure` standard errors are a disagreement.
     """
     try:
-        other = refine(fit.model, test, fit.noise)
+        other = refine(fit.model, driving_of(fit, test), fit.noise)
     except (NumericalError, np.linalg.LinAlgError):
         return ()
     told = {e.name for e in (*fit.estimates, *fit.derived)}

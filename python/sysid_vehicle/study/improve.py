@@ -18,7 +18,7 @@ from ..diagnose import Verdicts, considered, instead, judge, omnibus
 from ..effects import effect
 from ..errors import SysidWarning, warn
 from ..estimate import Driving
-from ..identify import Fit, explaining, identify
+from ..identify import Fit, driving_of, explaining, identify
 from ..log import Log, check_excitation, several_logs
 from ..model import Model
 from ..rules import USUAL, Change, Decision, Rules, grade, verdict
@@ -141,14 +141,15 @@ def improve(
         fit, diagnoses = found.fit, found.diagnoses
         fits = way(found.fits, ends)
         floor = fit.noise
-        on_train = in_parallel(lambda f: compare(f, train_driving, noise=floor), fits)
+        on_train = in_parallel(lambda f: compare(f, f.driving, noise=floor), fits)
         on_test = in_parallel(lambda f: compare(f, test_driving, noise=floor), fits)
         last = diagnoses[-1]
-        fitted = last.omnibus if last.fit is fit else omnibus(fit, train_driving, rules)
+        fitted = last.omnibus if last.fit is fit else omnibus(fit, fit.driving, rules)
         rivals = explained = None
         if len(fits) > 1:
-            every = _together(train_driving, test_driving)
-            rivals = instead(serving(fit, test_driving), every, _new(fits), rules)
+            both = serving(fit, test_driving)
+            every = _together(fit.driving, driving_of(both, test_driving))
+            rivals = instead(both, every, _new(fits), rules)
             explained = beyond_noise_ahead(fits, test_driving)
         much_left = explained is not None and explained.share < rules.most
         told = judge(
@@ -219,7 +220,7 @@ def _changes(
 def _together(train: Driving, test: Driving) -> Driving:
     """All driving; the training data where one of the two lacks the wheel force."""
     same = train.force_known == test.force_known
-    return Driving.of([*train.logs, *test.logs]) if same else train
+    return Driving.joined((train, test)) if same else train
 
 
 def _new(fits: Sequence[Fit]) -> tuple[str, ...]:

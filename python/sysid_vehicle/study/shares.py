@@ -27,7 +27,7 @@ from ..diagnose.ceiling import Inputs, folds, ridge
 from ..diagnose.coordinates import begins
 from ..errors import NumericalError
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
-from ..identify import Fit
+from ..identify import Fit, driving_of
 from ..rules import Share, share_between
 
 __all__ = ["CHANNELS", "Shares", "shares"]
@@ -298,7 +298,8 @@ def _errors(
     fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: Sequence[float]
 ) -> list[_Errors]:
     """At each horizon, samples at which predictions end, and errors, shape (predictions, 4)."""
-    problem, p, w = driving.problem(fit.model), fit.model.vector(), noise.vector()
+    problem = driving_of(fit, driving).problem(fit.model)
+    p, w = fit.model.vector(), noise.vector()
     lateral = [MEASURED.index(c) for c in CHANNELS[:-1]]
     with catch_warnings():
         simplefilter("ignore", RuntimeWarning)  # channels that were not measured

@@ -19,7 +19,7 @@ from ..diagnose.ceiling import Explainable, Inputs, Whole, left_out, pieces, thi
 from ..diagnose.force_map import missing_forces
 from ..errors import NumericalError
 from ..estimate import MEASURED, Driving
-from ..identify import Fit
+from ..identify import Fit, driving_of
 from .waterfall import all_ahead
 
 __all__ = ["Structure", "structure"]
@@ -84,7 +84,7 @@ def structure(fit: Fit, test: Driving) -> Structure:
     test : Driving
         Validation data.
     """
-    train, other = in_parallel(lambda d: dict(_of(fit, d)), (fit.driving, test))
+    train, other = in_parallel(lambda d: dict(_of(fit, d)), (fit.driving, driving_of(fit, test)))
     return Structure(train, other)
 
 

@@ -14,7 +14,7 @@ from .._threads import in_parallel
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
 from ..estimate import Driving
-from ..identify import Fit, Prediction, predict, predicting_ahead
+from ..identify import Fit, Prediction, driving_of, predict, predicting_ahead
 from ..log import Log, several_logs
 from ..rules import Change, Gain
 from .horizons import Beyond, beyond_noise, changes, typical_error
@@ -123,7 +123,8 @@ def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> Gain:
     floor = richer.noise.floor().vector()
 
     def squares(fit: Fit) -> FloatArray:
-        trace = test.problem(fit.model).trace(fit.model.vector(), floor, False)
+        own = driving_of(fit, test)
+        trace = own.problem(fit.model).trace(fit.model.vector(), floor, False)
         return as_float64(np.sum(trace["whitened"] ** 2, axis=1))
 
     try:

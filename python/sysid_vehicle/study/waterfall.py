@@ -14,7 +14,7 @@ from .._text import brief, html_table, text_table
 from ..compare import Comparison
 from ..errors import NumericalError
 from ..estimate import MEASURED, Driving, NoiseModel
-from ..identify import Fit
+from ..identify import Fit, driving_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -150,7 +150,7 @@ def all_ahead(
     array, shape (horizons, samples, 5)
         NaN where no prediction ends.
     """
-    problem = driving.problem(fit.model)
+    problem = driving_of(fit, driving).problem(fit.model)
     errors = np.full((len(horizons_s), driving.samples, len(MEASURED)), np.nan)
     for rate in np.unique(driving.sample_rate_hz):
         own = driving.sample_rate_hz == rate

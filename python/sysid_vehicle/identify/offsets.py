@@ -1,0 +1,150 @@
+"""Offsets that differ from log to log: biases of sensors, zero of the steering angle, crossfall.
+
+They are known to be there (`Model.with_nuisances`), and no property of the car. Each log has its
+own, with the prior of the model about their null values: those of other logs say nothing of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import scipy
+
+from .._arrays import FloatArray, as_float64
+from ..errors import NumericalError
+from ..estimate import Driving, NoiseModel
+from ..log import Log
+from ..model import Model
+from .box import free_box, free_prior
+from .fit import Fit
+from .objective import Objective
+from .search import minimise
+from .settle import risen
+
+__all__ = ["centred", "driving_of", "marginal_information"]
+
+_ROUNDS = 3
+_STANDS = 0.01  # nats
+
+
+def driving_of(fit: Fit, logs: Log | Sequence[Log] | Driving) -> Driving:
+    """Driving whose logs have the offsets that are likeliest under a fit.
+
+    Parameters
+    ----------
+    fit : Fit
+        Everything but its nuisances stays as it is.
+    logs : Log, sequence of Log, or Driving
+        Driving that has offsets keeps them, and so does what the fit was made of.
+
+    Returns
+    -------
+    Driving
+    """
+    driving = Driving.of(logs)
+    if driving is fit.driving or driving.offsets or not fit.model.nuisances:
+        return driving
+    return _settled(fit, driving)
+
+
+# Several measures ask for the same fit on the same validation data.
+@lru_cache(maxsize=64)
+def _settled(fit: Fit, driving: Driving) -> Driving:
+    try:
+        own = [_likeliest(fit.model, log, fit.noise) for log in driving.each_log()]
+    except (NumericalError, np.linalg.LinAlgError):
+        return driving
+    at = {n: fit.model.value(n) for n in fit.model.nuisance_names}
+    offsets = tuple({n: v - at[n] for n, v in values.items()} for values in own)
+    return replace(driving, offsets=offsets)
+
+
+def _likeliest(model: Model, driving: Driving, noise: NoiseModel) -> dict[str, float]:
+    """Values of the nuisances of one log."""
+    names = model.nuisance_names
+    alone = model.with_fixed([n for n in model.free_names if n not in names])
+    box = free_box(alone)
+    objective = Objective(driving.problem(alone), free_prior(alone))
+    p, told = alone.vector(), noise.vector()
+    p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
+    gains = objective.freeze(p, told)
+    for _ in range(_ROUNDS):
+        before = gains.log_likelihood - objective.prior_cost(p)
+        found = minimise(objective, p, gains, box, rounds=8, tolerance=_STANDS)
+        p, gains = risen(objective, p, gains, found.x, told, box)
+        if gains.log_likelihood - objective.prior_cost(p) < before + _STANDS:
+            break
+    return dict(zip(names, map(float, p[box.columns]), strict=True))
+
+
+def centred(fit: Fit) -> tuple[Model, Driving]:
+    """The model with the mean of what its nuisances are in each log, and these by their offsets."""
+    plain = replace(fit.driving, offsets=())
+    driving = _settled(fit, plain)
+    names = fit.model.nuisance_names
+    if not driving.offsets:
+        return fit.model, plain
+    mean = {n: float(np.mean([own[n] for own in driving.offsets])) for n in names}
+    offsets = tuple({n: own[n] - mean[n] for n in names} for own in driving.offsets)
+    values = {n: fit.model.value(n) + mean[n] for n in names}
+    return fit.model.with_values(values), replace(driving, offsets=offsets)
+
+
+def marginal_information(
+    model: Model, driving: Driving, p: FloatArray, noise: NoiseModel
+) -> FloatArray:
+    """Information about the free parameters where each log has nuisances of its own.
+
+    Of a nuisance it is that about its mean over the logs.
+
+    Parameters
+    ----------
+    model : Model
+    driving : Driving
+    p : array, shape (parameters,)
+        Of the core.
+    noise : NoiseModel
+
+    Returns
+    -------
+    array, shape (n, n)
+        In the order of the model's free parameters.
+    """
+    box, names = free_box(model), model.free_names
+    own = np.isin(names, model.nuisance_names)
+    n, each = len(names), driving.each_log()
+    shared, several = int(np.count_nonzero(~own)), int(np.count_nonzero(own))
+    prior = np.zeros((n, n))
+    for rows in free_prior(model):
+        slopes = rows(p)[1][:, box.columns]
+        prior += slopes.T @ slopes
+    whole = np.zeros((shared + several * len(each),) * 2)
+    whole[:shared, :shared] = prior[np.ix_(~own, ~own)]
+    # From shared parameters, means of nuisances and what all logs but the last differ by from them.
+    back = np.zeros_like(whole)
+    back[:shared, :shared] = np.eye(shared)
+    at = np.empty(n, dtype=np.intp)
+    at[~own] = np.arange(shared)
+    for i, log in enumerate(each):
+        problem: Any = log.problem(model)
+        gains = problem.freeze(p, noise.vector())
+        _, _, told = problem.normal_equations(p, gains, box.columns)
+        told[np.ix_(own, own)] += prior[np.ix_(own, own)]
+        at[own] = shared + several * i + np.arange(several)
+        whole[np.ix_(at, at)] += told
+        back[at[own], shared : shared + several] = np.eye(several)
+        for j in range(len(each) - 1):
+            sign = float(i == j) - float(i == len(each) - 1)
+            back[at[own], shared + several * (j + 1) + np.arange(several)] = sign
+    turned = back.T @ whole @ back
+    # Differences have the prior: what they could be is finite, and the rest is free of them.
+    kept, apart = slice(0, shared + several), slice(shared + several, None)
+    told = turned[kept, kept] - turned[kept, apart] @ scipy.linalg.solve(
+        turned[apart, apart], turned[apart, kept], assume_a="pos"
+    )
+    at[own] = shared + np.arange(several)
+    return as_float64(0.5 * (told + told.T)[np.ix_(at, at)])

@@ -1,0 +1,195 @@
+"""Nuisances that differ from log to log: each log has its own, whatever it is read for."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Fit, Log, Model, compare, identify, load
+from sysid_vehicle.diagnose.evidence import Evidence
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.estimate.pieces import PiecewiseProblem
+from sysid_vehicle.identify import driving_of, predicting_ahead
+from sysid_vehicle.identify.offsets import marginal_information
+
+STEER, GYRO = "steer_offset.offset_rad", "gyro_bias.bias_radps"
+NUISANCES = ("steer_offset", "gyro_bias")
+
+
+@pytest.fixture(scope="module")
+def several(lap: Log, course: Log, altered: Callable[..., Log]) -> tuple[Log, ...]:
+    """Three logs of one car whose steering sensor and gyro were set to zero anew for each."""
+
+    def moved(log: Log, steer: float, gyro: float) -> Log:
+        steer_rad, yaw_rate = log["steer_rad"] + steer, log["yaw_rate_radps"] + gyro
+        return altered(log, steer_rad=steer_rad, yaw_rate_radps=yaw_rate)
+
+    first, second = lap.between(0.0, 14.0), lap.between(14.0, 28.0)
+    return (
+        moved(first, 0.004, 0.003),
+        moved(second, -0.006, 0.0),
+        moved(course.between(0.0, 15.0), 0.01, -0.003),
+    )
+
+
+@pytest.fixture(scope="module")
+def found(start: Model, several: tuple[Log, ...]) -> Fit:
+    return identify(start.with_nuisances(NUISANCES), several[:2], starts=1)
+
+
+def test_each_log_of_a_fit_has_its_own(found: Fit, several: tuple[Log, ...], truth: Model) -> None:
+    first, second = (found.offsets[log.name] for log in several[:2])
+    assert first[STEER] == pytest.approx(-0.004, abs=2e-4)
+    assert second[STEER] == pytest.approx(0.006, abs=2e-4)
+    assert first[GYRO] == pytest.approx(0.003, abs=6e-4)
+    assert second[GYRO] == pytest.approx(0.0, abs=6e-4)
+    # What the table has is the mean, and the car is the true one in spite of them.
+    assert found[STEER].value == pytest.approx(0.5 * (first[STEER] + second[STEER]))
+    assert f"{several[0].name}: steer_offset.offset_rad" in str(found)
+    assert several[1].name in found._repr_html_()
+    for axle in ("front", "rear"):
+        load_n = truth.vehicle.mass_kg * 9.80665 / truth.vehicle.wheelbase_m
+        load_n *= truth.vehicle.lr_m if axle == "front" else truth.vehicle.lf_m
+        stiffness = load_n * np.prod([truth.value(f"{x}_{axle}") for x in "BCD"])
+        e = found[f"cornering stiffness {axle}"]
+        assert abs(e.value - stiffness) < 4.0 * e.std
+
+
+def test_logs_of_the_same_offsets_need_none(start: Model, lap: Log) -> None:
+    plain = start.with_nuisances(NUISANCES)
+    halves = [lap.between(0.0, 10.0), lap.between(10.0, 20.0)]
+    fit = identify(plain, halves, starts=1)
+    assert all(abs(own[STEER]) < 4e-4 for own in fit.offsets.values())
+    alone = replace(fit, driving=Driving.of(lap))
+    assert not alone.driving.offsets
+    assert alone.offsets == {lap.name: {n: alone.model.value(n) for n in (STEER, GYRO)}}
+    assert replace(alone, model=start).offsets == {lap.name: {}}
+
+
+def test_other_logs_have_their_own_too(found: Fit, several: tuple[Log, ...]) -> None:
+    other = several[2]
+    own = driving_of(found, other).offsets[0]
+    assert own[STEER] + found.model.value(STEER) == pytest.approx(-0.01, abs=3e-4)
+    assert compare(found, other).error < 1.05
+    # Taken as offsets of the first logs they are an error of the model.
+    rigid = Driving((other,), True, ({STEER: 0.0},))
+    assert compare(found, rigid).error > 1.3
+    assert driving_of(found, found.driving) is found.driving
+    assert driving_of(found, rigid) is rigid
+
+
+def test_a_prior_holds_what_a_log_does_not_tell(found: Fit, several: tuple[Log, ...]) -> None:
+    loose, tight = (
+        driving_of(_with_prior(found, std), several[2]).offsets[0][STEER] + found.model.value(STEER)
+        for std in (0.02, 1e-7)
+    )
+    assert loose == pytest.approx(-0.01, abs=3e-4)
+    assert tight == pytest.approx(0.0, abs=1e-5)
+
+
+def _with_prior(fit: Fit, std: float) -> Fit:
+    return replace(fit, model=fit.model.with_priors({STEER: (0.0, std)}))
+
+
+def test_a_shifted_problem_is_that_of_shifted_parameters(
+    found: Fit, several: tuple[Log, ...]
+) -> None:
+    driving = found.driving
+    problem, noise, p = driving.problem(found.model), found.noise.vector(), found.model.vector()
+    columns = [found.model.parameters[n].column for n in ("B_front", STEER, GYRO)]
+    gains = problem.freeze(p, noise)
+    whole = problem.normal_equations(p, gains, columns)
+    horizons = [(1, 1), (50, 10)]
+    signals = np.ones((driving.samples, 2))
+    at, sums = 0, [0.0, np.zeros(3), np.zeros((3, 3)), 0.0, 0.0]
+    for one, own in zip(driving.each_log(), driving.offsets, strict=True):
+        moved = found.model.with_values({n: found.model.value(n) + v for n, v in own.items()})
+        q, alone = moved.vector(), Driving(one.logs, True).problem(moved)
+        kept = alone.freeze(q, noise)
+        here = slice(at, at + alone.samples)
+        rows = slice(5 * here.start, 5 * here.stop)
+        same = {
+            "residuals": (problem.residuals(p, gains)[here], alone.residuals(q, kept)),
+            "sensitivities": (
+                problem.sensitivities(p, gains, columns)[rows],
+                alone.sensitivities(q, kept, columns),
+            ),
+            "signals": (
+                problem.signal_sensitivities(p, gains, signals, [1, 7])[rows],
+                alone.signal_sensitivities(q, kept, signals[here], [1, 7]),
+            ),
+            "state": (
+                problem.trace(p, noise, True)["state"][here],
+                alone.trace(q, noise, True)["state"],
+            ),
+            "ahead": (
+                problem.look_ahead(p, noise, horizons)[:, here],
+                alone.look_ahead(q, noise, horizons),
+            ),
+            "free": (problem.free_run(p)[here], alone.free_run(q)),
+        }
+        for name, (got, expected) in same.items():
+            np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-9, err_msg=name)
+        told = alone.normal_equations(q, kept, columns)
+        score = alone.noise_score(q, noise)[0]
+        more = (*told, kept.log_likelihood, score)
+        sums = [a + b for a, b in zip(sums, more, strict=True)]
+        at = here.stop
+    for got, expected in zip(whole, sums, strict=False):
+        np.testing.assert_allclose(got, expected, rtol=1e-9)
+    assert gains.log_likelihood == pytest.approx(sums[3], rel=1e-12)
+    assert problem.noise_score(p, noise)[0] == pytest.approx(sums[4], rel=1e-9)
+    assert problem.half_sum_of_squares(p, gains) == pytest.approx(whole[0], rel=1e-12)
+    sets = np.stack([p] * 5)
+    np.testing.assert_allclose(problem.log_likelihoods(sets, noise), gains.log_likelihood)
+    pieces = driving.problem(found.model, longest=1000)
+    assert isinstance(pieces, PiecewiseProblem)
+    assert pieces.freeze(p, noise).log_likelihood == pytest.approx(sums[3], rel=1e-9)
+
+
+def test_standard_errors_count_the_offsets_as_unknown(found: Fit) -> None:
+    """Marginal information is what offsets leave of the information given them."""
+    model, driving, noise = found.model, found.driving, found.noise
+    p, names = model.vector(), model.free_names
+    told = marginal_information(model, driving, p, noise)
+    columns = [model.parameters[n].column for n in names]
+    problem = driving.problem(model)
+    given = problem.normal_equations(p, problem.freeze(p, noise.vector()), columns)[2]
+    shared = [i for i, n in enumerate(names) if n not in (STEER, GYRO)]
+    lost = (given - told)[np.ix_(shared, shared)]
+    scale = np.sqrt(np.diag(given)[shared])
+    assert np.linalg.eigvalsh(lost / np.outer(scale, scale))[0] > -1e-9
+    assert np.trace(lost / np.outer(scale, scale)) > 1e-6
+    # Each half of a log tells its own offset: the mean is known like that of two.
+    assert found[STEER].std == pytest.approx(told[names.index(STEER)].max() ** -0.5, rel=1.0)
+
+
+def test_what_logs_differ_by_is_projected_out(found: Fit) -> None:
+    evidence = Evidence(found, found.driving)
+    first = np.repeat(found.driving.log_number == 0, 5)
+    own = np.where(first, evidence.of_parameters(STEER)[:, 0], 0.0)
+    assert np.linalg.norm(evidence.project(own[:, None])) < 1e-6 * np.linalg.norm(own)
+
+
+def test_fits_to_predictions_and_files_keep_them(found: Fit, tmp_path: Path) -> None:
+    ahead = predicting_ahead(found, 1.0)
+    assert ahead.driving.offsets == found.driving.offsets
+    assert ahead[STEER].value == pytest.approx(found[STEER].value, abs=2e-3)
+    found.save(tmp_path / "fit.npz")
+    back = load(tmp_path / "fit.npz")
+    assert isinstance(back, Fit)
+    assert back.offsets == found.offsets
+    assert compare(back, back.driving).error == compare(found, found.driving).error
+
+
+def test_joined_driving_keeps_the_offsets_of_its_parts(
+    found: Fit, several: tuple[Log, ...]
+) -> None:
+    other = driving_of(found, several[2])
+    both = Driving.joined((found.driving, other))
+    assert both.offsets == (*found.driving.offsets, *other.offsets)
+    plain = Driving.joined((Driving.of(several[0]), other))
+    assert plain.offsets == ({}, *other.offsets)
+    assert [d.logs for d in both.each_log()] == [(log,) for log in several]
