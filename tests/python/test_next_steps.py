@@ -18,6 +18,7 @@ from sysid_vehicle.study import AddedEffect
 from sysid_vehicle.study.disagree import disagreements
 from sysid_vehicle.study.horizons import Beyond
 from sysid_vehicle.study.next_steps import next_steps
+from sysid_vehicle.study.said import ahead, small
 from sysid_vehicle.study.structure import Structure
 
 
@@ -53,6 +54,23 @@ def test_what_no_effect_explains_is_to_be_looked_at(unknown: Study) -> None:
     assert str(unknown).count("Next: ") == len(unknown.next_steps)
     assert unknown.to_dict()["next_steps"] == list(unknown.next_steps)
     assert "<li>Next: " in unknown._repr_html_()
+
+
+def test_errors_are_told_in_units_and_small_ones_as_such(adequate: Study, unknown: Study) -> None:
+    assert "Median error 2 s ahead on validation data: v_y 0.0" in str(adequate)
+    assert "rad/s, a_y 0.0" in adequate._repr_html_()
+    # With two models both are told, and a car that is lost is called so.
+    errors = unknown.horizons
+    lost = errors.error.repeat(2, axis=0)
+    lost[1, 2, errors.channels.index("vy_mps")] = np.inf
+    two = replace(unknown, fits=unknown.fits * 2)
+    two.__dict__["horizons"] = replace(errors, error=lost, steps=("baseline", "final"))
+    assert "-> lost m/s, yaw rate 0.0" in ahead(two)
+    assert not small(two)
+    # What is left may be too small for its user to look for.
+    assert any("--matters" in text for text in next_steps(replace(adequate, verdict="unknown")))
+    assert not small(unknown)
+    assert not any("--matters" in text for text in unknown.next_steps)
 
 
 def test_a_search_that_was_cut_short_is_to_go_on(unknown: Study) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .said import disturbance
+from .matters import USUAL_SIZES
+from .said import disturbance, small
 
 if TYPE_CHECKING:
     from .study import Study
@@ -57,6 +58,12 @@ def _of_what_is_left(study: Study) -> list[str]:
     found = []
     if study.stopped:
         found.append(f"give the search more time: {_few(study.stopped)} were still to be tried")
+    if study.verdict == "unknown" and not study.added and small(study):
+        usual = ", ".join(f"{name} {size}" for name, size in USUAL_SIZES.items())
+        found.append(
+            f"if errors 0.5 to 5 s ahead of less than {usual} do not matter to you, use the model "
+            "as it is: with `matters`, or `--matters`, the verdict counts larger ones alone"
+        )
     if not study.sensors and not study.checked:
         found.append(
             "check the sensors, and give the result to the study: `sv.check`, or "

@@ -40,7 +40,7 @@ from .horizons import Beyond, Horizons, horizons
 from .next_steps import next_steps
 from .predicting import Predicting, predicting
 from .record import record
-from .said import disturbance, in_the_end, structured
+from .said import ahead, disturbance, in_the_end, structured
 from .shares import Shares, shares
 from .structure import Structure
 from .validation import at_its_best
@@ -336,7 +336,7 @@ class Study:
         lines += [f"  {a}" for a in self.added]
         lines += [f"  {text}" for text in self.sensors]
         lines.append(text_table(self._HEAD, self._rows()))
-        lines.append(self.in_the_end)
+        lines += [text for text in (ahead(self), self.in_the_end) if text]
         lines += [f"Next: {text}." for text in self.next_steps]
         lines += [f"Warning: {w}" for w in self.warnings]
         return "\n".join(lines)
@@ -363,7 +363,7 @@ class Study:
             f"<p><b>{escape(self.verdict)}</b>: {escape(self.meaning)}.</p>"
             + html_list([*self.added, *self.sensors])
             + html_table(self._HEAD, self._rows())
-            + html_paragraph(self.in_the_end)
+            + html_paragraph(f"{ahead(self)} {self.in_the_end}".lstrip())
             + html_list([f"Next: {text}." for text in self.next_steps])
         )
 
