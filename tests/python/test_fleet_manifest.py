@@ -7,6 +7,7 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle.fleet import manifest_jobs
+from sysid_vehicle.model import NUISANCES
 
 
 @pytest.fixture(scope="module")
@@ -52,11 +53,14 @@ def test_a_manifest_names_its_studies(garage: Path, tmp_path: Path) -> None:
     assert jobs[0].options == {"candidates": [], "starts": 1}
     assert jobs[0].train == (garage / "logs/a/one.csv",)
     (garage / "two.toml").write_text(
-        'vehicle = "car.toml"\nlogs = ["logs/a/one.csv"]\n'
+        'vehicle = "car.toml"\nlogs = ["logs/a/one.csv"]\nnuisances = true\n'
         '[[study]]\nname = "c/both"\nlogs = ["logs/a/one.csv", "logs/a/two.csv"]\n'
-        'validation = "logs/b/one.csv"\n'
+        'validation = "logs/b/one.csv"\nnuisances = ["gyro_bias"]\n'
     )
     one, both = manifest_jobs(garage / "two.toml")
+    assert one.model.nuisances == NUISANCES
+    assert both.model.nuisances == ("gyro_bias",)
+    assert jobs[0].model.nuisances == ()
     assert (one.name, both.name, both.car) == ("one", "c/both", "c")
     assert len(both.train) == 2
     assert both.validation == (garage / "logs/b/one.csv",)
@@ -75,6 +79,10 @@ def test_a_manifest_names_its_studies(garage: Path, tmp_path: Path) -> None:
         ('vehicle = "car.toml"\nlogs = ["logs/a/one.csv", "logs/b/one.csv"]', "called 'one'"),
         ('vehicle = "car.toml"\n[[study]]\nname = "x"', r"study 1 \(x\): it has no logs"),
         ('vehicle = 1\nlogs = "logs/a/*.csv"', "vehicle = 1 is no path"),
+        (
+            'vehicle = "car.toml"\nlogs = "logs/a/*.csv"\nnuisances = "gyro"',
+            "nuisances = 'gyro'; give true for the usual ones",
+        ),
         ("study = 1", "is no list of tables"),
         ("improve = 1", "improve is no table"),
     ],

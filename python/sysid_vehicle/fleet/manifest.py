@@ -9,10 +9,12 @@ from typing import Any
 
 from .._files import as_path, read_toml, refuse_unknown
 from ..errors import InvalidInput
+from ..model import Model
 from ..read import ChannelMap
 from .jobs import Job, check_name, check_options, model_of
 
-_SHARED = ("vehicle", "channels", "dbc")
+_FILES = ("vehicle", "channels", "dbc")
+_SHARED = (*_FILES, "nuisances")
 
 
 def manifest_jobs(path: str | Path) -> list[Job]:
@@ -65,11 +67,11 @@ def _job(
     check_name(name)
     if "vehicle" not in told:
         raise InvalidInput(f'{where}: it has no car; give vehicle = "car.toml"')
-    vehicle, channels, dbc = (_file(path, told, key, where) for key in _SHARED)
+    vehicle, channels, dbc = (_file(path, told, key, where) for key in _FILES)
     assert vehicle is not None
     return Job(
         str(name),
-        model_of(vehicle),
+        _with_nuisances(model_of(vehicle), told.get("nuisances", False), where),
         tuple(path.parent.absolute() / log for log in logs),
         tuple(path.parent.absolute() / log for log in _texts(told, "validation", where)),
         None if channels is None else ChannelMap.from_toml(channels),
@@ -77,6 +79,16 @@ def _job(
         define,
         options,
     )
+
+
+def _with_nuisances(model: Model, asked: object, where: str) -> Model:
+    if isinstance(asked, bool):
+        return model.with_nuisances() if asked else model
+    if not isinstance(asked, list) or not all(isinstance(n, str) for n in asked):
+        raise InvalidInput(
+            f"{where}: nuisances = {asked!r}; give true for the usual ones, or a list of effects"
+        )
+    return model.with_nuisances(asked)
 
 
 def _file(path: Path, told: dict[str, Any], key: str, where: str) -> Path | None:
