@@ -173,8 +173,12 @@ def test_what_logs_differ_by_is_projected_out(found: Fit) -> None:
     assert np.linalg.norm(evidence.project(own[:, None])) < 1e-6 * np.linalg.norm(own)
 
 
-def test_fits_to_predictions_and_files_keep_them(found: Fit, tmp_path: Path) -> None:
+def test_fits_to_predictions_and_files_keep_them(
+    found: Fit, several: tuple[Log, ...], tmp_path: Path
+) -> None:
     ahead = predicting_ahead(found, 1.0)
+    other = driving_of(ahead, several[2]).offsets[0][STEER] + ahead.model.value(STEER)
+    assert other == pytest.approx(-0.01, abs=2e-3)
     assert ahead.driving.offsets == found.driving.offsets
     assert ahead[STEER].value == pytest.approx(found[STEER].value, abs=2e-3)
     found.save(tmp_path / "fit.npz")

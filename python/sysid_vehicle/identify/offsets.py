@@ -7,6 +7,7 @@ own, with the prior of the model about their null values: those of other logs sa
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -15,10 +16,11 @@ import numpy as np
 import scipy
 
 from .._arrays import FloatArray, as_float64
-from ..errors import NumericalError
-from ..estimate import Driving, NoiseModel
+from ..errors import InvalidInput, NumericalError
+from ..estimate import Driving, NoiseModel, noise_range
 from ..log import Log
 from ..model import Model
+from .ahead import predicting_ahead
 from .box import free_box, free_prior
 from .fit import Fit
 from .objective import Objective
@@ -28,11 +30,13 @@ from .settle import risen
 __all__ = ["centred", "driving_of", "marginal_information"]
 
 _ROUNDS = 3
-_STANDS = 0.01  # nats
+_STANDS = 0.1  # nats
 
 
 def driving_of(fit: Fit, logs: Log | Sequence[Log] | Driving) -> Driving:
-    """Driving whose logs have the offsets that are likeliest under a fit.
+    """Driving whose logs have the offsets that are best under a fit.
+
+    The likeliest ones with noise of the log's own; of a fit to predictions those that predict best.
 
     Parameters
     ----------
@@ -55,7 +59,7 @@ def driving_of(fit: Fit, logs: Log | Sequence[Log] | Driving) -> Driving:
 @lru_cache(maxsize=64)
 def _settled(fit: Fit, driving: Driving) -> Driving:
     try:
-        own = [_likeliest(fit.model, log, fit.noise) for log in driving.each_log()]
+        own = [_best(fit, log) for log in driving.each_log()]
     except (NumericalError, np.linalg.LinAlgError):
         return driving
     at = {n: fit.model.value(n) for n in fit.model.nuisance_names}
@@ -63,22 +67,40 @@ def _settled(fit: Fit, driving: Driving) -> Driving:
     return replace(driving, offsets=offsets)
 
 
-def _likeliest(model: Model, driving: Driving, noise: NoiseModel) -> dict[str, float]:
-    """Values of the nuisances of one log."""
-    names = model.nuisance_names
-    alone = model.with_fixed([n for n in model.free_names if n not in names])
+def _best(fit: Fit, driving: Driving) -> dict[str, float]:
+    """Values of the nuisances of one log, by the criterion of the fit."""
+    names = fit.model.nuisance_names
+    alone = fit.model.with_fixed([n for n in fit.model.free_names if n not in names])
+    if fit.horizon_s:
+        # One step ahead parameters that are not the likelihood's would bend the offsets.
+        with suppress(InvalidInput):  # too short for a window
+            found = predicting_ahead(replace(fit, model=alone, driving=driving), fit.horizon_s)
+            return {n: found.model.value(n) for n in names}
+    p = _likeliest(alone, driving, fit.noise)
+    return {n: float(p[alone.parameters[n].column]) for n in names}
+
+
+def _likeliest(alone: Model, driving: Driving, noise: NoiseModel) -> FloatArray:
+    """Parameters of the core, the free ones at the maximum of the likelihood.
+
+    Noise is that of the log: what a model lacks elsewhere is no offset.
+    """
     box = free_box(alone)
-    objective = Objective(driving.problem(alone), free_prior(alone))
-    p, told = alone.vector(), noise.vector()
+    within = noise_range(alone.vehicle, driving)
+    objective = Objective(driving.problem(alone), free_prior(alone), *within)
+    p = alone.vector()
     p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
-    gains = objective.freeze(p, told)
+    told = as_float64(np.clip(noise.vector(), *within))
+    value = -np.inf
     for _ in range(_ROUNDS):
-        before = gains.log_likelihood - objective.prior_cost(p)
+        told, _ = objective.learn_noise(p, told, rounds=2)
+        gains = objective.freeze(p, told)
         found = minimise(objective, p, gains, box, rounds=8, tolerance=_STANDS)
         p, gains = risen(objective, p, gains, found.x, told, box)
-        if gains.log_likelihood - objective.prior_cost(p) < before + _STANDS:
+        before, value = value, gains.log_likelihood - objective.prior_cost(p)
+        if value < before + _STANDS:
             break
-    return dict(zip(names, map(float, p[box.columns]), strict=True))
+    return p
 
 
 def centred(fit: Fit) -> tuple[Model, Driving]:
