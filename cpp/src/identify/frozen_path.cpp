@@ -56,6 +56,20 @@ class Gains {
         }
     }
 
+    /// Whether states of effects follow the motion uncorrected: the filter was frozen without them.
+    bool without(std::size_t states) const {
+        return std::any_of(places_.begin() + kMotionStates,
+                           places_.begin() + static_cast<long>(kMotionStates + states),
+                           [](int place) { return place < 0; });
+    }
+
+    /// Keeps states that have changed since `use`.
+    template <class State>
+    void keep_corrected(std::size_t run, std::size_t k, FrozenPath& path, State&& state) const {
+        for (std::size_t i = 0; i < path.states && i < places_.size(); ++i)
+            path.corrected[(first_[run] + k) * path.states + i] = state(i);
+    }
+
     void keep_parts(std::size_t run, std::size_t k, int parts, FrozenPath& path) const {
         if (path.states > 0) path.parts[first_[run] + k] = parts;
     }
@@ -73,6 +87,14 @@ class Gains {
     std::vector<std::size_t> first_;  // sample of each run
 };
 
+/// Lets states of effects follow the motion that the first reading has corrected: that reading's
+/// noise would be a kick to them.
+void settle_at_first(const SingleTrack& model, const Run& run, ModelState<double>& x,
+                     const double* p) {
+    const std::array<double, kExternals> calm{};
+    settle_auxiliary(model, x, calm.data(), run.inputs[0], p);
+}
+
 void walk_run(const Problem& problem, std::size_t number, const double* p, const Gains& gains,
               FrozenPath& path) {
     const SingleTrack& model = problem.model;
@@ -84,6 +106,7 @@ void walk_run(const Problem& problem, std::size_t number, const double* p, const
         forget[i] = gains.filter().noise.forget(i, run.dt);
     static_assert(kDisturbances == kExternals);
     ModelState<double> x = initial_state(model, run, p);
+    const bool settles = gains.without(own.count);
     std::array<double, kExternals> disturbance{};
     for (std::size_t k = 0; k < run.size(); ++k) {
         poll_interrupt(k);
@@ -96,12 +119,15 @@ void walk_run(const Problem& problem, std::size_t number, const double* p, const
             for (std::size_t i = 0; i < disturbances; ++i) disturbance[i] *= forget[i];
         }
         const auto y = sense(model, x, disturbance.data(), run.inputs[k], p);
-        gains.use(number, k, errors_of(run.measurements[k], y), path,
-                  [&](std::size_t i) -> double& {
-                      if (i < kMotionStates) return x[i];
-                      return i < moved ? x[kMotionStates + own.place[i - kMotionStates]]
-                                       : disturbance[i - moved];
-                  });
+        const auto state = [&](std::size_t i) -> double& {
+            if (i < kMotionStates) return x[i];
+            return i < moved ? x[kMotionStates + own.place[i - kMotionStates]]
+                             : disturbance[i - moved];
+        };
+        gains.use(number, k, errors_of(run.measurements[k], y), path, state);
+        if (k > 0 || !settles) continue;
+        settle_at_first(model, run, x, p);
+        gains.keep_corrected(number, k, path, state);
     }
 }
 
@@ -116,6 +142,7 @@ class PathWalk {
           path_(path),
           model_(problem.model, p, {}, gains.filter().noise.sloping()),
           rate_(problem.model.fastest_rate(p, 1.0)),
+          settles_(gains.without(model_.own().count)),
           state_(model_.moving()),
           forget_(model_.externals()) {}
 
@@ -170,8 +197,11 @@ class PathWalk {
                 if (!std::isfinite(e)) return false;
             const std::size_t run = pieces_[s.piece].run;
             gains_.keep_parts(run, s.at, parts[lane], path_);
-            gains_.use(run, s.at, error, path_,
-                       [&](std::size_t i) -> double& { return state_[i].at[lane]; });
+            const auto state = [&](std::size_t i) -> double& { return state_[i].at[lane]; };
+            gains_.use(run, s.at, error, path_, state);
+            if (s.at > 0 || !settles_) continue;
+            settle(*s.run, lane, pieces_[s.piece].set);
+            gains_.keep_corrected(run, s.at, path_, state);
         }
         return true;
     }
@@ -179,12 +209,21 @@ class PathWalk {
     void finish(std::size_t /*first*/, std::size_t /*last*/) const {}
 
   private:
+    void settle(const Run& run, std::size_t lane, std::size_t set) {
+        ModelState<double> x{};
+        for (std::size_t i = 0; i < kMotionStates; ++i) x[i] = state_[i].at[lane];
+        settle_at_first(model_.model(), run, x, model_.parameters(set));
+        std::size_t to = kMotionStates;
+        for (const std::size_t i : model_.own()) state_[to++].at[lane] = x[kMotionStates + i];
+    }
+
     const Problem& problem_;
     const std::vector<Piece>& pieces_;
     const Gains& gains_;
     FrozenPath& path_;
     RecordedModel model_;
     double rate_;
+    bool settles_;
     std::vector<LaneRow> state_, forget_;
     std::array<const Run*, kLanes> disturbed_{};
 };

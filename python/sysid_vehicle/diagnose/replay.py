@@ -54,6 +54,8 @@ class _Stretch:
         Noise of the sensors.
     channels : array, shape (n, channels in use)
         Columns of the log that effects of users read.
+    shift : list of float
+        By how much parameters differ in its log; empty where none does.
     """
 
     dt: float
@@ -64,6 +66,7 @@ class _Stretch:
     road: FloatArray
     scatter: FloatArray
     channels: FloatArray
+    shift: list[float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +203,7 @@ class Replay:
             v_x, v_y, yaw_rate = map(float, s.motion[0])
             inputs, _, outputs, lost_at = _core.simulate(
                 core,
-                p,
+                p + np.array(s.shift) if s.shift else p,
                 s.dt,
                 references,
                 driver,
@@ -222,7 +225,7 @@ class Replay:
                 inputs[:, 1] = outputs[:, _A_X]
                 reading[:, _A_X] = np.nan
             inputs = as_float64(np.column_stack([inputs, s.channels]))
-            problem.add_run(s.dt, inputs, as_float64(reading), s.start_s)
+            problem.add_run(s.dt, inputs, as_float64(reading), s.start_s, shift=s.shift)
         return problem
 
     @cached_property
@@ -284,6 +287,7 @@ class Replay:
                     self._road(n, dt, rng),
                     as_float64(scatter),
                     as_float64(channels[here][parts]),
+                    shift,
                 )
             )
         return tuple(made)
