@@ -74,13 +74,13 @@ SENSORS: dict[str, tuple[tuple[Callable[[Channels, np.random.Generator], None], 
     "vibration": ((_vibrating,), ()),
     "all": ((_vibrating, _late), (_filtered, _coarse)),
 }
-_PUSHES = (150.0, 200.0, 100.0)
+_PUSHES, _SLOPE_RAD = (150.0, 200.0, 100.0), np.radians(1.5)
 _DISTURBANCES = {
     "pushes": sv.RoadDisturbance(*_PUSHES, 0.3),
     "bumps": sv.RoadDisturbance(*_PUSHES, 0.03),
-    "all": sv.RoadDisturbance(*_PUSHES, 0.03),
+    "road": sv.RoadDisturbance(slope_rad=_SLOPE_RAD, slope_time_s=5.0),
+    "all": sv.RoadDisturbance(*_PUSHES, 0.03, _SLOPE_RAD, 5.0),
 }
-_SLOPE_RAD = np.radians(1.5)
 
 
 def car(truth: str) -> sv.Model:
@@ -93,8 +93,15 @@ def car(truth: str) -> sv.Model:
 def ride(rung: str, truth: str, manoeuvre: str, seed: int) -> sv.Log:
     """One drive on one rung; `manoeuvre` is `lap` or `handling_course`."""
     rng = np.random.default_rng([seed, len(manoeuvre)])
-    model = car(truth)
-    c = _driven(model, rung, getattr(sv.manoeuvres, manoeuvre)(), rng)
+    drive = drive_truth(
+        car(truth),
+        getattr(sv.manoeuvres, manoeuvre)(),
+        seed=rng,
+        noise=sv.SensorNoise.none(),
+        disturbance=_DISTURBANCES.get(rung),
+    )
+    # What perfect sensors would write.
+    c = {name: np.array(drive.log[name]) for name in drive.log.channels}
     before, after = SENSORS[rung]
     for act in before:
         act(c, rng)
@@ -104,37 +111,3 @@ def ride(rung: str, truth: str, manoeuvre: str, seed: int) -> sv.Log:
     for act in after:
         act(c, rng)
     return sv.Log.from_arrays(c, name=f"{manoeuvre}, {rung}, seed {seed}")
-
-
-def _driven(
-    model: sv.Model, rung: str, manoeuvre: sv.manoeuvres.Manoeuvre, rng: np.random.Generator
-) -> Channels:
-    """What perfect sensors would write.
-
-    Gravity on a slope is a force that no accelerometer feels.
-    """
-    mass = model.vehicle.mass_kg
-    weight = mass * 9.80665 * _SLOPE_RAD
-    slope = sv.RoadDisturbance(weight, weight, 0.0, 5.0)
-    both = _Sum(_DISTURBANCES.get(rung), slope if rung in ("road", "all") else None)
-    drive = drive_truth(model, manoeuvre, seed=rng, noise=sv.SensorNoise.none(), disturbance=both)
-    c = {name: np.array(drive.log[name]) for name in drive.log.channels}
-    if both.slope_force is not None:
-        c["ax_mps2"] = c["ax_mps2"] - both.slope_force[:, 0] / mass
-        c["ay_mps2"] = c["ay_mps2"] - both.slope_force[:, 1] / mass
-    return c
-
-
-class _Sum:
-    """Two disturbances at once; keeps what the second one was."""
-
-    def __init__(self, first: sv.RoadDisturbance | None, slope: sv.RoadDisturbance | None) -> None:
-        self.first, self.slope = first, slope
-        self.slope_force: np.ndarray | None = None
-
-    def sample(self, n: int, rate_hz: float, rng: np.random.Generator) -> np.ndarray:
-        total = (self.first or sv.RoadDisturbance()).sample(n, rate_hz, rng)
-        if self.slope is not None:
-            self.slope_force = self.slope.sample(n, rate_hz, rng)
-            total = total + self.slope_force
-        return np.ascontiguousarray(total)

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "arrays.hpp"
 #include "fields.hpp"
 #include "register.hpp"
@@ -30,7 +32,12 @@ void register_simulate(py::module_& m) {
             if (n < 2) throw std::invalid_argument("references: expected two samples or more");
             const double* r = matrix(references, n, 3, "references");
             const double* values = vector(p, kParameterCount, "parameters");
-            const double* d = matrix(disturbance, n, 3, "disturbance");
+            const bool slopes = disturbance.ndim() == 2 && disturbance.shape(1) == kExternals;
+            const py::ssize_t wide = slopes ? kExternals : 3;
+            const double* d = matrix(disturbance, n, wide, "disturbance");
+            std::vector<double> external(static_cast<std::size_t>(n * kExternals));
+            for (py::ssize_t k = 0; k < n; ++k)
+                std::copy_n(d + k * wide, wide, external.begin() + k * kExternals);
             std::vector<Reference> wanted(static_cast<std::size_t>(n));
             for (auto& w : wanted) {
                 w = {r[0], r[1], r[2]};
@@ -45,8 +52,10 @@ void register_simulate(py::module_& m) {
             const Beginning beginning{
                 initial_speed, initial_vy, initial_yaw_rate, initial_steer, start,
             };
-            const Drive drive = unlocked(
-                [&] { return simulate(model, values, dt, wanted, driver, d, beginning, logged); });
+            const Drive drive = unlocked([&] {
+                return simulate(model, values, dt, wanted, driver, external.data(), beginning,
+                                logged);
+            });
             return py::make_tuple(copy_of(drive.inputs, 2), copy_of(drive.states, kModelStates),
                                   copy_of(drive.outputs, kChannels), drive.lost_at);
         },

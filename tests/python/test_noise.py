@@ -23,7 +23,7 @@ from sysid_vehicle.estimate import (
     noise_range,
     promised_by_noise,
 )
-from sysid_vehicle.simulate import drive_truth
+from sysid_vehicle.vehicle import GRAVITY_MPS2
 
 SOME = NoiseModel(
     (0.1, 0.2, 0.3, 0.4, 0.5), (0.6, 0.7, 0.8), (900.0, 1000.0, 1100.0), (0.25, 0.5, 0.75)
@@ -141,13 +141,9 @@ def test_bumps_do_not_become_noise_of_the_sensors(truth: Model) -> None:
 
 
 def test_a_road_that_wanders_is_learned_and_a_level_one_is_not_there(truth: Model) -> None:
-    mass, slope = truth.vehicle.mass_kg, 0.25
-    road = RoadDisturbance(mass * slope, mass * slope, 0.0, 5.0)
-    driven = drive_truth(truth, manoeuvres.lap(40.0), seed=6, disturbance=road)
-    # Gravity is no force that an accelerometer feels.
-    gravity = driven.disturbance / mass
-    felt = {c: driven.log[c] - gravity[:, i] for i, c in enumerate(("ax_mps2", "ay_mps2"))}
-    driving = Driving.of(driven.log.corrected(felt, []))
+    slope = 0.25
+    road = RoadDisturbance(slope_rad=slope / GRAVITY_MPS2)
+    driving = Driving.of(drive(truth, manoeuvres.lap(40.0), seed=6, disturbance=road))
     problem, p = driving.problem(truth), truth.vector()
     level, below = learn_noise(
         problem, p, first_guess(driving, truth.vehicle), truth.vehicle, rounds=8

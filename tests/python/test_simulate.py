@@ -147,6 +147,21 @@ def test_a_side_force_pushes_the_car_sideways() -> None:
     assert together > 0.5
 
 
+def test_gravity_on_a_slope_moves_the_car_and_no_accelerometer_feels_it() -> None:
+    road = RoadDisturbance(slope_rad=0.03)
+    model = hidden({})
+    wavy = drive_truth(model, manoeuvres.lap(30.0), seed=1, disturbance=road)
+    gravity = wavy.disturbance[:, 3:]
+    assert not wavy.disturbance[:, :3].any()
+    np.testing.assert_allclose(gravity.std(axis=0), 9.80665 * 0.03, rtol=0.6)
+    v_x, v_y, r = wavy.states.T
+    along = np.gradient(v_x, 0.01) - v_y * r - wavy.outputs[:, 3]
+    across = np.gradient(v_y, 0.01) + v_x * r - wavy.outputs[:, 4]
+    for found, wanted in ((along, gravity[:, 0]), (across, gravity[:, 1])):
+        off = (found - wanted)[20:-20]
+        assert np.std(off) < 0.1 * np.std(wanted)
+
+
 def test_the_steering_lag_shows_in_the_yaw_rate() -> None:
     """Open-loop steering is the same; the car with the lag answers by that much later."""
     course = manoeuvres.sine_sweep()
@@ -200,6 +215,7 @@ def test_a_lap_is_the_same_at_another_rate(calm: Drive) -> None:
         (SensorNoise, {"vx_mps": float("nan")}, "SensorNoise: vx_mps = nan"),
         (RoadDisturbance, {"fy_n": -1.0}, "RoadDisturbance: fy_n = -1.0"),
         (RoadDisturbance, {"correlation_time_s": 0.0}, "must be more than zero"),
+        (RoadDisturbance, {"slope_time_s": 0.0}, "slope_time_s must be more than zero"),
     ],
 )
 def test_sizes_that_cannot_be_are_refused(

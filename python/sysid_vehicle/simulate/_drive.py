@@ -49,8 +49,8 @@ class Drive(Told):
         True v_x [m/s], v_y [m/s] and yaw rate [rad/s].
     outputs : ndarray, shape (n, 5)
         Sensor readings free of noise: v_x, v_y, yaw rate, a_x, a_y.
-    disturbance : ndarray, shape (n, 3)
-        F_x [N], F_y [N] and M_z [N m] that acted on the car.
+    disturbance : ndarray, shape (n, 3) or (n, 5)
+        F_x [N], F_y [N] and M_z [N m] that acted on the car; gravity on a sloping road [m/s2].
     own_states : mapping of str to ndarray, shape (n,)
         States of effects that users defined, by `effect.state`.
     """

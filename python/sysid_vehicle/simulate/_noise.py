@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
+import scipy
 
 from .._arguments import check_not_negative
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
+from ..vehicle import GRAVITY_MPS2
 
 
 @dataclass(frozen=True)
@@ -49,10 +51,12 @@ class SensorNoise:
 
 @dataclass(frozen=True)
 class RoadDisturbance:
-    """Forces and a moment that change at random and that no model knows.
+    """Forces, a moment and a slope of the road that change at random and that no model knows.
 
     Each is an Ornstein-Uhlenbeck process, Gaussian with this standard deviation and correlation
     ``exp(-|t| / correlation_time_s)``, and begins in its stationary state.
+
+    Gravity on a slope moves the car; no accelerometer feels it, and it shifts no wheel load.
 
     Parameters
     ----------
@@ -62,33 +66,47 @@ class RoadDisturbance:
         Standard deviation of the yaw moment [N m].
     correlation_time_s : float
         Correlation time, more than zero.
+    slope_rad, slope_time_s : float
+        Standard deviation of the slopes along and across the car, and their correlation time.
 
     Raises
     ------
     InvalidInput
-        If one is negative, or the correlation time is not positive.
+        If one is negative, or a correlation time is not positive.
     """
 
     fx_n: float = 0.0
     fy_n: float = 0.0
     mz_nm: float = 0.0
     correlation_time_s: float = 0.3
+    slope_rad: float = 0.0
+    slope_time_s: float = 5.0
 
     def __post_init__(self) -> None:
         check_not_negative(self, finite=True)
-        if self.correlation_time_s == 0.0:
-            raise InvalidInput("RoadDisturbance: correlation_time_s must be more than zero")
+        for name in ("correlation_time_s", "slope_time_s"):
+            if getattr(self, name) == 0.0:
+                raise InvalidInput(f"RoadDisturbance: {name} must be more than zero")
 
     def sample(self, n: int, rate_hz: float, rng: np.random.Generator) -> FloatArray:
         """Draw `n` samples of F_x [N], F_y [N] and M_z [N m]: an array of shape (n, 3).
 
-        Notes
-        -----
-        Exact sampling of the process: D. T. Gillespie, Phys. Rev. E 54 (1996), 2084-2091.
+        On a road that slopes two columns more, the gravity along and across [m/s2].
         """
-        keep = float(np.exp(-1.0 / (self.correlation_time_s * rate_hz)))
-        fresh = rng.standard_normal((n, 3))
-        fresh[1:] *= np.sqrt(1.0 - keep**2)
-        for k in range(1, n):
-            fresh[k] += keep * fresh[k - 1]
-        return as_float64(fresh * np.array([self.fx_n, self.fy_n, self.mz_nm]))
+        forces = _wandering(n, 3, self.correlation_time_s * rate_hz, rng)
+        forces *= np.array([self.fx_n, self.fy_n, self.mz_nm])
+        if self.slope_rad == 0.0:
+            return as_float64(forces)
+        slopes = self.slope_rad * _wandering(n, 2, self.slope_time_s * rate_hz, rng)
+        return as_float64(np.hstack([forces, GRAVITY_MPS2 * np.sin(slopes)]))
+
+
+def _wandering(n: int, width: int, samples: float, rng: np.random.Generator) -> FloatArray:
+    """Ornstein-Uhlenbeck processes of unit variance with a correlation time in samples.
+
+    Exact sampling of the process: D. T. Gillespie, Phys. Rev. E 54 (1996), 2084-2091.
+    """
+    keep = float(np.exp(-1.0 / samples))
+    fresh = rng.standard_normal((n, width))
+    fresh[1:] *= np.sqrt(1.0 - keep**2)
+    return as_float64(scipy.signal.lfilter([1.0], [1.0, -keep], fresh, axis=0))

@@ -24,6 +24,7 @@ from ..model import Model
 from ..rules import USUAL, Change, Decision, Rules, grade, verdict
 from ..sensors import SensorCheck, made_ready, put_right
 from .added import AddedEffect
+from .clock import in_time
 from .horizons import changes, horizons
 from .matters import sizes_that_matter, within
 from .search import Search, Trail, kept
@@ -86,7 +87,8 @@ def improve(
     sensors : SensorCheck or False, optional
         Check of the sensors: all logs are put right by it, and what kinematics settled is not
         considered. Without one only what the likelihood cannot hold is taken out: delays of one
-        channel against another, low-passes of sensors, and vibration; with False not even that.
+        channel against another, low-passes of sensors, vibration, and another clock of the wheel
+        force; with False not even that.
     time_limit_s : float, optional
         After so many seconds refits end, wherever they are; of what was refitted by then the best
         is added if validation data confirm it, the model is judged, and a warning tells what was
@@ -123,21 +125,33 @@ def improve(
         candidates = [e.id for e in considered(model, candidates) if e.id not in left_out]
     say = tell if tell is not None else teller(progress)
     train_driving, test_driving = set_aside(train, test)
-    baseline = identify(model, train_driving, starts=starts, seed=seed, progress=progress)
-    found = Trail([baseline])
+
+    def searched() -> Trail:
+        baseline = identify(model, train_driving, starts=starts, seed=seed, progress=progress)
+        found = Trail([baseline])
+        with kept(found):
+            say(f"Fitted the baseline to {train_driving}.")
+            search = Search(
+                test_driving,
+                candidates=candidates,
+                most_effects=len(model.effects) + min(most_effects, _room(train_driving, rules)),
+                ends=ends,
+                rules=rules,
+                seed=seed,
+                progress=progress,
+                say=say,
+            )
+            search.follow(found)
+        return found
+
+    found = searched()
     with kept(found):
-        say(f"Fitted the baseline to {train_driving}.")
-        search = Search(
-            test_driving,
-            candidates=candidates,
-            most_effects=len(model.effects) + min(most_effects, _room(train_driving, rules)),
-            ends=ends,
-            rules=rules,
-            seed=seed,
-            progress=progress,
-            say=say,
-        )
-        search.follow(found)
+        clocked = in_time(found.diagnoses[-1], test_driving) if sensors is not False else None
+    if clocked is not None and time.perf_counter() < ends:
+        train_driving, test_driving = clocked
+        say("The wheel force has a clock of its own: with it put right everything is done again.")
+        found = searched()
+    with kept(found):
         fit, diagnoses = found.fit, found.diagnoses
         fits = way(found.fits, ends)
         floor = fit.noise

@@ -31,7 +31,7 @@ struct Drive {
     std::size_t lost_at = 0;      // sample at which the car spun or stopped; samples if it did not
 };
 
-/// `disturbance`: samples x (F_x, F_y, M_z). The drive ends where the car is lost.
+/// `disturbance`: samples x kExternals. The drive ends where the car is lost.
 Drive simulate(const SingleTrack& model, const double* p, double dt,
                const std::vector<Reference>& references, const Driver& driver,
                const double* disturbance, const Beginning& beginning, const Logged& logged = {});
