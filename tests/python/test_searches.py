@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from sysid_vehicle.identify.identify import _apart
-from sysid_vehicle.identify.search import Box, eased
+from sysid_vehicle.identify.search import Box, _eased, minimise
 
 
 def test_damping_follows_what_was_gained_of_what_was_promised() -> None:
-    assert eased(1.0, 2.0, 2.0) == pytest.approx(1.0 / 8.0)
-    assert eased(1.0, 1.0, 2.0) == pytest.approx(1.0)
-    assert eased(1.0, 1e-9, 0.0) == pytest.approx(1.0 / 8.0)  # at a bound nothing is promised
+    assert _eased(1.0, 2.0, 2.0) == pytest.approx(1.0 / 8.0)
+    assert _eased(1.0, 1.0, 2.0) == pytest.approx(1.0)
+    assert _eased(1.0, 1e-9, 0.0) == pytest.approx(1.0 / 8.0)  # at a bound nothing is promised
 
 
 def test_ends_in_one_valley_are_followed_once() -> None:
@@ -19,3 +19,33 @@ def test_ends_in_one_valley_are_followed_once() -> None:
     box = Box([0, 1, 2], np.array([1.0, 0.5, -10.0]), np.array([50.0, 3.0, 1.0]))
     values = np.array([20497.53, 20497.53, 20497.47, 20496.65])
     assert [end[0] for end in _apart(ends, values, box)] == [7.34, 9.87]
+
+
+class Bent:
+    """A valley along log y = (log x)^2 that falls gently towards its end (Rosenbrock)."""
+
+    steep, asked, samples = 100.0, 0, 2
+
+    def half_sum_of_squares(self, p: np.ndarray, _: object) -> float:
+        x, y = np.log(p)
+        return 0.5 * float((self.steep * (y - x**2)) ** 2 + (1.0 - x) ** 2)
+
+    def normal_equations(
+        self, p: np.ndarray, gains: object, _: object
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        self.asked += 1
+        x, y = np.log(p)
+        by = np.array([[2.0 * self.steep * x, -self.steep], [1.0, 0.0]]) / p
+        errors = np.array([self.steep * (y - x**2), 1.0 - x])
+        return self.half_sum_of_squares(p, gains), by.T @ errors, by.T @ by
+
+
+@pytest.mark.parametrize("begin", [-1.0, -2.0])
+def test_a_bent_valley_is_followed_in_long_steps(begin: float) -> None:
+    """Steps that may never leave it take 250 and 280 passes."""
+    bent, box = Bent(), Box([0, 1], np.exp([-5.0, -9.0]), np.exp([5.0, 9.0]))
+    start = np.exp([begin, begin**2])
+    found = minimise(bent, start, None, box, rounds=200, tolerance=1e-6)  # type: ignore[arg-type]
+    assert found.settled
+    assert np.log(found.x) == pytest.approx([1.0, 1.0], abs=1e-4)
+    assert bent.asked < 125

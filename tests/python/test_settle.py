@@ -55,7 +55,7 @@ def test_the_likelihood_is_climbed_where_frozen_gains_see_no_slope() -> None:
 class Valleys:
     """Two values that fit alike but for three nats, and noise that may be worth some as well."""
 
-    slope = 0.0
+    samples, slope, middle = 1, 0.0, 1.0
 
     def freeze(self, p: np.ndarray, noise: np.ndarray) -> SimpleNamespace:
         if p[0] > 1.9:
@@ -63,13 +63,13 @@ class Valleys:
         return SimpleNamespace(log_likelihood=3.0 * (p[0] > 0.0) - self.half_sum_of_squares(p, 0))
 
     def half_sum_of_squares(self, p: np.ndarray, _: object) -> float:
-        return 50.0 * float(p[0] ** 2 - 1.0) ** 2
+        return 50.0 * float(p[0] ** 2 - self.middle) ** 2
 
     def normal_equations(
         self, p: np.ndarray, gains: object, _: object
     ) -> tuple[float, np.ndarray, np.ndarray]:
         by = -20.0 * p[:1]
-        gradient = by * 10.0 * (p[0] ** 2 - 1.0)
+        gradient = by * 10.0 * (p[0] ** 2 - self.middle)
         return self.half_sum_of_squares(p, gains), gradient, np.outer(by, by)
 
     def noise_score(self, p: np.ndarray, noise: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
@@ -113,6 +113,47 @@ def test_an_end_that_lacks_too_much_on_few_samples_is_not_followed_on_all() -> N
     assert rivalled(refused, high, np.array([-0.8]), box, few) is high
     with pytest.raises(AssertionError, match="asked"):
         rivalled(refused, low, np.array([0.8]), box, few)
+    # Few samples lead both to one end: there is nothing to follow.
+    assert rivalled(refused, low, np.array([-0.8]), box, few) is low
+
+
+def test_few_samples_lead_unless_the_start_is_better_already() -> None:
+    class Whole(Valleys):
+        samples, asked = 2, 0
+
+        def normal_equations(
+            self, p: np.ndarray, gains: object, of: object
+        ) -> tuple[float, np.ndarray, np.ndarray]:
+            self.asked += 1
+            return super().normal_equations(p, gains, of)
+
+    class Still(Valleys):
+        """All samples, of which frozen gains show no slope."""
+
+        samples = 2
+
+        def normal_equations(
+            self, p: np.ndarray, gains: object, _: object
+        ) -> tuple[float, np.ndarray, np.ndarray]:
+            return self.half_sum_of_squares(p, gains), np.zeros(1), np.eye(1)
+
+    noise, box = np.ones(1), Box([0], np.array([-2.0]), np.array([2.0]))
+
+    def end(problem: Valleys, start: float, thin: Valleys | None) -> np.ndarray:
+        every, few = (
+            Objective(one, (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
+            for one in (problem, thin or problem)
+        )
+        return settle(every, np.array([start]), noise, box, thin=few)[0]
+
+    alone, led = Whole(), Whole()
+    assert end(alone, 0.1, None) == pytest.approx(1.0, abs=1e-3)
+    assert end(led, 0.1, Valleys()) == pytest.approx(1.0, abs=1e-3)
+    assert led.asked < alone.asked
+    elsewhere = Valleys()
+    elsewhere.middle = 1.5
+    assert end(elsewhere, 1.0, None) ** 2 == pytest.approx(1.5, abs=1e-3)
+    assert end(Still(), 1.0, elsewhere) == 1.0
 
 
 class Refusing(Valleys):

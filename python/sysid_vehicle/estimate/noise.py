@@ -20,6 +20,7 @@ from .inputs import white_noise_std
 from .pieces import DrivingProblem
 
 _FAR, _TINY = 1.5, 1e-12  # of a logarithm, in one step
+_LITTLE = 0.05  # nats for which no other step is tried
 
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
@@ -223,8 +224,8 @@ def maximise_noise(
 ) -> tuple[FloatArray, float]:
     """Noise of maximum likelihood at fixed parameters of any model.
 
-    Fisher scoring with Levenberg's damping on the logarithms of the noise parameters; the
-    likelihood never falls.
+    Fisher scoring on the logarithms of the noise parameters, each step the best one within a box
+    that shrinks where the likelihood would fall; it never does.
 
     Parameters
     ----------
@@ -255,22 +256,15 @@ def maximise_noise(
         return as_float64(np.where(there_is, np.exp(logarithms), 0.0))
 
     value, gradient, information = problem.noise_score(p, noise_of(eta))
-    damping = 1e-2
+    reach = _FAR
     for _ in range(rounds):
         check_time()
-        if _promised(gradient, information, low - eta, high - eta, there_is) < enough:
-            break
-        # At a bound, only steps back inside count.
-        free = ~(((eta <= low) & (gradient < 0)) | ((eta >= high) & (gradient > 0)))
-        free &= (np.diag(information) > 1e-9) & there_is
-        if not free.any():
+        promised = _step(gradient, information, low - eta, high - eta, there_is)[1]
+        if promised < enough:
             break
         gained = 0.0
         for _ in range(6):
-            scale = np.diag(information)[free]
-            system = information[np.ix_(free, free)] + np.diag(damping * scale + 1e-3)
-            step = np.zeros_like(eta)
-            step[free] = np.clip(np.linalg.solve(system, gradient[free]), -_FAR, _FAR)
+            step, _ = _step(gradient, information, low - eta, high - eta, there_is, reach)
             trial = np.clip(eta + step, low, high)
             try:
                 there = problem.noise_score(p, noise_of(trial))
@@ -279,10 +273,12 @@ def maximise_noise(
             if there[0] > value:
                 gained = there[0] - value
                 eta, (value, gradient, information) = trial, there
-                damping = max(damping / 5.0, 1e-6)
+                reach = min(2.0 * reach, _FAR)
                 break
-            damping *= 8.0
-        if gained < 0.05:
+            reach *= 0.25
+            if promised < _LITTLE:
+                break
+        if gained < max(_LITTLE, enough):
             break
     return noise_of(eta), float(value)
 
@@ -306,25 +302,33 @@ def promised_by_noise(
     _, gradient, information = problem.noise_score(p, noise)
     there_is = noise > 0.0
     eta = np.log(np.where(there_is, noise, lowest))
-    return _promised(gradient, information, np.log(lowest) - eta, np.log(highest) - eta, there_is)
+    within = (np.log(lowest) - eta, np.log(highest) - eta)
+    return _step(gradient, information, *within, there_is)[1]
 
 
-def _promised(
+def _step(
     gradient: FloatArray,
     information: FloatArray,
     low: FloatArray,
     high: FloatArray,
     there_is: npt.NDArray[np.bool_],
-) -> float:
-    """Maximum of the quadratic model over the box of steps."""
+    reach: float = _FAR,
+) -> tuple[FloatArray, float]:
+    """The best step within the range and `reach`, and what it promises to gain.
+
+    Cut at the box, the best step without one may lead downhill: what is next to nothing acts like
+    its neighbours.
+    """
+    step = np.zeros_like(gradient)
     free = (np.diag(information) > 1e-9) & there_is
     if not free.any():
-        return 0.0
+        return step, 0.0
     size = np.sqrt(np.diag(information)[free])
     slope = gradient[free] / size
     scaled = information[np.ix_(free, free)] / np.outer(size, size)
     root = np.linalg.cholesky(scaled + 1e-3 * np.eye(len(size))).T
-    bounds = (np.clip(low[free], -_FAR, -_TINY) * size, np.clip(high[free], _TINY, _FAR) * size)
+    bounds = (np.clip(low[free], -reach, -_TINY) * size, np.clip(high[free], _TINY, reach) * size)
     aim = np.linalg.solve(root.T, slope)
-    step = scipy.optimize.lsq_linear(root, aim, bounds=bounds, method="bvls").x
-    return float(slope @ step - 0.5 * step @ scaled @ step)
+    best = scipy.optimize.lsq_linear(root, aim, bounds=bounds, method="bvls").x
+    step[free] = best / size
+    return as_float64(step), float(slope @ best - 0.5 * best @ scaled @ best)

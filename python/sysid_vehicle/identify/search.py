@@ -14,11 +14,11 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from .objective import Problem
 
-__all__ = ["HARDER", "METHODS", "Box", "Outcome", "eased", "minimise", "stride"]
+__all__ = ["METHODS", "Box", "Outcome", "minimise", "stride"]
 
 _LEAST_DAMPING = 1e-9
-HARDER = 6.0
-"""Factor of the damping after a step that gained nothing."""
+_ASTRAY = 1.5  # times what a step promised; where it loses more, it was far too long
+_HARDER = 6.0  # times the damping after a step that gained nothing
 
 
 @dataclass(frozen=True)
@@ -92,12 +92,20 @@ def _gauss_newton(
             # Most first steps are taken: the derivatives there cost as much again as the value.
             ahead = linearised(trial) if attempt == 0 else None
             trial_cost = cost_of(trial) if ahead is None else ahead[0]
+            if ahead is not None and cost <= trial_cost < np.inf:
+                # A long step leaves a bent valley; the next one from there leads back into it.
+                back, more = stride(trial, ahead[1], ahead[2], damping, box)
+                near = trial_cost < cost + _ASTRAY * promised
+                promised += more
+                trial = back if near else _halfway(begin, trial, back, box)
+                ahead = linearised(trial) if near else None
+                trial_cost = cost_of(trial) if ahead is None else ahead[0]
             if trial_cost < cost:
                 gained = cost - trial_cost
                 x, cost, there = trial, trial_cost, ahead
-                damping = max(eased(damping, gained, promised), _LEAST_DAMPING)
+                damping = max(_eased(damping, gained, promised), _LEAST_DAMPING)
                 break
-            damping *= HARDER
+            damping *= _HARDER
         if gained == 0.0:
             return Outcome(x, cost, True)
         if gained < tolerance:
@@ -112,7 +120,17 @@ def _gauss_newton(
     return Outcome(x, cost, False)
 
 
-def eased(damping: float, gained: float, promised: float) -> float:
+def _halfway(x: FloatArray, ahead: FloatArray, back: FloatArray, box: Box) -> FloatArray:
+    """Middle of the parabola that leaves `x` towards `ahead` and ends at `back`."""
+    ways = np.array([x, ahead, back])
+    positive = box.lower > 0.0
+    ways[:, positive] = np.log(ways[:, positive])
+    middle = np.array([0.5, 0.25, 0.25]) @ ways
+    middle[positive] = np.exp(middle[positive])
+    return as_float64(np.clip(middle, box.lower, box.upper))
+
+
+def _eased(damping: float, gained: float, promised: float) -> float:
     """Damping of the next step: less where this one gained what the quadratic model promised.
 
     In a bent valley a step gains less than promised. Were the next one longer all the same, every

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,8 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from .._threads import in_parallel
 from ..errors import NumericalError
-from .objective import Objective
-from .search import HARDER, Box, eased, minimise, stride
+from .objective import LinearRows, Objective
+from .search import Box, minimise, stride
 from .valley import down_the_valley
 
 __all__ = [
@@ -28,17 +27,20 @@ __all__ = [
 ]
 
 _STANDS = 0.5  # nats
+_SAME = 1e-2  # of the box: ends no farther apart lie in one valley
 _STILL = 3e-4  # nats
+_LITTLE = 0.1  # nats for which the noise is not learned once more while parameters still move
 _GAIN = 0.05  # nats
 _TWICE = 2.0  # times what a score promises
 _REFREEZES = 8
 _ROUNDS = 12
-_CLIMBS = 40  # steps
+_CLIMBS = 10  # steps
 _CLIMBED = 4  # times, with noise learned anew
 _NUDGE = 0.02  # standard errors by which the likelihood is differentiated
 _NARROW = 0.01  # of the box, which is narrower than that for what the data do not tell
 _SLIGHT = 1e-6  # damping at which a step shows what is to be had
 _TINY = 1e-300
+_STIFF = 1e3  # root of nats
 _SHARES = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, tried until the likelihood rises
 
 
@@ -126,7 +128,7 @@ def settle(
     noise : array, shape (noises,)
     box : Box
     thin : Objective, optional
-        The same on fewer samples, from which the noise is learned.
+        The same on fewer samples, which lead most of the way.
     method : str
         Local optimiser.
     parameters_first : bool
@@ -145,16 +147,18 @@ def settle(
     p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
     if parameters_first:
         p, _ = descend(objective, p, noise, box, method=method)
+    steps = 6
+    if thin is not None and thin.samples < objective.samples:
+        # Few samples lead most of the way, unless where it begins is better already.
+        near, told, _ = settle(thin, p, noise, box, method=method, rounds=rounds)
+        if objective.log_likelihood(near, told) > objective.log_likelihood(p, noise):
+            p, noise, steps = near, told, 3
     best = -np.inf
     gains = objective.freeze(p, noise)
-    for round_ in range(rounds):
-        learned, _ = (thin or objective).learn_noise(p, noise, rounds=6 if round_ == 0 else 3)
+    for _ in range(rounds):
+        learned, _ = objective.learn_noise(p, noise, rounds=steps, enough=_LITTLE)
+        steps = 3
         there = objective.freeze(p, learned)
-        if thin is not None and there.log_likelihood < gains.log_likelihood + _STANDS:
-            # Few samples do not tell slow disturbances; where they lead nowhere, all have to.
-            thin = None
-            learned, _ = objective.learn_noise(p, noise, rounds=3)
-            there = objective.freeze(p, learned)
         if there.log_likelihood >= gains.log_likelihood:
             noise, gains = learned, there
         value = gains.log_likelihood - objective.prior_cost(p)
@@ -191,7 +195,7 @@ def rivalled(
 
     Those move first, under the noise that was found. What noise of their own could add there is
     told by its score: where that is next to nothing they are settled too, and where it is far less
-    than what they lack they are not followed.
+    than what they lack they are not followed. Nor are they where few samples lead both to one end.
 
     Parameters
     ----------
@@ -208,6 +212,8 @@ def rivalled(
         if few is not None:
             near, gains = _moved(few, found, noise, box)
             p, there = _moved(few, p, noise, box)
+            if np.all(np.abs(near - p)[box.columns] < _SAME * (box.upper - box.lower)):
+                return best
             if _hopeless(few, gains.log_likelihood - few.prior_cost(near), p, there, noise)[0]:
                 return best
         value = objective.log_likelihood(found, noise)
@@ -237,8 +243,9 @@ def climb(
 
     The gains, and the spread that they predict, change with the parameters. Derivatives with frozen
     gains leave that out: they vanish elsewhere. In a flat valley, as that of tyres whose B C D is
-    the same, this is far from the maximum, often with a parameter at its bound. Here the slope is
-    that of the likelihood, by differences, and the curvature that of Gauss and Newton.
+    the same, this is far from the maximum, often with a parameter at its bound. Here the part that
+    they leave out is worked out by differences and added to them, as a slope that stays as it is
+    during a search (first-order model management: Alexandrov et al., AIAA 2000-4886).
 
     Parameters
     ----------
@@ -265,29 +272,30 @@ def _climbed_from(
     def values_at(trials: FloatArray) -> FloatArray:
         return objective.log_likelihoods(trials, noise)
 
-    gains, damping = objective.freeze(p, noise), 1e-3
+    gains = objective.freeze(p, noise)
     begin = value = gains.log_likelihood - objective.prior_cost(p)
     for _ in range(_CLIMBS):
-        _, _, information = objective.normal_equations(p, gains, box.columns)
+        _, seen, information = objective.normal_equations(p, gains, box.columns)
         x = p[box.columns]
         slope = _slope(values_at, p, information, box)
         if stride(x, slope, information, _SLIGHT, box)[1] < _GAIN:
             break
-        gained = 0.0
-        for _ in range(10):
-            trial = p.copy()
-            trial[box.columns], promised = stride(x, slope, information, damping, box)
-            with suppress(NumericalError):
-                there = objective.freeze(trial, noise)
-                reached = there.log_likelihood - objective.prior_cost(trial)
-                if reached > value:
-                    p, gains, gained, value = trial, there, reached - value, reached
-                    damping = max(eased(damping, gained, promised), _SLIGHT)
-                    break
-            damping *= HARDER
-        if gained < _GAIN:
+        leaning = objective.also(_leaning(p, slope - seen, box))
+        found = minimise(leaning, p, gains, box, rounds=8, tolerance=_GAIN)
+        p, gains = risen(objective, p, gains, found.x, noise, box)
+        reached = gains.log_likelihood - objective.prior_cost(p)
+        if reached < value + _GAIN:
+            value = reached
             break
+        value = reached
     return p, begin, value
+
+
+def _leaning(p: FloatArray, slope: FloatArray, box: Box) -> LinearRows:
+    """A residual whose half square falls by that slope, and hardly bends."""
+    rows = np.zeros((1, p.size))
+    rows[0, box.columns] = slope / _STIFF
+    return LinearRows(rows, as_float64(rows @ p + _STIFF))
 
 
 def to_the_top(
