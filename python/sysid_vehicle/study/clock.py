@@ -7,6 +7,8 @@ that channel alone. The posterior of what is missing has it as a rival of the ef
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy
 
@@ -75,7 +77,7 @@ def _predicted(fit: Fit, test: Driving) -> float:
 
 
 def _shifted(driving: Driving, late: dict[str, float]) -> Driving:
-    return Driving.of([_log_shifted(log, late) for log in driving.logs])
+    return replace(driving, logs=tuple(_log_shifted(log, late) for log in driving.logs))
 
 
 def _log_shifted(log: Log, late: dict[str, float]) -> Log:
