@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from types import MappingProxyType
 from typing import Any
 
@@ -209,8 +210,9 @@ def identify_runs(
     _check(model, runs, vary, tie)
     together = {run: Driving.of(logs).logs for run, logs in runs.items()}
     every = Driving.of([log for logs in together.values() for log in logs])
-    drivings = {run: Driving(logs, every.force_known) for run, logs in together.items()}
     common = identify(model, every, starts=starts, seed=seed, workers=workers, progress=progress)
+    logs = iter(common.driving.each_log())  # with the offsets of each
+    drivings = {run: Driving.joined(islice(logs, len(own))) for run, own in together.items()}
     layout = _Layout.of(common.model, tuple(runs), vary, tie)
     objective = layout.objective(drivings)
     q, noise, converged = settle(
@@ -301,8 +303,7 @@ class _Layout:
         )
         places = dict(zip(self._every, self.box.columns, strict=True))
         stated = {c: self.model.priors[n] for (n, _), c in places.items() if n in self.model.priors}
-        every = next(iter(drivings.values()))
-        whole = Driving(tuple(log for d in drivings.values() for log in d.logs), every.force_known)
+        whole = Driving.joined(drivings.values())
         return Objective(
             Mapped(parts),
             gaussian_prior(self.size, stated),
