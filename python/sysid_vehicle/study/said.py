@@ -10,20 +10,20 @@ from .._text import number
 from ..estimate import UNITS
 from .horizons import LATERAL
 from .matters import sizes_that_matter, within
+from .validation import AHEAD_S
 
 if TYPE_CHECKING:
     from .study import Study
 
 __all__ = ["ahead", "disturbance", "in_the_end", "small", "structured"]
 
-_AHEAD_S = 2.0
 _WORDS = dict(zip(LATERAL, ("v_y", "yaw rate", "a_y"), strict=True))
 
 
 def ahead(study: Study) -> str:
     """Errors some seconds ahead on validation data, in physical units; empty where too short."""
     errors = study.horizons
-    i = errors.horizons_s.index(_AHEAD_S)
+    i = errors.horizons_s.index(AHEAD_S)
     told = []
     for j, c in enumerate(errors.channels):
         first, last = (float(errors.error[k, i, j]) for k in (0, -1))
@@ -31,7 +31,7 @@ def ahead(study: Study) -> str:
             both = (first, last) if len(study.fits) > 1 else (last,)
             figures = " -> ".join(number(x, 2) if np.isfinite(x) else "lost" for x in both)
             told.append(f"{_WORDS[c]} {figures} {UNITS[c]}")
-    return f"Median error {_AHEAD_S:g} s ahead on validation data: {', '.join(told)}." * bool(told)
+    return f"Median error {AHEAD_S:g} s ahead on validation data: {', '.join(told)}." * bool(told)
 
 
 def small(study: Study) -> bool:
