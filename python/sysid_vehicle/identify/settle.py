@@ -19,6 +19,7 @@ __all__ = [
     "bottom",
     "climb",
     "descend",
+    "moved",
     "risen",
     "rivalled",
     "settle",
@@ -61,13 +62,12 @@ def descend(
     log_likelihood : float
         Priors included.
     """
-    p = p.copy()
     for _ in range(refreezes):
         gains = objective.freeze(p, noise)
         found = minimise(objective, p, gains, box, method=method, rounds=40)
-        moved = np.abs(found.x - p[box.columns])
-        p[box.columns] = found.x
-        if np.all(moved < 1e-3 * (box.upper - box.lower)):
+        step = np.abs(found.x - p[box.columns])
+        p = box.put(p, found.x)
+        if np.all(step < 1e-3 * (box.upper - box.lower)):
             break
     return p, objective.log_likelihood(p, noise)
 
@@ -95,8 +95,7 @@ def risen(
     least = gains.log_likelihood - objective.prior_cost(p)
     begin = p[box.columns]
     for share in _SHARES:
-        trial = p.copy()
-        trial[box.columns] = begin + share * (x - begin)
+        trial = box.put(p, begin + share * (x - begin))
         try:
             there = objective.freeze(trial, noise)
         except NumericalError:
@@ -143,8 +142,7 @@ def settle(
     converged : bool
         Whether it came to a stand.
     """
-    p = p.copy()
-    p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
+    p = box.inside(p)
     if parameters_first:
         p, _ = descend(objective, p, noise, box, method=method)
     steps = 6
@@ -165,11 +163,11 @@ def settle(
         if value < best + _STANDS:
             return p, noise, True
         best = value
-        p, gains = _moved(objective, p, noise, box, method=method, rounds=8)
+        p, gains = moved(objective, p, noise, box, method=method, rounds=8)
     return p, noise, False
 
 
-def _moved(
+def moved(
     objective: Objective,
     p: FloatArray,
     noise: FloatArray,
@@ -177,10 +175,11 @@ def _moved(
     *,
     method: str = "gauss-newton",
     rounds: int = 25,
+    tolerance: float = _GAIN,
 ) -> tuple[FloatArray, Any]:
     """The end of a search, as far as the likelihood rises, and the gains there."""
     gains = objective.freeze(p, noise)
-    found = minimise(objective, p, gains, box, method=method, rounds=rounds, tolerance=_GAIN)
+    found = minimise(objective, p, gains, box, method=method, rounds=rounds, tolerance=tolerance)
     return risen(objective, p, gains, found.x, noise, box)
 
 
@@ -210,14 +209,14 @@ def rivalled(
     found, noise, converged = best
     try:
         if few is not None:
-            near, gains = _moved(few, found, noise, box)
-            p, there = _moved(few, p, noise, box)
+            near, gains = moved(few, found, noise, box)
+            p, there = moved(few, p, noise, box)
             if np.all(np.abs(near - p)[box.columns] < _SAME * (box.upper - box.lower)):
                 return best
             if _hopeless(few, gains.log_likelihood - few.prior_cost(near), p, there, noise)[0]:
                 return best
         value = objective.log_likelihood(found, noise)
-        p, gains = _moved(objective, p, noise, box)
+        p, gains = moved(objective, p, noise, box)
         hopeless, more = _hopeless(objective, value, p, gains, noise)
         if hopeless:
             return best
