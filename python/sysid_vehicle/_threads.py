@@ -47,33 +47,39 @@ class _SmallMatrices:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._owner: int | None = None
         self._inside = 0
 
     def __enter__(self) -> None:
-        here = threading.get_ident()
         with self._lock:
-            if self._owner is None:
+            if self._inside == 0:
                 import scipy.linalg  # noqa: F401 - a library that is not loaded has no limit
                 from threadpoolctl import ThreadpoolController
 
-                self._owner = here
-                self._limit = ThreadpoolController().limit(limits=1, user_api="blas")
-            self._inside += self._owner == here
+                self._controller = ThreadpoolController()
+                self._heed_this_thread()
+                self._limit = self._controller.limit(limits=1, user_api="blas")
+            self._inside += 1
 
     def __exit__(self, *_: object) -> None:
         with self._lock:
-            self._inside -= self._owner == threading.get_ident()
-            if self._inside == 0 and self._owner == threading.get_ident():
+            self._inside -= 1
+            if self._inside == 0:
+                self._heed_this_thread()
                 self._limit.restore_original_limits()
-                self._owner = None
+                self._heed_this_thread()
+
+    def _heed_this_thread(self) -> None:
+        """Newer versions of threadpoolctl obey the first thread that ever set a limit, alone."""
+        for library in self._controller.lib_controllers:
+            if hasattr(library, "clear_controlling_thread"):
+                library.clear_controlling_thread(force=True)
 
 
 small_matrices = _SmallMatrices()
 """For `with`: on small matrices threads of linear algebra wait for each other most of the time.
 
-Their number is one of the whole process. The thread that sets it brings back what it was, as
-OpenBLAS heeds no other one; those that come meanwhile leave it alone.
+Their number is one of the whole process, and sums differ with it in their last digits. The first
+thread that comes in sets it, and the last one that leaves brings back what it was.
 """
 
 

@@ -55,21 +55,32 @@ def test_a_pool_has_all_cores_or_one_where_others_share_them() -> None:
     assert inside(None) == cores()
 
 
-def test_linear_algebra_has_one_thread_until_who_set_it_leaves() -> None:
-    def threads() -> set[int]:
-        return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
+def _of_linear_algebra() -> set[int]:
+    return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
 
+
+def test_linear_algebra_has_one_thread_until_the_last_one_leaves() -> None:
     def inside() -> set[int]:
         with small_matrices:
-            return threads()
+            return _of_linear_algebra()
 
     with threadpool_limits(2, user_api="blas"), ThreadPoolExecutor(1) as pool:
-        assert threads() == {2}
+        assert _of_linear_algebra() == {2}
         with small_matrices:
             assert inside() == {1}
             assert pool.submit(inside).result() == {1}
-            assert threads() == {1}
-        assert threads() == {2}
+            assert _of_linear_algebra() == {1}
+        assert _of_linear_algebra() == {2}
+        # Each thread has a say, also where another one set the number before it.
+        assert pool.submit(inside).result() == {1}
+        assert _of_linear_algebra() == {2}
+        pool.submit(small_matrices.__enter__).result()
+        with small_matrices:
+            pool.submit(small_matrices.__exit__).result()
+            assert _of_linear_algebra() == {1}
+        assert _of_linear_algebra() == {2}
+    with threadpool_limits(3, user_api="blas"):
+        assert _of_linear_algebra() == {3}
 
 
 def test_a_public_function_holds_all_its_threads_to_what_was_said(
