@@ -86,6 +86,40 @@ def test_a_sweep_at_one_speed_claims_no_delay() -> None:
             assert abs(fault.value) < 3.0 * fault.std
 
 
+@pytest.fixture(scope="module")
+def sweep() -> sv.Log:
+    """At one speed much acts alike: both scales, and delays and the place of the IMU."""
+    model = sv.Model(sv.example_vehicle())
+    return sv.drive(model, sv.manoeuvres.sine_sweep(), seed=4).between(0.0, 15.0)
+
+
+def test_of_two_scales_that_act_alike_none_is_claimed(sweep: sv.Log) -> None:
+    check = sv.check(sweep.corrected({"yaw_rate_radps": 1.05 * sweep["yaw_rate_radps"]}, []))
+    assert check.found == ()
+    gain = check["gain_ay"]
+    assert not gain.told
+    assert gain.why_not == "because the scale of yaw_rate_radps acts alike in this driving"
+    assert abs(gain.value) < 3.0 * gain.std  # the gyro may be all of it
+    # Gravity by roll makes an accelerometer read more; no gyro is wrong by so much.
+    rolled = sv.check(sweep.corrected({"ay_mps2": 1.06 * sweep["ay_mps2"]}, []))
+    assert [fault.name for fault in rolled.found] == ["gain_ay"]
+
+
+def test_the_likelier_of_two_explanations_is_found(sweep: sv.Log) -> None:
+    """A search from no fault at all ends with late speeds and an IMU 1.3 m behind."""
+    t, ay = sweep["time_s"], sweep["ay_mps2"]
+    check = sv.check(sweep.corrected({"ay_mps2": np.interp(t - 0.05, t, ay)}, []))
+    assert [fault.name for fault in check.found] == ["delay_ay_s"]
+    assert abs(check["delay_ay_s"].value - 0.05) < 3.0 * check["delay_ay_s"].std
+
+
+def test_a_wide_interval_does_not_say_that_nothing_is_there(sweep: sv.Log) -> None:
+    delay = sv.check(sweep.between(0.0, 7.0))["delay_vx_s"]
+    assert delay.interval[1] > 0.03
+    assert not delay.found
+    assert not delay.told
+
+
 def test_faults_are_named_with_their_size(faulty: sv.SensorCheck) -> None:
     assert {fault.name for fault in faulty.found} == set(TRUTH)
     for name, true in TRUTH.items():

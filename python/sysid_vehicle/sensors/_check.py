@@ -13,8 +13,8 @@ from ..errors import SysidError
 from ..log import Log, several_logs
 from ..vehicle import Vehicle
 from ._equations import FAULTS, Readings
-from ._estimate import Estimate, estimate, noise_of
-from ._faults import faults_of
+from ._estimate import Estimate, estimate, noise_of, preferred
+from ._faults import Rival, doubted, faults_of
 from ._motion import Grid, Stretch
 from ._parts import cut
 from ._result import SensorCheck
@@ -27,6 +27,7 @@ _MEAN_S = 0.03  # quick channels enter as means over so long
 # places between the knots, a delay that moves them to better places would seem to be there.
 _STEP_MEANS = 2.3607
 _STEP_SAMPLES = 1.618  # of a channel that is slower than that
+_SEARCHES = 1  # for a better explanation, from one that does without a fault
 _FLOOR = 1e-3  # least noise, of the channel's standard deviation
 
 
@@ -79,18 +80,40 @@ def check(
     floors = {r.channel: _floor(r, told) for r in readings}
     step_s = _step(readings)
 
-    def of(some: Sequence[Readings], where: Sequence[Stretch]) -> Estimate:
+    def of(
+        some: Sequence[Readings],
+        where: Sequence[Stretch],
+        without: Sequence[str] = (),
+        begin: dict[str, float] | None = None,
+    ) -> Estimate:
         means = [averaged(r, _MEAN_S) for r in some]
-        return estimate(means, Grid(where, step_s), _names(have), floors=floors, seed=seed)
+        names = [name for name in _names(have) if name not in without]
+        return estimate(means, Grid(where, step_s), names, floors=floors, begin=begin, seed=seed)
 
     found = of(readings, stretches)
     parts = []
     for some in cut(stretches):
         with suppress(SysidError):  # a part may hold too little
             parts.append(of(readings_of(together, some), some))
+    means = [averaged(r, _MEAN_S) for r in readings]
+    faults = faults_of(found, lacking, parts)
+    for left in range(_SEARCHES, -1, -1):
+        rivals = {}
+        for without in doubted([fault.name for fault in faults if fault.found]):
+            other = of(readings, stretches, without=without)
+            rivals[without] = Rival(other, preferred(means, found, other))
+        faults = faults_of(found, lacking, parts, rivals)
+        best = min(rivals.values(), key=lambda rival: rival.worse, default=None)
+        if not left or best is None or best.worse >= 0.0:
+            break
+        better = of(readings, stretches, begin=best.estimate.faults)
+        if preferred(means, better, found) <= 0.0:
+            break
+        found = better
+        faults = faults_of(found, lacking, parts)
     return SensorCheck(
         logs=tuple(together),
-        faults=faults_of(found, lacking, parts),
+        faults=faults,
         signals=told,
         estimate=found,
         noise=noise_of(readings, found, floors),

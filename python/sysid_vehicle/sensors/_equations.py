@@ -33,12 +33,21 @@ class FaultKind:
         and of several that would explain the same the small ones are taken.
     most : float
         Standard deviation of a normal prior on top, for what no sensor has.
+    below : float
+        Scale for negative values where these are to be claimed, if it differs: gravity by roll and
+        pitch makes an accelerometer read more, never less.
     """
 
     name: str
     channel: str
     typical: float
     most: float = 10.0
+    below: float = 0.0
+
+    def cost(self, value: float, *, one_sided: bool = False) -> float:
+        """How much less likely a value is than none, by the prior [nats]."""
+        scale = self.below if one_sided and value < 0.0 < self.below else self.typical
+        return float(np.log1p((value / scale) ** 2) + 0.5 * (value / self.most) ** 2)
 
 
 FAULTS = {
@@ -49,8 +58,8 @@ FAULTS = {
         FaultKind("delay.vy_mps", "vy_mps", 0.003),
         FaultKind("delay.ay_mps2", "ay_mps2", 0.003),
         FaultKind("gain.yaw_rate_radps", "yaw_rate_radps", 0.002, 0.03),
-        FaultKind("gain.ax_mps2", "ax_mps2", 0.03),
-        FaultKind("gain.ay_mps2", "ay_mps2", 0.03),
+        FaultKind("gain.ax_mps2", "ax_mps2", 0.03, below=0.002),
+        FaultKind("gain.ay_mps2", "ay_mps2", 0.03, below=0.002),
         FaultKind("bias.yaw_rate_radps", "yaw_rate_radps", 0.003),
         FaultKind("bias.vy_mps", "vy_mps", 0.05),
         FaultKind("arm_x", "ay_mps2", 0.4),

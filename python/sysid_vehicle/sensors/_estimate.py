@@ -22,7 +22,7 @@ from ._equations import FAULTS, Readings, predict
 from ._motion import QUICK, SLOW, Grid, IntArray
 from ._system import Band, Linearised, Normal, drawn, linearise, normal_equations
 
-__all__ = ["Estimate", "estimate", "noise_of"]
+__all__ = ["Estimate", "estimate", "noise_of", "preferred"]
 
 _ROUNDS = 30
 _LEAST_ROUNDS = 8
@@ -123,6 +123,7 @@ def estimate(
     names: Sequence[str],
     *,
     floors: dict[str, float],
+    begin: dict[str, float] | None = None,
     seed: int = 0,
 ) -> Estimate:
     """Estimate the faults `names`.
@@ -137,6 +138,8 @@ def estimate(
         Faults to estimate, of `FAULTS`.
     floors : dict of float
         Least standard deviation of each channel's noise.
+    begin : dict of float, optional
+        Where the search begins, by fault; without it, where nothing is wrong.
     seed : int
         Of the draws that teach the noise.
 
@@ -146,25 +149,17 @@ def estimate(
         If the motion cannot be told.
     """
     numbers = np.random.default_rng(seed).standard_normal((grid.size, _DRAWS))
-    faults = dict.fromkeys(names, 0.0)
+    faults = dict.fromkeys(names, 0.0) | (begin or {})
     typical = np.array([FAULTS[name].typical for name in names])
     most = np.array([FAULTS[name].most for name in names])
     runs = {r.channel: neighbours(r.stretch, r.time_s) for r in readings}
     x, colours = _begin(readings, grid, runs, floors)
     road = dict.fromkeys(SLOW, _ROAD_MPS2)
     steps = {signal: grid.steps(signal) for signal in SLOW}
-    bends = {signal: grid.bends(signal) for signal in QUICK}
     settled = False
     for count in range(1, _ROUNDS + 1):
         system = linearise(readings, grid, x, faults, colours, runs)
-        rows = scipy.sparse.vstack(
-            [
-                grid.levels,
-                *(steps[s] / road[s] for s in SLOW),
-                *(bends[s] / _ROUGH[s] for s in QUICK),
-            ],
-            format="csr",
-        )
+        rows = _rows(grid, road)
         now = np.array([faults[name] for name in names])
         # Cauchy's prior at its present curvature.
         prior = np.diag(2.0 / (typical**2 + now**2) + most**-2.0)
@@ -216,6 +211,46 @@ def estimate(
     )
 
 
+def preferred(readings: Sequence[Readings], one: Estimate, other: Estimate) -> float:
+    """How much likelier one explanation is than another, priors included [nats].
+
+    Each is judged with the noise that either has learned: with its own alone, one that lays much
+    to noise would have no misfit.
+    """
+    claimed = set(one.faults) - set(other.faults)
+    costs = [
+        sum(FAULTS[name].cost(f, one_sided=name in claimed) for name, f in of.faults.items())
+        for of in (other, one)
+    ]
+    return (
+        costs[0]
+        - costs[1]
+        + 0.5
+        * sum(
+            _misfit(readings, other, noise) - _misfit(readings, one, noise)
+            for noise in (one, other)
+        )
+    )
+
+
+def _misfit(readings: Sequence[Readings], found: Estimate, noise: Estimate) -> float:
+    """Half the squares of the errors and of the motion, the motion at its best."""
+    runs = {r.channel: neighbours(r.stretch, r.time_s) for r in readings}
+    rows = _rows(found.grid, noise.road_mps2)
+
+    def at(x: FloatArray) -> Linearised:
+        return linearise(readings, found.grid, x, found.faults, noise.colours, runs)
+
+    none = np.zeros(len(found.faults))
+    x = found.x + normal_equations(at(found.x), rows, found.x, np.eye(none.size), none).motion_step
+    system = at(x)
+    total = 0.5 * float(np.sum((rows @ x) ** 2))
+    for channel, white in system.white.items():
+        weight = system.weights[channel]
+        total += float(np.sum((1.0 / weight - 0.5) * (weight * white) ** 2))  # Huber's
+    return total
+
+
 def noise_of(
     readings: Sequence[Readings], found: Estimate, floors: dict[str, float]
 ) -> dict[str, tuple[Colour, FloatArray]]:
@@ -252,6 +287,13 @@ def _begin(
             values.append(r.values / std)
     j = scipy.sparse.vstack(rows, format="csr")
     return Band(j.T @ j).solve(j.T @ np.concatenate(values)), colours
+
+
+def _rows(grid: Grid, road: dict[str, float]) -> scipy.sparse.csr_matrix:
+    """Prior of the motion and of the road, whitened."""
+    steps = [grid.steps(signal) / road[signal] for signal in SLOW]
+    bends = [grid.bends(signal) / _ROUGH[signal] for signal in QUICK]
+    return scipy.sparse.vstack([grid.levels, *steps, *bends], format="csr")
 
 
 def _bounded(step: FloatArray, names: Sequence[str], faults: dict[str, float]) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from ._estimate import Estimate
 from ._parts import scatter
 from ._texts import DEG, why_not
 
-__all__ = ["SensorFault", "faults_of"]
+__all__ = ["Rival", "SensorFault", "doubted", "faults_of"]
 
 _Z95 = 1.959964
 _FALSE_CLAIMS = 0.01  # over all faults of one check
@@ -107,8 +107,37 @@ _TOLD = (
 )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Rival:
+    """An explanation without one of the faults, and how much less likely it is [nats]."""
+
+    estimate: Estimate
+    worse: float
+
+    @property
+    def share(self) -> float:
+        """Its probability beside the explanation with the fault."""
+        return 1.0 / (1.0 + math.exp(min(self.worse, 500.0)))
+
+
+def doubted(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """What has to be left out, to see whether the driving can do without the faults found.
+
+    Each fault by itself, and with those that it shares something with: a delay of one device.
+    """
+    of = {told.name: told.of for told in _TOLD if told.name in names}
+    together = (
+        tuple(dict.fromkeys(part for other in of.values() if {*one} & {*other} for part in other))
+        for one in of.values()
+    )
+    return list(dict.fromkeys([*of.values(), *together]))
+
+
 def faults_of(
-    found: Estimate, absent: Sequence[str], parts: Sequence[Estimate] = ()
+    found: Estimate,
+    absent: Sequence[str],
+    parts: Sequence[Estimate] = (),
+    rivals: Mapping[tuple[str, ...], Rival] | None = None,
 ) -> tuple[SensorFault, ...]:
     """Say what an estimate tells of each fault.
 
@@ -120,7 +149,11 @@ def faults_of(
         Channels without which faults cannot be told.
     parts : sequence of Estimate
         Of parts of the driving, which have to ask for the same faults.
+    rivals : mapping of Rival, optional
+        Explanations by what they leave out; one that is as likely as `found` makes all faults
+        unsure in which the two differ.
     """
+    rivals = rivals or {}
     names = list(found.faults)
     naive = np.linalg.inv(found.information)
     rows = [t for t in _TOLD if t.of[-1] in names]
@@ -145,17 +178,25 @@ def faults_of(
         )
         if spread is not None:
             std = spread.widened(value, std)
+        std = math.hypot(std, *(_apart(other, told, value) for other in rivals.values()))
         widest = max(std, at_null)
         prior = 1.0 / float(np.sum(1.0 / found.prior[pick > 0.0]))
-        claimed = abs(value) > max(critical * widest, told.negligible)
+        others = [rival for without, rival in rivals.items() if {*told.of} <= {*without}]
+        rival = min(others, key=lambda rival: rival.worse, default=None)
+        alone = rival is None or rival.share < _FALSE_CLAIMS
+        claimed = alone and abs(value) > max(critical * widest, told.negligible)
         variance = float(pick @ naive @ pick)
         if not claimed:
             # No fault is as likely: its interval is that of no fault, if that is wider.
             std, variance = widest, max(variance, at_null**2)
         learned = 1.0 - variance * prior
         claimed = claimed and learned > 0.0
-        well = learned > _LEARNED and _Z95 * std < told.enough
-        reason = "" if claimed or well else _confounded(told, pick, found, naive, names)
+        well = alone and learned > _LEARNED and abs(value) + _Z95 * std < told.enough
+        reason = ""
+        if rival is not None and not alone:
+            reason = why_not(told.name, other=_instead(found, rival.estimate, told))
+        elif not (claimed or well):
+            reason = _confounded(told, pick, found, naive, names)
         result.append(
             SensorFault(
                 told.name, told.channel, told.title, value, std, told.unit, claimed or well,
@@ -169,6 +210,23 @@ def _size(found: Estimate, pick: np.ndarray, covariance: np.ndarray) -> tuple[fl
     """Value and standard deviation of a sum of faults."""
     value = float(pick @ np.array(list(found.faults.values())))
     return value, float(np.sqrt(pick @ covariance @ pick))
+
+
+def _apart(rival: Rival, told: _Told, value: float) -> float:
+    """Standard deviation of a fault that takes one of two values."""
+    other = sum(rival.estimate.faults.get(name, 0.0) for name in told.of)
+    return math.sqrt(rival.share) * abs(other - value)
+
+
+def _instead(found: Estimate, rival: Estimate, told: _Told) -> str:
+    """What takes the place of a fault in an explanation without it."""
+    std = np.sqrt(np.diag(found.null_covariance))
+    moved = {
+        name: abs(rival.faults[name] - found.faults[name]) / sigma
+        for name, sigma in zip(found.faults, std, strict=True)
+        if name in rival.faults and name not in told.of
+    }
+    return max(moved, key=lambda name: moved[name])
 
 
 def _confounded(
