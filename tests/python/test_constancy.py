@@ -1,6 +1,7 @@
 """What is truly there has one value everywhere; what stands in for it has many."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -85,3 +86,11 @@ def test_two_parameters_of_one_sign_have_the_level_they_claim(name: str, alike: 
     for level in (0.01, 0.05, 0.2):
         assert np.mean(p < level) == pytest.approx(level, abs=4.0 * np.sqrt(level / 20000))
     assert _p_value(effect(name), np.array([[-5.0, -5.0]]), information) == [1.0]
+
+
+def test_differences_that_matter_to_nobody_are_none(fits: dict[str, Fit]) -> None:
+    kept = constancy(fits["head_wind"])["head_wind"]
+    size = kept.effect.parameters[0].matters
+    assert kept.spread * size == pytest.approx(np.std(kept.values), rel=0.5)
+    assert not kept.holds
+    assert replace(kept, spread=0.99).holds

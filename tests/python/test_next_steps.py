@@ -170,7 +170,6 @@ def said(base: Study, rng: random.Random) -> str:
     unrelated = {"ay_mps2": "ay_mps2 is turned round"} if rng.random() < 0.2 else {}
     facts = Facts(
         drawn_test(rng),
-        drawn_test(rng),
         validation,
         min(candidates),
         missing,

@@ -255,4 +255,4 @@ def test_what_follows_from_a_limit_is_none_of_its_own() -> None:
     with pytest.raises(InvalidInput, match=r"credible = 1\.0"):
         replace(USUAL, credible=1.0)
     assert USUAL.explainable == USUAL.taken == pytest.approx(1.0 - USUAL.most)
-    assert len(fields(Rules)) == len(USUAL.to_dict()) == 21
+    assert len(fields(Rules)) == len(USUAL.to_dict()) == 18

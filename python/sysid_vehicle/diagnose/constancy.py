@@ -37,8 +37,8 @@ class Constancy:
         Chi-squared where the value is one.
     p_value : float
     spread : float
-        Standard deviation of the value over the pieces, beyond what their noise explains, as a
-        share of the whole value; the largest of the effect's parameters.
+        Standard deviation of the value over the pieces, beyond what their noise explains, in sizes
+        that matter; the largest of the effect's parameters.
     values : tuple of float
         Of the first parameter, piece by piece.
     rules : Rules
@@ -55,11 +55,8 @@ class Constancy:
 
     @property
     def holds(self) -> bool:
-        """Whether one value will do: no evidence of differences, or only of small ones.
-
-        Those up to `Rules.spread` are what any equation of a textbook leaves open.
-        """
-        return self.p_value > self.rules.level or self.spread < self.rules.spread
+        """Whether one value will do: no evidence of differences, or of none that matters."""
+        return self.p_value > self.rules.level or self.spread < 1.0
 
     def __str__(self) -> str:
         if self.holds:
@@ -136,14 +133,13 @@ def _of_effect(
     # What noise alone would scatter, taken off (DerSimonian & Laird, Controlled Trials 1986).
     excess = max(1.0 - rank / statistic, 0.0) if statistic > 0.0 else 0.0
     scatter = np.sqrt(excess * (weights * centred**2).sum(axis=0))
-    share = scatter / np.maximum(np.abs(whole), 1e-300)
-    felt = [i for i, q in enumerate(effect.parameters) if abs(whole[i]) > rules.felt * q.matters]
+    matters = np.array([q.matters for q in effect.parameters])
     return Constancy(
         effect,
         statistic,
         rank,
         float(scipy.stats.chi2.sf(statistic, rank)),
-        float(np.max(share[felt])) if felt else 0.0,
+        float(np.max(scatter / matters)),
         tuple(float(v) for v in effect.parameters[0].null_value + whole[0] + centred[:, 0]),
         rules,
     )

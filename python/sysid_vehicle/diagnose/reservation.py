@@ -107,7 +107,7 @@ def reservation(
     if not left.omnibus.p_value < rules.strict or not left.fit.model.effects:
         return ""
     share = excess(left.omnibus) / max(excess(before), 1.0)
-    if share > rules.stays and share_explained(error_before, error_after) < rules.taken:
+    if share > rules.most and share_explained(error_before, error_after) < rules.taken:
         return (
             f"with the effect that fits best {100 * min(share, 1.0):.0f} % of the evidence that "
             f"something is missing stays, and the error does not fall; {left.worst}"

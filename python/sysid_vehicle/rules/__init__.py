@@ -13,10 +13,10 @@
    What the driving predicts on all data by more than `explainable` is left too; where it predicts
    nothing, only evidence below `strict` counts.
 7. Nothing left: what was added explains it. An added effect is not named if its value is physically
-   implausible, or differs between pieces of the driving (`spread`), or if something unknown does
-   all that it does and more.
+   implausible, or differs between pieces of the driving by a size that matters, or if something
+   unknown does all that it does and more.
 8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead,
-   leave more than `stays` of the evidence, take up less than is left, or should have explained it.
+   take up less than is left, or should have explained it.
    Beside much that is left names stay with which those errors fall wherever they move them
    (`falls`), if nothing that was added beside them and does not stay moves the same channels.
 9. The verdict follows from what is left and which names stand (`verdict`).

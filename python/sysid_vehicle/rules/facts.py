@@ -71,8 +71,8 @@ class Facts:
 
     Attributes
     ----------
-    before, fitted : Tested
-        For anything left by the baseline and by the final model, on the training data.
+    fitted : Tested
+        For anything left by the final model, on the training data.
     together : Tested or None
         For anything unknown beside what was added, on training and validation data together; None
         where nothing was added.
@@ -92,7 +92,6 @@ class Facts:
         Whether no error 0.5 to 5 s ahead on validation data is as large as matters to the user.
     """
 
-    before: Tested
     fitted: Tested
     together: Tested | None = None
     candidate: float = 1.0

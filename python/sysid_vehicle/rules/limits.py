@@ -60,12 +60,6 @@ class Rules:
     implausible: float = _limit(
         5.0, "typical sizes", "beyond which a value is physically implausible", _OUTSIDE
     )
-    spread: float = _limit(
-        0.25, "share", "of its value by which an effect may differ between pieces", _OUTSIDE
-    )
-    felt: float = _limit(
-        0.5, "sizes that matter", "from which the constancy of a parameter is asked", _OUTSIDE
-    )
     price: float = _limit(
         2.0, "BIC penalties", "of one parameter that the likelihood ratio of a refit covers", _NULLS
     )
@@ -119,9 +113,6 @@ class Rules:
         "of the error that names take up beside which something is left; less than the rest of it "
         "is no part worth a name, and no structure",
         _OUTSIDE,
-    )
-    stays: float = _limit(
-        0.6, "share", "of the evidence against the baseline that right names may leave", _OUTSIDE
     )
 
     def __post_init__(self) -> None:

@@ -198,10 +198,6 @@ def _withdrawn(
     if share < rules.most:
         because = f"takes up only {max(100 * share, 0.0):.0f} % of the error 1 to 5 s ahead"
         return [Withdrawn(names, because, names)]
-    stays = excess(facts.fitted) / max(excess(facts.before), 1.0)
-    if stays > rules.stays:
-        because = f"with it, {100 * stays:.0f} % of the evidence that something is missing stays"
-        return [Withdrawn(names, because, names)]
     taken = {a.id: a.taken for a in facts.added}
     small = smaller_than(after, taken, stand_ins)
     first = Withdrawn(small, "what is left unexplained is larger", names)

@@ -185,7 +185,6 @@ def improve(
             told,
             on_train[-1],
             explained,
-            before=diagnoses[0].omnibus,
             fitted=fitted,
             together=None if rivals is None else rivals.omnibus,
             candidate=min((c.p_value for c in last.ranking), default=1.0),

@@ -20,7 +20,6 @@ def facts_of(
     on_train: Comparison,
     explained: Beyond | None,
     *,
-    before: Omnibus,
     fitted: Omnibus,
     together: Omnibus | None,
     candidate: float,
@@ -41,7 +40,7 @@ def facts_of(
         Of the last fit with what it was fitted to.
     explained : Beyond or None
         What every fit leaves of the errors ahead; None where nothing was added.
-    before, fitted, together, candidate, excited, small, structure
+    fitted, together, candidate, excited, small, structure
         As in `Facts`.
     changes : mapping
         By effect, those on validation and on training data, as in `Added`.
@@ -50,7 +49,6 @@ def facts_of(
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
     taken = _taken_up(fits, missing)
     return Facts(
-        before,
         fitted,
         together,
         candidate,
