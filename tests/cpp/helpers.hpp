@@ -138,6 +138,13 @@ inline Noise ordinary_noise() {
     return noise;
 }
 
+/// The same without forces that have a correlation time.
+inline Noise white_noise() {
+    Noise noise = ordinary_noise();
+    noise.disturbance = {0.0, 0.0, 0.0};
+    return noise;
+}
+
 /// The same on a road that wanders.
 inline Noise sloping_noise() {
     Noise noise = ordinary_noise();

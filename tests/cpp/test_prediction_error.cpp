@@ -90,36 +90,37 @@ TEST(PredictionError, ResidualsAreTheFiltersWhitenedInnovations) {
 
 TEST(PredictionError, DisturbancesThatAreNotThereChangeNothing) {
     // Without them the filter has three states less.
-    const Problem problem = two_runs(kPlain);
     const Parameters p = typical_parameters();
-    Noise none = ordinary_noise();
-    none.disturbance = {0.0, 0.0, 0.0};
+    const Noise none = white_noise();
     Noise small = none;
     small.disturbance = {1e-7, 1e-7, 1e-7};
     ASSERT_TRUE(none.white() && !small.white());
-    const FrozenFilter three = freeze(problem, p.data(), none);
-    const FrozenFilter six = freeze(problem, p.data(), small);
-    EXPECT_EQ(three.rows.size(), 3U);
-    EXPECT_EQ(six.rows.size(), 6U);
-    EXPECT_NEAR(three.log_likelihood, six.log_likelihood, 1e-7);
-    EXPECT_LT((residuals_of(problem, p, three) - residuals_of(problem, p, six)).norm(), 1e-6);
-    const std::vector<int> columns{kBFront, kYawInertia, column_of("mass")};
-    EXPECT_LT(
-        (sensitivities_of(problem, p, three, columns) - sensitivities_of(problem, p, six, columns))
-            .norm(),
-        1e-6 * sensitivities_of(problem, p, six, columns).norm());
-    using All = std::array<double, kNoiseParameters>;
-    All score{}, other{};
-    std::array<double, std::size_t{kNoiseParameters} * kNoiseParameters> information{};
-    noise_score(problem, p.data(), none, score.data(), information.data());
-    noise_score(problem, p.data(), small, other.data(), information.data());
-    for (std::size_t i = 0; i < score.size(); ++i)
-        EXPECT_NEAR(score[i], other[i], 1e-6 * (1.0 + std::abs(other[i]))) << i;
-    const Trace filtered = trace(problem, p.data(), none, true);
-    const Trace full = trace(problem, p.data(), small, true);
-    for (std::size_t i = 0; i < filtered.state.size(); ++i) {
-        if (!std::isnan(full.state[i])) {
-            EXPECT_NEAR(filtered.state[i], full.state[i], 1e-6) << i;
+    for (const EffectMask effects : {kPlain, kLagging}) {
+        const Problem problem = two_runs(effects);
+        const FrozenFilter three = freeze(problem, p.data(), none);
+        const FrozenFilter six = freeze(problem, p.data(), small);
+        EXPECT_EQ(three.rows.size() + 3U, six.rows.size());
+        EXPECT_EQ(small.disturbances(), 3U);
+        EXPECT_NEAR(three.log_likelihood, six.log_likelihood, 1e-7);
+        EXPECT_LT((residuals_of(problem, p, three) - residuals_of(problem, p, six)).norm(), 1e-6);
+        const std::vector<int> columns{kBFront, kYawInertia, column_of("mass")};
+        EXPECT_LT((sensitivities_of(problem, p, three, columns) -
+                   sensitivities_of(problem, p, six, columns))
+                      .norm(),
+                  1e-6 * sensitivities_of(problem, p, six, columns).norm());
+        using All = std::array<double, kNoiseParameters>;
+        All score{}, other{};
+        std::array<double, std::size_t{kNoiseParameters} * kNoiseParameters> information{};
+        noise_score(problem, p.data(), none, score.data(), information.data());
+        noise_score(problem, p.data(), small, other.data(), information.data());
+        for (std::size_t i = 0; i < score.size(); ++i)
+            EXPECT_NEAR(score[i], other[i], 1e-6 * (1.0 + std::abs(other[i]))) << i;
+        const Trace filtered = trace(problem, p.data(), none, true);
+        const Trace full = trace(problem, p.data(), small, true);
+        for (std::size_t i = 0; i < filtered.state.size(); ++i) {
+            if (!std::isnan(full.state[i])) {
+                EXPECT_NEAR(filtered.state[i], full.state[i], 1e-6) << i;
+            }
         }
     }
 }

@@ -70,7 +70,7 @@ INSTANTIATE_TEST_SUITE_P(All, SideBySide, testing::ValuesIn(all_lane_kernels()),
 TEST_P(SideBySide, FiltersAreThoseOfWholeRuns) {
     bool cut = false;
     for (const EffectMask effects : {EffectMask{0}, kLagging})
-        for (const Noise& noise : {ordinary_noise(), sloping_noise()}) {
+        for (const Noise& noise : {ordinary_noise(), sloping_noise(), white_noise()}) {
             const Problem problem = long_run(effects);
             ASSERT_EQ(pieces_of(problem.runs).size(), 16U);
             cut = expect_whole(problem, noise) || cut;

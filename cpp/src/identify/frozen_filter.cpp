@@ -46,13 +46,11 @@ void freeze_run(const Problem& problem, std::size_t number, const double* p, Fro
         });
 }
 
-/// A filter with room for all samples, and for gains of so many rows.
-FrozenFilter empty(const Problem& problem, const Noise& noise,
-                   std::size_t rows = kStatesFull + kRoadStates) {
+/// A filter with room for all samples.
+FrozenFilter empty(const Problem& problem, const Noise& noise) {
     FrozenFilter filter;
     filter.noise = noise;
-    filter.rows = filter_rows(problem.model.effects, noise.sloping());
-    filter.rows.resize(std::min(rows, filter.rows.size()));
+    filter.rows = filter_rows(problem.model.effects, noise.disturbances());
     filter.deviations.assign(filter.rows.size(), 0.0);
     filter.runs.resize(problem.runs.size());
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
@@ -66,14 +64,14 @@ FrozenFilter empty(const Problem& problem, const Noise& noise,
 
 }  // namespace
 
-std::vector<int> filter_rows(EffectMask effects, bool sloping) {
+std::vector<int> filter_rows(EffectMask effects, std::size_t disturbances) {
     std::vector<int> rows;
     rows.reserve(kStatesFull + kRoadStates);
     for (int i = 0; i < kMotionStates; ++i) rows.push_back(i);
     for (const std::size_t i : active_states(effects))
         rows.push_back(kStatesPlain + static_cast<int>(i));
-    for (int i = 0; i < kMotionStates; ++i) rows.push_back(kMotionStates + i);
-    for (int i = 0; i < kRoadStates && sloping; ++i) rows.push_back(kStatesFull + i);
+    for (int i = 0; i < static_cast<int>(disturbances); ++i)
+        rows.push_back(i < kMotionStates ? kMotionStates + i : kStatesFull + i - kMotionStates);
     return rows;
 }
 
@@ -108,7 +106,7 @@ FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise) 
         }
     }
     with_state_size(problem.model.effects, noise, [&](auto nx) {
-        filter = empty(problem, noise, nx);
+        filter = empty(problem, noise);
         for (std::size_t i = 0; i < problem.runs.size(); ++i)
             freeze_run<decltype(nx)::value>(problem, i, p, filter);
     });

@@ -21,7 +21,7 @@ class Gains {
   public:
     Gains(const Problem& problem, const FrozenFilter& filter)
         : filter_(filter),
-          places_(filter.places(filter_rows(problem.model.effects, filter.noise.sloping()))) {
+          places_(filter.places(filter_rows(problem.model.effects, filter.noise.disturbances()))) {
         std::size_t samples = 0;
         for (const Run& run : problem.runs) {
             first_.push_back(samples);
@@ -140,7 +140,7 @@ class PathWalk {
           pieces_(pieces),
           gains_(gains),
           path_(path),
-          model_(problem.model, p, {}, gains.filter().noise.sloping()),
+          model_(problem.model, p, {}, gains.filter().noise.disturbances()),
           rate_(problem.model.fastest_rate(p, 1.0)),
           settles_(gains.without(model_.own().count)),
           state_(model_.moving()),

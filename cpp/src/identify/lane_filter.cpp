@@ -9,7 +9,7 @@ LaneFilter::LaneFilter(const Problem& problem, const std::vector<const double*>&
     : problem_(problem),
       noise_(noise),
       pieces_(pieces),
-      model_(problem.model, sets, {}, noise.sloping()),
+      model_(problem.model, sets, {}, noise.disturbances()),
       n_(model_.moving()),
       state_(n_ + packed(n_, 0)),
       part_(model_.states() * n_),

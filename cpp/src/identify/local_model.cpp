@@ -14,8 +14,8 @@ double at(const LaneRow* row, std::size_t lane) { return row == nullptr ? 1.0 : 
 }  // namespace
 
 LocalModel::LocalModel(const SingleTrack& model, const double* p, const std::vector<int>& columns,
-                       std::size_t width, bool all_externals)
-    : model_(model, p, columns, all_externals),
+                       std::size_t width, std::size_t externals)
+    : model_(model, p, columns, externals),
       columns_of_(kParameterCount),
       width_(width),
       step_parameters_(states() * model_.moving()),

@@ -22,13 +22,12 @@ constexpr int time_lane(std::size_t i) {
                              : kNoiseParameters - 1;
 }
 
-/// Of `L` noise parameters: those of the road only where there is one. Of `n` states the first
-/// `moving` have a transition; the disturbances stand where `disturbing` says.
+/// Of `L` noise parameters: those of disturbances and of the road only where there are such. Of `n`
+/// states the first `moving` have a transition; the disturbances stand where `disturbing` says.
 template <int L, class Disturbing>
 NoiseScore<kChannels, L> score_of(const Noise& noise, const Run& run, int n, int moving,
                                   Disturbing&& disturbing) {
-    std::size_t disturbances = noise.sloping() ? kDisturbances : kMotionStates;
-    if (n == kMotionStates) disturbances = 0;
+    const std::size_t disturbances = noise.disturbances();
     Vec<kChannels> sensor;
     for (int i = 0; i < kChannels; ++i) {
         const double s = noise.sensor[static_cast<std::size_t>(i)];
@@ -158,9 +157,12 @@ double noise_score(const Problem& logged, const double* p, const Noise& noise, d
                    double* information) {
     const InTime in_time(logged, p);
     const Problem& problem = *in_time;
-    return noise.sloping()
-               ? score_all<kNoiseParameters>(problem, p, noise, gradient, information)
-               : score_all<kPlainNoiseParameters>(problem, p, noise, gradient, information);
+    const auto score = [&](auto parameters) {
+        return score_all<decltype(parameters)::value>(problem, p, noise, gradient, information);
+    };
+    if (noise.white()) return score(std::integral_constant<int, kChannels + kMotionStates>{});
+    if (noise.sloping()) return score(std::integral_constant<int, kNoiseParameters>{});
+    return score(std::integral_constant<int, kPlainNoiseParameters>{});
 }
 
 }  // namespace sysid

@@ -31,13 +31,14 @@ class Derivatives {
           filter_(filter),
           signals_(signals),
           width_(padded(signals != nullptr ? signals->targets->size() : columns.size())),
-          local_(problem.model, p, columns, width_, signals != nullptr || filter.noise.sloping()),
+          local_(problem.model, p, columns, width_,
+                 signals != nullptr ? std::size_t{kExternals} : filter.noise.disturbances()),
           states_(local_.states()),
           externals_(local_.externals()),
           samples_(kTogether),
           derivatives_(kTogether * local_.size()),
           G_(kTogether * kChannels * width_),
-          places_(filter.places(filter_rows(problem.model.effects, externals_ == kExternals))),
+          places_(filter.places(filter_rows(problem.model.effects, externals_))),
           gain_(places_.size() * kChannels),
           whitener_(std::size_t{kChannels} * kChannels, 0.0) {}
 

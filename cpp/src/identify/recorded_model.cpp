@@ -51,17 +51,17 @@ void RecordedModel::Ready::give(std::size_t which, std::size_t lane, const Input
 }
 
 RecordedModel::RecordedModel(const SingleTrack& model, const double* p,
-                             const std::vector<int>& columns, bool all_externals)
-    : RecordedModel(model, std::vector<const double*>{p}, columns, all_externals) {}
+                             const std::vector<int>& columns, std::size_t externals)
+    : RecordedModel(model, std::vector<const double*>{p}, columns, externals) {}
 
 RecordedModel::RecordedModel(const SingleTrack& model, const std::vector<const double*>& sets,
-                             const std::vector<int>& columns, bool all_externals)
+                             const std::vector<int>& columns, std::size_t externals)
     : model_(model),
       sets_(sets),
       wanted_(kParameterCount, false),
       own_(active_states(model.effects)),
       states_(kMotionStates + own_.count),
-      externals_(all_externals ? kExternals : kMotionStates) {
+      externals_(externals) {
     for (const int column : columns) wanted_[place(column)] = true;
     read_ = ready(1, [&](Recorder& to, const double* p) {
         const Moving now = moving(to);

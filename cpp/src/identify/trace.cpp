@@ -23,7 +23,7 @@ void store_state(const RunSystem<NX>& system, Trace& out, const Vec<NX>& mean,
     };
     std::fill_n(out.state.begin() + static_cast<long>(begin), kStatesPlain, 0.0);
     std::fill_n(out.state_std.begin() + static_cast<long>(begin), kStatesPlain, 0.0);
-    for (int i = 0; i < std::min(NX, kStatesPlain); ++i) store(static_cast<std::size_t>(i), i);
+    for (int i = 0; i < std::min(system.packed(0), NX); ++i) store(static_cast<std::size_t>(i), i);
     for (std::size_t i = 0; i < system.own().count; ++i)
         store(kMotionStates + system.place(i), system.packed(i));
 }

@@ -91,6 +91,15 @@ struct SingleTrack {
     }
 
   private:
+    /// What only parameters move of the car has no slope where these are plain numbers.
+    template <class T, class S>
+    static auto plain(const S& x) {
+        if constexpr (std::is_same_v<T, double>)
+            return value_of(x);
+        else
+            return x;
+    }
+
     template <class T>
     static TyreCoefficients<T> front_tyre(const T* p) {
         return {p[kBFront], p[kCFront], p[kDFront], p[kEFront]};
@@ -114,23 +123,24 @@ struct SingleTrack {
         for_each_active_backwards(effects, q,
                                   [&](auto e, const T* own, At) { return e.input(own, w); });
         each([&](auto e, const T* own, At at) { return e.steering(own, w, lags.from(at)); });
-        settle_outside_forces(w, external);
+        settle_outside_forces<T>(w, external);
         each([&](auto e, const T* own, At) { return e.body(own, w); });
         user_body(user, q, w);
-        const Axles<S> alpha = slip_angles(w.v_x, w.v_y, w.r, w.l_f, w.l_r, w.delta);
+        const Axles<S> alpha =
+            slip_angles(w.v_x, w.v_y, w.r, plain<T>(w.l_f), plain<T>(w.l_r), w.delta);
         w.alpha_f = alpha.front;
         w.alpha_r = alpha.rear;
         each([&](auto e, const T* own, At at) { return e.slip(own, w, lags.from(at)); });
         const S mu_f = magic_formula(w.alpha_f, front_tyre(p));
         const S mu_r = magic_formula(w.alpha_r, rear_tyre(p));
-        const Axles<S> known = axle_loads(w, mu_f, u, since);
+        const Axles<S> known = axle_loads<T>(w, mu_f, u, since);
         each([&](auto e, const T* own, At) { return e.loads(own, w); });
         each([&](auto e, const T* own, At at) { return e.grip(own, w, lags.from(at).states()); });
         w.fy_f = (loads_known ? known.front : w.fz_f) * mu_f * w.grip_f;
         w.fy_r = (loads_known ? known.rear : w.fz_r) * mu_r * w.grip_r;
         each([&](auto e, const T* own, At) { return e.forces(own, w); });
         user_forces(user, q, w);
-        balance(w);
+        balance<T>(w);
         each([&](auto e, const T* own, At at) { return e.follow(own, w, lags.from(at)); });
         user_states(user, q, w, lags.from(kCatalogueStates));
     }
@@ -164,9 +174,9 @@ struct SingleTrack {
         w.grip_f = w.grip_r = S(1.0);
     }
 
-    template <class S>
+    template <class T, class S>
     static void settle_outside_forces(Workings<S>& w, const S* external) {
-        w.force_x = external[kForceX] - drag_force(w.rho, w.drag_area, w.v_x);
+        w.force_x = external[kForceX] - drag_force(w.rho, plain<T>(w.drag_area), w.v_x);
         w.force_y = external[kForceY];
         w.moment_z = external[kMomentZ];
         w.gravity_x = external[kGravityX];
@@ -176,19 +186,18 @@ struct SingleTrack {
     // The front load depends on a_x, which depends on the front lateral force, which is
     // proportional to the front load: (1) and (5), or (6), are solved together for F_zf. Returns
     // the loads of the input.
-    template <class S>
+    template <class T, class S>
     Axles<S> axle_loads(Workings<S>& w, const S& mu_f, const InputFor<S>& u,
                         const LoadsSince<S>& since) const {
         using std::cos;
         using std::sin;
-        const S wheelbase = w.l_f + w.l_r;
-        const S weight = w.m * car.gravity_mps2;
-        const Axles<S> rest = static_loads(weight, w.l_f, w.l_r);
-        w.fz0_f = rest.front;
-        w.fz0_r = rest.rear;
-        const S c = cos(w.delta);
-        const S s = sin(w.delta);
-        const S lever = w.h / wheelbase;
+        const auto m = plain<T>(w.m), l_f = plain<T>(w.l_f), l_r = plain<T>(w.l_r);
+        const auto rest = static_loads(m * car.gravity_mps2, l_f, l_r);
+        w.fz0_f = S(rest.front);
+        w.fz0_r = S(rest.rear);
+        const S c = w.cos_delta = cos(w.delta);
+        const S s = w.sin_delta = sin(w.delta);
+        const auto lever = plain<T>(w.h) / (l_f + l_r);
         Axles<S> told{S(u.loads_n.front), S(u.loads_n.rear)};
         if (since.on) {
             const S& squared = since.speed_squared;
@@ -209,7 +218,7 @@ struct SingleTrack {
                 front = (w.fz0_f - lever * known) / (1.0 - lever * (mu_f * s));
             pull = known - front * (mu_f * s);
         } else {
-            pull = w.m * w.ax_input;
+            pull = m * w.ax_input;
             const S front = loads_known ? told.front : w.fz0_f - lever * pull;
             const S along = pull - w.force_x + front * (mu_f * s);  // F_xf cos(delta) + F_xr
             const S share = front_share(w, along);
@@ -237,16 +246,15 @@ struct SingleTrack {
         w.fx_r = (1.0 - front) * w.fx;
     }
 
-    template <class S>
+    template <class T, class S>
     void balance(Workings<S>& w) const {
-        using std::cos;
-        using std::sin;
-        const S c = cos(w.delta);
-        const S s = sin(w.delta);
+        const S &c = w.cos_delta, &s = w.sin_delta;
+        const auto m = plain<T>(w.m);
         const S front_lateral = w.fy_f * c + w.fx_f * s;
-        w.a_x = force_known ? (w.fx_f * c - w.fy_f * s + w.fx_r + w.force_x) / w.m : w.ax_input;
-        w.a_y = (front_lateral + w.fy_r + w.force_y) / w.m;
-        w.r_dot = (w.l_f * front_lateral - w.l_r * w.fy_r + w.moment_z) / w.I_z;
+        w.a_x = force_known ? (w.fx_f * c - w.fy_f * s + w.fx_r + w.force_x) / m : w.ax_input;
+        w.a_y = (front_lateral + w.fy_r + w.force_y) / m;
+        w.r_dot = (plain<T>(w.l_f) * front_lateral - plain<T>(w.l_r) * w.fy_r + w.moment_z) /
+                  plain<T>(w.I_z);
     }
 };
 

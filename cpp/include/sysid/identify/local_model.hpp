@@ -27,9 +27,9 @@ struct PathSample {
 class LocalModel {
   public:
     /// Derivatives by the parameters `columns`, for which `width` places are kept, by states and by
-    /// externals: all of them, or the forces and the moment alone.
+    /// the first so many externals.
     LocalModel(const SingleTrack& model, const double* p, const std::vector<int>& columns,
-               std::size_t width, bool all_externals);
+               std::size_t width, std::size_t externals);
 
     std::size_t states() const { return model_.states(); }
     std::size_t externals() const { return model_.externals(); }

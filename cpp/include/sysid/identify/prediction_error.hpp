@@ -49,8 +49,9 @@ struct FrozenFilter {
 };
 
 /// Names of the states that a filter corrects: v_x, v_y, r, the states of effects, disturbances.
-/// They are places among `kStatesFull`; gravity along and across stand behind these.
-std::vector<int> filter_rows(EffectMask effects, bool sloping);
+/// They are places among `kStatesFull`; gravity along and across stand behind these. Of so many
+/// disturbances, see `Noise::disturbances`.
+std::vector<int> filter_rows(EffectMask effects, std::size_t disturbances);
 
 FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise);
 

@@ -48,6 +48,12 @@ struct Noise {
                                          [](double s) { return s == 0.0; });
     }
 
+    /// How many of F_x, F_y, M_z, gravity along and across are states of a filter.
+    std::size_t disturbances() const {
+        if (white()) return 0;
+        return std::size_t{kMotionStates} + (sloping() ? kRoadStates : 0);
+    }
+
     /// Correlation time and standard deviation of F_x, F_y, M_z, gravity along and across.
     double time_of(std::size_t i) const {
         return i < kMotionStates ? correlation_time_s[i] : road_time_s;

@@ -40,14 +40,14 @@ class RecordedModel {
         }
     };
 
-    /// With derivatives by states, by externals (all of them, or the forces and the moment alone)
-    /// and by the parameters `columns`.
+    /// With derivatives by states, by the first so many externals and by the parameters `columns`;
+    /// the other externals are zero.
     RecordedModel(const SingleTrack& model, const double* p, const std::vector<int>& columns,
-                  bool all_externals);
+                  std::size_t externals);
     /// With parameters of its own in each lane. Throws `NumericalFailure` where they lead to other
     /// steps.
     RecordedModel(const SingleTrack& model, const std::vector<const double*>& sets,
-                  const std::vector<int>& columns, bool all_externals);
+                  const std::vector<int>& columns, std::size_t externals);
 
     const SingleTrack& model() const { return model_; }
     const double* parameters(std::size_t lane) const { return sets_[sets_.size() > 1 ? lane : 0]; }

@@ -1,6 +1,7 @@
 // A run of a car as a state-space system for the extended Kalman filter.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 
 #include "sysid/estimate/kalman.hpp"
@@ -8,9 +9,9 @@
 
 namespace sysid {
 
-/// State: v_x, v_y, r, disturbing F_x, F_y, M_z, then the states of the model's own effects,
-/// gravity along and across where the slope varies; what is left of NX stands still at zero and is
-/// certain.
+/// State: v_x, v_y, r, disturbing F_x, F_y, M_z where there are such, then the states of the
+/// model's own effects, gravity along and across where the slope varies; what is left of NX stands
+/// still at zero and is certain.
 template <int NX>
 class RunSystem {
   public:
@@ -20,7 +21,7 @@ class RunSystem {
           p_(p),
           own_(active_states(model.effects)),
           start_(initial_state(model, run, p)),
-          disturbances_(number_of_disturbances(noise)) {
+          disturbances_(noise.disturbances()) {
         process_.setZero();
         for (int i = 0; i < kMotionStates; ++i) {
             const auto n = static_cast<std::size_t>(i);
@@ -94,7 +95,10 @@ class RunSystem {
     }
 
     /// Where the effects' state number `i` stands in the filter's state, and in the model's.
-    static int packed(std::size_t i) { return kStatesPlain + static_cast<int>(i); }
+    int packed(std::size_t i) const {
+        return static_cast<int>(kMotionStates +
+                                std::min<std::size_t>(disturbances_, kMotionStates) + i);
+    }
     std::size_t place(std::size_t i) const { return kMotionStates + own_.place[i]; }
     const ActiveStates& own() const { return own_; }
 
@@ -119,11 +123,6 @@ class RunSystem {
     }();
     static_assert(NX % kPass == 0);
     using D = Dual<kPass>;
-
-    static std::size_t number_of_disturbances(const Noise& noise) {
-        if (NX == kMotionStates) return 0;
-        return noise.sloping() ? kDisturbances : kMotionStates;
-    }
 
     /// Calls `use` with every state in turn as a direction; `keep` stores a row of what results.
     template <class Use>

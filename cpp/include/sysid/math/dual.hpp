@@ -17,8 +17,10 @@ inline double direction(double y, double x) {
 
 template <int N>
 struct Dual {
-    double v = 0.0;
+    // The slopes first: pairs of them are then copied as they were calculated, which processors do
+    // without waiting.
     std::array<double, N> d{};
+    double v = 0.0;
 
     Dual() = default;
     Dual(double value) : v(value) {}  // NOLINT(google-explicit-constructor): constants mix freely

@@ -29,7 +29,8 @@ struct Workings {
     S v_x, v_y, r;
     Given<S> time_s{};  // since the log began
     // inputs (stages `input` and `steering`)
-    S delta;                // road-wheel angle that acts [rad]
+    S delta;  // road-wheel angle that acts [rad]
+    S cos_delta, sin_delta;
     Given<S> steer_rate{};  // of the logged angle [rad/s]
     S fx;                   // total wheel force [N], or
     S ax_input;             // measured longitudinal specific force [m/s2] that stands in for it
