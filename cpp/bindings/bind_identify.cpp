@@ -74,8 +74,9 @@ void register_identify(py::module_& m) {
     m.attr("CHANNELS") = static_cast<int>(kChannels);
     m.attr("EXTERNALS") = static_cast<int>(kExternals);
     py::class_<LogwiseProblem> bound(m, "Problem");
-    bind_filter<LogwiseFilter>(m, "FrozenFilter", bound, kParameterCount, kNoiseParameters,
-                               &to_noise);
+    py::class_<LogwiseFilter>(m, "FrozenFilter")
+        .def_readonly("log_likelihood", &LogwiseFilter::log_likelihood)
+        .def_readonly("observed", &LogwiseFilter::observed);
     bind_least_squares<LogwiseFilter>(bound, kParameterCount, kChannels);
     bound
         .def(py::init([](const SingleTrack& model) { return LogwiseProblem(model); }),
@@ -86,6 +87,25 @@ void register_identify(py::module_& m) {
              py::arg("steer_after") = std::vector<double>{},
              py::arg("shift") = std::vector<double>{})
         .def("with_model", &LogwiseProblem::with_model, py::arg("model"))
+        .def_property_readonly("samples", &LogwiseProblem::samples)
+        .def(
+            "freeze",
+            [](const LogwiseProblem& self, const Array& p, const Array& noise) {
+                const double* values = values_of(p);
+                const Noise n = to_noise(noise);
+                return unlocked([&] { return freeze(self, values, n); });
+            },
+            py::arg("parameters"), py::arg("noise"))
+        .def(
+            "noise_score",
+            [](const LogwiseProblem& self, const Array& p, const Array& noise) {
+                const double* values = values_of(p);
+                const Noise n = to_noise(noise);
+                return with_derivatives(kNoiseParameters, [&](double* g, double* h) {
+                    return noise_score(self, values, n, g, h);
+                });
+            },
+            py::arg("parameters"), py::arg("noise"))
         .def(
             "log_likelihoods",
             [](const LogwiseProblem& self, const Array& sets, const Array& noise) {

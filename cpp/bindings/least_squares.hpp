@@ -71,33 +71,4 @@ void bind_least_squares(py::class_<P>& bound, std::size_t parameters, std::size_
             py::arg("parameters"), py::arg("filter"), py::arg("columns"));
 }
 
-/// Of a problem whose residuals are those of a filter: its gains, as the class `name`, and the
-/// score of its noise parameters, which `to_noise` takes from an array.
-template <class Gains, class P, class ToNoise>
-void bind_filter(py::module_& m, const char* name, py::class_<P>& bound,
-                 std::size_t parameter_count, std::size_t noise_count, ToNoise to_noise) {
-    py::class_<Gains>(m, name)
-        .def_readonly("log_likelihood", &Gains::log_likelihood)
-        .def_readonly("observed", &Gains::observed);
-    bound.def_property_readonly("samples", &P::samples)
-        .def(
-            "freeze",
-            [=](const P& self, const Array& p, const Array& noise) {
-                const double* values = vector(p, parameter_count, "parameters");
-                const auto n = to_noise(noise);
-                return unlocked([&] { return freeze(self, values, n); });
-            },
-            py::arg("parameters"), py::arg("noise"))
-        .def(
-            "noise_score",
-            [=](const P& self, const Array& p, const Array& noise) {
-                const double* values = vector(p, parameter_count, "parameters");
-                const auto n = to_noise(noise);
-                return with_derivatives(noise_count, [&](double* g, double* h) {
-                    return noise_score(self, values, n, g, h);
-                });
-            },
-            py::arg("parameters"), py::arg("noise"));
-}
-
 }  // namespace sysid::bindings

@@ -170,10 +170,9 @@ class Replay:
         """Where searches from some starts end: half the sum of squares, and parameters."""
         ends = []
         for start in starts:
-            start[box.columns] = np.clip(start[box.columns], box.lower, box.upper)
-            found = minimise(problem, start, frozen, box, tolerance=0.1)
-            start[box.columns] = found.x
-            ends.append((found.cost, start))
+            begin = box.inside(start)
+            found = minimise(problem, begin, frozen, box, tolerance=0.1)
+            ends.append((found.cost, box.put(begin, found.x)))
         if not any(np.isfinite(cost) for cost, _ in ends):
             raise NumericalError("no fit without it has a finite likelihood")
         return ends

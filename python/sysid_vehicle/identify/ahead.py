@@ -42,7 +42,7 @@ _SETTLED = 1e-3  # observations
 _BLOCK_S, _FEWEST = 10.0, 6  # windows of one such time are wrong alike; fewest such times
 _TINY = 1e-300
 _BLIND = 1e4  # standard deviations of a channel: a sensor that corrects nothing
-_STILL = 1e-6  # noise and disturbance of a motion that is certain
+_STILL = 1e-6  # noise of a motion that is certain
 
 
 _Gains = tuple[_core.FrozenFilter, ...]
@@ -125,8 +125,7 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     known = model.parameters
     prior = free_prior(model)
     whole = driving.problem(model)
-    p = model.vector()
-    p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
+    p = box.inside(model.vector())
     for _ in range(_PASSES):
         # What is not measured is smoothed with the parameters that are being sought.
         motion = as_float64(whole.trace(p, fit.noise.vector(), True)["state"])
@@ -140,7 +139,7 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
         found = minimise(
             Penalised(errors, prior), p, gains, box, rounds=_ROUNDS, tolerance=_SETTLED
         )
-        p[box.columns] = found.x
+        p = box.put(p, found.x)
     information = _information(
         errors.sensitivities(p, gains, box.columns),
         errors.residuals(p, gains).ravel(),
@@ -204,7 +203,9 @@ def _blind_noise(driving: Driving) -> FloatArray:
         [np.std(y[np.isfinite(y)]) if np.isfinite(y).any() else 1.0 for y in driving.measured.T]
     )
     spread[~(spread > 0.0)] = 1.0
-    return as_float64([*(_BLIND * spread), *(_STILL,) * 6, 0.1, 0.1, 0.1, 0.0, 0.0, 5.0])
+    return as_float64(
+        [*(_BLIND * spread), *(_STILL,) * 3, 0.0, 0.0, 0.0, 0.1, 0.1, 0.1, 0.0, 0.0, 5.0]
+    )
 
 
 def _squares(errors: FloatArray, windows: list[tuple[int, int]]) -> FloatArray:

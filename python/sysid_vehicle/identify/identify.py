@@ -23,7 +23,7 @@ from .objective import Objective
 from .offsets import centred, marginal_information
 from .profile import profile_all
 from .search import METHODS, Box, minimise
-from .settle import risen, rivalled, settle, settle_finely, to_the_top
+from .settle import moved, rivalled, settle, settle_finely, to_the_top
 from .starts import Runner, Starts, space_filling
 from .suspects import explaining
 
@@ -133,10 +133,8 @@ def identify(
     level = frozen.log_likelihood + thin.problem.half_sum_of_squares(p, frozen)
 
     def search(begin: FloatArray) -> tuple[FloatArray, float]:
-        end = begin.copy()
         found = minimise(thin, begin, frozen, box, method=method, tolerance=0.1)
-        end[box.columns] = found.x
-        return end, level - found.cost
+        return box.put(begin, found.x), level - found.cost
 
     begins = np.tile(p, (starts, 1))
     begins[:, box.columns] = _start_points(model, names, box, starts, seed)
@@ -222,13 +220,11 @@ def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3)
     """
     box = free_box(model)
     objective = objective_of(model, driving.problem(model), driving)
-    p = model.vector()
-    p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
-    gains = objective.freeze(p, noise.vector())
+    p = box.inside(model.vector())
+    gains = None
     for _ in range(rounds):
         before = p[box.columns]
-        found = minimise(objective, p, gains, box, rounds=8, tolerance=0.2)
-        p, gains = risen(objective, p, gains, found.x, noise.vector(), box)
+        p, gains = moved(objective, p, noise.vector(), box, rounds=8, tolerance=0.2)
         if np.all(np.abs(p[box.columns] - before) < 1e-4 * (box.upper - box.lower)):
             break
     return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True, gains)

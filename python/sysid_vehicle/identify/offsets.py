@@ -24,8 +24,7 @@ from .ahead import predicting_ahead
 from .box import free_box, free_prior
 from .fit import Fit
 from .objective import Objective
-from .search import minimise
-from .settle import risen
+from .settle import moved
 
 __all__ = ["centred", "driving_of", "marginal_information"]
 
@@ -88,15 +87,12 @@ def _likeliest(alone: Model, driving: Driving, noise: NoiseModel) -> FloatArray:
     box = free_box(alone)
     within = noise_range(alone.vehicle, driving)
     objective = Objective(driving.problem(alone), free_prior(alone), *within)
-    p = alone.vector()
-    p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
+    p = box.inside(alone.vector())
     told = as_float64(np.clip(noise.vector(), *within))
     value = -np.inf
     for _ in range(_ROUNDS):
         told, _ = objective.learn_noise(p, told, rounds=2)
-        gains = objective.freeze(p, told)
-        found = minimise(objective, p, gains, box, rounds=8, tolerance=_STANDS)
-        p, gains = risen(objective, p, gains, found.x, told, box)
+        p, gains = moved(objective, p, told, box, rounds=8, tolerance=_STANDS)
         before, value = value, gains.log_likelihood - objective.prior_cost(p)
         if value < before + _STANDS:
             break

@@ -256,9 +256,7 @@ def lost_at(
 
 def _moved(p: FloatArray, box: Box, step: FloatArray) -> FloatArray:
     """From a point that is known, along the direction that costs least."""
-    start = p.copy()
-    start[box.columns] = np.clip(p[box.columns] + step, box.lower, box.upper)
-    return start
+    return box.inside(box.put(p, p[box.columns] + step))
 
 
 def _next(inside: tuple[float, float, FloatArray], outside: tuple[float, float]) -> float:

@@ -29,6 +29,16 @@ class Box:
     lower: FloatArray
     upper: FloatArray
 
+    def put(self, p: FloatArray, x: FloatArray) -> FloatArray:
+        """All parameters `p`, with the free ones `x`."""
+        full = p.copy()
+        full[self.columns] = x
+        return full
+
+    def inside(self, p: FloatArray) -> FloatArray:
+        """All parameters `p`, the free ones at their nearest bound where they are beyond it."""
+        return self.put(p, np.clip(p[self.columns], self.lower, self.upper))
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -57,12 +67,6 @@ def minimise(
     return METHODS[method](problem, p, frozen, box, rounds, tolerance)
 
 
-def _filled(p: FloatArray, box: Box, x: FloatArray) -> FloatArray:
-    full = p.copy()
-    full[box.columns] = x
-    return full
-
-
 def _gauss_newton(
     problem: Problem,
     p: FloatArray,
@@ -74,10 +78,10 @@ def _gauss_newton(
     """Levenberg-Marquardt whose every step is the best one within the box."""
 
     def linearised(x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        return problem.normal_equations(_filled(p, box, x), frozen, box.columns)
+        return problem.normal_equations(box.put(p, x), frozen, box.columns)
 
     def cost_of(x: FloatArray) -> float:
-        return problem.half_sum_of_squares(_filled(p, box, x), frozen)
+        return problem.half_sum_of_squares(box.put(p, x), frozen)
 
     x = np.clip(p[box.columns], box.lower, box.upper)
     cost, gradient, information = linearised(x)
@@ -170,7 +174,7 @@ def _nlopt(
     def objective(z: FloatArray, gradient: FloatArray) -> float:
         nonlocal best
         x = box.lower + width * z
-        full = _filled(p, box, x)
+        full = box.put(p, x)
         cost, g, _ = problem.normal_equations(full, frozen, box.columns)
         if not np.isfinite(cost):
             cost, g = 1e12, np.zeros_like(x)
@@ -205,9 +209,9 @@ def _scipy(
     """Trust-region reflective least squares of SciPy."""
     inside = np.clip(p[box.columns], box.lower + 1e-9, box.upper - 1e-9)
     found = scipy.optimize.least_squares(
-        lambda x: problem.residuals(_filled(p, box, x), frozen).ravel(),
+        lambda x: problem.residuals(box.put(p, x), frozen).ravel(),
         inside,
-        jac=lambda x: -problem.sensitivities(_filled(p, box, x), frozen, box.columns),
+        jac=lambda x: -problem.sensitivities(box.put(p, x), frozen, box.columns),
         bounds=(box.lower, box.upper),
         x_scale="jac",
         max_nfev=rounds,

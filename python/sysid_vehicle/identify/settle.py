@@ -20,6 +20,7 @@ __all__ = [
     "bottom",
     "climb",
     "descend",
+    "moved",
     "risen",
     "rivalled",
     "settle",
@@ -59,13 +60,12 @@ def descend(
     log_likelihood : float
         Priors included.
     """
-    p = p.copy()
     for _ in range(refreezes):
         gains = objective.freeze(p, noise)
         found = minimise(objective, p, gains, box, method=method, rounds=40)
-        moved = np.abs(found.x - p[box.columns])
-        p[box.columns] = found.x
-        if np.all(moved < 1e-3 * (box.upper - box.lower)):
+        step = np.abs(found.x - p[box.columns])
+        p = box.put(p, found.x)
+        if np.all(step < 1e-3 * (box.upper - box.lower)):
             break
     return p, objective.log_likelihood(p, noise)
 
@@ -93,8 +93,7 @@ def risen(
     least = gains.log_likelihood - objective.prior_cost(p)
     begin = p[box.columns]
     for share in _SHARES:
-        trial = p.copy()
-        trial[box.columns] = begin + share * (x - begin)
+        trial = box.put(p, begin + share * (x - begin))
         try:
             there = objective.freeze(trial, noise)
         except NumericalError:
@@ -141,8 +140,7 @@ def settle(
     converged : bool
         Whether it came to a stand.
     """
-    p = p.copy()
-    p[box.columns] = np.clip(p[box.columns], box.lower, box.upper)
+    p = box.inside(p)
     if parameters_first:
         p, _ = descend(objective, p, noise, box, method=method)
     best = -np.inf
@@ -161,11 +159,11 @@ def settle(
         if value < best + _STANDS:
             return p, noise, True
         best = value
-        p, gains = _moved(objective, p, noise, box, method=method, rounds=8)
+        p, gains = moved(objective, p, noise, box, method=method, rounds=8)
     return p, noise, False
 
 
-def _moved(
+def moved(
     objective: Objective,
     p: FloatArray,
     noise: FloatArray,
@@ -173,10 +171,11 @@ def _moved(
     *,
     method: str = "gauss-newton",
     rounds: int = 25,
+    tolerance: float = _GAIN,
 ) -> tuple[FloatArray, Any]:
     """The end of a search, as far as the likelihood rises, and the gains there."""
     gains = objective.freeze(p, noise)
-    found = minimise(objective, p, gains, box, method=method, rounds=rounds, tolerance=_GAIN)
+    found = minimise(objective, p, gains, box, method=method, rounds=rounds, tolerance=tolerance)
     return risen(objective, p, gains, found.x, noise, box)
 
 
@@ -206,12 +205,12 @@ def rivalled(
     found, noise, converged = best
     try:
         if few is not None:
-            near, gains = _moved(few, found, noise, box)
-            p, there = _moved(few, p, noise, box)
+            near, gains = moved(few, found, noise, box)
+            p, there = moved(few, p, noise, box)
             if _hopeless(few, gains.log_likelihood - few.prior_cost(near), p, there, noise)[0]:
                 return best
         value = objective.log_likelihood(found, noise)
-        p, gains = _moved(objective, p, noise, box)
+        p, gains = moved(objective, p, noise, box)
         hopeless, more = _hopeless(objective, value, p, gains, noise)
         if hopeless:
             return best
@@ -275,8 +274,8 @@ def _climbed_from(
             break
         gained = 0.0
         for _ in range(10):
-            trial = p.copy()
-            trial[box.columns], promised = stride(x, slope, information, damping, box)
+            there_x, promised = stride(x, slope, information, damping, box)
+            trial = box.put(p, there_x)
             with suppress(NumericalError):
                 there = objective.freeze(trial, noise)
                 reached = there.log_likelihood - objective.prior_cost(trial)

@@ -88,9 +88,7 @@ class _Valley:
         return np.asarray(self.box.lower > 0.0)
 
     def full(self, x: FloatArray) -> FloatArray:
-        out = self.p.copy()
-        out[self.box.columns] = x
-        return out
+        return self.box.put(self.p, x)
 
     def residuals(self, x: FloatArray) -> FloatArray | None:
         """None where the car spins in the model."""

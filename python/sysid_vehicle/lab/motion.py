@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
+from .._arrays import FloatArray, as_float64, filled
 from ..errors import InvalidInput
 from .tyre_data import GreyBoxVehicle, TyreLog
 
@@ -68,7 +68,7 @@ class TyreMotion:
         """
         told = log if log.sideslip_measured else log.with_kinematic_sideslip()
         window = 2 * max(int(0.5 * window_s / log.step_s), 2) + 1
-        y = np.column_stack([_filled(told.measurements[:, i]) for i in range(4)])
+        y = np.column_stack([filled(told.measurements[:, i]) for i in range(4)])
         smooth = scipy.signal.savgol_filter(y[:, :3], window, 3, axis=0)
         rate = scipy.signal.savgol_filter(y[:, 2], window, 3, deriv=1, delta=log.step_s)
         motion = np.column_stack([smooth, told.inputs[:, 1:]])
@@ -120,12 +120,6 @@ class TyreMotion:
             as_float64(np.column_stack([self.ay_mps2, rate])),
             as_float64(np.column_stack([ay_weight, yaw_weight])),
         )
-
-
-def _filled(values: FloatArray) -> FloatArray:
-    there = np.isfinite(values)
-    k = np.arange(len(values))
-    return as_float64(np.interp(k, k[there], values[there]))
 
 
 def _finite(name: str, values: FloatArray) -> None:

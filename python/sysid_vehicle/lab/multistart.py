@@ -144,7 +144,7 @@ def valleys(
     tasted = []
     for trial in looking_alike(p):
         found = minimise(objective, trial, gains, box, rounds=_TASTE)
-        trial[box.columns] = found.x
+        trial = box.put(trial, found.x)
         if found.cost < here + _HOPELESS and not _same(trial, p, box):
             tasted.append((found.cost, trial))
     ends: list[tuple[FloatArray, float]] = []

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from .. import _core
 from .._arguments import check_positive_fields
-from .._arrays import FloatArray, as_float64
+from .._arrays import FloatArray, as_float64, filled
 from ..errors import InvalidInput
 from ..log import Log
 from ..vehicle import GRAVITY_MPS2, Vehicle
@@ -241,10 +241,7 @@ class TyreLog:
         Good enough to begin a search with, where v_y was not measured.
         """
         y = self.measurements.copy()
-        k = np.arange(self.n)
-        v_x, r, a_y = (
-            np.interp(k, k[np.isfinite(y[:, i])], y[np.isfinite(y[:, i]), i]) for i in (0, 2, 3)
-        )
+        v_x, r, a_y = (filled(y[:, i]) for i in (0, 2, 3))
         v_y = np.cumsum(a_y - v_x * r) * self.step_s
         half = min(int(0.5 * window_s / self.step_s), (self.n - 1) // 2)
         window = np.ones(2 * half + 1)

@@ -6,9 +6,10 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from .._arrays import filled
 from ._channels import CHANNELS, FloatArray
 from ._grid import between, own_period
-from ._signals import filled, runs, smoothed
+from ._signals import runs, smoothed
 
 _NAN_BLOCK_S = 0.5
 _FROZEN_S = 1.0

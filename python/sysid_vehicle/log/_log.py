@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._arguments import expect
+from .._arrays import filled
 from .._files import write_text
 from .._tables import dataset, frame
 from ..errors import InvalidInput, near_names, warn
@@ -21,7 +22,7 @@ from ._checks import excitation_note
 from ._columns import Columns
 from ._laws import Contradiction
 from ._plausibility import contradictions
-from ._signals import filled, runs
+from ._signals import runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._arrays import filled
 from ._channels import CHANNELS, DEG, FloatArray
 from ._grid import at, between
 from ._laws import Contradiction, Implausible
-from ._signals import disorder, filled, median_of_five, runs, white_noise
+from ._signals import disorder, median_of_five, runs, white_noise
 
 WHITE = 0.7  # share of white variance from which a channel has no order
 

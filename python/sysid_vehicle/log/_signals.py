@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._channels import FloatArray
+from .._arrays import FloatArray, filled
 
 # A spike stands out this many times from the local noise, from the quantum of the channel and
 # (as a fraction) from its range: below, it could be a quick but true movement.
@@ -18,15 +18,6 @@ def runs(mask: np.ndarray) -> list[tuple[int, int]]:
     """Return the half-open index ranges ``(start, stop)`` in which `mask` is true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def filled(values: FloatArray) -> FloatArray:
-    """Return `values` with NaN replaced by linear interpolation (held at both ends)."""
-    good = np.isfinite(values)
-    if good.all() or not good.any():
-        return values
-    index = np.arange(values.size)
-    return np.interp(index, index[good], values[good])
 
 
 def fill_short_gaps(values: FloatArray, longest: int) -> tuple[FloatArray, list[tuple[int, int]]]:

@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, filled
 from ..log import Log
 from ..vehicle import Vehicle
 
@@ -155,11 +155,9 @@ class _Motion:
 
         def smooth(name: str) -> FloatArray:
             values = log[name][where]
-            good = np.flatnonzero(np.isfinite(values))
-            if good.size == 0:
+            if not np.isfinite(values).any():
                 return np.zeros(values.size)
-            filled = np.interp(np.arange(values.size), good, values[good])
-            padded = np.pad(filled, width // 2, mode="edge")
+            padded = np.pad(filled(values), width // 2, mode="edge")
             return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
 
         steer, a_y = smooth("steer_rad"), smooth("ay_mps2")

@@ -100,9 +100,7 @@ def search(task: LossTask, begins: FloatArray) -> tuple[FloatArray, FloatArray, 
     rough = task.thinned(COARSE) if task.motion.n > 2 * COARSE else task
     found: list[tuple[FloatArray, float]] = []
     for begin in begins:
-        p = task.given.copy()
-        p[task.box.columns] = begin
-        found.append(rough.descend(p, ROUGH))
+        found.append(rough.descend(task.box.put(task.given, begin), ROUGH))
     behind = rough.behind(rough.merits(found))
     for i in np.flatnonzero(behind > _HOPELESS):
         found[i] = found[i][0], task.at(found[i][0])
@@ -122,15 +120,13 @@ def _walk(task: LossTask, found: list[tuple[FloatArray, float]]) -> None:
     samples. Whatever ended at the best goes on to the better.
     """
     # The given point may be better than where few samples led to.
-    tried = [(p, v) for p, v in [task.descend(_at_given(task), ROUGH)] if np.isfinite(v)]
+    given = task.descend(task.box.inside(task.given), ROUGH)
+    tried = [given] if np.isfinite(given[1]) else []
     for _ in range(_WALKS):
         best = int(np.argmax(task.merits(found)))
         here = found[best][0]
         for trial in looking_alike(here):
-            trial[task.box.columns] = np.clip(
-                trial[task.box.columns], task.box.lower, task.box.upper
-            )
-            tried.append(task.descend(trial, ROUGH))
+            tried.append(task.descend(task.box.inside(trial), ROUGH))
         merits = task.merits(tried)
         better = int(np.argmax(merits))
         now = task.merits([found[best]])[0]
@@ -141,12 +137,6 @@ def _walk(task: LossTask, found: list[tuple[FloatArray, float]]) -> None:
             if np.max(np.abs(p - here)[task.box.columns] / width) <= _SAME:
                 found[i] = tried[better]
         tried = []
-
-
-def _at_given(task: LossTask) -> FloatArray:
-    p = task.given.copy()
-    p[task.box.columns] = np.clip(p[task.box.columns], task.box.lower, task.box.upper)
-    return p
 
 
 def _go_on(

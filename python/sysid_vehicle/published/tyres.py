@@ -146,8 +146,7 @@ def regress_tyres(
         raise InvalidInput("the joint loss needs yaw_acc_radps2 in the motion")
     free = list(PARAMETERS[:8]) + (["P1", "P2", "P3"] if residual_terms else [])
     bounds = box_of(free, box or BOX)
-    p = first_point(GIVEN if start is None else start)
-    p[bounds.columns] = np.clip(p[bounds.columns], bounds.lower, bounds.upper)
+    p = bounds.inside(first_point(GIVEN if start is None else start))
     begins = space_filling(
         p[bounds.columns], bounds.lower, bounds.upper, starts, seed, list(range(8))
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, filled
 from ..log import Log
 
 __all__ = ["corrected", "shifted"]
@@ -74,7 +74,7 @@ def _accelerations(
     else:
         along, across = ax / (1.0 + gx), ay / (1.0 + gy)
     if lx or ly:
-        r = _filled(now.get("yaw_rate_radps", log["yaw_rate_radps"]))
+        r = filled(now.get("yaw_rate_radps", log["yaw_rate_radps"]))
         width = max(3, 2 * round(0.5 * _SMOOTH_S * log.rate_hz) + 1)
         smooth = scipy.signal.savgol_filter(r, width, 2)
         dr = scipy.signal.savgol_filter(r, width, 2, deriv=1, delta=1.0 / log.rate_hz)
@@ -96,11 +96,6 @@ def _accelerations(
         if value
     ]
     what.append(f"ax_mps2, ay_mps2: taken out: {', '.join(done)}")
-
-
-def _filled(values: FloatArray) -> FloatArray:
-    known = np.flatnonzero(np.isfinite(values))
-    return np.interp(np.arange(values.size), known, values[known])
 
 
 def shifted(time_s: FloatArray, values: FloatArray, delay_s: float) -> FloatArray:

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, filled
 from ..errors import InvalidInput
 from ..log import CHANNELS, Log, held_rows
 from ..vehicle import GRAVITY_MPS2
@@ -112,7 +112,7 @@ def pieces(logs: Sequence[Log]) -> list[Stretch]:
     found: list[tuple[float, Stretch]] = []
     for number, log in enumerate(logs):
         time_s = log["time_s"]
-        usable = _filled(log["vx_mps"]) > _SLOWEST_MPS
+        usable = filled(log["vx_mps"]) > _SLOWEST_MPS
         for channel in MOVING:
             if log.has(channel):
                 usable &= ~_in_holes(time_s, log[channel])
@@ -271,11 +271,6 @@ def _repeated(values: FloatArray) -> npt.NDArray[np.bool_]:
         known = np.flatnonzero(np.isfinite(values))
         result[known[1:][np.diff(values[known]) == 0.0]] = True
     return result
-
-
-def _filled(values: FloatArray) -> FloatArray:
-    known = np.flatnonzero(np.isfinite(values))
-    return np.interp(np.arange(values.size), known, values[known]) if known.size else values
 
 
 def _in_holes(time_s: FloatArray, values: FloatArray) -> npt.NDArray[np.bool_]:

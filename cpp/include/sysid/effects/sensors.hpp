@@ -176,19 +176,8 @@ struct InsLeverArm : Effect {
         .moves = "vy_mps, ay_mps2",
         .needs = "steer_rad, vx_mps, yaw_rate_radps, vy_mps, ay_mps2",
         .confounded_with = "cg_position, speed_sensor_lever_arm, imu_lever_arm",
-        .parameters = {{.name = "forward_m",
-                        .unit = "m",
-                        .typical = 0.8,
-                        .matters = 0.1,
-                        .bounds = {-4.0, 4.0},
-                        .usual = {0.1, 1.5}},
-                       {.name = "left_m",
-                        .unit = "m",
-                        .typical = 0.4,
-                        .matters = 0.1,
-                        .bounds = {-2.0, 2.0},
-                        .usual = {0.1, 0.8},
-                        .mirrored = true}},
+        .parameters = {SpeedSensorLeverArm::info.parameters[0],
+                       SpeedSensorLeverArm::info.parameters[1]},
     };
 
     static constexpr bool reads_yaw_acceleration = true;
