@@ -6,11 +6,13 @@ from typing import Any
 
 import pytest
 
-from sysid_vehicle import Model
+from sysid_vehicle import Model, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import Candidate
 from sysid_vehicle.effects import effect
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.identify import refine
 from sysid_vehicle.rules import USUAL
-from sysid_vehicle.study.steps import _with_others
+from sysid_vehicle.study.steps import _with_others, exchanged, in_common
 
 
 def test_an_effect_that_was_tried_against_the_same_ones_is_not_refitted(
@@ -34,3 +36,26 @@ def test_an_effect_that_was_tried_against_the_same_ones_is_not_refitted(
         replace(drag, fit=beside),
     ):
         assert _with_others(windy, "head_wind", (other,), USUAL) == "refined"
+
+
+def test_two_that_are_confounded_are_tried_against_what_they_have_in_common(
+    start: Model, truth: Model
+) -> None:
+    """All motion read elsewhere, and the speed where it was, are an accelerometer elsewhere."""
+    car = truth.add("imu_lever_arm").with_values({"imu_lever_arm.forward_m": 0.5})
+    train, test = (drive(car, manoeuvres.lap(15.0), seed=s) for s in (71, 72))
+    baseline = identify(start, train, starts=1)
+    ranking = diagnose(baseline, candidates=["imu_lever_arm", "cg_position"], refits=0).ranking
+    two = ("ins_lever_arm", "speed_sensor_lever_arm")
+    both = baseline.model.add(*two).with_values(
+        {"ins_lever_arm.forward_m": 0.5, "speed_sensor_lever_arm.forward_m": -0.5}
+    )
+    fit = refine(both, baseline.driving, baseline.noise)
+    near = in_common(fit, two[:1], ranking)
+    assert {name: {c.id for c in some} for name, some in near.items()} == {
+        name: {"imu_lever_arm", "cg_position"} for name in two
+    }
+    assert in_common(fit, ("mass",), ranking) == {}
+    found = exchanged(fit, near, Driving.of(test), most_effects=4)
+    assert found.model.effects == ("imu_lever_arm",)
+    assert exchanged(fit, {}, Driving.of(test), most_effects=4) is fit

@@ -14,7 +14,14 @@ from ..errors import Interrupted
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import Rules
-from .steps import alternatives, exchanged, first_that_holds, first_together, likeliest
+from .steps import (
+    alternatives,
+    exchanged,
+    first_that_holds,
+    first_together,
+    in_common,
+    likeliest,
+)
 
 __all__ = ["Search", "Trail", "kept"]
 
@@ -154,7 +161,7 @@ class Search:
                 return
             found = exchanged(
                 lean,
-                trail.nearly,
+                {**trail.nearly, **in_common(lean, chosen, dx.ranking)},
                 self.test,
                 most_effects=self.most_effects,
                 rules=self.rules,

@@ -192,6 +192,32 @@ def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
     return tuple(alike[:_ALTERNATIVES])
 
 
+def in_common(
+    fit: Fit, chosen: Sequence[str], ranking: Sequence[Candidate]
+) -> dict[str, tuple[Candidate, ...]]:
+    """Candidates in place of effects of a model that are confounded with each other.
+
+    Two such may together be a third one: all motion read elsewhere and the speed read where it was
+    are an accelerometer elsewhere.
+
+    Parameters
+    ----------
+    fit : Fit
+    chosen : sequence of str
+        What was added last; others were asked when they were.
+    ranking : sequence of Candidate
+        Of what the model lacked before.
+    """
+    found = {}
+    parts = {e.id: e for e in fit.model.parts if e.id not in fit.model.nuisances}
+    for name, part in parts.items():
+        for other in parts.keys() & {*part.confounded_with}:
+            if {name, other} & {*chosen}:
+                some = ({*part.confounded_with} | {*parts[other].confounded_with}) - parts.keys()
+                found[name] = tuple(c for c in ranking if c.id in some)
+    return found
+
+
 def exchanged(
     fit: Fit,
     nearly: Mapping[str, Sequence[Candidate]],
