@@ -1,6 +1,6 @@
 """Does the diagnosis name what is physically in a car of fourteen degrees of freedom?
 
-python benchmarks/twin/diagnosis_truth.py [HIDDEN ...] [--seeds 1] [--keep FILE]
+python benchmarks/twin/diagnosis_truth.py [HIDDEN ...] [--seeds 1] [--first 0] [--keep FILE]
 
 A single track with the workshop's numbers against driving of the built-in sports car: as it is, and
 with drag, downforce, payload or a steering lag that the baseline does not know of. Two sets of
@@ -182,6 +182,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("hidden", nargs="*", metavar="HIDDEN", help=f"of {', '.join(CASES)}")
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="seed")
     parser.add_argument("--keep", type=Path, help="file of what was done")
     args = parser.parse_args()
     warnings.simplefilter("ignore", sv.SysidWarning)
@@ -193,7 +194,7 @@ def main() -> None:
     for effect, where in ALWAYS.items():
         print(f"  {effect:22s} {where}")
     all_done = []
-    for seed in range(args.seeds):
+    for seed in range(args.first, args.first + args.seeds):
         for name in args.hidden or CASES:
             for which in SETS:
                 done = before.get((name, which, seed)) or study(name, which, seed)
