@@ -88,6 +88,19 @@ def magic_formula(slip_rad: npt.ArrayLike, B: float, C: float, D: float, E: floa
     return np.asarray(D * np.sin(C * np.arctan(x - E * (x - np.arctan(x)))), dtype=float)
 
 
+def slip_angles(
+    lf_m: float,
+    lr_m: float,
+    steer_rad: FloatArray,
+    v_x: npt.ArrayLike,
+    v_y: FloatArray,
+    yaw_rate: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Slip angles of the front and the rear axle [rad], as the core has them."""
+    front = steer_rad - np.arctan2(v_y + lf_m * yaw_rate, v_x)
+    return front, -np.arctan2(v_y - lr_m * yaw_rate, v_x)
+
+
 @dataclass(frozen=True)
 class Tyre:
     """Magic-formula tyre of one axle: ``F_y = D F_z sin(C atan(Ba - E (Ba - atan(Ba))))``.

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from .._arrays import FloatArray, as_float64
 from ..estimate import Driving
 from ..identify import Fit
+from ..vehicle import slip_angles
 
 
 @dataclass(frozen=True)
@@ -60,12 +61,13 @@ def coordinates(fit: Fit, driving: Driving, state: FloatArray) -> dict[str, Floa
     pull = (
         driving.channel("fx_n") / car.mass_kg if driving.force_known else driving.channel("ax_mps2")
     )
+    front, rear = slip_angles(car.lf_m, car.lr_m, steer, v, side, r)
     return {
         "vx_mps": v,
         "ay_mps2": v * r,
         "ax_mps2": pull,
-        "slip_front_rad": steer - np.arctan2(side + car.lf_m * r, v),
-        "slip_rear_rad": -np.arctan2(side - car.lr_m * r, v),
+        "slip_front_rad": front,
+        "slip_rear_rad": rear,
         "steer_rad": steer,
         "yaw_rate_radps": r,
         "time_s": running_time(driving),

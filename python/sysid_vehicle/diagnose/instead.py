@@ -25,7 +25,7 @@ from .._arrays import FloatArray, as_float64
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import USUAL, Rules
-from ..vehicle import GRAVITY_MPS2
+from ..vehicle import GRAVITY_MPS2, slip_angles
 from .coordinates import begins, late
 from .directions import Ask, Directions
 from .evidence import FORCES, READINGS, Evidence, Section
@@ -146,10 +146,9 @@ class _Rivals:
         starts = begins(driving)
         first = np.union1d([0], starts[(starts > at.start) & (starts < at.stop)] - at.start)
         v, side, r = state[:, 0], state[:, 1], state[:, 2]
-        slip = {
-            car.lf_m: driving.channel("steer_rad")[at] - np.arctan2(side + car.lf_m * r, v),
-            -car.lr_m: -np.arctan2(side - car.lr_m * r, v),
-        }
+        steer = driving.channel("steer_rad")[at]
+        front, rear = slip_angles(car.lf_m, car.lr_m, steer, v, side, r)
+        slip = {car.lf_m: front, -car.lr_m: rear}
         pull = driving.channel("fx_n") if driving.force_known else driving.channel("ax_mps2")
         a, u = v * r / GRAVITY_MPS2, pull[at] / max(float(np.nanstd(pull)), 1e-9)
         shapes = np.column_stack([a, a**2, u, np.abs(u)])

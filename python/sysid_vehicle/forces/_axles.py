@@ -17,7 +17,7 @@ from .._progress import doing
 from ..errors import InvalidInput
 from ..log import Log, several_logs
 from ..sensors import SensorCheck, check
-from ..vehicle import GRAVITY_MPS2, Vehicle
+from ..vehicle import GRAVITY_MPS2, Vehicle, slip_angles
 from ._motion import Motion, Places, draws, smoothed
 from ._result import AxleForces
 
@@ -154,9 +154,7 @@ def _forces(
     shift = m * ax * car.cg_height_m / length
     weight = m * GRAVITY_MPS2
     return _Forces(
-        as_float64(
-            np.stack([steer - np.arctan2(vy + lf * r, v), -np.arctan2(vy - lr * r, v)], axis=1)
-        ),
+        as_float64(np.stack(slip_angles(lf, lr, steer, v, vy, r), axis=1)),
         as_float64(np.stack([(front - share * push * s) / c, rear], axis=1)),
         as_float64(np.stack([weight * lr / length - shift, weight * lf / length + shift], axis=1)),
         as_float64(push),

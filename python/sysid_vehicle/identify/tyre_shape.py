@@ -75,14 +75,14 @@ COMBINATIONS: dict[str, tuple[Callable[[FloatArray], float], str]] = {
 """Name, function of B, C, D, E, and unit."""
 
 
-def slope_of(function: Callable[[FloatArray], float], bcde: FloatArray) -> FloatArray:
-    """Central differences of a combination; NaN where it does not exist."""
-    out = np.empty(4)
+def slope_of(function: Callable[[FloatArray], float | FloatArray], bcde: FloatArray) -> FloatArray:
+    """Central differences by B, C, D, E along the last axis; NaN where one does not exist."""
+    slopes = []
     for i in range(4):
         step = 1e-5 * max(abs(float(bcde[i])), 0.1)
         high, low = bcde.copy(), bcde.copy()
         high[i] += step
         low[i] -= step
         with np.errstate(invalid="ignore"):
-            out[i] = (function(high) - function(low)) / (2.0 * step)
-    return out
+            slopes.append((function(high) - function(low)) / (2.0 * step))
+    return np.stack(slopes, axis=-1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..identify.estimates import Estimate
 from ..identify.profile import Profile
 from ..identify.quantities import Quantity, parameter, std_of, tyre_quantity
 from ..identify.starts import Starts
-from ..identify.tyre_shape import COMBINATIONS, friction, peak_slip
+from ..identify.tyre_shape import COMBINATIONS, friction, peak_slip, slope_of
 from .tyre_data import GreyBoxVehicle, TyreLog
 
 if TYPE_CHECKING:
@@ -269,13 +270,7 @@ class TyreFit(Printed):
             slip_rad = np.linspace(0.0, max(1.5 * self.driven_rad[i], 0.02), 81)
         names = [e.name for e in self.estimates]
         where = [names.index(f"{letter}_{axle}") for letter in "BCDE"]
-        slopes = np.empty((len(slip_rad), 4))
-        for j in range(4):
-            step = 1e-5 * max(abs(float(bcde[j])), 0.1)
-            high, low = bcde.copy(), bcde.copy()
-            high[j] += step
-            low[j] -= step
-            slopes[:, j] = (friction(slip_rad, high) - friction(slip_rad, low)) / (2.0 * step)
+        slopes = slope_of(partial(friction, slip_rad), bcde)
         variance = np.einsum("nj,jk,nk->n", slopes, self.covariance[np.ix_(where, where)], slopes)
         std = np.sqrt(np.maximum(variance, 0.0))
         return TyreBand(axle, slip_rad, friction(slip_rad, bcde), std, self.driven_rad[i])

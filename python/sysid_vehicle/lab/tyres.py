@@ -18,6 +18,7 @@ from ..identify.profile import profile_all
 from ..identify.search import METHODS, Box
 from ..identify.settle import bottom, descend, settle, settle_finely
 from ..identify.starts import Starts, space_filling
+from ..vehicle import slip_angles
 from .motion import TyreMotion
 from .multistart import multistart
 from .regression_search import descend_regression
@@ -213,11 +214,10 @@ def _driven(
     vehicle: GreyBoxVehicle, logs: Sequence[TyreLog], states: FloatArray
 ) -> tuple[float, float]:
     steer = np.concatenate([log.inputs[:, 1] for log in logs])
-    v_x = np.maximum(states[:, 0], 1.0)
-    front = steer - np.arctan((states[:, 1] + vehicle.lf_m * states[:, 2]) / v_x)
-    rear = -np.arctan((states[:, 1] - vehicle.lr_m * states[:, 2]) / v_x)
-    high = [float(np.percentile(np.abs(a), 99.5)) for a in (front, rear)]
-    return high[0], high[1]
+    v_x, v_y, r = np.maximum(states[:, 0], 1.0), states[:, 1], states[:, 2]
+    slips = slip_angles(vehicle.lf_m, vehicle.lr_m, steer, v_x, v_y, r)
+    front, rear = (float(np.percentile(np.abs(a), 99.5)) for a in slips)
+    return front, rear
 
 
 def _check(logs: tuple[TyreLog, ...], method: str, starts: int) -> None:

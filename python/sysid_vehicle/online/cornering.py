@@ -19,7 +19,7 @@ from .._style import AFTER, MEASURED, axes_or_new, tidy
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..log import Log
-from ..vehicle import Vehicle
+from ..vehicle import Vehicle, slip_angles
 from .sideslip import static_stiffness, yaw_inertia
 
 if TYPE_CHECKING:
@@ -220,10 +220,7 @@ def cornering_stiffness(
         raise InvalidInput(f"window_s: {window_s:g} is not above 0; leave it out to have it chosen")
     rate, vx = log["yaw_rate_radps"], log["vx_mps"]
     vx = np.where(vx > _SLOWEST_MPS, vx, np.nan)
-    slips = (
-        log["steer_rad"] - np.arctan(np.tan(beta) + vehicle.lf_m * rate / vx),
-        -np.arctan(np.tan(beta) - vehicle.lr_m * rate / vx),
-    )
+    slips = slip_angles(vehicle.lf_m, vehicle.lr_m, log["steer_rad"], 1.0, np.tan(beta), rate / vx)
     if window_s is None:
         arms = (vehicle.lf_m, vehicle.lr_m)
         noise = white_noise_std(rate, _BLOCK) / vx
