@@ -160,7 +160,7 @@ def test_starts_agree(fit: Fit, start: Model) -> None:
 
 
 def test_the_same_seed_gives_the_same_answer(start: Model, lap: Log) -> None:
-    short = lap.between(0.0, 15.0)
+    short = lap.between(0.0, 8.0)
     one = identify(start, short, starts=2, seed=3)
     same = identify(start, short, starts=2, seed=3, workers=1)
     assert one.log_likelihood == same.log_likelihood

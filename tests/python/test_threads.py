@@ -31,7 +31,7 @@ def side_by_side(work: Callable[[], object], threads: int = _THREADS) -> list[ob
 
 @pytest.fixture(scope="module")
 def short(truth: Model) -> Log:
-    return drive(truth, drives.lap(15.0), seed=3)
+    return drive(truth, drives.lap(8.0), seed=3)
 
 
 def _identified(start: Model, log: Log, workers: int | None = 2) -> list[float]:
