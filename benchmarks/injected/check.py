@@ -4,11 +4,12 @@
         [--as-logged] [--json JSON]
 
 For each measured drive (`benchmarks/real_driving/cars.py`) half a minute is checked and put right
-until the check finds nothing more, at most three times; then checked once for each injection. A fault of one sensor is
-made of the readings of the others, so these have to be right (`--as-logged`: as they are). Named:
-the fault is found (an offset: it moved by more than it can be wrong). Size: the difference to the
-log without the injection lies in the 95 % interval. Wrong name: a fault is found that was not
-before. Where the check says that the fault cannot be told the case is not testable.
+until the check finds nothing more, at most three times; then checked once for each injection. A
+fault of one sensor is made of the readings of the others, so these have to be right (`--as-logged`:
+as they are). Named: the fault is found (an offset: it moved by more than it can be wrong). Size:
+the difference to the log without the injection lies in the 95 % interval. Wrong name: a fault is
+found that was not before. Where the check says that the fault cannot be told the case is not
+testable.
 """
 
 from __future__ import annotations
