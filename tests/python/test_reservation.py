@@ -26,6 +26,7 @@ from sysid_vehicle.diagnose import Omnibus
 from sysid_vehicle.diagnose.reservation import confirmed, reservation
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import MEASURED, Driving
+from sysid_vehicle.sensors import made_ready
 
 NAMED = ("missing", "one of a group", "open")
 
@@ -103,10 +104,15 @@ def test_a_late_yaw_rate_is_told_and_no_inertia_is_named(
     assert float(told[1]) == pytest.approx(0.1, abs=2.0 * float(told[2]))
     assert float(told[2]) < 0.02
     assert not [v for v in verdicts(dx).all if v.finding in NAMED]
-    found = improve(truth, log, log, starts=1, candidates=few)
+    found = improve(truth, log, log, starts=1, candidates=few, sensors=False)
     assert found.verdict == "unknown"
     assert all(a.stands_in for a in found.added)
     assert "yaw_rate_radps: lags behind" in str(found)
+    # Kinematics tell clocks against that of the yaw rate: what is left of it then is the input's.
+    ready, _, delayed = made_ready([log], [])
+    assert delayed
+    (moved,) = (text for text in ready[0].corrections if text.startswith("ay_mps2: taken"))
+    assert float(moved.split()[2]) == pytest.approx(-100.0, abs=10.0)
 
 
 @pytest.mark.parametrize(("channel", "factor"), [("fx_n", 1e-3), ("steer_rad", 16.0)])
