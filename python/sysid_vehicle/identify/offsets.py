@@ -88,7 +88,8 @@ def _likeliest(alone: Model, driving: Driving, noise: NoiseModel) -> FloatArray:
     within = noise_range(alone.vehicle, driving)
     objective = Objective(driving.problem(alone), free_prior(alone), *within)
     p = box.inside(alone.vector())
-    told = as_float64(np.clip(noise.vector(), *within))
+    told = noise.vector()
+    told = as_float64(np.where(told > 0.0, np.clip(told, *within), 0.0))  # no road where none is
     value = -np.inf
     for _ in range(_ROUNDS):
         told, _ = objective.learn_noise(p, told, rounds=2)
