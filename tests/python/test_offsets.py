@@ -67,6 +67,8 @@ def test_logs_of_the_same_offsets_need_none(start: Model, lap: Log) -> None:
     assert not alone.driving.offsets
     assert alone.offsets == {lap.name: {n: alone.model.value(n) for n in (STEER, GYRO)}}
     assert replace(alone, model=start).offsets == {lap.name: {}}
+    twice = Driving((lap, lap), True, ({STEER: 0.1}, {}))
+    assert [*replace(alone, driving=twice).offsets] == [f"{lap.name} (1)", f"{lap.name} (2)"]
 
 
 def test_other_logs_have_their_own_too(found: Fit, several: tuple[Log, ...]) -> None:
@@ -151,20 +153,33 @@ def test_a_shifted_problem_is_that_of_shifted_parameters(
 
 
 def test_standard_errors_count_the_offsets_as_unknown(found: Fit) -> None:
-    """Marginal information is what offsets leave of the information given them."""
+    """Marginal information is that of the joint fit of shared parameters and each log's own."""
     model, driving, noise = found.model, found.driving, found.noise
     p, names = model.vector(), model.free_names
-    told = marginal_information(model, driving, p, noise)
     columns = [model.parameters[n].column for n in names]
-    problem = driving.problem(model)
-    given = problem.normal_equations(p, problem.freeze(p, noise.vector()), columns)[2]
-    shared = [i for i, n in enumerate(names) if n not in (STEER, GYRO)]
-    lost = (given - told)[np.ix_(shared, shared)]
-    scale = np.sqrt(np.diag(given)[shared])
-    assert np.linalg.eigvalsh(lost / np.outer(scale, scale))[0] > -1e-9
-    assert np.trace(lost / np.outer(scale, scale)) > 1e-6
-    # Each half of a log tells its own offset: the mean is known like that of two.
-    assert found[STEER].std == pytest.approx(told[names.index(STEER)].max() ** -0.5, rel=1.0)
+    own = [names.index(n) for n in (STEER, GYRO)]
+    shared = [i for i in range(len(names)) if i not in own]
+    n, m = len(shared), len(own)
+    joint, mean = np.zeros((n + 2 * m, n + 2 * m)), np.zeros((n + m, n + 2 * m))
+    mean[:n, :n] = np.eye(n)
+    for i, log in enumerate(driving.each_log()):
+        problem = log.problem(model)
+        told = problem.normal_equations(p, problem.freeze(p, noise.vector()), columns)[2]
+        told[own, own] += [model.priors[name][1] ** -2.0 for name in (STEER, GYRO)]
+        at = [*range(n), *range(n + m * i, n + m * (i + 1))]
+        joint[np.ix_(at, at)] += told[np.ix_([*shared, *own], [*shared, *own])]
+        mean[n:, n + m * i : n + m * (i + 1)] = 0.5 * np.eye(m)
+    # What the driving does not tell of the tyres has no inverse without some more knowledge.
+    more = np.diag(1e-2 * np.diag(joint)[:n])
+    joint[:n, :n] += more
+    marginal = marginal_information(model, driving, p, noise)[
+        np.ix_([*shared, *own], [*shared, *own])
+    ]
+    marginal[:n, :n] += more
+    expected = mean @ np.linalg.inv(joint) @ mean.T
+    scale = np.sqrt(np.diag(expected))
+    got = np.linalg.inv(marginal) / np.outer(scale, scale)
+    np.testing.assert_allclose(got, expected / np.outer(scale, scale), atol=1e-6)
 
 
 def test_what_logs_differ_by_is_projected_out(found: Fit) -> None:

@@ -94,13 +94,21 @@ class Fit:
 
     @property
     def offsets(self) -> dict[str, dict[str, float]]:
-        """Nuisances of the model in each log, by the log's name; of one log, its values."""
+        """Nuisances of the model in each log, by the log's name; of one log, its values.
+
+        Logs of one name are numbered: `lap (1)`, `lap (2)`.
+        """
         logs = self.driving.logs
+        names = [log.name for log in logs]
+        labels = [
+            name if names.count(name) == 1 else f"{name} ({names[: i + 1].count(name)})"
+            for i, name in enumerate(names)
+        ]
         at = {n: self.model.value(n) for n in self.model.nuisance_names}
         own = self.driving.offsets or ({},) * len(logs)
         return {
-            log.name: {n: value + apart.get(n, 0.0) for n, value in at.items()}
-            for log, apart in zip(logs, own, strict=True)
+            label: {n: value + apart.get(n, 0.0) for n, value in at.items()}
+            for label, apart in zip(labels, own, strict=True)
         }
 
     @property

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, filled
 from ..diagnose import Diagnosis
 from ..diagnose.clocks import CLOCKS
 from ..diagnose.delay import delayed, pieces_of
@@ -92,7 +92,4 @@ def _log_shifted(log: Log, late: dict[str, float]) -> Log:
 
 def _later(values: FloatArray, rate_hz: float, by_s: float) -> FloatArray:
     """A channel that comes later; where it was not recorded it stays so."""
-    known = np.isfinite(values)
-    rows = np.arange(len(values))
-    whole = np.interp(rows, rows[known], values[known])
-    return np.where(known, delayed(whole, rate_hz, by_s), np.nan)
+    return np.where(np.isfinite(values), delayed(filled(values), rate_hz, by_s), np.nan)

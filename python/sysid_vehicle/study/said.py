@@ -31,7 +31,9 @@ def ahead(study: Study) -> str:
             both = (first, last) if len(study.fits) > 1 else (last,)
             figures = " -> ".join(number(x, 2) if np.isfinite(x) else "lost" for x in both)
             told.append(f"{_WORDS[c]} {figures} {UNITS[c]}")
-    return f"Median error {AHEAD_S:g} s ahead on validation data: {', '.join(told)}." * bool(told)
+    if not told:
+        return ""
+    return f"Median error {AHEAD_S:g} s ahead on validation data: {', '.join(told)}."
 
 
 def small(study: Study) -> bool:
