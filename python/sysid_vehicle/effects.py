@@ -74,6 +74,13 @@ class Parameter:
         """Whether the null value lies on a bound, so that only one sign is possible."""
         return self.null_value in (self.lower, self.upper)
 
+    def another_dynamics(self, value: float) -> bool:
+        """Whether at a value the car does not move as at the typical one: a lag that hardly lags.
+
+        What is linear there leads to no size of that kind.
+        """
+        return self.one_sided and not 0.5 * self.typical <= value <= 2.0 * self.typical
+
     def grid(self, duration_s: float) -> FloatArray:
         """Values at which a scanned parameter is tried in a log of this duration."""
         if self.scan == "time":

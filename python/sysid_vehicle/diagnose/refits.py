@@ -69,8 +69,7 @@ def _starts(c: Candidate) -> list[dict[str, float]]:
         predicted[f"{c.id}.{p.name}"] = float(np.clip(value, p.lower, p.upper))
     starts = [predicted]
     first = c.effect.parameters[0]
-    near = 0.5 * first.typical <= predicted[f"{c.id}.{first.name}"] <= 2.0 * first.typical
-    if len(c.effect.parameters) == 1 and first.one_sided and not near:
-        # Far from its null value the dynamics of such an effect are not those of the score.
+    found = predicted[f"{c.id}.{first.name}"]
+    if len(c.effect.parameters) == 1 and first.another_dynamics(found):
         starts.append({f"{c.id}.{first.name}": first.typical})
     return starts

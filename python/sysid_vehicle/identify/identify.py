@@ -24,7 +24,7 @@ from .offsets import centred, marginal_information
 from .profile import profile_all
 from .search import METHODS, Box, minimise
 from .settle import moved, rivalled, settle, settle_finely, to_the_top
-from .starts import Runner, Starts, space_filling
+from .starts import Runner, Starts, apart, at_typical_sizes, space_filling
 from .suspects import explaining
 
 __all__ = [
@@ -40,8 +40,6 @@ __all__ = [
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts
-_FOLLOWED = 2  # ends of searches that are followed with noise of their own
-_SAME = 1e-2  # of the box: ends no farther apart lie in one valley
 _OFFSETS = 2  # times that offsets of logs and what they share are found in turn
 _BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 
@@ -148,11 +146,18 @@ def identify(
     )
     # Which end is the best is told by the noise as it then is, not by that of the start.
     objective, few = _objectives(model, driving)
-    first, *others = _apart(ends, values, box)
+    first, *others = apart(ends, values, box)
     best = settle(objective, first, noise.vector(), box, thin=few)
+    thinned = few if few.samples < objective.samples else None
     for end in others:
-        best = rivalled(objective, best, end, box, few if few.samples < objective.samples else None)
-    fit = _on_its_road(_top(model, driving, objective, best, table))
+        best = rivalled(objective, best, end, box, thinned)
+    fit = _top(model, driving, objective, best, table)
+    best = at_top = fit.model.vector(), fit.noise.vector(), fit.converged
+    for elsewhere in at_typical_sizes(model, at_top[0]):
+        best = rivalled(objective, best, elsewhere, box, thinned)
+    if best is not at_top:
+        fit = _top(model, driving, objective, best, table)
+    fit = _on_its_road(fit)
     if fit.model.nuisances and len(driving.logs) > 1:
         fit = _log_by_log(fit)
     if intervals == "profile":
@@ -166,21 +171,6 @@ def _log_by_log(fit: Fit) -> Fit:
         model, driving = centred(fit)
         fit = replace(refine(model, driving, fit.noise), starts=fit.starts)
     return fit
-
-
-def _apart(ends: FloatArray, values: FloatArray, box: Box) -> list[FloatArray]:
-    """The best few ends of searches, each in a valley of its own."""
-    found: list[FloatArray] = []
-    for i in np.argsort(-values, kind="stable"):
-        x = ends[i][box.columns]
-        near = _SAME * (box.upper - box.lower)
-        if np.isfinite(values[i]) and not any(
-            np.all(np.abs(x - other[box.columns]) < near) for other in found
-        ):
-            found.append(ends[i])
-        if len(found) == _FOLLOWED:
-            break
-    return found
 
 
 def _told(

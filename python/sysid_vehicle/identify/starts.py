@@ -15,17 +15,29 @@ from .._progress import with_progress
 from .._style import AFTER, BEFORE, axes_or_new, tidy
 from .._threads import Workers
 from ..errors import NumericalError
+from ..model import Model
 from .search import Box
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["SAME_OPTIMUM", "Runner", "Search", "Start", "Starts", "space_filling"]
+__all__ = [
+    "SAME_OPTIMUM",
+    "Runner",
+    "Search",
+    "Start",
+    "Starts",
+    "apart",
+    "at_typical_sizes",
+    "space_filling",
+]
 
 SAME_OPTIMUM = 1.0
 """Ends whose log-likelihood differs by less than this [nats] are the same optimum."""
 
 _SAME_POINT = 1e-4  # of the box's width
+_FOLLOWED = 2  # ends of searches that are followed with noise of their own
+_SAME = 1e-2  # of the box: ends no farther apart lie in one valley
 
 Search = Callable[[FloatArray], tuple[FloatArray, float]]
 """From all parameters at a start to those at its end, and the log-likelihood there."""
@@ -179,3 +191,34 @@ def _guarded(search: Search, p: FloatArray) -> tuple[FloatArray, float]:
     except (NumericalError, np.linalg.LinAlgError):
         return p, -np.inf
     return end, value if np.isfinite(value) else -np.inf
+
+
+def apart(ends: FloatArray, values: FloatArray, box: Box) -> list[FloatArray]:
+    """The best few ends of searches, each in a valley of its own."""
+    found: list[FloatArray] = []
+    for i in np.argsort(-values, kind="stable"):
+        x = ends[i][box.columns]
+        near = _SAME * (box.upper - box.lower)
+        if np.isfinite(values[i]) and not any(
+            np.all(np.abs(x - other[box.columns]) < near) for other in found
+        ):
+            found.append(ends[i])
+        if len(found) == _FOLLOWED:
+            break
+    return found
+
+
+def at_typical_sizes(model: Model, p: FloatArray) -> Iterator[FloatArray]:
+    """Parameters with one effect at its typical size, for each that is far from it.
+
+    A lag that hardly lags has dynamics of its own, and noise is learned to suit them: from there
+    no search leads back.
+    """
+    for e in model.parts:
+        lead = e.parameters[0]
+        if e.id in model.nuisances or f"{e.id}.{lead.name}" not in model.free_names:
+            continue
+        if lead.another_dynamics(float(p[lead.column])):
+            other = p.copy()
+            other[lead.column] = lead.typical
+            yield other
