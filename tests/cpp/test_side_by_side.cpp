@@ -67,6 +67,44 @@ INSTANTIATE_TEST_SUITE_P(All, SideBySide, testing::ValuesIn(all_lane_kernels()),
                              return name;
                          });
 
+TEST_P(SideBySide, PredictionsAreThoseFromOneSampleAfterTheOther) {
+    const Parameters p = typical_parameters();
+    const std::vector<Horizon> horizons{{9, 3}, {25, 4}, {2, 1}};
+    for (const EffectMask effects : {EffectMask{0}, kLagging}) {
+        const Problem problem = long_run(effects);
+        const sysid::Run& run = problem.runs[0];
+        const Trace known = trace(problem, p.data(), ordinary_noise(), false);
+        std::vector<double> errors(horizons.size() * run.size() * kChannels);
+        look_ahead(problem, p.data(), ordinary_noise(), horizons, errors.data());
+        const double* error = errors.data();
+        for (const Horizon& h : horizons)
+            for (std::size_t end = 0; end < run.size(); ++end, error += kChannels) {
+                const std::size_t begin = end - h.ahead;
+                if (end < h.ahead || begin % h.every != 0) {
+                    EXPECT_TRUE(std::isnan(error[kVx])) << end;
+                    continue;
+                }
+                ModelState<double> x = initial_state(problem.model, run, p.data());
+                const double* state = known.state.data() + begin * kStatesFull;
+                std::copy_n(state, kMotionStates, x.begin());
+                for (const std::size_t i : active_states(effects))
+                    x[kMotionStates + i] = state[kStatesPlain + i];
+                const std::array<double, kExternals> calm{};
+                for (std::size_t k = begin; k < end; ++k)
+                    advance(problem.model, x, calm.data(), run.inputs[k], run.inputs[k + 1],
+                            p.data(), run.dt, substeps_for(problem.model, p.data(), x[0], run.dt));
+                const auto y = sense(problem.model, x, calm.data(), run.inputs[end], p.data());
+                for (std::size_t c = 0; c < kChannels; ++c) {
+                    const double e = run.measurements[end][static_cast<int>(c)] - y[c];
+                    EXPECT_EQ(std::isnan(error[c]), std::isnan(e)) << end;
+                    if (!std::isnan(e)) {
+                        EXPECT_NEAR(error[c], e, 1e-9) << end;
+                    }
+                }
+            }
+    }
+}
+
 TEST_P(SideBySide, FiltersAreThoseOfWholeRuns) {
     bool cut = false;
     for (const EffectMask effects : {EffectMask{0}, kLagging})

@@ -109,6 +109,23 @@ def test_noise_is_not_tried_where_its_score_promises_nothing() -> None:
     )
     assert found == pytest.approx(best, rel=1e-2)
     assert value > at_best - 1e-3
+    # Of the last step the likelihood alone is asked.
+    for rounds in (1, 2, 9):
+        problem.asked, told = 0, []
+
+        def alone(noise: np.ndarray, told: list[float] = told) -> float:
+            told.append(problem.noise_score(best, noise)[0])
+            return told[-1]
+
+        start, within = np.array([0.3, 0.5]), (low, high)
+        found, value = maximise_noise(
+            problem, best, start, *within, rounds=rounds, likelihood=alone
+        )
+        asked, problem.asked = problem.asked, 0
+        expected = maximise_noise(problem, best, start, *within, rounds=rounds)
+        assert np.array_equal(found, expected[0])
+        assert (value, asked) == (expected[1], problem.asked)
+        assert told or rounds == 9
 
 
 def test_twice_the_sensor_noise_is_learned(truth: Model) -> None:

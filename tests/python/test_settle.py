@@ -107,14 +107,14 @@ def test_an_end_that_lacks_too_much_on_few_samples_is_not_followed_on_all() -> N
         for _ in range(2)
     )
     low, high = (np.array([-1.0]), noise, True), (np.array([1.0]), noise, True)
-    reached = rivalled(every, low, np.array([0.8]), box, few)
+    reached = rivalled(every, low, np.array([0.8]), box, [few])
     assert reached[0] == pytest.approx(1.0, abs=0.01)
     refused = replace(every, problem=Refusing())  # type: ignore[arg-type]
-    assert rivalled(refused, high, np.array([-0.8]), box, few) is high
+    assert rivalled(refused, high, np.array([-0.8]), box, [few]) is high
     with pytest.raises(AssertionError, match="asked"):
-        rivalled(refused, low, np.array([0.8]), box, few)
+        rivalled(refused, low, np.array([0.8]), box, [few])
     # Few samples lead both to one end: there is nothing to follow.
-    assert rivalled(refused, low, np.array([-0.8]), box, few) is low
+    assert rivalled(refused, low, np.array([-0.8]), box, [few]) is low
 
 
 def test_few_samples_lead_unless_the_start_is_better_already() -> None:
@@ -144,12 +144,21 @@ def test_few_samples_lead_unless_the_start_is_better_already() -> None:
             Objective(one, (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
             for one in (problem, thin or problem)
         )
-        return settle(every, np.array([start]), noise, box, thin=few)[0]
+        return settle(every, np.array([start]), noise, box, thin=[few])[0]
 
+    alone, led, between = Whole(), Whole(), Whole()
+    levels = [
+        Objective(one, (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
+        for one in (Valleys(), between, led)
+    ]
+    found, _, _ = settle(levels[-1], np.array([0.1]), noise, box, thin=levels[:-1])
+    assert found == pytest.approx(1.0, abs=1e-3)
+    assert settle(levels[0], np.array([0.1]), noise, box)[0] == pytest.approx(1.0, abs=1e-3)
+    steps = led.asked, between.asked
     alone, led = Whole(), Whole()
     assert end(alone, 0.1, None) == pytest.approx(1.0, abs=1e-3)
     assert end(led, 0.1, Valleys()) == pytest.approx(1.0, abs=1e-3)
-    assert led.asked < alone.asked
+    assert steps == (led.asked, led.asked) < (alone.asked, alone.asked)
     elsewhere = Valleys()
     elsewhere.middle = 1.5
     assert end(elsewhere, 1.0, None) ** 2 == pytest.approx(1.5, abs=1e-3)

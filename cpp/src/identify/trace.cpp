@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <stdexcept>
 
 #include "sysid/estimate/smoother.hpp"
 #include "sysid/identify/in_time.hpp"
@@ -55,51 +54,6 @@ void trace_run(const Problem& problem, const Run& run, const double* p, const No
     for (const auto& s : smooth(steps)) store_state<NX>(system, out, s.mean, s.covariance);
 }
 
-template <int NX>
-void look_ahead_run(const Problem& problem, const Run& run, const double* p, const Noise& noise,
-                    const std::vector<Horizon>& horizons, std::size_t apart, double* errors,
-                    bool readings) {
-    const RunSystem<NX> system(problem.model, run, p, noise);
-    std::vector<Vec<NX>> means(run.size());
-    filter_run<NX>(system,
-                   [&](std::size_t k, const FilterStep<NX, kChannels>& s) { means[k] = s.mean; });
-    // Forces are not foreseen; the slope of the road fades from where it is known.
-    std::array<double, kExternals> external{};
-    static_assert(kGravityX == kMotionStates && kExternals == kDisturbances);
-    std::vector<std::size_t> asked;  // horizons of one start, the nearest first
-    for (std::size_t k = 0; k < run.size(); ++k) {
-        asked.clear();
-        for (std::size_t h = 0; h < horizons.size(); ++h)
-            if (k % horizons[h].every == 0 && horizons[h].ahead < run.size() - k)
-                asked.push_back(h);
-        if (asked.empty()) continue;
-        std::sort(asked.begin(), asked.end(), [&](std::size_t a, std::size_t b) {
-            return horizons[a].ahead < horizons[b].ahead;
-        });
-        poll_interrupt();
-        ModelState<double> x = system.start();
-        for (int i = 0; i < kMotionStates; ++i) x[static_cast<std::size_t>(i)] = means[k][i];
-        for (std::size_t i = 0; i < system.own().count; ++i)
-            x[system.place(i)] = means[k][system.packed(i)];
-        for (std::size_t i = kMotionStates; i < system.disturbances(); ++i)
-            external[i] = means[k][system.disturbing(i)];
-        std::size_t n = k;
-        for (const std::size_t h : asked) {
-            for (; n < k + horizons[h].ahead; ++n) {
-                const int substeps = substeps_for(problem.model, p, x[0], run.dt);
-                advance(problem.model, x, external.data(), run.inputs[n], run.inputs[n + 1], p,
-                        run.dt, substeps);
-                for (std::size_t i = kMotionStates; i < system.disturbances(); ++i)
-                    external[i] *= system.forget(i);
-            }
-            const auto y = sense(problem.model, x, external.data(), run.inputs[n], p);
-            double* const to = errors + (h * apart + n) * kChannels;
-            for (std::size_t i = 0; i < kChannels; ++i)
-                to[i] = readings ? y[i] : run.measurements[n][static_cast<int>(i)] - y[i];
-        }
-    }
-}
-
 }  // namespace
 
 Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smoothed) {
@@ -111,24 +65,6 @@ Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smo
             trace_run<decltype(nx)::value>(problem, run, p, noise, smoothed, out);
     });
     return out;
-}
-
-void look_ahead(const Problem& logged, const double* p, const Noise& noise,
-                const std::vector<Horizon>& horizons, double* errors, bool readings) {
-    const InTime in_time(logged, p);
-    const Problem& problem = *in_time;
-    for (const Horizon& h : horizons)
-        if (h.every == 0) throw std::invalid_argument("every = 0: give one or more");
-    std::size_t samples = 0;
-    for (const Run& run : problem.runs) samples += run.size();
-    std::fill(errors, errors + horizons.size() * samples * kChannels, std::nan(""));
-    with_state_size(problem.model.effects, noise, [&](auto nx) {
-        for (const Run& run : problem.runs) {
-            look_ahead_run<decltype(nx)::value>(problem, run, p, noise, horizons, samples, errors,
-                                                readings);
-            errors += run.size() * kChannels;
-        }
-    });
 }
 
 void free_run(const Problem& logged, const double* p, double* readings) {

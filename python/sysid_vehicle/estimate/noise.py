@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -221,6 +221,7 @@ def maximise_noise(
     *,
     rounds: int,
     enough: float = 0.01,
+    likelihood: Callable[[FloatArray], float] | None = None,
 ) -> tuple[FloatArray, float]:
     """Noise of maximum likelihood at fixed parameters of any model.
 
@@ -238,6 +239,9 @@ def maximise_noise(
         Most steps.
     enough : float
         What a step has to promise [nats].
+    likelihood : callable, optional
+        The log-likelihood alone, from noise, where that costs less than its score: after the last
+        step nobody asks for more.
 
     Notes
     -----
@@ -257,7 +261,7 @@ def maximise_noise(
 
     value, gradient, information = problem.noise_score(p, noise_of(eta))
     reach = _FAR
-    for _ in range(rounds):
+    for left in reversed(range(rounds)):
         check_time()
         promised = _step(gradient, information, low - eta, high - eta, there_is)[1]
         if promised < enough:
@@ -267,7 +271,10 @@ def maximise_noise(
             step, _ = _step(gradient, information, low - eta, high - eta, there_is, reach)
             trial = np.clip(eta + step, low, high)
             try:
-                there = problem.noise_score(p, noise_of(trial))
+                if likelihood is not None and left == 0:
+                    there = (likelihood(noise_of(trial)), gradient, information)
+                else:
+                    there = problem.noise_score(p, noise_of(trial))
             except NumericalError:
                 there = (-np.inf, gradient, information)
             if there[0] > value:

@@ -40,6 +40,7 @@ __all__ = [
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts
+_FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
 _OFFSETS = 2  # times that offsets of logs and what they share are found in turn
 _BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 
@@ -145,10 +146,9 @@ def identify(
         names, as_float64(begins[:, box.columns]), as_float64(ends[:, box.columns]), values
     )
     # Which end is the best is told by the noise as it then is, not by that of the start.
-    objective, few = _objectives(model, driving)
+    objective, thinned = _objectives(model, driving)
     first, *others = apart(ends, values, box)
-    best = settle(objective, first, noise.vector(), box, thin=few)
-    thinned = few if few.samples < objective.samples else None
+    best = settle(objective, first, noise.vector(), box, thin=thinned)
     for end in others:
         best = rivalled(objective, best, end, box, thinned)
     fit = _top(model, driving, objective, best, table)
@@ -281,21 +281,24 @@ def _polish(
     inputs: FloatArray | None = None,
 ) -> Fit:
     """Noise and parameters of maximum likelihood, from values that are already near."""
-    objective, few = _objectives(model, driving, inputs)
-    found = settle(objective, p, noise.vector(), free_box(model), thin=few)
+    objective, thinned = _objectives(model, driving, inputs)
+    found = settle(objective, p, noise.vector(), free_box(model), thin=thinned)
     return _top(model, driving, objective, found, starts)
 
 
 def _objectives(
     model: Model, driving: Driving, inputs: FloatArray | None = None
-) -> tuple[Objective, Objective]:
-    """The likelihood, and that of fewer samples.
+) -> tuple[Objective, list[Objective]]:
+    """The likelihood, and those of fewer samples, the fewest first.
 
     Noise needs fewer samples than parameters do; the last word has all of them.
     """
     objective = objective_of(model, driving.problem(model, other_inputs=inputs), driving)
-    few = driving.problem(model, most_samples=_THINNED, other_inputs=inputs)
-    return objective, replace(objective, problem=few)
+    every = objective.samples
+    levels = max(round(np.log(every / _THINNED) / np.log(_FINER)), 1)
+    thinned = [round(_THINNED * (every / _THINNED) ** (n / levels)) for n in range(levels)]
+    few = [driving.problem(model, most_samples=n, other_inputs=inputs) for n in thinned]
+    return objective, [replace(objective, problem=f) for f in few if f.samples < every]
 
 
 def _top(

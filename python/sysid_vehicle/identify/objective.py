@@ -236,8 +236,16 @@ class Objective(Penalised):
         self, p: FloatArray, noise: FloatArray, *, rounds: int = 12, enough: float = 0.01
     ) -> tuple[FloatArray, float]:
         """Noise of maximum likelihood at fixed parameters, and the log-likelihood of the data."""
-        within = (self.lowest, self.highest)
-        return maximise_noise(self.problem, p, noise, *within, rounds=rounds, enough=enough)
+        return maximise_noise(
+            self.problem,
+            p,
+            noise,
+            self.lowest,
+            self.highest,
+            rounds=rounds,
+            enough=enough,
+            likelihood=lambda v: float(self.freeze(p, v).log_likelihood),
+        )
 
     def noise_promises(self, p: FloatArray, noise: FloatArray) -> float:
         """What a step of the noise promises to gain at fixed parameters [nats]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -111,7 +111,7 @@ def settle(
     noise: FloatArray,
     box: Box,
     *,
-    thin: Objective | None = None,
+    thin: Sequence[Objective] = (),
     method: str = "gauss-newton",
     parameters_first: bool = False,
     rounds: int = 10,
@@ -126,8 +126,8 @@ def settle(
     p : array, shape (parameters,)
     noise : array, shape (noises,)
     box : Box
-    thin : Objective, optional
-        The same on fewer samples, which lead most of the way.
+    thin : sequence of Objective
+        The same on fewer samples, the fewest first, which lead most of the way.
     method : str
         Local optimiser.
     parameters_first : bool
@@ -146,9 +146,11 @@ def settle(
     if parameters_first:
         p, _ = descend(objective, p, noise, box, method=method)
     steps = 6
-    if thin is not None and thin.samples < objective.samples:
+    if thin:
         # Few samples lead most of the way, unless where it begins is better already.
-        near, told, _ = settle(thin, p, noise, box, method=method, rounds=rounds)
+        near, told, _ = settle(
+            thin[-1], p, noise, box, thin=thin[:-1], method=method, rounds=rounds
+        )
         if objective.log_likelihood(near, told) > objective.log_likelihood(p, noise):
             p, noise, steps = near, told, 3
     best = -np.inf
@@ -188,7 +190,7 @@ def rivalled(
     best: tuple[FloatArray, FloatArray, bool],
     p: FloatArray,
     box: Box,
-    few: Objective | None = None,
+    thin: Sequence[Objective] = (),
 ) -> tuple[FloatArray, FloatArray, bool]:
     """What `settle` found, or what it finds from other parameters, where that is likelier.
 
@@ -203,18 +205,22 @@ def rivalled(
         Parameters, noise, and whether the search came to a stand.
     p : array, shape (parameters,)
     box : Box
-    few : Objective, optional
-        The same on fewer samples: what lacks too much there is not followed on all.
+    thin : sequence of Objective
+        The same on fewer samples, the fewest first: what lacks too much on these is not followed
+        on more.
     """
     found, noise, converged = best
     try:
-        if few is not None:
+        if thin:
+            few = thin[0]
             near, gains = moved(few, found, noise, box)
             p, there = moved(few, p, noise, box)
             if np.all(np.abs(near - p)[box.columns] < _SAME * (box.upper - box.lower)):
                 return best
             if _hopeless(few, gains.log_likelihood - few.prior_cost(near), p, there, noise)[0]:
                 return best
+        for some in thin[1:]:
+            p, _ = moved(some, p, noise, box)
         value = objective.log_likelihood(found, noise)
         p, gains = moved(objective, p, noise, box)
         hopeless, more = _hopeless(objective, value, p, gains, noise)
