@@ -1,6 +1,7 @@
 """What the search for missing effects makes of driving that others measured.
 
     python benchmarks/real_driving/improve.py DATA [SET ...] [--fetched FOLDER] [--report FOLDER]
+        [--beside EFFECT ...]
 
 DATA is the folder that holds the data sets, FOLDER the logs of two cars that carry no licence; none
 is part of this project. Checks the sensors, puts the logs right, and prints what was found, the
@@ -35,6 +36,7 @@ def one(name: str, args: argparse.Namespace) -> dict[str, object]:
     print(f"  sensors: {faults or 'no fault'} ({time.perf_counter() - began:.0f} s)", flush=True)
     motion = motion_logs(check, validation)
     model = sv.Model(car) if args.no_nuisances else sv.Model(car).with_nuisances()
+    model = model.add(*args.beside)
     study = sv.improve(
         model,
         train,
@@ -76,6 +78,7 @@ def main() -> None:
     parser.add_argument("--fetched", type=Path, metavar="FOLDER", help="logs without a licence")
     parser.add_argument("--raw", action="store_true", help="do not put the sensors right")
     parser.add_argument("--no-nuisances", action="store_true", help="without offsets of the logs")
+    parser.add_argument("--beside", nargs="+", default=(), metavar="EFFECT", help="in the baseline")
     parser.add_argument("--time-limit", type=float, metavar="SECONDS", help="of each search")
     parser.add_argument("--save", type=Path, metavar="FOLDER", help="where studies go")
     parser.add_argument("--report", type=Path, metavar="FOLDER", help="where reports go")
