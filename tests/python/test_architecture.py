@@ -15,7 +15,7 @@ MAX_LINES = 400
 PYTHON_LAYERS = [
     {"errors", "_arguments", "_arrays", "_core", "_files", "_printed", "_replace", "_style"}
     | {"_progress", "_tables", "_text", "_threads", "vehicle", "effects", "model", "formula"}
-    | {"rules", "saved", "user_effects", "plugins", "_formula_slope", "_user_checks"},
+    | {"_memo", "rules", "saved", "user_effects", "plugins", "_formula_slope", "_user_checks"},
     {"log"},
     {"read"},
     {"manoeuvres"},

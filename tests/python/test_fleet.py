@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
+from sysid_vehicle import _memo
 from sysid_vehicle.cli import main
 from sysid_vehicle.fleet import Cause, Effect, Row, manifest_jobs
 from sysid_vehicle.fleet.improve_many import run
@@ -192,6 +193,9 @@ def test_logs_in_memory_and_a_car_for_each(garage: Path, tmp_path: Path) -> None
     ]  # fmt: skip
     assert found.rows[0].validation_s == pytest.approx(10.0, abs=0.2)
     assert found.rows[1].validation_s == pytest.approx(3.0, abs=0.2)
+    # A worker that does many studies holds none of their logs.
+    assert _memo._memories
+    assert not any(memory.cache_info().currsize for memory in _memo._memories)
 
 
 def effect(name: str, before: float, after: float, grade: str = "confirmed") -> Effect:

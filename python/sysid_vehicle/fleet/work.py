@@ -7,13 +7,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from .._memo import forget
 from .._threads import at_most
 from ..errors import SysidError
 from ..log import Log
 from ..read import read_log
 from ..saved import packed
 from ..study import AddedEffect, Study, horizons, improve
-from ..study.horizons import block_errors
 from ..user_effects import load_effects
 from .jobs import Job
 from .results import AHEAD_S, Effect, Row
@@ -46,7 +46,7 @@ def do(job: Job) -> Outcome:
     except Exception as error:  # one study that fails, however it does, leaves the others alone
         return failed(job, f"{type(error).__name__}: {error}", time.perf_counter() - began)
     finally:
-        block_errors.cache_clear()  # the next study is of another log
+        forget()  # the next study is of another log
 
 
 def failed(job: Job, because: str, seconds: float = 0.0) -> Outcome:

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import scipy
 
 from .._arrays import FloatArray, as_float64
+from .._memo import remembered
 from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving, NoiseModel, noise_range
 from ..log import Log
@@ -55,7 +55,7 @@ def driving_of(fit: Fit, logs: Log | Sequence[Log] | Driving) -> Driving:
 
 
 # Several measures ask for the same fit on the same validation data.
-@lru_cache(maxsize=64)
+@remembered(64)
 def _settled(fit: Fit, driving: Driving) -> Driving:
     try:
         own = [_best(fit, log) for log in driving.each_log()]

@@ -13,12 +13,12 @@ Association 1986). Where the fitted driving determines every parameter, p is p^.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
+from .._memo import remembered
 from ..estimate import Driving, NoiseModel
 from ..estimate.pieces import DrivingProblem
 from ..model import Model
@@ -147,7 +147,7 @@ def predict(fit: Fit, driving: Driving, noise: NoiseModel) -> Prediction:
 
 
 # A fit is asked under the noise of either of two models.
-@lru_cache(maxsize=8)
+@remembered(8)
 def _remembered(fit: Fit) -> _Remembered:
     """What the fitted driving told; of what it did not show, what the parameters' bounds tell."""
     box = free_box(fit.model)

@@ -8,11 +8,11 @@ load, tyres, road, how a sensor was set up) is a part of what is missing.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from .._memo import remembered
 from .._text import with_error
 from ..errors import NumericalError
 from ..estimate import Driving
@@ -57,7 +57,7 @@ class Disagreement:
         }
 
 
-@lru_cache(maxsize=8)
+@remembered(8)
 def disagreements(fit: Fit, test: Driving, rules: Rules = USUAL) -> tuple[Disagreement, ...]:
     """Find what validation data by themselves tell differently, the surest first.
 

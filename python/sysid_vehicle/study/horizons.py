@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 from warnings import catch_warnings, simplefilter
 
@@ -17,6 +16,7 @@ import numpy.typing as npt
 
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
+from .._memo import remembered
 from .._text import html_table, number, text_table
 from ..diagnose import blocks
 from ..errors import NumericalError
@@ -256,7 +256,7 @@ def _share(squares: FloatArray) -> float:
 
 
 # The poorer model of all candidates of a step is the same one.
-@lru_cache(maxsize=64)
+@remembered(64)
 def block_errors(
     fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: tuple[float, ...]
 ) -> FloatArray:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
+from .._memo import remembered
 from .._threads import in_parallel
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
@@ -96,7 +96,7 @@ def as_sure(poorer: Fit, richer: Fit, test: Driving) -> bool:
 
 
 # The poorer model of all candidates of a step is the same one.
-@lru_cache(maxsize=8)
+@remembered(8)
 def _prediction(fit: Fit, test: Driving, like: Fit) -> Prediction:
     """Of validation data by a fit, with another's noise."""
     return predict(fit, test, like.noise.elsewhere(fit.model.vehicle))
@@ -173,7 +173,7 @@ def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
 
 
 # One object for each fit: errors ahead are remembered by it.
-@lru_cache(maxsize=16)
+@remembered(16)
 def at_its_best(fit: Fit, test: Driving) -> Fit:
     """The fit, or the same model with the parameters that predict validation data best.
 
@@ -193,7 +193,7 @@ def at_its_best(fit: Fit, test: Driving) -> Fit:
     return min(found, key=lambda f: typical_error(f, noise, test, AHEAD))
 
 
-@lru_cache(maxsize=16)
+@remembered(16)
 def fitted_ahead(fit: Fit) -> Fit | None:
     """The same model fitted to predictions of `AHEAD_S`; None where its driving is too short."""
     if longest_s(fit.driving) < 2.0 * AHEAD_S:
