@@ -134,6 +134,19 @@ def test_faults_are_named_with_their_size(faulty: sv.SensorCheck) -> None:
     }  # fmt: skip
 
 
+def test_a_turned_speed_sensor_is_no_bias_of_the_lateral_speed(perfect: Channels) -> None:
+    c, turn = noisy(perfect), np.radians(1.5)
+    rough = 0.6 * np.random.default_rng(3).standard_normal((2, c["time_s"].size))
+    vx, vy = c["vx_mps"], c["vy_mps"]
+    c["vx_mps"] = np.cos(turn) * vx + np.sin(turn) * vy
+    c["vy_mps"] = np.cos(turn) * vy - np.sin(turn) * vx
+    c["ax_mps2"], c["ay_mps2"] = c["ax_mps2"] + rough[0], c["ay_mps2"] + rough[1]
+    check = sv.check(as_log(c))
+    assert not check["bias_vy_mps"].found
+    low, high = check["imu_turn_rad"].interval
+    assert low < -turn < high
+
+
 def test_a_log_put_right_holds_no_fault_any_more(faulty: sv.SensorCheck, perfect: Channels) -> None:
     right = faulty.apply(faulty.logs[0])
     assert len(right.corrections) == 3

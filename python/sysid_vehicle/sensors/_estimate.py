@@ -159,7 +159,7 @@ def estimate(
     settled = False
     for count in range(1, _ROUNDS + 1):
         system = linearise(readings, grid, x, faults, colours, runs)
-        rows = _rows(grid, road)
+        rows = _rows(readings, grid, road)
         now = np.array([faults[name] for name in names])
         # Cauchy's prior at its present curvature.
         prior = np.diag(2.0 / (typical**2 + now**2) + most**-2.0)
@@ -185,19 +185,27 @@ def estimate(
             if count % _ROAD_ROUNDS == 0:
                 for signal in SLOW:
                     road[signal] = _road(steps[signal], x, normal.band, road[signal])
-    # Faults that act alike where there are none look told apart where the estimate has left zero,
-    # and where the motion has followed the noise, whose derivatives are large: a delay at constant
-    # speed is the place of the IMU, up to the square of the delay.
+    # The motion has followed the noise, whose derivatives are large: on a smooth one delays are not
+    # told from places by what is noise. Faults that act alike where there are none look told apart
+    # where the estimate has left zero: a delay at constant speed is the place of the IMU, up to
+    # the square of the delay.
     calm = grid.smoothed(x)
-    healthy = linearise(readings, grid, calm, dict.fromkeys(names, 0.0), colours, runs)
-    at_null = normal_equations(healthy, rows, calm, prior, np.zeros(len(names)))
-    healthy = replace(healthy, white=system.white, weights=system.weights)
+
+    def smooth(at: FloatArray) -> FloatArray:
+        there = linearise(
+            readings, grid, calm, dict(zip(names, at.tolist(), strict=True)), colours, runs
+        )
+        equations = normal_equations(there, rows, calm, prior, at)
+        return _covariance(
+            readings, replace(there, white=system.white, weights=system.weights), equations
+        )
+
     inverse = as_float64(np.linalg.inv(normal.information))
     return Estimate(
         faults,
-        _covariance(readings, system, normal),
+        _inflated(_covariance(readings, system, normal), np.diag(smooth(now))),
         normal.information,
-        _covariance(readings, healthy, at_null),
+        smooth(np.zeros(len(names))),
         np.diag(prior),
         colours,
         _offsets(grid, x, normal.band, normal.across, inverse),
@@ -236,7 +244,7 @@ def preferred(readings: Sequence[Readings], one: Estimate, other: Estimate) -> f
 def _misfit(readings: Sequence[Readings], found: Estimate, noise: Estimate) -> float:
     """Half the squares of the errors and of the motion, the motion at its best."""
     runs = {r.channel: neighbours(r.stretch, r.time_s) for r in readings}
-    rows = _rows(found.grid, noise.road_mps2)
+    rows = _rows(readings, found.grid, noise.road_mps2)
 
     def at(x: FloatArray) -> Linearised:
         return linearise(readings, found.grid, x, found.faults, noise.colours, runs)
@@ -273,7 +281,7 @@ def _begin(
     floors: dict[str, float],
 ) -> tuple[FloatArray, dict[str, Colour]]:
     """Motion from speeds and yaw rate alone, noise from second differences."""
-    rows = [grid.levels, *(grid.bends(s) / _ROUGH[s] for s in QUICK)]
+    rows = [_levels(readings, grid), *(grid.bends(s) / _ROUGH[s] for s in QUICK)]
     values, colours = [np.zeros(row.shape[0]) for row in rows], {}
     for r in readings:
         c = r.channel
@@ -289,11 +297,18 @@ def _begin(
     return Band(j.T @ j).solve(j.T @ np.concatenate(values)), colours
 
 
-def _rows(grid: Grid, road: dict[str, float]) -> scipy.sparse.csr_matrix:
+def _levels(readings: Sequence[Readings], grid: Grid) -> scipy.sparse.csr_matrix:
+    of = [r.stretch for r in readings if r.channel == "vy_mps"]
+    return grid.levels(set(np.concatenate(of).tolist()) if of else set())
+
+
+def _rows(
+    readings: Sequence[Readings], grid: Grid, road: dict[str, float]
+) -> scipy.sparse.csr_matrix:
     """Prior of the motion and of the road, whitened."""
     steps = [grid.steps(signal) / road[signal] for signal in SLOW]
     bends = [grid.bends(signal) / _ROUGH[signal] for signal in QUICK]
-    return scipy.sparse.vstack([grid.levels, *steps, *bends], format="csr")
+    return scipy.sparse.vstack([_levels(readings, grid), *steps, *bends], format="csr")
 
 
 def _bounded(step: FloatArray, names: Sequence[str], faults: dict[str, float]) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -141,12 +141,16 @@ class Grid:
                 calm[at] = np.convolve(padded, _SMOOTH, mode="valid")
         return calm
 
-    @cached_property
-    def levels(self) -> scipy.sparse.csr_matrix:
-        """Rows, divided by their standard deviation, that matter only where no sensor speaks."""
+    def levels(self, told: Collection[int]) -> scipy.sparse.csr_matrix:
+        """Rows, divided by their standard deviation; of v_y only in stretches that are not `told`.
+
+        There are so many that they would forbid a turned speed sensor the lateral speed it reads.
+        """
+        places = np.split(self.index["vy"], np.cumsum(self._counts[0])[:-1])
+        untold = [at for k, at in enumerate(places) if k not in told]
+        at = {**self.index, "vy": np.concatenate([np.empty(0, dtype=np.intp), *untold])}
         rows = [
-            self._rows([self.index[signal]], np.array([1.0 / level]))
-            for signal, level in _LEVEL.items()
+            self._rows([at[signal]], np.array([1.0 / level])) for signal, level in _LEVEL.items()
         ]
         return scipy.sparse.vstack(rows, format="csr")
 
