@@ -40,6 +40,7 @@ def likelihood(model: sv.Model, driving: Driving) -> None:
     tyres = list(range(8))
     signals = np.ones((problem.samples, 8))
     targets = [0, 1, 2, 5, 6, 7, 8, 9]
+    ahead = [(100, 10), (200, 20), (500, 50)]  # of 100 Hz
     for name, work in (
         ("value with frozen gains", lambda: problem.half_sum_of_squares(p, filtered)),
         ("normal equations, 8 parameters", lambda: problem.normal_equations(p, filtered, tyres)),
@@ -57,6 +58,7 @@ def likelihood(model: sv.Model, driving: Driving) -> None:
         ),
         ("freeze", lambda: problem.freeze(p, noise)),
         ("noise score", lambda: problem.noise_score(p, noise)),
+        ("1, 2 and 5 s ahead", lambda: problem.look_ahead(p, noise, ahead)),
         ("trace, smoothed", lambda: problem.trace(p, noise, True)),
     ):
         print(f"  {name:<34} {microseconds(work, problem.samples):7.3f} us", flush=True)

@@ -1,7 +1,7 @@
-"""Memory and time of `compare` and `diagnose` on very long logs.
+"""Memory and time of `compare`, `diagnose` and `identify` on very long logs.
 
     python benchmarks/speed/long_log.py [--samples 1e5 1e6] [--limit-gib 4] [--refits 1]
-        [--only compare|diagnose]
+        [--only compare|diagnose|identify]
 
 Laps of a car with a hidden effect at 100 Hz, simulated in pieces of 10^6 samples by processes of
 their own and joined by a second without speed. The model is fitted to 60 s; then the long log is
@@ -76,6 +76,9 @@ def measure(samples: int, limit_gib: float, refits: int, only: str) -> None:
         began, used = time.perf_counter(), time.process_time()
         if name == "compare":
             told = f"error {sv.compare(fit, log).error:.6f}"
+        elif name == "identify":
+            found = sv.identify(sv.Model(sv.example_vehicle()), log, progress=False)
+            told = f"log-likelihood {found.log_likelihood:.3f}"
         else:
             dx = sv.diagnose(fit, log, refits=refits, progress=False)
             first = dx.ranking[0]
@@ -95,7 +98,7 @@ def main() -> None:
     parser.add_argument("--samples", type=float, nargs="+", default=[1e5, 1e6])
     parser.add_argument("--limit-gib", type=float, default=4.0)
     parser.add_argument("--refits", type=int, default=1)
-    parser.add_argument("--only", choices=("compare", "diagnose"), default="")
+    parser.add_argument("--only", choices=("compare", "diagnose", "identify"), default="")
     parser.add_argument("--simulate", nargs=3, help=argparse.SUPPRESS)
     parser.add_argument("--measure", type=int, help=argparse.SUPPRESS)
     args = parser.parse_args()
