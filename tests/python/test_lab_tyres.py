@@ -313,7 +313,8 @@ def golden(shared_data: Path, amplitude: str) -> TyreLog:
 
 
 def test_stiffness_from_the_published_drive(shared_data: Path) -> None:
-    fit = identify_tyres(CAR, golden(shared_data, "035"), starts=1, profiles=False)
+    log = golden(shared_data, "035").cut(4000, 9000)  # its noise is far below what is asked
+    fit = identify_tyres(CAR, log, starts=1, profiles=False)
     for axle in ("front", "rear"):
         assert fit[f"BCD_{axle}"].value == pytest.approx(63.36, rel=3e-3)
     assert "B_front" not in fit.determined

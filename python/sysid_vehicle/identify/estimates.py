@@ -4,24 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from .._text import number
-from .profile import Profile
+from .objective import Objective
+from .profile import Profile, profile_all
+from .quantities import Quantity
 from .search import Box
 
 __all__ = [
+    "BETTER_FOUND",
     "INTERVALS",
     "Estimate",
     "box_covariance",
     "profiled",
+    "profiled_estimates",
     "std_of_data",
     "wald",
-    "with_profiles",
 ]
+
+BETTER_FOUND = 4
+"""Times that profiling may lead to a better optimum."""
 
 INTERVALS = ("information", "profile")
 """Where intervals come from: the information matrix, or the profile likelihood."""
@@ -128,15 +134,52 @@ def wald(
     return estimates, covariance
 
 
-def with_profiles(
-    estimates: Sequence[Estimate], profiles: Sequence[Profile], box: Box
-) -> tuple[Estimate, ...]:
-    """Replace intervals, and the notes that they decide, by those of the profile likelihood."""
-    found = {f.name: f for f in profiles}
-    return tuple(
-        replace(e, note=_note(e, found[e.name], width), ends=found[e.name].interval)
-        for e, width in zip(estimates, box.upper - box.lower, strict=True)
+class Fitted(Protocol):
+    """What profiles need to know of a fit."""
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """The free parameters."""
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Of the estimates, in their order."""
+
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """Estimates, then what follows from them."""
+
+
+def profiled_estimates(
+    objective: Objective,
+    p: FloatArray,
+    noise: FloatArray,
+    box: Box,
+    fit: Fitted,
+    workers: int | None,
+    progress: bool | None,
+) -> tuple[tuple[Estimate, ...], tuple[Profile, ...], FloatArray | None]:
+    """Intervals, and the notes that they decide, of the profile likelihood.
+
+    Returns
+    -------
+    estimates : tuple of Estimate
+    profiles : tuple of Profile
+        Of all quantities.
+    better : array, shape (parameters,), or None
+        Parameters of higher likelihood, where profiling came upon some.
+    """
+    gains = objective.freeze(p, noise)
+    wanted = list(fit.quantities.values())
+    found, better = profile_all(
+        objective, p, gains, box, fit.covariance, wanted, workers=workers, progress=progress
     )
+    widths = box.upper - box.lower
+    estimates = tuple(
+        replace(e, note=_note(e, f, float(width)), ends=f.interval)
+        for e, f, width in zip(fit.estimates, found, widths, strict=False)
+    )
+    return estimates, found, better
 
 
 def profiled(estimate: Estimate, profiles: Sequence[Profile]) -> Estimate:

@@ -17,11 +17,10 @@ from ..log import Log, check_car, check_excitation
 from ..model import Model
 from .ahead import predicting_ahead
 from .box import free_box, free_prior
-from .estimates import INTERVALS, wald, with_profiles
+from .estimates import BETTER_FOUND, INTERVALS, profiled_estimates, wald
 from .fit import Fit
 from .objective import Objective
 from .offsets import centred, marginal_information
-from .profile import profile_all
 from .search import METHODS, Box, minimise
 from .settle import moved, rivalled, settle, settle_finely, to_the_top
 from .starts import Runner, Starts, apart, at_typical_sizes, space_filling
@@ -42,7 +41,6 @@ _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
 _OFFSETS = 2  # times that offsets of logs and what they share are found in turn
-_BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 
 
 @explaining
@@ -135,16 +133,9 @@ def identify(
         found = minimise(thin, begin, frozen, box, method=method, tolerance=0.1)
         return box.put(begin, found.x), level - found.cost
 
-    begins = np.tile(p, (starts, 1))
-    begins[:, box.columns] = _start_points(model, names, box, starts, seed)
-    ends, values = Runner(box, workers, progress).all_of(search, as_float64(begins))
-    if not np.isfinite(values).any():
-        raise NumericalError(
-            f"{', '.join(log.name for log in driving.logs)}: no start led to a finite likelihood"
-        )
-    table = Starts(
-        names, as_float64(begins[:, box.columns]), as_float64(ends[:, box.columns]), values
-    )
+    begins = _start_points(model, names, box, starts, seed)
+    ends, values = Runner(box, workers, progress).all_of(search, box.put(p, begins))
+    table = Starts(names, begins, as_float64(ends[:, box.columns]), values)
     # Which end is the best is told by the noise as it then is, not by that of the start.
     objective, thinned = _objectives(model, driving)
     first, *others = apart(ends, values, box)
@@ -228,24 +219,16 @@ def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool | None =
     objective = objective_of(fit.model, fit.driving.problem(fit.model), fit.driving)
     box = free_box(fit.model)
     p, noise = fit.model.vector(), fit.noise.vector()
-    for _ in range(_BETTER_FOUND):
+    for _ in range(BETTER_FOUND):
         p, noise, _ = settle_finely(objective, p, noise, box)
         told = NoiseModel.from_vector(noise)
         fit = _summary(fit.model, fit.driving, objective, p, told, fit.starts, fit.converged)
-        profiles, better = profile_all(
-            objective,
-            p,
-            objective.freeze(p, noise),
-            box,
-            fit.covariance,
-            list(fit.quantities.values()),
-            workers=workers,
-            progress=progress,
+        estimates, profiles, better = profiled_estimates(
+            objective, p, noise, box, fit, workers, progress
         )
         if better is None:
             break
         p = better
-    estimates = with_profiles(fit.estimates, profiles[: len(fit.estimates)], box)
     return replace(fit, estimates=estimates, profiles=profiles)
 
 

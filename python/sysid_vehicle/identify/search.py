@@ -30,9 +30,9 @@ class Box:
     upper: FloatArray
 
     def put(self, p: FloatArray, x: FloatArray) -> FloatArray:
-        """All parameters `p`, with the free ones `x`."""
-        full = p.copy()
-        full[self.columns] = x
+        """All parameters `p`, with the free ones `x`; a row for each row of `x`."""
+        full = np.broadcast_to(p, (*x.shape[:-1], p.size)).copy()
+        full[..., self.columns] = x
         return full
 
     def inside(self, p: FloatArray) -> FloatArray:

@@ -164,21 +164,42 @@ def space_filling(
 
 @dataclass(frozen=True)
 class Runner:
-    """Runs searches side by side; starts that have met share the rest of their way."""
+    """Runs searches side by side; starts that have met share the rest of their way.
+
+    Parameters
+    ----------
+    box : Box
+    workers : int or None
+    progress : bool or None
+    same : float
+        Points no farther apart have met, as a share of the box.
+    """
 
     box: Box
     workers: int | None
     progress: bool | None
+    same: float = _SAME_POINT
 
     def all_of(self, search: Search, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Ends and their log-likelihoods, from points of shape (starts, parameters)."""
+        """Ends and their log-likelihoods, from points of shape (starts, parameters).
+
+        Raises
+        ------
+        NumericalError
+            None of them led anywhere.
+        """
         width = self.box.upper - self.box.lower
-        place = np.round((points[:, self.box.columns] - self.box.lower) / width / _SAME_POINT)
+        place = np.round((points[:, self.box.columns] - self.box.lower) / width / self.same)
         _, first, which = np.unique(place, axis=0, return_index=True, return_inverse=True)
         with Workers(self.workers) as pool:
             found = pool.map(lambda i: _guarded(search, points[i]), first)
             bar = with_progress(found, "starts", total=len(first), shown=self.progress)
             ends, values = zip(*bar, strict=True)
+        if not np.isfinite(values).any():
+            raise NumericalError(
+                "no start led to a finite likelihood; check units, signs and the timing of the "
+                "inputs"
+            )
         back = which.ravel()  # NumPy 2.0 gives it another shape
         return as_float64(np.array(ends)[back]), as_float64(np.array(values)[back])
 

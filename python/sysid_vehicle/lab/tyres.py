@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -12,22 +13,20 @@ from .._arrays import FloatArray, as_float64
 from .._progress import doing
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
-from ..identify.estimates import box_covariance, wald, with_profiles
+from ..identify.estimates import BETTER_FOUND, box_covariance, profiled_estimates, wald
 from ..identify.objective import Objective
-from ..identify.profile import profile_all
 from ..identify.search import METHODS, Box
 from ..identify.settle import bottom, descend, settle, settle_finely
-from ..identify.starts import Starts, space_filling
+from ..identify.starts import Runner, Search, Starts, space_filling
+from ..identify.walk import alternate
 from ..vehicle import slip_angles
 from .motion import TyreMotion
-from .multistart import multistart
 from .regression_search import descend_regression
 from .tyre_data import GreyBoxVehicle, TyreLog
 from .tyre_fit import PARAMETERS, UNITS, Rival, TyreFit
 from .tyre_problem import box_of, first_point, free_parameters, objective_of, tyre_problem
 
 _THINNED = 3200  # samples that decide between starts
-_BETTER_FOUND = 4  # times that profiling may lead to a better optimum
 _KINEMATIC_VY = 0.1  # how far integrated accelerations may be off [m/s]
 _LEVEL_NATS = 1.92  # half the 95 % quantile of chi-square with one degree of freedom
 _HOPELESS = 5.0  # nats that the way to the bottom of a valley does not gain
@@ -91,35 +90,26 @@ def identify_tyres(
     box = box_of(free, {})
     given = np.clip(p[box.columns], box.lower, box.upper)
     begins = space_filling(given, box.lower, box.upper, starts, seed, list(range(8)))
+    runner = Runner(box, workers, progress)
     told = [g if g.sideslip_measured else g.with_kinematic_sideslip() for g in several]
-    p, noise, ends, others = multistart(
-        objective_of(vehicle, several, _THINNED, residual_terms=residual_terms),
-        objective_of(vehicle, told, _THINNED, residual_terms=residual_terms),
-        _regression(vehicle, told),
-        p,
-        box,
-        begins,
-        free,
-        _loose(several),
-        method=method,
-        workers=workers,
-        progress=progress,
+    thin, rough = (
+        objective_of(vehicle, logs, _THINNED, residual_terms=residual_terms)
+        for logs in (several, told)
     )
+    # A regression on the smoothed motion is quick and has few valleys that lead astray; a filter
+    # that follows the readings closely has less bias; the likelihood itself decides.
+    noise = _loose(several)
+    ends, _ = runner.all_of(_regression(vehicle, told), box.put(p, begins))
+    follow = partial(descend, rough, noise=noise, box=box, method=method)
+    ends, values = runner.all_of(follow, ends)
+    ends, values, noise, rivals = alternate(thin, ends, values, noise, runner, method=method)
+    table = Starts(free, begins, as_float64(ends[:, box.columns]), values)
+    p = ends[int(np.argmax(values))]
     whole = objective_of(vehicle, several, residual_terms=residual_terms)
-    p, noise, _ = settle(whole, p, noise, box, method=method, parameters_first=True)
-    value = whole.log_likelihood(p, noise)
-    rivals: list[FloatArray] = []
-    for other in others:
-        end, there = descend(whole, other, noise, box)
-        if there > value:
-            rivals.append(p)
-            p, value = end, there
-        else:
-            rivals.append(end)
-    for left in reversed(range(_BETTER_FOUND)):
+    for left in reversed(range(BETTER_FOUND)):
         passed, noise, _ = settle(whole, p, noise, box, method=method, parameters_first=True)
         p, noise, _ = settle_finely(whole, passed, noise, box)
-        fit = _summary(vehicle, several, whole, p, noise, box, free, ends)
+        fit = _summary(vehicle, several, whole, p, noise, box, free, table)
         fit = _with_rivals(fit, whole, rivals, box, None if profiles else passed)
         ahead = min(fit.rivals, key=lambda rival: rival.lost, default=None)
         if ahead is not None and ahead.lost < 0.0 and left:
@@ -127,23 +117,12 @@ def identify_tyres(
             p = ahead.parameters
             continue
         if not profiles:
-            return fit
-        gains = whole.freeze(p, noise)
-        found, better = profile_all(
-            whole,
-            p,
-            gains,
-            box,
-            fit.covariance,
-            list(fit.quantities.values()),
-            workers=workers,
-            progress=progress,
-        )
-        estimates = with_profiles(fit.estimates, found[: len(free)], box)
+            break
+        estimates, found, better = profiled_estimates(whole, p, noise, box, fit, workers, progress)
         fit = replace(fit, estimates=estimates, profiles=found)
         if better is None:
             break
-        p = better  # a profile came upon it
+        p = better
     return fit
 
 
@@ -205,8 +184,7 @@ def _with_rivals(
             there, value = bottom(objective, there, fit.noise, box)
         keep(there, value)
     if passed is not None:
-        gains = objective.freeze(passed, fit.noise)
-        keep(passed, gains.log_likelihood - objective.prior_cost(passed))
+        keep(passed, objective.log_likelihood(passed, fit.noise))
     return replace(fit, rivals=tuple(kept))
 
 
@@ -234,9 +212,7 @@ def _check(logs: tuple[TyreLog, ...], method: str, starts: int) -> None:
         )
 
 
-def _regression(
-    vehicle: GreyBoxVehicle, logs: Sequence[TyreLog]
-) -> Callable[[FloatArray], tuple[FloatArray, float]]:
+def _regression(vehicle: GreyBoxVehicle, logs: Sequence[TyreLog]) -> Search:
     """Search of B, C, D, E on the smoothed motion of all logs."""
     motions = [TyreMotion.from_log(log) for log in logs]
     total = sum(m.n for m in motions)

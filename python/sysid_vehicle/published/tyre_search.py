@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from .._arrays import FloatArray, as_float64
 from ..identify.objective import LinearRows
-from ..lab.multistart import looking_alike
+from ..identify.starts import Runner
+from ..identify.walk import looking_alike
 from ..lab.projection import Regression
 from ..lab.regression_search import COARSE, EXACT, FINE, ROUGH, RegressionTask
 
@@ -49,16 +49,16 @@ class LossTask(RegressionTask):
         problem = whole._problem(*self._weights(p)) if joint else whole._as_published()
         return 2.0 * problem.half_sum_of_squares(p)
 
-    def merits(self, found: list[tuple[FloatArray, float]]) -> FloatArray:
+    def merits(self, ends: FloatArray, losses: FloatArray) -> FloatArray:
         """By what ends are compared: minus half the loss, or the joint loss's log-likelihood.
 
         With its weights worked out anew at every end the joint loss is about the same at all of
         them; the likelihood of errors of those sizes tells them apart.
         """
         if self.loss != "joint":
-            return as_float64([-0.5 * value for _, value in found])
+            return as_float64(-0.5 * losses)
         n = self.motion.n
-        return as_float64([-n * float(np.sum(np.log(self._sizes(p)))) for p, _ in found])
+        return as_float64([-n * float(np.sum(np.log(self._sizes(p)))) for p in ends])
 
     def behind(self, merits: FloatArray) -> FloatArray:
         """How far behind the best each is [nats], were the errors as large as the best's."""
@@ -96,66 +96,55 @@ def search(task: LossTask, begins: FloatArray) -> tuple[FloatArray, FloatArray, 
     merits : array, shape (starts,)
         By which ends are compared, the greatest being the best.
     """
+    runner = Runner(task.box, None, False, _SAME)
     # The way to the valley needs few samples, the place in it all of them.
     rough = task.thinned(COARSE) if task.motion.n > 2 * COARSE else task
-    found: list[tuple[FloatArray, float]] = []
-    for begin in begins:
-        found.append(rough.descend(task.box.put(task.given, begin), ROUGH))
-    behind = rough.behind(rough.merits(found))
-    for i in np.flatnonzero(behind > _HOPELESS):
-        found[i] = found[i][0], task.at(found[i][0])
-    _go_on(task, found, np.flatnonzero(behind <= _HOPELESS), behind, ROUGH)
+    points = task.box.put(task.given, begins)
+    ends, losses = _onwards(runner, rough, points, ROUGH)
+    near = rough.behind(rough.merits(ends, losses)) <= _HOPELESS
+    losses[~near] = [task.at(p) for p in ends[~near]]
+    ends[near], losses[near] = _onwards(runner, task, ends[near], ROUGH)
     if len(begins) > 1:
-        _walk(task, found)
-    behind = task.behind(task.merits(found))
-    close = np.flatnonzero(2.0 * behind <= task.motion.n * _CLOSE)
-    _go_on(task, found, close, behind, FINE)
-    return as_float64([p for p, _ in found]), as_float64([v for _, v in found]), task.merits(found)
+        _walk(task, runner, ends, losses)
+    close = 2.0 * task.behind(task.merits(ends, losses)) <= task.motion.n * _CLOSE
+    ends[close], losses[close] = _onwards(runner, task, ends[close], FINE)
+    return ends, losses, task.merits(ends, losses)
 
 
-def _walk(task: LossTask, found: list[tuple[FloatArray, float]]) -> None:
+def _onwards(
+    runner: Runner, task: LossTask, points: FloatArray, still: float
+) -> tuple[FloatArray, FloatArray]:
+    """Ends of searches, and the losses there; those that have met go together."""
+
+    def descend(p: FloatArray) -> tuple[FloatArray, float]:
+        end, loss = task.descend(task.box.inside(p), still)
+        return end, -loss
+
+    ends, values = runner.all_of(descend, points)
+    return ends, -values
+
+
+def _walk(task: LossTask, runner: Runner, ends: FloatArray, losses: FloatArray) -> None:
     """Leave the best end for a better one among the tyres that look alike, where there is one.
 
     Fewer samples have fewer valleys: all starts may have met in one that is not the lowest of all
     samples. Whatever ended at the best goes on to the better.
     """
-    # The given point may be better than where few samples led to.
-    given = task.descend(task.box.inside(task.given), ROUGH)
-    tried = [given] if np.isfinite(given[1]) else []
-    for _ in range(_WALKS):
-        best = int(np.argmax(task.merits(found)))
-        here = found[best][0]
-        for trial in looking_alike(here):
-            tried.append(task.descend(task.box.inside(trial), ROUGH))
-        merits = task.merits(tried)
-        better = int(np.argmax(merits))
-        now = task.merits([found[best]])[0]
-        if merits[better] <= now + ROUGH * abs(now):
-            return
-        width = task.box.upper - task.box.lower
-        for i, (p, _) in enumerate(found):
-            if np.max(np.abs(p - here)[task.box.columns] / width) <= _SAME:
-                found[i] = tried[better]
-        tried = []
-
-
-def _go_on(
-    task: LossTask,
-    found: list[tuple[FloatArray, float]],
-    some: npt.NDArray[np.intp],
-    behind: FloatArray,
-    still: float,
-) -> None:
-    """Search on from some of the points, the best first; those that have met go together."""
     width = task.box.upper - task.box.lower
-    done: list[tuple[FloatArray, tuple[FloatArray, float]]] = []
-    for i in some[np.argsort(behind[some], kind="stable")]:
-        begin = found[i][0]
-        apart = [float(np.max(np.abs(begin - b)[task.box.columns] / width)) for b, _ in done]
-        if not apart or min(apart) > _SAME:
-            done.append((begin, task.descend(begin, still)))
-            apart.append(0.0)
-        found[i] = done[int(np.argmin(apart))][1]
+    others = [task.given]  # it may be better than where few samples led to
+    for _ in range(_WALKS):
+        merits = task.merits(ends, losses)
+        best = int(np.argmax(merits))
+        here = ends[best]
+        points = as_float64([*others, *looking_alike(here)])
+        tried, values = _onwards(runner, task, points, ROUGH)
+        found = task.merits(tried, values)
+        better = int(np.argmax(found))
+        if found[better] <= merits[best] + ROUGH * abs(merits[best]):
+            return
+        met = np.max(np.abs(ends - here)[:, task.box.columns] / width, axis=1) <= _SAME
+        ends[met], losses[met] = tried[better], values[better]
+        others = []
 
 
 def _wishes(start: FloatArray) -> LinearRows:

@@ -1,4 +1,4 @@
-"""Searches for tyres from many starts: quick ones first, then along the tyres that look alike."""
+"""Searches from many ends on: by noise learned anew, and along the tyres that look alike."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from functools import partial
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
-from ..errors import NumericalError
-from ..identify.objective import Objective
-from ..identify.search import Box, minimise
-from ..identify.settle import descend, settle
-from ..identify.starts import SAME_OPTIMUM, Runner, Search, Starts
-from ..identify.tyre_shape import look_alike
+from .._arrays import FloatArray
+from .objective import Objective
+from .search import Box, minimise
+from .settle import descend, settle
+from .starts import SAME_OPTIMUM, Runner
+from .tyre_shape import look_alike
 
+__all__ = ["alternate", "looking_alike", "valleys", "walk"]
+
+_ALTERNATIONS = 3
 _CURVATURES = (-1.0, 0.0, 0.4, 0.8)
 _SIDES = ((0,), (4,), (0, 4))  # where the coefficients of the axles that are moved begin
 _TASTE = 5  # steps that tell whether a valley is worth going down
@@ -25,73 +27,59 @@ _TRIED = 4
 _APART = 0.02  # of the box's width
 
 
-def multistart(
+def alternate(
     objective: Objective,
-    rough: Objective,
-    regression: Search,
-    p: FloatArray,
-    box: Box,
-    begins: FloatArray,
-    names: tuple[str, ...],
-    loose: FloatArray,
+    ends: FloatArray,
+    values: FloatArray,
+    noise: FloatArray,
+    runner: Runner,
     *,
     method: str,
-    workers: int | None,
-    progress: bool | None,
-) -> tuple[FloatArray, FloatArray, Starts, list[FloatArray]]:
-    """Search from every start, in three rounds, each from where the one before ended.
+) -> tuple[FloatArray, FloatArray, FloatArray, list[FloatArray]]:
+    """Go on from the ends of quicker searches, by the noise learned at the best of them.
 
-    A regression on the smoothed motion is quick and has few valleys that lead astray. A filter that
-    follows the readings closely (`rough`, noise `loose`) has less bias. The likelihood itself, with
-    the noise learned at the best end, decides; there each end is also tried along the tyres that
-    look alike.
+    The noise learned at a poor end hides better ones: it is learned again as ends get better. To
+    walk along the tyres that look alike takes long, and is for ends that are as good as they get
+    without.
+
+    Parameters
+    ----------
+    objective : Objective
+    ends : array, shape (starts, parameters)
+    values : array, shape (starts,)
+        By which the best of them is told.
+    noise : array, shape (noises,)
+    runner : Runner
+    method : str
+        Local optimiser.
 
     Returns
     -------
-    p : array, shape (parameters,)
-        The best end.
-    noise : array, shape (7,)
-    ends : Starts
+    ends : array, shape (starts, parameters)
+    values : array, shape (starts,)
+        Log-likelihoods.
+    noise : array, shape (noises,)
     others : list of array
-        Other optima found on the way, for a closer look.
+        Other optima than the best end, for a closer look.
     """
-    runner = Runner(box, workers, progress)
-    points = np.tile(p, (len(begins), 1))
-    points[:, box.columns] = begins
-    ends, _ = runner.all_of(regression, as_float64(points))
-    ends, values = runner.all_of(lambda x: descend(rough, x, loose, box, method=method), ends)
-    noise = loose
+    box = runner.box
     others: dict[float, list[FloatArray]] = {}
-    # The noise learned at a poor end hides better ones: it is learned again as ends get better. To
-    # walk takes long, and is for ends that are as good as they get without.
-    for walks in (False, True, False, True, False, True):
-        if not np.isfinite(values).any():
-            raise NumericalError(
-                "no start led to a finite likelihood; check units, signs and the timing of the "
-                "inputs"
-            )
-        if not walks:
-            best_end = ends[int(np.argmax(values))]
-            _, noise, _ = settle(
-                objective, best_end, noise, box, method=method, parameters_first=True
-            )
-            go = partial(descend, objective, noise=noise, box=box, method=method)
-            ends, values = runner.all_of(go, ends)
-            continue
 
-        def search(x: FloatArray, told: FloatArray = noise) -> tuple[FloatArray, float]:
-            value = objective.log_likelihood(x, told)
-            end, value, found = walk(objective, x, value, told, box)
-            others[value] = found
-            return end, value
+    def walked(p: FloatArray) -> tuple[FloatArray, float]:
+        end, value, found = walk(objective, p, noise, box)
+        others[value] = found
+        return end, value
 
+    for _ in range(_ALTERNATIONS):
+        best = ends[int(np.argmax(values))]
+        _, noise, _ = settle(objective, best, noise, box, method=method, parameters_first=True)
+        go = partial(descend, objective, noise=noise, box=box, method=method)
+        ends, values = runner.all_of(go, ends)
         before = float(np.max(values))
-        ends, values = runner.all_of(search, ends)
+        ends, values = runner.all_of(walked, ends)
         if np.max(values) < before + SAME_OPTIMUM:
             break
-    best = int(np.argmax(values))
-    table = Starts(names, begins, as_float64(ends[:, box.columns]), values)
-    return ends[best], noise, table, others.get(float(values[best]), [])
+    return ends, values, noise, others.get(float(np.max(values)), [])
 
 
 def looking_alike(p: FloatArray) -> Iterator[FloatArray]:
@@ -105,7 +93,7 @@ def looking_alike(p: FloatArray) -> Iterator[FloatArray]:
 
 
 def walk(
-    objective: Objective, p: FloatArray, value: float, noise: FloatArray, box: Box
+    objective: Objective, p: FloatArray, noise: FloatArray, box: Box
 ) -> tuple[FloatArray, float, list[FloatArray]]:
     """Leave a side valley for the best of those that `valleys` finds, again and again.
 
@@ -117,6 +105,7 @@ def walk(
         The valleys that were found and are not better.
     """
     others: list[FloatArray] = []
+    value = objective.log_likelihood(p, noise)
     for _ in range(_WALKS):
         found = valleys(objective, p, noise, box)
         if not found or found[0][1] < value + _WORTH:
