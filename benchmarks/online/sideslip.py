@@ -25,6 +25,7 @@ from sysid_vehicle.online import (
     estimate_sideslip,
     fitted_vehicle,
 )
+from sysid_vehicle.online.sideslip import static_stiffness
 from sysid_vehicle.published import PublishedSideslipObserver
 from sysid_vehicle.published import estimate_sideslip as as_published
 
@@ -82,9 +83,8 @@ def with_tyres_times(vehicle: sv.Vehicle, factor: float) -> sv.Vehicle:
 
 
 def published_car(vehicle: sv.Vehicle) -> sv.Vehicle:
-    load = PUBLISHED_MASS_KG * 9.80665 / vehicle.wheelbase_m
-    front = PUBLISHED_STIFFNESS_NPR / (load * vehicle.lr_m)
-    rear = PUBLISHED_STIFFNESS_NPR / (load * vehicle.lf_m)
+    loads = vehicle.replace(mass_kg=PUBLISHED_MASS_KG).static_loads_n
+    front, rear = (PUBLISHED_STIFFNESS_NPR / load for load in loads)
     return dataclasses.replace(
         vehicle,
         mass_kg=PUBLISHED_MASS_KG,
@@ -217,19 +217,11 @@ def low_speed_rows(table: Table, data: Path) -> None:
 
 
 def offline_tyres(vehicle: sv.Vehicle, found: tuple[float, float]) -> sv.Vehicle:
-    start = estimate_start(vehicle)
+    start = static_stiffness(vehicle)
     return dataclasses.replace(
         vehicle,
         tyre_front=vehicle.tyre_front.replace(B=vehicle.tyre_front.B * found[0] / start[0]),
         tyre_rear=vehicle.tyre_rear.replace(B=vehicle.tyre_rear.B * found[1] / start[1]),
-    )
-
-
-def estimate_start(vehicle: sv.Vehicle) -> tuple[float, float]:
-    load = vehicle.mass_kg * 9.80665 / vehicle.wheelbase_m
-    return (
-        vehicle.tyre_front.cornering_stiffness_per_load * load * vehicle.lr_m,
-        vehicle.tyre_rear.cornering_stiffness_per_load * load * vehicle.lf_m,
     )
 
 
@@ -312,7 +304,7 @@ def filterpy_time(
 ) -> float:
     from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-    c_f, c_r = estimate_start(vehicle)
+    c_f, c_r = static_stiffness(vehicle)
     m, lf, lr = vehicle.mass_kg, vehicle.lf_m, vehicle.lr_m
 
     def lateral(x, steer, vx, r):

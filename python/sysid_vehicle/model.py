@@ -297,7 +297,7 @@ class Model:
     def _own_bounds(self, name: str) -> tuple[float, float]:
         p = self.parameters[name]
         if name == _YAW_INERTIA:
-            guess = self._inertia_guess()
+            guess = self.vehicle.usual_inertia_kgm2
             return 0.2 * guess, 5.0 * guess
         return p.lower, p.upper
 
@@ -307,7 +307,7 @@ class Model:
             return float(self.values[name])
         if name == _YAW_INERTIA:
             given = self.vehicle.yaw_inertia_kgm2
-            return given if given is not None else self._inertia_guess()
+            return given if given is not None else self.vehicle.usual_inertia_kgm2
         if "." in name:
             return self.parameters[name].null_value
         letter, axle = name.split("_")
@@ -316,10 +316,6 @@ class Model:
     def tyre_of_vehicle(self, axle: str) -> Tyre:
         """Starting values of the tyre of an axle, `front` or `rear`."""
         return self.vehicle.tyre_front if axle == "front" else self.vehicle.tyre_rear
-
-    def _inertia_guess(self) -> float:
-        # I_z = m l_f l_r is the usual first guess: Milliken & Milliken, ch. 5.
-        return self.vehicle.mass_kg * self.vehicle.lf_m * self.vehicle.lr_m
 
     def vector(self, also: Iterable[Effect] = ()) -> FloatArray:
         """The core's parameter vector; effects that do not act stand at their null values."""

@@ -101,6 +101,12 @@ def slip_angles(
     return front, -np.arctan2(v_y - lr_m * yaw_rate, v_x)
 
 
+def static_loads(mass_kg: float, lf_m: float, lr_m: float) -> tuple[float, float]:
+    """Axle loads at rest, front and rear [N]."""
+    per_metre = mass_kg * GRAVITY_MPS2 / (lf_m + lr_m)
+    return per_metre * lr_m, per_metre * lf_m
+
+
 @dataclass(frozen=True)
 class Tyre:
     """Magic-formula tyre of one axle: ``F_y = D F_z sin(C atan(Ba - E (Ba - atan(Ba))))``.
@@ -217,7 +223,7 @@ class Vehicle:
         for key, value in numbers.items():
             object.__setattr__(self, key, float(value))
         if self.yaw_inertia_kgm2 is not None:
-            typical = self.mass_kg * self.lf_m * self.lr_m
+            typical = self.usual_inertia_kgm2
             if not 0.1 <= self.yaw_inertia_kgm2 / typical <= 10.0:
                 raise InvalidInput(
                     f"vehicle '{self.name}': yaw_inertia_kgm2 = {self.yaw_inertia_kgm2:g} does not "
@@ -229,6 +235,19 @@ class Vehicle:
     def wheelbase_m(self) -> float:
         """Distance between the axles, ``lf_m + lr_m``."""
         return self.lf_m + self.lr_m
+
+    @property
+    def static_loads_n(self) -> tuple[float, float]:
+        """Axle loads at rest, front and rear."""
+        return static_loads(self.mass_kg, self.lf_m, self.lr_m)
+
+    @property
+    def usual_inertia_kgm2(self) -> float:
+        """Yaw inertia that cars of this mass and these axles have, ``mass_kg * lf_m * lr_m``.
+
+        The usual first guess: Milliken & Milliken, *Race Car Vehicle Dynamics*, ch. 5.
+        """
+        return self.mass_kg * self.lf_m * self.lr_m
 
     def replace(self, **changes: Any) -> Vehicle:
         """Return a copy with some fields changed.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ..errors import InvalidInput
 from ..model import Model
-from ..vehicle import GRAVITY_MPS2
 
 _LINEAR = 1000.0  # PKY2 with which the stiffness is proportional to the load to 1e-6
 _SENSITIVITY = "tyre_load_sensitivity.sensitivity"
@@ -25,8 +24,7 @@ def tir_text(model: Model, axle: str) -> str:
     """
     b, c, d, e = (model.value(f"{letter}_{axle}") for letter in "BCDE")
     car = model.vehicle
-    arm = car.lr_m if axle == "front" else car.lf_m
-    load = 0.5 * car.mass_kg * GRAVITY_MPS2 * arm / car.wheelbase_m
+    load = 0.5 * car.static_loads_n[0 if axle == "front" else 1]
     loss = model.value(_SENSITIVITY) if "tyre_load_sensitivity" in model.effects else 0.0
     if not 0.0 <= loss < 1.0:
         raise InvalidInput(

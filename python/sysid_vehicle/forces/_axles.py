@@ -17,7 +17,7 @@ from .._progress import doing
 from ..errors import InvalidInput
 from ..log import Log, several_logs
 from ..sensors import SensorCheck, check
-from ..vehicle import GRAVITY_MPS2, Vehicle, slip_angles
+from ..vehicle import Vehicle, slip_angles
 from ._motion import Motion, Places, draws, smoothed
 from ._result import AxleForces
 
@@ -97,9 +97,7 @@ def axle_forces(
     for log in together:
         if not np.isfinite(log["steer_rad"]).any():
             raise InvalidInput(f"{log.name}: steer_rad holds no value; map the steering angle")
-    inertia = vehicle.yaw_inertia_kgm2
-    if inertia is None:
-        inertia = vehicle.mass_kg * vehicle.lf_m * vehicle.lr_m
+    inertia = vehicle.yaw_inertia_kgm2 or vehicle.usual_inertia_kgm2
     places = Places.of(sensors)
     steer = places.values(sensors, "steer_rad")
     motion = smoothed(sensors, places)
@@ -152,11 +150,11 @@ def _forces(
     share = np.where(along < 0.0, car.brake_front_share, car.drive_front_share)
     push = along / (share / c + 1.0 - share)
     shift = m * ax * car.cg_height_m / length
-    weight = m * GRAVITY_MPS2
+    load_f, load_r = car.static_loads_n
     return _Forces(
         as_float64(np.stack(slip_angles(lf, lr, steer, v, vy, r), axis=1)),
         as_float64(np.stack([(front - share * push * s) / c, rear], axis=1)),
-        as_float64(np.stack([weight * lr / length - shift, weight * lf / length + shift], axis=1)),
+        as_float64(np.stack([load_f - shift, load_r + shift], axis=1)),
         as_float64(push),
         as_float64(moment),
     )

@@ -14,7 +14,6 @@ from .._text import brief, html_list, html_paragraph, html_table, number, text_t
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
-from ..vehicle import GRAVITY_MPS2
 from .estimates import Estimate, profiled
 from .posterior import Posterior, posterior
 from .profile import Profile
@@ -146,8 +145,7 @@ class Fit:
         known = self.model.parameters
         found = [parameter(e.name, known[e.name].column) for e in self.estimates]
         v = self.model.vehicle
-        for axle, arm in (("front", v.lr_m), ("rear", v.lf_m)):
-            load = v.mass_kg * GRAVITY_MPS2 * arm / v.wheelbase_m
+        for axle, load in zip(("front", "rear"), v.static_loads_n, strict=True):
             columns = [known[f"{letter}_{axle}"].column for letter in "BCDE"]
             for short, (function, _) in COMBINATIONS.items():
                 factor = load if short == "BCD" else 1.0

@@ -124,8 +124,7 @@ def _of_car(model: Model) -> list[str]:
         for axle in ("front", "rear")
         for letter, (low, high) in _TYRES.items()
     ]
-    typical = car.mass_kg * car.lf_m * car.lr_m
-    low, high = (ratio * typical for ratio in _INERTIA_RATIO)
+    low, high = (ratio * car.usual_inertia_kgm2 for ratio in _INERTIA_RATIO)
     values.append(("yaw_inertia_kgm2", model.value("yaw_inertia_kgm2"), low, high))
     return [
         f"{name} = {value:.4g} (cars: {low:.4g} to {high:.4g})"

@@ -162,7 +162,7 @@ class Nominal:
     def of(cls, vehicle: Vehicle, stiffness: float = 50.0) -> Nominal:
         """Take mass and geometry from a vehicle, and one stiffness for both axles."""
         v = vehicle
-        inertia = v.yaw_inertia_kgm2 or v.mass_kg * v.lf_m * v.lr_m
+        inertia = v.yaw_inertia_kgm2 or v.usual_inertia_kgm2
         return cls(v.mass_kg, inertia, v.lf_m, v.lr_m, v.cg_height_m, stiffness, stiffness)
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..log import Log
-from ..vehicle import GRAVITY_MPS2, Vehicle
+from ..vehicle import Vehicle, static_loads
 from .observed import READINGS, refuse
 
 
@@ -58,8 +58,7 @@ class ObserverCar:
 
     def static_loads_n(self) -> tuple[float, float]:
         """Axle loads at rest, front and rear [N]."""
-        per_metre = self.mass_kg * GRAVITY_MPS2 / (self.lf_m + self.lr_m)
-        return per_metre * self.lr_m, per_metre * self.lf_m
+        return static_loads(self.mass_kg, self.lf_m, self.lr_m)
 
 
 @dataclass(frozen=True, eq=False)

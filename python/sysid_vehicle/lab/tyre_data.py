@@ -13,7 +13,7 @@ from .._arguments import check_positive_fields
 from .._arrays import FloatArray, as_float64, filled
 from ..errors import InvalidInput
 from ..log import Log
-from ..vehicle import GRAVITY_MPS2, Vehicle
+from ..vehicle import Vehicle, static_loads
 from .observed import READINGS, refuse
 
 _INPUTS = ("fx_n", "steer_rad", "fz_front_n", "fz_rear_n")
@@ -66,10 +66,9 @@ class GreyBoxVehicle:
         A yaw inertia that it does not say is taken as m l_f l_r, good to a tenth for most cars.
         """
         known = vehicle.yaw_inertia_kgm2
-        usual = vehicle.mass_kg * vehicle.lf_m * vehicle.lr_m
         return cls(
             vehicle.mass_kg,
-            usual if known is None else known,
+            vehicle.usual_inertia_kgm2 if known is None else known,
             vehicle.lf_m,
             vehicle.lr_m,
             vehicle.air_density_kgpm3,
@@ -193,11 +192,8 @@ class TyreLog:
         else:
             base = vehicle.lf_m + vehicle.lr_m
             shift = vehicle.mass_kg * np.nan_to_num(a_x) * vehicle.cg_height_m / base
-            weight = vehicle.mass_kg * GRAVITY_MPS2 / base
-            loads = [
-                np.maximum(weight * vehicle.lr_m - shift, 0.0),
-                np.maximum(weight * vehicle.lf_m + shift, 0.0),
-            ]
+            front, rear = static_loads(vehicle.mass_kg, vehicle.lf_m, vehicle.lr_m)
+            loads = [np.maximum(front - shift, 0.0), np.maximum(rear + shift, 0.0)]
         y = np.column_stack([log["vx_mps"], v_y, log["yaw_rate_radps"], log["ay_mps2"]])
         u = np.column_stack([force, log["steer_rad"], *loads])
         # A car at walking pace tells nothing of its tyres, and its slip angles are ill-defined.

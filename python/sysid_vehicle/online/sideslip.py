@@ -12,7 +12,7 @@ from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, warn
 from ..log import Log
 from ..model import vehicle_data
-from ..vehicle import GRAVITY_MPS2, Tyre, Vehicle
+from ..vehicle import Tyre, Vehicle
 from .sideslip_results import SideslipRun
 from .sideslip_settings import SideslipSettings
 
@@ -211,10 +211,10 @@ def run_over(log: Log, observer: SideslipObserver, settings: SideslipSettings) -
 
 def static_stiffness(vehicle: Vehicle) -> tuple[float, float]:
     """Cornering stiffness of both axles [N/rad] at the static load, from the vehicle file."""
-    weight = vehicle.mass_kg * GRAVITY_MPS2 / vehicle.wheelbase_m
+    front, rear = vehicle.static_loads_n
     return (
-        vehicle.tyre_front.cornering_stiffness_per_load * weight * vehicle.lr_m,
-        vehicle.tyre_rear.cornering_stiffness_per_load * weight * vehicle.lf_m,
+        vehicle.tyre_front.cornering_stiffness_per_load * front,
+        vehicle.tyre_rear.cornering_stiffness_per_load * rear,
     )
 
 
@@ -222,7 +222,7 @@ def yaw_inertia(vehicle: Vehicle) -> float:
     """Yaw inertia of the car, or what cars of its mass and wheelbase have [kg m^2]."""
     if vehicle.yaw_inertia_kgm2 is not None:
         return vehicle.yaw_inertia_kgm2
-    typical = vehicle.mass_kg * vehicle.lf_m * vehicle.lr_m
+    typical = vehicle.usual_inertia_kgm2
     warn(
         f"{vehicle.name}: yaw_inertia_kgm2 is not given; {typical:.4g} is taken, which cars of its "
         f"mass and wheelbase have"

@@ -15,7 +15,7 @@ from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
 from ..twin.car import TwinCar
 from ..twin.readings import Readings
-from ..vehicle import GRAVITY_MPS2
+from ..vehicle import static_loads
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +124,8 @@ class DoubleTrackObserver:
             *(n["drag_area_m2"], n["air_density_kgpm3"]),
             stiff["front"] / (stiff["front"] + stiff["rear"]),
         ]
-        weight = 0.5 * load.mass_kg * GRAVITY_MPS2 / base
-        return data, _tyre(n, "front", weight * (base - lf)), _tyre(n, "rear", weight * lf)
+        front, rear = static_loads(load.mass_kg, lf, base - lf)
+        return data, _tyre(n, "front", 0.5 * front), _tyre(n, "rear", 0.5 * rear)
 
 
 def _tyre(n: Mapping[str, float], axle: str, load_n: float) -> list[float]:
