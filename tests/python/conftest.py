@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -45,6 +46,20 @@ def _figures_closed() -> Iterator[None]:
 def repo() -> Path:
     """Root folder of the repository."""
     return REPO
+
+
+@pytest.fixture(scope="module")
+def program(request: pytest.FixtureRequest) -> Iterator[SimpleNamespace]:
+    """The modules of a benchmark, which is a program and no package: `BENCHMARK` of the file."""
+    folder, *modules = request.module.BENCHMARK
+    path = str(REPO / "benchmarks" / folder)
+    sys.path.insert(0, path)
+    try:
+        yield SimpleNamespace(**{name: __import__(name) for name in modules})
+    finally:
+        sys.path.remove(path)
+        for name in modules:
+            sys.modules.pop(name, None)
 
 
 @pytest.fixture(scope="session")

@@ -2,9 +2,9 @@
 
 import dataclasses
 import re
-import sys
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -68,29 +68,22 @@ def test_the_laboratory_drives_an_oval(duration_s: float) -> None:
     assert heard(columns_of(log)) == ""
 
 
-@pytest.fixture(scope="module")
-def corruptions() -> dict[str, dict[str, object]]:
-    folder = str(Path(__file__).resolve().parents[2] / "benchmarks" / "reading")
-    sys.path.insert(0, folder)
-    try:
-        import corruptions
-    finally:
-        sys.path.remove(folder)
-    return {"all": corruptions.CORRUPTIONS, "matters": {"": corruptions.matters}}
-
+BENCHMARK = ("reading", "corruptions")
 
 # What a lap holds too little of: its v_y is too slow to have a time.
 LAP_MISSES = {("0.1 s late", "vy_mps")}
 
 
 @pytest.mark.parametrize("seed", [21, 22])
-def test_corruptions_of_a_lap_are_noticed(truth: Model, corruptions: dict, seed: int) -> None:
+def test_corruptions_of_a_lap_are_noticed(
+    truth: Model, program: SimpleNamespace, seed: int
+) -> None:
     data = columns_of(drive(truth, manoeuvres.lap(), seed=seed))
     rng = np.random.default_rng(seed)
-    for kind, channels in corruptions["all"].items():
+    for kind, channels in program.corruptions.CORRUPTIONS.items():
         for channel, corrupt in channels.items():
             spoilt = corrupt(data, rng)
-            if (kind, channel) in LAP_MISSES or not corruptions["matters"][""](data, spoilt):
+            if (kind, channel) in LAP_MISSES or not program.corruptions.matters(data, spoilt):
                 continue
             said = heard(spoilt)
             assert said, (kind, channel)

@@ -1,8 +1,6 @@
 """The exam keeps its books: what is hidden, what was found, and how often."""
 
 import json
-import sys
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,20 +11,12 @@ import pytest
 
 import sysid_vehicle as sv
 
-MODULES = ("confusion", "design", "rates", "rivals", "store", "tables", "trial", "truths")
+BENCHMARK = ("exam", "confusion", "design", "rates", "rivals", "store", "tables", "trial", "truths")
 
 
 @pytest.fixture(scope="module")
-def exam(repo: Path) -> Iterator[SimpleNamespace]:
-    """The modules of the benchmark, which is a program and no package."""
-    folder = str(repo / "benchmarks" / "exam")
-    sys.path.insert(0, folder)
-    try:
-        yield SimpleNamespace(**{name: __import__(name) for name in MODULES})
-    finally:
-        sys.path.remove(folder)
-        for name in MODULES:
-            sys.modules.pop(name, None)
+def exam(program: SimpleNamespace) -> SimpleNamespace:
+    return program
 
 
 def outcome(exam: SimpleNamespace, kind: str, truth: tuple[str, ...], **told: Any) -> Any:

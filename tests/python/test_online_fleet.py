@@ -1,29 +1,16 @@
 """The sideslip observer on random cars that had no part in choosing its defaults."""
 
-import sys
-from collections.abc import Iterator
-from pathlib import Path
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-MODULES = ("multibody", "fleet")
+BENCHMARK = ("online", "multibody", "fleet")
 SEED = 77  # of the draw to judge on; nothing was chosen on it
 CARS = 3
 
 
 @pytest.fixture(scope="module")
-def bench(repo: Path) -> Iterator[SimpleNamespace]:
-    """The modules of the benchmark, which is a program and no package."""
-    folder = str(repo / "benchmarks" / "online")
-    sys.path.insert(0, folder)
-    try:
-        yield SimpleNamespace(**{name: __import__(name) for name in MODULES})
-    finally:
-        sys.path.remove(folder)
-        for name in MODULES:
-            sys.modules.pop(name, None)
+def bench(program):
+    return program
 
 
 @pytest.fixture(scope="module")
