@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ __all__ = [
     "BETTER_FOUND",
     "INTERVALS",
     "Estimate",
+    "Estimated",
     "box_covariance",
     "profiled",
     "profiled_estimates",
@@ -134,20 +135,47 @@ def wald(
     return estimates, covariance
 
 
-class Fitted(Protocol):
-    """What profiles need to know of a fit."""
+class Estimated:
+    """What all fits have in common: estimates, and what follows from them, by name."""
+
+    estimates: tuple[Estimate, ...]
+    covariance: FloatArray
+    profiles: tuple[Profile, ...]
+
+    __iter__ = None  # numbers are no names
 
     @property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """The free parameters."""
-
-    @property
-    def covariance(self) -> FloatArray:
-        """Of the estimates, in their order."""
+    def derived(self) -> tuple[Estimate, ...]:
+        """What follows from the estimates together."""
+        raise NotImplementedError
 
     @property
     def quantities(self) -> dict[str, Quantity]:
-        """Estimates, then what follows from them."""
+        """Estimates, then what follows from them, as functions of all parameters."""
+        raise NotImplementedError
+
+    def __getitem__(self, name: str) -> Estimate:
+        return _named(name, (*self.estimates, *self.derived))
+
+    def profile(self, name: str) -> Profile:
+        """Profile likelihood of an estimate, or of what follows from them."""
+        return _named(name, self.profiles)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Parameters that this driving does not determine."""
+        return tuple(e.name for e in self.estimates if e.note)
+
+
+_Named = TypeVar("_Named", Estimate, Profile)
+
+
+def _named(name: str, every: Sequence[_Named]) -> _Named:
+    for one in every:
+        if name in (one.name, one.name.replace(" ", "_")):
+            return one
+    known = ", ".join(e.name for e in every) or "none: identify with profile intervals"
+    raise KeyError(f"'{name}'; there are {known}")
 
 
 def profiled_estimates(
@@ -155,7 +183,7 @@ def profiled_estimates(
     p: FloatArray,
     noise: FloatArray,
     box: Box,
-    fit: Fitted,
+    fit: Estimated,
     workers: int | None,
     progress: bool | None,
 ) -> tuple[tuple[Estimate, ...], tuple[Profile, ...], FloatArray | None]:

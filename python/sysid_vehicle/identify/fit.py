@@ -14,7 +14,7 @@ from .._text import brief, html_list, html_paragraph, html_table, number, text_t
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
-from .estimates import Estimate, profiled
+from .estimates import Estimate, Estimated, profiled
 from .posterior import Posterior, posterior
 from .profile import Profile
 from .quantities import Quantity, parameter, std_of, tyre_quantity
@@ -29,7 +29,7 @@ _UNITS = {"cornering stiffness": "N/rad", "peak friction": "1", "slip at the pea
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Estimated):
     """A model fitted to driving.
 
     Attributes
@@ -67,15 +67,6 @@ class Fit:
     profiles: tuple[Profile, ...] = ()
     horizon_s: float = 0.0
 
-    __iter__ = None  # numbers are no names
-
-    def __getitem__(self, name: str) -> Estimate:
-        every = (*self.estimates, *self.derived)
-        for e in every:
-            if name in (e.name, e.name.replace(" ", "_")):
-                return e
-        raise KeyError(f"'{name}'; there are {', '.join(e.name for e in every)}")
-
     def save(self, path: str | Path) -> None:
         """Write the fit, with the driving it was fitted to; :func:`sysid_vehicle.load` reads it.
 
@@ -85,11 +76,6 @@ class Fit:
             If the file cannot be written.
         """
         save(self, path)
-
-    @property
-    def undetermined(self) -> tuple[str, ...]:
-        """Parameters that this driving does not determine."""
-        return tuple(e.name for e in self.estimates if e.note)
 
     @property
     def offsets(self) -> dict[str, dict[str, float]]:
@@ -151,14 +137,6 @@ class Fit:
                 factor = load if short == "BCD" else 1.0
                 found.append(tyre_quantity(f"{_MEANINGS[short]} {axle}", columns, function, factor))
         return {what.name: what for what in found}
-
-    def profile(self, name: str) -> Profile:
-        """Profile likelihood of an estimate, or of what follows from them."""
-        for found in self.profiles:
-            if name in (found.name, found.name.replace(" ", "_")):
-                return found
-        known = ", ".join(f.name for f in self.profiles) or 'none; pass intervals="profile"'
-        raise KeyError(f"'{name}'; there are {known}")
 
     def posterior(
         self,

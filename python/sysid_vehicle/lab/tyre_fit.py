@@ -13,7 +13,7 @@ from .._arrays import FloatArray, as_float64
 from .._printed import Part, Printed, Table
 from .._style import AFTER, BEFORE, axes_or_new, tidy
 from .._text import number
-from ..identify.estimates import Estimate
+from ..identify.estimates import Estimate, Estimated
 from ..identify.profile import Profile
 from ..identify.quantities import Quantity, parameter, std_of, tyre_quantity
 from ..identify.starts import Starts
@@ -114,7 +114,7 @@ def quantities(names: Sequence[str]) -> dict[str, Quantity]:
 
 
 @dataclass(frozen=True, eq=False)
-class TyreFit(Printed):
+class TyreFit(Estimated, Printed):
     """Tyre coefficients identified from driving.
 
     Attributes
@@ -151,21 +151,6 @@ class TyreFit(Printed):
     profiles: tuple[Profile, ...] = ()
     rivals: tuple[Rival, ...] = ()
 
-    def __getitem__(self, name: str) -> Estimate:
-        for e in (*self.estimates, *self.combinations):
-            if e.name == name:
-                return e
-        known = ", ".join(e.name for e in (*self.estimates, *self.combinations))
-        raise KeyError(f"'{name}'; there are {known}")
-
-    def profile(self, name: str) -> Profile:
-        """Profile likelihood of an estimate or a combination."""
-        for found in self.profiles:
-            if found.name == name:
-                return found
-        known = ", ".join(f.name for f in self.profiles) or "none; identify with profiles=True"
-        raise KeyError(f"'{name}'; there are {known}")
-
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval: of the profile likelihood, or of the information matrix without one.
 
@@ -200,7 +185,7 @@ class TyreFit(Printed):
         return as_float64(self.covariance / np.outer(std, std))
 
     @property
-    def combinations(self) -> tuple[Estimate, ...]:
+    def derived(self) -> tuple[Estimate, ...]:
         """Cornering stiffness B C D over load, highest friction, and slip angle of the peak."""
         known = self.quantities
         found = []
@@ -216,16 +201,11 @@ class TyreFit(Printed):
         return tuple(found)
 
     @property
-    def undetermined(self) -> tuple[str, ...]:
-        """Parameters that this driving does not determine."""
-        return tuple(e.name for e in self.estimates if e.note)
-
-    @property
     def determined(self) -> tuple[str, ...]:
         """Coefficients and combinations known to 5 % or better."""
         return tuple(
             e.name
-            for e in (*self.estimates, *self.combinations)
+            for e in (*self.estimates, *self.derived)
             if not e.note and self._half_width(e.name) < 2.0 * _KNOWN_WELL * abs(e.value)
         )
 
@@ -242,7 +222,7 @@ class TyreFit(Printed):
             "log_likelihood": self.log_likelihood,
             "estimates": {
                 e.name: {**e.to_dict(), "interval": list(self.interval(e.name)), "note": e.note}
-                for e in (*self.estimates, *self.combinations)
+                for e in (*self.estimates, *self.derived)
             },
             "noise": dict(zip(NOISES, map(float, self.noise), strict=True)),
             "undetermined": list(self.undetermined),
@@ -303,7 +283,7 @@ class TyreFit(Printed):
 
     def _rows(self) -> list[list[str]]:
         rows = []
-        for e in (*self.estimates, *self.combinations):
+        for e in (*self.estimates, *self.derived):
             interval = self._interval_text(e)
             rows.append([e.name, number(e.value, 5), number(e.std, 2), interval, e.unit, e.note])
         return rows
