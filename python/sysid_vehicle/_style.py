@@ -43,17 +43,7 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return figure
 
 
-def framed(
-    width_in: float,
-    height_in: float,
-    *,
-    left: float = 0.7,
-    right: float = 0.15,
-    bottom: float = 0.5,
-    top: float = 0.3,
-    wspace: float = 0.3,
-    hspace: float = 0.12,
-) -> Figure:
+def framed(width_in: float, height_in: float, left: float = 0.7, wspace: float = 0.3) -> Figure:
     """Make a figure with given margins [in] and gaps between axes (shares of their size).
 
     It is drawn in a third of the time that one takes whose margins are worked out.
@@ -65,11 +55,11 @@ def framed(
     FigureCanvasSVG(figure)
     figure.subplots_adjust(
         left / width_in,
-        bottom / height_in,
-        1.0 - right / width_in,
-        1.0 - top / height_in,
+        0.5 / height_in,
+        1.0 - 0.15 / width_in,
+        1.0 - 0.3 / height_in,
         wspace,
-        hspace,
+        0.12,
     )
     return figure
 

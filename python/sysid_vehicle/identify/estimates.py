@@ -11,7 +11,7 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from .._text import number
 from .objective import Objective
-from .profile import Profile, profile_all
+from .profile import Optimum, Profile, profile_all
 from .quantities import Quantity
 from .search import Box
 
@@ -197,11 +197,9 @@ def profiled_estimates(
     better : array, shape (parameters,), or None
         Parameters of higher likelihood, where profiling came upon some.
     """
-    gains = objective.freeze(p, noise)
+    at = Optimum.of(objective, p, noise, box, fit.covariance)
     wanted = list(fit.quantities.values())
-    found, better = profile_all(
-        objective, p, gains, box, fit.covariance, wanted, workers=workers, progress=progress
-    )
+    found, better = profile_all(at, wanted, workers=workers, progress=progress)
     widths = box.upper - box.lower
     estimates = tuple(
         replace(e, note=_note(e, f, float(width)), ends=f.interval)

@@ -18,7 +18,7 @@ from .._progress import with_progress
 from .._style import AFTER, FLOOR, axes_or_new, tidy
 from .._text import number
 from .._threads import Workers
-from .objective import Penalised
+from .objective import Objective, Penalised
 from .quantities import Quantity
 from .search import Box
 from .valley import down_the_valley
@@ -26,7 +26,7 @@ from .valley import down_the_valley
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["LEVEL", "Profile", "lost_at", "profile", "profile_all"]
+__all__ = ["LEVEL", "Optimum", "Profile", "lost_at", "profile", "profile_all"]
 
 LEVEL = 1.96
 """Root of the 95 % quantile of chi-square with one degree of freedom."""
@@ -94,16 +94,60 @@ class Profile:
         return tidy(ax, xlabel=self.name, ylabel="log-likelihood lost")
 
 
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Where a search ended, and what it searched.
+
+    Parameters
+    ----------
+    objective : Penalised
+    gains : object
+        Those of the problem there.
+    box : Box
+    p : array, shape (parameters,)
+    covariance : array, shape (free, free)
+        Of the free parameters.
+    cost : float
+        Half the sum of squares.
+    """
+
+    objective: Penalised
+    gains: Any
+    box: Box
+    p: FloatArray
+    covariance: FloatArray
+    cost: float
+
+    @classmethod
+    def of(
+        cls,
+        objective: Objective,
+        p: FloatArray,
+        noise: FloatArray,
+        box: Box,
+        covariance: FloatArray,
+    ) -> Optimum:
+        """Of parameters and noise that were found."""
+        gains = objective.freeze(p, noise)
+        return cls(objective, gains, box, p, covariance, objective.half_sum_of_squares(p, gains))
+
+    def cost_of(self, p: FloatArray) -> float:
+        """Half the sum of squares of other parameters."""
+        return self.objective.half_sum_of_squares(p, self.gains)
+
+    def across(self, what: Quantity) -> tuple[FloatArray, float]:
+        """Covariance of the free parameters with a quantity, and its variance."""
+        gradient = np.nan_to_num(what.slope(self.p)[self.box.columns])
+        across = self.covariance @ gradient
+        return as_float64(across), float(gradient @ across)
+
+    def bottom(self, objective: Penalised, p: FloatArray, box: Box) -> FloatArray:
+        """The way down from `p`."""
+        return down_the_valley(objective, p, self.gains, box, tolerance=_ENOUGH, rounds=_ROUNDS)
+
+
 def profile_all(
-    objective: Penalised,
-    p: FloatArray,
-    gains: Any,
-    box: Box,
-    covariance: FloatArray,
-    wanted: Sequence[Quantity],
-    *,
-    workers: int | None,
-    progress: bool | None,
+    at: Optimum, wanted: Sequence[Quantity], *, workers: int | None, progress: bool | None
 ) -> tuple[tuple[Profile, ...], FloatArray | None]:
     """Profile many quantities side by side.
 
@@ -116,7 +160,7 @@ def profile_all(
 
     def one(what: Quantity) -> tuple[Profile, FloatArray | None]:
         with np.errstate(over="ignore", invalid="ignore"):
-            return profile(objective, p, gains, box, covariance, what)
+            return profile(at, what)
 
     with Workers(workers) as pool:
         found = list(
@@ -125,7 +169,7 @@ def profile_all(
     better = [b for _, b in found if b is not None]
     return (
         tuple(f for f, _ in found),
-        min(better, key=lambda b: objective.half_sum_of_squares(b, gains)) if better else None,
+        min(better, key=at.cost_of) if better else None,
     )
 
 
@@ -138,15 +182,8 @@ class _Side:
     better: FloatArray | None
 
 
-def profile(
-    objective: Penalised,
-    p: FloatArray,
-    gains: Any,
-    box: Box,
-    covariance: FloatArray,
-    what: Quantity,
-) -> tuple[Profile, FloatArray | None]:
-    """Profile one quantity around the optimum `p`.
+def profile(at: Optimum, what: Quantity) -> tuple[Profile, FloatArray | None]:
+    """Profile one quantity around an optimum.
 
     Returns
     -------
@@ -154,9 +191,8 @@ def profile(
     better : array, shape (parameters,), or None
         A point of higher likelihood, where one was come upon.
     """
-    best = objective.half_sum_of_squares(p, gains)
-    sides = [_side(objective, p, gains, box, covariance, what, best, s) for s in (-1.0, 1.0)]
-    centre = what.of(p)
+    sides = [_side(at, what, s) for s in (-1.0, 1.0)]
+    centre = what.of(at.p)
     values = np.array([*sides[0].values, centre, *sides[1].values])
     lost = np.array([*sides[0].lost, 0.0, *sides[1].lost])
     order = np.argsort(values)
@@ -172,20 +208,9 @@ def profile(
     return found, next((s.better for s in sides if s.better is not None), None)
 
 
-def _side(
-    objective: Penalised,
-    p: FloatArray,
-    gains: Any,
-    box: Box,
-    covariance: FloatArray,
-    what: Quantity,
-    best: float,
-    sign: float,
-) -> _Side:
-    centre = what.of(p)
-    gradient = np.nan_to_num(what.slope(p)[box.columns])
-    across = covariance @ gradient
-    variance = float(gradient @ across)
+def _side(at: Optimum, what: Quantity, sign: float) -> _Side:
+    centre, box = what.of(at.p), at.box
+    across, variance = at.across(what)
     side = _Side([], [], centre, True, None)
     if not (np.isfinite(centre) and np.isfinite(variance) and variance > 0.0):
         return side
@@ -198,12 +223,10 @@ def _side(
     if furthest <= 1e-9 * max(abs(centre), 1.0):
         return side
     distance = min(LEVEL * std, furthest)
-    inside, outside = (0.0, 0.0, p), (np.inf, np.inf)
+    inside, outside = (0.0, 0.0, at.p), (np.inf, np.inf)
     for _ in range(_POINTS):
         start = _moved(inside[2], box, across * (sign * (distance - inside[0]) / variance))
-        there, loss = _pinned(
-            objective, start, gains, box, what, centre + sign * distance, std, best
-        )
+        there, loss = _pinned(at, start, what, centre + sign * distance, std)
         if loss < -_BETTER:
             return replace(side, better=there)
         distance = sign * (what.of(there) - centre)
@@ -231,27 +254,13 @@ def _side(
     return replace(side, end=centre + sign * (furthest if np.isfinite(limit) else inside[0]))
 
 
-def lost_at(
-    objective: Penalised,
-    p: FloatArray,
-    gains: Any,
-    box: Box,
-    covariance: FloatArray,
-    what: Quantity,
-    value: float,
-    best: float,
-) -> float:
-    """Log-likelihood lost where the quantity is held at `value`, searched for from `p`.
-
-    `best` is half the sum of squares at the optimum.
-    """
-    gradient = np.nan_to_num(what.slope(p)[box.columns])
-    across = covariance @ gradient
-    variance = float(gradient @ across)
+def lost_at(at: Optimum, what: Quantity, value: float) -> float:
+    """Log-likelihood lost where the quantity is held at `value`, searched for from the optimum."""
+    across, variance = at.across(what)
     if not (np.isfinite(variance) and variance > 0.0):
         return np.inf
-    start = _moved(p, box, across * ((value - what.of(p)) / variance))
-    return _pinned(objective, start, gains, box, what, value, float(np.sqrt(variance)), best)[1]
+    start = _moved(at.p, at.box, across * ((value - what.of(at.p)) / variance))
+    return _pinned(at, start, what, value, float(np.sqrt(variance)))[1]
 
 
 def _moved(p: FloatArray, box: Box, step: FloatArray) -> FloatArray:
@@ -268,32 +277,23 @@ def _next(inside: tuple[float, float, FloatArray], outside: tuple[float, float])
 
 
 def _pinned(
-    objective: Penalised,
-    start: FloatArray,
-    gains: Any,
-    box: Box,
-    what: Quantity,
-    target: float,
-    std: float,
-    best: float,
+    at: Optimum, start: FloatArray, what: Quantity, target: float, std: float
 ) -> tuple[FloatArray, float]:
     """Best other parameters with the quantity held at `target`, and the likelihood lost."""
-    there = start.copy()
+    box = at.box
     if what.column is not None:
         i = box.columns.index(what.column)
-        target = float(np.clip(target, box.lower[i], box.upper[i]))
         others = [j for j in range(len(box.columns)) if j != i]
-        there[what.column] = target
+        there = start.copy()
+        there[what.column] = float(np.clip(target, box.lower[i], box.upper[i]))
         inner = Box([box.columns[j] for j in others], box.lower[others], box.upper[others])
-        there = down_the_valley(objective, there, gains, inner, tolerance=_ENOUGH, rounds=_ROUNDS)
-        return there, objective.half_sum_of_squares(there, gains) - best
+        there = at.bottom(at.objective, there, inner)
+        return there, at.cost_of(there) - at.cost
     weight = _STIFF / std
 
     def wish(p: FloatArray) -> tuple[FloatArray, FloatArray]:
         error = np.array([weight * (target - what.of(p))])
         return error, weight * np.nan_to_num(what.slope(p))[None, :]
 
-    there = down_the_valley(
-        objective.also(wish), there, gains, box, tolerance=_ENOUGH, rounds=_ROUNDS
-    )
-    return there, objective.half_sum_of_squares(there, gains) - best
+    there = at.bottom(at.objective.also(wish), start, box)
+    return there, at.cost_of(there) - at.cost

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .._arrays import FloatArray
 from .._text import number
 from ..errors import InvalidInput, near_names
-from ..identify.profile import LEVEL, lost_at
+from ..identify.profile import LEVEL, Optimum, lost_at
 from .tyre_fit import TyreFit
 from .tyre_problem import box_of, objective_of
 
@@ -78,15 +77,8 @@ def hold_value(fit: TyreFit, name: str, value: float) -> HeldValue:
     elif not np.isfinite(value):
         raise InvalidInput(f"{name} = {value} is not a number")
     objective = objective_of(fit.vehicle, fit.logs, residual_terms="P1" in names)
-    gains = objective.freeze(fit.parameters, fit.noise)
-    best = objective.half_sum_of_squares(fit.parameters, gains)
-    valleys = [
-        (fit.parameters, fit.covariance),
-        *((r.parameters, r.covariance) for r in fit.rivals),
-    ]
-
-    def lost(p: FloatArray, covariance: FloatArray) -> float:
-        return lost_at(objective, p, gains, box, covariance, what, value, best)
-
+    at = Optimum.of(objective, fit.parameters, fit.noise, box, fit.covariance)
+    rivals = [replace(at, p=r.parameters, covariance=r.covariance) for r in fit.rivals]
     with np.errstate(over="ignore", invalid="ignore"):
-        return HeldValue(name, value, max(min(lost(p, c) for p, c in valleys), 0.0))
+        lost = min(lost_at(valley, what, value) for valley in (at, *rivals))
+    return HeldValue(name, value, max(lost, 0.0))
