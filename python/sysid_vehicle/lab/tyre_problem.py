@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
-from ..effects import effect
+from ..effects import base_parameters, effect
 from ..errors import InvalidInput, near_names
 from ..estimate import NoiseModel
 from ..estimate.driving import MEASURED
@@ -26,9 +26,9 @@ from .observed import READINGS
 from .tyre_data import SHORTEST, GreyBoxVehicle, TyreLog
 from .tyre_fit import PARAMETERS
 
-_LETTERS = {"B": (1.0, 40.0), "C": (0.5, 3.0), "D": (0.1, 3.0), "E": (-3.0, 1.0)}
+_TYRES = base_parameters()[:8]
 BOX: dict[str, tuple[float, float]] = {
-    **{f"{x}_{axle}": bounds for axle in ("front", "rear") for x, bounds in _LETTERS.items()},
+    **{p.name: (p.lower, p.upper) for p in _TYRES},
     "P1": (-0.01, 0.01),
     "P2": (-1.0, 1.0),
     "P3": (-10.0, 10.0),
@@ -38,9 +38,8 @@ BOX: dict[str, tuple[float, float]] = {
 }
 """Where a search looks. Beyond E = 1 the curve would turn back to zero at large slip."""
 
-_TYRE = {"B": 10.0, "C": 1.4, "D": 1.0, "E": 0.0}
 _CAR = {"mass_factor": 1.0, "yaw_inertia_factor": 1.0, "drag_area_m2": 0.5}
-GIVEN = {f"{x}_{axle}": v for axle in ("front", "rear") for x, v in _TYRE.items()} | _CAR
+GIVEN = {p.name: p.typical for p in _TYRES} | _CAR
 """Where a search begins that is told nothing."""
 
 _SETTLES_S = 1.0
