@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, InvalidInput, Log
+from sysid_vehicle import Fit, InvalidInput, Log, compare
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify.ahead import of_few
 from sysid_vehicle.rules import worse
@@ -75,7 +75,7 @@ def test_a_model_that_loses_the_car_is_worse(fit: Fit, course: Log) -> None:
     broken = replace(fit, model=fit.model.with_values({"B_front": float("nan")}))
     driving = Driving.of(course)
     grown = worse(changes(fit, broken, driving, (1.0,)))
-    assert len(grown) == len(LATERAL)
+    assert len(grown) == len(PREDICTED)
     assert worse(changes(broken, fit, driving, (1.0,))) == ()
     assert changes(broken, broken, driving, (1.0,)) == ()
 
@@ -196,3 +196,14 @@ def test_how_far_an_error_could_fall(fit: Fit, late: Fit, course: Log) -> None:
 def test_few_blocks_tell_less_than_many() -> None:
     assert of_few(5) == pytest.approx(2.776 / 1.960, rel=1e-3)
     assert of_few(6) > of_few(12) > of_few(100) > 1.0
+
+
+def test_channels_read_now_and_then_are_predicted_and_mapped(fit: Fit, course: Log) -> None:
+    rows = np.arange(course.n)
+    slow = {c: np.where(rows % 4 == 1 + k, course[c], np.nan) for k, c in enumerate(LATERAL)}
+    log = Log.from_arrays({c: slow.get(c, course[c]) for c in course.channels}, check=False)
+    found = horizons((fit,), ("right",), Driving.of(log), (2.0, 5.0))
+    assert np.isfinite(found.error).all()
+    speed = {**slow, "vx_mps": np.where(rows % 4 == 0, course["vx_mps"], np.nan)}
+    log = Log.from_arrays({c: speed.get(c, course[c]) for c in course.channels}, check=False)
+    assert np.isfinite(compare(fit, log).failure_map.error).any()

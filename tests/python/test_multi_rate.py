@@ -9,7 +9,7 @@ from smooth_log import Columns, columns, make
 
 from sysid_vehicle.errors import SysidWarning
 from sysid_vehicle.log import Log
-from sysid_vehicle.log._held import held_rows
+from sysid_vehicle.log._held import blank_held, held_rows
 
 
 @pytest.fixture
@@ -102,3 +102,14 @@ class TestHeld:
         ):
             values = true + rng.normal(0.0, noise, 6001) if noise else true
             assert held_rows(np.round(values / quantum) * quantum) == 0.0
+
+    def test_equal_readings_of_a_held_channel_in_quanta_are_readings(
+        self, rng: np.random.Generator
+    ) -> None:
+        values = np.repeat(0.02 * np.round(rng.normal(0.0, 0.025, 500) / 0.02), 2)
+        notes: list[str] = []
+        known = np.flatnonzero(np.isfinite(blank_held({"vy_mps": values}, 100.0, notes)["vy_mps"]))
+        assert "vy_mps: each value is held for 2 samples" in notes[0]
+        np.testing.assert_array_equal(known[:-2], np.arange(0, 2 * known.size - 4, 2))
+        # Of what is the same to the end of the record only the first is a reading.
+        assert known.size > 495

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, filled
 from .._style import axes_or_new
 from ..estimate import Driving
 
@@ -69,9 +69,10 @@ class FailureMap:
         squares, count : array, shape (n,)
             Sum and number of the squares of each sample.
         """
-        v = driving.channel("vx_mps")
-        a = driving.channel("ay_mps2")
-        known = np.isfinite(v) & np.isfinite(a)
+        # Slow channels may never be read at the same moment.
+        v = filled(driving.channel("vx_mps"))
+        a = filled(driving.channel("ay_mps2"))
+        known = count > 0.0
         v, a, squares, count = v[known], a[known], squares[known], count[known]
         edges_v = np.linspace(*_range(v), cells[0] + 1)
         reach = max(abs(x) for x in _range(a))

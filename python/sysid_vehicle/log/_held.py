@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 
 from ._channels import CHANNELS, FloatArray
 
@@ -37,8 +38,7 @@ def blank_held(
         rows = held_rows(values) if name in CHANNELS and name != "time_s" else 0.0
         if not rows:
             continue
-        known = np.flatnonzero(np.isfinite(values))
-        repeated = known[1:][np.diff(values[known]) == 0.0]
+        repeated = _repeated(values, rows)
         result[name] = values.copy()
         result[name][repeated] = np.nan
         notes.append(
@@ -48,6 +48,27 @@ def blank_held(
             f"cells between its samples empty"
         )
     return result
+
+
+def _repeated(values: FloatArray, beat: float) -> npt.NDArray[np.intp]:
+    """Rows at which the value before is written again.
+
+    A channel that counts in quanta reads the same twice by chance, though no more often than it
+    changes by one quantum: what is equal at a beat is a reading then, or only changes would count.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    step = np.diff(values[known])
+    first = np.append(0, np.flatnonzero(step) + 1)
+    lengths = np.diff(first)
+    several = np.maximum(np.round(lengths / beat), 1.0).astype(np.intp)
+    sizes = np.abs(step[step != 0.0])
+    if np.sum(several - 1) > np.sum(sizes < 1.5 * sizes.min()):
+        several[:] = 1
+    again = np.ones(known.size, dtype=bool)
+    again[first] = False
+    for start, length, count in zip(first[:-1], lengths, several, strict=True):
+        again[start + np.round(np.arange(1, count) * length / count).astype(np.intp)] = False
+    return known[again]
 
 
 def held_rows(values: FloatArray) -> float:

@@ -155,9 +155,20 @@ def all_ahead(
     for rate in np.unique(driving.sample_rate_hz):
         own = driving.sample_rate_hz == rate
         ahead = [max(round(h * rate), 1) for h in horizons_s]
-        asked = [(n, max(int(apart * n), 1)) for n in ahead]
+        steps = [max(int(apart * n), 1) for n in ahead]
+        if not np.isfinite(driving.measured[own]).all():
+            # Channels that are read every few samples are met by steps that share no divisor.
+            steps = [_prime(n) for n in steps]
+        asked = list(zip(ahead, steps, strict=True))
         errors[:, own] = problem.look_ahead(fit.model.vector(), noise.vector(), asked)[:, own]
     return errors
+
+
+def _prime(least: int) -> int:
+    """The smallest prime from a number on; one stays one."""
+    while any(least % k == 0 for k in range(2, least)):
+        least += 1
+    return least
 
 
 def _errors(
