@@ -342,7 +342,7 @@ def _number_of_blocks(driving: Driving) -> int:
 def changes(
     before: Fit, after: Fit, driving: Driving, horizons_s: Sequence[float], *, reach: bool = False
 ) -> tuple[Change, ...]:
-    """How the errors of the lateral channels change from one model to another.
+    """How errors some seconds ahead change from one model to another.
 
     Parameters
     ----------
@@ -364,7 +364,7 @@ def changes(
     moved = _moved(before, after, noise, driving, tuple(horizons_s)) if reach else None
     for i, h in enumerate(horizons_s):
         one, other = (errors[:, i] for errors in both)
-        for channel in LATERAL:
+        for channel in _explainable(driving):
             j = PREDICTED.index(channel)
             known = (one[:, j] > 0.0) & (other[:, j] > 0.0)
             # Of a block that both models lose there is nothing to be learnt.

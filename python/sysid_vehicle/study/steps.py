@@ -51,7 +51,7 @@ def first_that_holds(
             c.id not in first.indistinguishable_from or _can_be(c, rules) != _can_be(first, rules)
         ):
             continue
-        if c.fit is None or not _sound(c, rules):
+        if c.fit is None or not _sound(c, rules) or _bends(fit, c.fit, rules):
             continue
         lean: Fit | None = c.fit
         if _insignificant(c.fit, rules):
@@ -85,17 +85,8 @@ def first_together(
     single effect where it is `better` than that; where no single effect holds, where validation
     data confirm it.
 
-    Parameters
-    ----------
-    dx : Diagnosis
-    test : Driving
-        Validation data.
-    single : Fit or None
-        With the single effect that holds.
-    most_effects : int
-        That the model may have.
-    ends : float
-        When refits end, by `time.perf_counter`.
+    `single` is the fit with the single effect that holds; the model may have `most_effects`, and
+    refits end at `ends`, by `time.perf_counter`.
     """
     rules, fit = dx.rules, dx.fit
     for names in _leading_subsets(dx, most_effects - len(fit.model.effects)):
@@ -150,6 +141,12 @@ def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
 def _sound(c: Candidate, rules: Rules) -> bool:
     """Whether it was refitted, and gained more than its price could be by chance."""
     return c.fit is not None and c.statistic >= rules.price * np.log(c.fit.driving.samples)
+
+
+def _bends(fit: Fit, found: Fit, rules: Rules) -> bool:
+    """Whether an effect of the model gets a value that no car can have: new and old then cancel."""
+    own = (e.id for e in fit.model.parts if e.id not in fit.model.nuisances)
+    return any(_real(fit, name, rules) and not _real(found, name, rules) for name in own)
 
 
 def _measures(fit: Fit, found: Fit, plausible: bool, test: Driving) -> Measures:
@@ -291,9 +288,9 @@ def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules)
 def better(one: Fit, other: Fit, test: Driving, rules: Rules = USUAL) -> bool:
     """Whether one fit is to be preferred, and what is new in it has values that a car can have.
 
-    Both drivings speak: that of the fit, less the Bayesian price of the parameters, and the held-
-    out one, where the error must fall too. Of two that are as good the one with fewer effects of a
-    size that matters is preferred, and then the one with fewer effects.
+    All driving speaks: that of the fit, less the Bayesian price of the parameters, and the
+    validation data, where the error must fall too. Of two that are as good the one with fewer
+    effects of a size that matters is preferred, and then the one with fewer effects.
     """
     ones, others = set(one.model.effects), set(other.model.effects)
     if not all(_real(one, name, rules) for name in ones - others):
