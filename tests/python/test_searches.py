@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sysid_vehicle.identify.identify import _apart
 from sysid_vehicle.identify.search import Box, _eased, minimise
+from sysid_vehicle.identify.starts import apart
 
 
 def test_damping_follows_what_was_gained_of_what_was_promised() -> None:
@@ -18,7 +18,7 @@ def test_ends_in_one_valley_are_followed_once() -> None:
     ends = np.array([[7.34, 1.86, 0.86], [7.41, 1.85, 0.85], [9.87, 1.39, 0.08], [8.1, 2.6, 1.0]])
     box = Box([0, 1, 2], np.array([1.0, 0.5, -10.0]), np.array([50.0, 3.0, 1.0]))
     values = np.array([20497.53, 20497.53, 20497.47, 20496.65])
-    assert [end[0] for end in _apart(ends, values, box)] == [7.34, 9.87]
+    assert [end[0] for end in apart(ends, values, box)] == [7.34, 9.87]
 
 
 class Bent:

@@ -13,7 +13,6 @@ from sysid_vehicle.identify import Estimate, refine
 from sysid_vehicle.rules import USUAL, share_explained
 from sysid_vehicle.study.search import Search, Trail, _more
 from sysid_vehicle.study.steps import (
-    _bends,
     _distance,
     _leading_subsets,
     _mattering,
@@ -285,14 +284,6 @@ def test_a_possible_value_comes_before_an_impossible_one(
     alone = first_that_holds(replace(dx, ranking=(far,)), baseline, driving[1])
     assert alone is not None
     assert alone[0] is far
-
-
-def test_what_bends_another_effect_is_told(dx: Diagnosis) -> None:
-    right = by_id(dx, "aero_drag")
-    bent = replace(right, estimates=tuple(replace(e, value=9.0) for e in right.estimates))
-    assert _bends(right, bent, USUAL)
-    assert not _bends(right, right, USUAL)
-    assert not _bends(bent, bent, USUAL)
 
 
 def test_a_search_that_ends_at_its_bound_wanted_more_than_any_car_has() -> None:

@@ -51,7 +51,7 @@ def first_that_holds(
             c.id not in first.indistinguishable_from or _can_be(c, rules) != _can_be(first, rules)
         ):
             continue
-        if c.fit is None or not _sound(c, rules) or _bends(fit, c.fit, rules):
+        if c.fit is None or not _sound(c, rules):
             continue
         lean: Fit | None = c.fit
         if _insignificant(c.fit, rules):
@@ -141,12 +141,6 @@ def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
 def _sound(c: Candidate, rules: Rules) -> bool:
     """Whether it was refitted, and gained more than its price could be by chance."""
     return c.fit is not None and c.statistic >= rules.price * np.log(c.fit.driving.samples)
-
-
-def _bends(fit: Fit, found: Fit, rules: Rules) -> bool:
-    """Whether an effect of the model gets a value that no car can have: new and old then cancel."""
-    own = (e.id for e in fit.model.parts if e.id not in fit.model.nuisances)
-    return any(_real(fit, name, rules) and not _real(found, name, rules) for name in own)
 
 
 def _measures(fit: Fit, found: Fit, plausible: bool, test: Driving) -> Measures:
