@@ -80,6 +80,18 @@ def judged(
     }
 
 
+def summary(rows: dict[str, dict[str, dict[str, object]]]) -> str:
+    """Counts over all data sets and injections."""
+    cases = [row for of in rows.values() for row in of.values()]
+    testable = [row for row in cases if row["testable"]]
+    named, inside = (sum(bool(row[k]) for row in testable) for k in ("named", "inside"))
+    wrong = sum(bool(row["wrong"]) for row in cases)
+    return (
+        f"{len(testable)} of {len(cases)} testable: {named} named, {inside} with the size inside "
+        f"the interval; a wrong name in {wrong} of {len(cases)}"
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", type=Path)
@@ -116,14 +128,7 @@ def main() -> None:
         print(f"  {time.perf_counter() - began:.0f} s", flush=True)
         if args.json is not None:
             args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    cases = [row for of in rows.values() for row in of.values()]
-    testable = [row for row in cases if row["testable"]]
-    named, inside = (sum(bool(row[k]) for row in testable) for k in ("named", "inside"))
-    wrong = sum(bool(row["wrong"]) for row in cases)
-    print(
-        f"{len(testable)} of {len(cases)} testable: {named} named, {inside} with the size inside "
-        f"the interval; a wrong name in {wrong} of {len(cases)}"
-    )
+    print(summary(rows))
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "real_driving"))
 
 from cars import NAMES, vehicle
-from check import piece
+from check import piece, summary
 from falsify import DYNAMIC, Falsified, falsified
 
 import sysid_vehicle as sv
@@ -142,14 +142,7 @@ def main() -> None:
         print(f"  {time.perf_counter() - began:.0f} s", flush=True)
         if args.json is not None:
             args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    cases = [row for of in rows.values() for row in of.values()]
-    testable = [row for row in cases if row["testable"]]
-    named, inside = (sum(bool(row[k]) for row in testable) for k in ("named", "inside"))
-    wrong = sum(bool(row["wrong"]) for row in cases)
-    print(
-        f"{len(testable)} of {len(cases)} testable: {named} named, {inside} with the size inside "
-        f"the interval; a wrong name in {wrong} of {len(cases)}"
-    )
+    print(summary(rows))
 
 
 if __name__ == "__main__":

@@ -66,8 +66,10 @@ def _repeated(values: FloatArray, beat: float) -> npt.NDArray[np.intp]:
         several[:] = 1
     again = np.ones(known.size, dtype=bool)
     again[first] = False
-    for start, length, count in zip(first[:-1], lengths, several, strict=True):
-        again[start + np.round(np.arange(1, count) * length / count).astype(np.intp)] = False
+    more = several - 1
+    nth = np.arange(np.sum(more)) - np.repeat(np.cumsum(more) - more, more) + 1
+    begin, length, count = (np.repeat(a, more) for a in (first[:-1], lengths, several))
+    again[begin + np.round(nth * length / count).astype(np.intp)] = False
     return known[again]
 
 
