@@ -43,8 +43,14 @@ def contradictions(text: str) -> list[str]:
         found.append("what is left is disturbance, and depends on the driving")
     if re.search(r"explains? (-|nan)", text) or re.search(r"takes up (-|nan)", text):
         found.append("a share below nothing is explained")
-    if "takes nothing off the error" in text and re.search(r"takes up (only )?[1-9]", text):
-        found.append("what was added takes a part off the error, and nothing")
+    if "takes nothing off" in text:
+        if re.search(r"takes up (only )?[1-9]", text):
+            found.append("what was added takes a part off the error, and nothing")
+        ahead = re.search(r"s ahead on validation data: ([^;]*?)\. [A-Z]", text)
+        pairs = re.findall(r"([0-9.]+) -> ([0-9.]+)", ahead[1] if ahead else "")
+        fell = bool(pairs) and all(float(b) < 0.8 * float(a) for a, b in pairs)
+        if fell and "the baseline errs no more" not in text:
+            found.append("what was added takes nothing off errors that fell with it")
     if "no effect of the catalogue explains it" in text and "more time" in text:
         found.append("no effect explains it, and some were not tried")
     if verdict == "explained" and (

@@ -56,6 +56,15 @@ def test_what_no_effect_explains_is_to_be_looked_at(unknown: Study) -> None:
     assert "<li>Next: " in unknown._repr_html_()
 
 
+def test_what_predicts_better_some_seconds_ahead_is_to_be_used(unknown: Study) -> None:
+    found = replace(unknown)
+    assert unknown.predicting is not None
+    falls, same = (Change("vy_mps", 2.0, log_ratio, 0.05) for log_ratio in (-0.5, 0.0))
+    for needed, use in (((falls,), "final"), ((same,), "baseline")):
+        found.__dict__["predicting"] = replace(unknown.predicting, better=(falls,), needed=needed)
+        assert any(f"use `study.predicting.{use}`" in text for text in next_steps(found))
+
+
 def test_errors_are_told_in_units_and_small_ones_as_such(adequate: Study, unknown: Study) -> None:
     assert "Median error 2 s ahead on validation data: v_y 0.0" in str(adequate)
     assert "rad/s, a_y 0.0" in adequate._repr_html_()

@@ -29,6 +29,7 @@ from .accept import Change, Gain, Measures, accept, bic, worse
 from .facts import Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
 from .verdict import (
+    NONE_GONE,
     Grade,
     Share,
     excess,
@@ -42,6 +43,7 @@ from .verdict import (
 )
 
 __all__ = [
+    "NONE_GONE",
     "USUAL",
     "Added",
     "Change",

@@ -14,6 +14,7 @@ from .facts import Added, Decision, Facts, Tested, Withdrawn
 from .limits import USUAL, Rules
 
 __all__ = [
+    "NONE_GONE",
     "Grade",
     "Share",
     "excess",
@@ -27,6 +28,11 @@ __all__ = [
 ]
 
 Grade = Literal["confirmed", "plausible", "alias"]
+NONE_GONE = (
+    "with the parameters that predict validation data best, the baseline errs no more 1 to 5 s "
+    "ahead"
+)
+"""Why what was added explains nothing, though the fits of one step err less with it."""
 
 
 def excess(test: Tested) -> float:
@@ -196,7 +202,8 @@ def _withdrawn(
         )
         return [Withdrawn(names - stands, because, names)]
     if share < rules.most:
-        because = f"takes up only {max(100 * share, 0.0):.0f} % of the error 1 to 5 s ahead"
+        little = f"takes up only {100 * share:.0f} % of the error 1 to 5 s ahead"
+        because = little if share > 0.0 else NONE_GONE
         return [Withdrawn(names, because, names)]
     taken = {a.id: a.taken for a in facts.added}
     small = smaller_than(after, taken, stand_ins)

@@ -93,6 +93,12 @@ def _of_what_is_left(study: Study) -> list[str]:
             "log the wheel force `fx_n`, if it can be had: without it drag, slopes and the "
             "split of forces cannot be told"
         )
+    if study.predicting is not None and study.predicting.helps:
+        which = "final" if study.predicting.explains else "baseline"
+        found.append(
+            f"where errors some seconds ahead matter, use `study.predicting.{which}`: its "
+            "parameters are fitted to them"
+        )
     where = " and ".join(
         dict.fromkeys(
             o.strongest

@@ -8,6 +8,7 @@ import numpy as np
 
 from .._text import number
 from ..estimate import UNITS
+from ..rules import NONE_GONE
 from .horizons import LATERAL
 from .matters import sizes_that_matter, within
 from .validation import AHEAD_S
@@ -97,7 +98,7 @@ def _explained(study: Study) -> list[str]:
     if study.explained is None:
         return []
     if not study.explained.share > 0.0:
-        return ["What was added takes nothing off the error 1 to 5 s ahead."]
+        return [f"{NONE_GONE.capitalize()}: what was added takes nothing off that error."]
     said = [f"Of the error 1 to 5 s ahead, {study.explained} is gone."]
     whole = study.shares.whole
     if whole.known and whole.value > 0.0:

@@ -32,7 +32,7 @@ from ..diagnose import (
 from ..estimate import Driving
 from ..identify import Fit, refine
 from ..model import Model
-from ..rules import USUAL, Rules, Verdict
+from ..rules import NONE_GONE, USUAL, Rules, Verdict
 from ..saved import save
 from .added import AddedEffect
 from .disagree import Disagreement, disagreements
@@ -142,6 +142,8 @@ class Study:
         if self.verdict == "unknown" and self.stopped:
             return "something is missing; the time limit ended the search for what explains it"
         if self.verdict == "unknown" and self.added and self.explained is not None:
+            if not self.explained.share > 0.0:
+                return f"something is missing; what was added is no sure name: {NONE_GONE}"
             return (
                 f"something is missing; what was added takes up {self.explained} of the error 1 to "
                 "5 s ahead, and is no sure name beside what is left"
