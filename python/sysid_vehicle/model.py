@@ -28,8 +28,12 @@ NUISANCES = (
     "accelerometer_bias",
     "gyro_bias",
     "road_bank",
+    "ins_lever_arm",
 )
-"""Offsets that measured logs have, crossfall of the road among them."""
+"""Offsets that measured logs have, crossfall among them, and the place of the instruments."""
+
+# The logs of a car share the places of its sensors, whatever else is their own.
+_PLACES = ("ins_lever_arm", "imu_lever_arm", "speed_sensor_lever_arm")
 
 _YAW_INERTIA = "yaw_inertia_kgm2"
 
@@ -177,9 +181,9 @@ class Model:
         )
 
     @property
-    def nuisance_names(self) -> tuple[str, ...]:
-        """Full names of the parameters of those effects."""
-        nuisances = set(self.nuisances)
+    def offset_names(self) -> tuple[str, ...]:
+        """Full names of those effects' parameters of which each log has its own."""
+        nuisances = set(self.nuisances).difference(_PLACES)
         return tuple(n for n in self.free_names if n.split(".")[0] in nuisances)
 
     def _with_settings(self, changes: Mapping[str, Mapping[str, Any]]) -> Model:

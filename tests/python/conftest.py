@@ -133,6 +133,27 @@ def hidden_fit(truth: Model, start: Model) -> Callable[[str, float], Fit]:
 
 
 @pytest.fixture(scope="session")
+def double_lane_change(shared_data: Path) -> tuple[Vehicle, Log]:
+    """A measured car (BMW M8) and its log, the steering on the clock of the motion."""
+    vehicle = REPO / "benchmarks" / "real_driving" / "bmw_m8_roadview.vehicle.toml"
+    motion, inputs = (
+        np.genfromtxt(
+            shared_data / "bmw_m8_roadview" / f"m8_double_lane_change_{part}.csv",
+            delimiter=",",
+            names=True,
+        )
+        for part in ("car_100Hz", "inputs_1kHz")
+    )
+    time = motion["car_time"]
+    steer = np.interp(time, inputs["time"], inputs["steering"]) * 20.0 / 14.3
+    names = ("Velocity_X", "Velocity_Y", "Yaw_Velocity", "Acceleration_X", "Acceleration_Y")
+    channels = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+    read = {c: motion[n] for c, n in zip(channels, names, strict=True)}
+    log = Log.from_arrays({"time_s": time, "steer_rad": steer, **read}).between(5.0, 13.1)
+    return Vehicle.from_toml(vehicle), log
+
+
+@pytest.fixture(scope="session")
 def altered() -> Callable[..., Log]:
     """Make a log without some channels (`without`) and with some replaced, by name."""
 

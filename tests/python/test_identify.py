@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -342,23 +341,11 @@ def test_a_refit_is_never_worse_than_its_start(truth: Model, altered: Callable[.
 
 
 @pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")  # too short for many effects
-def test_of_a_measured_car_a_richer_model_is_no_less_likely(shared_data: Path, repo: Path) -> None:
+def test_of_a_measured_car_a_richer_model_is_no_less_likely(
+    double_lane_change: tuple[Vehicle, Log],
+) -> None:
     # Beside a delay that is learned first, noise that suits it hides a relaxation of a metre.
-    car = Vehicle.from_toml(repo / "benchmarks" / "real_driving" / "bmw_m8_roadview.vehicle.toml")
-    motion, inputs = (
-        np.genfromtxt(
-            shared_data / "bmw_m8_roadview" / f"m8_double_lane_change_{part}.csv",
-            delimiter=",",
-            names=True,
-        )
-        for part in ("car_100Hz", "inputs_1kHz")
-    )
-    time = motion["car_time"]
-    steer = np.interp(time, inputs["time"], inputs["steering"]) * 20.0 / 14.3
-    names = ("Velocity_X", "Velocity_Y", "Yaw_Velocity", "Acceleration_X", "Acceleration_Y")
-    channels = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
-    read = {c: motion[n] for c, n in zip(channels, names, strict=True)}
-    log = Log.from_arrays({"time_s": time, "steer_rad": steer, **read}).between(5.0, 13.1)
+    car, log = double_lane_change
     poor = Model(car).add("ins_lever_arm", "tyre_relaxation")
     poorer, richer = (identify(m, log, starts=1) for m in (poor, poor.add("steer_delay")))
     assert richer.log_likelihood > poorer.log_likelihood

@@ -1,5 +1,6 @@
 """What is said of added effects beside what is left."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -47,12 +48,17 @@ def test_short_driving_leaves_room_for_few_effects(lap: Log) -> None:
 
 
 def test_effects_of_the_model_take_no_room_of_those_that_may_be_added(
-    truth: Model, start: Model
+    truth: Model, start: Model, altered: Callable[..., Log]
 ) -> None:
     lagging = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.06})
     logs = [drive(lagging, manoeuvres.lap(20.0), seed=seed) for seed in (71, 72)]
+    turned = [altered(log, yaw_rate_radps=log["yaw_rate_radps"] + 0.01) for log in logs]
     offsets = start.with_nuisances()
-    found = improve(offsets, *logs, candidates=["steer_lag"], most_effects=1, starts=1)
+    found = improve(offsets, *turned, candidates=["steer_lag"], most_effects=1, starts=1)
     assert [a.id for a in found.added] == ["steer_lag"]
     assert set(found.model.effects) == {"steer_lag", *offsets.nuisances}
     assert found.verdict == "explained"
+    # What is clearly there is told, and nothing else.
+    (told,) = (line for line in str(found).splitlines() if "Nuisance" in line)
+    assert "gyro_bias (bias of the yaw-rate sensor): bias_radps 0.0" in told
+    assert told.strip() in found._repr_html_()

@@ -21,9 +21,9 @@ from .causes import causes_of
 from .clocks import shifts
 from .diagnosis import Candidate, Diagnosis
 from .evidence import Evidence
-from .omnibus import Unknown, omnibus_of
+from .omnibus import Omnibus, Unknown, omnibus, omnibus_of
 from .refits import finished as finished_of
-from .refits import in_time, refitted
+from .refits import from_typical, in_time, is_hidden_by_noise, refitted
 from .score import Score, ScoreBoard, score_board_of
 
 REFITS = 5
@@ -99,41 +99,71 @@ def diagnose(
         )
         for s in board.scores
     ]
-    few = _worth_refitting([c for c in ranked if c.p_value < rules.alpha], refits)
-    if few:
-        # What the best one gains tells which of the others cannot come near it.
-        first = in_time(lambda c: refitted(fit, driving, c), ends)(few[0])
-        best = max(first.statistic, few[0].statistic)
-        others = [
-            c
-            for c in few[1:]
-            if not _too_fast(c) and (c.statistic > _hopeless(c) * best or _rivals(c, few[0]))
-        ]
-        with Workers(workers) as pool:
-            tried = [
-                first,
-                *with_progress(
-                    pool.map(in_time(lambda c: refitted(fit, driving, c), ends), others),
-                    "refits",
-                    total=len(others),
-                    shown=progress,
-                ),
-            ]
-            # Under the noise of the poorer model they differ less than they really do.
-            top = max(c.statistic for c in tried)
-            near = [c for c in tried if c.statistic > 0.4 * top]
-            finished = list(pool.map(in_time(lambda c: finished_of(fit, c), ends), near))
-        if any(c is begun and c.fit for c, begun in zip(finished, near, strict=True)):
-            finished = near  # with noise of their own only some would seem the likelier ones
+    with Workers(workers) as pool:
+        few = _worth_refitting([c for c in ranked if c.p_value < rules.alpha], refits)
+        finished, far = _refitted(fit, driving, few, pool, ends, progress)
         finished.sort(key=lambda c: -_merit(c, driving.samples))
-        finished = [_with_refit_rivals(c, finished, 2.0 * rules.apart) for c in finished]
-        done = {c.id for c in finished}
-        far = sorted((c for c in tried if c.id not in done), key=lambda c: -c.statistic)
-        done |= {c.id for c in far}
-        ranked = finished + far + [c for c in ranked if c.id not in done]
+        known = {c.id for c in finished}
+        hidden = [c for c in ranked if is_hidden_by_noise(c.effect) and c.id not in known]
+        if refits and hidden and _leaves_more(finished[:1], left, driving, rules):
+            tried = pool.map(in_time(lambda c: from_typical(fit, c, len(ranked)), ends), hidden)
+            finished += [c for c in tried if c.finished and c.p_value < rules.alpha]
+    finished.sort(key=lambda c: -_merit(c, driving.samples))
+    finished = [_with_refit_rivals(c, finished, 2.0 * rules.apart) for c in finished]
+    done = {c.id for c in finished}
+    far = [c for c in far if c.id not in done]
+    done |= {c.id for c in far}
+    ranked = finished + far + [c for c in ranked if c.id not in done]
     return _with_errors(
         Diagnosis(fit, driving, tuple(ranked), left, rules, board.scores, family, proposed=proposed)
     )
+
+
+def _refitted(
+    fit: Fit,
+    driving: Driving,
+    few: Sequence[Candidate],
+    pool: Workers,
+    ends: float,
+    progress: bool | None,
+) -> tuple[list[Candidate], list[Candidate]]:
+    """Those near the best with noise of their own, and the others under that of the fit."""
+    if not few:
+        return [], []
+    # What the best one gains tells which of the others cannot come near it.
+    first = in_time(lambda c: refitted(fit, driving, c), ends)(few[0])
+    best = max(first.statistic, few[0].statistic)
+    others = [
+        c
+        for c in few[1:]
+        if not _too_fast(c) and (c.statistic > _hopeless(c) * best or _rivals(c, few[0]))
+    ]
+    tried = [
+        first,
+        *with_progress(
+            pool.map(in_time(lambda c: refitted(fit, driving, c), ends), others),
+            "refits",
+            total=len(others),
+            shown=progress,
+        ),
+    ]
+    # Under the noise of the poorer model they differ less than they really do.
+    top = max(c.statistic for c in tried)
+    near = [c for c in tried if c.statistic > 0.4 * top]
+    finished = list(pool.map(in_time(lambda c: finished_of(fit, c), ends), near))
+    if any(c is begun and c.fit for c, begun in zip(finished, near, strict=True)):
+        finished = near  # with noise of their own only some would seem the likelier ones
+    done = {c.id for c in finished}
+    far = sorted((c for c in tried if c.id not in done), key=lambda c: -c.statistic)
+    return finished, far
+
+
+def _leaves_more(best: Sequence[Candidate], left: Omnibus, driving: Driving, rules: Rules) -> bool:
+    """Whether something is left with the best candidate, or where there is none."""
+    for c in best:
+        if c.fit is not None:
+            left = omnibus(c.fit, driving, rules)
+    return left.p_value < rules.strict
 
 
 def _with_errors(dx: Diagnosis) -> Diagnosis:

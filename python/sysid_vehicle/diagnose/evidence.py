@@ -96,7 +96,7 @@ class Evidence:
     def _own(self) -> FloatArray:
         """Sensitivities to the nuisances of each log but the last, which differ from their mean."""
         names = self.fit.model.free_names
-        places = [names.index(n) for n in self.fit.model.nuisance_names]
+        places = [names.index(n) for n in self.fit.model.offset_names]
         logs = np.repeat(self.driving.log_number, _core.CHANNELS)
         apart = range(len(self.driving.logs) - 1 if self.driving.offsets else 0)
         own = [np.where((logs == i)[:, None], self.fitted[:, places], 0.0) for i in apart]

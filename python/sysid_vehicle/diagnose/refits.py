@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from .._threads import before
+from ..effects import Effect
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refine, refit
@@ -48,6 +50,32 @@ def finished(fit: Fit, c: Candidate) -> Candidate:
         return c
     found = _with_fit(fit, c, refine(c.fit.model, c.fit.driving, c.fit.noise))
     return replace(found, finished=True)
+
+
+def is_hidden_by_noise(effect: Effect) -> bool:
+    """Whether a score may miss the effect: a lag, whose one parameter has no derivative at null.
+
+    A disturbance that was learned without it acts for some time, as the effect does. Under that
+    noise neither score nor refit shows what the effect takes over.
+    """
+    return effect.scored_at_typical and len(effect.parameters) == 1
+
+
+def from_typical(fit: Fit, c: Candidate, tests: int) -> Candidate:
+    """The candidate fitted with noise of its own from its typical size, and tested by likelihood.
+
+    Its p-value is that of the likelihood ratio on one side, over the variance ratio of its score,
+    corrected for so many tests (Bonferroni).
+    """
+    (p,) = c.effect.parameters
+    model = fit.model.add(c.effect).with_values({f"{c.id}.{p.name}": p.typical})
+    try:
+        found = _with_fit(fit, c, refine(model, fit.driving, fit.noise))
+    except (NumericalError, np.linalg.LinAlgError):
+        return c
+    ratio = max(found.statistic, 0.0) / max(c.variance_ratio, 1.0)
+    alone = 0.5 * float(scipy.special.chdtrc(1, ratio))
+    return replace(found, finished=True, p_value=min(tests * alone, 1.0))
 
 
 def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:

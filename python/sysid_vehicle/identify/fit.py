@@ -89,7 +89,7 @@ class Fit(Estimated):
             name if names.count(name) == 1 else f"{name} ({names[: i + 1].count(name)})"
             for i, name in enumerate(names)
         ]
-        at = {n: self.model.value(n) for n in self.model.nuisance_names}
+        at = {n: self.model.value(n) for n in self.model.offset_names}
         own = self.driving.offsets or ({},) * len(logs)
         return {
             label: {n: value + apart.get(n, 0.0) for n, value in at.items()}

@@ -149,7 +149,7 @@ def identify(
     if best is not at_top:
         fit = _top(model, driving, objective, best, table)
     fit = _on_its_road(fit)
-    if fit.model.nuisances and len(driving.logs) > 1:
+    if fit.model.offset_names and len(driving.logs) > 1:
         fit = _log_by_log(fit)
     if intervals == "profile":
         return profile_fit(fit, workers=workers, progress=progress)

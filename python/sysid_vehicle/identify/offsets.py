@@ -49,7 +49,7 @@ def driving_of(fit: Fit, logs: Log | Sequence[Log] | Driving) -> Driving:
     Driving
     """
     driving = Driving.of(logs)
-    if driving is fit.driving or driving.offsets or not fit.model.nuisances:
+    if driving is fit.driving or driving.offsets or not fit.model.offset_names:
         return driving
     return _settled(fit, driving)
 
@@ -61,14 +61,14 @@ def _settled(fit: Fit, driving: Driving) -> Driving:
         own = [_best(fit, log) for log in driving.each_log()]
     except (NumericalError, np.linalg.LinAlgError):
         return driving
-    at = {n: fit.model.value(n) for n in fit.model.nuisance_names}
+    at = {n: fit.model.value(n) for n in fit.model.offset_names}
     offsets = tuple({n: v - at[n] for n, v in values.items()} for values in own)
     return replace(driving, offsets=offsets)
 
 
 def _best(fit: Fit, driving: Driving) -> dict[str, float]:
     """Values of the nuisances of one log, by the criterion of the fit."""
-    names = fit.model.nuisance_names
+    names = fit.model.offset_names
     alone = fit.model.with_fixed([n for n in fit.model.free_names if n not in names])
     if fit.horizon_s:
         # One step ahead parameters that are not the likelihood's would bend the offsets.
@@ -104,7 +104,7 @@ def centred(fit: Fit) -> tuple[Model, Driving]:
     """The model with the mean of what its nuisances are in each log, and these by their offsets."""
     plain = replace(fit.driving, offsets=())
     driving = _settled(fit, plain)
-    names = fit.model.nuisance_names
+    names = fit.model.offset_names
     if not driving.offsets:
         return fit.model, plain
     mean = {n: float(np.mean([own[n] for own in driving.offsets])) for n in names}
@@ -134,7 +134,7 @@ def marginal_information(
         In the order of the model's free parameters.
     """
     box, names = free_box(model), model.free_names
-    own = np.isin(names, model.nuisance_names)
+    own = np.isin(names, model.offset_names)
     n, each = len(names), driving.each_log()
     shared, several = int(np.count_nonzero(~own)), int(np.count_nonzero(own))
     prior = np.zeros((n, n))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._text import number
+from .._text import number, with_error
 from ..estimate import UNITS
 from ..rules import NONE_GONE
 from .horizons import LATERAL
@@ -16,7 +16,7 @@ from .validation import AHEAD_S
 if TYPE_CHECKING:
     from .study import Study
 
-__all__ = ["ahead", "disturbance", "in_the_end", "small", "structured"]
+__all__ = ["ahead", "disturbance", "in_the_end", "nuisances", "small", "structured"]
 
 _WORDS = dict(zip(LATERAL, ("v_y", "yaw rate", "a_y"), strict=True))
 
@@ -42,6 +42,20 @@ def small(study: Study) -> bool:
     errors = study.horizons
     seen = np.isfinite(errors.error[-1]).any() and not np.isinf(errors.error[-1]).any()
     return bool(seen) and within(errors, sizes_that_matter({}))
+
+
+def nuisances(study: Study) -> list[str]:
+    """Those that are clearly there and of a size that matters, in words; none is a finding."""
+    fit, found = study.fit, []
+    for part in fit.model.parts:
+        if part.id not in fit.model.nuisances:
+            continue
+        own = [(p, fit[f"{part.id}.{p.name}"]) for p in part.parameters]
+        off = [(abs(e.value - p.null_value), e.std, p.matters) for p, e in own]
+        if any(by >= matters and by > study.rules.clear * std for by, std, matters in off):
+            sizes = ", ".join(f"{p.name} {with_error(e.value, e.std)} {p.unit}" for p, e in own)
+            found.append(f"Nuisance {part.id} ({part.title}): {sizes}")
+    return found
 
 
 def disturbance(study: Study) -> bool:

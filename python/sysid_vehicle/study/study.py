@@ -40,7 +40,7 @@ from .horizons import Beyond, Horizons, horizons
 from .next_steps import next_steps
 from .predicting import Predicting, predicting
 from .record import record
-from .said import ahead, disturbance, in_the_end, structured
+from .said import ahead, disturbance, in_the_end, nuisances, structured
 from .shares import Shares, shares
 from .structure import Structure
 from .validation import at_its_best
@@ -336,7 +336,7 @@ class Study:
     def __str__(self) -> str:
         lines = [f"Verdict: {self.verdict} - {self.meaning}."]
         lines += [f"  {a}" for a in self.added]
-        lines += [f"  {text}" for text in self.sensors]
+        lines += [f"  {text}" for text in (*nuisances(self), *self.sensors)]
         lines.append(text_table(self._HEAD, self._rows()))
         lines += [text for text in (ahead(self), self.in_the_end) if text]
         lines += [f"Next: {text}." for text in self.next_steps]
@@ -363,7 +363,7 @@ class Study:
     def _repr_html_(self) -> str:
         return (
             f"<p><b>{escape(self.verdict)}</b>: {escape(self.meaning)}.</p>"
-            + html_list([*self.added, *self.sensors])
+            + html_list([*self.added, *nuisances(self), *self.sensors])
             + html_table(self._HEAD, self._rows())
             + html_paragraph(f"{ahead(self)} {self.in_the_end}".lstrip())
             + html_list([f"Next: {text}." for text in self.next_steps])

@@ -1,0 +1,49 @@
+"""Exact dynamics of candidates whose score shows little of them."""
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Fit, Log, Model, Vehicle, diagnose, drive, identify, manoeuvres
+from sysid_vehicle.diagnose.diagnosis import Candidate
+from sysid_vehicle.diagnose.refits import from_typical, is_hidden_by_noise
+from sysid_vehicle.effects import catalogue
+
+
+def scored(fit: Fit, name: str) -> Candidate:
+    return next(c for c in diagnose(fit, refits=0).ranking if c.id == name)
+
+
+def test_lags_of_one_parameter_may_hide_in_the_noise() -> None:
+    found = {e.id for e in catalogue() if is_hidden_by_noise(e)}
+    assert found == {"tyre_relaxation", "steer_lag"}
+
+
+def test_a_lag_is_found_from_its_typical_size(truth: Model, start: Model) -> None:
+    car = truth.add("tyre_relaxation").with_values({"tyre_relaxation.relaxation_length_m": 0.7})
+    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1)
+    found = from_typical(fit, scored(fit, "tyre_relaxation"), 30)
+    assert found.finished
+    assert found.p_value < 1e-6
+    assert abs(found.value[0] - 0.7) < 4.0 * found.std[0]
+    assert found.fit is not None
+    assert found.statistic == pytest.approx(2.0 * (found.fit.log_likelihood - fit.log_likelihood))
+
+
+def test_a_lag_that_is_not_there_is_not_found(complete_fits: tuple[Fit, ...]) -> None:
+    p = [from_typical(f, scored(f, "tyre_relaxation"), 1).p_value for f in complete_fits]
+    assert min(p) > 0.01
+    assert np.isfinite(p).all()
+
+
+@pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")  # too short for many effects
+def test_what_the_disturbance_took_over_is_found_in_a_measured_log(
+    double_lane_change: tuple[Vehicle, Log],
+) -> None:
+    """The score of the relaxation is small, and so is the gain of a refit under learned noise."""
+    car, log = double_lane_change
+    fit = identify(Model(car).with_nuisances(), log, starts=1)
+    assert scored(fit, "tyre_relaxation").p_value > 0.05
+    first = diagnose(fit).ranking[0]
+    assert first.id == "tyre_relaxation"
+    assert first.finished
+    assert first.p_value < 0.01
