@@ -28,9 +28,8 @@ NUISANCES = (
     "accelerometer_bias",
     "gyro_bias",
     "road_bank",
-    "ins_lever_arm",
 )
-"""Offsets that measured logs have, crossfall among them, and the place of the instruments."""
+"""Offsets that measured logs have, crossfall of the road among them."""
 
 # The logs of a car share the places of its sensors, whatever else is their own.
 _PLACES = ("ins_lever_arm", "imu_lever_arm", "speed_sensor_lever_arm")
@@ -160,7 +159,7 @@ class Model:
         whose standard deviation is the typical size in the catalogue, every fit has them, and a
         study neither names nor drops them.
         """
-        several = [names] if isinstance(names, str) else list(names)
+        several = [names] if isinstance(names, str) else list(dict.fromkeys(names))
         model = self.add(*(n for n in several if n not in self.effects))
         return model.with_priors(
             {

@@ -84,7 +84,9 @@ def test_nuisances_have_priors_of_their_typical_sizes(truth: Model) -> None:
     assert "mass" not in model.nuisances
     # The logs of a car share the place of its instruments.
     assert "gyro_bias.bias_radps" in model.offset_names
-    assert "ins_lever_arm.forward_m" not in model.offset_names
+    placed = truth.with_nuisances((*NUISANCES, "ins_lever_arm", "gyro_bias"))
+    assert placed.nuisances == (*NUISANCES, "ins_lever_arm")
+    assert set(placed.offset_names) == set(model.offset_names)
     assert model.priors["gyro_bias.bias_radps"] == (0.0, 0.006)
     assert model.vector().tolist() == truth.vector().tolist()
     # Known to be something is no nuisance, nor is an effect of which a part is unknown.

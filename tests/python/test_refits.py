@@ -7,6 +7,7 @@ from sysid_vehicle import Fit, Log, Model, Vehicle, diagnose, drive, identify, m
 from sysid_vehicle.diagnose.diagnosis import Candidate
 from sysid_vehicle.diagnose.refits import from_typical, is_hidden_by_noise
 from sysid_vehicle.effects import catalogue
+from sysid_vehicle.model import NUISANCES
 
 
 def scored(fit: Fit, name: str) -> Candidate:
@@ -41,7 +42,7 @@ def test_what_the_disturbance_took_over_is_found_in_a_measured_log(
 ) -> None:
     """The score of the relaxation is small, and so is the gain of a refit under learned noise."""
     car, log = double_lane_change
-    fit = identify(Model(car).with_nuisances(), log, starts=1)
+    fit = identify(Model(car).with_nuisances((*NUISANCES, "ins_lever_arm")), log, starts=1)
     assert scored(fit, "tyre_relaxation").p_value > 0.05
     first = diagnose(fit).ranking[0]
     assert first.id == "tyre_relaxation"

@@ -230,6 +230,11 @@ def test_no_name_stands_beside_a_stand_in_that_moves_the_same() -> None:
     both = frozenset({"yaw_rate_radps", "ay_mps2"})
     beside = Added("aligning_moment", "proxy", moves=both, taken=1.0)
     assert verdict(replace(road, added=(mass, beside))).verdict == "unknown"
+    # Next to nothing of the error cannot be what takes up a third of it.
+    small = replace(road, added=(mass, replace(beside, taken=0.1)))
+    assert set(withdrawn(small)) == {"aligning_moment"}
+    assert verdict(small).verdict == "partly_explained"
+    assert verdict(replace(road, added=(mass, replace(beside, taken=-1.0)))).verdict == "unknown"
     unsure = replace(beside, finding="missing", changes=falling(0.2))
     assert verdict(replace(road, added=(mass, unsure))).verdict == "unknown"
     sure = replace(mass, id="aligning_moment", moves=both)

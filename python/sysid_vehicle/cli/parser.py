@@ -123,7 +123,7 @@ def _search(parser: argparse.ArgumentParser) -> None:
         "--nuisances",
         action="store_true",
         help="fit offsets that every measured log has (biases, turn of the speed sensor, steering "
-        "offset, crossfall), and the place of the instruments, without naming them",
+        "offset, crossfall) without naming them",
     )
     parser.add_argument(
         "--exclude",

@@ -217,16 +217,18 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
     """Effects with which the errors ahead fall wherever they move them, though much is left.
 
     What does not stand tells that something is missing which moves the same: where an effect moves
-    a channel that such a one moves, it may be a part of that itself.
+    a channel that such a one moves, it may be a part of that itself, unless next to nothing of the
+    error is at stake.
     """
+    least = rules.taken * facts.missing[0]
     standing = {
         a.id
         for a in facts.added
-        if a.named
-        and a.taken >= rules.taken * facts.missing[0]
-        and falls(a.changes, a.changes_in_training, rules)
+        if a.named and a.taken >= least and falls(a.changes, a.changes_in_training, rules)
     }
-    unsure = {c for a in facts.added if a.id not in standing for c in a.moves}
+    unsure = {
+        c for a in facts.added if a.id not in standing and abs(a.taken) >= least for c in a.moves
+    }
     return frozenset(a.id for a in facts.added if a.id in standing and not a.moves & unsure)
 
 

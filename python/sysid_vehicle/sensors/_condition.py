@@ -23,6 +23,7 @@ __all__ = ["conditioned"]
 
 _ONE_FILTER = 0.15  # corner frequencies that differ by no more are of one kind of filter
 _EDGE_S = 0.5
+_DEVICES = (("vx_mps", "vy_mps"), ("yaw_rate_radps", "ax_mps2", "ay_mps2"))  # as a rule
 
 
 def conditioned(logs: Sequence[Log]) -> list[Log]:
@@ -61,10 +62,18 @@ def _spectra(log: Log) -> dict[str, NoiseSpectrum]:
 
 
 def _delays(found: Sequence[dict[str, NoiseSpectrum]]) -> dict[str, tuple[float, float]]:
-    """Corner and delay of each channel's filter; those of one kind share the figures."""
+    """Corner and delay of each channel's filter; those of one kind share the figures.
+
+    A device filters its channels alike. Where the noise of one falls in a way that is no low-pass
+    of its own (noise of the road, folded frequencies), that of the others is no safe one either:
+    one channel shifted by itself would be an error between them.
+    """
     own = {}
+    unclear = {c for spectra in found for c, s in spectra.items() if s.falls and not s.delay_s}
     for channel in MOVING:
         told = [s[channel] for s in found if channel in s]
+        if any(channel in device and unclear.intersection(device) for device in _DEVICES):
+            continue
         if told and all(s.delay_s for s in told):
             own[channel] = (
                 float(np.median([s.corner_hz for s in told])),

@@ -66,6 +66,11 @@ class NoiseSpectrum:
     every: int
 
     @property
+    def falls(self) -> bool:
+        """Whether the noise is not white."""
+        return bool(np.isfinite(self.corner_hz))
+
+    @property
     def gain(self) -> FloatArray:
         """Factor at each frequency that takes vibration down to the noise beside it."""
         ratio = self.power / self.smooth

@@ -73,8 +73,7 @@ def _of_what_is_left(study: Study) -> list[str]:
     if not study.fit.model.nuisances:
         found.append(
             "give the model the offsets that every measured log has (biases, a turned speed "
-            "sensor, crossfall, the place of the instruments): `model.with_nuisances()`, or "
-            "`--nuisances`"
+            "sensor, crossfall): `model.with_nuisances()`, or `--nuisances`"
         )
     apart = "; ".join(str(d) for d in study.disagreements[:_SHOWN])
     if apart:
