@@ -64,8 +64,8 @@ def is_hidden_by_noise(effect: Effect) -> bool:
 def from_typical(fit: Fit, c: Candidate, tests: int) -> Candidate:
     """The candidate fitted with noise of its own from its typical size, and tested by likelihood.
 
-    Its p-value is that of the likelihood ratio on one side, over the variance ratio of its score,
-    corrected for so many tests (Bonferroni).
+    Its p-value is that of the likelihood ratio, on one side where the parameter has one sign, over
+    the variance ratio of its score, corrected for so many tests (Bonferroni).
     """
     (p,) = c.effect.parameters
     model = fit.model.add(c.effect).with_values({f"{c.id}.{p.name}": p.typical})
@@ -74,7 +74,7 @@ def from_typical(fit: Fit, c: Candidate, tests: int) -> Candidate:
     except (NumericalError, np.linalg.LinAlgError):
         return c
     ratio = max(found.statistic, 0.0) / max(c.variance_ratio, 1.0)
-    alone = 0.5 * float(scipy.special.chdtrc(1, ratio))
+    alone = (0.5 if p.one_sided else 1.0) * float(scipy.special.chdtrc(1, ratio))
     return replace(found, finished=True, p_value=min(tests * alone, 1.0))
 
 

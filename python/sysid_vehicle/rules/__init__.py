@@ -2,7 +2,8 @@
 
 1. All effects are scored at once. There is evidence for an effect whose p-value, corrected for
    testing all of them, is below `alpha`. One that the fit copies (`retained`) is not testable.
-2. The best are refitted. A refit counts if it gains `price` BIC penalties, or ln n in nats.
+2. The best are refitted, and lags whatever they score where the best one leaves something
+   (`strict`). A refit counts if it gains `price` BIC penalties, or ln n in nats.
 3. It is accepted if the validation data confirm it (`accept`): two of three measures speak for it
    (`lean`, `clear`), or its likelihood alone (`sure`), and no error 1 to 5 s ahead grows (`worse`).
 4. Effects whose likelihoods differ by less than `apart` are confounded; validation data choose. An
@@ -18,7 +19,8 @@
 8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead,
    take up less than is left, or should have explained it.
    Beside much that is left names stay with which those errors fall wherever they move them
-   (`falls`), if nothing that was added beside them and does not stay moves the same channels.
+   (`falls`), if nothing that was added beside them and does not stay moves the same channels and
+   changes a share `taken` of those errors.
 9. The verdict follows from what is left and which names stand (`verdict`).
 10. `Rules` holds every limit with unit, meaning, and the benchmark that chose or judges it.
 
