@@ -17,6 +17,7 @@ GRAVITY_MPS2 = 9.81  # the package's
 # With 5 ms wheels that brake below 15 m/s shake, and accelerations are read twice as large.
 _DT_S = 0.002
 _STEER_RATE_RADPS = 0.8
+_AIR_KGPM3 = 1.225
 _SPEED_GAIN, _LEAST_AX, _MOST_AX = 1.0, -7.0, 4.0
 _NAMES = {"atan": "arctan", "fabs": "abs", "sin": "sin", "cos": "cos", "tan": "tan", "sqrt": "sqrt"}
 
@@ -48,6 +49,7 @@ def base_car(number: int) -> SimpleNamespace:
     parameters = importlib.import_module("vehiclemodels.vehicle_parameters")
     p = parameters.setup_vehicle_parameters(number)
     flat = {k: v for k, v in vars(p).items() if isinstance(v, int | float)}
+    flat["drag_area_m2"] = 0.0  # the package's cars have none
     return SimpleNamespace(**flat, tire=SimpleNamespace(**vars(p.tire)))
 
 
@@ -78,7 +80,8 @@ def drive(
 
     The driver steers by the curvature, the understeer gradient [rad s2/m] and feedback from the yaw
     rate. Returns channels of shape (n, drives) without noise; an accelerometer sits in the sprung
-    mass, and a drive that was lost ends in NaN.
+    mass, the wheel force is what the torques give less what spins the wheels up, and a drive that
+    was lost ends in NaN.
     """
     rhs, p = _equations(), _stacked(cars)
     wheelbase = np.asarray(p.a + p.b)
@@ -89,7 +92,9 @@ def drive(
     kept: dict[str, list[np.ndarray]] = {}
 
     def slope(state: np.ndarray, inputs: list[np.ndarray]) -> np.ndarray:
-        return np.array(rhs([_lanes(row) for row in state], inputs, p))
+        rate = np.array(rhs([_lanes(row) for row in state], inputs, p))
+        rate[3] -= 0.5 * _AIR_KGPM3 * np.asarray(p.drag_area_m2 / p.m) * state[3] ** 2
+        return rate
 
     with np.errstate(all="ignore"):
         for k in range(len(speed)):
@@ -104,6 +109,8 @@ def drive(
             inputs = [_lanes(rate), _lanes(push)]
             first = slope(x, inputs)
             felt = _felt(x, first)
+            spin_up = np.asarray(p.I_y_w / p.R_w) * first[23:27].sum(axis=0)
+            felt["fx_n"] = np.asarray(p.m) * push - spin_up
             for name, value in felt.items():
                 kept.setdefault(name, []).append(value)
             for piece in range(pieces):

@@ -12,7 +12,7 @@ file, line by line, and not done again.
 import argparse
 import json
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -72,7 +72,24 @@ MISSING = ("missing", "one of a group")
 Done = dict[str, Any]
 
 
-def study(name: str, which: str, seed: int) -> Done:
+@dataclass(frozen=True)
+class Truth:
+    """A car whose equations are known: what it always has, what may be hidden, how it is driven.
+
+    `improved` takes the name of what is hidden, that of the driving, and a seed.
+    """
+
+    always: dict[str, str]
+    cases: dict[str, Hidden]
+    driving: tuple[str, ...]
+    improved: Callable[[str, str, int], sv.Study]
+
+    def in_car(self, name: str) -> set[str]:
+        """All that a claim may name and be right."""
+        return set(self.always) | self.cases[name].named | self.cases[name].besides
+
+
+def improved(name: str, which: str, seed: int) -> sv.Study:
     """Improve the single track on one driving, judged on the other."""
     case = CASES[name]
     car = SPORTS_CAR.replace(case.values)
@@ -83,7 +100,12 @@ def study(name: str, which: str, seed: int) -> Done:
         to_log(car, on_manoeuvre(car, load, m), seed=2 * seed + i, steer_lag_s=case.lag_s)
         for i, m in enumerate(SETS[which])
     ]
-    done = sv.improve(sv.Model(single_track(SPORTS_CAR)), logs[0], logs[1], seed=seed)
+    return sv.improve(sv.Model(single_track(SPORTS_CAR)), logs[0], logs[1], seed=seed)
+
+
+def study(truth: Truth, name: str, which: str, seed: int) -> Done:
+    """One study, and what it said."""
+    done = truth.improved(name, which, seed)
     return {
         "hidden": name,
         "driving": which,
@@ -106,9 +128,9 @@ def claims_of(done: Done) -> dict[str, list[str]]:
     return {n: found[n][1] for n in done["added"] if found[n][0] in MISSING}
 
 
-def line_of(done: Done) -> str:
+def line_of(truth: Truth, done: Done) -> str:
     """One study: wrong claims in brackets, rivals behind a stroke, what was taken back behind -."""
-    right = in_car(done["hidden"])
+    right = truth.in_car(done["hidden"])
     claims = claims_of(done)
     shown = [
         (n if n in right else f"[{n}]") + "".join(f"|{rival}" for rival in group)
@@ -120,11 +142,6 @@ def line_of(done: Done) -> str:
         f"{done['hidden']:13s} {done['driving']:12s} {done['seed']:3d} {done['verdict']:17s} "
         f"{before:6.2f} -> {after:5.2f}  " + ", ".join(shown)
     )
-
-
-def in_car(name: str) -> set[str]:
-    """All that a claim may name and be right."""
-    return set(ALWAYS) | CASES[name].named | CASES[name].besides
 
 
 def told(text: str, outcomes: Iterable[bool]) -> None:
@@ -139,34 +156,34 @@ def told(text: str, outcomes: Iterable[bool]) -> None:
     )
 
 
-def summary(all_done: list[Done]) -> None:
+def summary(truth: Truth, all_done: list[Done]) -> None:
     """Print what the studies come to."""
     claims = [(d, n, g) for d in all_done for n, g in claims_of(d).items()]
-    sought = [d for d in all_done if CASES[d["hidden"]].named]
+    sought = [d for d in all_done if truth.cases[d["hidden"]].named]
 
     def names(d: Done, with_rivals: bool) -> bool:
         said = set(claims_of(d))
         if with_rivals:
             said |= {rival for group in claims_of(d).values() for rival in group}
-        return bool(said & CASES[d["hidden"]].named)
+        return bool(said & truth.cases[d["hidden"]].named)
 
-    told("claims that are in the car", (n in in_car(d["hidden"]) for d, n, _ in claims))
+    told("claims that are in the car", (n in truth.in_car(d["hidden"]) for d, n, _ in claims))
     told(
         "the same, rivals that are said not to be told apart counted",
-        (bool({n, *g} & in_car(d["hidden"])) for d, n, g in claims),
+        (bool({n, *g} & truth.in_car(d["hidden"])) for d, n, g in claims),
     )
     told("hidden effects named", (names(d, False) for d in sought))
     told("the same, rivals counted", (names(d, True) for d in sought))
-    for name in CASES:
+    for name in truth.cases:
         told(f"  {name}", (names(d, True) for d in sought if d["hidden"] == name))
     said = [(d, n) for d in all_done for n, (f, _) in d["verdicts"].items() if f in MISSING]
     told(
         "all that the verdicts call missing, added or not",
-        (n in in_car(d["hidden"]) for d, n in said),
+        (n in truth.in_car(d["hidden"]) for d, n in said),
     )
     told(
         "hidden effects among all that",
-        (bool({n for e, n in said if e is d} & CASES[d["hidden"]].named) for d in sought),
+        (bool({n for e, n in said if e is d} & truth.cases[d["hidden"]].named) for d in sought),
     )
     told(
         "of those not named: called unknown or partly explained",
@@ -178,9 +195,10 @@ def summary(all_done: list[Done]) -> None:
     )
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("hidden", nargs="*", metavar="HIDDEN", help=f"of {', '.join(CASES)}")
+def run(truth: Truth, says: str) -> None:
+    """Do the studies that the command line asks for, and print them."""
+    parser = argparse.ArgumentParser(description=says.split("\n")[0])
+    parser.add_argument("hidden", nargs="*", metavar="HIDDEN", help=f"of {', '.join(truth.cases)}")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="seed")
     parser.add_argument("--keep", type=Path, help="file of what was done")
@@ -191,20 +209,20 @@ def main() -> None:
         kept = [json.loads(line) for line in args.keep.read_text(encoding="utf-8").splitlines()]
     before = {(d["hidden"], d["driving"], d["seed"]): d for d in kept}
     print("always in the car:")
-    for effect, where in ALWAYS.items():
+    for effect, where in truth.always.items():
         print(f"  {effect:22s} {where}")
     all_done = []
     for seed in range(args.first, args.first + args.seeds):
-        for name in args.hidden or CASES:
-            for which in SETS:
-                done = before.get((name, which, seed)) or study(name, which, seed)
+        for name in args.hidden or truth.cases:
+            for which in truth.driving:
+                done = before.get((name, which, seed)) or study(truth, name, which, seed)
                 if args.keep is not None and (name, which, seed) not in before:
                     with args.keep.open("a", encoding="utf-8") as file:
                         file.write(json.dumps(done) + "\n")
                 all_done.append(done)
-                print(line_of(done), flush=True)
-    summary(all_done)
+                print(line_of(truth, done), flush=True)
+    summary(truth, all_done)
 
 
 if __name__ == "__main__":
-    main()
+    run(Truth(ALWAYS, CASES, tuple(SETS), improved), __doc__)

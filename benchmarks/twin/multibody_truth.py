@@ -1,0 +1,143 @@
+"""Does the diagnosis name what is physically in the multi-body car of another package?
+
+python benchmarks/twin/multibody_truth.py [HIDDEN ...] [--seeds 1] [--first 0] [--keep FILE]
+
+The car is one of `commonroad-vehicle-models` (29 states; `benchmarks/online/multibody.py`), another
+one by seed, driven in closed loop; claims are counted as in `diagnosis_truth.py`. What is in the
+car follows from its equations. Every tyre force and stiffness is in proportion to the wheel's load,
+so load sensitivity, and grip lost by lateral load transfer, are not in it. Nor are drag, rolling
+resistance, lift, aligning moment, or compliance of the steering. The vehicle file has the height of
+the sprung mass, by which the springs take the load transfer. Camber gives side force that jumps
+with the sign of the camber (`p_hy1`, `p_vy1`), for which the catalogue has no name.
+"""
+
+import sys
+from dataclasses import dataclass, field, fields
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+from diagnosis_truth import Hidden, Truth, run
+
+import sysid_vehicle as sv
+from sysid_vehicle import manoeuvres
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "online"))
+import multibody
+
+ALWAYS = {
+    "accelerometer_scale": "the accelerometer leans with the body: a_y + g roll, roll about a_y",
+    "body_attitude": "the sprung mass rolls and pitches, and the accelerometer with it",
+    "combined_slip": "Magic Formula with combined slip, r_bx1 to r_vy6",
+    "drive_yaw_moment": "a driven tyre pushes sideways, r_vy1 r_vy5 r_vy6 / p_kx1 = 0.025 N per N",
+    "tyre_relaxation": "camber and its side force wait for the body to roll, about 0.1 s",
+}
+
+
+@dataclass(frozen=True)
+class Other(Hidden):
+    """What is changed in the car, and in the log.
+
+    `payload_kg` lies 0.8 m behind the centre of mass; `values` are numbers of the car,
+    `factors` multiply some; the logged steering is `ratio` times the wheels'.
+    """
+
+    ratio: float = 1.0
+    factors: dict[str, float] = field(default_factory=dict)
+
+
+CASES = {
+    "nothing": Other(set()),
+    "drag": Other({"aero_drag"}, {"drag_area_m2": 1.0}),
+    "payload": Other({"mass", "cg_position", "yaw_inertia"}, payload_kg=200.0),
+    "yaw inertia": Other({"yaw_inertia"}, factors={"I_z": 1.3}),
+    "steering ratio": Other({"steer_ratio"}, ratio=1.1),
+    "steering lag": Other({"steer_lag"}, lag_s=0.06),
+}
+SETS = {
+    "steps and ramps, course": (
+        manoeuvres.step_steer((18.0, 28.0), (3.0, 6.5)),
+        manoeuvres.ramp_steer((18.0, 27.0), 7.5, 4.0),
+        manoeuvres.handling_course(40.0, 7.5),
+    ),
+    "sweep and lanes, lap": (
+        manoeuvres.sine_sweep(30.0, 25.0, 5.0),
+        manoeuvres.double_lane_change((20.0, 26.0)),
+        manoeuvres.lap(40.0, 7.5),
+    ),
+}
+_RATE_HZ = 100.0
+_BEHIND_M = 0.8
+
+
+def car_of(case: Other, number: int) -> SimpleNamespace:
+    """One of the package's cars with what is hidden in it."""
+    p = multibody.base_car(number)
+    for name, value in case.values.items():
+        setattr(p, name, value)
+    for name, factor in case.factors.items():
+        setattr(p, name, factor * getattr(p, name))
+    if case.payload_kg:
+        share = case.payload_kg / (p.m_s + case.payload_kg)
+        p.I_z += (1.0 - share) * case.payload_kg * _BEHIND_M**2
+        p.I_y_s += (1.0 - share) * case.payload_kg * _BEHIND_M**2
+        p.a, p.b = p.a + share * _BEHIND_M, p.b - share * _BEHIND_M
+        p.m, p.m_s = p.m + case.payload_kg, p.m_s + case.payload_kg
+    return p
+
+
+def workshop(number: int) -> sv.Vehicle:
+    """What is known of the car, with generic tyres."""
+    p = multibody.base_car(number)
+    return sv.Vehicle(
+        name=f"multi-body {number}",
+        mass_kg=p.m,
+        yaw_inertia_kgm2=p.I_z,
+        lf_m=p.a,
+        lr_m=p.b,
+        cg_height_m=p.h_s,
+        track_front_m=p.T_f,
+        track_rear_m=p.T_r,
+        drag_area_m2=0.0,
+        brake_front_share=p.T_sb,
+        drive_front_share=float(p.T_se),
+        tyre_front=sv.Tyre(),
+        tyre_rear=sv.Tyre(),
+    )
+
+
+@cache
+def driven(which: str, number: int) -> dict[str, np.ndarray]:
+    """Channels without noise of all cases, each in each drive; all at once, which is as fast."""
+    drives = SETS[which]
+    n = round(max(m.duration_s for m in drives) * _RATE_HZ)
+    time_s = np.arange(n) / _RATE_HZ
+    speed = np.column_stack([m.speed_mps(np.minimum(time_s, m.duration_s)) for m in drives])
+    # After its end a drive goes straight on until the others have ended.
+    lateral = np.column_stack([(time_s < m.duration_s) * m.lateral_mps2(time_s) for m in drives])
+    cars = [car_of(case, number) for case in CASES.values() for _ in drives]
+    speed, lateral = np.tile(speed, len(CASES)), np.tile(lateral, len(CASES))
+    return multibody.drive(cars, speed, lateral / speed**2, np.zeros(len(cars)))
+
+
+def improved(name: str, which: str, seed: int) -> sv.Study:
+    """Improve the single track on all drives of a set but the last, which judges."""
+    case, number = CASES[name], (2, 1, 3)[seed % 3]
+    channels, sensors, logs = driven(which, number), sv.SensorNoise(), []
+    first = list(CASES).index(name) * len(SETS[which])
+    for lane, manoeuvre in enumerate(SETS[which], first):
+        n = round(manoeuvre.duration_s * _RATE_HZ)
+        columns = {c: values[:n, lane].copy() for c, values in channels.items()}
+        steer = columns["steer_rad"]
+        columns["steer_rad"] = case.ratio * (steer + case.lag_s * np.gradient(steer, 1 / _RATE_HZ))
+        rng = np.random.default_rng([seed, lane])
+        for f in fields(sensors):
+            columns[f.name] += getattr(sensors, f.name) * rng.standard_normal(n)
+        columns["time_s"] = np.arange(n) / _RATE_HZ
+        logs.append(sv.Log.from_arrays(columns, name=manoeuvre.name, check=False))
+    return sv.improve(sv.Model(workshop(number)), logs[:-1], logs[-1], seed=seed)
+
+
+if __name__ == "__main__":
+    run(Truth(ALWAYS, CASES, tuple(SETS), improved), __doc__)
