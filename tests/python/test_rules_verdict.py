@@ -152,6 +152,12 @@ def test_an_effect_named_alone_should_have_explained_what_is_left() -> None:
     assert withdrawn(left) == {"mass": alone}
     assert verdict(left).verdict == "unknown"
     assert withdrawn(replace(left, fitted=of(0.005, 209.0))) == {}
+    # Where errors ahead fall throughout the effect is in the car, and something else too.
+    fallen = left.with_changes({"mass": (falling(), falling(-0.1, 0.1))})
+    assert withdrawn(fallen) == {}
+    assert verdict(fallen).verdict == "partly_explained"
+    spoilt = left.with_changes({"mass": (falling(0.01), falling(-0.1, 0.1))})
+    assert withdrawn(spoilt) == {"mass": alone}
     # Beside a proxy something else may be missing, which may be all that is left.
     proxy = replace(DRAG, finding="proxy")
     beside = replace(left, added=(MASS, proxy))

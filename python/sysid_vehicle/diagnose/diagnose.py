@@ -105,7 +105,8 @@ def diagnose(
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         known = {c.id for c in finished}
         hidden = [c for c in ranked if is_hidden_by_noise(c.effect) and c.id not in known]
-        if refits and hidden and _leaves_more(finished[:1], left, driving, rules):
+        asked = refits and hidden and time.perf_counter() < ends
+        if asked and _leaves_more(finished[:1], left, driving, rules):
             tried = pool.map(in_time(lambda c: from_typical(fit, c, len(ranked)), ends), hidden)
             finished += [c for c in tried if c.finished and c.p_value < rules.alpha]
     finished.sort(key=lambda c: -_merit(c, driving.samples))

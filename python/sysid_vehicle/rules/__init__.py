@@ -17,7 +17,8 @@
    implausible, or differs between pieces of the driving by a size that matters, or if something
    unknown does all that it does and more.
 8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead,
-   take up less than is left, or should have explained it.
+   take up less than is left, or should have explained it and do not
+   take the errors ahead down throughout.
    Beside much that is left names stay with which those errors fall wherever they move them
    (`falls`), if nothing that was added beside them and does not stay moves the same channels and
    changes a share `taken` of those errors.

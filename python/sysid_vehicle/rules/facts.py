@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 from .accept import Change
@@ -48,7 +49,7 @@ class Added:
         Of `Facts.missing`, what it took up in its turn.
     changes, changes_in_training : tuple of Change
         With it, of the errors 1 to 5 s ahead: on validation data, and on training data, where
-        errors of one step were fitted. Nothing where little is left.
+        errors of one step were fitted. Only asked where something is left.
     """
 
     id: str
@@ -101,6 +102,15 @@ class Facts:
     excited: bool = True
     structure: tuple[float, float] = (1.0, 0.0)
     small: bool = False
+
+    def with_changes(
+        self, changes: Mapping[str, tuple[tuple[Change, ...], tuple[Change, ...]]]
+    ) -> Facts:
+        """The same with changes by effect: on validation data, and on training data."""
+        none: tuple[tuple[Change, ...], tuple[Change, ...]] = ((), ())
+        told = ((a, *changes.get(a.id, none)) for a in self.added)
+        added = (replace(a, changes=c, changes_in_training=t) for a, c, t in told)
+        return replace(self, added=tuple(added))
 
 
 @dataclass(frozen=True)

@@ -193,8 +193,8 @@ def _withdrawn(
     """Names that are not safe beside something that is left."""
     before, after = facts.missing
     share = share_of(before, after)
-    stands = _standing(facts, rules) if share < rules.most else frozenset()
-    if stands:
+    stands = _standing(facts, rules)
+    if share < rules.most and stands:
         # A real road, and what nobody knows of a car, leave much beside the right effect too. What
         # only stands in for it serves some channels and moments at the price of others.
         because = (
@@ -208,13 +208,13 @@ def _withdrawn(
     taken = {a.id: a.taken for a in facts.added}
     small = smaller_than(after, taken, stand_ins)
     first = Withdrawn(small, "what is left unexplained is larger", names)
-    alone = _alone(facts, rules, small)
+    alone = _alone(facts, rules, small) - stands
     because = "were it what is missing, nothing would be left"
     return [first, Withdrawn(alone, because, names)]
 
 
 def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
-    """Effects with which the errors ahead fall wherever they move them, though much is left.
+    """Effects with which the errors ahead fall wherever they move them, whatever is left.
 
     What does not stand tells that something is missing which moves the same: where an effect moves
     a channel that such a one moves, it may be a part of that itself, unless next to nothing of the
@@ -234,6 +234,8 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
 
 def _alone(facts: Facts, rules: Rules, small: frozenset[str]) -> frozenset[str]:
     """The effect that is named, where it is one only, if it should have explained what is left.
+
+    A real car lacks more than one: that has no say where the effect stands (`_standing`).
 
     A proxy beside it tells that something else is missing too. That may be all that is left, unless
     it moves what the effect moves.

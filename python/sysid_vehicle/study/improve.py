@@ -21,7 +21,7 @@ from ..estimate import Driving
 from ..identify import Fit, driving_of, explaining, identify
 from ..log import Log, check_excitation, several_logs
 from ..model import Model
-from ..rules import USUAL, Change, Decision, Rules, grade, verdict
+from ..rules import USUAL, Change, Decision, Rules, grade, something_left, verdict
 from ..sensors import SensorCheck, made_ready, put_right
 from .added import AddedEffect
 from .clock import in_time
@@ -165,7 +165,6 @@ def improve(
             every = _together(fit.driving, driving_of(both, test_driving))
             rivals = instead(both, every, _new(fits), rules)
             explained = beyond_noise_ahead(fits, test_driving)
-        much_left = explained is not None and explained.share < rules.most
         told = judge(
             fit,
             scored=(last.scores, last.family) if last.fit is fit else None,
@@ -190,9 +189,10 @@ def improve(
             candidate=min((c.p_value for c in last.ranking), default=1.0),
             excited=_excited(train_driving),
             structure=(pattern.anywhere, pattern.everywhere),
-            changes=_changes(fits, test_driving) if much_left else {},
             small=sizes is not None and within(horizons([fit], [""], test_driving), sizes),
         )
+        if len(fits) > 1 and something_left(facts, rules):
+            facts = facts.with_changes(_changes(fits, test_driving))
         decision = verdict(facts, rules)
         alone, told = told, in_the_light_of(decision, told)
         return Study(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Sequence
 
 from ..compare import Comparison
 from ..diagnose import Omnibus, Verdicts
 from ..identify import Fit
-from ..rules import Added, Change, Decision, Facts
+from ..rules import Added, Decision, Facts
 from .horizons import Beyond
 
 __all__ = ["facts_of", "in_the_light_of"]
@@ -26,7 +25,6 @@ def facts_of(
     excited: bool,
     small: bool = False,
     structure: tuple[float, float] = (1.0, 0.0),
-    changes: Mapping[str, tuple[tuple[Change, ...], tuple[Change, ...]]] = MappingProxyType({}),
 ) -> Facts:
     """Collect what is known of a final model.
 
@@ -42,8 +40,6 @@ def facts_of(
         What every fit leaves of the errors ahead; None where nothing was added.
     fitted, together, candidate, excited, small, structure
         As in `Facts`.
-    changes : mapping
-        By effect, those on validation and on training data, as in `Added`.
     """
     missing = (0.0,) if explained is None else explained.squares
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
@@ -60,7 +56,6 @@ def facts_of(
                 v.group,
                 frozenset(v.effect.moves.split(", ")),
                 taken.get(v.effect.id, 0.0),
-                *changes.get(v.effect.id, ()),
             )
             for v in told.all
             if v.effect.id in added
