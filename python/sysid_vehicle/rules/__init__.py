@@ -16,11 +16,10 @@
 7. Nothing left: what was added explains it. An added effect is not named if its value is physically
    implausible, or differs between pieces of the driving by a size that matters, or if something
    unknown does all that it does and more.
-8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead,
-   take up less than is left, or should have explained it and do not
-   take the errors ahead down throughout.
-   Beside much that is left names stay with which those errors fall wherever they move them
-   (`falls`), if nothing that was added beside them and does not stay moves the same channels and
+8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead, or
+   less than is left; so is a single one that should have explained it too, unless those errors
+   fall with it wherever it moves them (`falls`). Beside much that is left names stay with which
+   they do, if nothing that was added beside them and does not stay moves the same channels and
    changes a share `taken` of those errors.
 9. The verdict follows from what is left and which names stand (`verdict`).
 10. `Rules` holds every limit with unit, meaning, and the benchmark that chose or judges it.
