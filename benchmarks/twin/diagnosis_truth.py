@@ -12,7 +12,7 @@ file, line by line, and not done again.
 import argparse
 import json
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -80,7 +80,7 @@ class Truth:
     """
 
     always: dict[str, str]
-    cases: dict[str, Hidden]
+    cases: Mapping[str, Hidden]
     driving: tuple[str, ...]
     improved: Callable[[str, str, int], sv.Study]
 

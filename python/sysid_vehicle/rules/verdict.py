@@ -208,6 +208,7 @@ def _withdrawn(
     taken = {a.id: a.taken for a in facts.added}
     small = smaller_than(after, taken, stand_ins)
     first = Withdrawn(small, "what is left unexplained is larger", names)
+    # A real car lacks more than one effect: what stands need not have explained what is left.
     alone = _alone(facts, rules, small) - stands
     because = "were it what is missing, nothing would be left"
     return [first, Withdrawn(alone, because, names)]
@@ -234,8 +235,6 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
 
 def _alone(facts: Facts, rules: Rules, small: frozenset[str]) -> frozenset[str]:
     """The effect that is named, where it is one only, if it should have explained what is left.
-
-    A real car lacks more than one: that has no say where the effect stands (`_standing`).
 
     A proxy beside it tells that something else is missing too. That may be all that is left, unless
     it moves what the effect moves.

@@ -13,8 +13,8 @@ import numpy as np
 import scipy
 
 from .._arrays import FloatArray, filled
-from ..diagnose import Causes, Diagnosis
-from ..diagnose.clocks import CLOCKS, Clock
+from ..diagnose import Diagnosis
+from ..diagnose.clocks import CLOCKS
 from ..diagnose.delay import delayed, pieces_of
 from ..diagnose.evidence import Evidence
 from ..errors import NumericalError
@@ -37,10 +37,10 @@ def in_time(dx: Diagnosis, test: Driving) -> tuple[Driving, Driving] | None:
     test : Driving
         Validation data.
     """
-    # Refits only take sets away: where none is proposed, there is nothing to confirm.
-    if not _alone(dx.proposed):
+    # Refits narrow the proposed sets and take some away: a clock that is in none stays in none.
+    if not any(c.name in s.effects for c in CLOCKS for s in dx.proposed.sets):
         return None
-    shown = _alone(dx.causes)
+    shown = [c for c in CLOCKS if any(s.effects == (c.name,) for s in dx.causes.sets)]
     if not shown:
         return None
     evidence = Evidence(dx.fit, dx.driving)
@@ -54,11 +54,6 @@ def in_time(dx: Diagnosis, test: Driving) -> tuple[Driving, Driving] | None:
     statistic = 2.0 * (fit.log_likelihood - dx.fit.log_likelihood)
     price = dx.rules.price * len(late) * float(np.log(train.samples))
     return (train, other) if statistic > price and gain > 0.0 else None
-
-
-def _alone(causes: Causes) -> list[Clock]:
-    """Clocks that stand alone in a credible set."""
-    return [c for c in CLOCKS if any(s.effects == (c.name,) for s in causes.sets)]
 
 
 def _refined(evidence: Evidence, column: int, guess_s: float) -> float:
