@@ -12,6 +12,7 @@ from .noise import (
     noise_range,
     promised_by_noise,
 )
+from .turning import turning, turning_blocks
 
 __all__ = [
     "MEASURED",
@@ -32,5 +33,7 @@ __all__ = [
     "nis_check",
     "noise_range",
     "promised_by_noise",
+    "turning",
+    "turning_blocks",
     "whiteness_check",
 ]

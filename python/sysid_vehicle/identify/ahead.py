@@ -23,7 +23,7 @@ import scipy
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
-from ..estimate import Driving
+from ..estimate import Driving, turning
 from ..model import Model
 from .box import free_box, free_prior
 from .estimates import wald
@@ -35,7 +35,8 @@ __all__ = ["predicting_ahead"]
 
 _MOST = 400  # windows
 # Windows that err by more than so many times the typical error count as lost, but of all windows
-# no more than a tenth: they are left out (trimmed squares, Rousseeuw, JASA 1984).
+# no more than a tenth: they are left out (trimmed squares, Rousseeuw, JASA 1984). Both are those of
+# windows in which the car turns: beside a straight every corner would be lost.
 _LOST, _KEPT = 3.0, 0.9
 _PASSES, _ROUNDS = 3, 60
 _SETTLED = 1e-3  # observations
@@ -121,6 +122,7 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     box = free_box(fit.model)
     driving, model = fit.driving, fit.model
     windows = _windows_of(driving, horizon_s)
+    turns = _turns(driving, windows)
     noise = _blind_noise(driving)
     known = model.parameters
     prior = free_prior(model)
@@ -131,10 +133,11 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
         motion = as_float64(whole.trace(p, fit.noise.vector(), True)["state"])
         every = driving.windows(model, windows, motion)
         squares = _squares(every.residuals(p, every.freeze(p, noise)), windows)
-        most = max(_LOST**2 * float(np.median(squares)), float(np.quantile(squares, _KEPT)))
+        typical = float(np.median(squares[turns]))
+        most = max(_LOST**2 * typical, float(np.quantile(squares[turns], _KEPT)))
         kept = [w for w, square in zip(windows, squares, strict=True) if square <= most]
         counted = sorted(kept, key=lambda window: window[::-1])
-        errors = _counting(driving, model, counted, motion, float(np.median(squares)))
+        errors = _counting(driving, model, counted, motion, typical)
         gains = errors.freeze(p, noise)
         found = minimise(
             Penalised(errors, prior), p, gains, box, rounds=_ROUNDS, tolerance=_SETTLED
@@ -195,6 +198,13 @@ def _windows_of(driving: Driving, horizon_s: float) -> list[tuple[int, int]]:
     if len(found) <= _MOST:
         return found
     return [found[i] for i in np.linspace(0, len(found) - 1, _MOST).round().astype(int)]
+
+
+def _turns(driving: Driving, windows: list[tuple[int, int]]) -> npt.NDArray[np.bool_]:
+    """In which windows the car turns half of the time; all, where it does in none."""
+    turned = np.concatenate([[0], np.cumsum(turning(driving))])
+    found = np.array([2 * (turned[at + size] - turned[at]) >= size for at, size in windows])
+    return found if found.any() else ~found
 
 
 def _blind_noise(driving: Driving) -> FloatArray:

@@ -1,7 +1,8 @@
 """Errors some seconds ahead, in the units of the channels, block by block.
 
 Medians over blocks of the driving: one spin decides nothing. Where two models are compared, block
-is held against block.
+is held against block. Lateral errors count where the car turns, and blocks hold equal times of
+that: on a straight every model predicts that nothing happens.
 """
 
 from __future__ import annotations
@@ -18,9 +19,8 @@ from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._memo import remembered
 from .._text import html_table, number, text_table
-from ..diagnose import blocks
 from ..errors import NumericalError
-from ..estimate import MEASURED, UNITS, Driving, NoiseModel
+from ..estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_blocks
 from ..identify import Fit
 from ..identify.ahead import of_few
 from ..rules import Change, share_of
@@ -41,8 +41,9 @@ __all__ = [
 
 LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2")
 PREDICTED = ("vx_mps", "ax_mps2", *LATERAL)
+_LATERAL = [PREDICTED.index(c) for c in LATERAL]
 AHEAD = (0.5, 1.0, 2.0, 5.0)
-_BLOCK_S, _FEWEST = 5.0, 6
+_FEWEST = 5  # blocks that show a change
 _DRAWS = 300
 _APART = 0.1  # of the horizon, between predictions
 _NORMAL = 1.4826  # standard deviation over the median absolute deviation
@@ -63,8 +64,9 @@ class Horizons:
     channels : tuple of str
         Those that were measured.
     error : array, shape (steps, horizons, channels)
-        Median over blocks of about 5 s of their root mean square errors; NaN where the driving is
-        too short, infinite where a model lost the car in most blocks.
+        Median over blocks of about 5 s of their root mean square errors, lateral ones where the
+        car turns (`sysid_vehicle.estimate.turning`); NaN where the driving is too short, infinite
+        where a model lost the car in most blocks.
     low, high : array, shape (steps, horizons, channels)
         First and last decile over the blocks.
     noise : array, shape (channels,)
@@ -291,9 +293,10 @@ def _ahead(
 
 
 def _by_block(e: FloatArray, driving: Driving) -> FloatArray:
-    """Root mean squares, shape (blocks, horizons, channels)."""
-    starts = blocks(driving, driving.usable_s / _number_of_blocks(driving))
+    """Root mean squares, shape (blocks, horizons, channels); lateral ones where the car turns."""
+    starts = turning_blocks(driving)
     there = ~np.isnan(e)
+    there[..., _LATERAL] &= turning(driving)[:, None]
     squares = np.add.reduceat(np.where(there, e, 0.0) ** 2, starts, axis=1)
     count = np.add.reduceat(there.astype(float), starts, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -326,17 +329,12 @@ def typical_error(
 
     Infinite where the model loses the car in most blocks.
     """
-    columns = [PREDICTED.index(c) for c in LATERAL]
     found = []
     for by_block in block_errors(fit, noise, driving, tuple(horizons_s)).swapaxes(0, 1):
-        by_block = by_block[:, columns]
+        by_block = by_block[:, _LATERAL]
         known = ~np.isnan(by_block).all(axis=0)
         found += list(np.nanmedian(by_block[:, known], axis=0))
     return float(np.mean(np.log(found))) if found else np.inf
-
-
-def _number_of_blocks(driving: Driving) -> int:
-    return max(round(driving.usable_s / _BLOCK_S), _FEWEST)
 
 
 def changes(
@@ -369,7 +367,7 @@ def changes(
             known = (one[:, j] > 0.0) & (other[:, j] > 0.0)
             # Of a block that both models lose there is nothing to be learnt.
             known &= np.isfinite(one[:, j]) | np.isfinite(other[:, j])
-            if np.count_nonzero(known) < _FEWEST - 1:
+            if np.count_nonzero(known) < _FEWEST:
                 continue
             with np.errstate(divide="ignore", over="ignore"):
                 ratio = np.log(other[known, j]) - np.log(one[known, j])

@@ -22,11 +22,10 @@ from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._text import html_paragraph, html_table, number, text_table
 from .._threads import in_parallel
-from ..diagnose import blocks
 from ..diagnose.ceiling import Inputs, folds, ridge
 from ..diagnose.coordinates import begins
 from ..errors import NumericalError
-from ..estimate import MEASURED, UNITS, Driving, NoiseModel
+from ..estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_blocks
 from ..identify import Fit, driving_of
 from ..rules import Share, share_between
 
@@ -37,7 +36,6 @@ AHEAD = (0.0, 0.5, 1.0, 2.0, 5.0)
 _UNITS = {**UNITS, "path_m": "m"}
 _WORDS = {"vy_mps": "v_y", "yaw_rate_radps": "yaw rate", "ay_mps2": "a_y", "path_m": "path"}
 _LEAST_APART_S, _APART = 0.1, 0.1  # between predictions; the latter of the horizon
-_BLOCK_S, _FEWEST = 5.0, 6
 _DRAWS = 300
 _LONG_S = 1.0  # horizons of which the share of all is
 _FEW = 30  # predictions that a regression needs
@@ -61,8 +59,8 @@ class Shares:
     horizons_s : tuple of float
         0 is one sample.
     baseline, final, ceiling : array, shape (3, horizons, channels)
-        First decile, median and last decile over blocks of driving; NaN where the driving is too
-        short.
+        First decile, median and last decile over blocks of turning (`Horizons`); NaN where the
+        driving is too short.
     noise : array, shape (channels,)
         Standard deviation of the sensors; NaN of the path.
     share : tuple of tuple of Share
@@ -282,12 +280,12 @@ def _squares(
 
 
 def _by_block(driving: Driving, at: npt.NDArray[np.intp], errors: FloatArray) -> FloatArray:
-    count = max(round(driving.usable_s / _BLOCK_S), _FEWEST)
-    starts = blocks(driving, driving.usable_s / count)
+    starts = turning_blocks(driving)
     block = np.searchsorted(starts, at, side="right") - 1
     out = np.full((len(starts), errors.shape[1]), np.nan)
+    turns = turning(driving)[at]
     for k in range(errors.shape[1]):
-        known = np.isfinite(errors[:, k])
+        known = np.isfinite(errors[:, k]) & turns
         number_of = np.bincount(block[known], minlength=len(starts))
         total = np.bincount(block[known], errors[known, k] ** 2, minlength=len(starts))
         out[number_of > 0, k] = (total / np.maximum(number_of, 1))[number_of > 0]

@@ -1,0 +1,77 @@
+"""When the car turns: elsewhere there is no lateral motion to predict."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from .._arrays import FloatArray
+from .._memo import remembered
+from .driving import Driving
+
+__all__ = ["turning", "turning_blocks"]
+
+_AROUND_S = 0.5  # on either side
+_LEAST = 0.25  # of the root mean square over all driving
+_BLOCK_S, _FEWEST = 5.0, 6
+
+_Bools = npt.NDArray[np.bool_]
+
+
+@remembered(16)
+def turning(driving: Driving) -> _Bools:
+    """At which samples the car turns.
+
+    There the yaw rate, or the lateral acceleration v_x r, has in the second around the sample a
+    quarter at least of its root mean square over all the driving. A log that is straight for most
+    of the time would else be judged by what every model predicts: that nothing happens.
+
+    Parameters
+    ----------
+    driving : Driving
+
+    Returns
+    -------
+    array of bool, shape (samples,)
+        All samples, where the car never turns more than its sensors scatter.
+    """
+    r = driving.channel("yaw_rate_radps")
+    v = driving.channel("vx_mps")
+    found = np.zeros(driving.samples, dtype=bool)
+    for motion in (r, np.where(np.isfinite(v), v, 0.0) * r):
+        known = np.isfinite(motion)
+        squares = np.where(known, motion, 0.0) ** 2
+        least = _LEAST**2 * float(squares.sum()) / max(int(known.sum()), 1)
+        found |= _around(squares, known.astype(float), driving) >= least
+    return found
+
+
+def _around(squares: FloatArray, known: FloatArray, driving: Driving) -> FloatArray:
+    """Mean square in the second around each sample, within its stretch."""
+    out = np.zeros(len(squares))
+    at = 0
+    for s in driving.stretches:
+        size = s.where.stop - s.where.start
+        reach = max(round(_AROUND_S * driving.logs[s.log].rate_hz), 1)
+        k = np.arange(size)
+        first, last = np.maximum(k - reach, 0), np.minimum(k + reach + 1, size)
+        sums, counts = (
+            np.concatenate([[0.0], np.cumsum(x[at : at + size])]) for x in (squares, known)
+        )
+        count = counts[last] - counts[first]
+        out[at : at + size] = (sums[last] - sums[first]) / np.maximum(count, 1.0)
+        at += size
+    return out
+
+
+@remembered(16)
+def turning_blocks(driving: Driving) -> npt.NDArray[np.intp]:
+    """First samples of blocks that hold about five seconds of turning each.
+
+    Where the car turns for less than half a minute there are six shorter ones.
+    """
+    seconds = np.cumsum(turning(driving) / driving.sample_rate_hz)
+    count = max(round(float(seconds[-1]) / _BLOCK_S), _FEWEST)
+    middle = seconds - 0.5 / driving.sample_rate_hz
+    block = np.maximum(np.floor(count * middle / seconds[-1]), 0.0)
+    return np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1])
