@@ -24,6 +24,7 @@ from sysid_vehicle.identify import predicting_ahead
 from sysid_vehicle.rules import USUAL, Change
 from sysid_vehicle.study.horizons import changes
 from sysid_vehicle.study.predicting import Predicting
+from sysid_vehicle.study.waterfall import look_ahead
 
 STIFFNESS = ("cornering stiffness front", "cornering stiffness rear")
 
@@ -102,6 +103,20 @@ def test_without_lateral_speed_windows_begin_with_the_smoothed_one(fit: Fit, alt
     blind = predicting_ahead(identify(fit.model, log, starts=1))
     for name in STIFFNESS:
         assert blind[name].value == pytest.approx(fit[name].value, rel=0.05)
+
+
+def test_a_channel_that_shakes_decides_little(fit: Fit, start: Model, altered) -> None:
+    """Vibration of 4 m/s2 in a_y, and a yaw rate that tells another stiffness than a_y does."""
+    log = fit.driving.logs[0]
+    noise = np.random.default_rng(3).standard_normal(log.n)
+    shaken = altered(log, ay_mps2=1.2 * log["ay_mps2"] + 4.0 * noise)
+    calm = altered(log, ay_mps2=1.2 * log["ay_mps2"])
+    off = {}
+    for name, driven in (("shaken", shaken), ("calm", calm)):
+        ahead = predicting_ahead(identify(start, driven, starts=1))
+        own = look_ahead(ahead, fit.noise.floor(), fit.driving, 2.0, apart=0.1)[:, 2]
+        off[name] = float(np.sqrt(np.nanmean(own**2)))
+    assert off["shaken"] < 0.7 * off["calm"]
 
 
 def test_what_cannot_be_asked_is_refused(fit: Fit, ahead: Fit, lap: Log, start: Model) -> None:

@@ -23,7 +23,7 @@ import scipy
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
-from ..estimate import Driving, turning
+from ..estimate import Driving, NoiseModel, turning
 from ..model import Model
 from .box import free_box, free_prior
 from .estimates import wald
@@ -42,6 +42,7 @@ _PASSES, _ROUNDS = 3, 60
 _SETTLED = 1e-3  # observations
 _BLOCK_S, _FEWEST = 10.0, 6  # windows of one such time are wrong alike; fewest such times
 _TINY = 1e-300
+_ERRS = 0.1  # of the motion: what a fair model leaves; a car whose a_y shakes by 4 m/s2 chose it
 _BLIND = 1e4  # standard deviations of a channel: a sensor that corrects nothing
 _STILL = 1e-6  # noise of a motion that is certain
 
@@ -97,9 +98,11 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     """Fit the free parameters to predictions over windows, from a fit of the likelihood.
 
     Each window begins with the smoothed motion, and from there on knows steering and wheel force
-    alone. Errors count in standard deviations of their channel over the driving. Windows in which
-    the model loses the car do not count, a tenth at most. Standard errors are those of windows that
-    are wrong alike for ten seconds (sandwich of Huber and White over such blocks).
+    alone. Errors count in standard deviations of their channel over the driving, together with ten
+    times the noise of its sensor: beside an accelerometer that shakes other channels decide.
+    Windows in which the model loses the car do not count, a tenth at most. Standard errors are
+    those of windows that are wrong alike for ten seconds (sandwich of Huber and White over such
+    blocks).
 
     Parameters
     ----------
@@ -123,7 +126,7 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     driving, model = fit.driving, fit.model
     windows = _windows_of(driving, horizon_s)
     turns = _turns(driving, windows)
-    noise = _blind_noise(driving)
+    noise = _blind_noise(driving, fit.noise.floor())
     known = model.parameters
     prior = free_prior(model)
     whole = driving.problem(model)
@@ -207,11 +210,18 @@ def _turns(driving: Driving, windows: list[tuple[int, int]]) -> npt.NDArray[np.b
     return found if found.any() else ~found
 
 
-def _blind_noise(driving: Driving) -> FloatArray:
-    """Noise with which a filter only predicts, and whitens errors by the spread of the channels."""
+def _blind_noise(driving: Driving, noise: NoiseModel) -> FloatArray:
+    """Noise with which a filter only predicts, and whitens errors by what a model may err.
+
+    That is a share of the motion, and the noise of the sensor, both told by the spread of the
+    channel.
+    """
+    sensor = np.array(noise.sensor)
     spread = np.array(
         [np.std(y[np.isfinite(y)]) if np.isfinite(y).any() else 1.0 for y in driving.measured.T]
     )
+    motion = np.maximum(spread**2 - sensor**2, 0.0)
+    spread = np.sqrt(motion + (sensor / _ERRS) ** 2)
     spread[~(spread > 0.0)] = 1.0
     return as_float64(
         [*(_BLIND * spread), *(_STILL,) * 3, 0.0, 0.0, 0.0, 0.1, 0.1, 0.1, 0.0, 0.0, 5.0]
