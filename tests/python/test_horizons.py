@@ -21,7 +21,7 @@ from sysid_vehicle.study.horizons import (
     changes,
     horizons,
 )
-from sysid_vehicle.study.matters import sizes_that_matter, within
+from sysid_vehicle.study.matters import sizes_that_matter, sufficient, within
 from sysid_vehicle.study.validation import AHEAD, at_its_best
 from sysid_vehicle.study.waterfall import look_ahead
 
@@ -129,6 +129,16 @@ def test_errors_smaller_than_matters(fit: Fit, late: Fit, course: Log) -> None:
     assert given["yaw_rate_radps"] == pytest.approx(np.radians(2.0))
     assert given["vy_mps"] == 0.3
     assert given["ay_mps2"] == pytest.approx(0.980665)
+
+
+def test_parameters_fitted_to_predictions_may_be_sufficient(fit: Fit, course: Log) -> None:
+    driving, usual = Driving.of(course), sizes_that_matter({})
+    assert sufficient(fit, driving, usual) is fit
+    bent = replace(fit, model=fit.model.with_values({"B_front": 0.5 * fit.model.value("B_front")}))
+    found = sufficient(bent, driving, usual)
+    assert found is not None
+    assert found.horizon_s == validation.AHEAD_S
+    assert sufficient(fit, driving, dict.fromkeys(usual, 1e-6)) is None
 
 
 @pytest.mark.parametrize(

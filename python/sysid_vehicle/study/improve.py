@@ -25,8 +25,8 @@ from ..rules import USUAL, Change, Decision, Rules, grade, something_left, verdi
 from ..sensors import SensorCheck, made_ready, put_right
 from .added import AddedEffect
 from .clock import in_time
-from .horizons import changes, horizons
-from .matters import sizes_that_matter, within
+from .horizons import changes
+from .matters import sizes_that_matter, sufficient
 from .search import Search, Trail, kept
 from .steps import way
 from .structure import structure
@@ -96,7 +96,8 @@ def improve(
     matters : mapping, optional
         Errors that matter, such as ``{"yaw_rate": "0.5deg/s"}`` (`sizes_that_matter`); those not
         given have usual sizes. A baseline whose errors 0.5 to 5 s ahead on validation data are all
-        smaller is adequate, whatever is left. By default whatever is shown to be left counts.
+        smaller, as the likelihood fits it or as predictions do, is adequate, whatever is left. By
+        default whatever is shown to be left counts.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
     progress : bool, optional
@@ -189,7 +190,7 @@ def improve(
             candidate=min((c.p_value for c in last.ranking), default=1.0),
             excited=_excited(train_driving),
             structure=(pattern.anywhere, pattern.everywhere),
-            small=sizes is not None and within(horizons([fit], [""], test_driving), sizes),
+            small=sizes is not None and sufficient(fit, test_driving, sizes) is not None,
         )
         if len(fits) > 1 and something_left(facts, rules):
             facts = facts.with_changes(_changes(fits, test_driving))

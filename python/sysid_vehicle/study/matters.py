@@ -9,11 +9,13 @@ import numpy as np
 
 from .._arguments import real
 from ..errors import InvalidInput, near_names
-from ..estimate import UNITS
+from ..estimate import UNITS, Driving
+from ..identify import Fit
 from ..read._units import factor_to
-from .horizons import PREDICTED, Horizons
+from .horizons import PREDICTED, Horizons, horizons
+from .validation import fitted_ahead
 
-__all__ = ["USUAL_SIZES", "sizes_that_matter", "within"]
+__all__ = ["USUAL_SIZES", "sizes_that_matter", "sufficient", "within"]
 
 _NAMES = {
     "vx": "vx_mps",
@@ -75,4 +77,17 @@ def within(errors: Horizons, sizes: Mapping[str, float]) -> bool:
     """Whether no median error, beyond the noise of the sensors, is as large as matters."""
     most = np.array([sizes[c] for c in errors.channels])
     beyond = errors.error[-1] ** 2 - errors.noise**2
-    return bool(np.all((beyond < most**2) | np.isnan(beyond)))
+    known = ~np.isnan(beyond)
+    return bool(known.any() and np.all((beyond < most**2)[known]))
+
+
+def sufficient(fit: Fit, test: Driving, sizes: Mapping[str, float]) -> Fit | None:
+    """The fit whose errors 0.5 to 5 s ahead on validation data are all smaller than matters.
+
+    The one given, or the same model fitted to predictions of the training data; None where neither
+    will do.
+    """
+    for found in (fit, fitted_ahead(fit)):
+        if found is not None and within(horizons([found], [""], test), sizes):
+            return found
+    return None

@@ -10,7 +10,7 @@ from .._text import number, with_error
 from ..estimate import UNITS
 from ..rules import NONE_GONE
 from .horizons import LATERAL
-from .matters import sizes_that_matter, within
+from .matters import sizes_that_matter, sufficient
 from .validation import AHEAD_S
 
 if TYPE_CHECKING:
@@ -38,10 +38,8 @@ def ahead(study: Study) -> str:
 
 
 def small(study: Study) -> bool:
-    """Whether errors 0.5 to 5 s ahead on validation data are all within the usual sizes."""
-    errors = study.horizons
-    seen = np.isfinite(errors.error[-1]).any() and not np.isinf(errors.error[-1]).any()
-    return bool(seen) and within(errors, sizes_that_matter({}))
+    """Whether errors 0.5 to 5 s ahead on validation data can all be within the usual sizes."""
+    return sufficient(study.fit, study.validation, sizes_that_matter({})) is not None
 
 
 def nuisances(study: Study) -> list[str]:

@@ -158,7 +158,12 @@ class Study:
         if self.verdict == "adequate" and seen:
             if disturbance(self):
                 return "what is left is disturbance: no function of the driving predicts it"
-            return "what is left is smaller, 0.5 to 5 s ahead, than the errors that matter"
+            helps = self.predicting is not None and self.predicting.helps
+            how = " with parameters fitted to predictions (`study.predicting.final`)"
+            return (
+                "what is left is smaller, 0.5 to 5 s ahead, than the errors that matter"
+                f"{how if helps else ''}"
+            )
         return _MEANING[self.verdict]
 
     @property
