@@ -134,16 +134,11 @@ void register_vehicle(py::module_& m) {
             "drive",
             [](const Vehicle14& v, const Driver& driver, const std::array<double, 2>& pedals,
                const Array& references, const Array& base, double dt) {
-                const auto n = references.ndim() == 2 ? references.shape(0) : 0;
-                if (n < 2) throw std::invalid_argument("references: expected two samples or more");
-                const double* r = matrix(references, n, 3, "references");
+                const std::vector<Reference> wanted = references_of(references);
                 const Input14* u = inputs_of(base);
-                if (base.shape(0) != n) throw std::invalid_argument("base: as long as references");
+                if (base.shape(0) != references.shape(0))
+                    throw std::invalid_argument("base: as long as references");
                 check_driver(driver, step_of(dt));
-                std::vector<Reference> wanted;
-                wanted.reserve(static_cast<std::size_t>(n));
-                for (py::ssize_t k = 0; k < n; ++k)
-                    wanted.push_back({r[3 * k], r[3 * k + 1], r[3 * k + 2]});
                 const Drive14 out = unlocked(
                     [&] { return drive14(v, driver, {pedals[0], pedals[1]}, wanted, u, dt); });
                 return py::make_tuple(copy_of(out.inputs, kTwinInputs),
@@ -292,10 +287,6 @@ void register_observers(py::module_& m) {
 }  // namespace
 
 void register_twin(py::module_& m) {
-    m.attr("TWIN_STATES") = kTwinStatesWithTyres;
-    m.attr("TWIN_INPUTS") = kTwinInputs;
-    m.attr("TWIN_OUTPUTS") = kTwinOutputs;
-    m.attr("TWIN_READINGS") = kReadings;
     m.attr("TWIN_ESTIMATES") = kEstimates;
     register_data(m);
     register_vehicle(m);

@@ -5,10 +5,6 @@ from collections.abc import Sequence
 from ._core import Driver, _Array, _Bound
 
 TWIN_ESTIMATES: int
-TWIN_INPUTS: int
-TWIN_OUTPUTS: int
-TWIN_READINGS: int
-TWIN_STATES: int
 
 class TwinTyre(metaclass=_Bound):
     nominal_load_n: float

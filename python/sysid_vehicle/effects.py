@@ -133,6 +133,11 @@ class Effect:
         Effects that act alike in most driving; each names the other.
     through : str
         Effect through which it chiefly acts, if any: weak in a model without that.
+    breaks : str
+        Law of motion that readings seem to break where it acts, through no fault of theirs:
+        `readings late`, `answers late`, `on a slope`, or empty.
+    same_in_all_logs : bool
+        As a nuisance it is the same in all logs of a car, where others differ from log to log.
     states : int
         How many states of its own it adds to the model.
     acts : tuple
@@ -157,6 +162,8 @@ class Effect:
     confounded_with: tuple[str, ...]
     through: str
     states: int
+    breaks: str = ""
+    same_in_all_logs: bool = False
     acts: tuple[tuple[int, Any], ...] = ()
     channels: tuple[str, ...] = ()
     own_states: tuple[OwnState, ...] = ()
@@ -245,6 +252,8 @@ class Effect:
             lines.append(f"  acts like   {', '.join(self.confounded_with)}")
         if self.through:
             lines.append(f"  through     {self.through}")
+        if self.same_in_all_logs:
+            lines.append("  nuisance    the same in all logs of a car")
         return "\n".join(lines)
 
     _repr_html_ = html_text

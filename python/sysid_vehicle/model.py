@@ -31,9 +31,6 @@ NUISANCES = (
 )
 """Offsets that measured logs have, crossfall of the road among them."""
 
-# The logs of a car share the places of its sensors, whatever else is their own.
-_PLACES = ("ins_lever_arm", "imu_lever_arm", "speed_sensor_lever_arm")
-
 _YAW_INERTIA = "yaw_inertia_kgm2"
 
 
@@ -182,8 +179,9 @@ class Model:
     @property
     def offset_names(self) -> tuple[str, ...]:
         """Full names of those effects' parameters of which each log has its own."""
-        nuisances = set(self.nuisances).difference(_PLACES)
-        return tuple(n for n in self.free_names if n.split(".")[0] in nuisances)
+        shared = {e.id for e in self.parts if e.same_in_all_logs}
+        own = set(self.nuisances) - shared
+        return tuple(n for n in self.free_names if n.split(".")[0] in own)
 
     def _with_settings(self, changes: Mapping[str, Mapping[str, Any]]) -> Model:
         told = dict(self.settings)

@@ -27,7 +27,6 @@ MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 UNITS = dict(zip(MEASURED, ("m/s", "m/s", "rad/s", "m/s2", "m/s2"), strict=True))
 
 _REACH_S = effect("steer_delay").parameters[0].upper  # either way
-_TAPS = 10  # on either side, by which the core interpolates
 
 _Part = tuple[Log, slice, int]
 """Log, samples of it, and the place of the first among all usable samples."""
@@ -333,7 +332,7 @@ class Driving:
             return [], []
         begin, end, size = (x - whole.start for x in (where.start, where.stop, whole.stop))
         inputs = self._inputs(log, whole) if other_inputs is None else other_inputs[at : at + size]
-        reach = round(_REACH_S * log.rate_hz) + _TAPS
+        reach = round(_REACH_S * log.rate_hz) + _core.SHIFT_REACH
         steer = inputs[:, 0]
         return steer[max(begin - reach, 0) : begin].tolist(), steer[end : end + reach].tolist()
 
