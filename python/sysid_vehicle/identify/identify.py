@@ -204,9 +204,9 @@ def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3)
     p = box.inside(model.vector())
     gains = None
     for _ in range(rounds):
-        before = p[box.columns]
+        before = p
         p, gains = moved(objective, p, noise.vector(), box, rounds=8, tolerance=0.2)
-        if np.all(np.abs(p[box.columns] - before) < 1e-4 * (box.upper - box.lower)):
+        if box.near(p, before, 1e-4):
             break
     return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True, gains)
 

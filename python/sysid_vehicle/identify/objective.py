@@ -205,7 +205,11 @@ class Objective(Penalised):
 
     def log_likelihood(self, p: FloatArray, noise: FloatArray) -> float:
         """Of the data, less what the priors cost."""
-        return float(self.freeze(p, noise).log_likelihood) - self.prior_cost(p)
+        return self.reached(p, self.freeze(p, noise))
+
+    def reached(self, p: FloatArray, gains: Any) -> float:
+        """The same where the gains of the parameters are known."""
+        return float(gains.log_likelihood) - self.prior_cost(p)
 
     def log_likelihoods(self, sets: FloatArray, noise: FloatArray) -> FloatArray:
         """The same for several sets of parameters, minus infinity where the model fails.

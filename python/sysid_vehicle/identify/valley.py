@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
 from .._arrays import FloatArray, as_float64
@@ -82,11 +81,6 @@ class _Valley:
     gains: Any
     box: Box
 
-    @property
-    def positive(self) -> npt.NDArray[np.bool_]:
-        """Which parameters move on a logarithmic scale."""
-        return np.asarray(self.box.lower > 0.0)
-
     def full(self, x: FloatArray) -> FloatArray:
         return self.box.put(self.p, x)
 
@@ -98,18 +92,12 @@ class _Valley:
             return None
         return found if np.isfinite(found).all() else None
 
-    def moved(self, x: FloatArray, step: FloatArray) -> FloatArray:
-        there = np.where(self.positive, x * np.exp(np.where(self.positive, step, 0.0)), x + step)
-        return as_float64(np.clip(there, self.box.lower, self.box.upper))
-
     def slope(self, x: FloatArray, residuals: FloatArray) -> _Slope:
-        unit = np.where(self.positive, x, 1.0)
-        by = self.objective.sensitivities(self.full(x), self.gains, self.box.columns) * unit
+        by = self.objective.sensitivities(self.full(x), self.gains, self.box.columns)
+        by = by * self.box.units(x)
         scale = np.sqrt(np.maximum(np.einsum("ij,ij->j", by, by), 1e-12))
         by = by / scale
-        lower, upper = self.box.lower - x, self.box.upper - x
-        lower[self.positive] = np.log(self.box.lower[self.positive] / x[self.positive])
-        upper[self.positive] = np.log(self.box.upper[self.positive] / x[self.positive])
+        lower, upper = self.box.room(x)
         return _Slope(lower * scale, upper * scale, scale, by, by.T @ residuals, by.T @ by)
 
     def bent(
@@ -120,7 +108,7 @@ class _Valley:
         None where the valley bends too much for a step of that length.
         """
         tangent = slope.step(damping)
-        probe = self.residuals(self.moved(x, _PROBE * tangent / slope.scale))
+        probe = self.residuals(self.box.moved(x, _PROBE * tangent / slope.scale))
         if probe is None:
             return None
         second = 2.0 / _PROBE * ((probe - residuals) / _PROBE + slope.by @ tangent)
@@ -175,7 +163,7 @@ def down_the_valley(
             if found is None:
                 damping *= 4.0
                 continue
-            trial = valley.moved(x, found[0])
+            trial = box.moved(x, found[0])
             there = valley.residuals(trial)
             value = np.inf if there is None else 0.5 * float(there @ there)
             if there is not None and value < cost:
