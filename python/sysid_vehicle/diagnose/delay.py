@@ -32,7 +32,7 @@ from ..identify import refine
 from .evidence import Evidence, solve
 from .omnibus import omnibus_of
 
-__all__ = ["HIGHEST_HZ", "Delay", "Piece", "delay", "delayed", "pieces_of"]
+__all__ = ["HIGHEST_HZ", "Delay", "Piece", "delay", "delayed", "later", "pieces_of"]
 
 _BANDS = 6
 _LOWEST_HZ, HIGHEST_HZ = 0.15, 5.0
@@ -139,9 +139,7 @@ def delay(
         tiny = 2.0 * np.pi * HIGHEST_HZ * abs(step) < _TINY_RAD and abs(step) < _NOTABLE * std
         if abs(step) < std or tiny:
             break  # the second order of so small a step is next to nothing
-        late = inputs.copy()
-        for begin, end, rate in pieces:
-            late[begin:end, which] = delayed(inputs[begin:end, which], rate, total)
+        late = later(inputs, which, pieces, total)
         fit = refine(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
         evidence = Evidence(fit, evidence.driving, late)
     else:
@@ -258,6 +256,14 @@ def delayed(u: FloatArray, rate: float, by_s: float) -> FloatArray:
     """
     f, spectrum = _spectrum(u, rate)
     return as_float64(np.fft.irfft(spectrum * np.exp(-2j * np.pi * f * by_s), 2 * len(u))[: len(u)])
+
+
+def later(inputs: FloatArray, which: int, pieces: list[Piece], by_s: float) -> FloatArray:
+    """Inputs of which number `which` comes later in every stretch."""
+    late = inputs.copy()
+    for begin, end, rate in pieces:
+        late[begin:end, which] = delayed(inputs[begin:end, which], rate, by_s)
+    return late
 
 
 def _in_band(
