@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["FloatArray", "as_float64", "filled"]
-
 FloatArray = npt.NDArray[np.float64]
 
 

@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 from ._text import brief, html_list, html_paragraph, html_table, html_text, text_table
 
-__all__ = ["Part", "Printed", "Table", "Told"]
-
 
 class Table(NamedTuple):
     """Columns under their heads."""

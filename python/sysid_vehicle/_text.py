@@ -9,19 +9,6 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from math import isfinite
 
-__all__ = [
-    "brief",
-    "columns",
-    "html_list",
-    "html_paragraph",
-    "html_table",
-    "html_text",
-    "number",
-    "text_table",
-    "with_error",
-    "wrapped",
-]
-
 
 def brief(self: object) -> str:
     """Return the `repr` of a result: its type, and the first line of what it prints."""

@@ -18,18 +18,6 @@ from ._arrays import FloatArray, as_float64
 from ._text import html_text
 from .errors import InvalidInput, near_names
 
-__all__ = [
-    "Effect",
-    "OwnState",
-    "Parameter",
-    "base_parameters",
-    "catalogue",
-    "channels_in_use",
-    "effect",
-    "forget",
-    "register",
-]
-
 Steps = tuple[Any, ...]
 
 

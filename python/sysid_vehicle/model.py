@@ -20,8 +20,6 @@ from .errors import InvalidInput
 from .saved import save
 from .vehicle import Tyre, Vehicle
 
-__all__ = ["NUISANCES", "Model", "Setting", "vehicle_data"]
-
 NUISANCES = (
     "steer_offset",
     "speed_sensor_misalignment",

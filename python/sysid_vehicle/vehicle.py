@@ -19,8 +19,6 @@ from ._arrays import FloatArray
 from ._files import as_path, read_toml, refuse_unknown, write_text
 from .errors import InvalidInput, warn
 
-__all__ = ["GRAVITY_MPS2", "Tyre", "Vehicle"]
-
 GRAVITY_MPS2: float = _core.GRAVITY_MPS2
 """Standard gravity, the same in the core."""
 

@@ -26,8 +26,6 @@ from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
 from .log_arguments import read_logs, written_map
 from .outputs import write_figures
 
-__all__ = ["COMMANDS"]
-
 Warnings = list[str]
 
 

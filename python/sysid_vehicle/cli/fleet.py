@@ -9,8 +9,6 @@ from .._progress import note
 from ..fleet import manifest_jobs
 from ..fleet.improve_many import run as improve_all
 
-__all__ = ["add_parser", "run"]
-
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command to the program's."""

@@ -25,8 +25,6 @@ from ..vehicle import Vehicle
 from . import lab_logs
 from .outputs import add_json, add_output, write_figures, write_picture
 
-__all__ = ["add_parser", "run"]
-
 _DESIGNED = "designed"
 _PRESETS = {"default": Setup.default, "published": published.setup}
 

@@ -33,16 +33,6 @@ from .outputs import add_json, add_output, write_figures, write_picture
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = [
-    "em",
-    "em_arguments",
-    "identify",
-    "identify_arguments",
-    "validate",
-    "validate_arguments",
-    "vehicle_of",
-]
-
 
 def em_arguments(parser: argparse.ArgumentParser) -> None:
     """Say what may be typed of `lab em`."""

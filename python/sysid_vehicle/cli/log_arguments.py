@@ -13,8 +13,6 @@ from ..log import Log
 from ..read import ChannelMap, Proposal, propose_channels, read_log
 from ..vehicle import Vehicle
 
-__all__ = ["LOG_HELP", "add_driving", "add_reading", "read_logs", "written_map"]
-
 LOG_HELP = "log of one run: CSV, MDF, MCAP, ROS bag, .mat, .vbo, CAN log, Parquet, ..."
 
 

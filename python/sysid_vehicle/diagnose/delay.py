@@ -32,8 +32,6 @@ from ..identify import refine
 from .evidence import Evidence, solve
 from .omnibus import omnibus_of
 
-__all__ = ["HIGHEST_HZ", "Delay", "Piece", "delay", "delayed", "later", "pieces_of"]
-
 _BANDS = 6
 _LOWEST_HZ, HIGHEST_HZ = 0.15, 5.0
 _SMALL = 1e-3  # of an input, to differentiate by

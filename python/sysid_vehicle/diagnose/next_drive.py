@@ -31,8 +31,6 @@ from ..simulate import Drive, SensorNoise, drive_truth
 from .information import Information, information_of
 from .suggestion import Suggestion, ground_m
 
-__all__ = ["DriveLimits", "NextDrive", "Suggestion", "separations", "suggest_manoeuvre"]
-
 _ENOUGH = 5.0  # standard errors
 
 

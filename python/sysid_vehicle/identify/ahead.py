@@ -31,8 +31,6 @@ from .fit import Fit
 from .objective import Penalised
 from .search import minimise
 
-__all__ = ["predicting_ahead"]
-
 _MOST = 400  # windows
 # Windows that err by more than so many times the typical error count as lost, but of all windows
 # no more than a tenth: they are left out (trimmed squares, Rousseeuw, JASA 1984).

@@ -16,18 +16,6 @@ from .profile import Optimum, Profile, profile_all
 from .quantities import Quantity
 from .search import Box
 
-__all__ = [
-    "BETTER_FOUND",
-    "INTERVALS",
-    "Estimate",
-    "Estimated",
-    "box_covariance",
-    "profiled",
-    "profiled_estimates",
-    "std_of_data",
-    "wald",
-]
-
 BETTER_FOUND = 4
 """Times that profiling may lead to a better optimum."""
 

@@ -21,9 +21,6 @@ from .quantities import Quantity, parameter, std_of, tyre_quantity
 from .starts import Starts
 from .tyre_shape import COMBINATIONS
 
-__all__ = ["Fit"]
-
-
 _MEANINGS = {"BCD": "cornering stiffness", "peak": "peak friction", "peak_slip": "slip at the peak"}
 _UNITS = {"cornering stiffness": "N/rad", "peak friction": "1", "slip at the peak": "rad"}
 

@@ -26,16 +26,6 @@ from .settle import moved, rivalled, settle, settle_finely, to_the_top
 from .starts import Runner, Starts, apart, at_typical_sizes, space_filling
 from .suspects import explaining
 
-__all__ = [
-    "free_box",
-    "identify",
-    "objective_of",
-    "predicting_ahead",
-    "profile_fit",
-    "refine",
-    "refit",
-]
-
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts

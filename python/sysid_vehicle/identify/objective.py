@@ -17,17 +17,6 @@ from .._threads import check_time
 from ..errors import NumericalError
 from ..estimate import maximise_noise, promised_by_noise
 
-__all__ = [
-    "LinearRows",
-    "Objective",
-    "Penalised",
-    "Predicting",
-    "Problem",
-    "Rows",
-    "Together",
-    "gaussian_prior",
-]
-
 Rows = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """Further residuals: from all parameters to errors (m,) and minus their derivatives (m, n)."""
 

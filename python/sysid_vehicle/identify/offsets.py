@@ -26,8 +26,6 @@ from .fit import Fit
 from .objective import Objective
 from .settle import moved
 
-__all__ = ["centred", "driving_of", "marginal_information"]
-
 _ROUNDS = 3
 _STANDS = 0.1  # nats
 

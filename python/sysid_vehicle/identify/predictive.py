@@ -29,8 +29,6 @@ from .objective import Penalised
 from .offsets import driving_of
 from .search import Box, minimise
 
-__all__ = ["Prediction", "predict"]
-
 _PASSES, _ROUNDS = 3, 20
 _ENOUGH = 0.1  # nats
 _SETTLED = 1e-4  # the same: along the valley of one B C D many small steps lead far

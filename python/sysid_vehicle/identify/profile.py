@@ -26,8 +26,6 @@ from .valley import down_the_valley
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["LEVEL", "Optimum", "Profile", "lost_at", "profile", "profile_all"]
-
 LEVEL = 1.96
 """Root of the 95 % quantile of chi-square with one degree of freedom."""
 

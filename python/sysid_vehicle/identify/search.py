@@ -15,8 +15,6 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from .objective import Problem
 
-__all__ = ["METHODS", "Box", "Outcome", "minimise", "stride"]
-
 _LEAST_DAMPING = 1e-9
 _ASTRAY = 1.5  # times what a step promised; where it loses more, it was far too long
 _HARDER = 6.0  # times the damping after a step that gained nothing

@@ -16,18 +16,6 @@ from .search import Box, minimise, stride
 from .starts import SAME_VALLEY
 from .valley import down_the_valley
 
-__all__ = [
-    "bottom",
-    "climb",
-    "descend",
-    "moved",
-    "risen",
-    "rivalled",
-    "settle",
-    "settle_finely",
-    "to_the_top",
-]
-
 _STANDS = 0.5  # nats
 _STILL = 3e-4  # nats
 _LITTLE = 0.1  # nats for which the noise is not learned once more while parameters still move

@@ -21,18 +21,6 @@ from .search import Box
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "SAME_OPTIMUM",
-    "SAME_VALLEY",
-    "Runner",
-    "Search",
-    "Start",
-    "Starts",
-    "apart",
-    "at_typical_sizes",
-    "space_filling",
-]
-
 SAME_OPTIMUM = 1.0
 """Ends whose log-likelihood differs by less than this [nats] are the same optimum."""
 

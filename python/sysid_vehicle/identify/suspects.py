@@ -18,8 +18,6 @@ from ..log import Log
 from ..model import Model
 from .fit import Fit
 
-__all__ = ["explaining", "suspects"]
-
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 

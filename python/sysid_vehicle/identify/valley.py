@@ -18,8 +18,6 @@ from ..errors import NumericalError
 from .objective import Problem
 from .search import Box
 
-__all__ = ["down_the_valley"]
-
 _LEAST_DAMPING = 1e-13
 _HARDLY_DAMPED = (_LEAST_DAMPING, 1e-9, 1e-6)
 _TRIALS = 14

@@ -14,8 +14,6 @@ from .settle import descend, settle
 from .starts import SAME_OPTIMUM, Runner
 from .tyre_shape import look_alike
 
-__all__ = ["alternate", "looking_alike", "valleys", "walk"]
-
 _ALTERNATIONS = 3
 _CURVATURES = (-1.0, 0.0, 0.4, 0.8)
 _SIDES = ((0,), (4,), (0, 4))  # where the coefficients of the axles that are moved begin

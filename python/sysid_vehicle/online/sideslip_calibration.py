@@ -20,8 +20,6 @@ from .sideslip import estimate_sideslip
 from .sideslip_results import SideslipRun
 from .sideslip_settings import SideslipSettings
 
-__all__ = ["SideslipCalibration", "calibrate_sideslip", "fitted_vehicle"]
-
 #: What no data sheet tells: errors of the model, and how far two sensors are to be trusted.
 _LEARNT = (
     "road_mps2", "road_time_s", "roll_expected", "roll_share", "roll_time_s", "error_load",

@@ -12,8 +12,6 @@ from ..errors import InvalidInput
 from ..estimate.inputs import white_noise_std
 from ..log import Log
 
-__all__ = ["SideslipSettings"]
-
 _MEANING = {
     "vx_mps": "noise of the speed [m/s]",
     "yaw_rate_radps": "noise of the yaw rate [rad/s]",

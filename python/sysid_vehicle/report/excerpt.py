@@ -12,8 +12,6 @@ from ..estimate.driving import Stretch
 from ..study import Study, look_ahead
 from .words import stages
 
-__all__ = ["Excerpt", "worst_excerpt"]
-
 _SHOWN = ("yaw_rate_radps", "ay_mps2")
 _FORGETS_S = 5.0
 

@@ -14,8 +14,6 @@ from .chart import DIVERGING, Chart, figure, legend, scale
 from .page import bullets, heading, paragraph
 from .samples import Samples
 
-__all__ = ["unknown", "where_and_when"]
-
 _SIZE = 430, 260
 
 

@@ -17,17 +17,6 @@ from .samples import Samples
 from .tyres import TyreCurve
 from .words import shown_in, stages
 
-__all__ = [
-    "ahead",
-    "causes",
-    "failure_maps",
-    "overlay",
-    "place",
-    "residuals",
-    "sizes",
-    "tyre_curves",
-]
-
 LOOKS = ("before", "after")
 """Style classes of the baseline and the final model."""
 

@@ -14,8 +14,6 @@ from ..study import Study, look_ahead
 from .excerpt import Excerpt, worst_excerpt
 from .words import shown_in, stages
 
-__all__ = ["Samples", "samples_of"]
-
 _MOST = 1500  # samples of all the driving, and of the worst seconds
 _OVAL = 0.15  # a track's smaller extent over its larger one, above which its map is worth a look
 

@@ -10,8 +10,6 @@ from .._arrays import FloatArray, as_float64
 from ..identify import Fit
 from ..model import Model
 
-__all__ = ["AXLES", "TyreCurve", "driven_slip", "identified_curves", "model_curves"]
-
 AXLES = ("front", "rear")
 # Columns of the core's evaluation, front and rear.
 _SLIP = (5, 6)

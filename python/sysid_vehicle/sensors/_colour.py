@@ -10,8 +10,6 @@ import scipy
 from .._arrays import FloatArray
 from ._motion import IntArray
 
-__all__ = ["Colour", "fit_colour", "neighbours"]
-
 _LONGEST = 8
 _CLIP = 5.0  # deviations beyond so many standard deviations teach no colour
 

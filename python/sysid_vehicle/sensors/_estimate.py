@@ -22,8 +22,6 @@ from ._equations import FAULTS, Readings, predict
 from ._motion import QUICK, SLOW, Grid
 from ._system import Band, Linearised, Normal, drawn, linearise, normal_equations
 
-__all__ = ["Estimate", "estimate", "noise_of", "preferred"]
-
 _ROUNDS = 30
 _LEAST_ROUNDS = 8
 _DRAWS = 2

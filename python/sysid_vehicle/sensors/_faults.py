@@ -13,8 +13,6 @@ from ._estimate import Estimate
 from ._parts import scatter
 from ._texts import DEG, why_not
 
-__all__ = ["Rival", "SensorFault", "doubted", "faults_of"]
-
 _Z95 = 1.959964
 _FALSE_CLAIMS = 0.01  # over all faults of one check
 _LEARNED = 0.5  # share of what is known of a fault that has to come from the log

@@ -16,8 +16,6 @@ import scipy
 
 from ._motion import Stretch
 
-__all__ = ["Scatter", "cut", "scatter"]
-
 _PART_S = 60.0  # a shorter one may find another explanation by chance
 _MOST = 4
 _SHORTEST_S = 5.0

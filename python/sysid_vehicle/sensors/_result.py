@@ -28,8 +28,6 @@ from ._texts import ON_CORRECTION, gradient, map_line
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["SensorCheck", "put_right"]
-
 _SURE = 3.0  # standard errors of a mean offset
 _HEAD = ("fault", "channel", "value", "95 % interval", "verdict")
 _SIGNAL_HEAD = ("channel", "rate", "held", "quantum", "missing", "noise", "colour")

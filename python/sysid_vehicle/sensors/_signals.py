@@ -17,18 +17,6 @@ from ._colour import neighbours
 from ._equations import Readings
 from ._motion import IntArray, Stretch
 
-__all__ = [
-    "MOVING",
-    "Signal",
-    "averaged",
-    "own_samples",
-    "pieces",
-    "quantum",
-    "readings_of",
-    "refuse_mixed_up",
-    "signals",
-]
-
 MOVING = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 _SLOWEST_MPS = 3.0
 _SHORTEST_S = 3.0

@@ -22,8 +22,6 @@ from ..estimate import Driving
 from ..identify import Fit, predict, refine
 from ..log import Log
 
-__all__ = ["in_time"]
-
 
 def in_time(dx: Diagnosis, test: Driving) -> tuple[Driving, Driving] | None:
     """Training and validation data with inputs on the clock of the motion; None where they are.

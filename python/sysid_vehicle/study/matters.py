@@ -13,8 +13,6 @@ from ..estimate import UNITS
 from ..read._units import factor_to
 from .horizons import PREDICTED, Horizons
 
-__all__ = ["USUAL_SIZES", "sizes_that_matter", "within"]
-
 _NAMES = {
     "vx": "vx_mps",
     "vy": "vy_mps",

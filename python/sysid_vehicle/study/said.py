@@ -16,8 +16,6 @@ from .validation import AHEAD_S
 if TYPE_CHECKING:
     from .study import Study
 
-__all__ = ["ahead", "disturbance", "in_the_end", "nuisances", "small", "structured"]
-
 _WORDS = dict(zip(LATERAL, ("v_y", "yaw rate", "a_y"), strict=True))
 
 

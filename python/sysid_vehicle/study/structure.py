@@ -22,8 +22,6 @@ from ..estimate import MEASURED, Driving
 from ..identify import Fit, driving_of
 from .waterfall import all_ahead
 
-__all__ = ["Structure", "structure"]
-
 _AHEAD_S = (1.0, 5.0)
 _APART = 0.1  # of the horizon, between predictions
 _FEW = 40  # predictions that a regression needs

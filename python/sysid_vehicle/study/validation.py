@@ -19,22 +19,6 @@ from ..log import Log, several_logs
 from ..rules import Change, Gain
 from .horizons import Beyond, beyond_noise, changes, typical_error
 
-__all__ = [
-    "AHEAD",
-    "AHEAD_S",
-    "as_sure",
-    "at_its_best",
-    "beyond_noise_ahead",
-    "changes_ahead",
-    "error_falls",
-    "fall_in_error",
-    "fitted_ahead",
-    "gain_in_log_likelihood",
-    "longest_s",
-    "serving",
-    "set_aside",
-]
-
 _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6
 _TRIMMED = 0.1  # of the pieces, at either end
