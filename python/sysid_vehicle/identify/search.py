@@ -184,15 +184,28 @@ def stride(
     scale = np.sqrt(np.maximum(np.diag(information), 1e-12)) * unit
     normal = information * np.outer(unit, unit) / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(normal + damping * np.eye(len(x)))
-    root = np.sqrt(np.maximum(values, 1e-12))
+    downhill = gradient * unit / scale
+    step = least_within(np.maximum(values, 1e-12), vectors, downhill, lower * scale, upper * scale)
+    gain = downhill @ step - 0.5 * step @ normal @ step
+    return box.moved(x, step / scale), float(gain)
+
+
+def least_within(
+    values: FloatArray,
+    vectors: FloatArray,
+    downhill: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> FloatArray:
+    """Minimum within bounds of a quadratic, given the eigenvalues, above zero, of its curvature."""
+    root = np.sqrt(values)
     found = scipy.optimize.lsq_linear(
         root[:, None] * vectors.T,
-        (vectors.T @ (gradient * unit / scale)) / root,
-        bounds=(lower * scale, upper * scale),
+        (vectors.T @ downhill) / root,
+        bounds=(lower, upper),
         method="bvls",
     )
-    gain = (gradient * unit / scale) @ found.x - 0.5 * found.x @ normal @ found.x
-    return box.moved(x, found.x / scale), float(gain)
+    return as_float64(found.x)
 
 
 def _nlopt(

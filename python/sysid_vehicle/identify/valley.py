@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy
 
 from .._arrays import FloatArray, as_float64
 from ..errors import NumericalError
 from .objective import Problem
-from .search import Box
+from .search import Box, least_within
 
 _LEAST_DAMPING = 1e-13
 _HARDLY_DAMPED = (_LEAST_DAMPING, 1e-9, 1e-6)
@@ -40,14 +39,8 @@ class _Slope:
     def step(self, damping: float) -> FloatArray:
         """Minimum of the damped quadratic model over the box."""
         values, vectors = np.linalg.eigh(self.curvature + damping * np.eye(len(self.scale)))
-        root = np.sqrt(np.maximum(values, _TINY))
-        found = scipy.optimize.lsq_linear(
-            root[:, None] * vectors.T,
-            (vectors.T @ self.gradient) / root,
-            bounds=(np.minimum(self.to_lower, -_TINY), np.maximum(self.to_upper, _TINY)),
-            method="bvls",
-        )
-        return as_float64(found.x)
+        lower, upper = np.minimum(self.to_lower, -_TINY), np.maximum(self.to_upper, _TINY)
+        return least_within(np.maximum(values, _TINY), vectors, self.gradient, lower, upper)
 
     def gain(self, step: FloatArray) -> float:
         """What the quadratic model promises."""
