@@ -20,10 +20,10 @@ from .._threads import Workers
 from ..effects import Effect, base_parameters, effect
 from ..errors import InvalidInput, NumericalError
 from ..identify import Fit, explaining
+from ..vehicle import AXLES
 from .replay import Replay
 from .sensitivity import duration
 
-_AXLES = ("front", "rear")
 _WORTH_TELLING = 0.01  # of the parameter: refits agree no better
 # How far two drives may lead apart from their mean: of the parameter, or of the bias.
 _NEAR, _SHARE = 0.01, 0.2
@@ -106,7 +106,7 @@ class BiasReport:
                 rows.append([b.effect.id, size, "-", "-", f"not stated: {b.because}"])
                 continue
             worst = f"{b.worst[0]} {100.0 * b.relative[b.worst[0]]:+.1f} %" if b.worst else "-"
-            stiff = [f"{100.0 * b.relative[f'stiffness_{a}']:+.1f} %" for a in _AXLES]
+            stiff = [f"{100.0 * b.relative[f'stiffness_{a}']:+.1f} %" for a in AXLES]
             rows.append([b.effect.id, size, *stiff, worst])
         return rows
 
@@ -228,13 +228,13 @@ class _Told:
         )
 
     def read(self, p: FloatArray) -> FloatArray:
-        stiffness = [np.log(np.prod(p[[_column(x, axle) for x in "BCD"]])) for axle in _AXLES]
+        stiffness = [np.log(np.prod(p[[_column(x, axle) for x in "BCD"]])) for axle in AXLES]
         return np.array([*stiffness, *p[list(self.columns)]])
 
     def relative(self, off: FloatArray) -> dict[str, float]:
-        n = len(_AXLES)
+        n = len(AXLES)
         parts = [*np.expm1(off[:n]), *(off[n:] / self.values)]
-        names = [*(f"stiffness_{axle}" for axle in _AXLES), *self.names]
+        names = [*(f"stiffness_{axle}" for axle in AXLES), *self.names]
         return dict(zip(names, map(float, parts), strict=True))
 
 
@@ -270,4 +270,4 @@ def _bias(
 
 
 def _harm(b: Bias) -> float:
-    return max((abs(b.relative[f"stiffness_{a}"]) for a in _AXLES if not b.because), default=-1.0)
+    return max((abs(b.relative[f"stiffness_{a}"]) for a in AXLES if not b.because), default=-1.0)

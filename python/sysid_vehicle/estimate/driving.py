@@ -13,7 +13,7 @@ from .._arrays import FloatArray, as_float64
 from .._text import brief
 from ..effects import Effect, channels_in_use, effect
 from ..errors import InvalidInput
-from ..log import Log, several_logs
+from ..log import CHANNELS, MEASURED, Log, several_logs
 from ..model import Model
 from ..sensors import quantum
 from . import pieces
@@ -21,10 +21,8 @@ from .channels import check_channels, has_channels, logged_channels
 from .inputs import quiet
 from .pieces import DrivingProblem, PiecewiseProblem, cut
 
-MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
-"""Measured channels, in the core's order."""
-
-UNITS = dict(zip(MEASURED, ("m/s", "m/s", "rad/s", "m/s2", "m/s2"), strict=True))
+UNITS = {c: CHANNELS[c].unit for c in MEASURED}
+WORDS = dict(zip(MEASURED, ("v_x", "v_y", "yaw rate", "a_x", "a_y"), strict=True))
 
 _REACH_S = effect("steer_delay").parameters[0].upper  # either way
 

@@ -15,12 +15,11 @@ from .._style import MEASURED, tidy
 from .._text import brief, number
 from ..errors import InvalidInput, near_names
 from ..sensors import SensorCheck
-from ..vehicle import Vehicle
+from ..vehicle import AXLES, Vehicle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-AXLES = ("front", "rear")
 _HEAD = ("axle", "slip angle", "side force", "of the load", "slope", "95 % band")
 _SMALL = 0.3  # of the load, below which a side force is nearly proportional to slip
 _FEWEST = 50

@@ -14,6 +14,7 @@ from .._text import brief, html_list, html_paragraph, html_table, number, text_t
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
+from ..vehicle import AXLES
 from .estimates import Estimate, Estimated, profiled
 from .posterior import Posterior, posterior
 from .profile import Profile
@@ -128,7 +129,7 @@ class Fit(Estimated):
         known = self.model.parameters
         found = [parameter(e.name, known[e.name].column) for e in self.estimates]
         v = self.model.vehicle
-        for axle, load in zip(("front", "rear"), v.static_loads_n, strict=True):
+        for axle, load in zip(AXLES, v.static_loads_n, strict=True):
             columns = [known[f"{letter}_{axle}"].column for letter in "BCDE"]
             for short, (function, _) in COMBINATIONS.items():
                 factor = load if short == "BCD" else 1.0

@@ -13,7 +13,7 @@ from .._style import AFTER, BEFORE, FLOOR, MEASURED, axes_or_new, tidy
 from .._text import number
 from ..identify.estimates import std_of_data
 from ..model import Model
-from ..vehicle import Tyre
+from ..vehicle import AXLES, Tyre
 from .excitation import Excitation
 from .information import MOTION, TYRES, information
 from .loop import ClosedLoop, run_closed_loop
@@ -248,7 +248,7 @@ def preview(
             Expected(name, value, float(s))
             for name, value, s in zip(free, values, std * size, strict=True)
         ),
-        tuple(_coverage(drive, believed, axle) for axle in ("front", "rear")),
+        tuple(_coverage(drive, believed, axle) for axle in AXLES),
         condition,
         believed,
         drive,

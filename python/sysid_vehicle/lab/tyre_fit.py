@@ -18,12 +18,12 @@ from ..identify.profile import Profile
 from ..identify.quantities import Quantity, parameter, std_of, tyre_quantity
 from ..identify.starts import Starts
 from ..identify.tyre_shape import COMBINATIONS, friction, peak_slip, slope_of
+from ..vehicle import AXLES
 from .tyre_data import GreyBoxVehicle, TyreLog
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-AXLES = ("front", "rear")
 PARAMETERS = (
     *(f"{letter}_{axle}" for axle in AXLES for letter in "BCDE"),
     "P1",

@@ -6,8 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
+from .._arrays import FloatArray
 from ..errors import InvalidInput
-from ._channels import FloatArray
 from ._laws import Contradiction
 from ._motion import Motion
 from ._steering import several_frequencies

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._channels import FloatArray
+from .._arrays import FloatArray
 
 _PASSES = 5
 _HUBER = 2.5  # residuals beyond so many robust deviations lose weight

@@ -50,7 +50,7 @@ _MEANING = {
 }
 # Quieter than these no sensor of a car is; simulated channels without noise are.
 _QUIETEST = {"vx_mps": 0.01, "yaw_rate_radps": 5e-4, "ax_mps2": 0.02, "ay_mps2": 0.02}
-_BLOCK = 100  # samples; vibration comes and goes with the driving
+NOISE_BLOCK = 100  # samples; vibration comes and goes with the driving
 
 
 class SideslipSettings(Mapping[str, float]):
@@ -86,7 +86,7 @@ class SideslipSettings(Mapping[str, float]):
     def of(cls, log: Log, **changes: float) -> SideslipSettings:
         """Take the noise of the sensors from the fast scatter of the log's channels."""
         noise = {
-            name: max(white_noise_std(log[name], _BLOCK), least)
+            name: max(white_noise_std(log[name], NOISE_BLOCK), least)
             for name, least in _QUIETEST.items()
             if log.has(name)
         }

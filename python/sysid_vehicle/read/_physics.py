@@ -13,12 +13,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from .._arrays import FloatArray
 from ..log import times_wheelbase
 from ..vehicle import GRAVITY_MPS2
-
-FloatArray = npt.NDArray[np.float64]
 
 _DEG, _G = math.pi / 180.0, GRAVITY_MPS2
 _WINDOW_S = 1.0

@@ -14,6 +14,7 @@ from .._arrays import FloatArray
 from .._style import AFTER, MEASURED, axes_or_new, tidy
 from .._text import html_list, html_paragraph, html_table, number, text_table
 from ..errors import InvalidInput, near_names
+from ..log import MEASURED as MOVING
 from ..log import Log
 from ..vehicle import Vehicle
 from ._apply import corrected
@@ -130,7 +131,7 @@ class SensorCheck:
     def map_lines(self) -> tuple[str, ...]:
         """Lines for the table ``[channels]`` of a channel map that put right what was found."""
         lines = []
-        for channel in ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2"):
+        for channel in MOVING:
             delay, gain, bias = (
                 self._found_value(table.get(channel)) for table in (_DELAYS, _GAINS, _BIASES)
             )

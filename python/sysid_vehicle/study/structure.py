@@ -19,13 +19,13 @@ from ..diagnose.ceiling import Explainable, Inputs, Whole, left_out, pieces, thi
 from ..diagnose.force_map import missing_forces
 from ..errors import NumericalError
 from ..estimate import MEASURED, Driving
+from ..estimate.driving import WORDS
 from ..identify import Fit, driving_of
+from .horizons import APART
 from .waterfall import all_ahead
 
 _AHEAD_S = (1.0, 5.0)
-_APART = 0.1  # of the horizon, between predictions
 _FEW = 40  # predictions that a regression needs
-_WORDS = dict(zip(MEASURED, ("v_x", "v_y", "yaw rate", "a_x", "a_y"), strict=True))
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def _of(fit: Fit, driving: Driving) -> Iterator[tuple[str, Explainable]]:
     inputs = Inputs.of(fit, driving, driving).train
     try:
         missing = missing_forces(fit, driving)
-        ahead = all_ahead(fit, fit.noise.floor(), driving, _AHEAD_S, apart=_APART)
+        ahead = all_ahead(fit, fit.noise.floor(), driving, _AHEAD_S, apart=APART)
     except NumericalError:  # the model loses the car: of its errors nothing can be told
         return
     rows = thinned(driving)
@@ -101,7 +101,7 @@ def _of(fit: Fit, driving: Driving) -> Iterator[tuple[str, Explainable]]:
         for j, channel in enumerate(MEASURED):
             there = np.isfinite(errors[:, j]) & np.isfinite(driving.measured[:, j])
             rows = np.flatnonzero(there)
-            name = f"error of {_WORDS[channel]} {seconds:g} s ahead"
+            name = f"error of {WORDS[channel]} {seconds:g} s ahead"
             yield from _named(name, driving, inputs, rows, errors[rows, j])
 
 
