@@ -9,6 +9,9 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from math import isfinite
 
+HALF_95 = 1.96
+"""Standard errors on either side of a value in the 95 % intervals that are told."""
+
 
 def brief(self: object) -> str:
     """Return the `repr` of a result: its type, and the first line of what it prints."""

@@ -70,7 +70,7 @@ NUMERICAL = {
     "diagnose/force_map.py": {
         "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_BLOCK_S", "_LONGEST_S",
     },
-    "diagnose/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE", "_CERTAIN"},
+    "diagnose/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE"},
     "diagnose/next_drive.py": {"_ENOUGH"},
     "diagnose/proposals.py": {"_MOST", "_TRIED", "_ALIKE", "_BLOCK_S", "_RETAINED", "_VISIBLE"},
     "diagnose/shape.py": {

@@ -18,7 +18,7 @@ import scipy
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._style import axes_or_new, tidy
-from .._text import brief, html_text
+from .._text import HALF_95, brief, html_text
 from .._threads import in_parallel
 from ..estimate import MEASURED
 from .delay import HIGHEST_HZ, Delay, delay, pieces_of
@@ -106,7 +106,7 @@ class Coherence:
             phase, std = np.degrees(d.phase_rad), np.degrees(d.phase_std_rad)
             known = std < 30.0
             ax.errorbar(
-                d.frequency_hz[known], phase[known], 1.96 * std[known], fmt="ko", ms=4.0, lw=1.0
+                d.frequency_hz[known], phase[known], HALF_95 * std[known], fmt="ko", ms=4.0, lw=1.0
             )
             ax.legend(frameon=False, loc="upper left")
         return tidy(

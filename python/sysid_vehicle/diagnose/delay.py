@@ -26,6 +26,7 @@ import numpy.typing as npt
 import scipy
 
 from .._arrays import FloatArray, as_float64
+from .._text import HALF_95
 from ..estimate import Driving
 from ..estimate.inputs import quiet, white_noise_std
 from ..identify import refine
@@ -72,7 +73,7 @@ class Delay:
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval."""
-        return self.delay_s - 1.96 * self.std_s, self.delay_s + 1.96 * self.std_s
+        return self.delay_s - HALF_95 * self.std_s, self.delay_s + HALF_95 * self.std_s
 
     @property
     def significant(self) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from .._progress import with_progress
-from .._text import brief, html_table, number, text_table
+from .._text import HALF_95, brief, html_table, number, text_table
 from .._threads import Workers
 from ..effects import Effect, base_parameters, effect
 from ..errors import InvalidInput, NumericalError
@@ -27,7 +27,6 @@ from .sensitivity import duration
 _WORTH_TELLING = 0.01  # of the parameter: refits agree no better
 # How far two drives may lead apart from their mean: of the parameter, or of the bias.
 _NEAR, _SHARE = 0.01, 0.2
-_CERTAIN = 1.96
 
 
 @dataclass(frozen=True)
@@ -220,7 +219,7 @@ class _Told:
     @classmethod
     def of(cls, fit: Fit) -> _Told:
         known = fit.model.parameters
-        others = [e for e in fit.estimates if e.name[1] != "_" and abs(e.value) > _CERTAIN * e.std]
+        others = [e for e in fit.estimates if e.name[1] != "_" and abs(e.value) > HALF_95 * e.std]
         return cls(
             tuple(known[e.name].column for e in others),
             tuple(e.name for e in others),

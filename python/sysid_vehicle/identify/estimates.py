@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
-from .._text import number
+from .._text import HALF_95, number
 from .objective import Objective
 from .profile import Optimum, Profile, profile_all
 from .quantities import Quantity
@@ -56,7 +56,7 @@ class Estimate:
         """95 % interval: of the profile likelihood where there is one, else of the std."""
         if self.ends is not None:
             return self.ends
-        return self.value - 1.96 * self.std, self.value + 1.96 * self.std
+        return self.value - HALF_95 * self.std, self.value + HALF_95 * self.std
 
     def to_dict(self) -> dict[str, Any]:
         """Value, standard error, unit, and an interval of the profile likelihood, for JSON."""
