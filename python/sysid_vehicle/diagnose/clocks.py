@@ -14,7 +14,7 @@ from .. import _core
 from .._arrays import FloatArray
 from ..estimate.pieces import DrivingProblem
 from ..rules import Rules
-from .delay import later, pieces_of
+from .delay import later
 from .directions import Ask, Directions
 from .evidence import Evidence, Section
 
@@ -44,7 +44,7 @@ class Clock:
     def late(self, evidence: Evidence, by_s: float) -> DrivingProblem:
         """The problem of some evidence with the input later than it is there."""
         inputs = evidence.driving.inputs() if evidence.inputs is None else evidence.inputs
-        return evidence.problem_of(later(inputs, self.column, pieces_of(evidence.driving), by_s))
+        return evidence.problem_of(later(inputs, self.column, evidence.driving.spans, by_s))
 
 
 CLOCKS = (Clock("fx_n", 1, 0.1),)

@@ -88,8 +88,7 @@ def blocks(driving: Driving, seconds: float) -> npt.NDArray[np.intp]:
 
 def begins(driving: Driving) -> npt.NDArray[np.intp]:
     """First samples of the stretches."""
-    lengths = [s.where.stop - s.where.start for s in driving.stretches]
-    return np.cumsum([0, *lengths[:-1]])
+    return np.array([span.first for span in driving.spans])
 
 
 def late(

@@ -318,9 +318,8 @@ def _places(driving: Driving) -> tuple[npt.NDArray[np.intp], int]:
     finest = float(driving.sample_rate_hz.max())
     gap = int(_LONGEST_S * finest) + 1
     places, at = [], 0
-    for s in driving.stretches:
-        n = s.where.stop - s.where.start
-        own = np.round(np.arange(n) * (finest / driving.logs[s.log].rate_hz)).astype(np.intp)
+    for first, end, rate in driving.spans:
+        own = np.round(np.arange(end - first) * (finest / rate)).astype(np.intp)
         places.append(at + own)
         at += int(own[-1]) + 1 + gap
     return np.concatenate(places), 1 << int(np.ceil(np.log2(at + gap)))

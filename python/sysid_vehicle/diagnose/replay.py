@@ -312,19 +312,18 @@ class Replay:
         Of driving with more samples than are worth the time, windows evenly spread.
         """
         driving = self.fit.driving
+        logs = [driving.logs[s.log] for s in driving.stretches]
         whole = sum(
-            (s.where.stop - s.where.start) / _every(driving.logs[s.log]) for s in driving.stretches
+            (end - at) / _every(log) for log, (at, end, _) in zip(logs, driving.spans, strict=True)
         )
         share = min(self.most_samples / whole, 1.0)
-        at = 0
-        for s in driving.stretches:
-            log, (first, last) = driving.logs[s.log], (s.where.start, s.where.stop)
+        for s, log, (at, _, _) in zip(driving.stretches, logs, driving.spans, strict=True):
+            first, last = s.where.start, s.where.stop
             length = last - first if share == 1.0 else int(_WINDOW_S * log.rate_hz)
             for begin in range(first, last, int(np.ceil(length / share))):
                 end = min(begin + length, last)
                 if end - begin >= log.rate_hz:
                     yield log, slice(begin, end), at + begin - first
-            at += last - first
 
 
 def _cost(end: tuple[float, FloatArray]) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,14 @@ _REACH_S = effect("steer_delay").parameters[0].upper  # either way
 
 _Part = tuple[Log, slice, int]
 """Log, samples of it, and the place of the first among all usable samples."""
+
+
+class Span(NamedTuple):
+    """First and end of a stretch among all usable samples, and its rate."""
+
+    first: int
+    end: int
+    rate_hz: float
 
 
 @dataclass(frozen=True)
@@ -100,6 +109,13 @@ class Driving:
             Stretch(i, where) for i, log in enumerate(self.logs) for where in log.stretches()
         )
 
+    @cached_property
+    def spans(self) -> tuple[Span, ...]:
+        """Where each stretch lies among all usable samples."""
+        ends = np.cumsum([s.where.stop - s.where.start for s in self.stretches]).tolist()
+        rates = (self.logs[s.log].rate_hz for s in self.stretches)
+        return tuple(map(Span, [0, *ends[:-1]], ends, rates))
+
     def only(self, stretch: Stretch) -> Driving:
         """One stretch, or a part of one, alone."""
         alone = replace(self)
@@ -119,7 +135,10 @@ class Driving:
     def log_number(self) -> FloatArray:
         """For each sample, the number of the log it comes from."""
         return np.concatenate(
-            [np.full(s.where.stop - s.where.start, float(s.log)) for s in self.stretches]
+            [
+                np.full(end - first, float(s.log))
+                for s, (first, end, _) in zip(self.stretches, self.spans, strict=True)
+            ]
         )
 
     @cached_property
@@ -145,12 +164,7 @@ class Driving:
     @cached_property
     def sample_rate_hz(self) -> FloatArray:
         """For each sample, the rate of the log it comes from: separate runs may differ."""
-        return np.concatenate(
-            [
-                np.full(s.where.stop - s.where.start, self.logs[s.log].rate_hz)
-                for s in self.stretches
-            ]
-        )
+        return np.concatenate([np.full(end - first, rate) for first, end, rate in self.spans])
 
     @property
     def mean_rate_hz(self) -> float:
@@ -165,10 +179,7 @@ class Driving:
     @property
     def usable_s(self) -> float:
         """Usable seconds, over all stretches."""
-        lengths = (
-            (s.where.stop - s.where.start) / self.logs[s.log].rate_hz for s in self.stretches
-        )
-        return float(sum(lengths))
+        return float(sum((end - first) / rate for first, end, rate in self.spans))
 
     @property
     def present(self) -> tuple[str, ...]:
@@ -251,8 +262,7 @@ class Driving:
         def some(core: _core.SingleTrack, begin: int, end: int) -> _core.Problem:
             return self._problem(model, core, self._between(begin, end), inputs, channels)
 
-        runs = [(at, at + where.stop - where.start, log.rate_hz) for log, where, at in self._whole]
-        return PiecewiseProblem(some, core, cut(runs, longest))
+        return PiecewiseProblem(some, core, cut(self.spans, longest))
 
     def windows(
         self, model: Model, windows: Sequence[tuple[int, int]], motion: FloatArray
@@ -337,11 +347,9 @@ class Driving:
     @cached_property
     def _whole(self) -> list[_Part]:
         """Log, samples and place among all usable samples of each stretch."""
-        lengths = [s.where.stop - s.where.start for s in self.stretches]
-        ends = np.cumsum([0, *lengths])
         return [
-            (self.logs[s.log], s.where, int(at))
-            for s, at in zip(self.stretches, ends, strict=False)
+            (self.logs[s.log], s.where, span.first)
+            for s, span in zip(self.stretches, self.spans, strict=True)
         ]
 
     def _between(self, begin: int, end: int) -> list[_Part]:

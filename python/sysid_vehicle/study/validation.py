@@ -190,10 +190,7 @@ def fitted_ahead(fit: Fit) -> Fit | None:
 
 def longest_s(driving: Driving) -> float:
     """Duration of the longest stretch [s]."""
-    lengths = [
-        float(s.where.stop - s.where.start) / driving.logs[s.log].rate_hz for s in driving.stretches
-    ]
-    return max(lengths)
+    return max((end - first) / rate for first, end, rate in driving.spans)
 
 
 def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:
