@@ -42,15 +42,15 @@ NUMERICAL = {
     "diagnose/sensitivity.py": {"_AT_ONCE", "_BOUNDED", "_SHARES"},
     "diagnose/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},
     "study/validation.py": {"AHEAD", "AHEAD_S", "_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
-    "study/horizons.py": {"AHEAD", "APART", "DRAWS", "_BLOCK_S", "_FEWEST", "_NORMAL", "_LOST"},
+    "study/horizons.py": {"AHEAD", "_BLOCK_S", "_FEWEST", "_DRAWS", "_APART", "_NORMAL", "_LOST"},
     "study/improve.py": {"_SHORT_S"},
     "study/next_steps.py": {"_SHOWN"},
     "study/shares.py": {
-        "AHEAD", "_LEAST_APART_S", "_LONG_S", "_FEW",
+        "AHEAD", "_LEAST_APART_S", "_APART", "_BLOCK_S", "_FEWEST", "_DRAWS", "_LONG_S", "_FEW",
         "_VISIBLE", "_LOST", "_LEAST", "_QUANTILES",
     },
     "study/steps.py": {"_ALTERNATIVES"},
-    "study/structure.py": {"_AHEAD_S", "_FEW"},
+    "study/structure.py": {"_AHEAD_S", "_APART", "_FEW"},
     # Descriptions of the unknown, of biases, and of the next drive.
     "diagnose/ceiling.py": {
         "_RATE_HZ", "_LAGS_S", "_BLOCK_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",

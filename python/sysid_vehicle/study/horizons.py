@@ -30,10 +30,8 @@ LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2")
 PREDICTED = ("vx_mps", "ax_mps2", *LATERAL)
 AHEAD = (0.5, 1.0, 2.0, 5.0)
 _BLOCK_S, _FEWEST = 5.0, 6
-DRAWS = 300
-"""Of blocks of driving, by which intervals are found."""
-APART = 0.1
-"""Share of the horizon between predictions."""
+_DRAWS = 300
+_APART = 0.1  # of the horizon, between predictions
 _NORMAL = 1.4826  # standard deviation over the median absolute deviation
 _LOST = 10.0  # logarithm of the ratio, where one of two models lost the car
 _OF_MEDIAN = float(np.sqrt(0.5 * np.pi))  # its standard error over that of a mean
@@ -224,7 +222,7 @@ def beyond_noise(
     most = np.nanmax(np.where(np.isfinite(squares), squares, 0.0), axis=(0, 1))
     squares = np.where(np.isinf(squares), _LOST**2 * most, squares)
     whole = _beyond(squares, sensor, seen)
-    draws = generator(seed).integers(0, squares.shape[1], (DRAWS, squares.shape[1]))
+    draws = generator(seed).integers(0, squares.shape[1], (_DRAWS, squares.shape[1]))
     shares = [_share(_beyond(squares[:, d], sensor, seen)) for d in draws]
     low, high = np.quantile(shares, (0.025, 0.975))
     return Beyond(tuple(map(float, whole)), _share(whole), float(low), float(high))
@@ -273,7 +271,7 @@ def _ahead(
     """Errors of the predicted channels, (horizons, samples, 5), infinite where the model fails."""
     columns = [MEASURED.index(c) for c in PREDICTED]
     try:
-        e = all_ahead(fit, noise, driving, horizons_s, apart=APART)[:, :, columns]
+        e = all_ahead(fit, noise, driving, horizons_s, apart=_APART)[:, :, columns]
     except NumericalError:
         return np.full((len(horizons_s), driving.samples, len(PREDICTED)), np.inf)
     return as_float64(np.where(np.isfinite(driving.measured[:, columns]), e, np.nan))
@@ -281,7 +279,7 @@ def _ahead(
 
 def _by_block(e: FloatArray, driving: Driving) -> FloatArray:
     """Root mean squares, shape (blocks, horizons, channels)."""
-    starts = blocks_of(driving)
+    starts = blocks(driving, driving.usable_s / _number_of_blocks(driving))
     there = ~np.isnan(e)
     squares = np.add.reduceat(np.where(there, e, 0.0) ** 2, starts, axis=1)
     count = np.add.reduceat(there.astype(float), starts, axis=1)
@@ -324,9 +322,8 @@ def typical_error(
     return float(np.mean(np.log(found))) if found else np.inf
 
 
-def blocks_of(driving: Driving) -> npt.NDArray[np.intp]:
-    """Where pieces of driving begin whose errors ahead count as independent."""
-    return blocks(driving, driving.usable_s / max(round(driving.usable_s / _BLOCK_S), _FEWEST))
+def _number_of_blocks(driving: Driving) -> int:
+    return max(round(driving.usable_s / _BLOCK_S), _FEWEST)
 
 
 def changes(

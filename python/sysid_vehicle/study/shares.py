@@ -22,21 +22,21 @@ from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._text import html_paragraph, html_table, number, text_table
 from .._threads import in_parallel
+from ..diagnose import blocks
 from ..diagnose.ceiling import Inputs, folds, ridge
 from ..diagnose.coordinates import begins
 from ..errors import NumericalError
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
-from ..estimate.driving import WORDS
 from ..identify import Fit, driving_of
 from ..rules import Share, share_between
-from .horizons import AHEAD as _FURTHER
-from .horizons import APART, DRAWS, blocks_of
 
 CHANNELS = ("vy_mps", "yaw_rate_radps", "ay_mps2", "path_m")
-AHEAD = (0.0, *_FURTHER)
+AHEAD = (0.0, 0.5, 1.0, 2.0, 5.0)
 _UNITS = {**UNITS, "path_m": "m"}
-_WORDS = {**WORDS, "path_m": "path"}
-_LEAST_APART_S = 0.1  # between predictions
+_WORDS = {"vy_mps": "v_y", "yaw_rate_radps": "yaw rate", "ay_mps2": "a_y", "path_m": "path"}
+_LEAST_APART_S, _APART = 0.1, 0.1  # between predictions; the latter of the horizon
+_BLOCK_S, _FEWEST = 5.0, 6
+_DRAWS = 300
 _LONG_S = 1.0  # horizons of which the share of all is
 _FEW = 30  # predictions that a regression needs
 _VISIBLE = 0.01  # of an error: what is explained beyond shows in three digits
@@ -212,7 +212,7 @@ def shares(
     best = np.take_along_axis(squares[n - 1 :], order[None, None], axis=0)[0]
     ceiling = _deciles(np.sqrt(best)[None])[:, 0]
     stack = np.stack([squares[0], squares[n - 1], best])
-    drawn = generator(seed).integers(0, squares.shape[1], (DRAWS, squares.shape[1]))
+    drawn = generator(seed).integers(0, squares.shape[1], (_DRAWS, squares.shape[1]))
     middle = np.stack([_middle(stack[:, d]) for d in (slice(None), *drawn)])
     long = np.array(horizons_s) >= _LONG_S
     scale = middle[0, 0][long]
@@ -280,7 +280,8 @@ def _squares(
 
 
 def _by_block(driving: Driving, at: npt.NDArray[np.intp], errors: FloatArray) -> FloatArray:
-    starts = blocks_of(driving)
+    count = max(round(driving.usable_s / _BLOCK_S), _FEWEST)
+    starts = blocks(driving, driving.usable_s / count)
     block = np.searchsorted(starts, at, side="right") - 1
     out = np.full((len(starts), errors.shape[1]), np.nan)
     for k in range(errors.shape[1]):
@@ -304,7 +305,7 @@ def _errors(
     parts: list[list[_Errors]] = [[] for _ in horizons_s]
     for rate in np.unique(driving.sample_rate_hz):
         ahead = [max(round(h * rate), 1) for h in horizons_s]
-        apart = [max(round(max(_LEAST_APART_S, APART * h) * rate), 1) for h in horizons_s]
+        apart = [max(round(max(_LEAST_APART_S, _APART * h) * rate), 1) for h in horizons_s]
         half_way = [max(n // 2, 1) for n in ahead]  # for the path
         try:
             asked = list(zip((*half_way, *ahead), (*apart, *apart), strict=True))

@@ -21,10 +21,10 @@ from ..errors import NumericalError
 from ..estimate import MEASURED, Driving
 from ..estimate.driving import WORDS
 from ..identify import Fit, driving_of
-from .horizons import APART
 from .waterfall import all_ahead
 
 _AHEAD_S = (1.0, 5.0)
+_APART = 0.1  # of the horizon, between predictions
 _FEW = 40  # predictions that a regression needs
 
 
@@ -90,7 +90,7 @@ def _of(fit: Fit, driving: Driving) -> Iterator[tuple[str, Explainable]]:
     inputs = Inputs.of(fit, driving, driving).train
     try:
         missing = missing_forces(fit, driving)
-        ahead = all_ahead(fit, fit.noise.floor(), driving, _AHEAD_S, apart=APART)
+        ahead = all_ahead(fit, fit.noise.floor(), driving, _AHEAD_S, apart=_APART)
     except NumericalError:  # the model loses the car: of its errors nothing can be told
         return
     rows = thinned(driving)
