@@ -10,7 +10,7 @@ import numpy as np
 from .._arguments import expect, whole
 from .._progress import doing
 from ..errors import SysidError
-from ..log import MEASURED, Log, several_logs
+from ..log import Log, several_logs
 from ..vehicle import Vehicle
 from ._equations import FAULTS, Readings
 from ._estimate import Estimate, estimate, noise_of, preferred
@@ -18,7 +18,7 @@ from ._faults import Rival, doubted, faults_of
 from ._motion import Grid, Stretch
 from ._parts import cut
 from ._result import SensorCheck
-from ._signals import Signal, averaged, pieces, readings_of, refuse_mixed_up, signals
+from ._signals import MOVING, Signal, averaged, pieces, readings_of, refuse_mixed_up, signals
 
 _MEAN_S = 0.03  # quick channels enter as means over so long
 # Knots of the motion, in sampling periods. No simple ratio: were the samples always at the same
@@ -73,7 +73,7 @@ def check(
     readings = readings_of(together, stretches)
     refuse_mixed_up(together, readings)
     have = {r.channel for r in readings}
-    lacking = [c for c in MEASURED if c not in have]
+    lacking = [c for c in MOVING if c not in have]
     told = tuple(signal for log in together for signal in signals(log))
     floors = {r.channel: _floor(r, told) for r in readings}
     step_s = _step(readings)

@@ -14,9 +14,9 @@ import numpy as np
 import scipy
 
 from .._arrays import FloatArray
-from ..log import MEASURED, Log
+from ..log import Log
 from ._apply import shifted
-from ._signals import own_samples
+from ._signals import MOVING, own_samples
 from ._spectrum import NoiseSpectrum, noise_spectrum
 
 _ONE_FILTER = 0.15  # corner frequencies that differ by no more are of one kind of filter
@@ -44,7 +44,7 @@ def conditioned(logs: Sequence[Log]) -> list[Log]:
 
 def _spectra(log: Log) -> dict[str, NoiseSpectrum]:
     found = {}
-    for channel in MEASURED:
+    for channel in MOVING:
         if not log.has(channel):
             continue
         at, every = own_samples(log[channel])
@@ -68,7 +68,7 @@ def _delays(found: Sequence[dict[str, NoiseSpectrum]]) -> dict[str, tuple[float,
     """
     own = {}
     unclear = {c for spectra in found for c, s in spectra.items() if s.falls and not s.delay_s}
-    for channel in MEASURED:
+    for channel in MOVING:
         told = [s[channel] for s in found if channel in s]
         if any(channel in device and unclear.intersection(device) for device in _DEVICES):
             continue

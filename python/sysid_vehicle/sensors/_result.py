@@ -14,7 +14,6 @@ from .._arrays import FloatArray
 from .._style import AFTER, MEASURED, axes_or_new, tidy
 from .._text import html_list, html_paragraph, html_table, number, text_table
 from ..errors import InvalidInput, near_names
-from ..log import MEASURED as MOVING
 from ..log import Log
 from ..vehicle import Vehicle
 from ._apply import corrected
@@ -23,7 +22,7 @@ from ._equations import Readings
 from ._estimate import Estimate
 from ._faults import SensorFault
 from ._motion import Stretch
-from ._signals import Signal
+from ._signals import MOVING, Signal
 from ._texts import ON_CORRECTION, gradient, map_line
 
 if TYPE_CHECKING:

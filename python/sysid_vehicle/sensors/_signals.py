@@ -17,6 +17,7 @@ from ._colour import neighbours
 from ._equations import Readings
 from ._motion import IntArray, Stretch
 
+MOVING = MEASURED  # channels of which the motion is made
 _SLOWEST_MPS = 3.0
 _SHORTEST_S = 3.0
 _LONGEST_HOLE_S = 0.6  # without a sample of a channel the motion is not told
@@ -100,7 +101,7 @@ def pieces(logs: Sequence[Log]) -> list[Stretch]:
     for number, log in enumerate(logs):
         time_s = log["time_s"]
         usable = filled(log["vx_mps"]) > _SLOWEST_MPS
-        for channel in MEASURED:
+        for channel in MOVING:
             if log.has(channel):
                 usable &= ~_in_holes(time_s, log[channel])
         edges = np.flatnonzero(np.diff(np.concatenate(([0], usable.astype(np.int8), [0]))))
@@ -141,7 +142,7 @@ def _joined(kept: list[Stretch], logs: Sequence[Log]) -> list[Stretch]:
 def readings_of(logs: Sequence[Log], stretches: Sequence[Stretch]) -> list[Readings]:
     """The samples of each channel of the motion; repeated values of held channels count once."""
     result = []
-    for channel in MEASURED:
+    for channel in MOVING:
         if not all(log.has(channel) for log in logs):
             continue
         at, times, values = [], [], []
