@@ -240,6 +240,8 @@ class Effect:
             lines.append(f"  acts like   {', '.join(self.confounded_with)}")
         if self.through:
             lines.append(f"  through     {self.through}")
+        if self.breaks:
+            lines.append(f"  breaks      laws of motion: {self.breaks}")
         if self.same_in_all_logs:
             lines.append("  nuisance    the same in all logs of a car")
         return "\n".join(lines)
