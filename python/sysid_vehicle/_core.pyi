@@ -21,6 +21,7 @@ from ._core_sideslip import SideslipUkf as SideslipUkf
 from ._core_sideslip import _SideslipObserver as _SideslipObserver
 from ._core_sideslip import _SideslipUkf as _SideslipUkf
 from ._core_sideslip import sideslip_defaults as sideslip_defaults
+from ._core_sideslip import sideslip_meanings as sideslip_meanings
 from ._core_twin import TWIN_ESTIMATES as TWIN_ESTIMATES
 from ._core_twin import BatchEstimator as BatchEstimator
 from ._core_twin import ParameterLaw as ParameterLaw
