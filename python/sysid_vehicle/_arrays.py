@@ -8,6 +8,10 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 
 
+NORMAL_MAD = 1.4826
+"""Standard deviation of a normal variable over its median absolute deviation."""
+
+
 def as_float64(values: npt.ArrayLike) -> FloatArray:
     """Contiguous float64 array of `values`; a copy only where one is needed."""
     return np.ascontiguousarray(values, dtype=np.float64)

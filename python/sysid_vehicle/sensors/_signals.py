@@ -12,6 +12,7 @@ import numpy.typing as npt
 from .._arrays import FloatArray, filled
 from ..errors import InvalidInput
 from ..log import CHANNELS, MEASURED, Log, held_rows
+from ..log._signals import runs
 from ..vehicle import GRAVITY_MPS2
 from ._colour import neighbours
 from ._equations import Readings
@@ -104,8 +105,7 @@ def pieces(logs: Sequence[Log]) -> list[Stretch]:
         for channel in MOVING:
             if log.has(channel):
                 usable &= ~_in_holes(time_s, log[channel])
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], usable.astype(np.int8), [0]))))
-        for a, b in zip(edges[::2], edges[1::2], strict=True):
+        for a, b in runs(usable):
             count = max(1, round((time_s[b - 1] - time_s[a]) / _PIECE_S))
             cuts = np.linspace(a, b, count + 1).astype(np.intp)
             for i, j in pairwise(cuts):
