@@ -316,6 +316,10 @@ class Model:
         """Starting values of the tyre of an axle, `front` or `rear`."""
         return self.vehicle.tyre_front if axle == "front" else self.vehicle.tyre_rear
 
+    def tyre(self, axle: str) -> Tyre:
+        """The tyre that an axle, `front` or `rear`, has in this model."""
+        return Tyre(*(self.value(f"{letter}_{axle}") for letter in "BCDE"))
+
     def vector(self, also: Iterable[Effect] = ()) -> FloatArray:
         """The core's parameter vector; effects that do not act stand at their null values."""
         p = np.zeros(_core.PARAMETERS)

@@ -249,8 +249,8 @@ class Replay:
     def _understeer(self) -> float:
         """Steering angle per lateral acceleration of the fitted tyres [rad s2/m], none below 0."""
         model = self.fit.model
-        front, rear = (np.prod([model.value(f"{x}_{a}") for x in "BCD"]) for a in AXLES)
-        return max(float(1.0 / front - 1.0 / rear) / GRAVITY_MPS2, 0.0)
+        front, rear = (model.tyre(a).cornering_stiffness_per_load for a in AXLES)
+        return max((1.0 / front - 1.0 / rear) / GRAVITY_MPS2, 0.0)
 
     def _references(self, s: _Stretch) -> FloatArray:
         """Speed, curvature, and what of the steering the driver does not add for the curvature."""
