@@ -205,6 +205,11 @@ class Effect:
         return [p.column for p in self.parameters]
 
     @property
+    def named(self) -> dict[str, Parameter]:
+        """Its parameters by the names that they have in a model."""
+        return {f"{self.id}.{p.name}": p for p in self.parameters}
+
+    @property
     def scanned(self) -> Parameter | None:
         """Its parameter that means nothing while the effect is null, if there is one."""
         return next((p for p in self.parameters if p.scan), None)

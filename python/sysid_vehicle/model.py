@@ -158,10 +158,10 @@ class Model:
         model = self.add(*(n for n in several if n not in self.effects))
         return model.with_priors(
             {
-                f"{e.id}.{p.name}": (p.null_value, abs(p.typical - p.null_value))
+                name: (p.null_value, abs(p.typical - p.null_value))
                 for e in model.parts
                 if e.id in several
-                for p in e.parameters
+                for name, p in e.named.items()
             }
         )
 
@@ -170,9 +170,7 @@ class Model:
         """Effects of which every parameter has a prior about its null value."""
         priors = self.priors
         about = {n for n, (mean, _) in priors.items() if mean == self.parameters[n].null_value}
-        return tuple(
-            e.id for e in self.parts if all(f"{e.id}.{p.name}" in about for p in e.parameters)
-        )
+        return tuple(e.id for e in self.parts if about.issuperset(e.named))
 
     @property
     def offset_names(self) -> tuple[str, ...]:
@@ -229,7 +227,7 @@ class Model:
         """Parameters by full name, those of the baseline first."""
         named = {p.name: p for p in base_parameters()}
         for e in self.parts:
-            named.update({f"{e.id}.{p.name}": p for p in e.parameters})
+            named.update(e.named)
         return named
 
     @property

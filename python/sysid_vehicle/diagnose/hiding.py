@@ -168,8 +168,7 @@ def bias_report(
         tuple(middle_s if p.scan == "time" else p.typical for p in e.parameters) for e in wanted
     ]
     effects_at = [
-        {f"{e.id}.{p.name}": v for p, v in zip(e.parameters, size, strict=True)}
-        for e, size in zip(wanted, sizes, strict=True)
+        dict(zip(e.named, size, strict=True)) for e, size in zip(wanted, sizes, strict=True)
     ]
     replay, told = Replay(fit, most_samples, seed), _Told.of(fit)
     try:
