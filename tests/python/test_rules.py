@@ -26,6 +26,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "sysid_vehicle"
 NUMERICAL = {
     "diagnose/causes.py": {"_KEPT", "_LEAST"},
     "diagnose/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
+    "diagnose/coordinates.py": {"BLOCK_S"},
     "diagnose/diagnose.py": {"REFITS", "_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS"},
     "diagnose/directions.py": {"_ROWS"},
     "diagnose/evidence.py": {"HELD", "_AT_ONCE"},
@@ -53,7 +54,7 @@ NUMERICAL = {
     "study/structure.py": {"_AHEAD_S", "_APART", "_FEW"},
     # Descriptions of the unknown, of biases, and of the next drive.
     "diagnose/ceiling.py": {
-        "_RATE_HZ", "_LAGS_S", "_BLOCK_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",
+        "_RATE_HZ", "_LAGS_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",
     },
     "study/predicting.py": {"_WORTH"},
     "diagnose/change_directions.py": {"_BLEND_S", "_SMALL"},
@@ -68,11 +69,11 @@ NUMERICAL = {
         "_TINY_RAD",
     },
     "diagnose/force_map.py": {
-        "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_BLOCK_S", "_LONGEST_S",
+        "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_LONGEST_S",
     },
     "diagnose/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE"},
     "diagnose/next_drive.py": {"_ENOUGH"},
-    "diagnose/proposals.py": {"_MOST", "_TRIED", "_ALIKE", "_BLOCK_S", "_RETAINED", "_VISIBLE"},
+    "diagnose/proposals.py": {"_MOST", "_TRIED", "_ALIKE", "_RETAINED", "_VISIBLE"},
     "diagnose/shape.py": {
         "_KNOTS", "_KNOTS_OF_PAIR", "_SIZES", "_SIZES_OF_PAIR", "_SMOOTH", "_FINE", "_DRAWS",
         "_LEVEL", "_FEWEST",

@@ -22,7 +22,7 @@ from .._text import HALF_95, brief, html_text
 from ..estimate import Driving
 from ..identify import Fit
 from ..vehicle import GRAVITY_MPS2
-from .coordinates import COORDINATES, Coordinate, coordinates
+from .coordinates import BLOCK_S, COORDINATES, Coordinate, coordinates
 from .evidence import FORCES
 
 if TYPE_CHECKING:
@@ -39,7 +39,6 @@ _CELLS = (8, 9)
 _CELLS_ALONE = 24
 _FEWEST = 20  # samples that make a cell worth showing
 _FOLDS = 5
-_BLOCK_S = 5.0
 _LONGEST_S = 5.0  # of the autocorrelation
 UNITS = {"F_x": "N", "F_y": "N", "M_z": "N m"}
 
@@ -332,7 +331,7 @@ def _predicted(
 
     Blocks of some seconds are left out in turns; a cell that was hardly visited says little.
     """
-    block = int(_BLOCK_S * driving.mean_rate_hz)
+    block = int(BLOCK_S * driving.mean_rate_hz)
     fold = (np.arange(len(x)) // max(min(block, len(x) // (2 * _FOLDS)), 1)) % _FOLDS
     both = cell * _FOLDS + fold
     size = cells * _FOLDS
