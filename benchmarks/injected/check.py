@@ -92,14 +92,31 @@ def summary(rows: dict[str, dict[str, dict[str, object]]]) -> str:
     )
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def line(injection: Injection, row: dict[str, object]) -> str:
+    """A row in a line."""
+    return (
+        f"  {injection.what:28s} {row['difference']:+8.4f} of {row['wanted']:+8.4f} "
+        f"+- {row['std']:.2g}"
+        f"{'' if row['testable'] else '  not testable'}"
+        f"{'  named' if row['named'] else ''}{'  inside' if row['inside'] else ''}"
+        f"{'  WRONG: ' + ', '.join(row['wrong']) if row['wrong'] else ''}"
+    )
+
+
+def arguments(doc: str) -> argparse.ArgumentParser:
+    """What every benchmark of injections is given."""
+    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("data", type=Path)
     parser.add_argument("sets", nargs="*", metavar="SET", help=", ".join(NAMES))
     parser.add_argument("--fetched", type=Path, metavar="FOLDER", help="logs without a licence")
     parser.add_argument("--validation", action="store_true", help="the logs for validation")
-    parser.add_argument("--as-logged", action="store_true", help="not put right before")
     parser.add_argument("--json", type=Path, metavar="JSON", help="file for the figures")
+    return parser
+
+
+def main() -> None:
+    parser = arguments(__doc__)
+    parser.add_argument("--as-logged", action="store_true", help="not put right before")
     args = parser.parse_args()
     warnings.simplefilter("ignore", sv.SysidWarning)
     rows: dict[str, dict[str, dict[str, object]]] = {}
@@ -117,14 +134,7 @@ def main() -> None:
         for injection in KINEMATIC:
             row = judged(injection, before, sv.check(falsified(log, injection.act)))
             rows[name][injection.what] = row
-            print(
-                f"  {injection.what:28s} {row['difference']:+8.4f} of {row['wanted']:+8.4f} "
-                f"+- {row['std']:.2g}"
-                f"{'' if row['testable'] else '  not testable'}"
-                f"{'  named' if row['named'] else ''}{'  inside' if row['inside'] else ''}"
-                f"{'  WRONG: ' + ', '.join(row['wrong']) if row['wrong'] else ''}",
-                flush=True,
-            )
+            print(line(injection, row), flush=True)
         print(f"  {time.perf_counter() - began:.0f} s", flush=True)
         if args.json is not None:
             args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

@@ -15,7 +15,6 @@ or its interval is wider than the injection.
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
@@ -28,7 +27,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "real_driving"))
 
 from cars import NAMES, vehicle
-from check import piece, summary
+from check import arguments, line, piece, summary
 from falsify import DYNAMIC, Falsified, falsified
 
 import sysid_vehicle as sv
@@ -109,13 +108,8 @@ def changed(model: sv.Model, car: sv.Vehicle) -> sv.Model:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("data", type=Path)
-    parser.add_argument("sets", nargs="*", metavar="SET", help=", ".join(NAMES))
-    parser.add_argument("--fetched", type=Path, metavar="FOLDER", help="logs without a licence")
-    parser.add_argument("--validation", action="store_true", help="the logs for validation")
+    parser = arguments(__doc__)
     parser.add_argument("--only", default="", metavar="WORD", help="injections with this word")
-    parser.add_argument("--json", type=Path, metavar="JSON", help="file for the figures")
     args = parser.parse_args()
     warnings.simplefilter("ignore", sv.SysidWarning)
     rows: dict[str, dict[str, dict[str, object]]] = {}
@@ -132,13 +126,7 @@ def main() -> None:
         for injection in (f for f in DYNAMIC if args.only in f.what):
             row = judged(injection, log, before, settled)
             rows[name][injection.what] = row
-            print(
-                f"  {injection.what:24s} {row['difference']:+.4f} of {row['wanted']:+.4f} "
-                f"+- {row['std']:.2g}{'' if row['testable'] else '  not testable'}"
-                f"{'  named' if row['named'] else ''}{'  inside' if row['inside'] else ''}"
-                f"{'  WRONG: ' + ', '.join(row['wrong']) if row['wrong'] else ''}",
-                flush=True,
-            )
+            print(line(injection, row), flush=True)
         print(f"  {time.perf_counter() - began:.0f} s", flush=True)
         if args.json is not None:
             args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

@@ -12,12 +12,19 @@ read as they are.
 from __future__ import annotations
 
 import argparse
+import sys
 import warnings
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+
+sys.path += [str(Path(__file__).resolve().parents[1] / other) for other in ("exam", "real_driving")]
+
+from cars import lane_change_columns
+from design import VEHICLES
+from truths import vehicle
 
 import sysid_vehicle as sv
 
@@ -79,32 +86,14 @@ CORRUPTIONS: dict[str, dict[str, Corruption]] = {
 }
 
 
-def hatchback() -> sv.Vehicle:
-    return sv.Vehicle(
-        name="hatchback",
-        mass_kg=1080.0,
-        yaw_inertia_kgm2=1480.0,
-        lf_m=1.0,
-        lr_m=1.5,
-        cg_height_m=0.53,
-        track_front_m=1.48,
-        track_rear_m=1.47,
-        drag_area_m2=0.68,
-        brake_front_share=0.72,
-        drive_front_share=1.0,
-        tyre_front=sv.Tyre(B=9.0, C=1.35, D=1.02, E=0.0),
-        tyre_rear=sv.Tyre(B=11.0, C=1.35, D=1.05, E=-0.1),
-    )
-
-
 def clean(first: int, seeds: int) -> Iterator[tuple[str, Columns]]:
     """Drive every manoeuvre with every effect; car and noise are drawn."""
-    cars = (sv.example_vehicle(), hatchback())
+    drivable = [vehicle(name) for name in VEHICLES]
     for seed in range(first, first + seeds):
         for effect in (None, *(e.id for e in sv.catalogue())):
             for name, manoeuvre in sv.manoeuvres.all().items():
                 rng = np.random.default_rng([seed, len(name), hash_of(f"{effect}{name}")])
-                model = sv.Model(cars[int(rng.integers(2))])
+                model = sv.Model(drivable[int(rng.integers(2))])
                 if effect is not None:
                     sizes = {f"{effect}.{p.name}": p.typical for p in sv.effect(effect).parameters}
                     model = model.add(effect).with_values(sizes)
@@ -160,26 +149,7 @@ def real(data: Path) -> Iterator[tuple[str, Columns]]:
     ):
         log = sv.read_log(data / file, maps / f"{car}.channels.toml", check=False)
         yield file, {c: np.array(log[c]) for c in log.channels}
-    yield "bmw_m8_roadview, double lane change", bmw(data / "bmw_m8_roadview")
-
-
-def bmw(folder: Path) -> Columns:
-    """Join the car's readings with the steering, which has a file and a clock of its own."""
-    car = np.genfromtxt(folder / "m8_double_lane_change_car_100Hz.csv", delimiter=",", names=True)
-    inputs = np.genfromtxt(
-        folder / "m8_double_lane_change_inputs_1kHz.csv", delimiter=",", names=True
-    )
-    time_s = car["car_time"] - car["car_time"][0]
-    steer = np.interp(time_s, inputs["time"] - inputs["time"][0], inputs["steering"]) * 20.0 / 14.3
-    return {
-        "time_s": time_s,
-        "vx_mps": car["Velocity_X"],
-        "vy_mps": car["Velocity_Y"],
-        "yaw_rate_radps": car["Yaw_Velocity"],
-        "ax_mps2": car["Acceleration_X"],
-        "ay_mps2": car["Acceleration_Y"],
-        "steer_rad": steer,
-    }
+    yield "bmw_m8_roadview, double lane change", lane_change_columns(data / "bmw_m8_roadview")
 
 
 def main() -> None:

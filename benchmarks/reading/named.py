@@ -15,7 +15,7 @@ import warnings
 from collections import Counter
 
 import numpy as np
-from corruptions import CORRUPTIONS, coloured, hatchback, matters
+from corruptions import CORRUPTIONS, VEHICLES, coloured, matters, vehicle
 
 import sysid_vehicle as sv
 
@@ -27,7 +27,7 @@ def draw(number: int) -> tuple[str, sv.Model, sv.Log]:
     """Drive and corrupt; what moves the channels by less than their noise is drawn again."""
     rng = np.random.default_rng([number, 61])
     while True:
-        model = sv.Model((sv.example_vehicle(), hatchback())[int(rng.integers(2))])
+        model = sv.Model(vehicle(VEHICLES[int(rng.integers(2))]))
         name, manoeuvre = list(sv.manoeuvres.all().items())[rng.integers(len(sv.manoeuvres.all()))]
         log = sv.drive(model, manoeuvre, seed=rng, rate_hz=RATE_HZ)
         data = {c: np.array(log[c]) for c in log.channels}

@@ -79,7 +79,12 @@ def without_force(log: sv.Log) -> sv.Log:
 
 
 def lane_change(folder: Path) -> sv.Log:
-    """The double lane change: motion and steering are in two files, at two rates, of one clock."""
+    """The double lane change as a log."""
+    return sv.Log.from_arrays(lane_change_columns(folder), name="double lane change")
+
+
+def lane_change_columns(folder: Path) -> dict[str, np.ndarray]:
+    """Its columns: motion and steering are in two files, at two rates, of one clock."""
     car, inputs = (
         np.genfromtxt(folder / f"m8_double_lane_change_{part}.csv", delimiter=",", names=True)
         for part in ("car_100Hz", "inputs_1kHz")
@@ -87,18 +92,15 @@ def lane_change(folder: Path) -> sv.Log:
     time = car["car_time"]
     # Normalised steering; the authors divide 20 rad by the ratio of the steering gear.
     steer = np.interp(time, inputs["time"], inputs["steering"]) * 20.0 / 14.3
-    return sv.Log.from_arrays(
-        {
-            "time_s": time,
-            "vx_mps": car["Velocity_X"],
-            "vy_mps": car["Velocity_Y"],
-            "yaw_rate_radps": car["Yaw_Velocity"],
-            "ax_mps2": car["Acceleration_X"],
-            "ay_mps2": car["Acceleration_Y"],
-            "steer_rad": steer,
-        },
-        name="double lane change",
-    )
+    return {
+        "time_s": time,
+        "vx_mps": car["Velocity_X"],
+        "vy_mps": car["Velocity_Y"],
+        "yaw_rate_radps": car["Yaw_Velocity"],
+        "ax_mps2": car["Acceleration_X"],
+        "ay_mps2": car["Acceleration_Y"],
+        "steer_rad": steer,
+    }
 
 
 def _beside(name: str, data: Path) -> Path:

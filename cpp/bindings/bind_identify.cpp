@@ -3,6 +3,7 @@
 #include "register.hpp"
 #include "sysid/identify/logwise.hpp"
 #include "sysid/math/program.hpp"
+#include "sysid/math/shift.hpp"
 
 namespace sysid::bindings {
 
@@ -21,10 +22,9 @@ void add_run(LogwiseProblem& logwise, double dt, const Array& inputs, const Arra
     const double* u = matrix(inputs, n, width, "inputs");
     const double* y = matrix(measurements, n, kChannels, "measurements");
     if (n < 2) throw std::invalid_argument("inputs: expected two samples or more");
-    if (!(dt > 0.0) || !std::isfinite(dt)) throw std::invalid_argument("dt: expected above zero");
     const std::string log = name.empty() ? "" : name + ", ";
     Run run;
-    run.dt = dt;
+    run.dt = step_of(dt);
     run.name = name;
     run.steer_before = steer_before;
     run.steer_after = steer_after;
@@ -71,6 +71,7 @@ void register_identify(py::module_& m) {
     m.attr("NOISE_PARAMETERS") = kNoiseParameters;
     m.attr("PARAMETERS") = kParameterCount;
     m.attr("LANES") = kLanes;
+    m.attr("SHIFT_REACH") = kShiftReach;
     m.attr("CHANNELS") = static_cast<int>(kChannels);
     m.attr("EXTERNALS") = static_cast<int>(kExternals);
     py::class_<LogwiseProblem> bound(m, "Problem");

@@ -8,9 +8,14 @@ namespace sysid::bindings {
 
 namespace {
 
-const char* scan_name(Scan scan) {
+const char* name_of(Scan scan) {
     if (scan == Scan::kTime) return "time";
     return scan == Scan::kRange ? "range" : "";
+}
+
+const char* name_of(Breaks breaks) {
+    constexpr std::array names{"", "readings late", "answers late", "on a slope"};
+    return names[static_cast<std::size_t>(breaks)];
 }
 
 py::dict describe(const ParameterInfo& info) {
@@ -25,7 +30,7 @@ py::dict describe(const ParameterInfo& info) {
     d["typical_low"] = info.usual.low;
     d["typical_high"] = info.usual.high;
     d["mirrored"] = info.mirrored;
-    d["scan"] = scan_name(info.scan);
+    d["scan"] = name_of(info.scan);
     return d;
 }
 
@@ -61,6 +66,8 @@ py::list effects() {
         d["needs"] = names(info.needs);
         d["confounded_with"] = names(info.confounded_with);
         d["through"] = info.through;
+        d["breaks"] = name_of(info.breaks);
+        d["same_in_all_logs"] = info.same_in_all_logs;
         d["states"] = detail::kEffectStateCounts[i];
         d["scored_at_typical"] = info.scored_at_typical;
         d["needs_force"] = info.needs_force;

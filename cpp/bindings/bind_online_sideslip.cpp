@@ -14,44 +14,6 @@ namespace sysid::bindings {
 
 namespace {
 
-using Member = double ObserverSettings::*;
-constexpr std::pair<const char*, Member> kSettings[] = {
-    {"vx_mps", &ObserverSettings::vx_mps},
-    {"yaw_rate_radps", &ObserverSettings::yaw_rate_radps},
-    {"ax_mps2", &ObserverSettings::ax_mps2},
-    {"ay_mps2", &ObserverSettings::ay_mps2},
-    {"road_mps2", &ObserverSettings::road_mps2},
-    {"roll_expected", &ObserverSettings::roll_expected},
-    {"roll_share", &ObserverSettings::roll_share},
-    {"roll_time_s", &ObserverSettings::roll_time_s},
-    {"road_time_s", &ObserverSettings::road_time_s},
-    {"force_walk", &ObserverSettings::force_walk},
-    {"error_load", &ObserverSettings::error_load},
-    {"error_lateral", &ObserverSettings::error_lateral},
-    {"error_braking", &ObserverSettings::error_braking},
-    {"error_drive", &ObserverSettings::error_drive},
-    {"error_time_s", &ObserverSettings::error_time_s},
-    {"yaw_walk_radps", &ObserverSettings::yaw_walk_radps},
-    {"sideslip_walk_rad", &ObserverSettings::sideslip_walk_rad},
-    {"stiffness_prior", &ObserverSettings::stiffness_prior},
-    {"friction_prior", &ObserverSettings::friction_prior},
-    {"stiffness_walk", &ObserverSettings::stiffness_walk},
-    {"friction_time_s", &ObserverSettings::friction_time_s},
-    {"relaxation_m", &ObserverSettings::relaxation_m},
-    {"relaxation_std", &ObserverSettings::relaxation_std},
-    {"learning_use", &ObserverSettings::learning_use},
-    {"error_slip_rad", &ObserverSettings::error_slip_rad},
-    {"error_curve", &ObserverSettings::error_curve},
-    {"gate_probability", &ObserverSettings::gate_probability},
-    {"gate_patience_s", &ObserverSettings::gate_patience_s},
-    {"frozen_after_s", &ObserverSettings::frozen_after_s},
-    {"stop_below_mps", &ObserverSettings::stop_below_mps},
-    {"go_above_mps", &ObserverSettings::go_above_mps},
-    {"fx_walk", &ObserverSettings::fx_walk},
-    {"beta_walk_radps", &ObserverSettings::beta_walk_radps},
-    {"model_ay_mps2", &ObserverSettings::model_ay_mps2},
-};
-
 TyreCoefficients<double> to_tyre(const std::array<double, 4>& t) {
     return {t[0], t[1], t[2], t[3]};
 }
@@ -59,7 +21,7 @@ TyreCoefficients<double> to_tyre(const std::array<double, 4>& t) {
 ObserverSettings to_settings(const py::dict& values) {
     ObserverSettings out;
     std::size_t known = 0;
-    for (const auto& [name, member] : kSettings)
+    for (const auto& [name, member, meaning] : kObserverSettings)
         if (values.contains(name)) {
             out.*member = values[name].cast<double>();
             ++known;
@@ -198,7 +160,12 @@ void register_online_sideslip(py::module_& m) {
     m.def("sideslip_defaults", [] {
         py::dict out;
         const ObserverSettings defaults;
-        for (const auto& [name, member] : kSettings) out[name] = defaults.*member;
+        for (const auto& setting : kObserverSettings) out[setting.name] = defaults.*setting.value;
+        return out;
+    });
+    m.def("sideslip_meanings", [] {
+        py::dict out;
+        for (const auto& setting : kObserverSettings) out[setting.name] = setting.meaning;
         return out;
     });
 

@@ -15,6 +15,18 @@ void check_driver(const Driver& d, double dt) {
     if (!possible) throw std::invalid_argument("driver: reaction_s must not be negative");
 }
 
+std::vector<Reference> references_of(const Array& array) {
+    const auto n = array.ndim() == 2 ? array.shape(0) : 0;
+    if (n < 2) throw std::invalid_argument("references: expected two samples or more");
+    const double* r = matrix(array, n, 3, "references");
+    std::vector<Reference> wanted(static_cast<std::size_t>(n));
+    for (auto& w : wanted) {
+        w = {r[0], r[1], r[2]};
+        r += 3;
+    }
+    return wanted;
+}
+
 void register_simulate(py::module_& m) {
     fields(py::class_<Driver>(m, "Driver").def(py::init<>()), SYSID_FIELD(Driver, reaction_s),
            SYSID_FIELD(Driver, yaw_rate_gain), SYSID_FIELD(Driver, yaw_rate_integral_ps),
@@ -28,9 +40,8 @@ void register_simulate(py::module_& m) {
         [](const SingleTrack& model, const Array& p, double dt, const Array& references,
            const Driver& driver, const Array& disturbance, double initial_speed, double initial_vy,
            double initial_yaw_rate, double initial_steer, double start, const Array& channels) {
-            const auto n = references.ndim() == 2 ? references.shape(0) : 0;
-            if (n < 2) throw std::invalid_argument("references: expected two samples or more");
-            const double* r = matrix(references, n, 3, "references");
+            const std::vector<Reference> wanted = references_of(references);
+            const auto n = references.shape(0);
             const double* values = vector(p, kParameterCount, "parameters");
             const bool slopes = disturbance.ndim() == 2 && disturbance.shape(1) == kExternals;
             const py::ssize_t wide = slopes ? kExternals : 3;
@@ -38,11 +49,6 @@ void register_simulate(py::module_& m) {
             std::vector<double> external(static_cast<std::size_t>(n * kExternals));
             for (py::ssize_t k = 0; k < n; ++k)
                 std::copy_n(d + k * wide, wide, external.begin() + k * kExternals);
-            std::vector<Reference> wanted(static_cast<std::size_t>(n));
-            for (auto& w : wanted) {
-                w = {r[0], r[1], r[2]};
-                r += 3;
-            }
             const py::ssize_t width = channels.ndim() == 2 ? channels.shape(1) : 0;
             if (width > static_cast<py::ssize_t>(kUserChannels))
                 throw std::invalid_argument("channels: there are more than there is room for");

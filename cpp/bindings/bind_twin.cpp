@@ -134,16 +134,11 @@ void register_vehicle(py::module_& m) {
             "drive",
             [](const Vehicle14& v, const Driver& driver, const std::array<double, 2>& pedals,
                const Array& references, const Array& base, double dt) {
-                const auto n = references.ndim() == 2 ? references.shape(0) : 0;
-                if (n < 2) throw std::invalid_argument("references: expected two samples or more");
-                const double* r = matrix(references, n, 3, "references");
+                const std::vector<Reference> wanted = references_of(references);
                 const Input14* u = inputs_of(base);
-                if (base.shape(0) != n) throw std::invalid_argument("base: as long as references");
+                if (base.shape(0) != references.shape(0))
+                    throw std::invalid_argument("base: as long as references");
                 check_driver(driver, step_of(dt));
-                std::vector<Reference> wanted;
-                wanted.reserve(static_cast<std::size_t>(n));
-                for (py::ssize_t k = 0; k < n; ++k)
-                    wanted.push_back({r[3 * k], r[3 * k + 1], r[3 * k + 2]});
                 const Drive14 out = unlocked(
                     [&] { return drive14(v, driver, {pedals[0], pedals[1]}, wanted, u, dt); });
                 return py::make_tuple(copy_of(out.inputs, kTwinInputs),
@@ -166,13 +161,13 @@ void register_laws(py::module_& m) {
                 l.sign = yes ? SignSource::kMeasured : SignSource::kTwin;
             });
     fields(law, SYSID_FIELD(ParameterLaw, parameter), SYSID_FIELD(ParameterLaw, channel),
-           SYSID_FIELD(ParameterLaw, differentiate), SYSID_FIELD(ParameterLaw, literal_sign),
-           SYSID_FIELD(ParameterLaw, gain), SYSID_FIELD(ParameterLaw, gain_start),
-           SYSID_FIELD(ParameterLaw, gain_time_s), SYSID_FIELD(ParameterLaw, deadband),
+           SYSID_FIELD(ParameterLaw, differentiate), SYSID_FIELD(ParameterLaw, published_sign),
+           SYSID_FIELD(ParameterLaw, gain), SYSID_FIELD(ParameterLaw, first_gain),
+           SYSID_FIELD(ParameterLaw, first_gain_s), SYSID_FIELD(ParameterLaw, deadband),
            SYSID_FIELD(ParameterLaw, floor), SYSID_FIELD(ParameterLaw, averaging_s),
            SYSID_FIELD(ParameterLaw, lower), SYSID_FIELD(ParameterLaw, upper),
-           SYSID_FIELD(ParameterLaw, yaw_rate_below), SYSID_FIELD(ParameterLaw, yaw_rate_above),
-           SYSID_FIELD(ParameterLaw, stage));
+           SYSID_FIELD(ParameterLaw, yaw_rate_below_radps),
+           SYSID_FIELD(ParameterLaw, yaw_rate_above_radps), SYSID_FIELD(ParameterLaw, stage));
     py::class_<ParameterLaws>(m, "ParameterLaws")
         .def(py::init([](std::vector<ParameterLaw> laws, double dt, std::size_t yaw_rate_channel,
                          double derivative_hz, const std::array<double, 3>& schedule) {
@@ -263,7 +258,7 @@ void register_observers(py::module_& m) {
         [](const std::array<double, 10>& car, const std::array<double, 8>& front,
            const std::array<double, 8>& rear, const std::array<double, 7>& gains,
            const std::array<double, 4>& start, const Array& inputs, const Array& measured,
-           double dt, bool literal_sign) {
+           double dt, bool published_sign) {
             const auto pair = [](const std::array<double, 8>& t) {
                 return PacejkaPair{t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]};
             };
@@ -272,7 +267,8 @@ void register_observers(py::module_& m) {
                 car[6], car[7], car[8], car[9], pair(front), pair(rear),
             };
             const DoubleTrackGains k{
-                gains[0], gains[1], gains[2], gains[3], gains[4], literal_sign, gains[5], gains[6],
+                gains[0], gains[1],       gains[2], gains[3],
+                gains[4], published_sign, gains[5], gains[6],
             };
             if (!(k.lowest_mass_kg <= k.highest_mass_kg))
                 throw std::invalid_argument("gains: limits of the mass are not in their order");
@@ -286,16 +282,12 @@ void register_observers(py::module_& m) {
                            4);
         },
         py::arg("car"), py::arg("front"), py::arg("rear"), py::arg("gains"), py::arg("start"),
-        py::arg("inputs"), py::arg("measured"), py::arg("dt"), py::arg("literal_sign"));
+        py::arg("inputs"), py::arg("measured"), py::arg("dt"), py::arg("published_sign"));
 }
 
 }  // namespace
 
 void register_twin(py::module_& m) {
-    m.attr("TWIN_STATES") = kTwinStatesWithTyres;
-    m.attr("TWIN_INPUTS") = kTwinInputs;
-    m.attr("TWIN_OUTPUTS") = kTwinOutputs;
-    m.attr("TWIN_READINGS") = kReadings;
     m.attr("TWIN_ESTIMATES") = kEstimates;
     register_data(m);
     register_vehicle(m);

@@ -2,14 +2,22 @@
 
 #include <pybind11/pybind11.h>
 
+#include <vector>
+
+#include "arrays.hpp"
+
 namespace sysid {
 struct Driver;
-}
+struct Reference;
+}  // namespace sysid
 
 namespace sysid::bindings {
 
 /// Throws std::invalid_argument unless a driver can be simulated in steps of `dt`.
 void check_driver(const Driver& driver, double dt);
+
+/// What a driver follows, sample by sample; `array` has a row of three for each, two at least.
+std::vector<Reference> references_of(const Array& array);
 
 void register_interrupts(pybind11::module_& m);
 void register_model(pybind11::module_& m);

@@ -13,17 +13,6 @@ import numpy as np
 
 from .errors import InvalidInput
 
-__all__ = [
-    "check_not_negative",
-    "check_positive",
-    "check_positive_fields",
-    "duration",
-    "expect",
-    "generator",
-    "real",
-    "whole",
-]
-
 
 def real(value: object) -> float | None:
     """The real scalar as a float, whatever its type; None for what is none.

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["FloatArray", "as_float64", "filled"]
-
 FloatArray = npt.NDArray[np.float64]
+
+
+NORMAL_MAD = 1.4826
+"""Standard deviation of a normal variable over its median absolute deviation."""
 
 
 def as_float64(values: npt.ArrayLike) -> FloatArray:

@@ -21,11 +21,8 @@ from ._core_sideslip import SideslipUkf as SideslipUkf
 from ._core_sideslip import _SideslipObserver as _SideslipObserver
 from ._core_sideslip import _SideslipUkf as _SideslipUkf
 from ._core_sideslip import sideslip_defaults as sideslip_defaults
+from ._core_sideslip import sideslip_meanings as sideslip_meanings
 from ._core_twin import TWIN_ESTIMATES as TWIN_ESTIMATES
-from ._core_twin import TWIN_INPUTS as TWIN_INPUTS
-from ._core_twin import TWIN_OUTPUTS as TWIN_OUTPUTS
-from ._core_twin import TWIN_READINGS as TWIN_READINGS
-from ._core_twin import TWIN_STATES as TWIN_STATES
 from ._core_twin import BatchEstimator as BatchEstimator
 from ._core_twin import ParameterLaw as ParameterLaw
 from ._core_twin import ParameterLaws as ParameterLaws
@@ -50,6 +47,7 @@ CHANNELS: int
 GRAVITY_MPS2: float
 NOISE_PARAMETERS: int
 PARAMETERS: int
+SHIFT_REACH: int
 USER_EFFECTS: int
 USER_OFFSET: int
 USER_CHANNELS: int

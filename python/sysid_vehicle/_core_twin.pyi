@@ -5,10 +5,6 @@ from collections.abc import Sequence
 from ._core import Driver, _Array, _Bound
 
 TWIN_ESTIMATES: int
-TWIN_INPUTS: int
-TWIN_OUTPUTS: int
-TWIN_READINGS: int
-TWIN_STATES: int
 
 class TwinTyre(metaclass=_Bound):
     nominal_load_n: float
@@ -77,17 +73,17 @@ class ParameterLaw(metaclass=_Bound):
     differentiate: bool
     by_gradient: bool
     sign_measured: bool
-    literal_sign: bool
+    published_sign: bool
     gain: float
-    gain_start: float
-    gain_time_s: float
+    first_gain: float
+    first_gain_s: float
     deadband: float
     floor: float
     averaging_s: float
     lower: float
     upper: float
-    yaw_rate_below: float
-    yaw_rate_above: float
+    yaw_rate_below_radps: float
+    yaw_rate_above_radps: float
     stage: int
     def __init__(self) -> None: ...
 
@@ -141,5 +137,5 @@ def observe_double_track(
     inputs: _Array,
     measured: _Array,
     dt: float,
-    literal_sign: bool,
+    published_sign: bool,
 ) -> _Array: ...

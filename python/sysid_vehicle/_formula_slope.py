@@ -8,8 +8,6 @@ import numpy as np
 
 from .formula import _OPERATIONS, Step, Traced, _needed, _Tape
 
-__all__ = ["decay_of"]
-
 _NAMES = {number: name for name, number in _OPERATIONS.items()}
 _LEAVES = ("constant", "signal", "parameter", "channel", "state")
 

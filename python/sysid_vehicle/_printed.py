@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from ._text import brief, html_list, html_paragraph, html_table, html_text, text_table
-
-__all__ = ["Part", "Printed", "Table", "Told"]
 
 
 class Table(NamedTuple):
@@ -21,11 +20,11 @@ Part = str | Table | list[str]
 """A paragraph, a table, or remarks, each on a line of its own."""
 
 
-class Printed:
+class Printed(ABC):
     """A result that prints, and shows itself in a notebook, by its `_parts`."""
 
-    def _parts(self) -> Iterable[Part]:
-        raise NotImplementedError
+    @abstractmethod
+    def _parts(self) -> Iterable[Part]: ...
 
     def __str__(self) -> str:
         return "\n".join(_text(part) for part in self._parts() if part)

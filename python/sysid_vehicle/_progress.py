@@ -17,8 +17,6 @@ from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from typing import TypeVar
 
-__all__ = ["Task", "doing", "note", "teller", "watched", "with_progress"]
-
 T = TypeVar("T")
 
 _SILENT_S = 2.0  # before anything that nobody asked for

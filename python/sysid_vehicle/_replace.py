@@ -15,8 +15,6 @@ from .errors import InvalidInput
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["could_replace", "replace_file"]
-
 
 def could_replace(target: Path, there: os.stat_result | None) -> None:
     """Raise what stands against replacing or creating the file; leaves nothing behind.

@@ -10,21 +10,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "AFTER",
-    "BEFORE",
-    "FLOOR",
-    "MEASURED",
-    "TRUTH",
-    "axes_or_new",
-    "framed",
-    "inline_svg",
-    "legend_above",
-    "new_figure",
-    "svg",
-    "tidy",
-]
-
 # Told apart in grey print and by colour-blind readers (Okabe & Ito, 2008).
 MEASURED = "#000000"
 BEFORE = "#d55e00"

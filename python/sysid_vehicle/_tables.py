@@ -11,8 +11,6 @@ import numpy.typing as npt
 
 from .errors import InvalidInput
 
-__all__ = ["dataset", "frame", "imported"]
-
 
 def imported(module: str, extra: str) -> Any:
     """Import a library that not everybody needs.

@@ -9,18 +9,8 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from math import isfinite
 
-__all__ = [
-    "brief",
-    "columns",
-    "html_list",
-    "html_paragraph",
-    "html_table",
-    "html_text",
-    "number",
-    "text_table",
-    "with_error",
-    "wrapped",
-]
+HALF_95 = 1.96
+"""Standard errors on either side of a value in the 95 % intervals that are told."""
 
 
 def brief(self: object) -> str:

@@ -16,8 +16,6 @@ from .effects import Parameter, catalogue
 from .errors import InvalidInput
 from .formula import EVERYTHING, SIGNALS, TARGETS, evaluate
 
-__all__ = ["CANONICAL", "Function", "State", "check_names", "checked"]
-
 Function = Callable[[Any, Any], Any]
 
 CANONICAL = {

@@ -18,18 +18,6 @@ from ._arrays import FloatArray, as_float64
 from ._text import html_text
 from .errors import InvalidInput, near_names
 
-__all__ = [
-    "Effect",
-    "OwnState",
-    "Parameter",
-    "base_parameters",
-    "catalogue",
-    "channels_in_use",
-    "effect",
-    "forget",
-    "register",
-]
-
 Steps = tuple[Any, ...]
 
 
@@ -133,6 +121,11 @@ class Effect:
         Effects that act alike in most driving; each names the other.
     through : str
         Effect through which it chiefly acts, if any: weak in a model without that.
+    breaks : str
+        Law of motion that readings seem to break where it acts, through no fault of theirs:
+        `readings late`, `answers late`, `on a slope`, or empty.
+    same_in_all_logs : bool
+        As a nuisance it is the same in all logs of a car, where others differ from log to log.
     states : int
         How many states of its own it adds to the model.
     acts : tuple
@@ -157,6 +150,8 @@ class Effect:
     confounded_with: tuple[str, ...]
     through: str
     states: int
+    breaks: str = ""
+    same_in_all_logs: bool = False
     acts: tuple[tuple[int, Any], ...] = ()
     channels: tuple[str, ...] = ()
     own_states: tuple[OwnState, ...] = ()
@@ -210,6 +205,11 @@ class Effect:
         return [p.column for p in self.parameters]
 
     @property
+    def named(self) -> dict[str, Parameter]:
+        """Its parameters by the names that they have in a model."""
+        return {f"{self.id}.{p.name}": p for p in self.parameters}
+
+    @property
     def scanned(self) -> Parameter | None:
         """Its parameter that means nothing while the effect is null, if there is one."""
         return next((p for p in self.parameters if p.scan), None)
@@ -245,6 +245,10 @@ class Effect:
             lines.append(f"  acts like   {', '.join(self.confounded_with)}")
         if self.through:
             lines.append(f"  through     {self.through}")
+        if self.breaks:
+            lines.append(f"  breaks      laws of motion: {self.breaks}")
+        if self.same_in_all_logs:
+            lines.append("  nuisance    the same in all logs of a car")
         return "\n".join(lines)
 
     _repr_html_ = html_text

@@ -8,6 +8,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ __all__ = [
     "warn",
 ]
 
+_COMPARED = 1000  # near names are sought among so many
 _PACKAGE_DIR = os.path.dirname(os.path.abspath(__file__)) + os.sep
 
 
@@ -115,7 +117,7 @@ def explained(
 
 def near_names(name: str, known: Iterable[str], count: int = 3) -> str:
     """Return ``" (did you mean 'a', 'b'?)"`` for the known names like `name`, else ``""``."""
-    by_lower = {candidate.lower(): candidate for candidate in known}
+    by_lower = {candidate.lower(): candidate for candidate in islice(known, _COMPARED)}
     found = difflib.get_close_matches(name.lower(), by_lower, n=count, cutoff=0.5)
     if not found:
         return ""

@@ -17,8 +17,6 @@ from . import _core
 from ._arrays import FloatArray
 from .errors import InvalidInput
 
-__all__ = ["EVERYTHING", "OUTSET", "SIGNALS", "TARGETS", "Formula", "Traced", "evaluate", "trace"]
-
 _PARTS = _core.formula_parts()
 _OPERATIONS = {name: number for number, name in enumerate(_PARTS["operations"])}
 SIGNALS: tuple[str, ...] = _PARTS["signals"]

@@ -20,8 +20,6 @@ from .errors import InvalidInput
 from .saved import save
 from .vehicle import Tyre, Vehicle
 
-__all__ = ["NUISANCES", "Model", "Setting", "vehicle_data"]
-
 NUISANCES = (
     "steer_offset",
     "speed_sensor_misalignment",
@@ -30,9 +28,6 @@ NUISANCES = (
     "road_bank",
 )
 """Offsets that measured logs have, crossfall of the road among them."""
-
-# The logs of a car share the places of its sensors, whatever else is their own.
-_PLACES = ("ins_lever_arm", "imu_lever_arm", "speed_sensor_lever_arm")
 
 _YAW_INERTIA = "yaw_inertia_kgm2"
 
@@ -163,10 +158,10 @@ class Model:
         model = self.add(*(n for n in several if n not in self.effects))
         return model.with_priors(
             {
-                f"{e.id}.{p.name}": (p.null_value, abs(p.typical - p.null_value))
+                name: (p.null_value, abs(p.typical - p.null_value))
                 for e in model.parts
                 if e.id in several
-                for p in e.parameters
+                for name, p in e.named.items()
             }
         )
 
@@ -175,15 +170,14 @@ class Model:
         """Effects of which every parameter has a prior about its null value."""
         priors = self.priors
         about = {n for n, (mean, _) in priors.items() if mean == self.parameters[n].null_value}
-        return tuple(
-            e.id for e in self.parts if all(f"{e.id}.{p.name}" in about for p in e.parameters)
-        )
+        return tuple(e.id for e in self.parts if about.issuperset(e.named))
 
     @property
     def offset_names(self) -> tuple[str, ...]:
         """Full names of those effects' parameters of which each log has its own."""
-        nuisances = set(self.nuisances).difference(_PLACES)
-        return tuple(n for n in self.free_names if n.split(".")[0] in nuisances)
+        shared = {e.id for e in self.parts if e.same_in_all_logs}
+        own = set(self.nuisances) - shared
+        return tuple(n for n in self.free_names if n.split(".")[0] in own)
 
     def _with_settings(self, changes: Mapping[str, Mapping[str, Any]]) -> Model:
         told = dict(self.settings)
@@ -233,7 +227,7 @@ class Model:
         """Parameters by full name, those of the baseline first."""
         named = {p.name: p for p in base_parameters()}
         for e in self.parts:
-            named.update({f"{e.id}.{p.name}": p for p in e.parameters})
+            named.update(e.named)
         return named
 
     @property
@@ -319,6 +313,10 @@ class Model:
     def tyre_of_vehicle(self, axle: str) -> Tyre:
         """Starting values of the tyre of an axle, `front` or `rear`."""
         return self.vehicle.tyre_front if axle == "front" else self.vehicle.tyre_rear
+
+    def tyre(self, axle: str) -> Tyre:
+        """The tyre that an axle, `front` or `rear`, has in this model."""
+        return Tyre(*(self.value(f"{letter}_{axle}") for letter in "BCDE"))
 
     def vector(self, also: Iterable[Effect] = ()) -> FloatArray:
         """The core's parameter vector; effects that do not act stand at their null values."""

@@ -12,8 +12,6 @@ from importlib.metadata import EntryPoint, entry_points
 
 from .errors import InvalidInput, warn
 
-__all__ = ["Plugin", "installed_effects", "run"]
-
 GROUP = "sysid_vehicle.effects"
 
 

@@ -23,8 +23,6 @@ from ._files import as_path, write_bytes
 from .effects import Effect, effect
 from .errors import InvalidInput
 
-__all__ = ["VERSION", "fingerprint", "load", "packed", "save"]
-
 VERSION = 1
 _NAME = "sysid_vehicle result"
 _CONTENT = "content"

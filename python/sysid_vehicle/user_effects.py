@@ -14,8 +14,6 @@ from .effects import Effect, OwnState, Parameter, catalogue, effect, forget, reg
 from .errors import InvalidInput
 from .formula import EVERYTHING, OUTSET, SIGNALS, TARGETS, Formula, trace
 
-__all__ = ["define_effect", "forget_effect", "load_effects", "parameter", "state"]
-
 _MOVES = {
     "force_x": ("ax_mps2", "vx_mps"),
     "force_y": ("ay_mps2",),

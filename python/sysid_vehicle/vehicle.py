@@ -19,10 +19,10 @@ from ._arrays import FloatArray
 from ._files import as_path, read_toml, refuse_unknown, write_text
 from .errors import InvalidInput, warn
 
-__all__ = ["GRAVITY_MPS2", "Tyre", "Vehicle"]
-
 GRAVITY_MPS2: float = _core.GRAVITY_MPS2
 """Standard gravity, the same in the core."""
+
+AXLES = ("front", "rear")
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,6 @@ _VEHICLE_RANGES = {
 
 _CURVE_POINTS = 3001
 _OPTIONAL = ("yaw_inertia_kgm2", "air_density_kgpm3")
-_TYRE_TABLES = ("front", "rear")
 
 
 def _check_ranges(ranges: Mapping[str, _Range], values: Mapping[str, object], where: str) -> None:
@@ -294,8 +293,8 @@ class Vehicle:
         values = {key: content.get(key) for key in _VEHICLE_RANGES}
         missing = [key for key, value in values.items() if value is None and key not in _OPTIONAL]
         refuse_unknown(content, _VEHICLE_RANGES, where, likely=missing)
-        refuse_unknown(tyre_tables, _TYRE_TABLES, f"{where}, [tyre]")
-        for axle in _TYRE_TABLES:
+        refuse_unknown(tyre_tables, AXLES, f"{where}, [tyre]")
+        for axle in AXLES:
             table = tyre_tables.get(axle, {})
             if not isinstance(table, dict):
                 raise InvalidInput(f"{where}: 'tyre.{axle}' must be a table [tyre.{axle}]")
@@ -303,7 +302,7 @@ class Vehicle:
             missing += [f"tyre.{axle}.{key}" for key in _TYRE_RANGES if key not in table]
         if missing:
             raise InvalidInput(f"{where}: missing keys: {', '.join(missing)}; add them to the file")
-        for axle in _TYRE_TABLES:
+        for axle in AXLES:
             _check_ranges(_TYRE_RANGES, tyre_tables[axle], f"{where}, [tyre.{axle}]")
         given = {key: value for key, value in values.items() if value is not None}
         _check_ranges(_VEHICLE_RANGES, given, where)
@@ -331,7 +330,7 @@ class Vehicle:
             value = getattr(self, key)
             if value is not None:
                 lines.append(f"{key} = {value!r}")
-        for axle, tyre in zip(_TYRE_TABLES, (self.tyre_front, self.tyre_rear), strict=True):
+        for axle, tyre in zip(AXLES, (self.tyre_front, self.tyre_rear), strict=True):
             lines += ["", f"[tyre.{axle}]"]
             lines += [f"{key} = {getattr(tyre, key)!r}" for key in _TYRE_RANGES]
         write_text(path, "\n".join(lines) + "\n")
@@ -341,7 +340,7 @@ class Vehicle:
         for key in _VEHICLE_RANGES:
             value = getattr(self, key)
             rows.append((key, "to identify" if value is None else f"{value:.6g}"))
-        for axle, tyre in zip(_TYRE_TABLES, (self.tyre_front, self.tyre_rear), strict=True):
+        for axle, tyre in zip(AXLES, (self.tyre_front, self.tyre_rear), strict=True):
             numbers = ", ".join(f"{key} {getattr(tyre, key):.6g}" for key in _TYRE_RANGES)
             rows.append((f"tyre {axle}", numbers))
         return rows

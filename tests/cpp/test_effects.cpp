@@ -240,10 +240,9 @@ TEST(Catalogue, StatesOfTheirOwn) {
         const std::map<std::string, std::size_t> expected{
             {"steer_lag", 1}, {"tyre_relaxation", 2}, {"tyre_temperature", 2}, {"sensor_delay", 5}};
         EXPECT_EQ(own, expected.count(id) ? expected.at(id) : 0U) << id;
-        EXPECT_EQ(has_own_states(EffectMask{1} << i), own > 0) << id;
     }
-    EXPECT_FALSE(has_own_states(0));
-    EXPECT_TRUE(has_own_states(kAllEffects));
+    EXPECT_EQ(active_states(0).count, 0U);
+    EXPECT_EQ(active_states(kAllEffects).count, kCatalogueStates);
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ TEST(TwinLaws, AHeavierCarMakesTheParameterGrow) {
 TEST(TwinLaws, LimitsGatesAndMissingReadingsHold) {
     ParameterLaw law = mass_law(1e6);
     law.upper = 2200.0;
-    law.yaw_rate_below = 0.05;
+    law.yaw_rate_below_radps = 0.05;
     ParameterLaws laws({law}, kDt, 1);
     Estimates load = start();
     const double twin[2] = {1.0, 0.0};
@@ -61,8 +61,8 @@ TEST(TwinLaws, LimitsGatesAndMissingReadingsHold) {
 TEST(TwinLaws, AnUnknownYawRateClosesAGateThatAsksForIt) {
     const double car[2] = {0.9, kNone}, twin[2] = {1.0, 0.0};
     ParameterLaw straight = mass_law(100.0), bends = mass_law(100.0);
-    straight.yaw_rate_below = 0.05;
-    bends.yaw_rate_above = 0.05;
+    straight.yaw_rate_below_radps = 0.05;
+    bends.yaw_rate_above_radps = 0.05;
     for (const ParameterLaw& gated : {straight, bends}) {
         ParameterLaws laws({gated}, kDt, 1);
         Estimates load = start();

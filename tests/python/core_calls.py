@@ -323,6 +323,6 @@ def twin(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
         "inputs": calm,
         "measured": measured,
         "dt": 1e-3,
-        "literal_sign": False,
+        "published_sign": False,
     }
     yield "observe_double_track", (_core.observe_double_track, double)

@@ -281,6 +281,12 @@ def test_the_check_sees_types_that_others_see_and_no_others() -> None:
     ]  # fmt: skip
 
 
+def test_only_what_users_get_is_listed() -> None:
+    """In other modules a name without an underscore says as much."""
+    listed = {p for p in PYTHON_FILES if re.search(r"^__all__", p.read_text("utf-8"), re.MULTILINE)}
+    assert {p for p in listed if p.name != "__init__.py"} == {PACKAGE / "errors.py"}
+
+
 def test_no_file_is_too_long_to_read() -> None:
     suffixes = {".py", ".pyi", ".cpp", ".hpp", ".cmake"}
     lines = {

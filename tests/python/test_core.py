@@ -100,7 +100,7 @@ def test_a_parameter_that_is_not_there_is_refused(
 
 @pytest.mark.parametrize("dt", [0.0, -0.01, np.nan, np.inf])
 def test_an_interval_that_is_none_is_refused(dt: float, problem: _core.Problem) -> None:
-    with pytest.raises(ValueError, match="dt: expected above zero"):
+    with pytest.raises(ValueError, match="dt: the step must be positive and finite"):
         problem.add_run(dt, np.zeros((N, 2)), np.zeros((N, 5)))
 
 

@@ -50,6 +50,17 @@ def test_twins_name_each_other_and_needs_are_channels() -> None:
         assert not e.through or effect(e.through).id in str(e)
 
 
+def test_effects_say_what_they_break_and_what_logs_share() -> None:
+    broken = {e.id: e.breaks for e in catalogue() if e.breaks}
+    late = ("steer_delay", "steer_lag", "steer_compliance", "tyre_relaxation")
+    expected = dict.fromkeys(late, "answers late") | {"sensor_delay": "readings late"}
+    assert broken == expected | {"road_grade": "on a slope"}
+    assert all(f"breaks      laws of motion: {e.breaks}" in str(e) for e in map(effect, broken))
+    shared = {e.id for e in catalogue() if e.same_in_all_logs}
+    assert shared == {e.id for e in catalogue() if e.id.endswith("lever_arm")}
+    assert all("the same in all logs of a car" in str(effect(e)) for e in shared)
+
+
 def test_a_scanned_parameter_is_tried_over_the_log_or_its_range() -> None:
     at = effect("friction_change").scanned
     assert at is not None

@@ -231,13 +231,15 @@ def test_causes_are_ranked_by_share_of_cars_and_gain() -> None:
 
 
 def test_processes_and_the_command_line_find_the_same(
-    garage: Path, done: sv.Fleet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    garage: Path, done: sv.Fleet, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     status = main(
         ["improve-many", str(garage / "fleet.toml"), "--out", str(tmp_path), "--workers", "1"]
     )
-    said = capsys.readouterr()
+    said = capfd.readouterr()
     assert status == 0
+    assert "sysid-vehicle: warning: a/one: no validation data were given" in said.err
+    assert "SysidWarning" not in said.err
     assert str(done) in said.out
     assert "b/bad: " in said.err
     again = sv.Fleet(tmp_path, tuple(Row.from_dict(json.loads(p.read_text())["row"]) for p in

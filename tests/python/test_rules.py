@@ -26,14 +26,15 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "sysid_vehicle"
 NUMERICAL = {
     "diagnose/causes.py": {"_KEPT", "_LEAST"},
     "diagnose/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
-    "diagnose/diagnose.py": {"_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS"},
+    "diagnose/coordinates.py": {"BLOCK_S"},
+    "diagnose/diagnose.py": {"REFITS", "_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS"},
     "diagnose/directions.py": {"_ROWS"},
-    "diagnose/evidence.py": {"_AT_ONCE"},
+    "diagnose/evidence.py": {"HELD", "_AT_ONCE"},
     "diagnose/information.py": {"_COPIED"},
-    "diagnose/instead.py": {"_COPIED", "_MEMORIES_S", "_SHAPES_REMEMBERED"},
+    "diagnose/instead.py": {"_MEMORIES_S", "_SHAPES_REMEMBERED"},
     "diagnose/possible.py": {"_AT_BOUND"},
-    "diagnose/omnibus.py": {"_COPIED", "_FEW_SHAPES", "_FORCE_SHAPES"},
-    "diagnose/projection.py": {"_SINGULAR", "_LAGS", "_ROWS", "_TERMS"},
+    "diagnose/omnibus.py": {"LEAST_LEFT", "_FEW_SHAPES", "_FORCE_SHAPES"},
+    "diagnose/projection.py": {"COPIED", "_SINGULAR", "_LAGS", "_ROWS", "_TERMS"},
     "diagnose/replay.py": {
         "_RATE_HZ", "_WINDOW_S", "_LOOKS", "_ROUNDS", "_BENDS", "_AS_GOOD",
     },
@@ -41,19 +42,19 @@ NUMERICAL = {
     "diagnose/score.py": {"_BLOCK_S", "_DRAWN", "_FEWEST_BLOCKS"},
     "diagnose/sensitivity.py": {"_AT_ONCE", "_BOUNDED", "_SHARES"},
     "diagnose/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},
-    "study/validation.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
-    "study/horizons.py": {"_BLOCK_S", "_FEWEST", "_DRAWS", "_APART", "_NORMAL", "_LOST"},
+    "study/validation.py": {"AHEAD", "AHEAD_S", "_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
+    "study/horizons.py": {"AHEAD", "_BLOCK_S", "_FEWEST", "_DRAWS", "_APART", "_NORMAL", "_LOST"},
     "study/improve.py": {"_SHORT_S"},
     "study/next_steps.py": {"_SHOWN"},
     "study/shares.py": {
-        "_LEAST_APART_S", "_APART", "_BLOCK_S", "_FEWEST", "_DRAWS", "_LONG_S", "_FEW",
+        "AHEAD", "_LEAST_APART_S", "_APART", "_BLOCK_S", "_FEWEST", "_DRAWS", "_LONG_S", "_FEW",
         "_VISIBLE", "_LOST", "_LEAST", "_QUANTILES",
     },
     "study/steps.py": {"_ALTERNATIVES"},
     "study/structure.py": {"_AHEAD_S", "_APART", "_FEW"},
     # Descriptions of the unknown, of biases, and of the next drive.
     "diagnose/ceiling.py": {
-        "_RATE_HZ", "_LAGS_S", "_BLOCK_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",
+        "_RATE_HZ", "_LAGS_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",
     },
     "study/predicting.py": {"_WORTH"},
     "diagnose/change_directions.py": {"_BLEND_S", "_SMALL"},
@@ -64,14 +65,15 @@ NUMERICAL = {
     "diagnose/coherence.py": {"_WINDOW_S", "_LEVEL"},
     "diagnose/confirm.py": {"_HOPELESS"},
     "diagnose/delay.py": {
-        "_BANDS", "_LOWEST_HZ", "_SMALL", "_ROUNDS", "_DRAWS", "_NOTABLE", "_TINY_RAD",
+        "HIGHEST_HZ", "_BANDS", "_LOWEST_HZ", "_SMALL", "_ROUNDS", "_DRAWS", "_NOTABLE",
+        "_TINY_RAD",
     },
     "diagnose/force_map.py": {
-        "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_BLOCK_S", "_LONGEST_S",
+        "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_LONGEST_S",
     },
-    "diagnose/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE", "_CERTAIN"},
+    "diagnose/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE"},
     "diagnose/next_drive.py": {"_ENOUGH"},
-    "diagnose/proposals.py": {"_MOST", "_TRIED", "_ALIKE", "_BLOCK_S", "_RETAINED", "_VISIBLE"},
+    "diagnose/proposals.py": {"_MOST", "_TRIED", "_ALIKE", "_RETAINED", "_VISIBLE"},
     "diagnose/shape.py": {
         "_KNOTS", "_KNOTS_OF_PAIR", "_SIZES", "_SIZES_OF_PAIR", "_SMOOTH", "_FINE", "_DRAWS",
         "_LEVEL", "_FEWEST",
@@ -82,8 +84,8 @@ NUMERICAL = {
 _NO_LIMIT = (0, 1, -1, 2, 0.5)  # of which halves, squares and signs are made
 
 
-def private_constants(text: str) -> Iterator[str]:
-    """Private names that a module binds to plain numbers."""
+def constants(text: str) -> Iterator[str]:
+    """Names that a module binds to plain numbers."""
     for node in ast.parse(text).body:
         if not isinstance(node, ast.Assign):
             continue
@@ -93,7 +95,7 @@ def private_constants(text: str) -> Iterator[str]:
             numbers = values and all(type(v.value) in (int, float) for v in values)
             called = any(isinstance(n, ast.Call | ast.Subscript) for n in ast.walk(node.value))
             if numbers and not called:
-                yield from (n.id for n in names if isinstance(n, ast.Name) and n.id.startswith("_"))
+                yield from (n.id for n in names if isinstance(n, ast.Name) and n.id.isupper())
 
 
 def compared_numbers(text: str) -> Iterator[tuple[int, float]]:
@@ -112,7 +114,7 @@ def compared_numbers(text: str) -> Iterator[tuple[int, float]]:
 
 def test_no_limit_that_decides_a_claim_stands_elsewhere() -> None:
     found = {
-        str(path.relative_to(PACKAGE)): set(private_constants(path.read_text("utf-8")))
+        str(path.relative_to(PACKAGE)): set(constants(path.read_text("utf-8")))
         for folder in ("study", "diagnose")
         for path in (PACKAGE / folder).glob("*.py")
     }
@@ -132,7 +134,7 @@ def test_deciding_files_compare_with_no_number_of_their_own() -> None:
 
 def test_the_checks_see_constants_and_comparisons() -> None:
     text = "_A = 0.3\n_B, _C = 1.0, 2\n_D = 'x'\n_E = {1: 'y'}\nF = 3.0\n_G = f(3.0)\nx = y > 0.7"
-    assert set(private_constants(text)) == {"_A", "_B", "_C"}
+    assert set(constants(text)) == {"_A", "_B", "_C", "F"}
     assert list(compared_numbers(text)) == [(7, 0.7)]
 
 

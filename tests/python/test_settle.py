@@ -46,7 +46,7 @@ def test_the_likelihood_is_climbed_where_frozen_gains_see_no_slope() -> None:
     p, _, converged = settle(objective, np.array([1.3, 0.8]), noise, box)
     assert converged
     assert objective.log_likelihood(p, noise) < highest - 10.0
-    p, reached = climb(objective, p, noise, box)
+    p, _, reached = climb(objective, p, noise, box)
     assert reached == objective.log_likelihood(p, noise)
     assert reached > highest - 0.05
     assert p[1] == box.upper[1]

@@ -10,29 +10,28 @@ namespace sysid {
 
 namespace {
 
-constexpr int kReach = 10;  // samples on either side
-constexpr int kTaps = 2 * kReach;
+constexpr int kTaps = 2 * kShiftReach;
 constexpr std::array<double, 4> kWindow{0.355768, 0.487396, 0.144232, 0.012604};
 
 struct Taps {
     std::array<double, kTaps> value{}, slope{};
 };
 
-/// Weights of the samples number 1 - kReach to kReach for the place `part` after number 0, and
-/// their derivatives. The window and its derivative end at zero: values and slopes are
+/// Weights of the samples number 1 - kShiftReach to kShiftReach for the place `part` after number
+/// 0, and their derivatives. The window and its derivative end at zero: values and slopes are
 /// continuous in the shift (A. H. Nuttall, IEEE Trans. ASSP 29, 1981).
 Taps taps_at(double part) {
     constexpr double pi = std::numbers::pi;
     Taps taps;
     double sum = 0.0, sum_slope = 0.0;
     for (std::size_t i = 0; i < taps.value.size(); ++i) {
-        const double t = part - (static_cast<double>(i) + 1.0 - kReach);
-        const double turn = pi * t / kReach;
+        const double t = part - (static_cast<double>(i) + 1.0 - kShiftReach);
+        const double turn = pi * t / kShiftReach;
         double window = kWindow[0], window_slope = 0.0;
         for (std::size_t m = 1; m < kWindow.size(); ++m) {
             const auto often = static_cast<double>(m);
             window += kWindow[m] * std::cos(often * turn);
-            window_slope -= kWindow[m] * often * pi / kReach * std::sin(often * turn);
+            window_slope -= kWindow[m] * often * pi / kShiftReach * std::sin(often * turn);
         }
         double wave = 1.0, wave_slope = 0.0;
         if (std::abs(t) > 1e-9) {
@@ -59,7 +58,7 @@ void shift_in_time(const double* signal, std::size_t count, double late, double*
     const double whole = std::floor(-late);
     const Taps taps = taps_at(-late - whole);
     const bool between = -late != whole;
-    const std::int64_t first = static_cast<std::int64_t>(whole) + 1 - kReach;
+    const std::int64_t first = static_cast<std::int64_t>(whole) + 1 - kShiftReach;
     const auto sample = [&](std::int64_t i) {
         if (i < 0) return 2.0 * signal[0] - signal[std::min(-i, n - 1)];
         if (i < n) return signal[i];

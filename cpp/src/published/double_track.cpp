@@ -79,8 +79,8 @@ std::vector<double> observe_double_track(const DoubleTrackData& car, const Doubl
         s[0] += dt * (ax + before[1] * before[2] + gains.ax_vx * error_x);
         s[1] += dt * (ay - before[0] * before[2] + gains.ay_vy * (my - ay));
         s[2] += dt * (f.moment / car.jzz_kgm2 + gains.yaw_yaw * (mr - before[2]));
-        if (std::abs(mr) < gains.yaw_rate_below) {
-            const double direction = gains.literal_sign ? 1.0 : -1.0;
+        if (std::abs(mr) < gains.yaw_rate_below_radps) {
+            const double direction = gains.published_sign ? 1.0 : -1.0;
             s[3] += dt * direction * gains.ax_mass * std::copysign(1.0, ax) * error_x;
             s[3] = std::clamp(s[3], gains.lowest_mass_kg, gains.highest_mass_kg);
         }

@@ -69,13 +69,13 @@ void ParameterLaws::update(const double* car, const double* twin, Estimates& par
         w.power += dt_ / law.averaging_s * (model * model - w.power);
         // Written so that an unknown yaw rate closes a gate, but only where one is asked for.
         const bool gated =
-            (std::isfinite(law.yaw_rate_below) && !(yaw_rate <= law.yaw_rate_below)) ||
-            (law.yaw_rate_above > 0.0 && !(yaw_rate >= law.yaw_rate_above));
+            (std::isfinite(law.yaw_rate_below_radps) && !(yaw_rate <= law.yaw_rate_below_radps)) ||
+            (law.yaw_rate_above_radps > 0.0 && !(yaw_rate >= law.yaw_rate_above_radps));
         const double leading = law.sign == SignSource::kTwin ? model : real;
         if (law.stage != stage_ || gated || !(std::abs(leading) > law.deadband)) continue;
         const double gain =
-            std::max(law.gain, law.gain_start / (1.0 + w.acting_s / law.gain_time_s));
-        const double direction = law.literal_sign ? -1.0 : 1.0;
+            std::max(law.gain, law.first_gain / (1.0 + w.acting_s / law.first_gain_s));
+        const double direction = law.published_sign ? -1.0 : 1.0;
         const double weight = law.kind == LawKind::kSign
                                   ? std::copysign(1.0, leading)
                                   : leading / (law.floor * law.floor + w.power);

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
@@ -23,10 +22,8 @@ from ..study import Study, improve
 from ..user_effects import load_effects
 from ..vehicle import Vehicle
 from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
-from .log_arguments import read_logs, written_map
+from .log_arguments import read_logs, say_it_runs, written_map
 from .outputs import write_figures
-
-__all__ = ["COMMANDS"]
 
 Warnings = list[str]
 
@@ -139,14 +136,10 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
 
 
 def _define(args: argparse.Namespace) -> None:
-    """Run the user's files that define effects, and say so: they can do whatever the user can."""
+    """Run the user's files that define effects."""
     for path in args.define:
         if path.exists():  # for what a package brings, `load_effects` says it
-            print(
-                f"sysid-vehicle: runs {path} as a Python program, with all your rights",
-                file=sys.stderr,
-                flush=True,
-            )
+            say_it_runs(path)
         load_effects(path)
 
 

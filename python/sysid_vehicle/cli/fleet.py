@@ -8,8 +8,7 @@ from pathlib import Path
 from .._progress import note
 from ..fleet import manifest_jobs
 from ..fleet.improve_many import run as improve_all
-
-__all__ = ["add_parser", "run"]
+from .log_arguments import say_it_runs
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -37,8 +36,7 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Do the studies that the folder does not hold yet, and tell the causes."""
     jobs = manifest_jobs(args.manifest)
     for path in dict.fromkeys(p for job in jobs for p in job.define):
-        text = f"sysid-vehicle: runs {path} as a Python program, with all your rights"
-        note(text)
+        say_it_runs(path)
     fleet = improve_all(
         jobs,
         args.out,

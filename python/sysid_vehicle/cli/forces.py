@@ -10,8 +10,6 @@ from ..vehicle import Vehicle
 from .log_arguments import add_driving, read_logs
 from .outputs import add_json, add_output, write_figures, write_picture
 
-__all__ = ["add_parser", "run"]
-
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import published
+from ..effects import effect
 from ..errors import InvalidInput, near_names
 from ..lab import (
     ClosedLoop,
@@ -24,8 +25,6 @@ from ..model import Model
 from ..vehicle import Vehicle
 from . import lab_logs
 from .outputs import add_json, add_output, write_figures, write_picture
-
-__all__ = ["add_parser", "run"]
 
 _DESIGNED = "designed"
 _PRESETS = {"default": Setup.default, "published": published.setup}
@@ -116,11 +115,7 @@ def _setup(args: argparse.Namespace) -> Setup:
         if not name:
             continue
         plant = setup.plant if name in setup.plant.effects else setup.plant.add(name)
-        typical = {
-            n: p.null_value + p.typical
-            for n, p in plant.parameters.items()
-            if n.startswith(f"{name}.")
-        }
+        typical = {n: p.null_value + p.typical for n, p in effect(name).named.items()}
         setup = replace(setup, plant=plant.with_values(typical))
     return setup
 

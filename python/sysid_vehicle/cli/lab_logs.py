@@ -26,22 +26,12 @@ from ..lab import (
     validate_tyres,
 )
 from ..lab.observed import READINGS
-from ..vehicle import Vehicle
+from ..vehicle import AXLES, Vehicle
 from .log_arguments import LOG_HELP, add_reading, read_logs
 from .outputs import add_json, add_output, write_figures, write_picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = [
-    "em",
-    "em_arguments",
-    "identify",
-    "identify_arguments",
-    "validate",
-    "validate_arguments",
-    "vehicle_of",
-]
 
 
 def em_arguments(parser: argparse.ArgumentParser) -> None:
@@ -163,7 +153,7 @@ def identify(args: argparse.Namespace, heard: list[str]) -> None:
     if args.plot is not None:
         figure = new_figure(9.0, 3.8)  # two axes: curves that agree would cover each other
         axes = figure.subplots(1, 2, sharey=True)
-        for ax, axle in zip(axes, ("front", "rear"), strict=True):
+        for ax, axle in zip(axes, AXLES, strict=True):
             fit.plot(ax, [axle]).label_outer()
         write_picture(args.plot, figure)
     write_figures(args.json, fit.to_dict(), heard)

@@ -8,14 +8,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .._files import write_text
+from .._progress import note
 from ..errors import warn
 from ..log import Log
 from ..read import ChannelMap, Proposal, propose_channels, read_log
 from ..vehicle import Vehicle
 
-__all__ = ["LOG_HELP", "add_driving", "add_reading", "read_logs", "written_map"]
-
 LOG_HELP = "log of one run: CSV, MDF, MCAP, ROS bag, .mat, .vbo, CAN log, Parquet, ..."
+
+
+def say_it_runs(path: Path) -> None:
+    """Say that a user's file is a program: it can do whatever the user can."""
+    note(f"sysid-vehicle: runs {path} as a Python program, with all your rights")
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:

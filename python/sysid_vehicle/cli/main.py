@@ -16,8 +16,6 @@ from .commands import COMMANDS
 from .outputs import refuse_outputs
 from .parser import parse
 
-__all__ = ["main"]
-
 _FAILED = 2
 _INTERRUPTED = 130  # what shells report for Ctrl-C
 

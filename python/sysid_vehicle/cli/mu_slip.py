@@ -24,8 +24,6 @@ from ..online import (
 )
 from .outputs import add_json, add_output, write_figures, write_picture
 
-__all__ = ["add_parser", "run"]
-
 _CURVES = {curve.name: curve for curve in (TWO_PARAMETER, MAGIC_FORMULA)}
 _CONTRACT = """\
 DATA is a CSV file whose first line names the columns; these two are read, others are ignored:

@@ -12,8 +12,6 @@ from ..vehicle import Vehicle
 from .log_arguments import add_driving, read_logs
 from .outputs import add_json, add_output, write_figures, write_picture
 
-__all__ = ["add_parser", "run"]
-
 _USUAL = DriveLimits()
 
 

@@ -14,8 +14,6 @@ from ..errors import InvalidInput
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["add_json", "add_output", "refuse_outputs", "write_figures", "write_picture"]
-
 _SUFFIXES = {"SVG": ".svg", "GIF": ".gif"}
 
 

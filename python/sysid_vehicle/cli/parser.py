@@ -11,8 +11,6 @@ from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
 from .log_arguments import LOG_HELP, add_driving
 from .outputs import add_json, add_output
 
-__all__ = ["parse"]
-
 
 def parse(argv: list[str] | None) -> argparse.Namespace:
     """Read the arguments; ends the program with status 2 on those that make no sense."""

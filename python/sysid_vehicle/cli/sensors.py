@@ -13,8 +13,6 @@ from ..vehicle import Vehicle
 from .log_arguments import LOG_HELP, add_reading, read_logs, written_map
 from .outputs import add_json, add_output, write_figures
 
-__all__ = ["add_parser", "run"]
-
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command."""

@@ -12,8 +12,6 @@ from ..vehicle import Vehicle
 from .log_arguments import LOG_HELP, add_reading, read_logs
 from .outputs import add_json, add_output, write_figures, write_picture
 
-__all__ = ["add_parser", "run"]
-
 _PUBLISHED = "dual UKF of Cl4y3R/VehicleStateEstimation, 2024, with its defects"
 _KINDS = {**KINDS, "published": _PUBLISHED}
 _CONTRACT = """\

@@ -33,8 +33,6 @@ from ..published.joint import (
 from ..twin import calibrate
 from .outputs import add_json, add_output, write_figures, write_picture
 
-__all__ = ["add_parser", "run"]
-
 _NO_NOISE = float("inf")
 _RATIOS = (5.0, 7.5, 10.0, 15.0, 20.0)
 _ROAD = (0.0, 0.05, 0.1, 0.2, 0.3)

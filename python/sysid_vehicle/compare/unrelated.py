@@ -9,12 +9,13 @@ no model of the car, tell what no model can be fitted to.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Iterable
 
 import numpy as np
 
 from .._arrays import FloatArray
 from .._text import number
+from ..effects import Effect, effect
 from ..estimate import MEASURED, Driving
 from ..estimate.inputs import white_noise_std
 
@@ -24,9 +25,6 @@ _FELT = 0.1  # of the channel's variance, which a prediction must have to be cal
 _SIGNAL = 0.5  # of the variance of a prediction: the rest is white noise
 _ALIKE = 0.5  # square of the correlation, beyond which readings follow their prediction
 _SCALES = (0.5, 2.0)
-_DELAYS_SENSORS = {"sensor_delay"}
-_DELAYS_STEERING = {"steer_delay", "steer_lag", "steer_compliance", "tyre_relaxation"}
-_PULLS = {"road_grade"}
 
 
 def unrelated(driving: Driving, innovation: FloatArray, spread: FloatArray) -> dict[str, str]:
@@ -72,7 +70,7 @@ def unrelated(driving: Driving, innovation: FloatArray, spread: FloatArray) -> d
     return {name: text for _, name, text in sorted(found, reverse=True)}
 
 
-def incoherent(driving: Driving, effects: Collection[str]) -> dict[str, str]:
+def incoherent(driving: Driving, effects: Iterable[str | Effect]) -> dict[str, str]:
     """Find the channels that break the laws of motion: wrong unit, sign, order or time.
 
     Effects that move forces seem to explain such readings: a yaw rate that is late looks like a
@@ -81,7 +79,7 @@ def incoherent(driving: Driving, effects: Collection[str]) -> dict[str, str]:
     Parameters
     ----------
     driving : Driving
-    effects : collection of str
+    effects : iterable of str or Effect
         Of the model; what they do themselves is no contradiction.
 
     Returns
@@ -89,14 +87,16 @@ def incoherent(driving: Driving, effects: Collection[str]) -> dict[str, str]:
     dict of str to str
         A sentence for each such channel.
     """
-    delayed = set(MEASURED) | {"steer_rad"} if _DELAYS_SENSORS & set(effects) else set()
-    answers_late, slope = bool(_DELAYS_STEERING & set(effects)), bool(_PULLS & set(effects))
+    breaks = {effect(e).breaks for e in effects}
+    delayed = {*MEASURED, "steer_rad"} if "readings late" in breaks else set()
     found: dict[str, str] = {}
     for log in driving.logs:
         for c in log.contradictions:
             # A car that answers late makes its steering early. None makes it late.
-            early = answers_late and c.channel == "steer_rad" and c.late_s < 0.0
-            if (c.late_s and (early or c.channel in delayed)) or (c.on_the_level and slope):
+            answered = "answers late" in breaks and c.channel == "steer_rad" and c.late_s < 0.0
+            if c.late_s and (answered or c.channel in delayed):
+                continue
+            if c.on_the_level and "on a slope" in breaks:
                 continue
             found.setdefault(
                 c.channel, f"{log.name}: {c.text}" if len(driving.logs) > 1 else c.text

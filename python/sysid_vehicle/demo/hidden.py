@@ -34,7 +34,7 @@ def hide(hidden: str, rng: np.random.Generator) -> Model:
         e = baseline.candidates[int(rng.integers(len(baseline.candidates)))]
     else:
         e = effect(hidden)
-    values = {f"{e.id}.{p.name}": p.null_value + p.typical for p in e.parameters}
+    values = {name: p.null_value + p.typical for name, p in e.named.items()}
     return baseline.add(e).with_values(values)
 
 

@@ -23,14 +23,14 @@ from ..estimate import Driving
 from ..identify import Fit, driving_of, explaining
 from ..log import Log
 from ..rules import USUAL, Rules
-from .coordinates import begins, blocks
+from .coordinates import BLOCK_S, begins, blocks
 from .force_map import UNITS, missing_forces
 
 Whole = npt.NDArray[np.intp]
 
 _RATE_HZ = 20.0  # missing forces are smooth
 _LAGS_S = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.8)
-_BLOCK_S, _FOLDS = 5.0, 5
+_FOLDS = 5
 _PENALTIES = 10.0 ** np.arange(-4.0, 2.5, 0.5)  # over the number of samples
 _DRAWS = 400
 _UNDERSTEER_MPS = 25.0  # characteristic speed, by which steering becomes lateral acceleration
@@ -268,7 +268,7 @@ def thinned(driving: Driving) -> Whole:
 
 
 def _block_numbers(driving: Driving) -> Whole:
-    starts = blocks(driving, min(_BLOCK_S, driving.usable_s / (2.0 * _FOLDS)))
+    starts = blocks(driving, min(BLOCK_S, driving.usable_s / (2.0 * _FOLDS)))
     return np.searchsorted(starts, np.arange(driving.samples), side="right") - 1
 
 

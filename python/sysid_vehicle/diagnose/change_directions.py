@@ -86,14 +86,12 @@ def _of_grip(
     evidence: Evidence, kind: Kind, changing: DrivingProblem, at: list[int], sample: int
 ) -> FloatArray:
     """Direction of more grip from a sample on, exact in the stretch in which it lies."""
-    driving, begin = evidence.driving, 0
-    for s in driving.stretches:
-        end = begin + s.where.stop - s.where.start
-        if sample < end:
-            break
-        begin = end
+    driving = evidence.driving
+    s, (begin, end, rate) = next(
+        pair for pair in zip(driving.stretches, driving.spans, strict=True) if sample < pair[1].end
+    )
     p = evidence.fit.model.vector().copy()
-    moment = (s.where.start + sample - begin) / driving.logs[s.log].rate_hz
+    moment = (s.where.start + sample - begin) / rate
     p[at] = [-_SMALL, moment]
     channels = len(evidence.residual) // driving.samples
     own = slice(channels * begin, channels * end)

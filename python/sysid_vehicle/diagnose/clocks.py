@@ -14,7 +14,7 @@ from .. import _core
 from .._arrays import FloatArray
 from ..estimate.pieces import DrivingProblem
 from ..rules import Rules
-from .delay import delayed, pieces_of
+from .delay import later
 from .directions import Ask, Directions
 from .evidence import Evidence, Section
 
@@ -40,6 +40,11 @@ class Clock:
     def name(self) -> str:
         """What it is called among the causes."""
         return f"clock of {self.channel}"
+
+    def late(self, evidence: Evidence, by_s: float) -> DrivingProblem:
+        """The problem of some evidence with the input later than it is there."""
+        inputs = evidence.driving.inputs() if evidence.inputs is None else evidence.inputs
+        return evidence.problem_of(later(inputs, self.column, evidence.driving.spans, by_s))
 
 
 CLOCKS = (Clock("fx_n", 1, 0.1),)
@@ -75,16 +80,7 @@ class Shifts:
 
     def __init__(self, evidence: Evidence, clocks: list[Clock]) -> None:
         self.evidence, self.clocks = evidence, clocks
-        driving = evidence.driving
-        self._moved: list[DrivingProblem] = []
-        inputs = driving.inputs() if evidence.inputs is None else evidence.inputs
-        for clock in self.clocks:
-            moved = inputs.copy()
-            for begin, end, rate in pieces_of(driving):
-                moved[begin:end, clock.column] = delayed(
-                    inputs[begin:end, clock.column], rate, clock.typical_s
-                )
-            self._moved.append(evidence.problem_of(moved))
+        self._moved = [clock.late(evidence, clock.typical_s) for clock in clocks]
 
     @property
     def width(self) -> int:

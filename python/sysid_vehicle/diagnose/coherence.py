@@ -18,10 +18,10 @@ import scipy
 from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._style import axes_or_new, tidy
-from .._text import brief, html_text
+from .._text import HALF_95, brief, html_text
 from .._threads import in_parallel
 from ..estimate import MEASURED
-from .delay import HIGHEST_HZ, Delay, delay, pieces_of
+from .delay import HIGHEST_HZ, Delay, delay
 from .evidence import Evidence
 from .omnibus import Omnibus, omnibus_of
 
@@ -106,7 +106,7 @@ class Coherence:
             phase, std = np.degrees(d.phase_rad), np.degrees(d.phase_std_rad)
             known = std < 30.0
             ax.errorbar(
-                d.frequency_hz[known], phase[known], 1.96 * std[known], fmt="ko", ms=4.0, lw=1.0
+                d.frequency_hz[known], phase[known], HALF_95 * std[known], fmt="ko", ms=4.0, lw=1.0
             )
             ax.legend(frameon=False, loc="upper left")
         return tidy(
@@ -157,7 +157,7 @@ def _with(
 ) -> Coherence:
     driving = evidence.driving
     e = evidence.residual.reshape(driving.samples, -1)
-    pieces = pieces_of(driving)
+    pieces = driving.spans
     # Windows of one duration have one grid of frequencies, whatever the rate.
     window_s = min(_WINDOW_S, max((end - begin) / rate for begin, end, rate in pieces) / 3.0)
     band = min(
@@ -184,5 +184,5 @@ def _with(
     effective = max(1.0 + (windows - 1) * 11.0 / 18.0, 2.0)
     tests = len(there) * band
     threshold = 1.0 - (_LEVEL / tests) ** (1.0 / (effective - 1.0))
-    late = None if rng is None else delay(evidence, inputs, which, pieces, rng, complete)
+    late = None if rng is None else delay(evidence, inputs, which, rng, complete)
     return Coherence(name, as_float64(f), there, float(threshold), late)

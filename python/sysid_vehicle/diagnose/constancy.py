@@ -90,7 +90,7 @@ def constancy(fit: Fit, rules: Rules = USUAL) -> dict[str, Constancy]:
         part.id: _of_effect(
             part,
             evidence,
-            evidence.fitted[:, [names.index(f"{part.id}.{q.name}") for q in part.parameters]],
+            evidence.fitted[:, [names.index(n) for n in part.named]],
             pieces,
             rules,
         )
@@ -115,7 +115,7 @@ def _of_effect(
     rules: Rules,
 ) -> Constancy:
     fit, e = evidence.fit, evidence.left
-    whole = np.array([fit[f"{effect.id}.{q.name}"].value - q.null_value for q in effect.parameters])
+    whole = np.array([fit[n].value - q.null_value for n, q in effect.named.items()])
     # The pieces add up to the whole, which is fitted: the last one says nothing of its own.
     cut = np.hstack([own * piece[:, None] for piece in pieces])
     R = evidence.project(cut)

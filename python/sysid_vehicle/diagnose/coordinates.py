@@ -79,6 +79,10 @@ def running_time(driving: Driving) -> FloatArray:
     return as_float64(np.cumsum(1.0 / driving.sample_rate_hz))
 
 
+BLOCK_S = 5.0
+"""Blocks of driving that are taken as independent, and left out in turns."""
+
+
 def blocks(driving: Driving, seconds: float) -> npt.NDArray[np.intp]:
     """First samples of blocks of so many seconds driven, whatever the rates of the logs."""
     middle = running_time(driving) - 0.5 / driving.sample_rate_hz
@@ -88,8 +92,7 @@ def blocks(driving: Driving, seconds: float) -> npt.NDArray[np.intp]:
 
 def begins(driving: Driving) -> npt.NDArray[np.intp]:
     """First samples of the stretches."""
-    lengths = [s.where.stop - s.where.start for s in driving.stretches]
-    return np.cumsum([0, *lengths[:-1]])
+    return np.array([span.first for span in driving.spans])
 
 
 def late(

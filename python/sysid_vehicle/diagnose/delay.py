@@ -17,7 +17,7 @@ go through the model in place of u, for all bands together. A delay shows as phi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -26,13 +26,12 @@ import numpy.typing as npt
 import scipy
 
 from .._arrays import FloatArray, as_float64
-from ..estimate import Driving
+from .._text import HALF_95
+from ..estimate.driving import Span
 from ..estimate.inputs import quiet, white_noise_std
 from ..identify import refine
 from .evidence import Evidence, solve
 from .omnibus import omnibus_of
-
-__all__ = ["HIGHEST_HZ", "Delay", "Piece", "delay", "delayed", "pieces_of"]
 
 _BANDS = 6
 _LOWEST_HZ, HIGHEST_HZ = 0.15, 5.0
@@ -40,9 +39,6 @@ _SMALL = 1e-3  # of an input, to differentiate by
 _ROUNDS = 4
 _TINY_RAD, _NOTABLE = 0.1, 2.0  # phase, standard errors; a delay is claimed beyond three
 _DRAWS = 16  # of noise of the inputs
-
-Piece = tuple[int, int, float]
-"""Begin, end and sampling rate of a stretch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +70,7 @@ class Delay:
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval."""
-        return self.delay_s - 1.96 * self.std_s, self.delay_s + 1.96 * self.std_s
+        return self.delay_s - HALF_95 * self.std_s, self.delay_s + HALF_95 * self.std_s
 
     @property
     def significant(self) -> bool:
@@ -110,18 +106,10 @@ class Delay:
         )
 
 
-def pieces_of(driving: Driving) -> list[Piece]:
-    """Begin, end and sampling rate of each stretch."""
-    ends = np.cumsum([s.where.stop - s.where.start for s in driving.stretches])
-    rates = [driving.logs[s.log].rate_hz for s in driving.stretches]
-    return list(zip([0, *map(int, ends[:-1])], map(int, ends), rates, strict=True))
-
-
 def delay(
     evidence: Evidence,
     inputs: FloatArray,
     which: int,
-    pieces: list[Piece],
     rng: np.random.Generator,
     complete: Callable[[], bool],
 ) -> Delay | None:
@@ -134,21 +122,19 @@ def delay(
         return None
     total, late, first = 0.0, inputs, evidence
     for _ in range(_ROUNDS):
-        direction, step, std = _later(evidence, late, which, pieces)
+        direction, step, std = _later(evidence, late, which)
         total += step
         tiny = 2.0 * np.pi * HIGHEST_HZ * abs(step) < _TINY_RAD and abs(step) < _NOTABLE * std
         if abs(step) < std or tiny:
             break  # the second order of so small a step is next to nothing
-        late = inputs.copy()
-        for begin, end, rate in pieces:
-            late[begin:end, which] = delayed(inputs[begin:end, which], rate, total)
+        late = later(inputs, which, evidence.driving.spans, total)
         fit = refine(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
         evidence = Evidence(fit, evidence.driving, late)
     else:
-        direction, step, std = _later(evidence, late, which, pieces)
+        direction, step, std = _later(evidence, late, which)
         total += step
-    std = float(np.hypot(std, std**2 * _by_input_noise(evidence, late, direction, pieces, rng)))
-    found = _phases(evidence, late, which, pieces)
+    std = float(np.hypot(std, std**2 * _by_input_noise(evidence, late, direction, rng)))
+    found = _phases(evidence, late, which)
     if found is None:
         return None
     f, phase, phase_std, linear = found
@@ -157,12 +143,10 @@ def delay(
     return Delay(total, std, f, as_float64(phase + put_in), phase_std, linear, alone)
 
 
-def _later(
-    evidence: Evidence, inputs: FloatArray, which: int, pieces: list[Piece]
-) -> tuple[FloatArray, float, float]:
+def _later(evidence: Evidence, inputs: FloatArray, which: int) -> tuple[FloatArray, float, float]:
     """By how much an input should come later, to first order: direction, size, standard error."""
     slower = np.zeros(len(inputs))
-    for begin, end, rate in pieces:
+    for begin, end, rate in evidence.driving.spans:
         # From the last sample to this one: what the driver does next answers to this residual.
         slower[begin + 1 : end] = -rate * np.diff(inputs[begin:end, which])
     R = evidence.project(_through(evidence, inputs, which, slower)[:, None])
@@ -174,7 +158,6 @@ def _by_input_noise(
     evidence: Evidence,
     inputs: FloatArray,
     direction: FloatArray,
-    pieces: list[Piece],
     rng: np.random.Generator,
 ) -> float:
     """Scatter of the score along a direction that comes from noise of the measured inputs.
@@ -188,7 +171,7 @@ def _by_input_noise(
     p = evidence.fit.model.vector()
     parts = [
         (slice(begin, end), i, u, quiet(u), white_noise_std(u))
-        for begin, end, _ in pieces
+        for begin, end, _ in evidence.driving.spans
         for i, u in enumerate(measured[begin:end].T)
     ]
     scores = []
@@ -203,7 +186,7 @@ def _by_input_noise(
 
 
 def _phases(
-    evidence: Evidence, inputs: FloatArray, which: int, pieces: list[Piece]
+    evidence: Evidence, inputs: FloatArray, which: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, bool] | None:
     """Frequency, phase by which the car lags, its standard error; whether a delay would do that."""
     u = inputs[:, which]
@@ -212,7 +195,7 @@ def _phases(
     for low, high in pairwise(edges):
         signal, quadrature = np.zeros_like(u), np.zeros_like(u)
         power, moment = 0.0, 0.0
-        for begin, end, rate in pieces:
+        for begin, end, rate in evidence.driving.spans:
             part, turned, p, m = _in_band(u[begin:end], rate, low, high)
             signal[begin:end], quadrature[begin:end] = part, turned
             power, moment = power + p, moment + m
@@ -258,6 +241,14 @@ def delayed(u: FloatArray, rate: float, by_s: float) -> FloatArray:
     """
     f, spectrum = _spectrum(u, rate)
     return as_float64(np.fft.irfft(spectrum * np.exp(-2j * np.pi * f * by_s), 2 * len(u))[: len(u)])
+
+
+def later(inputs: FloatArray, which: int, spans: Sequence[Span], by_s: float) -> FloatArray:
+    """Inputs of which number `which` comes later in every stretch."""
+    late = inputs.copy()
+    for begin, end, rate in spans:
+        late[begin:end, which] = delayed(inputs[begin:end, which], rate, by_s)
+    return late
 
 
 def _in_band(

@@ -9,6 +9,7 @@ is found over the whole drive: with 1(k) telling whether sample k lies in the ce
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -17,11 +18,11 @@ import numpy.typing as npt
 
 from .._arrays import FloatArray, as_float64
 from .._style import axes_or_new, tidy
-from .._text import brief, html_text
+from .._text import HALF_95, brief, html_text
 from ..estimate import Driving
 from ..identify import Fit
 from ..vehicle import GRAVITY_MPS2
-from .coordinates import COORDINATES, coordinates
+from .coordinates import BLOCK_S, COORDINATES, Coordinate, coordinates
 from .evidence import FORCES
 
 if TYPE_CHECKING:
@@ -38,7 +39,6 @@ _CELLS = (8, 9)
 _CELLS_ALONE = 24
 _FEWEST = 20  # samples that make a cell worth showing
 _FOLDS = 5
-_BLOCK_S = 5.0
 _LONGEST_S = 5.0  # of the autocorrelation
 UNITS = {"F_x": "N", "F_y": "N", "M_z": "N m"}
 
@@ -124,21 +124,36 @@ class ForceMap:
         if len(axes) == 1:
             ax = axes_or_new(ax, 6.5, 2.8)
             middle = 0.5 * (edges[0][1:] + edges[0][:-1])
-            ax.errorbar(middle, force, 1.96 * std, fmt="o", ms=3.0, lw=1.0, color="0.2")
+            ax.errorbar(middle, force, HALF_95 * std, fmt="o", ms=3.0, lw=1.0, color="0.2")
             ax.axhline(0.0, color="0.5", lw=0.8)
             return tidy(ax, xlabel=axes[0].axis, ylabel=f"missing {label}")
-        ax = axes_or_new(ax, 5.0, 3.8)
-        ax.set_facecolor("0.85")
-        top = max(float(np.nanmax(np.abs(force), initial=0.0)), 1e-9)
-        shown = np.ma.masked_invalid(force)
-        mesh = ax.pcolormesh(edges[1], edges[0], shown, cmap="RdBu_r", vmin=-top, vmax=top)
-        mesh.set_rasterized(True)
-        ax.figure.colorbar(mesh, ax=ax, label=f"missing {label}")
-        beyond = np.argwhere(np.abs(force) > 2.0 * std)
         middles = [0.5 * (e[1:] + e[:-1]) for e in edges]
-        ax.plot(middles[1][beyond[:, 1]], middles[0][beyond[:, 0]], "k.", ms=3.0)
-        ax.set(xlabel=axes[1].axis, ylabel=axes[0].axis)
-        return ax
+        sure = np.abs(force) > 2.0 * std
+        return draw_map(ax, axes, edges, middles, force, sure, f"missing {label}", 3.0)
+
+
+def draw_map(
+    ax: Axes | None,
+    over: Sequence[Coordinate],
+    cells: Sequence[FloatArray],
+    middles: Sequence[FloatArray],
+    force: FloatArray,
+    sure: npt.NDArray[np.bool_],
+    label: str,
+    dots: float,
+) -> Axes:
+    """Draw a force over two coordinates: grey where nobody drove, dots where it is sure."""
+    ax = axes_or_new(ax, 5.0, 3.8)
+    ax.set_facecolor("0.85")
+    top = max(float(np.nanmax(np.abs(force), initial=0.0)), 1e-9)
+    shown = np.ma.masked_invalid(force)
+    mesh = ax.pcolormesh(cells[1], cells[0], shown, cmap="RdBu_r", vmin=-top, vmax=top)
+    mesh.set_rasterized(True)
+    ax.figure.colorbar(mesh, ax=ax, label=label)
+    at = np.argwhere(sure)
+    ax.plot(middles[1][at[:, 1]], middles[0][at[:, 0]], "k.", ms=dots)
+    ax.set(xlabel=over[1].axis, ylabel=over[0].axis)
+    return ax
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,9 +317,8 @@ def _places(driving: Driving) -> tuple[npt.NDArray[np.intp], int]:
     finest = float(driving.sample_rate_hz.max())
     gap = int(_LONGEST_S * finest) + 1
     places, at = [], 0
-    for s in driving.stretches:
-        n = s.where.stop - s.where.start
-        own = np.round(np.arange(n) * (finest / driving.logs[s.log].rate_hz)).astype(np.intp)
+    for first, end, rate in driving.spans:
+        own = np.round(np.arange(end - first) * (finest / rate)).astype(np.intp)
         places.append(at + own)
         at += int(own[-1]) + 1 + gap
     return np.concatenate(places), 1 << int(np.ceil(np.log2(at + gap)))
@@ -317,7 +331,7 @@ def _predicted(
 
     Blocks of some seconds are left out in turns; a cell that was hardly visited says little.
     """
-    block = int(_BLOCK_S * driving.mean_rate_hz)
+    block = int(BLOCK_S * driving.mean_rate_hz)
     fold = (np.arange(len(x)) // max(min(block, len(x) // (2 * _FOLDS)), 1)) % _FOLDS
     both = cell * _FOLDS + fold
     size = cells * _FOLDS

@@ -15,19 +15,18 @@ import numpy as np
 
 from .._arrays import FloatArray, as_float64
 from .._progress import with_progress
-from .._text import brief, html_table, number, text_table
+from .._text import HALF_95, brief, html_table, number, text_table
 from .._threads import Workers
 from ..effects import Effect, base_parameters, effect
 from ..errors import InvalidInput, NumericalError
 from ..identify import Fit, explaining
+from ..vehicle import AXLES
 from .replay import Replay
 from .sensitivity import duration
 
-_AXLES = ("front", "rear")
 _WORTH_TELLING = 0.01  # of the parameter: refits agree no better
 # How far two drives may lead apart from their mean: of the parameter, or of the bias.
 _NEAR, _SHARE = 0.01, 0.2
-_CERTAIN = 1.96
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ class BiasReport:
                 rows.append([b.effect.id, size, "-", "-", f"not stated: {b.because}"])
                 continue
             worst = f"{b.worst[0]} {100.0 * b.relative[b.worst[0]]:+.1f} %" if b.worst else "-"
-            stiff = [f"{100.0 * b.relative[f'stiffness_{a}']:+.1f} %" for a in _AXLES]
+            stiff = [f"{100.0 * b.relative[f'stiffness_{a}']:+.1f} %" for a in AXLES]
             rows.append([b.effect.id, size, *stiff, worst])
         return rows
 
@@ -169,8 +168,7 @@ def bias_report(
         tuple(middle_s if p.scan == "time" else p.typical for p in e.parameters) for e in wanted
     ]
     effects_at = [
-        {f"{e.id}.{p.name}": v for p, v in zip(e.parameters, size, strict=True)}
-        for e, size in zip(wanted, sizes, strict=True)
+        dict(zip(e.named, size, strict=True)) for e, size in zip(wanted, sizes, strict=True)
     ]
     replay, told = Replay(fit, most_samples, seed), _Told.of(fit)
     try:
@@ -220,7 +218,7 @@ class _Told:
     @classmethod
     def of(cls, fit: Fit) -> _Told:
         known = fit.model.parameters
-        others = [e for e in fit.estimates if e.name[1] != "_" and abs(e.value) > _CERTAIN * e.std]
+        others = [e for e in fit.estimates if e.name[1] != "_" and abs(e.value) > HALF_95 * e.std]
         return cls(
             tuple(known[e.name].column for e in others),
             tuple(e.name for e in others),
@@ -228,13 +226,13 @@ class _Told:
         )
 
     def read(self, p: FloatArray) -> FloatArray:
-        stiffness = [np.log(np.prod(p[[_column(x, axle) for x in "BCD"]])) for axle in _AXLES]
+        stiffness = [np.log(np.prod(p[[_column(x, axle) for x in "BCD"]])) for axle in AXLES]
         return np.array([*stiffness, *p[list(self.columns)]])
 
     def relative(self, off: FloatArray) -> dict[str, float]:
-        n = len(_AXLES)
+        n = len(AXLES)
         parts = [*np.expm1(off[:n]), *(off[n:] / self.values)]
-        names = [*(f"stiffness_{axle}" for axle in _AXLES), *self.names]
+        names = [*(f"stiffness_{axle}" for axle in AXLES), *self.names]
         return dict(zip(names, map(float, parts), strict=True))
 
 
@@ -270,4 +268,4 @@ def _bias(
 
 
 def _harm(b: Bias) -> float:
-    return max((abs(b.relative[f"stiffness_{a}"]) for a in _AXLES if not b.because), default=-1.0)
+    return max((abs(b.relative[f"stiffness_{a}"]) for a in AXLES if not b.because), default=-1.0)

@@ -25,18 +25,17 @@ from .._arrays import FloatArray, as_float64
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import USUAL, Rules
-from ..vehicle import GRAVITY_MPS2, slip_angles
+from ..vehicle import AXLES, GRAVITY_MPS2, slip_angles
 from .coordinates import begins, late
 from .directions import Ask, Directions
 from .evidence import FORCES, READINGS, Evidence, Section
-from .omnibus import Omnibus, Unknown
+from .omnibus import LEAST_LEFT, Omnibus, Unknown
 from .projection import pseudo_inverse
 
 _SLIPS_RAD = 0.01 * 2.0 ** np.arange(5)  # knots of the curves over slip angles
 _MEMORIES_S = (0.5, 2.0, 8.0)
 _SHAPES_REMEMBERED = 4
 _ONE_OF = " no. "
-_COPIED = 1e-3  # of its size, below which other directions can copy one
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,7 @@ class _Rivals:
             target = self._flexible.names[group.start]
             what = f"error of {target}" if target in READINGS else target
             self._note(what, target, group)
-        for axle in ("front", "rear"):
+        for axle in AXLES:
             self._note(f"side force of the {axle} axle", "F_y", slice(0, len(_SLIPS_RAD)))
         for force in forces:
             self._note(f"{force} that remembers the driving", force, slice(0, several))
@@ -220,7 +219,7 @@ class _Competition:
             left = left - information[np.ix_(columns, given)] @ copy
             S = S - copy[:, columns].T @ score[given]
         free = np.sqrt(np.maximum(left[:, columns].diagonal(), 0.0))
-        kept = np.flatnonzero(free > _COPIED * np.sqrt(self._projected.before[columns]))
+        kept = np.flatnonzero(free > LEAST_LEFT * np.sqrt(self._projected.before[columns]))
         direction = np.zeros(len(score))
         if not len(kept):
             return 0.0, 0, direction

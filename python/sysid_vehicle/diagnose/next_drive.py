@@ -31,8 +31,6 @@ from ..simulate import Drive, SensorNoise, drive_truth
 from .information import Information, information_of
 from .suggestion import Suggestion, ground_m
 
-__all__ = ["DriveLimits", "NextDrive", "Suggestion", "separations", "suggest_manoeuvre"]
-
 _ENOUGH = 5.0  # standard errors
 
 
@@ -248,8 +246,8 @@ def _size(e: Effect, given: tuple[float, ...] | None) -> tuple[float, ...]:
 
 def _values(e: Effect, size: tuple[float, ...] | None) -> dict[str, float]:
     return {
-        f"{e.id}.{p.name}": float(np.clip(p.null_value + s, p.lower, p.upper))
-        for p, s in zip(e.parameters, _size(e, size), strict=True)
+        name: float(np.clip(p.null_value + s, p.lower, p.upper))
+        for (name, p), s in zip(e.named.items(), _size(e, size), strict=True)
     }
 
 

@@ -24,14 +24,13 @@ from ..rules import USUAL, Rules
 from ..vehicle import GRAVITY_MPS2
 from .coordinates import begins, late
 from .directions import Ask, Directions
-from .evidence import Evidence, Section
+from .evidence import FORCES, READINGS, Evidence, Section
 from .projection import pseudo_inverse
 
-# Targets in the core's order: external F_x, F_y, M_z, then accelerations, then sensor readings.
 _FORCE_SHAPES, _FEW_SHAPES = 12, 4  # signals that act on each force, and on each of the others
-_COPIED = 1e-3  # of its size, below which the fitted parameters can copy a signal
-_TARGETS = {"F_x": 0, "F_y": 1, "M_z": 2, "dv_x/dt": 3, "dv_y/dt": 4}
-_SENSORS = {"r": 7, "a_x": 8, "a_y": 9}
+LEAST_LEFT = 1e-3
+"""Share of its size: of a direction of which less is left others can copy it."""
+_TARGETS = {**FORCES, "dv_x/dt": 3, "dv_y/dt": 4, **READINGS}
 
 _FORWARD, _SIDEWAYS, _TURNING = ("vx_mps", "ax_mps2"), ("vy_mps", "ay_mps2"), ("yaw_rate_radps",)
 _MOVES = {
@@ -107,7 +106,7 @@ def omnibus_of(
 def not_copied(projected: Directions) -> npt.NDArray[np.bool_]:
     """Of which directions the fitted parameters leave something."""
     after, before = np.diag(projected.information), np.maximum(projected.before, 1e-300)
-    return np.asarray(np.sqrt(after) > _COPIED * np.sqrt(before))
+    return np.asarray(np.sqrt(after) > LEAST_LEFT * np.sqrt(before))
 
 
 class Unknown:
@@ -130,7 +129,7 @@ class Unknown:
         self.targets: list[int] = []
         self.names: list[str] = []
         heavy = set() if driving.force_known else {"F_x", "a_x"}
-        for target, number in {**_TARGETS, **_SENSORS}.items():
+        for target, number in _TARGETS.items():
             if target not in heavy:
                 count = _FORCE_SHAPES if number <= 2 else _FEW_SHAPES
                 self.names += [target] * count

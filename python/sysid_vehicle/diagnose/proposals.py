@@ -23,7 +23,7 @@ from .._arrays import FloatArray, as_float64
 from .._text import brief, number
 from ..effects import Effect
 from ..user_effects import define_effect, parameter
-from .coordinates import blocks
+from .coordinates import BLOCK_S, blocks
 from .evidence import FORCES, READINGS, Evidence, Solution, solve
 from .grammar import Form, forms, unit_of_gain
 from .shape import known
@@ -31,7 +31,6 @@ from .shape import known
 _MOST = 3
 _TRIED = 4  # on validation data, before a step gives up
 _ALIKE = 9.0  # difference of statistics that does not tell two formulas apart
-_BLOCK_S = 5.0
 _RETAINED = 0.02  # below that the formula is what a fitted parameter does as well
 _VISIBLE = 0.03  # share of a formula that those chosen before it cannot copy
 _CHANNELS = {"r": "yaw_rate_radps", "a_x": "ax_mps2", "a_y": "ay_mps2"}
@@ -268,7 +267,7 @@ def _on_validation(
         residuals.append(validation.residual - predicted)
     fall = 0.5 * (residuals[0] ** 2 - residuals[1] ** 2)
     by_sample = fall.reshape(validation.driving.samples, -1).sum(axis=1)
-    sums = np.add.reduceat(by_sample, blocks(validation.driving, _BLOCK_S))
+    sums = np.add.reduceat(by_sample, blocks(validation.driving, BLOCK_S))
     return float(fall.sum()), float(np.std(sums) * np.sqrt(len(sums)))
 
 

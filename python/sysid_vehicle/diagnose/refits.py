@@ -67,8 +67,8 @@ def from_typical(fit: Fit, c: Candidate, tests: int) -> Candidate:
     Its p-value is that of the likelihood ratio, on one side where the parameter has one sign, over
     the variance ratio of its score, corrected for so many tests (Bonferroni).
     """
-    (p,) = c.effect.parameters
-    model = fit.model.add(c.effect).with_values({f"{c.id}.{p.name}": p.typical})
+    ((name, p),) = c.effect.named.items()
+    model = fit.model.add(c.effect).with_values({name: p.typical})
     try:
         found = _with_fit(fit, c, refine(model, fit.driving, fit.noise))
     except (NumericalError, np.linalg.LinAlgError):
@@ -79,7 +79,7 @@ def from_typical(fit: Fit, c: Candidate, tests: int) -> Candidate:
 
 
 def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:
-    names = [f"{c.id}.{p.name}" for p in c.effect.parameters]
+    names = c.effect.named
     return replace(
         c,
         statistic=2.0 * (found.log_likelihood - fit.log_likelihood),
@@ -91,13 +91,12 @@ def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:
 
 def _starts(c: Candidate) -> list[dict[str, float]]:
     predicted = {}
-    for p, v in zip(c.effect.parameters, c.value, strict=True):
+    for (name, p), v in zip(c.effect.named.items(), c.value, strict=True):
         reach = np.inf if p.scan else _BEYOND * p.typical
         value = float(np.clip(v, p.null_value - reach, p.null_value + reach))
-        predicted[f"{c.id}.{p.name}"] = float(np.clip(value, p.lower, p.upper))
+        predicted[name] = float(np.clip(value, p.lower, p.upper))
     starts = [predicted]
-    first = c.effect.parameters[0]
-    found = predicted[f"{c.id}.{first.name}"]
-    if len(c.effect.parameters) == 1 and first.another_dynamics(found):
-        starts.append({f"{c.id}.{first.name}": first.typical})
+    lead, first = next(iter(c.effect.named.items()))
+    if len(c.effect.parameters) == 1 and first.another_dynamics(predicted[lead]):
+        starts.append({lead: first.typical})
     return starts

@@ -22,7 +22,7 @@ from ..identify.search import Box, minimise
 from ..log import Log
 from ..model import Model
 from ..simulate import RoadDisturbance
-from ..vehicle import GRAVITY_MPS2
+from ..vehicle import AXLES, GRAVITY_MPS2
 
 # Slow enough to be quick; what tyres do to the motion is slower still.
 _RATE_HZ = 25.0
@@ -156,7 +156,7 @@ class Replay:
         frozen = problem.freeze(p, replace(self.fit.noise, sensor=sensor).vector())
         ends = self._ends(problem, (p.copy(), *self._bent(p)), frozen, box)
         enough = min(cost for cost, _ in ends) + _AS_GOOD
-        peaks = [model.parameters[f"D_{axle}"].column for axle in ("front", "rear")]
+        peaks = [model.parameters[f"D_{axle}"].column for axle in AXLES]
         _, other = max(
             ((cost, end) for cost, end in ends if cost <= enough),
             key=lambda end: float(np.sum(np.abs(np.log(end[1][peaks] / p[peaks])))),
@@ -185,7 +185,7 @@ class Replay:
         columns = self.fit.model.parameters
         for C, D, E in _BENDS:
             other = p.copy()
-            for axle in ("front", "rear"):
+            for axle in AXLES:
                 b, c, d, e = (columns[f"{x}_{axle}"].column for x in "BCDE")
                 other[b] *= p[c] * p[d] / (C * D)
                 other[c], other[d], other[e] = C, D, E
@@ -249,8 +249,8 @@ class Replay:
     def _understeer(self) -> float:
         """Steering angle per lateral acceleration of the fitted tyres [rad s2/m], none below 0."""
         model = self.fit.model
-        front, rear = (np.prod([model.value(f"{x}_{a}") for x in "BCD"]) for a in ("front", "rear"))
-        return max(float(1.0 / front - 1.0 / rear) / GRAVITY_MPS2, 0.0)
+        front, rear = (model.tyre(a).cornering_stiffness_per_load for a in AXLES)
+        return max((1.0 / front - 1.0 / rear) / GRAVITY_MPS2, 0.0)
 
     def _references(self, s: _Stretch) -> FloatArray:
         """Speed, curvature, and what of the steering the driver does not add for the curvature."""
@@ -312,19 +312,18 @@ class Replay:
         Of driving with more samples than are worth the time, windows evenly spread.
         """
         driving = self.fit.driving
+        logs = [driving.logs[s.log] for s in driving.stretches]
         whole = sum(
-            (s.where.stop - s.where.start) / _every(driving.logs[s.log]) for s in driving.stretches
+            (end - at) / _every(log) for log, (at, end, _) in zip(logs, driving.spans, strict=True)
         )
         share = min(self.most_samples / whole, 1.0)
-        at = 0
-        for s in driving.stretches:
-            log, (first, last) = driving.logs[s.log], (s.where.start, s.where.stop)
+        for s, log, (at, _, _) in zip(driving.stretches, logs, driving.spans, strict=True):
+            first, last = s.where.start, s.where.stop
             length = last - first if share == 1.0 else int(_WINDOW_S * log.rate_hz)
             for begin in range(first, last, int(np.ceil(length / share))):
                 end = min(begin + length, last)
                 if end - begin >= log.rate_hz:
                     yield log, slice(begin, end), at + begin - first
-            at += last - first
 
 
 def _cost(end: tuple[float, FloatArray]) -> float:

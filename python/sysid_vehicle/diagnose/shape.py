@@ -30,7 +30,7 @@ from .._text import brief
 from ..vehicle import GRAVITY_MPS2
 from .coordinates import COORDINATES, Coordinate, begins, coordinates, late
 from .evidence import FORCES, Evidence
-from .force_map import UNITS
+from .force_map import UNITS, draw_map
 from .projection import variance_ratio
 
 if TYPE_CHECKING:
@@ -119,18 +119,10 @@ class Surface:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw it: grey where nobody drove, dots where the band excludes zero."""
-        ax = axes_or_new(ax, 5.0, 3.8)
-        ax.set_facecolor("0.85")
-        y, x = (c.scale * a for c, a in zip(self.coordinates, self.at, strict=True))
-        top = max(float(np.nanmax(np.abs(self.force), initial=0.0)), 1e-9)
-        shown = np.ma.masked_invalid(self.force)
-        mesh = ax.pcolormesh(x, y, shown, shading="nearest", cmap="RdBu_r", vmin=-top, vmax=top)
-        mesh.set_rasterized(True)
-        ax.figure.colorbar(mesh, ax=ax, label=f"missing {self.target} [{UNITS[self.target]}]")
-        sure = np.argwhere(np.abs(self.force) > self.half_width)
-        ax.plot(x[sure[:, 1]], y[sure[:, 0]], "k.", ms=4.0)
-        ax.set(xlabel=self.coordinates[1].axis, ylabel=self.coordinates[0].axis)
-        return ax
+        at = [c.scale * a for c, a in zip(self.coordinates, self.at, strict=True)]
+        sure = np.abs(self.force) > self.half_width
+        label = f"missing {self.target} [{UNITS[self.target]}]"
+        return draw_map(ax, self.coordinates, at, at, self.force, sure, label, 4.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -303,7 +303,7 @@ def judge(
 
 
 def _of_added(effect: Effect, final: Fit, group: tuple[str, ...], rules: Rules) -> EffectVerdict:
-    estimates = [final[f"{effect.id}.{p.name}"] for p in effect.parameters]
+    estimates = [final[name] for name in effect.named]
     value, std = tuple(e.value for e in estimates), tuple(e.std for e in estimates)
     return _of_present(effect, value, std, group, rules)
 

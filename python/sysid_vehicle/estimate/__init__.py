@@ -1,7 +1,8 @@
 """State estimation: prepared driving, the noise model, filters for models of one's own."""
 
+from ..log import MEASURED
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
-from .driving import MEASURED, UNITS, Driving
+from .driving import UNITS, Driving
 from .filters import FilterRun, FilterState, LateMeasurements, StateFilter, StateModel
 from .noise import (
     NoiseModel,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from .._arrays import FloatArray, as_float64
 from .._text import brief
 from ..effects import Effect, channels_in_use, effect
 from ..errors import InvalidInput
-from ..log import Log, several_logs
+from ..log import CHANNELS, MEASURED, Log, several_logs
 from ..model import Model
 from ..sensors import quantum
 from . import pieces
@@ -21,16 +22,21 @@ from .channels import check_channels, has_channels, logged_channels
 from .inputs import quiet
 from .pieces import DrivingProblem, PiecewiseProblem, cut
 
-MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
-"""Measured channels, in the core's order."""
-
-UNITS = dict(zip(MEASURED, ("m/s", "m/s", "rad/s", "m/s2", "m/s2"), strict=True))
+UNITS = {c: CHANNELS[c].unit for c in MEASURED}
+WORDS = dict(zip(MEASURED, ("v_x", "v_y", "yaw rate", "a_x", "a_y"), strict=True))
 
 _REACH_S = effect("steer_delay").parameters[0].upper  # either way
-_TAPS = 10  # on either side, by which the core interpolates
 
 _Part = tuple[Log, slice, int]
 """Log, samples of it, and the place of the first among all usable samples."""
+
+
+class Span(NamedTuple):
+    """First and end of a stretch among all usable samples, and its rate."""
+
+    first: int
+    end: int
+    rate_hz: float
 
 
 @dataclass(frozen=True)
@@ -103,6 +109,13 @@ class Driving:
             Stretch(i, where) for i, log in enumerate(self.logs) for where in log.stretches()
         )
 
+    @cached_property
+    def spans(self) -> tuple[Span, ...]:
+        """Where each stretch lies among all usable samples."""
+        ends = np.cumsum([s.where.stop - s.where.start for s in self.stretches]).tolist()
+        rates = (self.logs[s.log].rate_hz for s in self.stretches)
+        return tuple(map(Span, [0, *ends[:-1]], ends, rates))
+
     def only(self, stretch: Stretch) -> Driving:
         """One stretch, or a part of one, alone."""
         alone = replace(self)
@@ -122,7 +135,10 @@ class Driving:
     def log_number(self) -> FloatArray:
         """For each sample, the number of the log it comes from."""
         return np.concatenate(
-            [np.full(s.where.stop - s.where.start, float(s.log)) for s in self.stretches]
+            [
+                np.full(end - first, float(s.log))
+                for s, (first, end, _) in zip(self.stretches, self.spans, strict=True)
+            ]
         )
 
     @cached_property
@@ -148,12 +164,7 @@ class Driving:
     @cached_property
     def sample_rate_hz(self) -> FloatArray:
         """For each sample, the rate of the log it comes from: separate runs may differ."""
-        return np.concatenate(
-            [
-                np.full(s.where.stop - s.where.start, self.logs[s.log].rate_hz)
-                for s in self.stretches
-            ]
-        )
+        return np.concatenate([np.full(end - first, rate) for first, end, rate in self.spans])
 
     @property
     def mean_rate_hz(self) -> float:
@@ -168,10 +179,7 @@ class Driving:
     @property
     def usable_s(self) -> float:
         """Usable seconds, over all stretches."""
-        lengths = (
-            (s.where.stop - s.where.start) / self.logs[s.log].rate_hz for s in self.stretches
-        )
-        return float(sum(lengths))
+        return float(sum((end - first) / rate for first, end, rate in self.spans))
 
     @property
     def present(self) -> tuple[str, ...]:
@@ -254,8 +262,7 @@ class Driving:
         def some(core: _core.SingleTrack, begin: int, end: int) -> _core.Problem:
             return self._problem(model, core, self._between(begin, end), inputs, channels)
 
-        runs = [(at, at + where.stop - where.start, log.rate_hz) for log, where, at in self._whole]
-        return PiecewiseProblem(some, core, cut(runs, longest))
+        return PiecewiseProblem(some, core, cut(self.spans, longest))
 
     def windows(
         self, model: Model, windows: Sequence[tuple[int, int]], motion: FloatArray
@@ -333,18 +340,16 @@ class Driving:
             return [], []
         begin, end, size = (x - whole.start for x in (where.start, where.stop, whole.stop))
         inputs = self._inputs(log, whole) if other_inputs is None else other_inputs[at : at + size]
-        reach = round(_REACH_S * log.rate_hz) + _TAPS
+        reach = round(_REACH_S * log.rate_hz) + _core.SHIFT_REACH
         steer = inputs[:, 0]
         return steer[max(begin - reach, 0) : begin].tolist(), steer[end : end + reach].tolist()
 
     @cached_property
     def _whole(self) -> list[_Part]:
         """Log, samples and place among all usable samples of each stretch."""
-        lengths = [s.where.stop - s.where.start for s in self.stretches]
-        ends = np.cumsum([0, *lengths])
         return [
-            (self.logs[s.log], s.where, int(at))
-            for s, at in zip(self.stretches, ends, strict=False)
+            (self.logs[s.log], s.where, span.first)
+            for s, span in zip(self.stretches, self.spans, strict=True)
         ]
 
     def _between(self, begin: int, end: int) -> list[_Part]:

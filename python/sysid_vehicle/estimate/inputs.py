@@ -18,7 +18,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
+from .._arrays import NORMAL_MAD, FloatArray, as_float64
 
 _HALF_WIDTHS = (4, 6, 9, 12)
 _DEGREE = 6
@@ -37,7 +37,7 @@ def white_noise_std(y: FloatArray, block: int | None = None) -> float:
     parts = [d] if block is None else np.array_split(d, max(len(d) // block, 1))
     # 20 = 1 + 9 + 9 + 1; the median stands a few corners in the signal.
     variances = [
-        (1.4826 * np.median(np.abs(part - np.median(part)))) ** 2 / 20.0
+        (NORMAL_MAD * np.median(np.abs(part - np.median(part)))) ** 2 / 20.0
         for part in parts
         if len(part) >= 20
     ]

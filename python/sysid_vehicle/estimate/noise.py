@@ -14,8 +14,9 @@ from .._arrays import FloatArray, as_float64
 from .._text import html_text
 from .._threads import check_time
 from ..errors import NumericalError
+from ..log import MEASURED
 from ..vehicle import GRAVITY_MPS2, Vehicle
-from .driving import MEASURED, UNITS, Driving
+from .driving import UNITS, Driving
 from .inputs import white_noise_std
 from .pieces import DrivingProblem
 

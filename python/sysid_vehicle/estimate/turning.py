@@ -9,8 +9,6 @@ from .._arrays import FloatArray
 from .._memo import remembered
 from .driving import Driving
 
-__all__ = ["turning", "turning_blocks"]
-
 _AROUND_S = 0.5  # on either side
 _LEAST = 0.25  # of the root mean square over all driving
 _BLOCK_S, _FEWEST = 5.0, 6

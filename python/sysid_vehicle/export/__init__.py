@@ -9,7 +9,7 @@ from .._files import as_path, write_bytes, write_text
 from ..errors import InvalidInput, warn
 from ..identify import Fit
 from ..model import Model
-from ..vehicle import Tyre, Vehicle
+from ..vehicle import AXLES, Vehicle
 from ._fmu import fmu_bytes
 from ._languages import casadi_function, cpp_text, python_text
 from ._tyres import tir_text
@@ -59,7 +59,7 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
         write_bytes(path, fmu_bytes(model))
         return (path,)
     if suffix == ".tir":
-        files = {path.with_stem(f"{path.stem}_{a}"): tir_text(model, a) for a in ("front", "rear")}
+        files = {path.with_stem(f"{path.stem}_{a}"): tir_text(model, a) for a in AXLES}
     elif suffix == ".py":
         files = {path: python_text(model)}
     elif suffix in (".hpp", ".h"):
@@ -80,8 +80,5 @@ def export(what: Model | Fit, path: str | Path) -> tuple[Path, ...]:
 
 def identified_vehicle(model: Model) -> Vehicle:
     """Return the vehicle with the tyres and the yaw inertia that the model has."""
-    tyres = {
-        f"tyre_{axle}": Tyre(*(model.value(f"{letter}_{axle}") for letter in "BCDE"))
-        for axle in ("front", "rear")
-    }
+    tyres = {f"tyre_{axle}": model.tyre(axle) for axle in AXLES}
     return model.vehicle.replace(**tyres, yaw_inertia_kgm2=model.value("yaw_inertia_kgm2"))

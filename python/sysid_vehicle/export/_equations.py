@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from ..effects import Effect
 from ..errors import InvalidInput
 from ..model import Model
-from ..vehicle import GRAVITY_MPS2
+from ..vehicle import AXLES, GRAVITY_MPS2
 
 _SHORTEST_LAG = 1e-6  # s, as in `lags.hpp`
 
@@ -190,7 +190,7 @@ def _of_car(model: Model) -> list[tuple[str, float, str]]:
         ("drive_share", car.drive_front_share, "of the front axle in drive force"),
     ]
     units = {"B": "1/rad", "C": "1", "D": "1", "E": "1"}
-    for axle in ("front", "rear"):
+    for axle in AXLES:
         for letter in "BCDE":
             name = f"{letter}_{axle}"
             given.append((name, model.value(name), f"{units[letter]}, Magic Formula"))

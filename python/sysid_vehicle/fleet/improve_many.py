@@ -14,7 +14,7 @@ from .._arguments import expect, whole
 from .._files import as_path, write_text
 from .._progress import with_progress
 from .._threads import cores
-from ..errors import SysidError
+from ..errors import SysidError, warn
 from ..read import ChannelMap
 from .jobs import Car, Drive, Job, check_options, jobs_of
 from .page import fleet_page
@@ -83,6 +83,11 @@ def improve_many(
         An argument cannot be used. What is wrong with a log stands in its row instead.
     SysidError
         The executor broke; all studies that ended are kept.
+
+    Warns
+    -----
+    SysidWarning
+        Of what a study warned of in another process.
     """
     check_options(options, "improve_many")
     if isinstance(channels, Mapping):
@@ -132,6 +137,8 @@ def run(
         row = outcome.row
         store.keep(outcome, digests[row.name])
         rows[row.name] = row
+        for text in outcome.heard:
+            warn(f"{row.name}: {text}")
         say(f"{row.name}: {row.failure or row.verdict.replace('_', ' ')}")
         if time.monotonic() - summarised > _SUMMARY_EVERY_S:
             store.summarise([rows[job.name] for job in jobs if job.name in rows])

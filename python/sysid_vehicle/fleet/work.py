@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from .._memo import forget
@@ -24,14 +25,27 @@ _defining = threading.Lock()
 
 @dataclass(frozen=True)
 class Outcome:
-    """What comes back: the row, and the study as it stands in a file; None where it failed."""
+    """What comes back: the row, and the study as it stands in a file; None where it failed.
+
+    `heard` are the warnings of a worker, for the process that asked.
+    """
 
     row: Row
     study: bytes | None
+    heard: tuple[str, ...] = ()
 
 
 def do(job: Job) -> Outcome:
     """Do a study. One that cannot be done is an outcome, too."""
+    if threading.current_thread() is not threading.main_thread():
+        return _done(job)  # other threads would hear of it if warnings were caught
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        outcome = _done(job)
+    return replace(outcome, heard=tuple(dict.fromkeys(str(w.message) for w in heard)))
+
+
+def _done(job: Job) -> Outcome:
     began = time.perf_counter()
     try:
         _define(job.define)

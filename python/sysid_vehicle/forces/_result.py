@@ -12,20 +12,18 @@ import numpy.typing as npt
 from .._arrays import FloatArray
 from .._printed import Part, Printed, Table
 from .._style import MEASURED, tidy
-from .._text import brief, number
+from .._text import HALF_95, brief, number
 from ..errors import InvalidInput, near_names
 from ..sensors import SensorCheck
-from ..vehicle import Vehicle
+from ..vehicle import AXLES, Vehicle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-AXLES = ("front", "rear")
 _HEAD = ("axle", "slip angle", "side force", "of the load", "slope", "95 % band")
 _SMALL = 0.3  # of the load, below which a side force is nearly proportional to slip
 _FEWEST = 50
 _DRAWN = 4000  # points of a picture
-_WIDE = 1.96
 # Figure, label and factor by the word that asks for it.
 _COLOURS = {
     "load": ("load_n", "axle load [kN]", 1e-3),
@@ -210,8 +208,8 @@ class AxleForces(Printed):
             axes.errorbar(
                 slip,
                 force,
-                1e-3 * _WIDE * self.lateral_std_n[some, i],
-                np.degrees(_WIDE * self.slip_std_rad[some, i]),
+                1e-3 * HALF_95 * self.lateral_std_n[some, i],
+                np.degrees(HALF_95 * self.slip_std_rad[some, i]),
                 fmt="none",
                 ecolor=MEASURED,
                 elinewidth=0.4,
@@ -248,7 +246,7 @@ class AxleForces(Printed):
 
 def _band(std: FloatArray) -> str:
     """Half the width of a 95 % interval in the middle of the driving."""
-    return number(_WIDE * float(np.median(std)), 2)
+    return number(HALF_95 * float(np.median(std)), 2)
 
 
 def _two(ax: Sequence[Axes]) -> tuple[Axes, Axes]:

@@ -31,8 +31,6 @@ from .fit import Fit
 from .objective import Penalised
 from .search import minimise
 
-__all__ = ["predicting_ahead"]
-
 _MOST = 400  # windows
 # Windows that err by more than so many times the typical error count as lost, but of all windows
 # no more than a tenth: they are left out (trimmed squares, Rousseeuw, JASA 1984). Both are those of
@@ -188,12 +186,9 @@ def _counting(
 def _windows_of(driving: Driving, horizon_s: float) -> list[tuple[int, int]]:
     """First sample and number of samples of windows that begin half a horizon apart."""
     found = []
-    at = 0
-    for s in driving.stretches:
-        rate, size = driving.logs[s.log].rate_hz, s.where.stop - s.where.start
+    for first, end, rate in driving.spans:
         length = max(round(horizon_s * rate), 1) + 1
-        found += [(at + k, length) for k in range(0, size - length + 1, max(length // 2, 1))]
-        at += size
+        found += [(k, length) for k in range(first, end - length + 1, max(length // 2, 1))]
     if not found:
         raise InvalidInput(
             f"horizon_s = {horizon_s:g}: no stretch of {driving} is as long; give a shorter one"

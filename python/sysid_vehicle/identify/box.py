@@ -9,8 +9,6 @@ from ..model import Model
 from .objective import LinearRows, gaussian_prior
 from .search import Box
 
-__all__ = ["free_box", "free_prior"]
-
 
 def free_box(model: Model) -> Box:
     """The model's free parameters, in the order of their names."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -9,23 +10,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .._arrays import FloatArray, as_float64
-from .._text import number
+from .._text import HALF_95, number
 from .objective import Objective
 from .profile import Optimum, Profile, profile_all
 from .quantities import Quantity
 from .search import Box
-
-__all__ = [
-    "BETTER_FOUND",
-    "INTERVALS",
-    "Estimate",
-    "Estimated",
-    "box_covariance",
-    "profiled",
-    "profiled_estimates",
-    "std_of_data",
-    "wald",
-]
 
 BETTER_FOUND = 4
 """Times that profiling may lead to a better optimum."""
@@ -67,7 +56,7 @@ class Estimate:
         """95 % interval: of the profile likelihood where there is one, else of the std."""
         if self.ends is not None:
             return self.ends
-        return self.value - 1.96 * self.std, self.value + 1.96 * self.std
+        return self.value - HALF_95 * self.std, self.value + HALF_95 * self.std
 
     def to_dict(self) -> dict[str, Any]:
         """Value, standard error, unit, and an interval of the profile likelihood, for JSON."""
@@ -85,8 +74,7 @@ def box_covariance(information: FloatArray, box: Box, x: FloatArray) -> FloatArr
     combinations that are known none either. It is that of a uniform over the box, about the
     estimate `x`: an estimate at a bound is further from the rest of the box than one amid it.
     """
-    width = box.upper - box.lower
-    spread = np.hypot(_SPREAD_OF_BOX * width, x - 0.5 * (box.lower + box.upper))
+    spread = np.hypot(_SPREAD_OF_BOX * box.width, x - 0.5 * (box.lower + box.upper))
     per_std = 1.0 / spread
     total = information + np.diag(per_std**2)
     scale = np.sqrt(np.diag(total))
@@ -115,7 +103,7 @@ def wald(
     What the data alone do not determine is called that, even where it ended at a bound: the bound
     is not what stopped it. At a bound there is no standard error, nor for what they never felt.
     """
-    width = box.upper - box.lower
+    width = box.width
     covariance = box_covariance(information, box, x)
     std = np.sqrt(np.diag(covariance))
     of_data = std_of_data(information)
@@ -135,7 +123,7 @@ def wald(
     return estimates, covariance
 
 
-class Estimated:
+class Estimated(ABC):
     """What all fits have in common: estimates, and what follows from them, by name."""
 
     estimates: tuple[Estimate, ...]
@@ -145,14 +133,14 @@ class Estimated:
     __iter__ = None  # numbers are no names
 
     @property
+    @abstractmethod
     def derived(self) -> tuple[Estimate, ...]:
         """What follows from the estimates together."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def quantities(self) -> dict[str, Quantity]:
         """Estimates, then what follows from them, as functions of all parameters."""
-        raise NotImplementedError
 
     def __getitem__(self, name: str) -> Estimate:
         return _named(name, (*self.estimates, *self.derived))
@@ -200,10 +188,9 @@ def profiled_estimates(
     at = Optimum.of(objective, p, noise, box, fit.covariance)
     wanted = list(fit.quantities.values())
     found, better = profile_all(at, wanted, workers=workers, progress=progress)
-    widths = box.upper - box.lower
     estimates = tuple(
         replace(e, note=_note(e, f, float(width)), ends=f.interval)
-        for e, f, width in zip(fit.estimates, found, widths, strict=False)
+        for e, f, width in zip(fit.estimates, found, box.width, strict=False)
     )
     return estimates, found, better
 

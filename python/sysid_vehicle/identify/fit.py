@@ -14,15 +14,13 @@ from .._text import brief, html_list, html_paragraph, html_table, number, text_t
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
+from ..vehicle import AXLES
 from .estimates import Estimate, Estimated, profiled
 from .posterior import Posterior, posterior
 from .profile import Profile
 from .quantities import Quantity, parameter, std_of, tyre_quantity
 from .starts import Starts
 from .tyre_shape import COMBINATIONS
-
-__all__ = ["Fit"]
-
 
 _MEANINGS = {"BCD": "cornering stiffness", "peak": "peak friction", "peak_slip": "slip at the peak"}
 _UNITS = {"cornering stiffness": "N/rad", "peak friction": "1", "slip at the peak": "rad"}
@@ -131,7 +129,7 @@ class Fit(Estimated):
         known = self.model.parameters
         found = [parameter(e.name, known[e.name].column) for e in self.estimates]
         v = self.model.vehicle
-        for axle, load in zip(("front", "rear"), v.static_loads_n, strict=True):
+        for axle, load in zip(AXLES, v.static_loads_n, strict=True):
             columns = [known[f"{letter}_{axle}"].column for letter in "BCDE"]
             for short, (function, _) in COMBINATIONS.items():
                 factor = load if short == "BCD" else 1.0

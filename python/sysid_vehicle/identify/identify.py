@@ -26,16 +26,6 @@ from .settle import moved, rivalled, settle, settle_finely, to_the_top
 from .starts import Runner, Starts, apart, at_typical_sizes, space_filling
 from .suspects import explaining
 
-__all__ = [
-    "free_box",
-    "identify",
-    "objective_of",
-    "predicting_ahead",
-    "profile_fit",
-    "refine",
-    "refit",
-]
-
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts
@@ -204,9 +194,9 @@ def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3)
     p = box.inside(model.vector())
     gains = None
     for _ in range(rounds):
-        before = p[box.columns]
+        before = p
         p, gains = moved(objective, p, noise.vector(), box, rounds=8, tolerance=0.2)
-        if np.all(np.abs(p[box.columns] - before) < 1e-4 * (box.upper - box.lower)):
+        if box.near(p, before, 1e-4):
             break
     return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True, gains)
 

@@ -16,8 +16,6 @@ import numpy.typing as npt
 from .._arrays import FloatArray, as_float64
 from .objective import Predicting
 
-__all__ = ["Copied", "Mapped"]
-
 _Places = npt.NDArray[np.intp]
 
 

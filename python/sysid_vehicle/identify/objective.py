@@ -17,17 +17,6 @@ from .._threads import check_time
 from ..errors import NumericalError
 from ..estimate import maximise_noise, promised_by_noise
 
-__all__ = [
-    "LinearRows",
-    "Objective",
-    "Penalised",
-    "Predicting",
-    "Problem",
-    "Rows",
-    "Together",
-    "gaussian_prior",
-]
-
 Rows = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """Further residuals: from all parameters to errors (m,) and minus their derivatives (m, n)."""
 
@@ -205,7 +194,11 @@ class Objective(Penalised):
 
     def log_likelihood(self, p: FloatArray, noise: FloatArray) -> float:
         """Of the data, less what the priors cost."""
-        return float(self.freeze(p, noise).log_likelihood) - self.prior_cost(p)
+        return self.reached(p, self.freeze(p, noise))
+
+    def reached(self, p: FloatArray, gains: Any) -> float:
+        """The same where the gains of the parameters are known."""
+        return float(gains.log_likelihood) - self.prior_cost(p)
 
     def log_likelihoods(self, sets: FloatArray, noise: FloatArray) -> FloatArray:
         """The same for several sets of parameters, minus infinity where the model fails.

@@ -26,8 +26,6 @@ from .fit import Fit
 from .objective import Objective
 from .settle import moved
 
-__all__ = ["centred", "driving_of", "marginal_information"]
-
 _ROUNDS = 3
 _STANDS = 0.1  # nats
 
@@ -94,7 +92,7 @@ def _likeliest(alone: Model, driving: Driving, noise: NoiseModel) -> FloatArray:
     for _ in range(_ROUNDS):
         told, _ = objective.learn_noise(p, told, rounds=2)
         p, gains = moved(objective, p, told, box, rounds=8, tolerance=_STANDS)
-        before, value = value, gains.log_likelihood - objective.prior_cost(p)
+        before, value = value, objective.reached(p, gains)
         if value < before + _STANDS:
             break
     return p

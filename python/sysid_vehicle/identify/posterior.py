@@ -19,8 +19,6 @@ from .box import free_box
 if TYPE_CHECKING:
     from .fit import Fit
 
-__all__ = ["Posterior", "posterior"]
-
 _BATCH, _BATCHES = 4096, 400
 _WALKERS = 4  # of the ensemble, for each parameter
 _BURN_IN = 0.3  # share of the steps that is left out

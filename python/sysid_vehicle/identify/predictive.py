@@ -29,8 +29,6 @@ from .objective import Penalised
 from .offsets import driving_of
 from .search import Box, minimise
 
-__all__ = ["Prediction", "predict"]
-
 _PASSES, _ROUNDS = 3, 20
 _ENOUGH = 0.1  # nats
 _SETTLED = 1e-4  # the same: along the valley of one B C D many small steps lead far
@@ -55,24 +53,19 @@ class _Remembered:
         """Of the fit, in these coordinates."""
         return as_float64(self.root.T @ self.root)
 
-    def units(self, x: FloatArray) -> FloatArray:
-        """How much of a parameter is one of its coordinate."""
-        return np.where(self.box.lower > 0.0, x, 1.0)
-
     def __call__(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
         """How far parameters are from the fit, in its standard errors, as residuals."""
         x = p[self.box.columns]
-        positive = self.box.lower > 0.0
-        ratio = np.where(positive, x, 1.0) / np.where(positive, self.fitted, 1.0)
-        off = np.where(positive, np.log(ratio), x - self.fitted)
+        ratio = self.box.units(x) / self.box.units(self.fitted)
+        off = np.where(self.box.positive, np.log(ratio), x - self.fitted)
         slopes = np.zeros((len(x), len(p)))
-        slopes[:, self.box.columns] = self.root / self.units(x)
+        slopes[:, self.box.columns] = self.root / self.box.units(x)
         return as_float64(-self.root @ off), slopes
 
     def occam(self, problem: DrivingProblem, p: FloatArray, frozen: Any) -> float:
         """Half the log of by how much the other driving narrows the parameters down."""
         _, _, learnt = problem.normal_equations(p, frozen, self.box.columns)
-        units = self.units(p[self.box.columns])
+        units = self.box.units(p[self.box.columns])
         known = self.information
         scale = np.sqrt(np.diag(known))
         before, after = (
@@ -156,8 +149,8 @@ def _remembered(fit: Fit) -> _Remembered:
     _, _, information = objective.normal_equations(
         p, objective.freeze(p, fit.noise.vector()), box.columns
     )
-    information = information + np.diag(12.0 / (box.upper - box.lower) ** 2)
-    units = np.where(box.lower > 0.0, p[box.columns], 1.0)
+    information = information + np.diag(12.0 / box.width**2)
+    units = box.units(p[box.columns])
     scaled = information * np.outer(units, units)
     size = np.sqrt(np.diag(scaled))
     # A root of what is scaled to ones loses no digits to units.

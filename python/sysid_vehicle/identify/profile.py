@@ -16,7 +16,7 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from .._progress import with_progress
 from .._style import AFTER, FLOOR, axes_or_new, tidy
-from .._text import number
+from .._text import HALF_95, number
 from .._threads import Workers
 from .objective import Objective, Penalised
 from .quantities import Quantity
@@ -26,9 +26,7 @@ from .valley import down_the_valley
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["LEVEL", "Optimum", "Profile", "lost_at", "profile", "profile_all"]
-
-LEVEL = 1.96
+LEVEL = HALF_95
 """Root of the 95 % quantile of chi-square with one degree of freedom."""
 
 _CLOSE = 0.04  # of the level

@@ -10,8 +10,6 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from .tyre_shape import slope_of
 
-__all__ = ["Quantity", "parameter", "std_of", "tyre_quantity"]
-
 
 @dataclass(frozen=True)
 class Quantity:

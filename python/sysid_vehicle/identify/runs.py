@@ -35,8 +35,6 @@ from .settle import settle
 from .starts import Starts
 from .suspects import explaining
 
-__all__ = ["Difference", "RunsFit", "identify_runs"]
-
 
 @dataclass(frozen=True)
 class Difference:

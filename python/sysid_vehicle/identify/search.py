@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from .objective import Problem
-
-__all__ = ["METHODS", "Box", "Outcome", "minimise", "stride"]
 
 _LEAST_DAMPING = 1e-9
 _ASTRAY = 1.5  # times what a step promised; where it loses more, it was far too long
@@ -28,6 +27,37 @@ class Box:
     columns: list[int]
     lower: FloatArray
     upper: FloatArray
+
+    @property
+    def width(self) -> FloatArray:
+        """From bound to bound."""
+        return self.upper - self.lower
+
+    @property
+    def positive(self) -> npt.NDArray[np.bool_]:
+        """Which parameters move on a logarithmic scale."""
+        return np.asarray(self.lower > 0.0)
+
+    def units(self, x: FloatArray) -> FloatArray:
+        """How much of a parameter is one of its scale."""
+        return np.where(self.positive, x, 1.0)
+
+    def room(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """How far it is to the lower and to the upper bound, on the parameters' scales."""
+        lower, upper, positive = self.lower - x, self.upper - x, self.positive
+        lower[positive] = np.log(self.lower[positive] / x[positive])
+        upper[positive] = np.log(self.upper[positive] / x[positive])
+        return lower, upper
+
+    def moved(self, x: FloatArray, step: FloatArray) -> FloatArray:
+        """Free parameters after a step on their scales, inside the box."""
+        positive = self.positive
+        there = np.where(positive, x * np.exp(np.where(positive, step, 0.0)), x + step)
+        return as_float64(np.clip(there, self.lower, self.upper))
+
+    def near(self, p: FloatArray, other: FloatArray, share: float) -> bool:
+        """Whether the free ones of two sets of all parameters differ by less of the box."""
+        return bool(np.all(np.abs(p - other)[self.columns] < share * self.width))
 
     def put(self, p: FloatArray, x: FloatArray) -> FloatArray:
         """All parameters `p`, with the free ones `x`; a row for each row of `x`."""
@@ -68,12 +98,7 @@ def minimise(
 
 
 def _gauss_newton(
-    problem: Problem,
-    p: FloatArray,
-    frozen: Any,
-    box: Box,
-    rounds: int,
-    tolerance: float,
+    problem: Problem, p: FloatArray, frozen: Any, box: Box, rounds: int, tolerance: float
 ) -> Outcome:
     """Levenberg-Marquardt whose every step is the best one within the box."""
 
@@ -127,7 +152,7 @@ def _gauss_newton(
 def _halfway(x: FloatArray, ahead: FloatArray, back: FloatArray, box: Box) -> FloatArray:
     """Middle of the parabola that leaves `x` towards `ahead` and ends at `back`."""
     ways = np.array([x, ahead, back])
-    positive = box.lower > 0.0
+    positive = box.positive
     ways[:, positive] = np.log(ways[:, positive])
     middle = np.array([0.5, 0.25, 0.25]) @ ways
     middle[positive] = np.exp(middle[positive])
@@ -154,39 +179,42 @@ def stride(
     parameters move on a logarithmic scale, on which the valley of equal cornering stiffness, B C D,
     is straight.
     """
-    positive = box.lower > 0.0
-    unit = np.where(positive, x, 1.0)
-    lower, upper = box.lower - x, box.upper - x
-    lower[positive] = np.log(box.lower[positive] / x[positive])
-    upper[positive] = np.log(box.upper[positive] / x[positive])
+    unit = box.units(x)
+    lower, upper = box.room(x)
     scale = np.sqrt(np.maximum(np.diag(information), 1e-12)) * unit
     normal = information * np.outer(unit, unit) / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(normal + damping * np.eye(len(x)))
-    root = np.sqrt(np.maximum(values, 1e-12))
+    downhill = gradient * unit / scale
+    step = least_within(np.maximum(values, 1e-12), vectors, downhill, lower * scale, upper * scale)
+    gain = downhill @ step - 0.5 * step @ normal @ step
+    return box.moved(x, step / scale), float(gain)
+
+
+def least_within(
+    values: FloatArray,
+    vectors: FloatArray,
+    downhill: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> FloatArray:
+    """Minimum within bounds of a quadratic, given the eigenvalues, above zero, of its curvature."""
+    root = np.sqrt(values)
     found = scipy.optimize.lsq_linear(
         root[:, None] * vectors.T,
-        (vectors.T @ (gradient * unit / scale)) / root,
-        bounds=(lower * scale, upper * scale),
+        (vectors.T @ downhill) / root,
+        bounds=(lower, upper),
         method="bvls",
     )
-    step = found.x / scale
-    there = np.where(positive, x * np.exp(np.where(positive, step, 0.0)), x + step)
-    gain = (gradient * unit / scale) @ found.x - 0.5 * found.x @ normal @ found.x
-    return as_float64(np.clip(there, box.lower, box.upper)), float(gain)
+    return as_float64(found.x)
 
 
 def _nlopt(
-    problem: Problem,
-    p: FloatArray,
-    frozen: Any,
-    box: Box,
-    rounds: int,
-    tolerance: float,
+    problem: Problem, p: FloatArray, frozen: Any, box: Box, rounds: int, tolerance: float
 ) -> Outcome:
     """Sequential quadratic programming of NLopt on parameters scaled to the box."""
     import nlopt
 
-    width = box.upper - box.lower
+    width = box.width
     best = Outcome(np.clip(p[box.columns], box.lower, box.upper), np.inf, False)
 
     def objective(z: FloatArray, gradient: FloatArray) -> float:
@@ -217,12 +245,7 @@ def _nlopt(
 
 
 def _scipy(
-    problem: Problem,
-    p: FloatArray,
-    frozen: Any,
-    box: Box,
-    rounds: int,
-    tolerance: float,
+    problem: Problem, p: FloatArray, frozen: Any, box: Box, rounds: int, tolerance: float
 ) -> Outcome:
     """Trust-region reflective least squares of SciPy."""
     inside = np.clip(p[box.columns], box.lower + 1e-9, box.upper - 1e-9)

@@ -13,22 +13,10 @@ from .._threads import in_parallel
 from ..errors import NumericalError
 from .objective import LinearRows, Objective
 from .search import Box, minimise, stride
+from .starts import SAME_VALLEY
 from .valley import down_the_valley
 
-__all__ = [
-    "bottom",
-    "climb",
-    "descend",
-    "moved",
-    "risen",
-    "rivalled",
-    "settle",
-    "settle_finely",
-    "to_the_top",
-]
-
 _STANDS = 0.5  # nats
-_SAME = 1e-2  # of the box: ends no farther apart lie in one valley
 _STILL = 3e-4  # nats
 _LITTLE = 0.1  # nats for which the noise is not learned once more while parameters still move
 _GAIN = 0.05  # nats
@@ -65,9 +53,8 @@ def descend(
     for _ in range(refreezes):
         gains = objective.freeze(p, noise)
         found = minimise(objective, p, gains, box, method=method, rounds=40)
-        step = np.abs(found.x - p[box.columns])
-        p = box.put(p, found.x)
-        if np.all(step < 1e-3 * (box.upper - box.lower)):
+        before, p = p, box.put(p, found.x)
+        if box.near(p, before, 1e-3):
             break
     return p, objective.log_likelihood(p, noise)
 
@@ -92,7 +79,7 @@ def risen(
     p : array, shape (parameters,)
     gains : object
     """
-    least = gains.log_likelihood - objective.prior_cost(p)
+    least = objective.reached(p, gains)
     begin = p[box.columns]
     for share in _SHARES:
         trial = box.put(p, begin + share * (x - begin))
@@ -100,7 +87,7 @@ def risen(
             there = objective.freeze(trial, noise)
         except NumericalError:
             continue
-        if there.log_likelihood - objective.prior_cost(trial) >= least:
+        if objective.reached(trial, there) >= least:
             return trial, there
     return p, gains
 
@@ -161,7 +148,7 @@ def settle(
         there = objective.freeze(p, learned)
         if there.log_likelihood >= gains.log_likelihood:
             noise, gains = learned, there
-        value = gains.log_likelihood - objective.prior_cost(p)
+        value = objective.reached(p, gains)
         if value < best + _STANDS:
             return p, noise, True
         best = value
@@ -215,9 +202,9 @@ def rivalled(
             few = thin[0]
             near, gains = moved(few, found, noise, box)
             p, there = moved(few, p, noise, box)
-            if np.all(np.abs(near - p)[box.columns] < _SAME * (box.upper - box.lower)):
+            if box.near(near, p, SAME_VALLEY):
                 return best
-            if _hopeless(few, gains.log_likelihood - few.prior_cost(near), p, there, noise)[0]:
+            if _hopeless(few, few.reached(near, gains), p, there, noise)[0]:
                 return best
         for some in thin[1:]:
             p, _ = moved(some, p, noise, box)
@@ -237,13 +224,13 @@ def _hopeless(
 ) -> tuple[bool, float]:
     """Whether parameters lack more than noise of their own can add, and what it can add."""
     more = objective.noise_promises(p, noise)
-    there = gains.log_likelihood - objective.prior_cost(p)
+    there = objective.reached(p, gains)
     return there + _TWICE * more + _STANDS < value, more
 
 
 def climb(
     objective: Objective, p: FloatArray, noise: FloatArray, box: Box
-) -> tuple[FloatArray, float]:
+) -> tuple[FloatArray, float, float]:
     """From where searches with frozen gains stand still to the maximum of the likelihood itself.
 
     The gains, and the spread that they predict, change with the parameters. Derivatives with frozen
@@ -262,23 +249,15 @@ def climb(
     Returns
     -------
     p : array, shape (parameters,)
-    log_likelihood : float
-        Priors included; never below that of the start.
+    begin, reached : float
+        Log-likelihoods of the start and there, priors included; the second is never the lower one.
     """
-    p, _, reached = _climbed_from(objective, p, noise, box)
-    return p, reached
-
-
-def _climbed_from(
-    objective: Objective, p: FloatArray, noise: FloatArray, box: Box
-) -> tuple[FloatArray, float, float]:
-    """Parameters, and the likelihoods of the start and there."""
 
     def values_at(trials: FloatArray) -> FloatArray:
         return objective.log_likelihoods(trials, noise)
 
     gains = objective.freeze(p, noise)
-    begin = value = gains.log_likelihood - objective.prior_cost(p)
+    begin = value = objective.reached(p, gains)
     for _ in range(_CLIMBS):
         _, seen, information = objective.normal_equations(p, gains, box.columns)
         x = p[box.columns]
@@ -288,7 +267,7 @@ def _climbed_from(
         leaning = objective.also(_leaning(p, slope - seen, box))
         found = minimise(leaning, p, gains, box, rounds=8, tolerance=_GAIN)
         p, gains = risen(objective, p, gains, found.x, noise, box)
-        reached = gains.log_likelihood - objective.prior_cost(p)
+        reached = objective.reached(p, gains)
         if reached < value + _GAIN:
             value = reached
             break
@@ -314,7 +293,7 @@ def to_the_top(
     noise : array, shape (noises,)
     """
     for _ in range(_CLIMBED):
-        p, begin, reached = _climbed_from(objective, p, noise, box)
+        p, begin, reached = climb(objective, p, noise, box)
         stands = reached < begin + _STANDS
         noise, _ = objective.learn_noise(p, noise, rounds=1 if stands else 3)
         if stands:
@@ -330,7 +309,7 @@ def _slope(
 ) -> FloatArray:
     """Derivatives by central differences, one-sided at a bound; zero where the model fails."""
     step = _NUDGE / np.sqrt(np.maximum(np.diag(information), _TINY))
-    step = np.minimum(step, _NARROW * (box.upper - box.lower))
+    step = np.minimum(step, _NARROW * box.width)
     x = p[box.columns]
     ends = np.array([np.maximum(x - step, box.lower), np.minimum(x + step, box.upper)])
     trials = np.tile(p, (2, len(x), 1))
@@ -358,11 +337,11 @@ def bottom(
         Priors included.
     """
     gains = objective.freeze(p, noise)
-    value = gains.log_likelihood - objective.prior_cost(p)
+    value = objective.reached(p, gains)
     for _ in range(_REFREEZES):
         trial = down_the_valley(objective, p, gains, box)
         gains = objective.freeze(trial, noise)
-        reached = gains.log_likelihood - objective.prior_cost(trial)
+        reached = objective.reached(trial, gains)
         if reached > value:
             p = trial
         if reached < value + _STILL:

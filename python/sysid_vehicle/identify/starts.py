@@ -21,23 +21,14 @@ from .search import Box
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "SAME_OPTIMUM",
-    "Runner",
-    "Search",
-    "Start",
-    "Starts",
-    "apart",
-    "at_typical_sizes",
-    "space_filling",
-]
-
 SAME_OPTIMUM = 1.0
 """Ends whose log-likelihood differs by less than this [nats] are the same optimum."""
 
+SAME_VALLEY = 1e-2
+"""Share of the box: ends less far apart lie in one valley."""
+
 _SAME_POINT = 1e-4  # of the box's width
 _FOLLOWED = 2  # ends of searches that are followed with noise of their own
-_SAME = 1e-2  # of the box: ends no farther apart lie in one valley
 
 Search = Callable[[FloatArray], tuple[FloatArray, float]]
 """From all parameters at a start to those at its end, and the log-likelihood there."""
@@ -188,8 +179,8 @@ class Runner:
         NumericalError
             None of them led anywhere.
         """
-        width = self.box.upper - self.box.lower
-        place = np.round((points[:, self.box.columns] - self.box.lower) / width / self.same)
+        above = points[:, self.box.columns] - self.box.lower
+        place = np.round(above / self.box.width / self.same)
         _, first, which = np.unique(place, axis=0, return_index=True, return_inverse=True)
         with Workers(self.workers) as pool:
             found = pool.map(lambda i: _guarded(search, points[i]), first)
@@ -218,11 +209,8 @@ def apart(ends: FloatArray, values: FloatArray, box: Box) -> list[FloatArray]:
     """The best few ends of searches, each in a valley of its own."""
     found: list[FloatArray] = []
     for i in np.argsort(-values, kind="stable"):
-        x = ends[i][box.columns]
-        near = _SAME * (box.upper - box.lower)
-        if np.isfinite(values[i]) and not any(
-            np.all(np.abs(x - other[box.columns]) < near) for other in found
-        ):
+        known = any(box.near(ends[i], other, SAME_VALLEY) for other in found)
+        if np.isfinite(values[i]) and not known:
             found.append(ends[i])
         if len(found) == _FOLLOWED:
             break

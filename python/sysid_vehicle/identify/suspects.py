@@ -16,9 +16,8 @@ from ..errors import explained
 from ..estimate import Driving
 from ..log import Log
 from ..model import Model
+from ..vehicle import AXLES
 from .fit import Fit
-
-__all__ = ["explaining", "suspects"]
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -121,7 +120,7 @@ def _of_car(model: Model) -> list[str]:
     values = [(n, getattr(car, n), low, high) for n, (low, high) in _CARS.items()]
     values += [
         (f"{letter}_{axle}", model.value(f"{letter}_{axle}"), low, high)
-        for axle in ("front", "rear")
+        for axle in AXLES
         for letter, (low, high) in _TYRES.items()
     ]
     low, high = (ratio * car.usual_inertia_kgm2 for ratio in _INERTIA_RATIO)

@@ -10,8 +10,6 @@ import scipy
 from .._arrays import FloatArray
 from ..vehicle import magic_formula
 
-__all__ = ["COMBINATIONS", "friction", "look_alike", "peak_slip", "slope_of", "stiffness", "top"]
-
 _PEAKLESS = 1.0 + 1e-6
 
 

@@ -11,15 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-import scipy
 
 from .._arrays import FloatArray, as_float64
 from ..errors import NumericalError
 from .objective import Problem
-from .search import Box
-
-__all__ = ["down_the_valley"]
+from .search import Box, least_within
 
 _LEAST_DAMPING = 1e-13
 _HARDLY_DAMPED = (_LEAST_DAMPING, 1e-9, 1e-6)
@@ -43,14 +39,8 @@ class _Slope:
     def step(self, damping: float) -> FloatArray:
         """Minimum of the damped quadratic model over the box."""
         values, vectors = np.linalg.eigh(self.curvature + damping * np.eye(len(self.scale)))
-        root = np.sqrt(np.maximum(values, _TINY))
-        found = scipy.optimize.lsq_linear(
-            root[:, None] * vectors.T,
-            (vectors.T @ self.gradient) / root,
-            bounds=(np.minimum(self.to_lower, -_TINY), np.maximum(self.to_upper, _TINY)),
-            method="bvls",
-        )
-        return as_float64(found.x)
+        lower, upper = np.minimum(self.to_lower, -_TINY), np.maximum(self.to_upper, _TINY)
+        return least_within(np.maximum(values, _TINY), vectors, self.gradient, lower, upper)
 
     def gain(self, step: FloatArray) -> float:
         """What the quadratic model promises."""
@@ -82,11 +72,6 @@ class _Valley:
     gains: Any
     box: Box
 
-    @property
-    def positive(self) -> npt.NDArray[np.bool_]:
-        """Which parameters move on a logarithmic scale."""
-        return np.asarray(self.box.lower > 0.0)
-
     def full(self, x: FloatArray) -> FloatArray:
         return self.box.put(self.p, x)
 
@@ -98,18 +83,12 @@ class _Valley:
             return None
         return found if np.isfinite(found).all() else None
 
-    def moved(self, x: FloatArray, step: FloatArray) -> FloatArray:
-        there = np.where(self.positive, x * np.exp(np.where(self.positive, step, 0.0)), x + step)
-        return as_float64(np.clip(there, self.box.lower, self.box.upper))
-
     def slope(self, x: FloatArray, residuals: FloatArray) -> _Slope:
-        unit = np.where(self.positive, x, 1.0)
-        by = self.objective.sensitivities(self.full(x), self.gains, self.box.columns) * unit
+        by = self.objective.sensitivities(self.full(x), self.gains, self.box.columns)
+        by = by * self.box.units(x)
         scale = np.sqrt(np.maximum(np.einsum("ij,ij->j", by, by), 1e-12))
         by = by / scale
-        lower, upper = self.box.lower - x, self.box.upper - x
-        lower[self.positive] = np.log(self.box.lower[self.positive] / x[self.positive])
-        upper[self.positive] = np.log(self.box.upper[self.positive] / x[self.positive])
+        lower, upper = self.box.room(x)
         return _Slope(lower * scale, upper * scale, scale, by, by.T @ residuals, by.T @ by)
 
     def bent(
@@ -120,7 +99,7 @@ class _Valley:
         None where the valley bends too much for a step of that length.
         """
         tangent = slope.step(damping)
-        probe = self.residuals(self.moved(x, _PROBE * tangent / slope.scale))
+        probe = self.residuals(self.box.moved(x, _PROBE * tangent / slope.scale))
         if probe is None:
             return None
         second = 2.0 / _PROBE * ((probe - residuals) / _PROBE + slope.by @ tangent)
@@ -175,7 +154,7 @@ def down_the_valley(
             if found is None:
                 damping *= 4.0
                 continue
-            trial = valley.moved(x, found[0])
+            trial = box.moved(x, found[0])
             there = valley.residuals(trial)
             value = np.inf if there is None else 0.5 * float(there @ there)
             if there is not None and value < cost:

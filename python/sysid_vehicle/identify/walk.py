@@ -14,8 +14,6 @@ from .settle import descend, settle
 from .starts import SAME_OPTIMUM, Runner
 from .tyre_shape import look_alike
 
-__all__ = ["alternate", "looking_alike", "valleys", "walk"]
-
 _ALTERNATIONS = 3
 _CURVATURES = (-1.0, 0.0, 0.4, 0.8)
 _SIDES = ((0,), (4,), (0, 4))  # where the coefficients of the axles that are moved begin
@@ -134,20 +132,15 @@ def valleys(
     for trial in looking_alike(p):
         found = minimise(objective, trial, gains, box, rounds=_TASTE)
         trial = box.put(trial, found.x)
-        if found.cost < here + _HOPELESS and not _same(trial, p, box):
+        if found.cost < here + _HOPELESS and not box.near(trial, p, _APART):
             tasted.append((found.cost, trial))
     ends: list[tuple[FloatArray, float]] = []
     tried: list[FloatArray] = [p]
     for _, trial in sorted(tasted, key=lambda one: one[0])[:_TRIED]:
-        if any(_same(trial, other, box) for other in tried):
+        if any(box.near(trial, other, _APART) for other in tried):
             continue
         there, value = descend(objective, trial, noise, box)
-        if not any(_same(there, other, box) for other in tried):
+        if not any(box.near(there, other, _APART) for other in tried):
             ends.append((there, value))
         tried += [trial, there]
     return sorted(ends, key=lambda one: -one[1])
-
-
-def _same(a: FloatArray, b: FloatArray, box: Box) -> bool:
-    apart = np.abs(a - b)[box.columns] / (box.upper - box.lower)
-    return bool(np.all(apart < _APART))

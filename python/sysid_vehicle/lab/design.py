@@ -18,10 +18,11 @@ from .._threads import Workers
 from ..errors import InvalidInput, NumericalError
 from ..manoeuvres import peak_lateral_mps2
 from ..model import Model
+from ..vehicle import AXLES
 from .excitation import Excitation, Weaving
 from .information import TYRES
 from .observed import READINGS
-from .preview import Preview, preview, tyre_of
+from .preview import Preview, preview
 from .setup import Setup
 
 if TYPE_CHECKING:
@@ -270,7 +271,7 @@ _Box = dict[str, tuple[float, float]]
 
 def _box(believed: Model, setup: Setup, limits: Limits) -> _Box:
     """What a design chooses, and from where to where; the swing is a share of the room it has."""
-    tyres = {f"tyre_{axle}": tyre_of(believed, axle) for axle in ("front", "rear")}
+    tyres = {f"tyre_{axle}": believed.tyre(axle) for axle in AXLES}
     grip = peak_lateral_mps2(believed.vehicle.replace(**tyres)) * setup.simulator.load_share
     room = limits.fastest_mps - limits.slowest_mps
     return {
@@ -308,7 +309,7 @@ def _around(tried: list[Trial], box: _Box, rng: np.random.Generator, done: float
 
 def _prepared(setup: Setup, believed: Model) -> Setup:
     """The setup with a controller that holds the tyres somewhat beyond their believed peaks."""
-    front, rear = (tyre_of(believed, axle).peak_slip_rad() for axle in ("front", "rear"))
+    front, rear = (believed.tyre(axle).peak_slip_rad() for axle in AXLES)
     controller = replace(
         setup.controller,
         slip_limit_rad=_FRONT_SLIP_SHARE * front,

@@ -16,13 +16,13 @@ import numpy as np
 from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput
-from ..estimate import NoiseModel
-from ..estimate.driving import MEASURED
+from ..estimate import MEASURED, NoiseModel
 from ..model import Model
+from ..vehicle import AXLES
 from .loop import ClosedLoop
 from .observed import READINGS
 
-TYRES = tuple(f"{letter}_{axle}" for axle in ("front", "rear") for letter in "BCDE")
+TYRES = tuple(f"{letter}_{axle}" for axle in AXLES for letter in "BCDE")
 """The eight tyre coefficients."""
 
 MOTION = (5e-3, 5e-3, 1e-3)

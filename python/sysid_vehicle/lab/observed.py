@@ -11,7 +11,7 @@ import numpy.typing as npt
 from .._arrays import FloatArray
 from .._printed import Part, Printed, Table
 from .._style import AFTER, BEFORE, MEASURED, TRUTH, axes_or_new, tidy
-from .._text import number
+from .._text import HALF_95, number
 from ..errors import InvalidInput, near_names
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ class StateEstimate(Printed):
         if channel in READINGS:
             measured = self.measured[:, READINGS.index(channel)]
             ax.plot(self.time_s, measured, ".", color=MEASURED, ms=1.5, alpha=0.25, label="sensor")
-        low, high = value - 1.96 * std, value + 1.96 * std
+        low, high = value - HALF_95 * std, value + HALF_95 * std
         ax.fill_between(self.time_s, low, high, color=AFTER, alpha=0.25, lw=0, label="95 %")
         ax.plot(self.time_s, value, color=AFTER, lw=1.0, label=self._kind)
         ax.legend(loc="upper right", frameon=False)
@@ -137,7 +137,7 @@ class StateEstimate(Printed):
         for i, (label, color) in enumerate(
             (("ahead", BEFORE), ("sideways", AFTER), ("yaw moment per metre", TRUTH))
         ):
-            value, half = self.force[:, i], 1.96 * self.force_std[:, i]
+            value, half = self.force[:, i], HALF_95 * self.force_std[:, i]
             ax.fill_between(self.time_s, value - half, value + half, color=color, alpha=0.2, lw=0)
             ax.plot(self.time_s, value, color=color, lw=1.0, label=label)
         ax.legend(frameon=False, ncols=3)

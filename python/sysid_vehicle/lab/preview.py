@@ -13,7 +13,7 @@ from .._style import AFTER, BEFORE, FLOOR, MEASURED, axes_or_new, tidy
 from .._text import number
 from ..identify.estimates import std_of_data
 from ..model import Model
-from ..vehicle import Tyre
+from ..vehicle import AXLES
 from .excitation import Excitation
 from .information import MOTION, TYRES, information
 from .loop import ClosedLoop, run_closed_loop
@@ -171,7 +171,7 @@ class Preview(Printed):
                 alpha=0.35,
                 label=c.axle,
             )
-            curve = tyre_of(self.believed, c.axle).friction(slip)
+            curve = self.believed.tyre(c.axle).friction(slip)
             right.plot(slip, curve, line, color=colour, linewidth=1.2)
             for side in (-c.peak_rad, c.peak_rad):
                 ax.axvline(side, color=FLOOR, linewidth=0.7, linestyle=":")
@@ -183,11 +183,6 @@ class Preview(Printed):
 
 def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 1.0 else "> 100 %"
-
-
-def tyre_of(model: Model, axle: str) -> Tyre:
-    """The tyre that an axle, `front` or `rear`, has in a model."""
-    return Tyre(*(model.value(f"{letter}_{axle}") for letter in "BCDE"))
 
 
 def preview(
@@ -248,7 +243,7 @@ def preview(
             Expected(name, value, float(s))
             for name, value, s in zip(free, values, std * size, strict=True)
         ),
-        tuple(_coverage(drive, believed, axle) for axle in ("front", "rear")),
+        tuple(_coverage(drive, believed, axle) for axle in AXLES),
         condition,
         believed,
         drive,
@@ -256,7 +251,7 @@ def preview(
 
 
 def _coverage(drive: ClosedLoop, model: Model, axle: str) -> Coverage:
-    peak = tyre_of(model, axle).peak_slip_rad()
+    peak = model.tyre(axle).peak_slip_rad()
     slip = np.abs(drive.truth[f"slip_{axle}_rad"])
     return Coverage(
         axle,

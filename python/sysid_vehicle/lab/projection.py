@@ -12,6 +12,7 @@ import scipy
 
 from .._arrays import FloatArray, as_float64
 from ..identify.objective import Problem
+from ..identify.search import least_within
 
 
 @dataclass
@@ -124,11 +125,6 @@ def _bounded(
     if np.all(step >= lower) and np.all(step <= upper):
         return as_float64(step)
     values, vectors = np.linalg.eigh(matrix)
-    root = np.sqrt(np.maximum(values, 1e-14 * values[-1]))
-    found = scipy.optimize.lsq_linear(
-        root[:, None] * vectors.T,
-        (vectors.T @ gradient) / root,
-        bounds=(np.minimum(lower, 0.0) - 1e-15, np.maximum(upper, 0.0) + 1e-15),
-        method="bvls",
-    )
-    return as_float64(np.clip(found.x, lower, upper))
+    values = np.maximum(values, 1e-14 * values[-1])
+    ends = np.minimum(lower, 0.0) - 1e-15, np.maximum(upper, 0.0) + 1e-15
+    return as_float64(np.clip(least_within(values, vectors, gradient, *ends), lower, upper))

@@ -15,8 +15,6 @@ from .projection import Regression
 from .tyre_data import GreyBoxVehicle
 from .tyre_fit import PARAMETERS
 
-__all__ = ["COARSE", "EXACT", "FINE", "ROUGH", "RegressionTask", "descend_regression"]
-
 COARSE = 800  # samples of a first search
 ROUGH, FINE = 1e-5, 1e-8  # of the loss: what a whole search may gain and count as none
 EXACT = 1e-12  # of the squares to explain: less is rounding

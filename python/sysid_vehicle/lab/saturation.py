@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ..log._signals import runs
+
 # In the order of the bits, and for which part of the drive each may be met before the drive is no
 # longer the one that was wanted. A speed that is stepped meets the force's ends for a while.
 _LIMITS = (
@@ -68,8 +70,7 @@ def saturation(limits: npt.NDArray[np.uint32], rate_hz: float) -> tuple[Saturati
         on = (limits >> np.uint32(bit)) & np.uint32(1) == 1
         if not on.any():
             continue
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]])))
-        longest = float((edges[1::2] - edges[::2]).max()) / rate_hz
+        longest = float(max(end - begin for begin, end in runs(on))) / rate_hz
         first = float(np.argmax(on)) / rate_hz
         met.append(Saturation(what, 1 << bit, float(on.mean()), first, longest, tolerated))
     return tuple(met)

@@ -12,18 +12,18 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from .._printed import Part, Printed, Table
 from .._style import AFTER, BEFORE, axes_or_new, tidy
-from .._text import number
+from .._text import HALF_95, number
 from ..identify.estimates import Estimate, Estimated
 from ..identify.profile import Profile
 from ..identify.quantities import Quantity, parameter, std_of, tyre_quantity
 from ..identify.starts import Starts
 from ..identify.tyre_shape import COMBINATIONS, friction, peak_slip, slope_of
+from ..vehicle import AXLES
 from .tyre_data import GreyBoxVehicle, TyreLog
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-AXLES = ("front", "rear")
 PARAMETERS = (
     *(f"{letter}_{axle}" for axle in AXLES for letter in "BCDE"),
     "P1",
@@ -270,7 +270,7 @@ class TyreFit(Estimated, Printed):
             seen = band.slip_rad <= band.driven_rad
             ax.plot(band.slip_rad[seen], band.friction[seen], color=colour, label=axle)
             ax.plot(band.slip_rad[~seen], band.friction[~seen], ":", color=colour)
-            low, high = band.friction - 1.96 * band.std, band.friction + 1.96 * band.std
+            low, high = band.friction - HALF_95 * band.std, band.friction + HALF_95 * band.std
             ax.fill_between(band.slip_rad, low, high, color=colour, alpha=0.2, linewidth=0)
         ax.set_ylim(0.0, 1.3 * max(float(self.curve(a).friction.max()) for a in AXLES))
         ax.legend()

@@ -17,8 +17,7 @@ from .. import _core
 from .._arrays import FloatArray, as_float64
 from ..effects import base_parameters, effect
 from ..errors import InvalidInput, near_names
-from ..estimate import NoiseModel
-from ..estimate.driving import MEASURED
+from ..estimate import MEASURED, NoiseModel
 from ..formula import TARGETS, trace
 from ..identify.objective import Objective, gaussian_prior
 from ..identify.search import Box

@@ -12,17 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._arrays import FloatArray
 from ..errors import InvalidInput, warn
 from ..vehicle import GRAVITY_MPS2
-from ._channels import FloatArray
-from ._laws import EXCITED, WINDOW_S, Drive, size_of, spread_of
+from ._laws import EXCITED, LINEAR_MPS2, OFFSET, WINDOW_S, Drive, size_of, spread_of
 from ._log import Log
 from ._longitudinal import ramp_on
 from ._motion import Motion
 
 _MOVING = 5.0  # m/s
 _MIN_WINDOWS = 12
-_LINEAR_MPS2 = 5.0
 _SETTLING = 1  # windows before and after harder driving
 _FAR = 2.5  # times the usual steering: beyond it an angle counts as that much
 _SURE = 3.0  # deviations
@@ -34,7 +33,6 @@ _STEER_STD, _STEER_FACTOR = 0.2, 2.0
 _STEER_NEVER = 2.8  # whatever the differential
 _UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003  # rad of road wheels per m/s2
 _UNDERSTEER_MOST = 0.008  # rad per m/s2 either way: 4.5 deg/g, more than cars have
-_OFFSET = 0.3  # of the steering angle, as a share of its size
 _RATIOS = np.geomspace(1.0 / 128.0, 128.0, 281)
 _BLOCK, _FITTED = 6, 4  # windows that are taken as dependent; what is fitted to them
 # Squares left of the steering, as a multiple of the least and as a share of all, with which a ratio
@@ -159,7 +157,7 @@ def _steer(drive: Drive, wheelbase_m: float) -> _Told | None:
     """Steering angle over the one of a wheelbase, ``delta = L r / v + K a_y`` at low a_y."""
     c = drive.motion.channels
     ay = drive.mean(c["ay_mps2"])
-    hard = np.abs(ay) >= _LINEAR_MPS2
+    hard = np.abs(ay) >= LINEAR_MPS2
     # A car that slides, or catches itself, does not steer by the wheelbase, whatever its a_y is.
     gentle = np.convolve(hard, np.ones(2 * _SETTLING + 1), mode="same") < 0.5
     spare = float(np.count_nonzero(gentle)) / _BLOCK - _FITTED
@@ -177,7 +175,7 @@ def _steer(drive: Drive, wheelbase_m: float) -> _Told | None:
     yaw = even * yaw[gentle, None]
     columns -= yaw * (yaw.T @ columns / max(float(np.sum(yaw**2)), _TINY))
     squares = columns.T @ columns
-    offset = _OFFSET * size_of(steer[gentle])
+    offset = OFFSET * size_of(steer[gentle])
     noise = float(_left(squares, offset, 0.0).min()) / spare
     left = _left(squares, offset, noise)
     best = int(np.argmin(left))

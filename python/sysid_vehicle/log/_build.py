@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._arrays import FloatArray
 from ..errors import InvalidInput, warn
 from . import _checks
-from ._channels import CHANNELS, FloatArray
+from ._channels import CHANNELS
 from ._columns import Columns, collect
 from ._grid import at, check_time, own_period, to_grid
 from ._held import blank_held

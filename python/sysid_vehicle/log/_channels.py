@@ -4,11 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
-FloatArray = npt.NDArray[np.float64]
-
 DEG = 0.0174533  # rad per degree, as rounded in messages and channel maps
 
 
@@ -58,5 +53,7 @@ CHANNELS = {
         ),
     )
 }
+MEASURED = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+"""Measured channels of the motion, in the core's order."""
 
 REQUIRED = tuple(name for name, channel in CHANNELS.items() if channel.required)

@@ -6,8 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
+from .._arrays import NORMAL_MAD, FloatArray
 from ..errors import InvalidInput
-from ._channels import FloatArray
 from ._laws import Contradiction
 from ._motion import Motion
 from ._steering import several_frequencies
@@ -47,7 +47,7 @@ def clock_notes(motion: Motion) -> list[Contradiction]:
     times, lags = found[:, 0], found[:, 1]
     drift = float(np.median([(b[1] - a[1]) / (b[0] - a[0]) for a, b in combinations(found, 2)]))
     middle = float(np.median(lags - drift * times))
-    scatter = 1.4826 * float(np.median(np.abs(lags - middle - drift * times)))
+    scatter = NORMAL_MAD * float(np.median(np.abs(lags - middle - drift * times)))
     if scatter > _SCATTER_S:
         return []
     begin, end = (middle + drift * t for t in (motion.time_s[0], motion.time_s[-1]))

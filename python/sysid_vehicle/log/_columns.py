@@ -9,12 +9,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from .._arrays import FloatArray
 from ..errors import InvalidInput, near_names
-from ._channels import CHANNELS, REQUIRED, FloatArray
+from ._channels import CHANNELS, REQUIRED
 from ._grid import at
 
 _SHOWN_NAMES = 20
-_COMPARED_NAMES = 1000  # near names are sought among so many
 _LARGEST = 1e12  # in any channel's unit: nothing that a sensor of a car measures
 _STAMP = re.compile(r"(\d{4}-\d\d-\d\d[T ])?(\d\d?:\d\d:\d\d(?:[.,]\d+)?) ?(Z|[+-]\d\d:?\d\d)?")
 
@@ -115,9 +115,7 @@ def _check_presence(names: list[str]) -> None:
     missing = [channel for channel in REQUIRED if channel not in names]
     if missing:
         others = [name for name in dict.fromkeys(names) if name not in CHANNELS]
-        wanted = ", ".join(
-            f"{channel}{near_names(channel, others[:_COMPARED_NAMES])}" for channel in missing
-        )
+        wanted = ", ".join(f"{channel}{near_names(channel, others)}" for channel in missing)
         raise InvalidInput(
             f"missing column{'s' if len(missing) > 1 else ''} {wanted}; rename the column, or name "
             f"its source in a channel map, which `sysid-vehicle map` or sv.propose_channels "

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from .._arrays import FloatArray
 from ..errors import InvalidInput
-from ._channels import CHANNELS, FloatArray
+from ._channels import CHANNELS
 
 _JITTER = 0.01  # relative step variation up to which a log counts as uniform
 _GAP_STEPS = 5.0

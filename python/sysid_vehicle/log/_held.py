@@ -11,7 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ._channels import CHANNELS, FloatArray
+from .._arrays import FloatArray
+from ._channels import CHANNELS
 
 _FEWEST_CHANGES = 20
 _ON_BEAT = 0.97  # share of the changes that lie whole holding times apart

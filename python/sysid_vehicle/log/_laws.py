@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._arrays import FloatArray
 from ..errors import InvalidInput
-from ._channels import FloatArray
 from ._motion import Motion
 from ._regression import Regression, regress
 
@@ -16,6 +16,8 @@ WINDOW_S = 1.0
 EXCITED = 0.5  # m/s2 that one side must reach before anything is compared
 # Scale errors of good sensors, gravity through roll, and geometry that is not known.
 SCALE_STD = 0.12
+LINEAR_MPS2 = 5.0  # lateral acceleration up to which tyres are nearly linear
+OFFSET = 0.3  # of the steering angle, as a share of its size
 
 _NOT_ONE = 5.0  # deviations from the right unit before another is looked for
 _FITS = 3.0  # deviations within which another unit fits
@@ -23,6 +25,8 @@ _UNNAMED = math.log(2.5)  # a scale that is farther off is refused although no u
 
 Slip = tuple[str, str, str]
 Slips = tuple[tuple[float, tuple[Slip, ...]], ...]
+VX_KMH: Slip = ("vx_mps", "km/h", "factor = 0.2777778")
+VX_MPH: Slip = ("vx_mps", "miles per hour", "factor = 0.44704")
 
 
 @dataclass(frozen=True)

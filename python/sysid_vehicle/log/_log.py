@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._arguments import expect
-from .._arrays import filled
+from .._arrays import FloatArray, filled
 from .._files import write_text
 from .._tables import dataset, frame
 from ..errors import InvalidInput, near_names, warn
 from ._build import build
-from ._channels import CHANNELS, FloatArray
+from ._channels import CHANNELS
 from ._checks import excitation_note
 from ._columns import Columns
 from ._laws import Contradiction

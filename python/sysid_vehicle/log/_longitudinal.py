@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._arrays import FloatArray
 from ..vehicle import GRAVITY_MPS2
-from ._channels import FloatArray
 from ._lags import sideways
 from ._laws import (
     EXCITED,
     SCALE_STD,
+    VX_KMH,
+    VX_MPH,
     Contradiction,
     Drive,
     Implausible,
@@ -35,13 +37,11 @@ _FRONT_SHARE, _FRONT_SPREAD = 0.5, 0.2  # of the lateral force: what the front a
 _DRAG_PER_M = 0.003  # half the air's density times a large drag area, over the mass of a light car
 
 _AX_G = ("ax_mps2", "g", "factor = 9.80665")
-_VX_KMH = ("vx_mps", "km/h", "factor = 0.2777778")
-_VX_MPH = ("vx_mps", "miles per hour", "factor = 0.44704")
 _LONGITUDINAL_SLIPS: Slips = (
     (GRAVITY_MPS2, (_AX_G,)),
-    (3.6, (_VX_KMH,)),
-    (1.0 / 0.44704, (_VX_MPH,)),
-    (3.6 * GRAVITY_MPS2, (_AX_G, _VX_KMH)),
+    (3.6, (VX_KMH,)),
+    (1.0 / 0.44704, (VX_MPH,)),
+    (3.6 * GRAVITY_MPS2, (_AX_G, VX_KMH)),
 )
 
 

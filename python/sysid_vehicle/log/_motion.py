@@ -10,14 +10,34 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .._arrays import filled
-from ._channels import FloatArray
+from .._arrays import FloatArray, filled
 from ._grid import own_period
 from ._signals import disorder, median_of_five, white_noise
 
 _RATE_HZ = 50.0  # enough for what a car does; quicker logs are averaged down
 _MEDIAN_ABOVE_HZ = 40.0  # below, a median of five samples would take movement for spikes
 _KNOWN_S = 0.1  # a value counts as known so close to a sample
+
+
+class Windows:
+    """Windows of samples, each half over the next."""
+
+    def __init__(self, samples: int, half: int, rate_hz: float) -> None:
+        self.half, self.rate_hz = half, rate_hz
+        self.centres = np.arange(half, samples - half, half)
+
+    def mean(self, values: FloatArray) -> FloatArray:
+        """Return the mean over each window (trapezoids)."""
+        area = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))))
+        over = area[self.centres + self.half] - area[self.centres - self.half]
+        result: FloatArray = over / (2.0 * self.half)
+        return result
+
+    def change(self, values: FloatArray) -> FloatArray:
+        """Return the mean rate of change over each window [1/s]."""
+        over = values[self.centres + self.half] - values[self.centres - self.half]
+        result: FloatArray = over / (2.0 * self.half) * self.rate_hz
+        return result
 
 
 class Motion:
@@ -71,20 +91,20 @@ class Motion:
     def windows(self, length_s: float) -> None:
         """Use windows of about `length_s` [s] from here on, each half over the next."""
         n = self.time_s.size
-        self._half = min(max(1, round(0.5 * length_s * self.rate_hz)), max(1, (n - 1) // 2))
-        self._centres = np.arange(self._half, n - self._half, self._half)
-        missing = self._unknown[self._centres + self._half + 1]
-        self.usable = missing - self._unknown[self._centres - self._half] == 0.0
+        half = min(max(1, round(0.5 * length_s * self.rate_hz)), max(1, (n - 1) // 2))
+        self._windows = Windows(n, half, self.rate_hz)
+        centres = self._windows.centres
+        self.usable = self._unknown[centres + half + 1] - self._unknown[centres - half] == 0.0
 
     @property
     def count(self) -> int:
         """Number of windows."""
-        return self._centres.size
+        return self._windows.centres.size
 
     @property
     def times_s(self) -> FloatArray:
         """Centres of the windows [s]."""
-        return self.time_s[self._centres]
+        return self.time_s[self._windows.centres]
 
     def at(self, name: str, lag_s: float = 0.0) -> FloatArray:
         """Return a channel as it would be if it were `lag_s` earlier."""
@@ -99,17 +119,12 @@ class Motion:
         return result
 
     def mean(self, values: FloatArray) -> FloatArray:
-        """Return the mean over each window (trapezoids)."""
-        area = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))))
-        over = area[self._centres + self._half] - area[self._centres - self._half]
-        result: FloatArray = over / (2.0 * self._half)
-        return result
+        """Return the mean over each window."""
+        return self._windows.mean(values)
 
     def change(self, values: FloatArray) -> FloatArray:
         """Return the mean rate of change over each window [1/s]."""
-        over = values[self._centres + self._half] - values[self._centres - self._half]
-        result: FloatArray = over / (2.0 * self._half) * self.rate_hz
-        return result
+        return self._windows.change(values)
 
 
 def _averaged(values: FloatArray, every: int, count: int) -> FloatArray:

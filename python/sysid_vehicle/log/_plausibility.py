@@ -13,13 +13,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from .._arrays import FloatArray
 from ..vehicle import GRAVITY_MPS2
-from ._channels import DEG, FloatArray
+from ._channels import DEG
 from ._clock import clock_notes
 from ._lags import lag_notes
 from ._laws import (
     EXCITED,
+    LINEAR_MPS2,
+    OFFSET,
     SCALE_STD,
+    VX_KMH,
+    VX_MPH,
     WINDOW_S,
     Contradiction,
     Drive,
@@ -43,7 +48,6 @@ _MIN_WINDOWS = 8
 _SLIDING = 0.2  # m/s2, the same for the change of vy, which is a small part of ay
 _ABOVE_NOISE = 6.0  # noise of the regressor itself makes every coefficient too small
 _CLEARLY = 1.5  # m/s2 that it must reach before channels are called unrelated
-_LINEAR_MPS2 = 5.0
 
 # Lever arms and roll bend the lateral speed more than the accelerations.
 _SLIDE_STD = 0.35
@@ -53,13 +57,10 @@ _SLIDE_STD = 0.35
 _WHEELBASE_M, _WHEELBASE_STD = 2.9, 0.45
 _UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003
 _NOT_A_WHEELBASE = 3.5
-_OFFSET = 0.3  # of the steering angle, as a share of its size
 _LEAST_OFFSET_RAD = 1e-6  # a steering angle that stays at zero has no size
 
 _YAW_DEG = ("yaw_rate_radps", "degrees per second", f"factor = {DEG}")
 _AY_G = ("ay_mps2", "g", "factor = 9.80665")
-_VX_KMH = ("vx_mps", "km/h", "factor = 0.2777778")
-_VX_MPH = ("vx_mps", "miles per hour", "factor = 0.44704")
 _VY_KMH = ("vy_mps", "km/h", "factor = 0.2777778")
 _VY_MPH = ("vy_mps", "miles per hour", "factor = 0.44704")
 _RAD, _G = math.pi / 180.0, GRAVITY_MPS2
@@ -67,12 +68,12 @@ _RAD, _G = math.pi / 180.0, GRAVITY_MPS2
 _LATERAL_SLIPS: Slips = (
     (_RAD, (_YAW_DEG,)),
     (1.0 / _G, (_AY_G,)),
-    (1.0 / 3.6, (_VX_KMH,)),
-    (0.44704, (_VX_MPH,)),
+    (1.0 / 3.6, (VX_KMH,)),
+    (0.44704, (VX_MPH,)),
     (_RAD / _G, (_YAW_DEG, _AY_G)),
-    (_RAD / 3.6, (_YAW_DEG, _VX_KMH)),
-    (1.0 / _G / 3.6, (_AY_G, _VX_KMH)),
-    (_RAD / _G / 3.6, (_YAW_DEG, _AY_G, _VX_KMH)),
+    (_RAD / 3.6, (_YAW_DEG, VX_KMH)),
+    (1.0 / _G / 3.6, (_AY_G, VX_KMH)),
+    (_RAD / _G / 3.6, (_YAW_DEG, _AY_G, VX_KMH)),
 )
 _SLIDING_SLIPS: Slips = ((3.6, (_VY_KMH,)), (1.0 / 0.44704, (_VY_MPH,)))
 
@@ -218,7 +219,7 @@ def _check_steer(drive: Drive) -> None:
     curvature, steer = drive.mean(c["yaw_rate_radps"] / speed), drive.mean(c["steer_rad"])
     if size_of(ay) < EXCITED:
         return
-    gentle = np.abs(ay) < _LINEAR_MPS2
+    gentle = np.abs(ay) < LINEAR_MPS2
     if (
         np.count_nonzero(gentle) > max(_MIN_WINDOWS, 0.2 * ay.size)
         and size_of(ay[gentle]) > EXCITED
@@ -229,7 +230,7 @@ def _check_steer(drive: Drive) -> None:
     yaw = drive.change(c["yaw_rate_radps"])
     columns = [curvature[rows], yaw[rows], np.ones(np.count_nonzero(rows))]
     # On a circle of one radius only a small offset keeps the slope from being anything.
-    offset = max(_OFFSET * size_of(steer[rows]), _LEAST_OFFSET_RAD)
+    offset = max(OFFSET * size_of(steer[rows]), _LEAST_OFFSET_RAD)
     answer = fit(steer[rows], columns, [np.inf, np.inf, offset])
     alone = cosine(curvature[rows], steer[rows])
     if answer.coherence < 0.25 and abs(alone) < 0.45 and spread_of(ay[rows]) > _CLEARLY:

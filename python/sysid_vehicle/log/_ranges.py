@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import filled
-from ._channels import CHANNELS, DEG, FloatArray
+from .._arrays import FloatArray, filled
+from ._channels import CHANNELS, DEG
 from ._grid import at, between
 from ._laws import Contradiction, Implausible
 from ._signals import disorder, median_of_five, runs, white_noise

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._channels import FloatArray
+from .._arrays import NORMAL_MAD, FloatArray
 
 _PASSES = 5
 _HUBER = 2.5  # residuals beyond so many robust deviations lose weight
@@ -80,7 +80,7 @@ def regress(y: FloatArray, x: FloatArray, mean: FloatArray, spread: FloatArray) 
     for _ in range(_PASSES):
         b = _solve(y, x, mean, spread, weights, scale)
         residual = y - x @ b
-        scale = 1.4826 * float(np.median(np.abs(residual - np.median(residual)))) + _TINY
+        scale = NORMAL_MAD * float(np.median(np.abs(residual - np.median(residual)))) + _TINY
         weights = np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(residual), _TINY))
     _, deviations = _sandwich(x, y - x @ b, spread, weights, scale)
     return Regression(b, deviations, weights, scale, _coherence(y, x, weights))

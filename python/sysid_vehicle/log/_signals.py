@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray, filled
+from .._arrays import NORMAL_MAD, FloatArray, filled
 
 # A spike stands out this many times from the local noise, from the quantum of the channel and
 # (as a fraction) from its range: below, it could be a quick but true movement.
@@ -97,4 +97,4 @@ def white_noise(values: FloatArray) -> float:
     """Return the standard deviation of a channel's white noise, from its second differences."""
     if values.size < 3:
         return 0.0
-    return 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / float(np.sqrt(6.0))
+    return NORMAL_MAD * float(np.median(np.abs(np.diff(values, 2)))) / float(np.sqrt(6.0))

@@ -21,12 +21,12 @@ from ..estimate.inputs import white_noise_std
 from ..log import Log
 from ..vehicle import Vehicle, slip_angles
 from .sideslip import static_stiffness, yaw_inertia
+from .sideslip_settings import NOISE_BLOCK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _ENOUGH = 200  # samples with slip
-_BLOCK = 100  # samples over which the noise is one
 _SHORTEST_S, _LONGEST_S = 0.15, 1.0  # of the window; corners are smoothed away by a longer one
 _SLOWEST_MPS = 1.0  # below it slip angles mean nothing
 _NOISE_SHARE = 0.01  # of the variance of a slip angle
@@ -223,7 +223,7 @@ def cornering_stiffness(
     slips = slip_angles(vehicle.lf_m, vehicle.lr_m, log["steer_rad"], 1.0, np.tan(beta), rate / vx)
     if window_s is None:
         arms = (vehicle.lf_m, vehicle.lr_m)
-        noise = white_noise_std(rate, _BLOCK) / vx
+        noise = white_noise_std(rate, NOISE_BLOCK) / vx
         window_s = max(
             _window_s(slip, arm * noise, log.rate_hz) for slip, arm in zip(slips, arms, strict=True)
         )

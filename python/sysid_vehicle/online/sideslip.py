@@ -16,8 +16,6 @@ from ..vehicle import Tyre, Vehicle
 from .sideslip_results import SideslipRun
 from .sideslip_settings import SideslipSettings
 
-__all__ = ["KINDS", "SideslipEstimate", "SideslipObserver", "estimate_sideslip"]
-
 #: Kinds of observers, with what each is.
 KINDS: Mapping[str, str] = {
     "dual": "dual UKF with saturating, load-dependent, adapting tyres",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,14 +12,13 @@ from .._arguments import generator
 from .._arrays import FloatArray
 from .._printed import Told
 from ..errors import InvalidInput
+from ..export import identified_vehicle
 from ..identify import Fit
 from ..log import Log
-from ..vehicle import Tyre, Vehicle
+from ..vehicle import Vehicle
 from .sideslip import estimate_sideslip
 from .sideslip_results import SideslipRun
 from .sideslip_settings import SideslipSettings
-
-__all__ = ["SideslipCalibration", "calibrate_sideslip", "fitted_vehicle"]
 
 #: What no data sheet tells: errors of the model, and how far two sensors are to be trusted.
 _LEARNT = (
@@ -147,14 +145,4 @@ def _score(run: SideslipRun) -> float:
 
 def fitted_vehicle(fit: Fit) -> Vehicle:
     """The car of a fit with the tyres, and the yaw inertia, that were found."""
-    model = fit.model
-
-    def tyre(axle: str) -> Tyre:
-        return Tyre(**{letter: model.value(f"{letter}_{axle}") for letter in "BCDE"})
-
-    return dataclasses.replace(
-        model.vehicle,
-        yaw_inertia_kgm2=model.value("yaw_inertia_kgm2"),
-        tyre_front=tyre("front"),
-        tyre_rear=tyre("rear"),
-    )
+    return identified_vehicle(fit.model)

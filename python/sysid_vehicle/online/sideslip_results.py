@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["SideslipError", "SideslipRun", "sideslip_overview"]
-
 _BANDS_MPS2 = (0.0, 2.0, 4.0, 6.0, 8.0, 10.0)
 
 

@@ -15,7 +15,7 @@ from .._arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
 from ..twin.car import TwinCar
 from ..twin.readings import Readings
-from ..vehicle import static_loads
+from ..vehicle import AXLES, static_loads
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,7 @@ class DoubleTrackObserver:
         lf, base = -load.cg_x_m, n["wheelbase_m"]
         stiff = {
             a: n[f"{a}.track_m"] ** 2 * (0.5 * n[f"{a}.spring_npm"] + n[f"{a}.anti_roll_npm"])
-            for a in ("front", "rear")
+            for a in AXLES
         }
         data = [
             *(load.mass_kg, load.jzz_kgm2, lf, base - lf),

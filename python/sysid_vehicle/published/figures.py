@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, new_figure, tidy
+from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, legend_above, new_figure, tidy
 from ..twin.car import SPORTS_CAR
 from .joint import JointExperiment
 from .load import LoadExperiment
@@ -49,7 +49,7 @@ def load_figure(
             value = run.found.parameters[name]
             ax.plot(run.found.time_s, value, color=colour, label=f"from {value[0]:.4g}")
         ax.axhline(getattr(runs[0].true, name), color=TRUTH, linestyle="--", label="true")
-        _legend(ax)
+        legend_above(ax)
         tidy(ax, xlabel="time [s]", ylabel=name)
     drive = runs[0].drive
     ax = axes[len(names)]
@@ -59,7 +59,7 @@ def load_figure(
         for i, (name, colour) in enumerate(zip(names, _LINES, strict=False)):
             ax.plot(list(errors), [e[i] for e in errors.values()], "o-", color=colour, label=name)
         ax.axhline(_ACCEPTABLE, color=FLOOR, linestyle=":", label="acceptable")
-        _legend(ax)
+        legend_above(ax)
         tidy(ax, xlabel=condition, ylabel="error [% of the change]")
         ax.set_ylim(bottom=0.0)
     return figure
@@ -95,7 +95,7 @@ def _course(axes: Sequence[Axes], experiment: JointExperiment) -> None:
     mass.plot(time, experiment.twin.parameters["mass_kg"], color=AFTER, label="twin")
     mass.plot(time, experiment.benchmark.mass_kg[::step], color=BEFORE, label="double track")
     mass.axhline(SPORTS_CAR.design.mass_kg, color=TRUTH, linestyle="--", label="true")
-    _legend(mass)
+    legend_above(mass)
     tidy(mass, xlabel="time [s]", ylabel="mass [kg]")
     for ax, shown in zip(
         axes[4:], (np.full(len(time), True), time > time[-1] - _CLOSE_UP_S), strict=True
@@ -107,11 +107,5 @@ def _course(axes: Sequence[Axes], experiment: JointExperiment) -> None:
         ):
             beta = np.degrees(values[shown])
             ax.plot(time[shown], beta, style, color=colour, label=label, linewidth=1)
-        _legend(ax)
+        legend_above(ax)
         tidy(ax, xlabel="time [s]", ylabel="sideslip [deg]")
-
-
-def _legend(ax: Axes) -> None:
-    """In one row above the axes, where no line can run under it."""
-    count = len(ax.get_legend_handles_labels()[1])
-    ax.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=count, fontsize=8)

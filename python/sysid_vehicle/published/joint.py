@@ -20,14 +20,14 @@ from ..errors import InvalidInput
 from ..manoeuvres import double_lane_change, lap
 from ..twin.calibrate import Box
 from ..twin.car import SPORTS_CAR
-from ..twin.drives import Drive14, on_manoeuvre
+from ..twin.drives import WHEELS, Drive14, on_manoeuvre
 from ..twin.laws import SideBySide, mass_law, unknowns
 from ..twin.observer import Observation, Observer, StateGain, observe
 from ..twin.readings import READINGS, Readings, measure
+from ..vehicle import AXLES
 from .double_track import DoubleTrackObserver, DoubleTrackRun
 
 MASS_ERROR_KG = -350.0
-_WHEELS = ("fl", "fr", "rl", "rr")
 Course = Literal["lap", "double_lane_change"]
 Law = Literal["side_by_side", "published"]
 
@@ -35,7 +35,7 @@ Law = Literal["side_by_side", "published"]
 _NOISE = {
     **{f"a{axis}_mps2": 0.05 for axis in "xyz"},
     **{f"{turn}_rate_radps": 0.002 for turn in ("roll", "pitch", "yaw")},
-    **{f"wheel_speed_{w}_radps": 0.03 for w in _WHEELS},
+    **{f"wheel_speed_{w}_radps": 0.03 for w in WHEELS},
 }
 
 # What the twin does not know of the car, as factors of its own numbers.
@@ -89,7 +89,7 @@ def joint_drive(course: Course) -> Drive14:
     numbers = SPORTS_CAR.numbers()
     other = {
         f"{axle}.tyre.{name}": factor * numbers[f"{axle}.tyre.{name}"]
-        for axle in ("front", "rear")
+        for axle in AXLES
         for name, factor in _OTHER.items()
     }
     car = SPORTS_CAR.replace({**other, "both.tyre.relaxation_m": 0.35, "both.tyre.curvature": -0.6})
@@ -244,7 +244,7 @@ def _twin(drive: Drive14, readings: Readings, gains: Mapping[str, float], law: L
         StateGain("pitch_rate_radps", "pitch_rate_radps", gains["pitch"]),
         StateGain("yaw_rate_radps", "yaw_rate_radps", gains["yaw"]),
     ]
-    for w in _WHEELS:
+    for w in WHEELS:
         channel = f"wheel_speed_{w}_radps"
         corrections.append(StateGain(channel, channel, gains["wheel"]))
     if law == "side_by_side":

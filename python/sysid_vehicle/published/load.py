@@ -18,7 +18,7 @@ from .._printed import Told
 from ..errors import InvalidInput
 from ..twin.car import LOAD_NAMES, LOADED_SUV, NOMINAL_SUV, Load, TwinCar
 from ..twin.drives import INPUTS, Drive14, rough_road, swept_steer, urban_cycle
-from ..twin.laws import ParameterLaw, SideBySide, inertia_law, mass_law, unknowns
+from ..twin.laws import ParameterLaw, SideBySide, Unknown, inertia_law, mass_law, unknowns
 from ..twin.observer import Observation, Observer, observe
 from ..twin.readings import Readings, measure, noisy_road
 
@@ -30,7 +30,7 @@ Mass = Literal["known", "stage_1", "wrong"]
 
 _TORQUES = [i for i, name in enumerate(INPUTS) if name.startswith(("drive_", "brake_"))]
 # A sensor is never believed to be better than this.
-NOISE_FLOOR = {
+_NOISE_FLOOR = {
     "ax_mps2": 2e-3,
     "ay_mps2": 2e-3,
     "az_mps2": 2e-3,
@@ -139,11 +139,6 @@ _GAINS = {
 }
 
 
-def laws_of(law: Law, snr: float, names: Sequence[str]) -> list[ParameterLaw]:
-    """Laws of moments of inertia, with the gains of the paper's order."""
-    return _laws(law, snr, {name: _GAINS[name] for name in names})
-
-
 def _first(names: Sequence[str], errors: Sequence[float] | None) -> dict[str, float]:
     """Values to begin with: off by `errors` in parts of the true change, -1 for the nominal."""
     off = [-1.0] * len(names) if errors is None else list(errors)
@@ -156,12 +151,39 @@ def _first(names: Sequence[str], errors: Sequence[float] | None) -> dict[str, fl
     return out
 
 
-def _batch(
-    readings: Readings, channels: Sequence[str], names: Sequence[str], torque_std: float = 0.0
-) -> Observer:
-    """Twins side by side; by default the torques are exact, as the paper's twin has them."""
-    noise = {c: max(readings.noise[c], NOISE_FLOOR[c]) for c in channels}
-    return Observer(batch=SideBySide(unknowns(*names), noise, input_std=torque_std))
+def experiment(
+    name: str,
+    drive: Drive14,
+    first: Load,
+    names: tuple[str, ...],
+    looked_for: Sequence[Unknown],
+    channels: Sequence[str],
+    *,
+    law: Law,
+    snr: float,
+    seed: int | np.random.Generator,
+    road_noise: float = 0.0,
+    torque_error: float = 0.0,
+    torque_std: float = 0.0,
+) -> LoadExperiment:
+    """Measure a drive and look for `names`, twins side by side for all of `looked_for`.
+
+    By default the torques are exact, as the paper's twin has them.
+    """
+    rng = np.random.default_rng(seed)
+    readings = measure(drive, channels, snr=snr, seed=rng)
+    told = noisy_road(drive.inputs, road_noise, seed=rng) if road_noise > 0.0 else drive.inputs
+    if torque_error != 0.0:
+        told = told.copy()
+        told[:, _TORQUES] *= 1.0 + torque_error
+    if law == "side_by_side":
+        noise = {c: max(readings.noise[c], _NOISE_FLOOR[c]) for c in channels}
+        observer = Observer(batch=SideBySide(looked_for, noise, input_std=torque_std))
+    else:
+        observer = Observer(laws=[_law(law, snr, n) for n in names])
+    speed = float(drive["vx_mps"][0])
+    found = observe(TwinCar(), first, told, readings, observer, speed_mps=speed)
+    return LoadExperiment(name, drive, readings, found, names, LOADED_SUV, NOMINAL_SUV)
 
 
 def estimate_mass(
@@ -208,18 +230,19 @@ def estimate_mass(
         )
     drive = _town(duration_s)
     first = LOADED_SUV.replace(**_first(["mass_kg"], first_error), **_centre(wrong_cg))
-    told = drive.inputs.copy()
-    told[:, _TORQUES] *= 1.0 + torque_error
-    channels = ["ax_mps2", "pitch_rate_radps"] if law == "side_by_side" else ["ax_mps2"]
-    readings = measure(drive, channels, snr=snr, seed=seed)
-    if law == "side_by_side":
-        observer = _batch(readings, channels, ["mass_kg", "cg_x_m", "cg_z_m"], torque_std)
-    elif law == "published":
-        observer = Observer(laws=[mass_law(150.0, yaw_rate_below_radps=np.inf)])
-    else:
-        observer = Observer(laws=[mass_law(400.0, kind="gradient", yaw_rate_below_radps=np.inf)])
-    found = observe(TwinCar(), first, told, readings, observer, speed_mps=_speed(drive))
-    return LoadExperiment("mass", drive, readings, found, ("mass_kg",), LOADED_SUV, NOMINAL_SUV)
+    return experiment(
+        "mass",
+        drive,
+        first,
+        ("mass_kg",),
+        unknowns("mass_kg", "cg_x_m", "cg_z_m"),
+        ["ax_mps2", "pitch_rate_radps"] if law == "side_by_side" else ["ax_mps2"],
+        law=law,
+        snr=snr,
+        seed=seed,
+        torque_error=torque_error,
+        torque_std=torque_std,
+    )
 
 
 def estimate_roll_yaw(
@@ -256,15 +279,8 @@ def estimate_roll_yaw(
         looked_for += ["jxy_kgm2", "jxz_kgm2", "jyz_kgm2"]
     if law == "side_by_side" and len(looked_for) > 2:
         channels.append("ay_mps2")
-    readings = measure(drive, channels, snr=snr, seed=seed)
-    if law == "side_by_side":
-        observer = _batch(readings, channels, looked_for)
-    else:
-        observer = Observer(laws=laws_of(law, snr, names))
-    found = observe(TwinCar(), first, drive.inputs, readings, observer, speed_mps=_speed(drive))
-    return LoadExperiment(
-        "roll and yaw inertia", drive, readings, found, names, LOADED_SUV, NOMINAL_SUV
-    )
+    what, unknown = "roll and yaw inertia", unknowns(*looked_for)
+    return experiment(what, drive, first, names, unknown, channels, law=law, snr=snr, seed=seed)
 
 
 def estimate_pitch(
@@ -297,7 +313,6 @@ def estimate_pitch(
     """
     names = ("jyy_kgm2",)
     drive = _road(seed, duration_s)
-    rng = np.random.default_rng([seed, 1])
     first = LOADED_SUV.replace(
         **_first(names, first_error), **_centre(wrong_cg), mass_kg=_mass(mass, snr, law, seed)
     )
@@ -305,26 +320,29 @@ def estimate_pitch(
     looked_for = [*names, *(n for n in _unsure(mass, wrong_cg) if n != "cg_y_m")]
     if law == "side_by_side" and len(looked_for) > 1:
         channels += ["ax_mps2", "az_mps2"]
-    readings = measure(drive, channels, snr=snr, seed=rng)
-    told = noisy_road(drive.inputs, road_noise, seed=rng) if road_noise > 0.0 else drive.inputs
-    if law == "side_by_side":
-        observer = _batch(readings, channels, looked_for)
-    else:
-        observer = Observer(laws=laws_of(law, snr, names))
-    found = observe(TwinCar(), first, told, readings, observer, speed_mps=_speed(drive))
-    return LoadExperiment("pitch inertia", drive, readings, found, names, LOADED_SUV, NOMINAL_SUV)
+    return experiment(
+        "pitch inertia",
+        drive,
+        first,
+        names,
+        unknowns(*looked_for),
+        channels,
+        law=law,
+        snr=snr,
+        seed=np.random.default_rng([seed, 1]),
+        road_noise=road_noise,
+    )
 
 
-def _laws(law: Law, snr: float, gains: dict[str, tuple[float, float, float]]) -> list[ParameterLaw]:
-    """High gains first; without noise they stay, with noise they fall."""
+def _law(law: Law, snr: float, name: str) -> ParameterLaw:
+    """Gains of the order of the paper's; those of inertia begin high and fall if there is noise."""
     kind: Literal["sign", "gradient"] = "sign" if law == "published" else "gradient"
-    out = []
-    for name, (high, low, time_s) in gains.items():
-        final = high if np.isinf(snr) else low
-        out.append(
-            inertia_law(name, final, first_gain=high, first_gain_s=time_s, kind=kind, floor=0.05)
-        )
-    return out
+    if name == "mass_kg":
+        gain = 150.0 if law == "published" else 400.0
+        return mass_law(gain, kind=kind, yaw_rate_below_radps=np.inf)
+    high, low, time_s = _GAINS[name]
+    final = high if np.isinf(snr) else low
+    return inertia_law(name, final, first_gain=high, first_gain_s=time_s, kind=kind, floor=0.05)
 
 
 def _centre(wrong: bool) -> dict[str, float]:
@@ -348,7 +366,3 @@ def _unsure(mass: Mass, wrong_cg: bool) -> list[str]:
         *(["mass_kg"] if mass == "wrong" or wrong_cg else []),
         *(["cg_x_m", "cg_y_m", "cg_z_m"] if mass == "wrong" or wrong_cg else []),
     ]
-
-
-def _speed(drive: Drive14) -> float:
-    return float(drive["vx_mps"][0])

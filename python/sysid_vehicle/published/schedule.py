@@ -16,18 +16,9 @@ import numpy as np
 
 from .._printed import Told
 from ..errors import InvalidInput
-from ..twin.car import LOADED_SUV, NOMINAL_SUV, Load, TwinCar
-from ..twin.drives import Drive14
-from ..twin.laws import SideBySide, Unknown, mass_law, unknowns
-from ..twin.observer import Observer, observe
-from ..twin.readings import measure, noisy_road
-from .load import (
-    NOISE_FLOOR,
-    Law,
-    LoadExperiment,
-    drive_of,
-    laws_of,
-)
+from ..twin.car import NOMINAL_SUV, Load
+from ..twin.laws import Unknown, unknowns
+from .load import Law, LoadExperiment, drive_of, experiment
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -169,49 +160,29 @@ def run_schedule(
     if not snr > 0.0:
         raise InvalidInput(f"snr = {snr!r}; give a positive number, inf for no noise")
     load, known = NOMINAL_SUV, dict[str, float]()
-    done = []
+    done: list[LoadExperiment] = []
     for number, stage in enumerate(_STAGES):
         rng = np.random.default_rng([seed, number])
-        drive = drive_of(stage.drive, seed, shorten)
-        experiment = _run(stage, drive, load, known, snr, law, road_noise, rng)
-        found = experiment.found
-        looked_for = (*stage.names, *stage.beside) if law == "side_by_side" else stage.names
+        beside, more = (stage.beside, stage.more) if law == "side_by_side" else ((), ())
+        looked_for = (*stage.names, *beside)
+        done.append(
+            experiment(
+                stage.name,
+                drive_of(stage.drive, seed, shorten),
+                load,
+                stage.names,
+                [_narrowed(u, known) for u in unknowns(*looked_for, around=load)],
+                (*stage.channels, *more),
+                law=law,
+                snr=snr,
+                seed=rng,
+                road_noise=road_noise if stage.drive == "road" else 0.0,
+            )
+        )
+        found = done[-1].found
         load = load.replace(**{name: found.last(name) for name in looked_for})
         known.update(found.spread)
-        done.append(experiment)
     return ScheduleRun(tuple(done), load)
-
-
-def _run(
-    stage: _Stage,
-    drive: Drive14,
-    load: Load,
-    known: dict[str, float],
-    snr: float,
-    law: Law,
-    road_noise: float,
-    rng: np.random.Generator,
-) -> LoadExperiment:
-    channels = (*stage.channels, *stage.more) if law == "side_by_side" else stage.channels
-    readings = measure(drive, channels, snr=snr, seed=rng)
-    inputs = drive.inputs
-    if stage.drive == "road" and road_noise > 0.0:
-        inputs = noisy_road(inputs, road_noise, seed=rng)
-    if law == "side_by_side":
-        noise = {c: max(readings.noise[c], NOISE_FLOOR[c]) for c in channels}
-        looked_for = unknowns(*stage.names, *stage.beside, around=load)
-        observer = Observer(
-            batch=SideBySide([_narrowed(u, known) for u in looked_for], noise, input_std=0.0)
-        )
-    elif stage.names == ("mass_kg",):
-        gain = 150.0 if law == "published" else 400.0
-        kind = "sign" if law == "published" else "gradient"
-        observer = Observer(laws=[mass_law(gain, kind=kind, yaw_rate_below_radps=np.inf)])
-    else:
-        observer = Observer(laws=laws_of(law, snr, stage.names))
-    speed = float(drive["vx_mps"][0])
-    found = observe(TwinCar(), load, inputs, readings, observer, speed_mps=speed)
-    return LoadExperiment(stage.name, drive, readings, found, stage.names, LOADED_SUV, NOMINAL_SUV)
 
 
 def _narrowed(unknown: Unknown, known: dict[str, float]) -> Unknown:

@@ -19,6 +19,7 @@ from ..lab.motion import TyreMotion
 from ..lab.tyre_data import GreyBoxVehicle
 from ..lab.tyre_fit import PARAMETERS
 from ..lab.tyre_problem import BOX, GIVEN, box_of, first_point
+from ..vehicle import AXLES
 from .tyre_search import LossTask, search
 
 LOSSES = {
@@ -29,13 +30,12 @@ LOSSES = {
 }
 """The losses there are; the first three are the published ones."""
 
-_AXLES = ("front", "rear")
 _BOX = {"B": (1.0, 40.0), "C": (0.5, 3.0), "D": (0.1, 3.0), "E": (0.7, 2.0)}
-TYRE_BOX = BOX | {f"{letter}_{axle}": bounds for axle in _AXLES for letter, bounds in _BOX.items()}
+TYRE_BOX = BOX | {f"{letter}_{axle}": bounds for axle in AXLES for letter, bounds in _BOX.items()}
 """Where the published search looks; E is kept near the value of the published car."""
 
 _START = {"B": 30.0, "C": 1.0, "D": 1.0, "E": 1.0}
-TYRE_START = {f"{letter}_{axle}": value for axle in _AXLES for letter, value in _START.items()}
+TYRE_START = {f"{letter}_{axle}": value for axle in AXLES for letter, value in _START.items()}
 """Where the published search begins."""
 
 
@@ -63,7 +63,7 @@ class TyreRegression(Printed):
 
     def tyre(self, axle: str) -> FloatArray:
         """B, C, D, E of an axle, `front` or `rear`."""
-        first = 4 * ("front", "rear").index(axle)
+        first = 4 * AXLES.index(axle)
         return as_float64(self.parameters[first : first + 4])
 
     def stiffness(self, axle: str) -> float:
@@ -75,7 +75,7 @@ class TyreRegression(Printed):
     def _rows(self) -> list[list[str]]:
         return [
             [axle, *(number(x, 5) for x in self.tyre(axle)), number(self.stiffness(axle), 5)]
-            for axle in ("front", "rear")
+            for axle in AXLES
         ]
 
     def _parts(self) -> list[Part]:

@@ -18,7 +18,6 @@ from ._recording import Recording
 from ._table import Table
 from ._units import WHAT, factor_to, measures, states_nothing
 
-_COMPARED_NAMES = 1000  # near names are sought among so many
 _SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s")
 
 
@@ -156,7 +155,7 @@ class ChannelMap:
         result: dict[str, npt.NDArray[np.float64]] = {}
         for channel, source in self.sources.items():
             if not table.counts[source.column]:
-                hint = near_names(source.column, table.names[:_COMPARED_NAMES])
+                hint = near_names(source.column, table.names)
                 raise InvalidInput(
                     f"{channel}: the channel map names column '{source.column}', which is not in "
                     f"the file{hint}; columns are {listed(table.names)}"

@@ -13,12 +13,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from .._arrays import FloatArray, as_float64
 from ..log import times_wheelbase
+from ..log._laws import LINEAR_MPS2, cosine
+from ..log._motion import Windows
 from ..vehicle import GRAVITY_MPS2
-
-FloatArray = npt.NDArray[np.float64]
 
 _DEG, _G = math.pi / 180.0, GRAVITY_MPS2
 _WINDOW_S = 1.0
@@ -43,7 +43,6 @@ _WHEELBASE_M, _WHEELBASE_STD = 2.9, 0.35
 _RATIO, _RATIO_STD = 15.0, 0.25  # of steering gears
 _FORCES, _MASS_KG = (1.0, 1e3), 1300.0
 _FOLLOWS = 0.5  # cosine from which two channels are taken to go together
-_LINEAR_MPS2 = 5.0
 
 
 @dataclass(frozen=True)
@@ -97,11 +96,10 @@ class _Windows:
 
     def __init__(self, time_s: FloatArray, columns: Mapping[str, FloatArray]) -> None:
         dt = float(np.median(np.diff(time_s)))
-        self._half = max(1, round(0.5 * _WINDOW_S / dt))
-        self._centres = np.arange(self._half, time_s.size - self._half, self._half)
-        self._span = 2 * self._half * dt
+        half = max(1, round(0.5 * _WINDOW_S / dt))
+        self._windows = Windows(time_s.size, half, 1.0 / dt)
         self._columns = dict(columns)
-        self._time_s, self._rate_hz = time_s, 1.0 / dt
+        self._time_s = time_s
 
     def swap(self, a: str, b: str) -> None:
         self._columns[a], self._columns[b] = self._columns[b], self._columns[a]
@@ -113,26 +111,18 @@ class _Windows:
         """Channels times their factors, with the time, and the sampling rate."""
         known = {n: f * self._columns[n] for n, f in factors.items() if n in self._columns}
         known.setdefault("ay_mps2", known["vx_mps"] * known["yaw_rate_radps"])
-        return {"time_s": self._time_s, **known}, self._rate_hz
+        return {"time_s": self._time_s, **known}, self._windows.rate_hz
 
     def mean(self, name: str, by: str | None = None) -> FloatArray:
         values = self._columns[name] if by is None else self._columns[name] * self._columns[by]
-        area = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))))
-        over = area[self._centres + self._half] - area[self._centres - self._half]
-        result: FloatArray = over / (2.0 * self._half)
-        return result
+        return self._windows.mean(values)
 
     def change(self, name: str) -> FloatArray:
-        values = self._columns[name]
-        over = values[self._centres + self._half] - values[self._centres - self._half]
-        result: FloatArray = over / self._span
-        return result
+        return self._windows.change(self._columns[name])
 
 
 def _cosine(x: FloatArray, y: FloatArray) -> float:
-    x, y = x - np.median(x), y - np.median(y)
-    size = float(np.linalg.norm(x) * np.linalg.norm(y))
-    return float(x @ y) / size if size > 0.0 else 0.0
+    return cosine(as_float64(x - np.median(x)), as_float64(y - np.median(y)))
 
 
 def _force(
@@ -250,7 +240,7 @@ def _steer(
         return own[0]
     speed = factors["vx_mps"] * drive.mean("vx_mps")
     yaw = factors["yaw_rate_radps"] * drive.mean("yaw_rate_radps")
-    rows = (speed > _MOVING * float(np.median(speed))) & (np.abs(speed * yaw) < _LINEAR_MPS2)
+    rows = (speed > _MOVING * float(np.median(speed))) & (np.abs(speed * yaw) < LINEAR_MPS2)
     speed, steer = np.maximum(speed[rows], 1.0), drive.mean("steer_rad")[rows]
     curvature = yaw[rows] / speed
     alike = _cosine(curvature, steer)

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from .._arrays import FloatArray
 from ..errors import InvalidInput, near_names
 from ..log import CHANNELS, listed
 from ._table import Table
 
-FloatArray = npt.NDArray[np.float64]
-
-_COMPARED_NAMES = 1000  # near names are sought among so many
 _SAME_TIME = 0.01  # of the shortest period: nearer samples of two channels are one row
 _LATE_S = 1.0  # messages overtake each other by less; a clock that was set back, by more
 _LISTED_EXTRAS = 1000  # other channels of the groups that are read
@@ -80,7 +78,7 @@ class Recording:
                 f"{channel}: the channel map names '{name}', which is the last part of "
                 f"{len(found)} channels; name one in full: {listed(found)}"
             )
-        hint = near_names(name, list(self.entries)[:_COMPARED_NAMES])
+        hint = near_names(name, self.entries)
         raise InvalidInput(
             f"{channel}: the channel map names '{name}', which is not in the file{hint}; channels "
             f"are {listed(self.entries)}"

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .._arrays import FloatArray
 from ..errors import InvalidInput
 from ..log import as_floats, as_seconds, named_columns
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

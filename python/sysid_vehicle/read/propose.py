@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from .._arrays import FloatArray
 from .._files import as_path
 from ..errors import InvalidInput
 from ..log import CHANNELS, Columns, Log, listed
@@ -21,8 +21,6 @@ from ._recording import Recording
 from ._registry import blamed, recognised
 from ._table import Table
 from ._units import factor_to
-
-FloatArray = npt.NDArray[np.float64]
 
 _RATE_HZ = 50.0  # at which units and signs are looked for
 _FEWEST = 100

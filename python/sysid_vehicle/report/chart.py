@@ -13,18 +13,6 @@ from numpy.typing import ArrayLike
 
 from .._arrays import FloatArray
 
-__all__ = [
-    "CIVIDIS",
-    "DIVERGING",
-    "VIRIDIS",
-    "Chart",
-    "colours",
-    "figure",
-    "legend",
-    "scale",
-    "ticks",
-]
-
 Range = tuple[float, float]
 Tick = tuple[float, str]
 

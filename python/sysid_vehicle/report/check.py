@@ -8,8 +8,6 @@ from .._style import framed
 from ..sensors import SensorCheck
 from .page import bullets, heading, page, picture
 
-__all__ = ["check_page"]
-
 
 def check_page(found: SensorCheck, warnings: Sequence[str] = ()) -> str:
     """Make the document: what was found, and a picture of every channel."""

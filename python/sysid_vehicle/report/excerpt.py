@@ -12,8 +12,6 @@ from ..estimate.driving import Stretch
 from ..study import Study, look_ahead
 from .words import stages
 
-__all__ = ["Excerpt", "worst_excerpt"]
-
 _SHOWN = ("yaw_rate_radps", "ay_mps2")
 _FORGETS_S = 5.0
 
@@ -63,18 +61,14 @@ def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5)
     scale = np.nanstd(measured, axis=0)
     badness = np.nansum((rough / np.where(scale > 0.0, scale, 1.0)) ** 2, axis=1)
     best: tuple[float, int, int, Stretch, int] | None = None
-    begin = 0
-    for s in driving.stretches:
-        rate = driving.logs[s.log].rate_hz
-        n = s.where.stop - s.where.start
+    for s, (begin, end, rate) in zip(driving.stretches, driving.spans, strict=True):
         first = begin + round(horizon_s * rate)
-        width = min(int(seconds * rate), begin + n - first)
+        width = min(int(seconds * rate), end - first)
         if width >= 2:
-            total = np.convolve(badness[first : begin + n], np.ones(width), "valid")
+            total = np.convolve(badness[first:end], np.ones(width), "valid")
             at = first + int(np.argmax(total))
             if best is None or total.max() / width > best[0]:
                 best = (float(total.max()) / width, at, width, s, begin)
-        begin += n
     if best is None:
         return None
     _, at, width, stretch, begin = best

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import FloatArray
+from .._text import HALF_95
 from ..diagnose import INPUTS, Coherence, Curve, ForceMap, Surface, Where
 from ..diagnose.coordinates import COORDINATES
 from ..diagnose.force_map import UNITS
@@ -13,8 +14,6 @@ from ..study import Study
 from .chart import DIVERGING, Chart, figure, legend, scale
 from .page import bullets, heading, paragraph
 from .samples import Samples
-
-__all__ = ["unknown", "where_and_when"]
 
 _SIZE = 430, 260
 
@@ -90,7 +89,7 @@ def _over_time(found: Where) -> Chart:
     i = over.targets.index(target)
     coordinate, edges = COORDINATES["time_s"], over.edges[0]
     middle = coordinate.scale * 0.5 * (edges[1:] + edges[:-1])
-    force, half = over.force[i], 1.96 * over.std[i]
+    force, half = over.force[i], HALF_95 * over.std[i]
     known = [float(v) for v in (*(force - half), *(force + half)) if np.isfinite(v)]
     chart = Chart(
         *_SIZE, (0.0, coordinate.scale * float(edges[-1])),
@@ -126,8 +125,8 @@ def _phase(found: Coherence) -> Chart:
     f = np.linspace(0.0, 1.1 * float(d.frequency_hz.max()), 50)
     line = np.degrees(2.0 * np.pi * f)
     low, high = (end * line for end in d.interval)
-    phase, half = np.degrees(d.phase_rad), 1.96 * np.degrees(d.phase_std_rad)
-    known = half < 1.96 * 30.0
+    phase, half = np.degrees(d.phase_rad), HALF_95 * np.degrees(d.phase_std_rad)
+    known = half < HALF_95 * 30.0
     x, phase, half = d.frequency_hz[known], phase[known], half[known]
     ends = [*low, *high, *(phase - half), *(phase + half)]
     said = f"{1e3 * d.delay_s:.1f} \u00b1 {1e3 * d.std_s:.1f} ms"

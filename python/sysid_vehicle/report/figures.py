@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .._arrays import FloatArray
+from .._text import HALF_95
 from ..diagnose import Causes
 from ..estimate import MEASURED
 from ..model import Model
@@ -16,17 +17,6 @@ from .page import bars
 from .samples import Samples
 from .tyres import TyreCurve
 from .words import shown_in, stages
-
-__all__ = [
-    "ahead",
-    "causes",
-    "failure_maps",
-    "overlay",
-    "place",
-    "residuals",
-    "sizes",
-    "tyre_curves",
-]
 
 LOOKS = ("before", "after")
 """Style classes of the baseline and the final model."""
@@ -153,7 +143,7 @@ def sizes(study: Study, truth: Model | None, caption: str) -> str:
     rows = []
     for e in estimates:
         p = known[e.name]
-        half = 1.96 * e.std / p.typical
+        half = HALF_95 * e.std / p.typical
         real = None if truth is None or e.name not in truth.names else truth.value(e.name)
         rows.append(
             (
@@ -191,7 +181,7 @@ def tyre_curves(
     charts: list[Chart] = []
     for i, curve in enumerate(curves):
         slip, force = np.degrees(curve.slip_rad), curve.force_n / 1e3
-        half = 1.96 * curve.std_n / 1e3
+        half = HALF_95 * curve.std_n / 1e3
         chart = Chart(
             400, 300, (0.0, float(slip[-1])), (0.0, top), title=f"{curve.axle} axle",
             xlabel="slip angle [deg]", ylabel="force at static load [kN]",

@@ -5,8 +5,6 @@ from __future__ import annotations
 from html.parser import HTMLParser
 from itertools import pairwise
 
-__all__ = ["markdown"]
-
 _SKIPPED = {"figure", "style", "script", "title"}
 _TEXT = {"p", "li", "h1", "h2", "h3", "summary", "th", "td", "span"}
 _MARKS = {"h1": "# ", "h2": "## ", "summary": "## ", "h3": "### ", "li": "- ", "p": ""}

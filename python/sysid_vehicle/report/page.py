@@ -14,8 +14,6 @@ from .._text import html_table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["bars", "bullets", "fold", "heading", "page", "panel", "paragraph", "picture", "table"]
-
 _SCRIPT = Path(__file__).with_name("page.js").read_text("utf-8")
 _CSS = Path(__file__).with_name("page.css").read_text("utf-8")
 

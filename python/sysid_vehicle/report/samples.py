@@ -14,8 +14,6 @@ from ..study import Study, look_ahead
 from .excerpt import Excerpt, worst_excerpt
 from .words import shown_in, stages
 
-__all__ = ["Samples", "samples_of"]
-
 _MOST = 1500  # samples of all the driving, and of the worst seconds
 _OVAL = 0.15  # a track's smaller extent over its larger one, above which its map is worth a look
 
@@ -89,15 +87,14 @@ def samples_of(study: Study) -> Samples | None:
     if excerpt is None:
         return None
     driving = study.validation
-    lengths = [s.where.stop - s.where.start for s in driving.stretches]
-    run = np.repeat(np.arange(len(lengths)), lengths)
-    begins = np.concatenate([[0], np.cumsum(lengths)[:-1]])
+    begins = np.array([span.first for span in driving.spans])
+    run = np.searchsorted(begins, np.arange(driving.samples), side="right") - 1
     step = 1.0 / driving.sample_rate_hz
     v, r, ax, ay = (driving.channel(c) for c in ("vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2"))
     own = int(run[excerpt.where.start])
     track, has_track = _track(np.nan_to_num(v), np.nan_to_num(r), step, run == own)
     time = driving.channel("time_s")
-    if len(lengths) > 1:
+    if len(begins) > 1:
         time = np.cumsum(step) - step[0]
     all_: dict[str, FloatArray] = {
         "t": time,

@@ -11,8 +11,6 @@ from .page import bars, bullets, panel, paragraph, table
 from .samples import Samples
 from .words import errors, interval, quantity, shown_in, stages, summary, unit
 
-__all__ = ["first_screen"]
-
 _AHEAD_S = 1.0
 _CANDIDATES = 5
 

@@ -18,8 +18,6 @@ from .samples import Samples
 from .tyres import identified_curves, model_curves
 from .words import RANKING_HEAD, interval, quantity, ranking_rows, stages, summary, unit
 
-__all__ = ["SECTIONS"]
-
 
 def _where(study: Study, samples: Samples | None, truth: Model | None) -> list[str]:
     shown = [(title, study.test[i]) for title, i in stages(study)]

@@ -9,10 +9,8 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from ..identify import Fit
 from ..model import Model
+from ..vehicle import AXLES
 
-__all__ = ["AXLES", "TyreCurve", "driven_slip", "identified_curves", "model_curves"]
-
-AXLES = ("front", "rear")
 # Columns of the core's evaluation, front and rear.
 _SLIP = (5, 6)
 _FORCE = (9, 10)

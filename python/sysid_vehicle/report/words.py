@@ -10,20 +10,6 @@ from .._text import number
 from ..identify import Estimate
 from ..study import AddedEffect, Study
 
-__all__ = [
-    "RANKING_HEAD",
-    "effect_found",
-    "errors",
-    "interval",
-    "quantity",
-    "ranking_rows",
-    "ranking_title",
-    "shown_in",
-    "stages",
-    "summary",
-    "unit",
-]
-
 RANKING_HEAD = ("effect", "statistic", "p", "validation error with it", "size", "cannot tell from")
 
 

@@ -16,8 +16,6 @@ from .samples import samples_of
 from .screen import first_screen
 from .sections import SECTIONS
 
-__all__ = ["write_report"]
-
 
 def write_report(study: Study, path: str | Path, *, truth: Model | None = None) -> None:
     """Write a study as one self-contained HTML file, whole or not at all; `.md` as Markdown.

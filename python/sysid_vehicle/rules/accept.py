@@ -10,8 +10,6 @@ import numpy as np
 
 from .limits import USUAL, Rules
 
-__all__ = ["Change", "Gain", "Measures", "accept", "bic", "falls", "worse"]
-
 _LEAST = 1e-3  # standard error of a change, where blocks happen to agree
 
 

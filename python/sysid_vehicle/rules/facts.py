@@ -8,8 +8,6 @@ from typing import Literal, Protocol
 
 from .accept import Change
 
-__all__ = ["Added", "Decision", "Facts", "Tested", "Verdict", "Withdrawn"]
-
 Verdict = Literal["adequate", "explained", "partly_explained", "unknown", "not_testable"]
 
 

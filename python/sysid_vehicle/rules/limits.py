@@ -12,8 +12,6 @@ from .._arguments import real
 from .._text import text_table
 from ..errors import InvalidInput
 
-__all__ = ["USUAL", "Rules"]
-
 _NULLS = "benchmarks/exam --draw null=2000"
 _EFFECTS = "benchmarks/exam --draw effect=120 pair=50 --severity 1 2"
 _OUTSIDE = 'benchmarks/exam --draw "group removed=70" outside=40 --severity 0.5 2'

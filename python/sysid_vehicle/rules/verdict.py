@@ -13,20 +13,6 @@ from .accept import falls
 from .facts import Added, Decision, Facts, Tested, Withdrawn
 from .limits import USUAL, Rules
 
-__all__ = [
-    "NONE_GONE",
-    "Grade",
-    "Share",
-    "excess",
-    "grade",
-    "share_between",
-    "share_explained",
-    "share_of",
-    "smaller_than",
-    "something_left",
-    "verdict",
-]
-
 Grade = Literal["confirmed", "plausible", "alias"]
 NONE_GONE = (
     "with the parameters that predict validation data best, the baseline errs no more 1 to 5 s "

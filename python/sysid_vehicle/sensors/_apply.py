@@ -10,8 +10,6 @@ import scipy
 from .._arrays import FloatArray, filled
 from ..log import Log
 
-__all__ = ["corrected", "shifted"]
-
 _SMOOTH_S = 0.2  # yaw acceleration is that of a parabola over this time
 _HALF_TAPS = 8  # of the interpolation, on either side
 _KAISER = 6.0  # its window's shape

@@ -20,8 +20,6 @@ from ._parts import cut
 from ._result import SensorCheck
 from ._signals import MOVING, Signal, averaged, pieces, readings_of, refuse_mixed_up, signals
 
-__all__ = ["check"]
-
 _MEAN_S = 0.03  # quick channels enter as means over so long
 # Knots of the motion, in sampling periods. No simple ratio: were the samples always at the same
 # places between the knots, a delay that moves them to better places would seem to be there.

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray
+from .._arrays import NORMAL_MAD, FloatArray
 from ._motion import IntArray
-
-__all__ = ["Colour", "fit_colour", "neighbours"]
 
 _LONGEST = 8
 _CLIP = 5.0  # deviations beyond so many standard deviations teach no colour
@@ -98,7 +96,7 @@ def fit_colour(errors: FloatArray, run: IntArray, floor: float, longest: int = _
         Highest order.
     """
     n = errors.shape[1]
-    scale = 1.4826 * float(np.median(np.abs(errors))) + floor
+    scale = NORMAL_MAD * float(np.median(np.abs(errors))) + floor
     kept = np.clip(errors, -_CLIP * scale, _CLIP * scale)
     longest = min(longest, n // 30)
     lagged = [float(np.mean(kept**2))]

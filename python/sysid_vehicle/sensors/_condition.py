@@ -19,8 +19,6 @@ from ._apply import shifted
 from ._signals import MOVING, own_samples
 from ._spectrum import NoiseSpectrum, noise_spectrum
 
-__all__ = ["conditioned"]
-
 _ONE_FILTER = 0.15  # corner frequencies that differ by no more are of one kind of filter
 _EDGE_S = 0.5
 _DEVICES = (("vx_mps", "vy_mps"), ("yaw_rate_radps", "ax_mps2", "ay_mps2"))  # as a rule

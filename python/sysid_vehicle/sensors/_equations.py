@@ -15,8 +15,6 @@ import scipy
 from .._arrays import FloatArray
 from ._motion import Basis, Grid, IntArray
 
-__all__ = ["FAULTS", "FaultKind", "Readings", "predict"]
-
 
 @dataclass(frozen=True)
 class FaultKind:

@@ -19,10 +19,8 @@ import scipy
 from .._arrays import FloatArray, as_float64
 from ._colour import Colour, fit_colour, neighbours
 from ._equations import FAULTS, Readings, predict
-from ._motion import QUICK, SLOW, Grid, IntArray
+from ._motion import QUICK, SLOW, Grid
 from ._system import Band, Linearised, Normal, drawn, linearise, normal_equations
-
-__all__ = ["Estimate", "estimate", "noise_of", "preferred"]
 
 _ROUNDS = 30
 _LEAST_ROUNDS = 8
@@ -153,7 +151,7 @@ def estimate(
     typical = np.array([FAULTS[name].typical for name in names])
     most = np.array([FAULTS[name].most for name in names])
     runs = {r.channel: neighbours(r.stretch, r.time_s) for r in readings}
-    x, colours = _begin(readings, grid, runs, floors)
+    x, colours = _begin(readings, grid, floors)
     road = dict.fromkeys(SLOW, _ROAD_MPS2)
     steps = {signal: grid.steps(signal) for signal in SLOW}
     settled = False
@@ -275,10 +273,7 @@ def noise_of(
 
 
 def _begin(
-    readings: Sequence[Readings],
-    grid: Grid,
-    runs: dict[str, IntArray],
-    floors: dict[str, float],
+    readings: Sequence[Readings], grid: Grid, floors: dict[str, float]
 ) -> tuple[FloatArray, dict[str, Colour]]:
     """Motion from speeds and yaw rate alone, noise from second differences."""
     rows = [_levels(readings, grid), *(grid.bends(s) / _ROUGH[s] for s in QUICK)]

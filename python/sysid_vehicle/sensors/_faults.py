@@ -10,12 +10,9 @@ import numpy as np
 import scipy
 
 from ._estimate import Estimate
-from ._parts import scatter
+from ._parts import Z95, scatter
 from ._texts import DEG, why_not
 
-__all__ = ["Rival", "SensorFault", "doubted", "faults_of"]
-
-_Z95 = 1.959964
 _FALSE_CLAIMS = 0.01  # over all faults of one check
 _LEARNED = 0.5  # share of what is known of a fault that has to come from the log
 
@@ -58,7 +55,7 @@ class SensorFault:
     @property
     def interval(self) -> tuple[float, float]:
         """Bounds that hold the true value with a probability of 95 %."""
-        return self.value - _Z95 * self.std, self.value + _Z95 * self.std
+        return self.value - Z95 * self.std, self.value + Z95 * self.std
 
     def __str__(self) -> str:
         scale, unit = _SHOWN.get(self.unit, (1.0, self.unit))
@@ -191,7 +188,7 @@ def faults_of(
             std, variance = widest, max(variance, at_null**2)
         learned = 1.0 - variance * prior
         claimed = claimed and learned > 0.0
-        well = alone and learned > _LEARNED and abs(value) + _Z95 * std < told.enough
+        well = alone and learned > _LEARNED and abs(value) + Z95 * std < told.enough
         reason = ""
         if rival is not None and not alone:
             reason = why_not(told.name, other=_instead(found, rival.estimate, told))
@@ -240,7 +237,7 @@ def _confounded(
     own = int(np.argmax(pick * np.arange(1, pick.size + 1)))
     data = max(found.information[own, own] - found.prior[own], 1e-300)
     alone = 1.0 / math.sqrt(data)
-    if _Z95 * alone > told.enough:
+    if Z95 * alone > told.enough:
         return why_not(told.name, alone=alone)
     along = naive @ pick
     correlation = np.abs(along) / np.sqrt(np.diag(naive) * float(pick @ along))

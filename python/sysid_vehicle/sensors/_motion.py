@@ -14,8 +14,6 @@ from .._arrays import FloatArray
 
 IntArray = npt.NDArray[np.intp]
 
-__all__ = ["QUICK", "SLOW", "Basis", "Grid", "IntArray", "Stretch"]
-
 QUICK = ("vx", "vy", "yaw")
 SLOW = ("grade", "bank")
 SLOW_S = 1.0  # knots of what gravity adds on a road that is not level

@@ -16,12 +16,10 @@ import scipy
 
 from ._motion import Stretch
 
-__all__ = ["Scatter", "cut", "scatter"]
-
 _PART_S = 60.0  # a shorter one may find another explanation by chance
 _MOST = 4
 _SHORTEST_S = 5.0
-_Z95 = 1.959964
+Z95 = 1.959964
 _APART = 3.0  # standard deviations between the whole and the mean of its parts
 
 
@@ -78,7 +76,7 @@ def scatter(values: Sequence[float], stds: Sequence[float]) -> Scatter | None:
     between = max(0.0, (q - (n - 1)) / float(w.sum() - (w @ w) / w.sum()))
     w = 1.0 / (variance + between)
     # Few parts tell their scatter badly.
-    student = float(scipy.stats.t.isf(0.025, n - 1)) / _Z95
+    student = float(scipy.stats.t.isf(0.025, n - 1)) / Z95
     return Scatter(
         float(w @ v / w.sum()), float(w.sum() ** -0.5), student * float(np.sqrt(between / n))
     )

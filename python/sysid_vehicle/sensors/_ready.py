@@ -10,8 +10,6 @@ from ._apply import corrected
 from ._check import check
 from ._condition import conditioned
 
-__all__ = ["made_ready"]
-
 _OF_THE_SPEEDS = ("delay_vx_s", "delay_vy_s")  # of one device as a rule
 _DELAYS = (*_OF_THE_SPEEDS, "delay_ay_s")
 _LEVEL_MPS2 = 0.05  # change of gravity within a second, on a road that counts as level

@@ -22,13 +22,11 @@ from ._equations import Readings
 from ._estimate import Estimate
 from ._faults import SensorFault
 from ._motion import Stretch
-from ._signals import Signal
+from ._signals import MOVING, Signal
 from ._texts import ON_CORRECTION, gradient, map_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["SensorCheck", "put_right"]
 
 _SURE = 3.0  # standard errors of a mean offset
 _HEAD = ("fault", "channel", "value", "95 % interval", "verdict")
@@ -132,7 +130,7 @@ class SensorCheck:
     def map_lines(self) -> tuple[str, ...]:
         """Lines for the table ``[channels]`` of a channel map that put right what was found."""
         lines = []
-        for channel in ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2"):
+        for channel in MOVING:
             delay, gain, bias = (
                 self._found_value(table.get(channel)) for table in (_DELAYS, _GAINS, _BIASES)
             )

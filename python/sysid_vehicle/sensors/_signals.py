@@ -11,25 +11,14 @@ import numpy.typing as npt
 
 from .._arrays import FloatArray, filled
 from ..errors import InvalidInput
-from ..log import CHANNELS, Log, held_rows
+from ..log import CHANNELS, MEASURED, Log, held_rows
+from ..log._signals import runs
 from ..vehicle import GRAVITY_MPS2
 from ._colour import neighbours
 from ._equations import Readings
 from ._motion import IntArray, Stretch
 
-__all__ = [
-    "MOVING",
-    "Signal",
-    "averaged",
-    "own_samples",
-    "pieces",
-    "quantum",
-    "readings_of",
-    "refuse_mixed_up",
-    "signals",
-]
-
-MOVING = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+MOVING = MEASURED  # channels of which the motion is made
 _SLOWEST_MPS = 3.0
 _SHORTEST_S = 3.0
 _LONGEST_HOLE_S = 0.6  # without a sample of a channel the motion is not told
@@ -116,8 +105,7 @@ def pieces(logs: Sequence[Log]) -> list[Stretch]:
         for channel in MOVING:
             if log.has(channel):
                 usable &= ~_in_holes(time_s, log[channel])
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], usable.astype(np.int8), [0]))))
-        for a, b in zip(edges[::2], edges[1::2], strict=True):
+        for a, b in runs(usable):
             count = max(1, round((time_s[b - 1] - time_s[a]) / _PIECE_S))
             cuts = np.linspace(a, b, count + 1).astype(np.intp)
             for i, j in pairwise(cuts):

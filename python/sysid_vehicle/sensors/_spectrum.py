@@ -18,8 +18,6 @@ import scipy
 
 from .._arrays import FloatArray
 
-__all__ = ["NoiseSpectrum", "noise_spectrum"]
-
 _LOWEST_HZ: Final = 5.0  # the motion of a car has next to nothing beyond
 _HIGHEST: Final = 0.45  # of the sampling rate
 _WINDOW_S: Final = 2.0

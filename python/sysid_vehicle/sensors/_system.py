@@ -14,8 +14,6 @@ from ._colour import Colour
 from ._equations import Readings, predict
 from ._motion import Grid, IntArray
 
-__all__ = ["Band", "Linearised", "Normal", "drawn", "linearise", "normal_equations"]
-
 _OUTLIER = 4.0  # whitened errors beyond count less (Huber)
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-__all__ = ["DEG", "ON_CORRECTION", "gradient", "map_line", "why_not"]
-
 DEG = math.pi / 180.0
 
 _NEEDS_EXCITATION = {

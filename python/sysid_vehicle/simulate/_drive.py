@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +14,7 @@ from .._arrays import FloatArray, as_float64
 from .._printed import Told
 from ..effects import channels_in_use
 from ..errors import InvalidInput, NumericalError
-from ..log import CHANNELS, Log
+from ..log import CHANNELS, MEASURED, Log
 from ..manoeuvres import Manoeuvre
 from ..model import Model
 from ._noise import RoadDisturbance, SensorNoise
@@ -22,7 +22,6 @@ from ._noise import RoadDisturbance, SensorNoise
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_OUTPUTS = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
 Channel = float | FloatArray | Callable[[FloatArray], FloatArray]
 """A column of the log: a constant, its samples, or a function of the time of all samples [s]."""
 
@@ -124,15 +123,12 @@ def drive_truth(
         )
     columns = {
         "time_s": np.arange(n) / rate_hz,
-        **{channel: outputs[:, i] for i, channel in enumerate(_OUTPUTS)},
+        **{channel: outputs[:, i] for i, channel in enumerate(MEASURED)},
         "steer_rad": inputs[:, 0],
         "fx_n": inputs[:, 1].copy(),
         **logged,
     }
-    sensors = noise if noise is not None else SensorNoise()
-    for f in fields(sensors):
-        deviation = getattr(sensors, f.name)
-        columns[f.name] = columns[f.name] + deviation * rng.standard_normal(n)
+    (noise or SensorNoise()).add_to(columns, rng)
     log = Log.from_arrays(columns, name=name or manoeuvre.name, check=False)
     names = [f"{e.id}.{s.name}" for e in model.parts for s in e.own_states]
     own = {name: states[:, _core.USER_STATES_FROM + i] for i, name in enumerate(names)}

@@ -48,6 +48,12 @@ class SensorNoise:
         """Return the same sensors with `factor` times the noise."""
         return SensorNoise(**{f.name: factor * getattr(self, f.name) for f in fields(self)})
 
+    def add_to(self, columns: dict[str, FloatArray], rng: np.random.Generator) -> None:
+        """Put noise upon what the sensors would read without."""
+        for f in fields(self):
+            clean = columns[f.name]
+            columns[f.name] = clean + getattr(self, f.name) * rng.standard_normal(len(clean))
+
 
 @dataclass(frozen=True)
 class RoadDisturbance:

@@ -9,8 +9,6 @@ from .._text import with_error
 from ..identify import Estimate
 from ..rules import Grade
 
-__all__ = ["AddedEffect"]
-
 
 @dataclass(frozen=True)
 class AddedEffect:

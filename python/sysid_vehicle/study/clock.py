@@ -14,15 +14,13 @@ import scipy
 
 from .._arrays import FloatArray, filled
 from ..diagnose import Diagnosis
-from ..diagnose.clocks import CLOCKS
-from ..diagnose.delay import delayed, pieces_of
+from ..diagnose.clocks import CLOCKS, Clock
+from ..diagnose.delay import delayed
 from ..diagnose.evidence import Evidence
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, predict, refine
 from ..log import Log
-
-__all__ = ["in_time"]
 
 
 def in_time(dx: Diagnosis, test: Driving) -> tuple[Driving, Driving] | None:
@@ -44,7 +42,7 @@ def in_time(dx: Diagnosis, test: Driving) -> tuple[Driving, Driving] | None:
     if not shown:
         return None
     evidence = Evidence(dx.fit, dx.driving)
-    late = {c.channel: _refined(evidence, c.column, dx.causes.sizes[c.name][0][0]) for c in shown}
+    late = {c.channel: _refined(evidence, c, dx.causes.sizes[c.name][0][0]) for c in shown}
     train, other = (_shifted(driving, late) for driving in (dx.driving, test))
     try:
         fit = refine(dx.fit.model, train, dx.fit.noise)
@@ -56,18 +54,15 @@ def in_time(dx: Diagnosis, test: Driving) -> tuple[Driving, Driving] | None:
     return (train, other) if statistic > price and gain > 0.0 else None
 
 
-def _refined(evidence: Evidence, column: int, guess_s: float) -> float:
+def _refined(evidence: Evidence, clock: Clock, guess_s: float) -> float:
     """The shift that leaves least beside the fitted parameters.
 
     The posterior knows it from one step of a typical size, which may be several times as large.
     """
-    inputs, p = evidence.driving.inputs(), evidence.fit.model.vector()
+    p = evidence.fit.model.vector()
 
     def left(by_s: float) -> float:
-        moved = inputs.copy()
-        for begin, end, rate in pieces_of(evidence.driving):
-            moved[begin:end, column] = delayed(inputs[begin:end, column], rate, by_s)
-        residual = evidence.problem_of(moved).residuals(p, evidence.frozen).reshape(-1, 1)
+        residual = clock.late(evidence, by_s).residuals(p, evidence.frozen).reshape(-1, 1)
         return float(np.sum(evidence.project(residual) ** 2))
 
     limits = sorted((0.0, 2.0 * guess_s))

@@ -19,8 +19,6 @@ from ..estimate import Driving
 from ..identify import Estimate, Fit, driving_of, refine
 from ..rules import USUAL, Rules
 
-__all__ = ["Disagreement", "disagreements"]
-
 _STIFFNESS = ("cornering stiffness front", "cornering stiffness rear")
 
 

@@ -26,19 +26,6 @@ from ..identify.ahead import of_few
 from ..rules import Change, share_of
 from .waterfall import all_ahead
 
-__all__ = [
-    "AHEAD",
-    "LATERAL",
-    "PREDICTED",
-    "Beyond",
-    "Horizons",
-    "beyond_noise",
-    "block_errors",
-    "changes",
-    "horizons",
-    "typical_error",
-]
-
 LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2")
 PREDICTED = ("vx_mps", "ax_mps2", *LATERAL)
 _LATERAL = [PREDICTED.index(c) for c in LATERAL]

@@ -34,8 +34,6 @@ from .study import Study
 from .validation import AHEAD, beyond_noise_ahead, changes_ahead, serving, set_aside
 from .verdict import facts_of, in_the_light_of
 
-__all__ = ["improve"]
-
 _SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
 
 

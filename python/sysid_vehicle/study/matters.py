@@ -15,8 +15,6 @@ from ..read._units import factor_to
 from .horizons import PREDICTED, Horizons, horizons
 from .validation import fitted_ahead
 
-__all__ = ["USUAL_SIZES", "sizes_that_matter", "sufficient", "within"]
-
 _NAMES = {
     "vx": "vx_mps",
     "vy": "vy_mps",

@@ -10,8 +10,6 @@ from .said import disturbance, small
 if TYPE_CHECKING:
     from .study import Study
 
-__all__ = ["next_steps"]
-
 _SHOWN = 4
 _MEND = (
     "mend the channels that contradict each other, before anything else: `sysid-vehicle check` "

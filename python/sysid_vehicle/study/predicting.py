@@ -21,8 +21,6 @@ from .validation import AHEAD_S, fitted_ahead, longest_s
 if TYPE_CHECKING:
     from .study import Study
 
-__all__ = ["Predicting", "predicting"]
-
 _WORTH = 0.1  # logarithm of the ratio of two errors that differ
 
 

@@ -10,8 +10,6 @@ from ..diagnose import Candidate, EffectVerdict, Omnibus
 if TYPE_CHECKING:
     from .study import Study
 
-__all__ = ["record"]
-
 
 def record(study: Study) -> dict[str, Any]:
     """Collect what a study found.

@@ -8,6 +8,7 @@ import numpy as np
 
 from .._text import number, with_error
 from ..estimate import UNITS
+from ..estimate.driving import WORDS
 from ..rules import NONE_GONE
 from .horizons import LATERAL
 from .matters import sizes_that_matter, sufficient
@@ -15,10 +16,6 @@ from .validation import AHEAD_S
 
 if TYPE_CHECKING:
     from .study import Study
-
-__all__ = ["ahead", "disturbance", "in_the_end", "nuisances", "small", "structured"]
-
-_WORDS = dict(zip(LATERAL, ("v_y", "yaw rate", "a_y"), strict=True))
 
 
 def ahead(study: Study) -> str:
@@ -28,10 +25,10 @@ def ahead(study: Study) -> str:
     told = []
     for j, c in enumerate(errors.channels):
         first, last = (float(errors.error[k, i, j]) for k in (0, -1))
-        if c in _WORDS and not np.isnan(last):
+        if c in LATERAL and not np.isnan(last):
             both = (first, last) if len(study.fits) > 1 else (last,)
             figures = " -> ".join(number(x, 2) if np.isfinite(x) else "lost" for x in both)
-            told.append(f"{_WORDS[c]} {figures} {UNITS[c]}")
+            told.append(f"{WORDS[c]} {figures} {UNITS[c]}")
     if not told:
         return ""
     return f"Median error {AHEAD_S:g} s ahead on validation data: {', '.join(told)}."

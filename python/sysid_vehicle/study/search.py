@@ -23,8 +23,6 @@ from .steps import (
     likeliest,
 )
 
-__all__ = ["Search", "Trail", "kept"]
-
 
 @dataclass(eq=False)
 class Trail:

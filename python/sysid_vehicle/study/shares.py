@@ -29,8 +29,6 @@ from ..estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_bl
 from ..identify import Fit, driving_of
 from ..rules import Share, share_between
 
-__all__ = ["CHANNELS", "Shares", "shares"]
-
 CHANNELS = ("vy_mps", "yaw_rate_radps", "ay_mps2", "path_m")
 AHEAD = (0.0, 0.5, 1.0, 2.0, 5.0)
 _UNITS = {**UNITS, "path_m": "m"}

@@ -17,18 +17,6 @@ from ..identify import Estimate, Fit, refine, refit
 from ..rules import USUAL, Measures, Rules, accept, bic, worse
 from .validation import as_sure, changes_ahead, error_falls, fall_in_error, gain_in_log_likelihood
 
-__all__ = [
-    "alternatives",
-    "better",
-    "exchanged",
-    "first_that_holds",
-    "first_together",
-    "lead",
-    "likeliest",
-    "way",
-    "without_insignificant",
-]
-
 _ALTERNATIVES = 2  # tried in place of one effect
 
 

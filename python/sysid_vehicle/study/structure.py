@@ -19,15 +19,13 @@ from ..diagnose.ceiling import Explainable, Inputs, Whole, left_out, pieces, thi
 from ..diagnose.force_map import missing_forces
 from ..errors import NumericalError
 from ..estimate import MEASURED, Driving
+from ..estimate.driving import WORDS
 from ..identify import Fit, driving_of
 from .waterfall import all_ahead
-
-__all__ = ["Structure", "structure"]
 
 _AHEAD_S = (1.0, 5.0)
 _APART = 0.1  # of the horizon, between predictions
 _FEW = 40  # predictions that a regression needs
-_WORDS = dict(zip(MEASURED, ("v_x", "v_y", "yaw rate", "a_x", "a_y"), strict=True))
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ def _of(fit: Fit, driving: Driving) -> Iterator[tuple[str, Explainable]]:
         for j, channel in enumerate(MEASURED):
             there = np.isfinite(errors[:, j]) & np.isfinite(driving.measured[:, j])
             rows = np.flatnonzero(there)
-            name = f"error of {_WORDS[channel]} {seconds:g} s ahead"
+            name = f"error of {WORDS[channel]} {seconds:g} s ahead"
             yield from _named(name, driving, inputs, rows, errors[rows, j])
 
 

@@ -46,8 +46,6 @@ from .structure import Structure
 from .validation import at_its_best
 from .waterfall import Waterfall, waterfall
 
-__all__ = ["AddedEffect", "Study", "Verdict"]
-
 _MEANING = {
     "adequate": "nothing is missing that this driving can show",
     "explained": "the effects found explain all that depends on the driving",

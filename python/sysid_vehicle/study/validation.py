@@ -19,22 +19,6 @@ from ..log import Log, several_logs
 from ..rules import Change, Gain
 from .horizons import Beyond, beyond_noise, changes, typical_error
 
-__all__ = [
-    "AHEAD",
-    "AHEAD_S",
-    "as_sure",
-    "at_its_best",
-    "beyond_noise_ahead",
-    "changes_ahead",
-    "error_falls",
-    "fall_in_error",
-    "fitted_ahead",
-    "gain_in_log_likelihood",
-    "longest_s",
-    "serving",
-    "set_aside",
-]
-
 _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6
 _TRIMMED = 0.1  # of the pieces, at either end
@@ -206,10 +190,7 @@ def fitted_ahead(fit: Fit) -> Fit | None:
 
 def longest_s(driving: Driving) -> float:
     """Duration of the longest stretch [s]."""
-    lengths = [
-        float(s.where.stop - s.where.start) / driving.logs[s.log].rate_hz for s in driving.stretches
-    ]
-    return max(lengths)
+    return max((end - first) / rate for first, end, rate in driving.spans)
 
 
 def error_falls(poorer: Fit, richer: Fit, test: Driving) -> bool:

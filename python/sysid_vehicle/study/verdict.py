@@ -10,8 +10,6 @@ from ..identify import Fit
 from ..rules import Added, Decision, Facts
 from .horizons import Beyond
 
-__all__ = ["facts_of", "in_the_light_of"]
-
 
 def facts_of(
     fits: Sequence[Fit],

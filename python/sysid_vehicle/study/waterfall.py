@@ -19,8 +19,6 @@ from ..identify import Fit, driving_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Waterfall", "all_ahead", "look_ahead", "waterfall"]
-
 
 @dataclass(frozen=True, eq=False)
 class Waterfall:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,18 +21,18 @@ if TYPE_CHECKING:
 _WRENCH = INPUTS.index("force_x_n")
 
 
-class _Standing:
+class _Standing(ABC):
     """What a twin with states and parameters can do with where it stands."""
 
     _state: FloatArray
 
+    @abstractmethod
     def get_parameters(self) -> dict[str, float]:
         """Its parameters by name."""
-        raise NotImplementedError
 
+    @abstractmethod
     def set_parameters(self, values: Mapping[str, float]) -> None:
         """Change some of them."""
-        raise NotImplementedError
 
     def get_state(self) -> FloatArray:
         """Its states."""

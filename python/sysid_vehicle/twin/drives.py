@@ -15,14 +15,14 @@ from ..errors import InvalidInput, NumericalError
 from ..manoeuvres import Manoeuvre
 from .car import Load, TwinCar
 
-_WHEELS = ("fl", "fr", "rl", "rr")
+WHEELS = ("fl", "fr", "rl", "rr")
 INPUTS = (
     "steer_fl_rad",
     "steer_fr_rad",
-    *(f"drive_{w}_nm" for w in _WHEELS),
-    *(f"brake_{w}_nm" for w in _WHEELS),
-    *(f"road_{w}_m" for w in _WHEELS),
-    *(f"road_rate_{w}_mps" for w in _WHEELS),
+    *(f"drive_{w}_nm" for w in WHEELS),
+    *(f"brake_{w}_nm" for w in WHEELS),
+    *(f"road_{w}_m" for w in WHEELS),
+    *(f"road_rate_{w}_mps" for w in WHEELS),
     *(f"force_{a}_n" for a in "xyz"),
     *(f"moment_{a}_nm" for a in "xyz"),
 )
@@ -32,17 +32,17 @@ OUTPUTS = (
     "roll_rate_radps",
     "pitch_rate_radps",
     "yaw_rate_radps",
-    *(f"wheel_speed_{w}_radps" for w in _WHEELS),
+    *(f"wheel_speed_{w}_radps" for w in WHEELS),
     "roll_acceleration_radps2",
     "pitch_acceleration_radps2",
     "yaw_acceleration_radps2",
     "vx_mps",
     "vy_mps",
     "sideslip_rad",
-    *(f"fx_{w}_n" for w in _WHEELS),
-    *(f"fy_{w}_n" for w in _WHEELS),
-    *(f"fz_{w}_n" for w in _WHEELS),
-    *(f"travel_{w}_m" for w in _WHEELS),
+    *(f"fx_{w}_n" for w in WHEELS),
+    *(f"fy_{w}_n" for w in WHEELS),
+    *(f"fz_{w}_n" for w in WHEELS),
+    *(f"travel_{w}_m" for w in WHEELS),
     "roll_rad",
     "pitch_rad",
     "plane_ax_mps2",

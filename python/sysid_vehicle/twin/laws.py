@@ -108,12 +108,8 @@ class ParameterLaw:
         law.differentiate = self.channel in _ANGULAR.values()
         law.by_gradient = self.kind == "gradient"
         law.sign_measured = self.sign == "measured"
-        law.literal_sign = self.published_sign
-        law.gain, law.gain_start, law.gain_time_s = self.gain, self.first_gain, self.first_gain_s
-        law.deadband, law.floor, law.averaging_s = self.deadband, self.floor, self.averaging_s
-        law.yaw_rate_below = self.yaw_rate_below_radps
-        law.yaw_rate_above = self.yaw_rate_above_radps
-        law.lower, law.upper, law.stage = self.lower, self.upper, self.stage
+        for name in vars(self).keys() - {"parameter", "channel", "kind", "sign"}:
+            setattr(law, name, getattr(self, name))
         return law
 
 

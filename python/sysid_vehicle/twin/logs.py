@@ -6,8 +6,6 @@ its tyres are of another kind.
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 
 from .._arguments import generator
@@ -17,9 +15,7 @@ from ..log import Log
 from ..simulate import SensorNoise
 from ..vehicle import Tyre, Vehicle
 from .car import Load, TwinCar
-from .drives import Drive14
-
-_WHEELS = ("fl", "fr", "rl", "rr")
+from .drives import WHEELS, Drive14
 
 
 def single_track(
@@ -105,7 +101,7 @@ def to_log(
     if steer_lag_s > 0.0:
         steer = steer + steer_lag_s * np.gradient(steer, drive.dt_s)
     force = np.zeros(len(steer))
-    for wheel in _WHEELS:
+    for wheel in WHEELS:
         axle = "front" if wheel[0] == "f" else "rear"
         spin_up = np.gradient(drive[f"wheel_speed_{wheel}_radps"], drive.dt_s)
         torque = drive[f"drive_{wheel}_nm"] - drive[f"brake_{wheel}_nm"]
@@ -122,10 +118,5 @@ def to_log(
         "fx_n": force,
     }
     columns = {name: as_float64(values[::every]) for name, values in columns.items()}
-    sensors = noise or SensorNoise()
-    for field in fields(sensors):
-        deviation = getattr(sensors, field.name)
-        columns[field.name] = columns[field.name] + deviation * rng.standard_normal(
-            len(columns["time_s"])
-        )
+    (noise or SensorNoise()).add_to(columns, rng)
     return Log.from_arrays(columns, name=drive.name, check=False)

@@ -19,7 +19,7 @@ from .._style import AFTER, TRUTH, axes_or_new, tidy
 from ..errors import InvalidInput, NumericalError, warn
 from .car import LOAD_NAMES, Load, TwinCar
 from .checks import checked_rows, checked_step
-from .drives import INPUTS, OUTPUTS
+from .drives import INPUTS, OUTPUTS, WHEELS
 from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, place_of
 from .readings import READINGS, Readings
 from .residuals import ChannelResidual, contradictions, residual_of
@@ -27,17 +27,16 @@ from .residuals import ChannelResidual, contradictions, residual_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_WHEELS = ("fl", "fr", "rl", "rr")
 _FASTEST_MPS = 150.0
 STATES = (
     *("x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad"),
     *("vx_mps", "vy_mps", "vz_mps", "roll_rate_radps", "pitch_rate_radps", "yaw_rate_radps"),
-    *(f"wheel_height_{w}_m" for w in _WHEELS),
-    *(f"wheel_height_rate_{w}_mps" for w in _WHEELS),
-    *(f"wheel_angle_{w}_rad" for w in _WHEELS),
-    *(f"wheel_speed_{w}_radps" for w in _WHEELS),
-    *(f"slip_{w}" for w in _WHEELS),
-    *(f"slip_angle_{w}" for w in _WHEELS),
+    *(f"wheel_height_{w}_m" for w in WHEELS),
+    *(f"wheel_height_rate_{w}_mps" for w in WHEELS),
+    *(f"wheel_angle_{w}_rad" for w in WHEELS),
+    *(f"wheel_speed_{w}_radps" for w in WHEELS),
+    *(f"slip_{w}" for w in WHEELS),
+    *(f"slip_angle_{w}" for w in WHEELS),
 )
 """Names of the states of the built-in twin; the last eight move only with relaxing tyres."""
 

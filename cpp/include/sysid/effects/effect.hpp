@@ -19,6 +19,10 @@ namespace sysid {
 /// over the time of the log, or over its typical range.
 enum class Scan { kNone, kTime, kRange };
 
+/// A law of motion that readings seem to break where the effect acts, through no fault of theirs:
+/// all channels come late, the car answers its steering late, gravity acts along the car.
+enum class Breaks { kNothing, kReadingsLate, kAnswersLate, kOnASlope };
+
 struct Range {
     double low = 0.0, high = 0.0;
 };
@@ -53,6 +57,9 @@ struct EffectInfo {
     bool needs_force = false;
     // Effect through which it chiefly acts; weak in a model without that.
     const char* through = "";
+    Breaks breaks = Breaks::kNothing;
+    // As a nuisance it is the same in all logs of a car, where others differ from log to log.
+    bool same_in_all_logs = false;
 
     constexpr std::size_t parameter_count() const {
         std::size_t n = 0;

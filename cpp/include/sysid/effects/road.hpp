@@ -59,6 +59,7 @@ struct RoadGrade : Effect {
                         .matters = 0.005,
                         .bounds = {-0.5, 0.5},
                         .usual = {0.01, 0.06}}},
+        .breaks = Breaks::kOnASlope,
     };
 
     template <class T, class S>

@@ -6,6 +6,26 @@
 
 namespace sysid {
 
+/// How far ahead of the centre of gravity a sensor is.
+constexpr ParameterInfo arm_forward(double typical, double matters, double usual_most) {
+    return {.name = "forward_m",
+            .unit = "m",
+            .typical = typical,
+            .matters = matters,
+            .bounds = {-4.0, 4.0},
+            .usual = {0.1, usual_most}};
+}
+/// How far to the left.
+constexpr ParameterInfo arm_left(double typical, double matters, double usual_most) {
+    return {.name = "left_m",
+            .unit = "m",
+            .typical = typical,
+            .matters = matters,
+            .bounds = {-2.0, 2.0},
+            .usual = {0.1, usual_most},
+            .mirrored = true};
+}
+
 /// Sensors write late: the speeds (satellite or optical receiver) and the inertial unit each by a
 /// time of their own. Every channel is an all-pass lag of what the motion is; other errors of the
 /// sensors come on top and are not delayed.
@@ -34,6 +54,7 @@ struct SensorDelay : Effect {
                         .bounds = {0.0, 0.5},
                         .usual = {0.005, 0.03}}},
         .scored_at_typical = true,
+        .breaks = Breaks::kReadingsLate,
     };
     static constexpr std::size_t state_count = kChannels;
     static constexpr double state_spread = 0.3;
@@ -70,19 +91,8 @@ struct SpeedSensorLeverArm : Effect {
         .moves = "vy_mps, vx_mps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps, vy_mps",
         .confounded_with = "cg_position, ins_lever_arm",
-        .parameters = {{.name = "forward_m",
-                        .unit = "m",
-                        .typical = 0.8,
-                        .matters = 0.1,
-                        .bounds = {-4.0, 4.0},
-                        .usual = {0.1, 1.5}},
-                       {.name = "left_m",
-                        .unit = "m",
-                        .typical = 0.4,
-                        .matters = 0.1,
-                        .bounds = {-2.0, 2.0},
-                        .usual = {0.1, 0.8},
-                        .mirrored = true}},
+        .parameters = {arm_forward(0.8, 0.1, 1.5), arm_left(0.4, 0.1, 0.8)},
+        .same_in_all_logs = true,
     };
 
     template <class T, class S>
@@ -133,19 +143,8 @@ struct ImuLeverArm : Effect {
         .moves = "ay_mps2, ax_mps2",
         .needs = "ay_mps2, yaw_rate_radps",
         .confounded_with = "cg_position, ins_lever_arm",
-        .parameters = {{.name = "forward_m",
-                        .unit = "m",
-                        .typical = 0.5,
-                        .matters = 0.05,
-                        .bounds = {-4.0, 4.0},
-                        .usual = {0.1, 0.8}},
-                       {.name = "left_m",
-                        .unit = "m",
-                        .typical = 0.3,
-                        .matters = 0.05,
-                        .bounds = {-2.0, 2.0},
-                        .usual = {0.1, 0.5},
-                        .mirrored = true}},
+        .parameters = {arm_forward(0.5, 0.05, 0.8), arm_left(0.3, 0.05, 0.5)},
+        .same_in_all_logs = true,
     };
 
     static constexpr bool reads_yaw_acceleration = true;
@@ -178,6 +177,7 @@ struct InsLeverArm : Effect {
         .confounded_with = "cg_position, speed_sensor_lever_arm, imu_lever_arm",
         .parameters = {SpeedSensorLeverArm::info.parameters[0],
                        SpeedSensorLeverArm::info.parameters[1]},
+        .same_in_all_logs = true,
     };
 
     static constexpr bool reads_yaw_acceleration = true;

@@ -27,6 +27,7 @@ struct SteerDelay : Effect {
                         .matters = 0.008,
                         .bounds = {-0.5, 0.5},
                         .usual = {-0.04, 0.06}}},
+        .breaks = Breaks::kAnswersLate,
     };
 
     template <class T, class S>
@@ -129,6 +130,7 @@ struct SteerLag : Effect {
                         .bounds = {0.0, 0.5},
                         .usual = {0.02, 0.08}}},
         .scored_at_typical = true,
+        .breaks = Breaks::kAnswersLate,
     };
     static constexpr std::size_t state_count = 1;
 
@@ -157,6 +159,7 @@ struct SteerCompliance : Effect {
                         .matters = 3.0e-7,
                         .bounds = {-1.0e-5, 2.0e-5},
                         .usual = {5e-7, 2e-6}}},
+        .breaks = Breaks::kAnswersLate,
     };
 
     template <class T, class S>

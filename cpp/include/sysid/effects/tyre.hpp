@@ -50,6 +50,7 @@ struct TyreRelaxation : Effect {
                         .bounds = {0.0, 3.0},
                         .usual = {0.2, 0.7}}},
         .scored_at_typical = true,
+        .breaks = Breaks::kAnswersLate,
     };
     static constexpr std::size_t state_count = 2;
 

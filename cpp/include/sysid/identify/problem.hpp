@@ -83,8 +83,6 @@ struct Problem {
     }
 };
 
-inline bool has_own_states(EffectMask mask) { return active_states(mask).count > 0; }
-
 /// Variances of the motion where a run starts. Wide enough that the first measurements, not the
 /// guess, decide.
 constexpr std::array<double, kMotionStates> kFirstVariances{1.0, 1.0, 0.04};

@@ -5,6 +5,9 @@
 
 namespace sysid {
 
+/// Samples on either side of a place between samples that its value is made of.
+constexpr int kShiftReach = 10;
+
 /// `value[k]` is the signal `late` samples before its sample k, `slope[k]` its derivative there by
 /// samples. Between samples stands what a signal of their bandwidth has there (windowed sinc): a
 /// straight line would average their noise, and a model whose input is less noisy predicts better

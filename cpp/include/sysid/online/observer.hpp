@@ -77,36 +77,88 @@ inline SideslipEstimate rolling_without_slip(double lf_m, double lr_m, const Sen
 /// Standard deviations; those of things that walk are per root second. The defaults were chosen
 /// on random cars in three simulators (benchmarks/online/choose_noise.py).
 struct ObserverSettings {
-    // white noise of the sensors
     double vx_mps = 0.05, yaw_rate_radps = 0.005, ax_mps2 = 0.1, ay_mps2 = 0.1;
-    // lateral acceleration that moves the car but that no accelerometer feels (road bank), and the
-    // share of it that it feels too much, by gravity in body roll: expected, standard deviation,
-    // delay
     double road_mps2 = 0.02, road_time_s = 10.0;
     double roll_expected = 0.045, roll_share = 0.05, roll_time_s = 0.1;
-    // lateral axle forces as observer A lets them change, as a share of the load
     double force_walk = 1.0;
-    // error of the tyre model, as a share of load, lateral force, and grip lost to braking
     double error_load = 0.003, error_lateral = 0.05, error_braking = 0.15, error_time_s = 0.25;
-    // yaw moment by drive and brakes: share of their force, at half the wheelbase
     double error_drive = 0.05;
-    // what neither tyres nor road explain of yaw rate and sideslip
     double yaw_walk_radps = 0.02, sideslip_walk_rad = 0.0003;
-    // logarithm of the tyre's numbers: stiffness is uncertain at first and changes in hard driving,
-    // friction changes with the road and comes back
     double stiffness_prior = 0.4, stiffness_walk = 0.0003;
     double friction_prior = 0.1, friction_time_s = 50.0;
-    double relaxation_m = 0.3, relaxation_std = 0.6;  // of both axles, and of its logarithm
-    // what the observer cannot learn of the tyres: error of their curve, share of the slip, and of
-    // the slip without force; lateral force over load up to which slip tells less of the stiffness
+    double relaxation_m = 0.3, relaxation_std = 0.6;
     double error_curve = 0.06, error_slip_rad = 0.0004, learning_use = 0.2;
-    // gate, frozen sensors, low speed
     double gate_probability = 1e-6, gate_patience_s = 3.0, frozen_after_s = 0.2;
     double stop_below_mps = 3.0, go_above_mps = 4.0;
-    // longitudinal force as the observers let it change, as a share of the weight
     double fx_walk = 0.3;
-    // the three-state observer: errors of the sideslip rate and of the lateral acceleration
     double beta_walk_radps = 0.004, model_ay_mps2 = 0.3;
+};
+
+struct ObserverSetting {
+    const char* name;
+    double ObserverSettings::* value;
+    const char* meaning;
+};
+
+/// What they mean.
+inline constexpr ObserverSetting kObserverSettings[] = {
+    {"vx_mps", &ObserverSettings::vx_mps, "noise of the speed [m/s]"},
+    {"yaw_rate_radps", &ObserverSettings::yaw_rate_radps, "noise of the yaw rate [rad/s]"},
+    {"ax_mps2", &ObserverSettings::ax_mps2, "noise of the longitudinal acceleration [m/s2]"},
+    {"ay_mps2", &ObserverSettings::ay_mps2, "noise of the lateral acceleration [m/s2]"},
+    {"road_mps2", &ObserverSettings::road_mps2,
+     "bank of the road as a lateral acceleration [m/s2]"},
+    {"roll_expected", &ObserverSettings::roll_expected,
+     "gravity felt through body roll, share of a_y"},
+    {"roll_share", &ObserverSettings::roll_share, "standard deviation of that share"},
+    {"roll_time_s", &ObserverSettings::roll_time_s, "time that the body takes to roll [s]"},
+    {"road_time_s", &ObserverSettings::road_time_s, "time over which the bank changes [s]"},
+    {"force_walk", &ObserverSettings::force_walk,
+     "change of a lateral axle force, share of the load [1/sqrt(s)]"},
+    {"error_load", &ObserverSettings::error_load, "error of the tyre model, share of the load"},
+    {"error_lateral", &ObserverSettings::error_lateral,
+     "error of the tyre model, share of the lateral force"},
+    {"error_braking", &ObserverSettings::error_braking,
+     "error of the tyre model, share of the grip that braking takes"},
+    {"error_drive", &ObserverSettings::error_drive,
+     "yaw moment by drive and brakes, share of their force at half the wheelbase"},
+    {"error_time_s", &ObserverSettings::error_time_s, "time over which these errors change [s]"},
+    {"yaw_walk_radps", &ObserverSettings::yaw_walk_radps,
+     "unexplained change of the yaw rate [rad/s/sqrt(s)]"},
+    {"sideslip_walk_rad", &ObserverSettings::sideslip_walk_rad,
+     "unexplained change of the sideslip [rad/sqrt(s)]"},
+    {"stiffness_prior", &ObserverSettings::stiffness_prior,
+     "standard deviation of the stiffness at first (of its logarithm)"},
+    {"friction_prior", &ObserverSettings::friction_prior,
+     "change of the friction with the road (of its logarithm)"},
+    {"stiffness_walk", &ObserverSettings::stiffness_walk,
+     "change of the stiffness in hard driving [1/sqrt(s)]"},
+    {"friction_time_s", &ObserverSettings::friction_time_s, "time over which friction changes [s]"},
+    {"relaxation_m", &ObserverSettings::relaxation_m, "relaxation length of the tyres [m]"},
+    {"relaxation_std", &ObserverSettings::relaxation_std,
+     "standard deviation of that length (of its logarithm)"},
+    {"learning_use", &ObserverSettings::learning_use,
+     "lateral force over load up to which slip tells less of the stiffness"},
+    {"error_slip_rad", &ObserverSettings::error_slip_rad,
+     "slip angle without force, by toe, camber and compliance [rad]"},
+    {"error_curve", &ObserverSettings::error_curve,
+     "error of the tyre curve that is never learnt, share of the slip"},
+    {"gate_probability", &ObserverSettings::gate_probability,
+     "readings less probable than this are refused"},
+    {"gate_patience_s", &ObserverSettings::gate_patience_s,
+     "after so long they are taken again [s]"},
+    {"frozen_after_s", &ObserverSettings::frozen_after_s,
+     "a sensor that stands still for longer is left out [s]"},
+    {"stop_below_mps", &ObserverSettings::stop_below_mps,
+     "below this speed the car is taken to roll without slip [m/s]"},
+    {"go_above_mps", &ObserverSettings::go_above_mps,
+     "above this speed the observer begins again [m/s]"},
+    {"fx_walk", &ObserverSettings::fx_walk,
+     "change of the longitudinal force, share of the weight [1/sqrt(s)]"},
+    {"beta_walk_radps", &ObserverSettings::beta_walk_radps,
+     "three-state observer: unexplained change of the sideslip [rad/sqrt(s)]"},
+    {"model_ay_mps2", &ObserverSettings::model_ay_mps2,
+     "three-state observer: error of the modelled lateral acceleration [m/s2]"},
 };
 
 }  // namespace sysid

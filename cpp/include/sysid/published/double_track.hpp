@@ -32,11 +32,11 @@ struct DoubleTrackData {
     PacejkaPair front, rear;
 };
 
-/// Gains per second, in the order of eq. (32); `yaw_rate_below` gates the mass.
+/// Gains per second, in the order of eq. (32); `yaw_rate_below_radps` gates the mass.
 struct DoubleTrackGains {
     double ax_vx = 0.0, yaw_yaw = 0.0, ax_mass = 0.0, ay_vy = 0.0;
-    double yaw_rate_below = 0.0523598775598298873;
-    bool literal_sign = false;
+    double yaw_rate_below_radps = 0.0523598775598298873;
+    bool published_sign = false;
     double lowest_mass_kg = -1000.0, highest_mass_kg = 1000.0;
 };
 

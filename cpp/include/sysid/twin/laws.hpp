@@ -3,8 +3,8 @@
 //
 // Dettu et al. (2023), eqs. (14), (15), (18), (24), with these corrections:
 //   - Sign. Under equal forces the heavier body accelerates less, so sgn(s)(s - s~) is negative
-//     where the parameter must grow: d(delta)/dt = K sgn(s) (s~ - s) with K > 0. The literal sign
-//     diverges; it is kept behind `literal_sign`.
+//     where the parameter must grow: d(delta)/dt = K sgn(s) (s~ - s) with K > 0. The published sign
+//     diverges; it is kept behind `published_sign`.
 //   - Source of the sign. E[n sgn(s + n)] > 0: the sign of a noisy measurement makes the noise
 //     push the parameter. The twin's own reading has no noise and is the default.
 //   - Time. Gains are per second, whatever the step; eq. (15) lacks the dot on omega~.
@@ -31,16 +31,16 @@ struct ParameterLaw {
     /// kSign: d(delta)/dt = K sgn(s) (s~ - s). kGradient: K s~ (s~ - s) / (floor^2 + mean of s~^2).
     LawKind kind = LawKind::kSign;
     SignSource sign = SignSource::kTwin;
-    bool literal_sign = false;
-    double gain = 0.0;        // K(t) = max(gain, gain_start / (1 + t/gain_time_s))
-    double gain_start = 0.0;  // t counts while the law acts
-    double gain_time_s = 1.0;
+    bool published_sign = false;
+    double gain = 0.0;        // K(t) = max(gain, first_gain / (1 + t/first_gain_s))
+    double first_gain = 0.0;  // t counts while the law acts
+    double first_gain_s = 1.0;
     double deadband = 0.0;  // of |s|
     double floor = 0.1;
     double averaging_s = 5.0;
     double lower = 0.0, upper = std::numeric_limits<double>::infinity();
-    double yaw_rate_below = std::numeric_limits<double>::infinity();  // gate of eq. (24)
-    double yaw_rate_above = 0.0;
+    double yaw_rate_below_radps = std::numeric_limits<double>::infinity();  // gate of eq. (24)
+    double yaw_rate_above_radps = 0.0;
     int stage = 0;
 };
 
