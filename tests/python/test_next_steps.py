@@ -15,8 +15,8 @@ from sysid_vehicle.diagnose.ceiling import Explainable
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import Added, Change, Facts, Share, grade, share_of, verdict
 from sysid_vehicle.study import AddedEffect
+from sysid_vehicle.study.beyond import Beyond
 from sysid_vehicle.study.disagree import disagreements
-from sysid_vehicle.study.horizons import Beyond
 from sysid_vehicle.study.next_steps import next_steps
 from sysid_vehicle.study.said import ahead, small
 from sysid_vehicle.study.structure import Structure

@@ -42,7 +42,8 @@ NUMERICAL = {
     "diagnose/sensitivity.py": {"_AT_ONCE", "_BOUNDED", "_SHARES"},
     "diagnose/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},
     "study/validation.py": {"_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
-    "study/horizons.py": {"_BLOCK_S", "_FEWEST", "_DRAWS", "_APART", "_NORMAL", "_LOST"},
+    "study/horizons.py": {"_BLOCK_S", "_FEWEST", "_APART", "_NORMAL", "_LOST"},
+    "study/beyond.py": {"_DRAWS"},
     "study/improve.py": {"_SHORT_S"},
     "study/next_steps.py": {"_SHOWN"},
     "study/shares.py": {

@@ -30,22 +30,12 @@ Nothing here sees a fit or a log: others measure, this decides.
 from .accept import Change, Gain, Measures, accept, bic, worse
 from .facts import Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
-from .verdict import (
-    NONE_GONE,
-    Grade,
-    Share,
-    excess,
-    grade,
-    share_between,
-    share_explained,
-    share_of,
-    smaller_than,
-    something_left,
-    verdict,
-)
+from .share import NONE_GONE, UNKNOWN, Share, share_between, share_explained, share_of
+from .verdict import Grade, excess, grade, incomplete, something_left, verdict
 
 __all__ = [
     "NONE_GONE",
+    "UNKNOWN",
     "USUAL",
     "Added",
     "Change",
@@ -63,10 +53,10 @@ __all__ = [
     "bic",
     "excess",
     "grade",
+    "incomplete",
     "share_between",
     "share_explained",
     "share_of",
-    "smaller_than",
     "something_left",
     "verdict",
     "worse",
