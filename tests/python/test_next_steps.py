@@ -149,9 +149,11 @@ def drawn_test(rng: random.Random) -> Omnibus:
     return Omnibus(rng.choice((9.0, 30.0, 900.0)), 9, rng.choice(P), "M_z")
 
 
-def changed(rng: random.Random) -> tuple[Change, ...]:
-    by = rng.choice((-0.4, 0.0, 0.3))
-    return tuple(Change(c, 1.0, by, 0.02) for c in ("vy_mps", "yaw_rate_radps", "ay_mps2"))
+def own_share(rng: random.Random) -> Share:
+    """Shown to be large or not, of nothing, or not asked for."""
+    value = rng.choice((-0.4, 0.02, 0.2, 0.8, float("nan")))
+    by = rng.choice((0.01, 0.15, 0.5))
+    return Share(value, value - by, value + by)
 
 
 def said(base: Study, rng: random.Random) -> str:
@@ -162,9 +164,8 @@ def said(base: Study, rng: random.Random) -> str:
             finding := rng.choice(FINDINGS),
             ("mass",) if finding == "one of a group" else (),
             rng.choice((frozenset({"yaw_rate_radps"}), frozenset({"ay_mps2"}))),
-            rng.choice(SQUARES),
-            changed(rng),
-            changed(rng),
+            own_share(rng),
+            own_share(rng),
         )
         for e in EFFECTS[: rng.randrange(3)]
     )
