@@ -10,13 +10,12 @@ import pytest
 from sysid_vehicle import Fit, InvalidInput, Log, compare
 from sysid_vehicle.estimate import Driving, turning, turning_blocks
 from sysid_vehicle.identify.ahead import of_few
-from sysid_vehicle.rules import worse
+from sysid_vehicle.rules import Share, worse
 from sysid_vehicle.study import validation
+from sysid_vehicle.study.beyond import Beyond, beyond_noise, own_share
 from sysid_vehicle.study.horizons import (
     LATERAL,
     PREDICTED,
-    Beyond,
-    beyond_noise,
     block_errors,
     changes,
     horizons,
@@ -187,21 +186,37 @@ def test_an_error_that_grows_is_not_called_gone() -> None:
     assert str(Beyond((1.0, 7.9), -6.9, -200.0, 0.03)) == "0 % (0 to 3)"
 
 
-def test_how_far_an_error_could_fall(fit: Fit, late: Fit, course: Log) -> None:
-    """A lag of the steering moves most of the error of yaw rate, a bias of a_y none of it."""
+def test_the_own_share_of_what_a_model_has_more(fit: Fit, late: Fit, course: Log) -> None:
     driving = Driving.of(course)
-    short = replace(late, model=late.model.with_values({"steer_lag.time_constant_s": 0.05}))
-    told = changes(short, fit, driving, (1.0,), reach=True)
-    found = {c.channel: c for c in told}
-    yaw = found["yaw_rate_radps"]
-    # What was moved was error: as much of its square goes, to a tenth.
-    assert np.exp(2.0 * yaw.log_ratio) == pytest.approx(np.exp(-2.0 * yaw.reach), abs=0.1)
-    biased = fit.model.add("accelerometer_bias").with_values({"accelerometer_bias.ay_mps2": 0.3})
-    moved = changes(fit, replace(fit, model=biased), driving, (1.0,), reach=True)
-    assert [c.channel for c in moved if c.reach > np.log(1.05)] == ["ay_mps2"]
-    assert all(c.reach == np.inf for c in changes(fit, late, driving, (1.0,)))
+    own = own_share(late, fit, driving, (1.0, 2.0))
+    # A lag of the steering moves little of the speed; of yaw rate and a_y it is nearly all.
+    assert 0.4 < own.low <= own.value <= own.high < 1.0
+    swapped = own_share(
+        replace(fit, noise=late.noise), replace(late, noise=fit.noise), driving, (1.0, 2.0)
+    )
+    assert swapped.value == pytest.approx(-own.value)
+    assert own_share(fit, fit, driving, (1.0,)) == Share(0.0, 0.0, 0.0)
+    half = replace(late, model=late.model.with_values({"steer_lag.time_constant_s": 0.075}))
+    assert 0.0 < own_share(half, fit, driving, (1.0, 2.0)).value < own.value
+    short = Driving.of(course.between(0.0, 4.0))
+    assert not own_share(late, fit, short, (5.0,)).known
+
+
+def test_what_loses_the_car_has_no_share(fit: Fit, course: Log) -> None:
     broken = replace(fit, model=fit.model.with_values({"B_front": float("nan")}))
-    assert all(c.reach == np.inf for c in changes(fit, broken, driving, (1.0,), reach=True))
+    driving = Driving.of(course)
+    assert own_share(broken, fit, driving, (1.0,)).value > 0.99
+    assert own_share(fit, broken, driving, (1.0,)).value < -0.99
+
+
+def test_one_spin_decides_no_share(
+    fit: Fit, late: Fit, course: Log, altered: Callable[..., Log]
+) -> None:
+    yaw = course["yaw_rate_radps"].copy()
+    yaw[len(yaw) // 2 :][:200] += 3.0
+    spun = Driving.of(altered(course, yaw_rate_radps=yaw))
+    plain = own_share(late, fit, Driving.of(course), (1.0,)).value
+    assert own_share(late, fit, spun, (1.0,)).value == pytest.approx(plain, abs=0.1)
 
 
 def test_few_blocks_tell_less_than_many() -> None:

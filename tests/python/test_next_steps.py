@@ -15,8 +15,8 @@ from sysid_vehicle.diagnose.ceiling import Explainable
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import Added, Change, Facts, Share, grade, share_of, verdict
 from sysid_vehicle.study import AddedEffect
+from sysid_vehicle.study.beyond import Beyond
 from sysid_vehicle.study.disagree import disagreements
-from sysid_vehicle.study.horizons import Beyond
 from sysid_vehicle.study.next_steps import next_steps
 from sysid_vehicle.study.said import ahead, small
 from sysid_vehicle.study.structure import Structure
@@ -149,9 +149,11 @@ def drawn_test(rng: random.Random) -> Omnibus:
     return Omnibus(rng.choice((9.0, 30.0, 900.0)), 9, rng.choice(P), "M_z")
 
 
-def changed(rng: random.Random) -> tuple[Change, ...]:
-    by = rng.choice((-0.4, 0.0, 0.3))
-    return tuple(Change(c, 1.0, by, 0.02) for c in ("vy_mps", "yaw_rate_radps", "ay_mps2"))
+def own_share(rng: random.Random) -> Share:
+    """Shown to be large or not, of nothing, or not asked for."""
+    value = rng.choice((-0.4, 0.02, 0.2, 0.8, float("nan")))
+    by = rng.choice((0.01, 0.15, 0.5))
+    return Share(value, value - by, value + by)
 
 
 def said(base: Study, rng: random.Random) -> str:
@@ -162,9 +164,8 @@ def said(base: Study, rng: random.Random) -> str:
             finding := rng.choice(FINDINGS),
             ("mass",) if finding == "one of a group" else (),
             rng.choice((frozenset({"yaw_rate_radps"}), frozenset({"ay_mps2"}))),
-            rng.choice(SQUARES),
-            changed(rng),
-            changed(rng),
+            own_share(rng),
+            own_share(rng),
         )
         for e in EFFECTS[: rng.randrange(3)]
     )

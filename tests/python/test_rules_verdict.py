@@ -7,12 +7,13 @@ import pytest
 
 from sysid_vehicle.diagnose import Omnibus
 from sysid_vehicle.rules import (
+    USUAL,
     Added,
-    Change,
     Facts,
+    Share,
     grade,
+    incomplete,
     share_explained,
-    smaller_than,
     something_left,
     verdict,
 )
@@ -24,8 +25,9 @@ def of(p_value: float, statistic: float = 99.0, target: str = "M_z") -> Omnibus:
 
 NONE = of(0.5, 5.0)
 BEFORE = of(1e-60, 909.0)
-MASS = Added("mass", "missing", moves=frozenset({"yaw_rate_radps"}), taken=8.0)
-DRAG = Added("aero_drag", "missing", moves=frozenset({"vx_mps"}), taken=1.0)
+MOST, SOME, NONE_OF_IT = Share(0.6, 0.5, 0.7), Share(0.2, 0.1, 0.3), Share(0.01, -0.1, 0.1)
+MASS = Added("mass", "missing", (), frozenset({"yaw_rate_radps"}), MOST, MOST)
+DRAG = Added("aero_drag", "missing", (), frozenset({"vx_mps"}), SOME, SOME)
 WHOLE = Facts(NONE, NONE, missing=(8.0, 0.0), added=(MASS,))
 
 
@@ -90,82 +92,63 @@ def test_verdicts_where_nothing_is_left() -> None:
     assert verdict(replace(WHOLE, added=(rival, proxy))).verdict == "unknown"
     negligible = replace(MASS, finding="negligible")
     assert verdict(replace(WHOLE, added=(negligible,))).verdict == "explained"
+    # Where nothing is missing no share is asked for, where a stand-in tells of something it is.
+    small = replace(MASS, own=NONE_OF_IT)
+    assert verdict(replace(WHOLE, added=(small,))).verdict == "explained"
+    assert not incomplete(replace(WHOLE, added=(small,)))
+    assert incomplete(replace(WHOLE, added=(small, proxy)))
+    assert verdict(replace(WHOLE, added=(small, proxy))).verdict == "unknown"
+
+
+LEFT = replace(WHOLE, fitted=of(1e-9, 209.0), missing=(8.0, 0.44), added=(MASS, DRAG))
 
 
 def test_names_beside_something_that_is_left() -> None:
-    left = replace(WHOLE, fitted=of(1e-9, 209.0), missing=(8.0, 0.44), added=(MASS, DRAG))
-    assert verdict(left).verdict == "partly_explained"
-    assert withdrawn(left) == {}
-    error = replace(left, missing=(8.0, 3.0))
-    assert verdict(error).verdict == "unknown"
-    assert set(withdrawn(error)) == {"mass", "aero_drag"}
-    assert withdrawn(error)["mass"] == "takes up only 62 % of the error 1 to 5 s ahead"
-    little = replace(left, added=(MASS, replace(DRAG, taken=0.1)), fitted=of(0.005, 209.0))
-    assert withdrawn(little) == {"aero_drag": "what is left unexplained is larger"}
+    assert verdict(LEFT).verdict == "partly_explained"
+    assert not verdict(LEFT).much_left
+    assert withdrawn(LEFT) == {}
+    little = replace(LEFT, added=(MASS, replace(DRAG, own=NONE_OF_IT)))
+    assert set(withdrawn(little)) == {"aero_drag"}
+    assert "not shown to take a share of the error" in withdrawn(little)["aero_drag"]
     assert verdict(little).verdict == "partly_explained"
-    only = replace(left, added=(replace(MASS, finding="negligible"),))
+    only = replace(LEFT, added=(replace(MASS, finding="negligible"),))
     assert verdict(only).verdict == "unknown"
 
 
-def falling(log_ratio: float = -0.3, error: float = 0.05) -> tuple[Change, ...]:
-    channels = ("vy_mps", "yaw_rate_radps", "ay_mps2")
-    return tuple(Change(c, h, log_ratio, error) for c in channels for h in (1.0, 2.0, 5.0))
+def test_beside_much_that_is_left_a_share_is_shown_to_be_worth_a_name() -> None:
+    """A car whose tyres are of another form leaves much beside the right effect, too."""
+    much = replace(LEFT, missing=(8.0, 5.0), added=(MASS,))
+    assert withdrawn(much) == {}
+    assert verdict(much).verdict == "partly_explained"
+    assert verdict(much).much_left
+    unsure = replace(MASS, own=Share(0.3, 0.05, 0.5))
+    assert withdrawn(replace(LEFT, added=(unsure,))) == {}
+    assert set(withdrawn(replace(much, added=(unsure,)))) == {"mass"}
+    assert verdict(replace(much, added=(unsure,))).verdict == "unknown"
 
 
-def test_names_stand_beside_much_that_is_left_where_errors_fall_throughout() -> None:
-    """On a real road the right effect takes up a third of the error, and much is left."""
-    mass = replace(MASS, taken=3.0, changes=falling(), changes_in_training=falling(-0.1, 0.1))
-    road = replace(WHOLE, fitted=of(1e-9, 709.0), missing=(8.0, 5.0), added=(mass,))
-    said = verdict(road)
-    assert said.verdict == "partly_explained"
-    assert said.much_left
-    assert withdrawn(road) == {}
-    for spoilt in (
-        (),
-        # One channel that is not shown to fall, one horizon at which it does not; falls by chance,
-        # and such as matter to nobody.
-        (*falling()[:3], *falling(-0.09)[3:6], *falling()[6:]),
-        (*falling()[:-1], replace(falling()[-1], log_ratio=0.01)),
-        falling(error=0.2),
-        falling(-0.04, 0.01),
-    ):
-        facts = replace(road, added=(replace(mass, changes=spoilt),))
-        assert withdrawn(facts) == {"mass": "takes up only 38 % of the error 1 to 5 s ahead"}
-        assert verdict(facts).verdict == "unknown"
-        assert not verdict(facts).much_left
-    for other in (
-        replace(mass, changes_in_training=falling(0.01)),
-        replace(mass, changes=falling(error=0.1), changes_in_training=falling(-0.1, 0.1)),
-        replace(mass, taken=0.1),
-        replace(mass, finding="proxy"),
-    ):
-        assert verdict(replace(road, added=(other,))).verdict == "unknown"
-    # Each name stands or falls by itself.
-    beside = replace(road, added=(mass, DRAG))
-    assert set(withdrawn(beside)) == {"aero_drag"}
-    assert verdict(beside).verdict == "partly_explained"
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        Share(0.09, 0.05, 0.13),  # a tenth is as little as is worth a name
+        Share(0.3, -0.01, 0.5),  # it may be chance
+        Share(-0.3, -0.5, -0.1),
+        Share(float("nan"), float("nan"), float("nan")),  # it was not asked, or a model fails
+    ],
+)
+@pytest.mark.parametrize("where", ["own", "own_in_training"])
+def test_a_name_needs_a_share_of_its_own_on_all_data(wrong: Share, where: str) -> None:
+    facts = replace(LEFT, added=(replace(MASS, **{where: wrong}),))
+    assert set(withdrawn(facts)) == {"mass"}
+    assert verdict(facts).verdict == "unknown"
+    assert not verdict(facts).much_left
 
 
-def test_an_effect_named_alone_should_have_explained_what_is_left() -> None:
-    alone = "were it what is missing, nothing would be left"
-    left = replace(WHOLE, fitted=of(1e-9, 209.0, "F_x"), missing=(8.0, 0.44))
-    assert withdrawn(left) == {"mass": alone}
-    assert verdict(left).verdict == "unknown"
-    assert withdrawn(replace(left, fitted=of(0.005, 209.0))) == {}
-    # Where errors ahead fall throughout the effect is in the car, and something else too.
-    fallen = left.with_changes({"mass": (falling(), falling(-0.1, 0.1))})
-    assert withdrawn(fallen) == {}
-    assert verdict(fallen).verdict == "partly_explained"
-    spoilt = left.with_changes({"mass": (falling(0.01), falling(-0.1, 0.1))})
-    assert withdrawn(spoilt) == {"mass": alone}
-    # Beside a proxy something else may be missing, which may be all that is left.
-    proxy = replace(DRAG, finding="proxy")
-    beside = replace(left, added=(MASS, proxy))
-    assert withdrawn(beside).get("mass") is None
-    turning = replace(beside, fitted=of(1e-9, 209.0, "M_z"))
-    assert withdrawn(turning)["mass"] == alone
-    on_all = replace(beside, fitted=of(0.005, 209.0, "F_x"), together=of(5e-4))
-    assert withdrawn(on_all)["mass"] == alone
+def test_the_share_that_is_worth_a_name_is_a_limit() -> None:
+    facts = replace(LEFT, added=(DRAG,))
+    assert withdrawn(facts) == {}
+    strict = replace(USUAL, most=0.7)  # a share of 0.3
+    assert {e for w in verdict(facts, strict).withdrawn for e in w.effects} == {"aero_drag"}
 
 
 def test_grades_of_names() -> None:
@@ -177,16 +160,6 @@ def test_grades_of_names() -> None:
     assert grade("missing", "missing", much_left=True) == "plausible"
 
 
-def test_what_took_up_less_than_is_left_is_doubted() -> None:
-    taken = {"large": 10.0, "middle": 2.0, "tiny": 0.1}
-    assert smaller_than(0.01, taken, frozenset()) == set()
-    assert smaller_than(0.5, taken, frozenset()) == {"tiny"}
-    # What proxies took up is unexplained too, and so is what was reserved for it.
-    assert smaller_than(1.95, taken, frozenset()) == {"tiny", "middle"}
-    assert smaller_than(0.5, taken, frozenset({"large"})) == {"tiny", "middle"}
-    assert smaller_than(1.0, {}, frozenset()) == set()
-
-
 def test_the_share_explained_is_of_what_is_beyond_the_noise_floor() -> None:
     assert share_explained(2.0, 1.0) == 1.0
     assert share_explained(2.0, 0.99) == 1.0
@@ -196,52 +169,25 @@ def test_the_share_explained_is_of_what_is_beyond_the_noise_floor() -> None:
     assert share_explained(1.0, 1.0) == 1.0
 
 
-def moving(*channels: str, elsewhere: float = 0.0) -> tuple[Change, ...]:
-    """Errors that fall in these channels, and change by next to nothing in the others."""
-    return tuple(
-        c if c.channel in channels else replace(c, log_ratio=elsewhere, error=0.01, reach=0.01)
-        for c in (replace(c, reach=0.4) for c in falling())
-    )
-
-
-def test_errors_fall_where_an_effect_moves_something_and_grow_nowhere() -> None:
-    """A bias of the gyro moves one channel only: of the others no fall can be asked."""
-    one = moving("yaw_rate_radps", elsewhere=0.01)
-    mass = replace(MASS, taken=3.0, changes=one, changes_in_training=one)
-    road = replace(WHOLE, fitted=of(1e-9, 709.0), missing=(8.0, 5.0), added=(mass,))
-    assert verdict(road).verdict == "partly_explained"
-    for wrong in (
-        moving("yaw_rate_radps", elsewhere=0.06),  # it grows elsewhere
-        moving(),  # it moves nothing that could be seen to fall
-        # It moves another channel as much, whose error does not fall.
-        tuple(replace(c, reach=0.4) for c in one),
-    ):
-        for spoilt in (
-            replace(mass, changes=wrong),
-            replace(mass, changes=wrong, changes_in_training=wrong),
-        ):
-            assert verdict(replace(road, added=(spoilt,))).verdict == "unknown"
-    assert (
-        verdict(
-            replace(road, added=(replace(mass, changes_in_training=moving("ay_mps2")),))
-        ).verdict
-        == "unknown"
-    )
-
-
 def test_no_name_stands_beside_a_stand_in_that_moves_the_same() -> None:
-    """What the stand-in is for may be what the other one is for too."""
-    mass = replace(MASS, taken=3.0, changes=falling(), changes_in_training=falling())
-    road = replace(WHOLE, fitted=of(1e-9, 709.0), missing=(8.0, 5.0))
+    """What the stand-in is for may be what the other one is for too, if it is the larger one.
+
+    A stand-in beside which an effect keeps the larger share has not taken its place: that share is
+    what is left of it after the stand-in was fitted anew without it.
+    """
     both = frozenset({"yaw_rate_radps", "ay_mps2"})
-    beside = Added("aligning_moment", "proxy", moves=both, taken=1.0)
-    assert verdict(replace(road, added=(mass, beside))).verdict == "unknown"
-    # Next to nothing of the error cannot be what takes up a third of it.
-    small = replace(road, added=(mass, replace(beside, taken=0.1)))
+    beside = Added("aligning_moment", "proxy", (), both, SOME, SOME)
+    small = replace(LEFT, added=(MASS, beside))
     assert set(withdrawn(small)) == {"aligning_moment"}
     assert verdict(small).verdict == "partly_explained"
-    assert verdict(replace(road, added=(mass, replace(beside, taken=-1.0)))).verdict == "unknown"
-    unsure = replace(beside, finding="missing", changes=falling(0.2))
-    assert verdict(replace(road, added=(mass, unsure))).verdict == "unknown"
-    sure = replace(mass, id="aligning_moment", moves=both)
-    assert withdrawn(replace(road, added=(mass, sure))) == {}
+    larger = Share(0.7, 0.2, 0.9)
+    for where in ("own", "own_in_training"):
+        large = replace(beside, **{where: larger})
+        assert verdict(replace(LEFT, added=(MASS, large))).verdict == "unknown"
+        # So does an effect that is not shown to be one.
+        unsure = replace(large, finding="missing", **{where: replace(larger, low=-0.1)})
+        assert verdict(replace(LEFT, added=(MASS, unsure))).verdict == "unknown"
+        elsewhere = replace(large, moves=frozenset({"vx_mps"}))
+        assert set(withdrawn(replace(LEFT, added=(MASS, elsewhere)))) == {"aligning_moment"}
+    sure = replace(MASS, id="aligning_moment", moves=both, own=larger)
+    assert withdrawn(replace(LEFT, added=(MASS, sure))) == {}

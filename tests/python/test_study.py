@@ -23,7 +23,7 @@ from sysid_vehicle import (
     manoeuvres,
 )
 from sysid_vehicle.rules import Gain, share_explained
-from sysid_vehicle.study.horizons import Beyond
+from sysid_vehicle.study.beyond import Beyond
 from sysid_vehicle.study.shares import shares
 from sysid_vehicle.study.validation import error_falls, gain_in_log_likelihood, set_aside
 

@@ -5,18 +5,55 @@ from dataclasses import replace
 
 import pytest
 
-from sysid_vehicle import Fit, Log, Model, drive, improve, manoeuvres
+from sysid_vehicle import Fit, Log, Model, NumericalError, drive, identify, improve, manoeuvres
 from sysid_vehicle.estimate import Driving
-from sysid_vehicle.rules import USUAL
+from sysid_vehicle.identify import refit
+from sysid_vehicle.rules import UNKNOWN, USUAL
+from sysid_vehicle.study import own
 from sysid_vehicle.study.improve import _room
-from sysid_vehicle.study.verdict import _taken_up
+from sysid_vehicle.study.own import own_shares
 
 
-def test_of_effects_that_act_alike_the_later_counts_for_what_it_adds(fit: Fit, lap: Log) -> None:
-    drag = replace(fit, model=fit.model.add("aero_drag"))
-    wind = replace(drag, model=drag.model.add("head_wind"))
-    taken = _taken_up([fit, drag, wind], [8.0, 3.0, 2.61])
-    assert taken == pytest.approx({"aero_drag": 5.0, "head_wind": 0.39})
+def test_what_another_effect_would_do_in_its_place_is_not_its_own(
+    truth: Model, start: Model
+) -> None:
+    """Rolling resistance and a head wind act alike at one speed; a steering lag acts alone."""
+    car = truth.add("steer_lag", "rolling_resistance").with_values(
+        {"steer_lag.time_constant_s": 0.08, "rolling_resistance.coefficient": 0.03}
+    )
+    train, test = (drive(car, manoeuvres.lap(30.0), seed=seed) for seed in (3, 13))
+    asked = ("steer_lag", "rolling_resistance", "head_wind")
+    model = start.add(*asked)
+    found = own_shares(identify(model, train, starts=1), asked, asked, Driving.of(test))
+    for alone in found["steer_lag"]:
+        assert alone.value > USUAL.taken
+        assert alone.low > 0.0
+    assert all(shared.value < USUAL.taken for shared in found["head_wind"])
+
+
+def test_validation_data_are_asked_only_where_a_name_has_a_share(
+    fit: Fit, lap: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Fit] = []
+    monkeypatch.setattr(own, "at_its_best", lambda fit, _: asked.append(fit) or fit)
+    needless = refit(fit.model.add("gyro_scale"), fit.driving, fit.noise)
+    shares = own_shares(needless, ["gyro_scale"], ["gyro_scale"], Driving.of(lap))
+    assert not asked
+    assert not shares["gyro_scale"][0].known
+    assert abs(shares["gyro_scale"][1].value) < USUAL.taken
+
+
+def test_a_model_that_cannot_be_fitted_without_an_effect_tells_of_no_share(
+    fit: Fit, lap: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> Fit:
+        raise NumericalError("lost")
+
+    monkeypatch.setattr(own, "refit", fails)
+    richer = replace(fit, model=fit.model.add("gyro_scale"))
+    assert own_shares(richer, ["gyro_scale"], ["gyro_scale"], Driving.of(lap)) == {
+        "gyro_scale": (UNKNOWN, UNKNOWN)
+    }
 
 
 @pytest.mark.manual

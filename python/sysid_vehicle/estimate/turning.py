@@ -12,6 +12,8 @@ from .driving import Driving
 _AROUND_S = 0.5  # on either side
 _LEAST = 0.25  # of the root mean square over all driving
 _BLOCK_S, _FEWEST = 5.0, 6
+_MOST_MPS2 = 15.0  # of v_x r that counts: a spin is no measure of corners
+_SLOWEST_MPS = 3.0
 
 _Bools = npt.NDArray[np.bool_]
 
@@ -35,8 +37,10 @@ def turning(driving: Driving) -> _Bools:
     """
     r = driving.channel("yaw_rate_radps")
     v = driving.channel("vx_mps")
+    v = np.maximum(np.where(np.isfinite(v), v, 0.0), _SLOWEST_MPS)
+    side = np.clip(v * r, -_MOST_MPS2, _MOST_MPS2)
     found = np.zeros(driving.samples, dtype=bool)
-    for motion in (r, np.where(np.isfinite(v), v, 0.0) * r):
+    for motion in (side / v, side):
         known = np.isfinite(motion)
         squares = np.where(known, motion, 0.0) ** 2
         least = _LEAST**2 * float(squares.sum()) / max(int(known.sum()), 1)

@@ -16,11 +16,11 @@
 7. Nothing left: what was added explains it. An added effect is not named if its value is physically
    implausible, or differs between pieces of the driving by a size that matters, or if something
    unknown does all that it does and more.
-8. Something left: names are withdrawn that take up less than `most` of the error 1 to 5 s ahead, or
-   less than is left; so is a single one that should have explained it too, unless those errors
-   fall with it wherever it moves them (`falls`). Beside much that is left names stay with which
-   they do, if nothing that was added beside them and does not stay moves the same channels and
-   changes a share `taken` of those errors.
+8. Something left, or taken up by what only stands in for it: a name stands by its own share, what
+   comes back of the error 1 to 5 s ahead where the final model lacks it and all else is fitted
+   anew. It is above `taken` and shown not to be chance, on training and on validation data; where
+   less than `most` of that error is gone, the whole interval is above `taken`. Nothing that has no
+   such share takes more, and moves a channel that it moves.
 9. The verdict follows from what is left and which names stand (`verdict`).
 10. `Rules` holds every limit with unit, meaning, and the benchmark that chose or judges it.
 
@@ -30,22 +30,12 @@ Nothing here sees a fit or a log: others measure, this decides.
 from .accept import Change, Gain, Measures, accept, bic, worse
 from .facts import Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
-from .verdict import (
-    NONE_GONE,
-    Grade,
-    Share,
-    excess,
-    grade,
-    share_between,
-    share_explained,
-    share_of,
-    smaller_than,
-    something_left,
-    verdict,
-)
+from .share import NONE_GONE, UNKNOWN, Share, share_between, share_explained, share_of
+from .verdict import Grade, excess, grade, incomplete, something_left, verdict
 
 __all__ = [
     "NONE_GONE",
+    "UNKNOWN",
     "USUAL",
     "Added",
     "Change",
@@ -63,10 +53,10 @@ __all__ = [
     "bic",
     "excess",
     "grade",
+    "incomplete",
     "share_between",
     "share_explained",
     "share_of",
-    "smaller_than",
     "something_left",
     "verdict",
     "worse",

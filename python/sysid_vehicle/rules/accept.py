@@ -10,8 +10,6 @@ import numpy as np
 
 from .limits import USUAL, Rules
 
-_LEAST = 1e-3  # standard error of a change, where blocks happen to agree
-
 
 def bic(log_likelihood: float, parameters: int, samples: int) -> float:
     """Log-likelihood less the BIC penalty of the parameters [nats] (Schwarz, Ann. Stat. 1978)."""
@@ -51,15 +49,12 @@ class Change:
     log_ratio, error : float
         Logarithm of the error after over that before, and its standard error; of few blocks it is
         larger, so that as many of them hold the true value with the same probability.
-    reach : float
-        By how much the logarithm would fall were all that the effect moves an error before.
     """
 
     channel: str
     horizon_s: float
     log_ratio: float
     error: float
-    reach: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -133,31 +128,3 @@ def worse(changes: Sequence[Change], rules: Rules = USUAL) -> tuple[Change, ...]
 def _mean(changes: Sequence[Change], channel: str, what: str) -> float:
     """Over the horizons of a channel; their errors are nearly those of the same samples."""
     return float(np.mean([getattr(c, what) for c in changes if c.channel == channel]))
-
-
-def falls(validation: Sequence[Change], training: Sequence[Change], rules: Rules = USUAL) -> bool:
-    """Whether errors some seconds ahead fall in every channel that an effect moves, on all data.
-
-    It moves a channel whose error would fall by more than matters were all that it moves explained.
-    There the error must fall at every horizon, and one horizon has to show it: validation data
-    clearly and by more than it matters, all data together beyond chance. Elsewhere none may grow.
-    """
-    least = math.log1p(rules.worse)
-    channels = {c.channel for c in validation if c.reach > least}
-    moved = [c for c in (*validation, *training) if c.channel in channels]
-    shown = {c.channel for c in validation if _fallen(c, training, rules)}
-    return (
-        bool(channels)
-        and channels <= shown
-        and all(c.log_ratio < 0.0 for c in moved)
-        and not worse((*validation, *training), rules)
-    )
-
-
-def _fallen(here: Change, training: Sequence[Change], rules: Rules) -> bool:
-    there = [c for c in training if (c.channel, c.horizon_s) == (here.channel, here.horizon_s)]
-    errors = np.array([max(c.error, _LEAST) for c in (here, *there)])
-    precision = errors**-2.0
-    fall = -float(precision @ [c.log_ratio for c in (here, *there)]) / float(np.sum(precision))
-    clear = -here.log_ratio > max(math.log1p(rules.worse), rules.clear * here.error)
-    return clear and fall > rules.sure * float(np.sum(precision)) ** -0.5

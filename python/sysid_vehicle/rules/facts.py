@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
-from .accept import Change
+from .share import UNKNOWN, Share
 
 Verdict = Literal["adequate", "explained", "partly_explained", "unknown", "not_testable"]
 
@@ -43,20 +43,18 @@ class Added:
         Its rivals, where it is one of a group.
     moves : frozenset of str
         Channels that it moves.
-    taken : float
-        Of `Facts.missing`, what it took up in its turn.
-    changes, changes_in_training : tuple of Change
-        With it, of the errors 1 to 5 s ahead: on validation data, and on training data, where
-        errors of one step were fitted. Only asked where something is left.
+    own, own_in_training : Share
+        Of the error 1 to 5 s ahead that the final model leaves without it, all else fitted anew,
+        what it takes away: on validation and on training data. Only asked where something is
+        missing.
     """
 
     id: str
     finding: str
     group: tuple[str, ...] = ()
     moves: frozenset[str] = frozenset()
-    taken: float = 0.0
-    changes: tuple[Change, ...] = ()
-    changes_in_training: tuple[Change, ...] = ()
+    own: Share = UNKNOWN
+    own_in_training: Share = UNKNOWN
 
     @property
     def named(self) -> bool:
@@ -101,14 +99,11 @@ class Facts:
     structure: tuple[float, float] = (1.0, 0.0)
     small: bool = False
 
-    def with_changes(
-        self, changes: Mapping[str, tuple[tuple[Change, ...], tuple[Change, ...]]]
-    ) -> Facts:
-        """The same with changes by effect: on validation data, and on training data."""
-        none: tuple[tuple[Change, ...], tuple[Change, ...]] = ((), ())
-        told = ((a, *changes.get(a.id, none)) for a in self.added)
-        added = (replace(a, changes=c, changes_in_training=t) for a, c, t in told)
-        return replace(self, added=tuple(added))
+    def with_own(self, own: Mapping[str, tuple[Share, Share]]) -> Facts:
+        """The same with the own shares of effects: on validation data, and on training data."""
+        told = ((a, *own.get(a.id, (UNKNOWN, UNKNOWN))) for a in self.added)
+        added = tuple(replace(a, own=v, own_in_training=t) for a, v, t in told)
+        return replace(self, added=added)
 
 
 @dataclass(frozen=True)

@@ -77,13 +77,10 @@ class Rules:
     sure: float = _limit(
         4.5,
         "standard errors",
-        "of likelihood on validation data that decide alone, and of errors ahead on all data that "
-        "fall: then a name stands beside much that is left",
+        "of likelihood on validation data that decide alone, and between what two data sets tell",
         _EFFECTS,
     )
-    worse: float = _limit(
-        0.05, "share", "by which no error 1 to 5 s ahead may grow; a smaller fall is none", _EFFECTS
-    )
+    worse: float = _limit(0.05, "share", "by which no error 1 to 5 s ahead may grow", _EFFECTS)
     nothing: float = _limit(
         0.5, "probability", "before any data, that one of a sum of effects is none", _NULLS
     )
@@ -140,7 +137,7 @@ class Rules:
 
     @property
     def taken(self) -> float:
-        """Share of the error that a name takes up, where much evidence is left beside it."""
+        """Share of the error that is worth a name: less than what may be left beside names."""
         return 1.0 - self.most
 
     def at(self, alpha: float | None) -> Rules:

@@ -2,103 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Literal
 
-import numpy as np
-import numpy.typing as npt
-
-from .accept import falls
 from .facts import Added, Decision, Facts, Tested, Withdrawn
 from .limits import USUAL, Rules
+from .share import share_of
 
 Grade = Literal["confirmed", "plausible", "alias"]
-NONE_GONE = (
-    "with the parameters that predict validation data best, the baseline errs no more 1 to 5 s "
-    "ahead"
+_NOT_SHOWN = (
+    "beside all else it is not shown to take a share of the error 1 to 5 s ahead on training and "
+    "validation data"
 )
-"""Why what was added explains nothing, though the fits of one step err less with it."""
 
 
 def excess(test: Tested) -> float:
     """Evidence beyond what a complete model shows."""
     return max(test.statistic - test.degrees, 0.0)
-
-
-def share_explained(before: float, after: float) -> float:
-    """Of the square of an error beyond the noise floor, what a richer model took away.
-
-    All of it, where nothing was beyond the noise floor.
-    """
-    most, left = (max(error**2 - 1.0, 0.0) for error in (before, after))
-    return share_of(most, left) if most > 0.0 else 1.0
-
-
-def share_of(before: float, after: float) -> float:
-    """Of what is missing, what a richer model took away; where nothing was missing, all or none."""
-    if before > 0.0:
-        return 1.0 - after / before
-    return 0.0 if after > 0.0 else 1.0
-
-
-@dataclass(frozen=True)
-class Share:
-    """Of what could be explained, what is; NaN where nothing could.
-
-    Attributes
-    ----------
-    value, low, high : float
-        With a 95 % interval.
-    """
-
-    value: float
-    low: float
-    high: float
-
-    @property
-    def known(self) -> bool:
-        """Whether there is anything that could be explained."""
-        return not np.isnan(self.value)
-
-    def __str__(self) -> str:
-        if not self.known:
-            return ""
-        return f"{100 * self.value:.0f} % ({100 * self.low:.0f} to {100 * self.high:.0f})"
-
-    def to_dict(self) -> dict[str, float | None]:
-        """Share and interval, ready for JSON."""
-        names = ("value", "low", "high")
-        return {n: getattr(self, n) if self.known else None for n in names}
-
-
-def share_between(
-    squares: npt.NDArray[np.float64], least: float = 0.0, rules: Rules = USUAL
-) -> Share:
-    """Share of the way from the baseline to the ceiling.
-
-    Parameters
-    ----------
-    squares : array, shape (1 + draws, 3)
-        Mean squared errors of baseline, final model and ceiling: as found, then with blocks drawn
-        anew (Efron 1979).
-    least : float
-        Share of the baseline's square that must be explainable.
-
-    Returns
-    -------
-    Share
-        Unknown where the ceiling is not below the baseline by so much in 95 % of the draws.
-    """
-    before, after, least_left = squares.T
-    explainable = before - np.minimum(least_left, after)
-    seen = explainable - least * before
-    if not seen[0] > 0.0 or not np.quantile(seen[1:], rules.alpha) > 0.0:
-        return Share(np.nan, np.nan, np.nan)
-    found = explainable[1:] > 0.0
-    drawn = (before[1:] - after[1:])[found] / explainable[1:][found]
-    low, high = np.quantile(drawn, (0.025, 0.975))
-    return Share(float((before[0] - after[0]) / explainable[0]), float(low), float(high))
 
 
 def grade(alone: str, beside: str, *, much_left: bool = False) -> Grade:
@@ -139,8 +59,13 @@ def something_left(facts: Facts, rules: Rules = USUAL) -> bool:
     return anywhere > rules.explainable and not all(p > level for p, level in evidence)
 
 
+def incomplete(facts: Facts, rules: Rules = USUAL) -> bool:
+    """Whether something is missing in the final model: left by it, or taken up by a stand-in."""
+    return any(a.finding == "proxy" for a in facts.added) or something_left(facts, rules)
+
+
 def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
-    """The verdict on the whole, and the names that cannot be told beside what is left.
+    """The verdict on the whole, and the names that cannot be told beside what is missing.
 
     What was added may explain all, a part, or only stand in for what is missing. Its residuals
     tell: on the training data, and on all data together, where a stand-in leaves what the right
@@ -159,7 +84,9 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
             return Decision("not_testable")
         return Decision("unknown" if left and not facts.small else "adequate")
     stand_ins = frozenset(a.id for a in facts.added if a.finding == "proxy")
-    withdrawn = _withdrawn(facts, rules, names, stand_ins) if left else []
+    withdrawn = []
+    if left or stand_ins:
+        withdrawn.append(Withdrawn(names - _standing(facts, rules), _NOT_SHOWN, names))
     # What only stands in for something else explains nothing, however well it fits, and what cannot
     # be told from that is no better.
     because = f"it acts like {', '.join(sorted(stand_ins))}, which is none either"
@@ -173,84 +100,35 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     return Decision("explained" if whole else "partly_explained", tuple(withdrawn), much)
 
 
-def _withdrawn(
-    facts: Facts, rules: Rules, names: frozenset[str], stand_ins: frozenset[str]
-) -> list[Withdrawn]:
-    """Names that are not safe beside something that is left."""
-    before, after = facts.missing
-    share = share_of(before, after)
-    stands = _standing(facts, rules)
-    if share < rules.most and stands:
-        # A real road, and what nobody knows of a car, leave much beside the right effect too. What
-        # only stands in for it serves some channels and moments at the price of others.
-        because = (
-            "with it errors 1 to 5 s ahead are not shown to fall in every channel that it moves"
-        )
-        return [Withdrawn(names - stands, because, names)]
-    if share < rules.most:
-        little = f"takes up only {100 * share:.0f} % of the error 1 to 5 s ahead"
-        because = little if share > 0.0 else NONE_GONE
-        return [Withdrawn(names, because, names)]
-    taken = {a.id: a.taken for a in facts.added}
-    small = smaller_than(after, taken, stand_ins)
-    first = Withdrawn(small, "what is left unexplained is larger", names)
-    # A real car lacks more than one effect: what stands need not have explained what is left.
-    alone = _alone(facts, rules, small) - stands
-    because = "were it what is missing, nothing would be left"
-    return [first, Withdrawn(alone, because, names)]
-
-
 def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
-    """Effects with which the errors ahead fall wherever they move them, whatever is left.
+    """Effects whose own share of the error ahead is shown on training and validation data.
 
-    What does not stand tells that something is missing which moves the same: where an effect moves
-    a channel that such a one moves, it may be a part of that itself, unless next to nothing of the
-    error is at stake.
+    Evidence grows with the data, whatever small misfit an effect serves; a share does not. It is
+    that of the effect beside all others, which were fitted anew without it: what one of them, or
+    the tyres, would do in its place is not its own. A stand-in serves one manoeuvre, and the next
+    one at a price. Where much is left, what it stands in for may be that: the share must be shown
+    to be one worth a name. So may it be what a stand-in takes that moves the same channel, if
+    that is the larger part.
     """
-    least = rules.taken * facts.missing[0]
-    standing = {
-        a.id
+    much = share_of(*facts.missing) < rules.most
+    least = rules.taken if much else 0.0
+    shown = [
+        a
         for a in facts.added
-        if a.named and a.taken >= least and falls(a.changes, a.changes_in_training, rules)
-    }
-    unsure = {
-        c for a in facts.added if a.id not in standing and abs(a.taken) >= least for c in a.moves
-    }
-    return frozenset(a.id for a in facts.added if a.id in standing and not a.moves & unsure)
+        if a.named
+        and all(s.value > rules.taken and s.low > least for s in (a.own, a.own_in_training))
+    ]
+    others = [a for a in facts.added if a not in shown]
+    return frozenset(
+        a.id for a in shown if not any(a.moves & b.moves and _more(b, a) for b in others)
+    )
 
 
-def _alone(facts: Facts, rules: Rules, small: frozenset[str]) -> frozenset[str]:
-    """The effect that is named, where it is one only, if it should have explained what is left.
-
-    A proxy beside it tells that something else is missing too. That may be all that is left, unless
-    it moves what the effect moves.
-    """
-    tests = [facts.fitted] if facts.fitted.p_value < rules.strict else []
-    if facts.together is not None and _together(facts, rules):
-        tests.append(facts.together)
-    named = [a for a in facts.added if a.named and a.id not in small]
-    if len(named) != 1:
-        return frozenset()
-    own = frozenset({named[0].id})
-    if not any(a.finding == "proxy" or (a.named and a.id in small) for a in facts.added):
-        return own if tests else frozenset()
-    return own if any(named[0].moves & set(t.moves) for t in tests) else frozenset()
-
-
-def smaller_than(
-    left: float, taken: Mapping[str, float], proxies: frozenset[str]
-) -> frozenset[str]:
-    """Effects that took up less than is left unexplained in the end.
-
-    What a proxy took up is unexplained too.
-    """
-    uncertain = set(proxies)
-    while True:
-        unexplained = left + sum(max(taken.get(e, 0.0), 0.0) for e in uncertain)
-        more = {e for e, t in taken.items() if e not in uncertain and t < unexplained}
-        if not more:
-            return frozenset(uncertain - proxies)
-        uncertain |= more
+def _more(one: Added, other: Added) -> bool:
+    """Whether an effect takes more than another on any data."""
+    return (
+        one.own.value > other.own.value or one.own_in_training.value > other.own_in_training.value
+    )
 
 
 def _together(facts: Facts, rules: Rules) -> bool:

@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
 import numpy.typing as npt
 
-from .._arguments import generator
 from .._arrays import FloatArray, as_float64
 from .._memo import remembered
 from .._text import html_table, number, text_table
@@ -23,7 +21,7 @@ from ..errors import NumericalError
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_blocks
 from ..identify import Fit
 from ..identify.ahead import of_few
-from ..rules import Change, share_of
+from ..rules import Change
 from .waterfall import all_ahead
 
 LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2")
@@ -31,7 +29,6 @@ PREDICTED = ("vx_mps", "ax_mps2", *LATERAL)
 _LATERAL = [PREDICTED.index(c) for c in LATERAL]
 AHEAD = (0.5, 1.0, 2.0, 5.0)
 _FEWEST = 5  # blocks that show a change
-_DRAWS = 300
 _APART = 0.1  # of the horizon, between predictions
 _NORMAL = 1.4826  # standard deviation over the median absolute deviation
 _LOST = 10.0  # logarithm of the ratio, where one of two models lost the car
@@ -170,80 +167,6 @@ def _quantile(by_block: FloatArray, q: float) -> FloatArray:
     return as_float64(out)
 
 
-@dataclass(frozen=True)
-class Beyond:
-    """Errors some seconds ahead beyond the noise of the sensors, in one number for each model.
-
-    Attributes
-    ----------
-    squares : tuple of float
-        Mean over channels and horizons of the square of the median error, less that of the
-        sensor noise, over the square of the first model's error.
-    share, low, high : float
-        Of the first one's, what the last model takes away; 95 % interval from draws of the blocks.
-    """
-
-    squares: tuple[float, ...]
-    share: float
-    low: float
-    high: float
-
-    def __str__(self) -> str:
-        # What grows is not taken away: how many times it grows is another figure.
-        share, low, high = (f"{100 * max(x, 0.0):.0f}" for x in (self.share, self.low, self.high))
-        return f"{share} % ({low} to {high})"
-
-    def to_dict(self) -> dict[str, float]:
-        """Share and interval, ready for JSON."""
-        return {"share": self.share, "low": self.low, "high": self.high}
-
-
-def beyond_noise(
-    fits: Sequence[Fit], driving: Driving, horizons_s: Sequence[float], *, seed: int = 0
-) -> Beyond:
-    """Work out what errors some seconds ahead are beyond the noise of the sensors.
-
-    Parameters
-    ----------
-    fits : sequence of Fit
-        The last one's noise starts every prediction.
-    driving : Driving
-    horizons_s : sequence of float
-    seed : int
-        Of the draws.
-    """
-    noise = fits[-1].noise.floor()
-    sensor = np.array([noise.sensor[MEASURED.index(c)] for c in PREDICTED])
-    # Shape (models, blocks, horizons, channels).
-    squares = np.stack([block_errors(f, noise, driving, tuple(horizons_s)) for f in fits]) ** 2
-    seen = np.isfinite(squares).any(axis=(0, 1))
-    seen &= np.isin(PREDICTED, _explainable(driving))
-    if not seen.any():  # too short for any prediction
-        return Beyond((0.0,) * len(fits), 1.0, 0.0, 1.0)
-    # What a model loses is as wrong as anything that was seen, and much more.
-    most = np.nanmax(np.where(np.isfinite(squares), squares, 0.0), axis=(0, 1))
-    squares = np.where(np.isinf(squares), _LOST**2 * most, squares)
-    whole = _beyond(squares, sensor, seen)
-    draws = generator(seed).integers(0, squares.shape[1], (_DRAWS, squares.shape[1]))
-    shares = [_share(_beyond(squares[:, d], sensor, seen)) for d in draws]
-    low, high = np.quantile(shares, (0.025, 0.975))
-    return Beyond(tuple(map(float, whole)), _share(whole), float(low), float(high))
-
-
-def _beyond(squares: FloatArray, sensor: FloatArray, seen: npt.NDArray[np.bool_]) -> FloatArray:
-    with catch_warnings():
-        simplefilter("ignore", RuntimeWarning)  # blocks without a prediction this far ahead
-        middle = np.nanmedian(squares, axis=1)[:, seen]
-    noise = np.broadcast_to(sensor**2, seen.shape)[seen]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = np.maximum(middle - noise, 0.0) / middle[0]
-    return as_float64(np.nan_to_num(ratio, nan=0.0, posinf=0.0).mean(axis=1))
-
-
-def _share(squares: FloatArray) -> float:
-    return share_of(float(squares[0]), float(squares[-1]))
-
-
 # The poorer model of all candidates of a step is the same one.
 @remembered(64)
 def block_errors(
@@ -265,6 +188,25 @@ def block_errors(
         NaN where nothing is predicted, infinite where the model lost the car.
     """
     return _by_block(_ahead(fit, noise, driving, horizons_s), driving)
+
+
+def squares_ahead(
+    fits: Sequence[Fit], driving: Driving, horizons_s: Sequence[float]
+) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+    """Squares of errors, noise of the sensors, and which horizons and channels are seen.
+
+    The squares have shape (models, blocks, horizons, channels). The last model's noise starts every
+    prediction.
+    """
+    noise = fits[-1].noise.floor()
+    sensor = np.array([noise.sensor[MEASURED.index(c)] for c in PREDICTED])
+    squares = np.stack([block_errors(f, noise, driving, tuple(horizons_s)) for f in fits]) ** 2
+    seen = np.isfinite(squares).any(axis=(0, 1))
+    seen &= np.isin(PREDICTED, _explainable(driving))
+    # What a model loses is as wrong as anything that was seen, and much more.
+    most = np.max(squares, axis=(0, 1), initial=0.0, where=np.isfinite(squares))
+    squares = np.where(np.isinf(squares), _LOST**2 * most, squares)
+    return as_float64(squares), as_float64(sensor), seen
 
 
 def _ahead(
@@ -290,25 +232,6 @@ def _by_block(e: FloatArray, driving: Driving) -> FloatArray:
         return as_float64(np.where(count > 0.0, np.sqrt(squares / count), np.nan).swapaxes(0, 1))
 
 
-def _moved(
-    before: Fit, after: Fit, noise: NoiseModel, driving: Driving, horizons_s: tuple[float, ...]
-) -> FloatArray:
-    """Root mean squares of what a model predicts otherwise, shape (blocks, horizons, channels)."""
-    one, other = (_ahead(fit, noise, driving, horizons_s) for fit in (before, after))
-    with np.errstate(invalid="ignore"):
-        return _by_block(as_float64(other - one), driving)
-
-
-def _reach(moved: FloatArray, error: FloatArray) -> float:
-    """By how much the logarithm of an error falls if what is moved was a part of it.
-
-    What is right to be taken off is no part of what stays: squares fall by its square.
-    """
-    finite = np.isfinite(moved) & np.isfinite(error)
-    share = float(np.median(moved[finite] / error[finite])) if finite.any() else np.inf
-    return -0.5 * float(np.log1p(-(share**2))) if share < 1.0 else np.inf
-
-
 def typical_error(
     fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: Sequence[float]
 ) -> float:
@@ -325,7 +248,7 @@ def typical_error(
 
 
 def changes(
-    before: Fit, after: Fit, driving: Driving, horizons_s: Sequence[float], *, reach: bool = False
+    before: Fit, after: Fit, driving: Driving, horizons_s: Sequence[float]
 ) -> tuple[Change, ...]:
     """How errors some seconds ahead change from one model to another.
 
@@ -335,8 +258,6 @@ def changes(
         The noise floor of the latter starts the predictions of both.
     driving : Driving
     horizons_s : sequence of float
-    reach : bool
-        Whether to work out how far each error could fall.
 
     Returns
     -------
@@ -346,7 +267,6 @@ def changes(
     noise = after.noise.floor()
     found = []
     both = [block_errors(fit, noise, driving, tuple(horizons_s)) for fit in (before, after)]
-    moved = _moved(before, after, noise, driving, tuple(horizons_s)) if reach else None
     for i, h in enumerate(horizons_s):
         one, other = (errors[:, i] for errors in both)
         for channel in _explainable(driving):
@@ -367,7 +287,6 @@ def changes(
                     h,
                     middle,
                     _OF_MEDIAN * scatter * of_few(len(ratio)) / float(np.sqrt(len(ratio))),
-                    np.inf if moved is None else _reach(moved[known, i, j], one[known, j]),
                 )
             )
     return tuple(found)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
 from typing import Literal
 from warnings import catch_warnings, simplefilter
 
@@ -21,17 +20,17 @@ from ..estimate import Driving
 from ..identify import Fit, driving_of, explaining, identify
 from ..log import Log, check_excitation, several_logs
 from ..model import Model
-from ..rules import USUAL, Change, Decision, Rules, grade, something_left, verdict
+from ..rules import USUAL, Decision, Rules, grade, incomplete, verdict
 from ..sensors import SensorCheck, made_ready, put_right
 from .added import AddedEffect
 from .clock import in_time
-from .horizons import changes
 from .matters import sizes_that_matter, sufficient
+from .own import own_shares
 from .search import Search, Trail, kept
 from .steps import way
 from .structure import structure
 from .study import Study
-from .validation import AHEAD, beyond_noise_ahead, changes_ahead, serving, set_aside
+from .validation import beyond_noise_ahead, serving, set_aside
 from .verdict import facts_of, in_the_light_of
 
 _SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
@@ -190,8 +189,9 @@ def improve(
             structure=(pattern.anywhere, pattern.everywhere),
             small=sizes is not None and sufficient(fit, test_driving, sizes) is not None,
         )
-        if len(fits) > 1 and something_left(facts, rules):
-            facts = facts.with_changes(_changes(fits, test_driving))
+        if len(fits) > 1 and incomplete(facts, rules):
+            named = {a.id for a in facts.added if a.named}
+            facts = facts.with_own(own_shares(fit, _new(fits), named, test_driving))
         decision = verdict(facts, rules)
         alone, told = told, in_the_light_of(decision, told)
         return Study(
@@ -213,20 +213,6 @@ def improve(
             stopped=found.stopped,
             checked=bool(sensors),
         )
-
-
-def _changes(
-    fits: Sequence[Fit], test: Driving
-) -> dict[str, tuple[tuple[Change, ...], tuple[Change, ...]]]:
-    """How errors 1 to 5 s ahead change with each effect, on validation and on training data."""
-    return {
-        name: (
-            changes_ahead(before, after, test, reach=True),
-            changes(before, after, after.driving, AHEAD, reach=True),
-        )
-        for before, after in pairwise(fits)
-        for name in set(after.model.effects) - set(before.model.effects)
-    }
 
 
 def _together(train: Driving, test: Driving) -> Driving:

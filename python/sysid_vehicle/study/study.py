@@ -35,8 +35,9 @@ from ..model import Model
 from ..rules import NONE_GONE, USUAL, Rules, Verdict
 from ..saved import save
 from .added import AddedEffect
+from .beyond import Beyond
 from .disagree import Disagreement, disagreements
-from .horizons import Beyond, Horizons, horizons
+from .horizons import Horizons, horizons
 from .next_steps import next_steps
 from .predicting import Predicting, predicting
 from .record import record

@@ -8,7 +8,7 @@ from ..compare import Comparison
 from ..diagnose import Omnibus, Verdicts
 from ..identify import Fit
 from ..rules import Added, Decision, Facts
-from .horizons import Beyond
+from .beyond import Beyond
 
 
 def facts_of(
@@ -41,20 +41,13 @@ def facts_of(
     """
     missing = (0.0,) if explained is None else explained.squares
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
-    taken = _taken_up(fits, missing)
     return Facts(
         fitted,
         together,
         candidate,
         (missing[0], missing[-1]),
         tuple(
-            Added(
-                v.effect.id,
-                v.finding,
-                v.group,
-                frozenset(v.effect.moves.split(", ")),
-                taken.get(v.effect.id, 0.0),
-            )
+            Added(v.effect.id, v.finding, v.group, frozenset(v.effect.moves.split(", ")))
             for v in told.all
             if v.effect.id in added
         ),
@@ -70,17 +63,3 @@ def in_the_light_of(decision: Decision, told: Verdicts) -> Verdicts:
     for w in decision.withdrawn:
         told = told.with_reservation(w.effects, w.because, added=w.beside)
     return told
-
-
-def _taken_up(fits: Sequence[Fit], missing: Sequence[float]) -> dict[str, float]:
-    """Of what is missing, by each effect that was added, in its turn.
-
-    Of two that act alike the later one counts only for what the first could not take up: that much
-    may as well be a part of what is left.
-    """
-    taken: dict[str, float] = {}
-    steps = zip(fits[:-1], fits[1:], missing[:-1], missing[1:], strict=True)
-    for poorer, richer, before, after in steps:
-        for e in set(richer.model.effects) - set(poorer.model.effects):
-            taken[e] = before - after
-    return taken

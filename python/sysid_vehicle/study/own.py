@@ -1,0 +1,61 @@
+"""What each effect that was added does that nothing else of the model would do in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from .._threads import in_parallel
+from ..errors import NumericalError
+from ..estimate import Driving
+from ..identify import Fit, refit
+from ..rules import UNKNOWN, Share
+from .beyond import own_share
+from .validation import AHEAD, at_its_best
+
+
+def own_shares(
+    final: Fit, effects: Sequence[str], named: Collection[str], test: Driving
+) -> dict[str, tuple[Share, Share]]:
+    """Find the share of the error 1 to 5 s ahead that is an effect's own.
+
+    The model without it is fitted anew under the same noise: tyres and the other effects take up
+    what they can. On validation data both models have the parameters of `at_its_best`.
+
+    Parameters
+    ----------
+    final : Fit
+    effects : sequence of str
+        Those that were added.
+    named : collection of str
+        Those of them that are asked for: where none has a share of the training data, validation
+        data are not asked.
+    test : Driving
+        Validation data.
+
+    Returns
+    -------
+    dict
+        By effect, on validation and on training data; unknown where a model fails.
+    """
+    without = dict(zip(effects, in_parallel(lambda e: _without(final, e), effects), strict=True))
+    left = {e: fit for e, fit in without.items() if fit is not None}
+    trained = in_parallel(lambda f: own_share(f, final, final.driving, AHEAD), left.values())
+    fitted = dict(zip(left, trained, strict=True))
+    judged: dict[str, Share] = {}
+    if any(fitted[e].low > 0.0 for e in fitted if e in named):
+        best = at_its_best(final, test)
+
+        def on_test(fit: Fit) -> Share:
+            return own_share(at_its_best(fit, test), best, test, AHEAD)
+
+        judged = dict(zip(left, in_parallel(on_test, left.values()), strict=True))
+    return {e: (judged.get(e, UNKNOWN), fitted.get(e, UNKNOWN)) for e in effects}
+
+
+def _without(final: Fit, effect: str) -> Fit | None:
+    try:
+        return refit(final.model.drop(effect), final.driving, final.noise)
+    except (NumericalError, np.linalg.LinAlgError):
+        return None
