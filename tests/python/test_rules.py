@@ -48,7 +48,7 @@ NUMERICAL = {
     "study/improve.py": {"_SHORT_S"},
     "study/next_steps.py": {"_SHOWN"},
     "study/shares.py": {
-        "AHEAD", "_LEAST_APART_S", "_APART",  "_DRAWS", "_LONG_S", "_FEW",
+        "AHEAD", "_LEAST_APART_S", "_APART", "_DRAWS", "_LONG_S", "_FEW",
         "_VISIBLE", "_LOST", "_LEAST", "_QUANTILES",
     },
     "study/steps.py": {"_ALTERNATIVES"},
