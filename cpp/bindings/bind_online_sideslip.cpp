@@ -1,7 +1,5 @@
 // Sideslip observers, a sample at a time and over a whole log, and the recursive least squares of
 // the cornering stiffness.
-#include <utility>
-
 #include "arrays.hpp"
 #include "register.hpp"
 #include "stateful.hpp"
