@@ -16,12 +16,11 @@ from typing import Final
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray
+from .._arrays import ComplexArray, FloatArray
 from ..log import Log
-from ._apply import shifted
 from ._low_pass import NoiseFit, Response, fitted, with_low_pass
 from ._signals import MOVING, own_samples, quantum
-from ._spectrum import NoiseSpectrum, Spectrum, independent_every, spectrum_of, steady
+from ._spectrum import NoiseSpectrum, Spectrum, spectrum_of, steady
 
 __all__ = ["conditioned", "low_passes"]
 
@@ -33,6 +32,8 @@ _DEVICES: Final = (("vx_mps", "vy_mps"), ("yaw_rate_radps", "ax_mps2", "ay_mps2"
 _EVIDENCE: Final = 10.0  # nats that a filter must bring
 _MISMATCH: Final = 1.5  # of forms that are taken for right
 _DELAY_STD_S: Final = 0.0015  # of a delay that is taken out
+_RAISED: Final = 4.0  # times the power of noise at low frequencies, up to which it comes up
+_DAMPING: Final = (0.5, 0.95)  # Butterworth's is 0.71, Bessel's 0.87; one of 1 may be none in time
 _BAND: Final = 0.45  # of the rate; a corner beyond it is not seen
 
 
@@ -60,18 +61,11 @@ def conditioned(logs: Sequence[Log]) -> list[Log]:
         The same logs where their noise is white already.
     """
     channels = _channels(logs)
-    found = _filters(channels)
-    result = []
-    for number, log in enumerate(logs):
-        spectra = {}
-        for channel in channels:
-            if channel.log != number:
-                continue
-            s, filtered = channel.spectrum, found.get(channel.name)
-            smooth = filtered.smooth_of(channel) if filtered else channel.plain.smooth[0]
-            spectra[channel.name] = NoiseSpectrum(s.rate_hz, s.frequency_hz, s.power, smooth)
-        result.append(_put_right(log, spectra, found))
-    return result
+    found = _filters(channels, logs)
+    return [
+        _put_right(log, [c for c in channels if c.log == number], found)
+        for number, log in enumerate(logs)
+    ]
 
 
 def low_passes(logs: Sequence[Log]) -> dict[str, tuple[Response, float]]:
@@ -82,8 +76,8 @@ def low_passes(logs: Sequence[Log]) -> dict[str, tuple[Response, float]]:
     logs : sequence of Log
         Of the same sensors.
     """
-    channels = _channels(logs)
-    return {name: (f.response, f.fit.delay_std_s) for name, f in _filters(channels).items()}
+    found = _filters(_channels(logs), logs)
+    return {name: (f.response, f.fit.delay_std_s) for name, f in found.items()}
 
 
 def _channels(logs: Sequence[Log]) -> list[_Channel]:
@@ -119,27 +113,38 @@ class _Filtered:
         return (
             self.fit.mismatch < _MISMATCH
             and self.fit.delay_std_s < _DELAY_STD_S
+            and _DAMPING[0] < self.response.damping < _DAMPING[1]
             and self.response.corner_hz < _BAND * lowest_hz
         )
 
-    @property
-    def every(self) -> int:
-        """Samples from one reading to the next that is independent of it."""
-        return max(independent_every(white) for white in self.fit.white)
+    def undone(self, channel: _Channel) -> ComplexArray:
+        """Factor at each frequency that undoes the filter.
+
+        Where counting in quanta or folding came after it, only as far as noise allows.
+        """
+        s, white = channel.spectrum, self.fit.white[self.channels.index(channel)]
+        power = self.response.power(s.frequency_hz, s.rows_hz)
+        turn = self.response.turned(s.frequency_hz, s.rows_hz)
+        up = np.minimum(1.0 / np.maximum(power, 1e-12), _RAISED * white[0] / white)
+        result: ComplexArray = np.sqrt(up) * np.exp(1j * turn)
+        return result
 
     def smooth_of(self, channel: _Channel) -> FloatArray:
         """Power of a channel's noise without lines."""
         return self.fit.smooth[self.channels.index(channel)]
 
 
-def _filters(channels: Sequence[_Channel]) -> dict[str, _Filtered]:
+def _filters(channels: Sequence[_Channel], logs: Sequence[Log]) -> dict[str, _Filtered]:
     """The filter of each channel; a device has one for all its channels or none.
 
     One channel shifted by itself would be an error between them. The devices of a logger often
     filter alike: one filter for both where it explains them as well as two do.
     """
-    devices = [tuple(c for c in channels if c.name in device) for device in _DEVICES]
-    found = [f for f in map(_filtered, devices) if f is not None]
+    found = []
+    for device in _DEVICES:
+        own = tuple(c for c in channels if c.name in device)
+        if len(own) == sum(log.has(name) for log in logs for name in device):
+            found += [f for f in [_filtered(own)] if f is not None]
     if len(found) == len(_DEVICES):
         both = _filtered(tuple(channels))
         count = sum(c.spectrum.independent for c in channels)
@@ -151,6 +156,8 @@ def _filters(channels: Sequence[_Channel]) -> dict[str, _Filtered]:
 def _filtered(channels: tuple[_Channel, ...]) -> _Filtered | None:
     """The filter that the noise of some channels speaks for."""
     count = sum(c.spectrum.independent for c in channels)
+    if not channels:
+        return None
     # What fits without a filter leaves one nothing to explain.
     over = sum((c.plain.mismatch - 1.0) * c.spectrum.independent for c in channels)
     if 0.5 * over + 3.0 * np.sqrt(0.5 * count) < _EVIDENCE:
@@ -163,37 +170,39 @@ def _filtered(channels: tuple[_Channel, ...]) -> _Filtered | None:
 
 
 def _put_right(
-    log: Log, spectra: dict[str, NoiseSpectrum], filters: dict[str, _Filtered]
+    log: Log, channels: Sequence[_Channel], filters: dict[str, _Filtered]
 ) -> Log:
     now: dict[str, FloatArray] = {}
     what = []
-    for channel, spectrum in spectra.items():
-        lines = spectrum.vibration_hz
+    for channel in channels:
+        name, s = channel.name, channel.spectrum
+        found = filters.get(name)
+        smooth = found.smooth_of(channel) if found else channel.plain.smooth[0]
+        noise = NoiseSpectrum(s.rate_hz, s.frequency_hz, s.power, smooth)
+        lines = noise.vibration_hz
         if lines:
-            now[channel] = _without(log[channel], spectrum)
             shown = ", ".join(f"{f:.3g}" for f in lines)
-            what.append(f"{channel}: vibration at {shown} Hz taken out")
-        if channel in filters:
-            found = filters[channel]
-            delay, every = found.response.delay_s, found.every
-            values = shifted(log["time_s"], now.get(channel, log[channel]), delay)
-            now[channel] = _thinned(values, every)
+            what.append(f"{name}: vibration at {shown} Hz taken out")
+        if found:
+            now[name] = _passed(log[name], s, found.undone(channel) * noise.gain)
+            delay, std = 1000.0 * found.response.delay_s, 1000.0 * found.fit.delay_std_s
             what.append(
-                f"{channel}: its noise is that of a low-pass of {found.response.corner_hz:.3g} Hz; "
-                f"read {1000.0 * delay:.3g} +- {1000.0 * found.fit.delay_std_s:.1g} ms later in "
-                f"the file, every {every} samples"
+                f"{name}: its noise is that of a low-pass of {found.response.corner_hz:.3g} Hz, "
+                f"{delay:.3g} +- {std:.1g} ms late; undone"
             )
+        elif lines:
+            now[name] = _passed(log[name], s, noise.gain)
     return log.corrected(now, what) if now else log
 
 
-def _without(values: FloatArray, spectrum: NoiseSpectrum) -> FloatArray:
-    """Apply the gain over frequency, of zero phase, to the channel's own samples."""
+def _passed(values: FloatArray, spectrum: Spectrum, factor: ComplexArray | FloatArray) -> FloatArray:
+    """Apply a factor over frequency to the channel's own samples."""
     at, every = own_samples(values)
     grid = np.arange(at[0], at[-1] + 1, every)
     whole = np.interp(grid, at, values[at])
-    # The gain is of windows of that many samples; so long is its answer to an impulse.
-    width = 2 * (spectrum.gain.size - 1)
-    answer = np.roll(np.fft.irfft(spectrum.gain, width), width // 2)
+    # The factor is of windows of that many samples; so long is its answer to an impulse.
+    width = 2 * (factor.size - 1)
+    answer = np.roll(np.fft.irfft(factor, width), width // 2)
     answer = np.append(answer, answer[0])
     answer[[0, -1]] *= 0.5
     answer *= np.hanning(answer.size + 2)[1:-1]
@@ -206,12 +215,4 @@ def _without(values: FloatArray, spectrum: NoiseSpectrum) -> FloatArray:
     smooth[:edge] = smooth[len(smooth) - edge :] = np.nan
     result = values.copy()
     result[at] = np.interp(at, grid, smooth)
-    return result
-
-
-def _thinned(values: FloatArray, every: int) -> FloatArray:
-    at, _ = own_samples(values)
-    kept = at[::every]
-    result = np.full(values.size, np.nan)
-    result[kept] = values[kept]
     return result

@@ -26,11 +26,11 @@ __all__ = ["NoiseFit", "Response", "fitted", "with_low_pass"]
 
 _ROAD_HZ: Final = (3.0, 8.0)  # corners of noise that falls by 6 dB per octave
 _ROAD_POWERS: Final = (4, 6)  # of noise that falls faster
-_USUAL_DAMPING, _SPREAD = np.sqrt(0.5), 0.35  # Butterworth's, and of its logarithm
+_USUAL_DAMPING, _SPREAD = np.sqrt(0.5), 0.2  # Butterworth's, and of its logarithm
 _CORNERS_HZ: Final = (8.0, 14.0, 24.0)  # from which a fit begins
-_AFTER: Final = 0.02  # share of white noise that comes after a filter, up to which there is one
+_AFTER: Final = 1e-3  # share of white noise that comes after a filter, up to which there is one
 _SHARED: Final = 3  # parameters of a response
-_BOUNDS: Final = np.log([[2.0, 0.25, 1e-6], [200.0, 2.0, _AFTER]])
+_BOUNDS: Final = np.log([[2.0, 0.25, 1e-7], [200.0, 2.0, _AFTER]])
 _ROUNDS: Final = 60
 _FOLDS: Final = (-2, -1, 1, 2)
 _LOST: Final = 14.0  # logarithm by which a part may go down or up from where it begins
@@ -64,11 +64,21 @@ class Response:
 
     def power(self, frequency_hz: FloatArray, rows_hz: float) -> FloatArray:
         """Factor on the power at each frequency."""
+        u = self._over_corner(frequency_hz, rows_hz) ** 2
+        result: FloatArray = 1.0 / ((1.0 - u) ** 2 + 4.0 * self.damping**2 * u)
+        return result
+
+    def turned(self, frequency_hz: FloatArray, rows_hz: float) -> FloatArray:
+        """Angle by which each frequency lags [rad]."""
+        u = self._over_corner(frequency_hz, rows_hz)
+        result: FloatArray = np.arctan2(2.0 * self.damping * u, 1.0 - u**2)
+        return result
+
+    def _over_corner(self, frequency_hz: FloatArray, rows_hz: float) -> FloatArray:
         seen = frequency_hz
         if self.digital:
             seen = rows_hz / np.pi * np.abs(np.tan(np.pi * frequency_hz / rows_hz))
-        u = (seen / self.corner_hz) ** 2
-        result: FloatArray = 1.0 / ((1.0 - u) ** 2 + 4.0 * self.damping**2 * u)
+        result: FloatArray = seen / self.corner_hz
         return result
 
 
@@ -116,10 +126,10 @@ def with_low_pass(spectra: Sequence[Spectrum]) -> NoiseFit:
             x = problem.search(problem.begin(corner_hz))
             found.append((problem.state(x).cost, problem, x))
     _, problem, x = min(found, key=lambda item: item[0])
-    # Parts of the road that bring nothing would still bend the filter: they can only add.
-    needed = problem.worth(x)
-    less = _Problem(problem.spectra, problem.digital, needed)
-    return less.result(less.search(less.kept(x)))
+    # Parts of the road that bring nothing would still bend the filter: they can only add. That one
+    # cannot know whether they are there is part of the delay's uncertainty.
+    less = _Problem(problem.spectra, problem.digital, problem.worth(x))
+    return less.result(less.search(less.kept(x)), problem.delay_std_s(x))
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,7 +274,18 @@ class _Problem:
             result.append(needed)
         return tuple(result)
 
-    def result(self, x: FloatArray) -> NoiseFit:
+    def delay_std_s(self, x: FloatArray) -> float:
+        """Standard error of the delay, with everything else open."""
+        response = self._response(x)
+        if response is None:
+            return np.inf
+        # A tiny ridge for parts that are nothing.
+        covariance = np.linalg.inv(self.state(x).information + 1e-6 * np.eye(x.size))
+        slope = np.zeros(x.size)
+        slope[:2] = -response.delay_s, response.delay_s
+        return float(np.sqrt(slope @ covariance @ slope))
+
+    def result(self, x: FloatArray, delay_std_s: float = np.inf) -> NoiseFit:
         state, response = self.state(x), self._response(x)
         left = expected = 0.0
         smooth, white = [], []
@@ -280,15 +301,8 @@ class _Problem:
             within = _parts(_images(s, inside, self.digital), response, s)
             smooth.append(amounts @ within + s.floor)
             white.append(amounts[0] * parts[0] + s.floor)
-        std = np.inf
-        if response is not None:
-            # A tiny ridge for parts that are nothing.
-            covariance = np.linalg.inv(state.information + 1e-6 * np.eye(x.size))
-            slope = np.zeros(x.size)
-            slope[:2] = -response.delay_s, response.delay_s
-            std = float(np.sqrt(slope @ covariance @ slope))
         return NoiseFit(
-            state.cost, left / expected, tuple(smooth), tuple(white), response, std
+            state.cost, left / expected, tuple(smooth), tuple(white), response, delay_std_s
         )
 
 

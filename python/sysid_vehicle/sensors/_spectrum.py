@@ -15,7 +15,7 @@ import scipy
 
 from .._arrays import FloatArray
 
-__all__ = ["LOWEST_HZ", "NoiseSpectrum", "Spectrum", "independent_every", "spectrum_of", "steady"]
+__all__ = ["LOWEST_HZ", "NoiseSpectrum", "Spectrum", "spectrum_of", "steady"]
 
 LOWEST_HZ: Final = 5.0  # the motion of a car has next to nothing beyond
 _HIGHEST: Final = 0.45  # of the sampling rate
@@ -29,7 +29,6 @@ _LINE: Final = 8.0  # power above that on both sides that is a line
 _ABOVE: Final = 2.0  # and above the higher side: a slope is no line
 _NEAR_HZ, _FAR_HZ = 1.5, 2.5  # where the sides of a line are
 _CORE_HZ: Final = 1.3  # about a line the window's own width tells nothing else
-_UNCORRELATED: Final = 0.15  # readings count as independent from this correlation down
 # Readings of a periodogram that count as independent: windows of Hann overlap by half, neighbouring
 # frequencies share power, and the median of windows is known less well than the mean.
 _OF_WINDOWS, _OF_FREQUENCIES, _OF_MEDIAN = 0.947, 0.515, 1.0 / 2.08
@@ -188,17 +187,3 @@ def _lines(f: FloatArray, power: FloatArray) -> tuple[float, ...]:
     return tuple(
         float(np.average(f[labels == i], weights=power[labels == i])) for i in range(1, count + 1)
     )
-
-
-def independent_every(power: FloatArray) -> int:
-    """Samples from one reading to the next that is independent of it.
-
-    Parameters
-    ----------
-    power : ndarray, shape (k,)
-        Of the sensor's noise, from 0 to half the sampling rate.
-    """
-    correlation = np.fft.irfft(power)
-    correlation = np.abs(correlation[: correlation.size // 2] / correlation[0])
-    later = np.maximum.accumulate(correlation[::-1])[::-1]
-    return max(1, int(np.argmax(later < _UNCORRELATED)))
