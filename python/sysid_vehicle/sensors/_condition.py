@@ -1,9 +1,10 @@
 """A log as its sensors would have written it had they noise that is white.
 
 The likelihood knows white noise and readings of the moment. A sensor's own low-pass makes its
-noise coloured and its readings late; readings so far apart that their noise is independent hold
-all that it lets through, and its delay is known from its spectrum. Vibration in a narrow band, in
-which no car moves, is taken down to the noise beside it, without a shift in time.
+noise coloured and its readings late, and takes from the forces of the road what tells them from
+noise; where its spectrum tells the filter it is undone, as far as what came after it allows.
+Vibration in a narrow band, in which no car moves, is taken down to the noise beside it, without a
+shift in time.
 """
 
 from __future__ import annotations
@@ -18,17 +19,21 @@ import scipy
 
 from .._arrays import ComplexArray, FloatArray
 from ..log import Log
-from ._low_pass import NoiseFit, Response, fitted, with_low_pass
+from ._forms import Response
+from ._low_pass import NoiseFit, fitted, with_low_pass
+from ._motion import IntArray
 from ._signals import MOVING, own_samples, quantum
 from ._spectrum import NoiseSpectrum, Spectrum, spectrum_of, steady
 
 __all__ = ["conditioned", "low_passes"]
 
 _EDGE_S: Final = 0.5
+_BESIDE_GAP_S: Final = 0.1  # which a filter that is undone carries far no more
+_REGULAR: Final = 0.9  # share of a channel's samples that lie at equal distances
 _DEVICES: Final = (("vx_mps", "vy_mps"), ("yaw_rate_radps", "ax_mps2", "ay_mps2"))  # as a rule
-# Chosen on seeds 100 to 105 and 200 to 224 of benchmarks/ladder, and on measured drives: without a
-# filter at most 4 nats, with all imperfections 23 at least; forms that do not fit leave 1.8 and more
-# where no filter is known, those that do 1.2 at most; 0.4 to 1.5 ms.
+# Chosen by benchmarks/ladder, seeds 100 to 105 and 200 to 224, and by the measured drives of
+# benchmarks/real_driving: without a filter one brings 4 nats at most, with all imperfections 23 at
+# least; forms that fit leave 1.2 at most, on measured drives with steady noise 1.7 or more is left.
 _EVIDENCE: Final = 10.0  # nats that a filter must bring
 _MISMATCH: Final = 1.5  # of forms that are taken for right
 _DELAY_STD_S: Final = 0.0015  # of a delay that is taken out
@@ -90,6 +95,8 @@ def _channels(logs: Sequence[Log]) -> list[_Channel]:
             continue
         # Few samples are lost as a rule: a straight line takes their place.
         grid = np.arange(at[0], at[-1] + 1, every)
+        if np.mean(np.isin(at, grid)) < _REGULAR:
+            continue
         values = np.interp(grid, at, log[name][at])
         spectrum = spectrum_of(values, log.rate_hz / every, log.rate_hz, quantum(log[name][at]))
         if spectrum is None:
@@ -169,9 +176,7 @@ def _filtered(channels: tuple[_Channel, ...]) -> _Filtered | None:
     return _Filtered(channels, fit, fit.response)
 
 
-def _put_right(
-    log: Log, channels: Sequence[_Channel], filters: dict[str, _Filtered]
-) -> Log:
+def _put_right(log: Log, channels: Sequence[_Channel], filters: dict[str, _Filtered]) -> Log:
     now: dict[str, FloatArray] = {}
     what = []
     for channel in channels:
@@ -195,7 +200,9 @@ def _put_right(
     return log.corrected(now, what) if now else log
 
 
-def _passed(values: FloatArray, spectrum: Spectrum, factor: ComplexArray | FloatArray) -> FloatArray:
+def _passed(
+    values: FloatArray, spectrum: Spectrum, factor: ComplexArray | FloatArray
+) -> FloatArray:
     """Apply a factor over frequency to the channel's own samples."""
     at, every = own_samples(values)
     grid = np.arange(at[0], at[-1] + 1, every)
@@ -213,6 +220,19 @@ def _passed(values: FloatArray, spectrum: Spectrum, factor: ComplexArray | Float
     # At the ends vibration cannot be told from what it adds to.
     edge = round(_EDGE_S * spectrum.rate_hz)
     smooth[:edge] = smooth[len(smooth) - edge :] = np.nan
+    if np.iscomplexobj(factor):
+        # What was put into a gap is no reading, and comes up with the noise.
+        nearest = np.abs(grid[:, None] - at[_beside(at, grid)]).min(axis=1)
+        gaps = scipy.ndimage.binary_dilation(
+            nearest >= every, iterations=max(1, round(_BESIDE_GAP_S * spectrum.rate_hz))
+        )
+        smooth[gaps] = np.nan
     result = values.copy()
     result[at] = np.interp(at, grid, smooth)
     return result
+
+
+def _beside(at: IntArray, grid: IntArray) -> IntArray:
+    """Numbers of the samples before and after each place."""
+    after = np.clip(np.searchsorted(at, grid), 1, at.size - 1)
+    return np.stack([after - 1, after], axis=1)

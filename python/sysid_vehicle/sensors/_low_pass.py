@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -20,66 +21,20 @@ import numpy.typing as npt
 import scipy
 
 from .._arrays import FloatArray
-from ._spectrum import LOWEST_HZ, Spectrum
+from ._forms import ROAD, Response, count, images_of, parts_of
+from ._spectrum import Spectrum
 
-__all__ = ["NoiseFit", "Response", "fitted", "with_low_pass"]
+__all__ = ["NoiseFit", "fitted", "with_low_pass"]
 
-_ROAD_HZ: Final = (3.0, 8.0)  # corners of noise that falls by 6 dB per octave
-_ROAD_POWERS: Final = (4, 6)  # of noise that falls faster
 _USUAL_DAMPING, _SPREAD = np.sqrt(0.5), 0.2  # Butterworth's, and of its logarithm
 _CORNERS_HZ: Final = (8.0, 14.0, 24.0)  # from which a fit begins
 _AFTER: Final = 1e-3  # share of white noise that comes after a filter, up to which there is one
 _SHARED: Final = 3  # parameters of a response
 _BOUNDS: Final = np.log([[2.0, 0.25, 1e-7], [200.0, 2.0, _AFTER]])
 _ROUNDS: Final = 60
-_FOLDS: Final = (-2, -1, 1, 2)
 _LOST: Final = 14.0  # logarithm by which a part may go down or up from where it begins
 _STEP: Final = 1e-4  # of differences
 _PRICE: Final = 2.0  # nats that a part of the road must bring
-
-
-@dataclass(frozen=True)
-class Response:
-    """Low-pass of second order.
-
-    Attributes
-    ----------
-    corner_hz, damping : float
-        Of the filter; of a digital one as its bilinear transform sees them.
-    after : float
-        White noise that comes after it, as a share of that before.
-    digital : bool
-        Whether it works on samples at the rate of the log.
-    """
-
-    corner_hz: float
-    damping: float
-    after: float
-    digital: bool
-
-    @property
-    def delay_s(self) -> float:
-        """Of slow motion."""
-        return self.damping / (np.pi * self.corner_hz)
-
-    def power(self, frequency_hz: FloatArray, rows_hz: float) -> FloatArray:
-        """Factor on the power at each frequency."""
-        u = self._over_corner(frequency_hz, rows_hz) ** 2
-        result: FloatArray = 1.0 / ((1.0 - u) ** 2 + 4.0 * self.damping**2 * u)
-        return result
-
-    def turned(self, frequency_hz: FloatArray, rows_hz: float) -> FloatArray:
-        """Angle by which each frequency lags [rad]."""
-        u = self._over_corner(frequency_hz, rows_hz)
-        result: FloatArray = np.arctan2(2.0 * self.damping * u, 1.0 - u**2)
-        return result
-
-    def _over_corner(self, frequency_hz: FloatArray, rows_hz: float) -> FloatArray:
-        seen = frequency_hz
-        if self.digital:
-            seen = rows_hz / np.pi * np.abs(np.tan(np.pi * frequency_hz / rows_hz))
-        result: FloatArray = seen / self.corner_hz
-        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,12 +109,12 @@ class _Problem:
 
     @cached_property
     def _places(self) -> tuple[slice, ...]:
-        ends = np.cumsum([self._shared, *(_count(s) for s in self.spectra)])
-        return tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        ends = np.cumsum([self._shared, *(count(s) for s in self.spectra)])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
     @cached_property
     def _images(self) -> tuple[list[tuple[FloatArray, FloatArray]], ...]:
-        return tuple(_images(s, s.frequency_hz[s.used], self.digital) for s in self.spectra)
+        return tuple(images_of(s, s.frequency_hz[s.used], self.digital) for s in self.spectra)
 
     @cached_property
     def _bounds(self) -> FloatArray:
@@ -204,12 +159,12 @@ class _Problem:
         beside = [self._response(x + _STEP * row) for row in np.eye(x.size)[: self._shared]]
         powers = []
         for place, s, images in zip(self._places, self.spectra, self._images, strict=True):
-            amounts, parts = np.exp(x[place]), _parts(images, here, s)
+            amounts, parts = np.exp(x[place]), parts_of(images, here, s)
             model = amounts @ parts + s.floor
             jacobian = np.zeros((x.size, model.size))
             jacobian[place] = amounts[:, None] * parts / model
             for k, other in enumerate(beside):
-                moved = amounts @ _parts(images, other, s) + s.floor
+                moved = amounts @ parts_of(images, other, s) + s.floor
                 jacobian[k] = (moved / model - 1.0) / _STEP
             ratio = s.power[s.used] / model
             cost += s.weight * float(np.sum(np.log(model) + ratio))
@@ -257,12 +212,12 @@ class _Problem:
         here = self._response(x)
         result = []
         for place, s, images in zip(self._places, self.spectra, self._images, strict=True):
-            parts = _parts(images, here, s)
+            parts = parts_of(images, here, s)
             needed = np.ones(len(parts), dtype=bool)
             cost, amounts = _amounts(s, parts, np.exp(x[place]))
             while True:
                 trials = []
-                for k in np.flatnonzero(needed[1 : 1 + _road()]) + 1:
+                for k in np.flatnonzero(needed[ROAD]) + 1:
                     without = needed.copy()
                     without[k] = False
                     trials.append((*_amounts(s, parts[without], amounts[without]), int(k)))
@@ -295,59 +250,15 @@ class _Problem:
             expected += s.independent
             amounts = np.exp(x[place])
             lowest, highest = s.frequency_hz[s.used][[0, -1]]
-            parts = _parts(_images(s, s.frequency_hz, self.digital), response, s)
-            amounts[1 + _road() :] = 0.0
+            parts = parts_of(images_of(s, s.frequency_hz, self.digital), response, s)
+            amounts[ROAD.stop :] = 0.0
             inside = np.clip(s.frequency_hz, lowest, highest)
-            within = _parts(_images(s, inside, self.digital), response, s)
+            within = parts_of(images_of(s, inside, self.digital), response, s)
             smooth.append(amounts @ within + s.floor)
             white.append(amounts[0] * parts[0] + s.floor)
         return NoiseFit(
             state.cost, left / expected, tuple(smooth), tuple(white), response, delay_std_s
         )
-
-
-def _road() -> int:
-    return len(_ROAD_HZ) + len(_ROAD_POWERS)
-
-
-def _count(s: Spectrum) -> int:
-    return 1 + _road() + len(s.lines_hz)
-
-
-def _images(
-    s: Spectrum, frequency_hz: FloatArray, digital: bool | None
-) -> list[tuple[FloatArray, FloatArray]]:
-    """Frequencies that look alike to the samples, and the parts of the noise there."""
-    at = [frequency_hz]
-    if digital:
-        for k in range(1, round(s.rows_hz / s.rate_hz)):
-            half = 0.5 * s.rows_hz
-            at.append(np.abs((frequency_hz + k * s.rate_hz + half) % s.rows_hz - half))
-    elif digital is not None:
-        at += [np.abs(frequency_hz + k * s.rate_hz) for k in _FOLDS]
-    return [(f, _forms(s, f, own=i == 0)) for i, f in enumerate(at)]
-
-
-def _forms(s: Spectrum, f: FloatArray, *, own: bool) -> FloatArray:
-    """White noise of the sensor, noise of the road and of the motion, skirts of lines."""
-    forms = [np.ones(f.size)]
-    forms += [1.0 / (1.0 + (f / corner) ** 2) for corner in _ROAD_HZ]
-    forms += [(LOWEST_HZ / np.maximum(f, 1e-3)) ** power for power in _ROAD_POWERS]
-    forms += [own / np.maximum((f - line) ** 2, 1.0) for line in s.lines_hz]
-    return np.array(forms)
-
-
-def _parts(
-    images: list[tuple[FloatArray, FloatArray]], response: Response | None, s: Spectrum
-) -> FloatArray:
-    """The parts as the samples show them."""
-    if response is None:
-        return images[0][1]
-    result: FloatArray = np.zeros_like(images[0][1])
-    for f, forms in images:
-        result += forms * response.power(f, s.rows_hz)
-    result[0] += response.after
-    return result
 
 
 def _amounts(s: Spectrum, parts: FloatArray, begin: FloatArray) -> tuple[float, FloatArray]:

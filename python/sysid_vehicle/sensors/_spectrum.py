@@ -162,7 +162,12 @@ def steady(values: FloatArray, spectrum: Spectrum, smooth: FloatArray) -> bool:
     """
     width = round(_WINDOW_S * spectrum.rate_hz)
     _, _, power = scipy.signal.spectrogram(
-        values, spectrum.rate_hz, window="hann", nperseg=width, noverlap=width // 2, detrend="linear"
+        values,
+        spectrum.rate_hz,
+        window="hann",
+        nperseg=width,
+        noverlap=width // 2,
+        detrend="linear",
     )
     at = spectrum.used
     if not at.any():
