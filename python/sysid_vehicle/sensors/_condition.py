@@ -33,9 +33,9 @@ _REGULAR: Final = 0.9  # share of a channel's samples that lie at equal distance
 _DEVICES: Final = (("vx_mps", "vy_mps"), ("yaw_rate_radps", "ax_mps2", "ay_mps2"))  # as a rule
 # Chosen by benchmarks/ladder, seeds 100 to 105 and 200 to 224, and by the measured drives of
 # benchmarks/real_driving: without a filter one brings 4 nats at most, with all imperfections 23 at
-# least; forms that fit leave 1.2 at most, on measured drives with steady noise 1.7 or more is left.
+# least; forms that fit leave 1.1 at most, measured drives with steady noise 1.7 or more.
 _EVIDENCE: Final = 10.0  # nats that a filter must bring
-_MISMATCH: Final = 1.5  # of forms that are taken for right
+_MISMATCH: Final = 1.3  # of forms that are taken for right
 _DELAY_STD_S: Final = 0.0015  # of a delay that is taken out
 _RAISED: Final = 4.0  # times the power of noise at low frequencies, up to which it comes up
 _DAMPING: Final = (0.5, 0.95)  # Butterworth's is 0.71, Bessel's 0.87; one of 1 may be none in time
