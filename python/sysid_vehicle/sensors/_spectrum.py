@@ -21,6 +21,7 @@ LOWEST_HZ: Final = 5.0  # the motion of a car has next to nothing beyond
 _HIGHEST: Final = 0.45  # of the sampling rate
 _WINDOW_S: Final = 2.0
 _FEWEST_WINDOWS: Final = 8
+_FEWEST: Final = 10  # frequencies beside lines
 _PEAK: Final = 6.0  # power above its neighbours that is vibration
 _SIDES: Final = 1.1  # what of its sides is still vibration
 _STEADY: Final = 2.0  # upper over lower quartile of the power over time; motion has ten and more
@@ -142,6 +143,8 @@ def spectrum_of(
     lines = _lines(f, power)
     for line in lines:
         used &= np.abs(f - line) > _CORE_HZ
+    if np.count_nonzero(used) < _FEWEST:
+        return None
     windows = values.size // (width // 2) - 1
     weight = windows * _OF_WINDOWS * _OF_FREQUENCIES * _OF_MEDIAN
     floor = quantum**2 / 6.0 / rate_hz
