@@ -33,6 +33,7 @@ _SHARED: Final = 3  # parameters of a response
 _BOUNDS: Final = np.log([[2.0, 0.25, 1e-7], [200.0, 2.0, _AFTER]])
 _ROUNDS: Final = 60
 _LOST: Final = 14.0  # logarithm by which a part may go down or up from where it begins
+_FAR: Final = 30.0  # the same for one spectrum by itself, from its median
 _STEP: Final = 1e-4  # of differences
 _PRICE: Final = 2.0  # nats that a part of the road must bring
 
@@ -271,6 +272,8 @@ def _amounts(s: Spectrum, parts: FloatArray, begin: FloatArray) -> tuple[float, 
         slope = s.weight * (amounts[:, None] * parts / model) @ (1.0 - power / model)
         return s.weight * float(np.sum(np.log(model) + power / model)), slope
 
-    x = np.log(np.maximum(begin, 1e-300))
-    found = scipy.optimize.minimize(cost, x, jac=True, method="L-BFGS-B")
+    usual = float(np.log(np.median(power)))
+    bounds = (usual - _FAR, usual + _FAR)
+    x = np.clip(np.log(np.maximum(begin, 1e-300)), *bounds)
+    found = scipy.optimize.minimize(cost, x, jac=True, method="L-BFGS-B", bounds=[bounds] * x.size)
     return float(found.fun), np.exp(found.x)
