@@ -1,6 +1,7 @@
 """What a study says of the same car as its road and sensors become more real.
 
     python benchmarks/ladder [--seeds 2] [--first 3000] [--truth relaxation] [RUNG ...]
+    python benchmarks/ladder --low-pass [--seeds 2] [--first 3000] [RUNG ...]
 
 Laps are fitted, handling courses judge. One imperfection at a time: forces of the road over 0.3 s
 (`pushes`) and over 0.03 s (`bumps`), a road that leans by 1.5 deg rms over 5 s (`road`), a causal
@@ -8,7 +9,8 @@ low-pass of 15 Hz in every sensor (`filtered`), speeds 20 ms and everything else
 (`late`), quanta of a bus with every value held for two samples (`coarse`), vibration at 12 Hz, and
 all of them. Printed for each drive: what was claimed with its interval, whether that is the truth
 (`right`: it alone, inside its 95 % interval), the verdict, and the median errors of v_y and yaw
-rate 2 and 5 s ahead on validation data, before and after.
+rate 2 and 5 s ahead on validation data, before and after. `--low-pass` asks, in seconds, only for
+the delay of the sensors' low-pass that their noise tells, beside the true one.
 """
 
 from __future__ import annotations
@@ -17,9 +19,10 @@ import argparse
 import time
 import warnings
 
-from rungs import SENSORS, TRUTHS, ride
+from rungs import LOW_PASS_S, SENSORS, TRUTHS, ride
 
 import sysid_vehicle as sv
+from sysid_vehicle.sensors import low_passes
 
 _HEAD = "rung       seed  right  claimed; verdict; error of v_y [m/s] and yaw rate [rad/s] ahead"
 
@@ -32,7 +35,11 @@ def main() -> None:
     parser.add_argument("--truth", choices=list(TRUTHS), default="relaxation")
     parser.add_argument("--seconds", type=float, default=60.0, help="of each drive")
     parser.add_argument("--raw", action="store_true", help="take the logs as they are")
+    parser.add_argument("--low-pass", action="store_true", help="ask for the sensors' delay only")
     args = parser.parse_args()
+    if args.low_pass:
+        _low_passes(args)
+        return
     print(_HEAD)
     total = right = 0
     for rung in args.rungs or SENSORS:
@@ -43,11 +50,32 @@ def main() -> None:
     print(f"right in {right} of {total}")
 
 
+def _drives(rung: str, seed: int, args: argparse.Namespace) -> list[sv.Log]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sv.SysidWarning)
+        return [
+            ride(rung, args.truth, manoeuvre, seed).between(0.0, args.seconds)
+            for manoeuvre in ("lap", "handling_course")
+        ]
+
+
+def _low_passes(args: argparse.Namespace) -> None:
+    print("rung         told  largest error of the delay [ms]  inside its 95 % interval")
+    for rung in args.rungs or SENSORS:
+        off, inside = [], 0
+        for seed in range(args.first, args.first + args.seeds):
+            told = low_passes(_drives(rung, seed, args))
+            true_s = LOW_PASS_S if rung in ("filtered", "all") else 0.0
+            errors = [(response.delay_s - true_s, std_s) for response, std_s in told.values()]
+            if errors:
+                off.append(max(abs(error) for error, _ in errors))
+                inside += all(abs(error) < 1.96 * std_s for error, std_s in errors)
+        largest = f"{1000.0 * max(off):.2f}" if off else ""
+        print(f"{rung:10s}  {len(off):2d} of {args.seeds:2d}  {largest:>8s}  {inside}", flush=True)
+
+
 def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[bool, str]:
-    train, test = (
-        ride(rung, args.truth, manoeuvre, seed).between(0.0, args.seconds)
-        for manoeuvre in ("lap", "handling_course")
-    )
+    train, test = _drives(rung, seed, args)
     began = time.process_time()
     head = f"{rung:10s} {seed:4d}"
     with warnings.catch_warnings():

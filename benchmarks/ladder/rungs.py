@@ -18,6 +18,9 @@ TRUTHS = {
     "sensitivity": ("tyre_load_sensitivity", {"tyre_load_sensitivity.sensitivity": 0.25}),
     "nothing": ("", {}),
 }
+_LOW_PASS_HZ = 15.0
+# Of slow motion, by the bilinear transform at 100 Hz.
+LOW_PASS_S = float(np.sqrt(2.0) / (200.0 * np.tan(np.pi * _LOW_PASS_HZ / 100.0)))
 _DEVICES_S = {
     **dict.fromkeys(SPEEDS, 0.020),
     **dict.fromkeys(INERTIAL, 0.010),
@@ -36,7 +39,7 @@ _QUANTA = {
 def _filtered(c: Channels, rng: np.random.Generator) -> None:
     """A causal second-order low-pass of 15 Hz in every sensor."""
     rate = 1.0 / float(c["time_s"][1] - c["time_s"][0])
-    b, a = signal.butter(2, 15.0, fs=rate)
+    b, a = signal.butter(2, _LOW_PASS_HZ, fs=rate)
     for name in (*SPEEDS, *INERTIAL):
         start = signal.lfilter_zi(b, a) * c[name][0]
         c[name] = signal.lfilter(b, a, c[name], zi=start)[0]

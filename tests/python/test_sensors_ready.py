@@ -11,10 +11,13 @@ from scipy import signal
 import sysid_vehicle as sv
 from sysid_vehicle.sensors import _ready, made_ready
 from sysid_vehicle.sensors._apply import shifted
-from sysid_vehicle.sensors._condition import conditioned
-from sysid_vehicle.sensors._spectrum import noise_spectrum
+from sysid_vehicle.sensors._condition import conditioned, low_passes
 
-MOTION = ("vx_mps", "vy_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+SPEEDS, INERTIAL = ("vx_mps", "vy_mps"), ("yaw_rate_radps", "ax_mps2", "ay_mps2")
+MOTION = (*SPEEDS, *INERTIAL)
+NOISE = sv.SensorNoise()
+# Of the bilinear transform of Butterworth's filter of 15 Hz at 100 Hz.
+DELAY_S = float(np.sqrt(2.0) / (200.0 * np.tan(np.pi * 0.15)))
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +29,8 @@ def _with(log: sv.Log, **channels: np.ndarray) -> sv.Log:
     return log.corrected(channels, [])
 
 
-def _low_pass(values: np.ndarray) -> np.ndarray:
-    b, a = signal.butter(2, 15.0, fs=100.0)
+def _low_pass(values: np.ndarray, hz: float = 15.0, order: int = 2) -> np.ndarray:
+    b, a = signal.butter(order, hz, fs=100.0)
     return signal.lfilter(b, a, values, zi=signal.lfilter_zi(b, a) * values[0])[0]
 
 
@@ -48,24 +51,73 @@ def test_white_noise_is_left_as_it_is(log: sv.Log) -> None:
 
 
 def test_a_low_pass_is_told_from_the_noise_it_leaves(log: sv.Log) -> None:
-    found = noise_spectrum(_low_pass(log["vy_mps"]), 100.0)
-    assert found is not None
-    # Of the bilinear transform of Butterworth's filter at 100 Hz.
-    true = np.sqrt(2.0) / (200.0 * np.tan(np.pi * 0.15))
-    assert found.delay_s == pytest.approx(true, abs=0.002)
-    assert found.corner_hz == pytest.approx(15.9, rel=0.1)
-    assert found.every == 3
-    assert not found.vibration_hz
+    told = low_passes([_with(log, **{c: _low_pass(log[c]) for c in MOTION})])
+    assert sorted(told) == sorted(MOTION)
+    for response, std_s in told.values():
+        assert std_s < 0.001
+        assert abs(response.delay_s - DELAY_S) < 2.5 * std_s
+        assert response.corner_hz == pytest.approx(16.2, rel=0.1)
+        assert response.digital
 
 
-def test_bumps_of_the_road_are_no_low_pass() -> None:
+def test_one_filter_serves_both_devices_where_it_explains_them(log: sv.Log) -> None:
+    alike = low_passes([_with(log, **{c: _low_pass(log[c]) for c in MOTION})])
+    assert len({response for response, _ in alike.values()}) == 1
+    unlike = {c: _low_pass(log[c], 22.0) for c in SPEEDS}
+    unlike |= {c: _low_pass(log[c], 11.0) for c in INERTIAL}
+    told = {c: response for c, (response, _) in low_passes([_with(log, **unlike)]).items()}
+    assert told["vx_mps"] == told["vy_mps"] != told["ax_mps2"] == told["yaw_rate_radps"]
+    assert told["vx_mps"].delay_s == pytest.approx(np.sqrt(0.5) / (np.pi * 22.0), abs=0.002)
+    assert told["ax_mps2"].delay_s == pytest.approx(np.sqrt(0.5) / (np.pi * 11.0), abs=0.003)
+    alone = {c: _low_pass(log[c]) for c in INERTIAL}
+    assert sorted(low_passes([_with(log, **alone)])) == sorted(INERTIAL)
+
+
+def test_a_filter_is_told_behind_vibration_quanta_and_held_samples(log: sv.Log) -> None:
+    rng = np.random.default_rng(8)
+    phase = np.cumsum(0.05 * rng.standard_normal(log.n))
+    shaken = {c: np.array(log[c]) for c in log.channels if log.has(c)}
+    keep = np.exp(-0.01 / 0.03)
+    for channel, bumps, amplitude in (
+        ("ax_mps2", 0.1, 0.4),
+        ("ay_mps2", 0.13, 0.5),
+        ("yaw_rate_radps", 0.0, 0.004),
+    ):
+        road = signal.lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(log.n))
+        shaken[channel] += bumps * road
+        shaken[channel] += amplitude * np.sin(2.0 * np.pi * 12.0 * log["time_s"] + phase)
+    for channel, quantum in zip(MOTION, (0.02, 0.02, 0.002, 0.05, 0.05), strict=True):
+        counted = quantum * np.round(_low_pass(shaken[channel]) / quantum)
+        shaken[channel] = np.repeat(counted[::2], 2)[: log.n]
+    with pytest.warns(sv.SysidWarning, match="held for 2 samples"):
+        coarse = sv.Log.from_arrays(shaken)
+    told = low_passes([coarse])
+    assert sorted(told) == sorted(MOTION)
+    response, std_s = told["ay_mps2"]
+    assert std_s < 0.0015
+    assert abs(response.delay_s - DELAY_S) < 2.5 * std_s
+
+
+def test_bumps_of_the_road_are_no_low_pass(log: sv.Log) -> None:
     rng = np.random.default_rng(4)
     keep = np.exp(-0.01 / 0.03)
-    bumps = signal.lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(6000))
-    found = noise_spectrum(0.15 * bumps + 0.06 * rng.standard_normal(6000), 100.0)
-    assert found is not None
-    assert found.delay_s == 0.0
-    assert found.every == 1
+    bumps = {}
+    for channel in INERTIAL:
+        road = signal.lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(log.n))
+        bumps[channel] = log[channel] + 2.5 * getattr(NOISE, channel) * road
+    shaken = _with(log, **bumps)
+    assert not low_passes([shaken])
+    assert conditioned([shaken])[0] is shaken
+
+
+def test_what_no_form_fits_tells_no_delay(log: sv.Log) -> None:
+    # Steeper filters, and smoothing without delay, are not of the form that is fitted.
+    assert not low_passes([_with(log, **{c: _low_pass(log[c], order=4) for c in MOTION})])
+    b, a = signal.butter(1, 15.0, fs=100.0)
+    smooth = {c: signal.filtfilt(b, a, log[c]) for c in MOTION}
+    assert not low_passes([_with(log, **smooth)])
+    # One channel shifted against the others of its device would be an error of its own.
+    assert not low_passes([_with(log, ay_mps2=_low_pass(log["ay_mps2"]))])
 
 
 def test_motion_that_no_noise_covers_is_no_noise(log: sv.Log) -> None:
@@ -75,16 +127,29 @@ def test_motion_that_no_noise_covers_is_no_noise(log: sv.Log) -> None:
     assert conditioned([clean])[0] is clean
 
 
-def test_filtered_channels_are_put_in_time_with_independent_readings(log: sv.Log) -> None:
+def test_a_filter_that_is_told_is_undone(log: sv.Log) -> None:
     late = _with(log, **{c: _low_pass(log[c]) for c in MOTION})
     (ready,) = conditioned([late])
+    inner = slice(50, -50)
     for channel in MOTION:
-        assert 0.3 < np.mean(np.isfinite(ready[channel])) < 0.36
+        assert np.isfinite(ready[channel]).sum() == log.n - 100
+        left = (ready[channel] - log[channel])[inner]
+        assert np.std(left) < 0.35 * getattr(NOISE, channel)
+        assert np.std((late[channel] - log[channel])[inner]) > 0.8 * getattr(NOISE, channel)
     for channel in ("yaw_rate_radps", "ay_mps2"):
         assert _delay(late[channel], log[channel]) == pytest.approx(0.014, abs=0.002)
-        assert _delay(ready[channel], log[channel]) == pytest.approx(0.0, abs=0.002)
+        assert _delay(ready[channel], log[channel]) == pytest.approx(0.0, abs=0.001)
     assert len(ready.corrections) == 5
     assert "low-pass of 1" in ready.corrections[0]
+
+
+def test_beside_a_gap_a_filter_is_not_undone(log: sv.Log) -> None:
+    filtered = {c: _low_pass(log[c]) for c in MOTION}
+    filtered["vy_mps"][3000:3020] = np.nan
+    (ready,) = conditioned([_with(log, **filtered)])
+    assert np.isnan(ready["vy_mps"][2991:3029]).all()
+    assert np.isfinite(ready["vy_mps"][2900:2988]).all()
+    assert np.isfinite(ready["vx_mps"][2900:3100]).all()
 
 
 def test_vibration_is_taken_out_and_nothing_else(log: sv.Log) -> None:
