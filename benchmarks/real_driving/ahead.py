@@ -4,7 +4,7 @@ Each window starts from the smoothed motion (`sysid_vehicle.check`, no tyre in i
 steering angle and the longitudinal acceleration of the same motion, so that its speed is the
 measured one. Its error is that of v_y and yaw rate over the window, each over its standard
 deviation in all the driving; the figure is the median over windows of the root of the sum of both
-squares.
+squares, of all windows and of those in which the car turns for at least half of the time.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 import sysid_vehicle as sv
 from sysid_vehicle.diagnose.coordinates import begins
-from sysid_vehicle.estimate import Driving
+from sysid_vehicle.estimate import Driving, turning
 from sysid_vehicle.forces._motion import Places, smoothed
 from sysid_vehicle.identify import driving_of
 
@@ -30,20 +30,24 @@ _CERTAIN = sv.NoiseModel(
 
 @dataclass(frozen=True)
 class Ahead:
-    """Median over windows of the relative error of v_y, of the yaw rate, of both, and the lost."""
+    """Median over windows of the relative error of v_y, of the yaw rate, of both, and the lost.
+
+    `turning` is that of both where the car turns.
+    """
 
     vy: float
     yaw_rate: float
     both: float
     vy_mps: float
+    turning: float
     lost: float
     windows: int
 
     def __str__(self) -> str:
         return (
             f"v_y {self.vy:.4f} ({self.vy_mps:.4f} m/s), yaw rate {self.yaw_rate:.4f}, "
-            f"both {self.both:.4f} of their standard deviations; {100 * self.lost:.0f} % of "
-            f"{self.windows} windows lost"
+            f"both {self.both:.4f} of their standard deviations, {self.turning:.4f} where the car "
+            f"turns; {100 * self.lost:.0f} % of {self.windows} windows lost"
         )
 
 
@@ -98,7 +102,7 @@ def ahead(
     every = round(_BEGIN_S * rate)
     starts = _starts(driving, round(seconds * rate), every)
     if not len(starts):
-        return Ahead(*(float("nan"),) * 5, 0)
+        return Ahead(*(float("nan"),) * 6, 0)
     leads = np.unique(np.round(np.linspace(0.0, seconds * rate, _STEPS + 1)[1:]).astype(int))
     asked = [(int(lead), every) for lead in leads]
     found = problem.look_ahead(model.vector(), _CERTAIN.vector(), asked)
@@ -111,8 +115,12 @@ def ahead(
     lost = ~(last < _LOST).all(axis=1)
     both = np.sqrt(np.sum(relative**2, axis=1))
     vy, yaw = map(float, np.median(relative, axis=0))
+    turned = np.concatenate([[0.0], np.cumsum(turning(driving))])
+    turns = 2.0 * (turned[starts + leads[-1]] - turned[starts]) >= leads[-1]
+    corners = float(np.median(both[turns])) if turns.any() else float("nan")
     share = float(lost.mean())
-    return Ahead(vy, yaw, float(np.median(both)), vy * float(spread[0]), share, len(starts))
+    whole = float(np.median(both))
+    return Ahead(vy, yaw, whole, vy * float(spread[0]), corners, share, len(starts))
 
 
 def _starts(driving: Driving, length: int, every: int) -> np.ndarray:
