@@ -106,11 +106,12 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
     Evidence grows with the data, whatever small misfit an effect serves; a share does not. It is
     that of the effect beside all others, which were fitted anew without it: what one of them, or
     the tyres, would do in its place is not its own. A stand-in serves one manoeuvre, and the next
-    one at a price. What is left may be what it stands in for: the share must be shown to be more
-    than a small part of that. So may it be what another takes that has no such share and moves the
-    same channel, if that is the larger part.
+    one at a price. Where much is left, what it stands in for may be that: the share must be shown
+    to be one worth a name. So may it be what a stand-in takes that moves the same channel, if
+    that is the larger part.
     """
-    least = rules.taken * min(max(1.0 - share_of(*facts.missing), 0.0), 1.0)
+    much = share_of(*facts.missing) < rules.most
+    least = rules.taken if much else 0.0
     shown = [
         a
         for a in facts.added
