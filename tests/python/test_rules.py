@@ -43,7 +43,7 @@ NUMERICAL = {
     "diagnose/sensitivity.py": {"_AT_ONCE", "_BOUNDED", "_SHARES"},
     "diagnose/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},
     "study/validation.py": {"AHEAD", "AHEAD_S", "_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
-    "study/horizons.py": {"AHEAD", "_FEWEST", "_APART", "_NORMAL", "_LOST"},
+    "study/horizons.py": {"AHEAD", "_FEWEST", "_APART", "_LOST"},
     "study/beyond.py": {"_DRAWS"},
     "study/improve.py": {"_SHORT_S"},
     "study/next_steps.py": {"_SHOWN"},

@@ -53,18 +53,12 @@ def turning(driving: Driving) -> _Bools:
 def _around(squares: FloatArray, known: FloatArray, driving: Driving) -> FloatArray:
     """Mean square in the second around each sample, within its stretch."""
     out = np.zeros(len(squares))
-    at = 0
-    for s in driving.stretches:
-        size = s.where.stop - s.where.start
-        reach = max(round(_AROUND_S * driving.logs[s.log].rate_hz), 1)
-        k = np.arange(size)
-        first, last = np.maximum(k - reach, 0), np.minimum(k + reach + 1, size)
-        sums, counts = (
-            np.concatenate([[0.0], np.cumsum(x[at : at + size])]) for x in (squares, known)
-        )
-        count = counts[last] - counts[first]
-        out[at : at + size] = (sums[last] - sums[first]) / np.maximum(count, 1.0)
-        at += size
+    for begin, end, rate in driving.spans:
+        reach = max(round(_AROUND_S * rate), 1)
+        k = np.arange(end - begin)
+        first, last = np.maximum(k - reach, 0), np.minimum(k + reach + 1, end - begin)
+        sums, counts = (np.concatenate([[0.0], np.cumsum(x[begin:end])]) for x in (squares, known))
+        out[begin:end] = (sums[last] - sums[first]) / np.maximum(counts[last] - counts[first], 1.0)
     return out
 
 

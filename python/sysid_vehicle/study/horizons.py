@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray, as_float64
+from .._arrays import NORMAL_MAD, FloatArray, as_float64
 from .._memo import remembered
 from .._text import html_table, number, text_table
 from ..errors import NumericalError
@@ -30,7 +30,6 @@ _LATERAL = [PREDICTED.index(c) for c in LATERAL]
 AHEAD = (0.5, 1.0, 2.0, 5.0)
 _FEWEST = 5  # blocks that show a change
 _APART = 0.1  # of the horizon, between predictions
-_NORMAL = 1.4826  # standard deviation over the median absolute deviation
 _LOST = 10.0  # logarithm of the ratio, where one of two models lost the car
 _OF_MEDIAN = float(np.sqrt(0.5 * np.pi))  # its standard error over that of a mean
 
@@ -280,7 +279,7 @@ def changes(
                 ratio = np.log(other[known, j]) - np.log(one[known, j])
             ratio = np.clip(ratio, -_LOST, _LOST)
             middle = float(np.median(ratio))
-            scatter = _NORMAL * float(np.median(np.abs(ratio - middle)))
+            scatter = NORMAL_MAD * float(np.median(np.abs(ratio - middle)))
             found.append(
                 Change(
                     channel,
