@@ -1,6 +1,5 @@
 """One step of the way: what stands in for others is exchanged, what is not needed is dropped."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -368,22 +367,6 @@ def test_a_group_with_a_value_that_no_car_has_is_not_added(truth: Model, start: 
     assert found is not None
     assert found.model.effects == both
     assert first_together(dx, test, None, 2) is None
-
-
-def test_what_was_near_the_best_is_refitted_in_the_next_step_too(
-    dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[set[str]] = []
-
-    def noted(_: Fit, *, again: Sequence[str], **__: object) -> Diagnosis:
-        asked.append(set(again))
-        few = dx.ranking if len(asked) == 1 else ()
-        return replace(dx, ranking=few, proposed=replace(dx.proposed, known=()))
-
-    monkeypatch.setattr("sysid_vehicle.study.search.diagnose", noted)
-    search(driving[1], 1, []).follow(Trail([baseline]))
-    assert asked == [set(), {c.id for c in dx.significant if c.finished}]
-    assert len(asked[1]) > 1
 
 
 def test_what_came_with_a_step_is_told(dx: Diagnosis) -> None:
