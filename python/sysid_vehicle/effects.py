@@ -210,6 +210,11 @@ class Effect:
         return {f"{self.id}.{p.name}": p for p in self.parameters}
 
     @property
+    def moved(self) -> frozenset[str]:
+        """The measured channels that it moves first, one by one."""
+        return frozenset(self.moves.split(", "))
+
+    @property
     def scanned(self) -> Parameter | None:
         """Its parameter that means nothing while the effect is null, if there is one."""
         return next((p for p in self.parameters if p.scan), None)

@@ -144,6 +144,16 @@ def test_what_no_candidate_explains_is_unknown(hidden_fit: Hidden) -> None:
     assert max(causes.inclusion["mass"], causes.inclusion["aero_drag"]) < 0.5
 
 
+def test_unknown_forces_crowd_out_no_subset_that_a_refit_can_try(hidden_fit: Hidden) -> None:
+    fit, some = hidden_fit("gyro_bias.bias_radps", 0.006), ["mass", "aero_drag"]
+    causes = diagnose(fit, candidates=some, refits=0).causes
+    assert not set(causes.subsets[0].effects) <= set(some)
+    assert {s.effects for s in causes.known} == {("aero_drag",), ("mass",), ("aero_drag", "mass")}
+    odds = [s.log_odds for s in causes.known]
+    assert odds == sorted(odds, reverse=True)
+    assert causes.known[0].log_odds < causes.subsets[0].log_odds
+
+
 def test_confounded_effects_share_a_set(hidden_fit: Hidden) -> None:
     """On one lap a head wind is a drag; together they are as probable as one can be."""
     fit = hidden_fit("aero_drag.drag_area_m2", 0.3)

@@ -95,6 +95,23 @@ def test_a_refit_that_failed_names_nothing(found: Diagnosis) -> None:
     assert replace(found, ranking=(first, strong)).named is first
 
 
+def test_what_is_asked_for_is_refitted_again_where_there_is_evidence(
+    hidden_fit: Hidden, found: Diagnosis
+) -> None:
+    fit = hidden_fit(*OFFSET)
+    near = {found.best.id, *found.best.confounded_with}
+    asked = next(c.id for c in reversed(found.significant) if c.id not in near)
+    absent = next(c.id for c in reversed(found.ranking) if c not in found.significant)
+    some = [found.best.id, asked, absent]
+
+    def refitted(*again: str) -> set[str]:
+        dx = diagnose(fit, candidates=some, refits=1, again=again)
+        return {c.id for c in dx.ranking if c.fit is not None}
+
+    assert refitted() == {found.best.id}
+    assert refitted(asked, absent) == {found.best.id, asked}
+
+
 def test_only_the_candidates_asked_for_are_considered(hidden_fit: Hidden) -> None:
     fit = hidden_fit(*OFFSET)
     few = diagnose(fit, candidates=["aero_drag", "steer_offset"], refits=0)

@@ -19,6 +19,7 @@ from sysid_vehicle.study.horizons import (
     block_errors,
     changes,
     horizons,
+    moving_with,
 )
 from sysid_vehicle.study.matters import sizes_that_matter, sufficient, within
 from sysid_vehicle.study.validation import AHEAD, at_its_best
@@ -200,6 +201,18 @@ def test_the_own_share_of_what_a_model_has_more(fit: Fit, late: Fit, course: Log
     assert 0.0 < own_share(half, fit, driving, (1.0, 2.0)).value < own.value
     short = Driving.of(course.between(0.0, 4.0))
     assert not own_share(late, fit, short, (5.0,)).known
+
+
+def test_only_errors_of_the_motion_that_is_moved_count(fit: Fit, late: Fit, course: Log) -> None:
+    driving = Driving.of(course)
+    every, lateral, along = (
+        own_share(late, fit, driving, (1.0, 2.0), channels=c)
+        for c in ((), moving_with({"yaw_rate_radps"}), moving_with({"ax_mps2"}))
+    )
+    assert along.value < 0.3 < every.value < 0.8 < lateral.value
+    assert moving_with({"ay_mps2", "ax_mps2"}) == set(PREDICTED)
+    # What is not predicted at all leaves all that is.
+    assert own_share(late, fit, driving, (1.0, 2.0), channels=moving_with({"steer_rad"})) == every
 
 
 def test_what_loses_the_car_has_no_share(fit: Fit, course: Log) -> None:

@@ -71,6 +71,9 @@ class Causes(Printed):
         sets; linearised at the fit.
     subsets : tuple of Subset
         Leading subsets of up to three effects.
+    known : tuple of Subset
+        The same of effects of the catalogue alone, which a refit can try. Where a model is wrong in
+        several ways, unknown forces lead every other subset.
     units : dict of str to tuple of (str, str)
         Names and units of the parameters.
     rest : dict of str to float
@@ -81,6 +84,7 @@ class Causes(Printed):
     sets: tuple[CredibleSet, ...]
     sizes: dict[str, Size]
     subsets: tuple[Subset, ...] = ()
+    known: tuple[Subset, ...] = ()
     units: dict[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
     rest: dict[str, float] = field(default_factory=dict)
 
@@ -238,8 +242,9 @@ def causes_of(
         rules.nothing,
     )
     subsets = model.subsets()
+    known = replace(model, hypotheses=tuple(h for h in hypotheses if h.name in board.places))
     posterior = model.posterior(most, subsets[0])
-    return _told(model, posterior, subsets, board, scale, rules)
+    return _told(model, posterior, (subsets, known.subsets()), board, scale, rules)
 
 
 def _candidates(board: ScoreBoard) -> tuple[FloatArray, list[Hypothesis], FloatArray]:
@@ -302,7 +307,7 @@ def _unknown(projected: Directions) -> tuple[FloatArray, list[tuple[str, int]], 
 def _told(
     model: ScoreModel,
     posterior: Posterior,
-    subsets: Sequence[Subset],
+    subsets: tuple[Sequence[Subset], Sequence[Subset]],
     board: ScoreBoard,
     scale: FloatArray,
     rules: Rules,
@@ -346,7 +351,8 @@ def _told(
         {model.effects[i]: float(included[i]) for i in order},
         tuple(sets),
         sizes,
-        tuple(subsets[:_KEPT]),
+        tuple(subsets[0][:_KEPT]),
+        tuple(subsets[1][:_KEPT]),
         {
             e: (("delay_s", "s"),)
             if e in clocks

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from .._arguments import duration
@@ -43,6 +43,7 @@ def diagnose(
     alpha: float | None = None,
     rules: Rules = USUAL,
     refits: int = REFITS,
+    again: Collection[str] = (),
     workers: int | None = None,
     time_limit_s: float | None = None,
     seed: int = 0,
@@ -66,6 +67,10 @@ def diagnose(
         By which effects are claimed.
     refits : int
         How many of the best to refit; 0 ranks by score alone, and then none is named.
+    again : collection of str
+        Effects to refit beside them where there is evidence, such as those whose refits gained much
+        in a poorer model: where a model is wrong in several ways, a refit may gain ten times what
+        the score tells, as the noise that took up the effect is learned anew.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
     time_limit_s : float, optional
@@ -100,8 +105,8 @@ def diagnose(
         for s in board.scores
     ]
     with Workers(workers) as pool:
-        few = _worth_refitting([c for c in ranked if c.p_value < rules.alpha], refits)
-        finished, far = _refitted(fit, driving, few, pool, ends, progress)
+        few = _worth_refitting([c for c in ranked if c.p_value < rules.alpha], refits, again)
+        finished, far = _refitted(fit, driving, few, again, pool, ends, progress)
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         known = {c.id for c in finished}
         hidden = [c for c in ranked if is_hidden_by_noise(c.effect) and c.id not in known]
@@ -124,6 +129,7 @@ def _refitted(
     fit: Fit,
     driving: Driving,
     few: Sequence[Candidate],
+    again: Collection[str],
     pool: Workers,
     ends: float,
     progress: bool | None,
@@ -137,7 +143,8 @@ def _refitted(
     others = [
         c
         for c in few[1:]
-        if not _too_fast(c) and (c.statistic > _hopeless(c) * best or _rivals(c, few[0]))
+        if not _too_fast(c)
+        and (c.id in again or c.statistic > _hopeless(c) * best or _rivals(c, few[0]))
     ]
     tried = [
         first,
@@ -182,11 +189,13 @@ def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple
     return tuple(e for e in model.candidates if e.id in wanted)
 
 
-def _worth_refitting(significant: list[Candidate], refits: int) -> list[Candidate]:
-    """The best few, and the effects that the catalogue says act like the very best."""
+def _worth_refitting(
+    significant: list[Candidate], refits: int, again: Collection[str]
+) -> list[Candidate]:
+    """The best few, those asked for, and what the catalogue says acts like the very best."""
     few = significant[:refits]
-    confounded = few[0].effect.confounded_with if few else ()
-    return few + [c for c in significant[refits:] if c.id in confounded]
+    more = {*few[0].effect.confounded_with, *again} if few else set()
+    return few + [c for c in significant[refits:] if c.id in more]
 
 
 def _hopeless(c: Candidate) -> float:

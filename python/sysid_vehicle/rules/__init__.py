@@ -17,10 +17,10 @@
    implausible, or differs between pieces of the driving by a size that matters, or if something
    unknown does all that it does and more.
 8. Something left, or taken up by what only stands in for it: a name stands by its own share, what
-   comes back of the error 1 to 5 s ahead where the final model lacks it and all else is fitted
-   anew. It is above `taken` and shown not to be chance, on training and on validation data; where
-   less than `most` of that error is gone, the whole interval is above `taken`. Nothing that has no
-   such share takes more, and moves a channel that it moves.
+   comes back of the error 1 to 5 s ahead, of the motion that it moves, where the final model lacks
+   it and all else is fitted anew. It is above `taken` and shown not to be chance, on training and
+   on validation data; where less than `most` of that error is gone, the whole interval is above
+   `taken`. Nothing that has no such share takes more, and moves a channel that it moves.
 9. The verdict follows from what is left and which names stand (`verdict`).
 10. `Rules` holds every limit with unit, meaning, and the benchmark that chose or judges it.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from warnings import catch_warnings, simplefilter
 
@@ -14,7 +14,7 @@ from .._arrays import FloatArray, as_float64
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import UNKNOWN, Share, share_of
-from .horizons import squares_ahead
+from .horizons import PREDICTED, squares_ahead
 
 _DRAWS = 300
 
@@ -72,7 +72,13 @@ def beyond_noise(
 
 
 def own_share(
-    without: Fit, final: Fit, driving: Driving, horizons_s: Sequence[float], *, seed: int = 0
+    without: Fit,
+    final: Fit,
+    driving: Driving,
+    horizons_s: Sequence[float],
+    *,
+    channels: Collection[str] = (),
+    seed: int = 0,
 ) -> Share:
     """Work out what a model takes off the errors of one that lacks a part of it.
 
@@ -86,10 +92,14 @@ def own_share(
         The latter's noise starts every prediction.
     driving : Driving
     horizons_s : sequence of float
+    channels : collection of str
+        Those that count; by default, and where none of them is predicted, all.
     seed : int
         Of the draws.
     """
     squares, sensor, seen = squares_ahead((without, final), driving, horizons_s)
+    counted = seen & np.isin(PREDICTED, list(channels))
+    seen = counted if counted.any() else seen
     if not seen.any():
         return UNKNOWN
     beyond = np.maximum(squares - sensor**2, 0.0)

@@ -7,7 +7,7 @@ that: on a straight every model predicts that nothing happens.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,8 +24,9 @@ from ..identify.ahead import of_few
 from ..rules import Change
 from .waterfall import all_ahead
 
+_ALONG = ("vx_mps", "ax_mps2")
 LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2")
-PREDICTED = ("vx_mps", "ax_mps2", *LATERAL)
+PREDICTED = (*_ALONG, *LATERAL)
 _LATERAL = [PREDICTED.index(c) for c in LATERAL]
 AHEAD = (0.5, 1.0, 2.0, 5.0)
 _FEWEST = 5  # blocks that show a change
@@ -117,6 +118,15 @@ def _explainable(driving: Driving) -> tuple[str, ...]:
     and errs by that sensor alone.
     """
     return PREDICTED if driving.force_known else LATERAL
+
+
+def moving_with(channels: Collection[str]) -> frozenset[str]:
+    """Predicted channels of the motions, along the car and lateral, that some channels are of.
+
+    What moves the yaw rate moves v_y and a_y within a second, and the speed hardly at all.
+    """
+    motions = (m for m in (_ALONG, LATERAL) if not set(m).isdisjoint(channels))
+    return frozenset(c for motion in motions for c in motion)
 
 
 def _finite(figures: FloatArray) -> list[list[float | None]]:

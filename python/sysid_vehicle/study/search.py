@@ -60,6 +60,11 @@ class Trail:
         return self.fits[-1]
 
     @property
+    def refitted(self) -> tuple[str, ...]:
+        """Effects near the best of the last diagnosis, by refits with noise of their own."""
+        return tuple(c.id for dx in self.diagnoses[-1:] for c in dx.significant if c.finished)
+
+    @property
     def told(self) -> str:
         """The effects so far with their sizes, in words."""
         effects = [e for e in self.fit.model.effects if e not in self.fits[0].model.effects]
@@ -134,7 +139,7 @@ class Search:
         """Add what is missing to the last model until nothing more is that the driving can show."""
         while True:
             in_time = time.perf_counter() < self.ends
-            dx = self._diagnosis(trail.fit)
+            dx = self._diagnosis(trail.fit, trail.refitted)
             trail.diagnoses.append(dx)
             if not in_time:
                 trail.stopped = tuple(c.id for c in dx.significant)
@@ -187,7 +192,7 @@ class Search:
             return None
         if len(first.fit.model.effects) >= self.most_effects:
             return None
-        beside = self._diagnosis(first.fit)
+        beside = self._diagnosis(first.fit, trail.refitted)
         step = first_that_holds(beside, trail.fit, self.test, self.ends)
         if step is None or first.id not in step[1].model.effects:
             return None
@@ -196,14 +201,15 @@ class Search:
         trail.note(beside, step[0])
         return first, step[1]
 
-    def _diagnosis(self, fit: Fit) -> Diagnosis:
-        """All effects scored; where no time is left none is refitted."""
+    def _diagnosis(self, fit: Fit, again: Sequence[str]) -> Diagnosis:
+        """All effects scored, some refitted again; where no time is left none is refitted."""
         left = self.ends - time.perf_counter()
         return diagnose(
             fit,
             candidates=self.candidates,
             rules=self.rules,
             refits=REFITS if left > 0.0 else 0,
+            again=again if left > 0.0 else (),
             time_limit_s=left if left > 0.0 else None,
             seed=self.seed,
             progress=self.progress,

@@ -96,8 +96,7 @@ def first_together(
 
 def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:
     """Subsets of two effects or more with more evidence than any single one, the best first."""
-    known = {c.id for c in dx.ranking}
-    named = [s for s in dx.proposed.subsets if set(s.effects) <= known and len(s.effects) <= room]
+    named = [s for s in dx.proposed.known if len(s.effects) <= room]
     alone = max((s.log_odds for s in named if len(s.effects) == 1), default=0.0)
     least = max(alone, 0.0) + dx.rules.apart
     several = [s for s in named if len(s.effects) > 1 and s.log_odds > least]

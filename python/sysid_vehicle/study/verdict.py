@@ -47,7 +47,7 @@ def facts_of(
         candidate,
         (missing[0], missing[-1]),
         tuple(
-            Added(v.effect.id, v.finding, v.group, frozenset(v.effect.moves.split(", ")))
+            Added(v.effect.id, v.finding, v.group, v.effect.moved)
             for v in told.all
             if v.effect.id in added
         ),

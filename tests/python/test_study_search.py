@@ -1,0 +1,42 @@
+"""What the search for missing effects asks of its steps."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Diagnosis, Fit, diagnose
+from sysid_vehicle.rules import USUAL
+from sysid_vehicle.study.search import Search, Trail
+
+AGAINST = ["aero_drag", "rolling_resistance", "head_wind"]
+
+
+def test_what_was_near_the_best_is_refitted_in_the_next_step_too(
+    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = hidden_fit("aero_drag.drag_area_m2", 0.6)
+    dx = diagnose(fit, candidates=AGAINST)
+    asked: list[set[str]] = []
+
+    def noted(_: Fit, *, again: Sequence[str], **__: object) -> Diagnosis:
+        asked.append(set(again))
+        few = dx.ranking if len(asked) == 1 else ()
+        return replace(dx, ranking=few, proposed=replace(dx.proposed, known=()))
+
+    monkeypatch.setattr("sysid_vehicle.study.search.diagnose", noted)
+    trail = Trail([fit])
+    Search(
+        fit.driving,
+        candidates=AGAINST,
+        most_effects=1,
+        ends=np.inf,
+        rules=USUAL,
+        seed=0,
+        progress=False,
+        say=lambda _: None,
+    ).follow(trail)
+    assert trail.fit is not fit
+    assert asked == [set(), {c.id for c in dx.significant if c.finished}]
+    assert len(asked[1]) > 1
