@@ -221,6 +221,26 @@ def test_what_was_refitted_when_the_time_is_over_is_added(
     assert set(trail.stopped) == {c.id for c in dx.significant}
 
 
+def test_steps_with_which_the_model_errs_more_ahead_than_the_baseline_are_taken_back(
+    dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving]
+) -> None:
+    good = by_id(dx, "aero_drag")
+    windy = good.model.add("head_wind").with_values({"head_wind.speed_mps": 30.0})
+    bad = replace(good, model=windy)
+    told = [replace(dx, fit=f) for f in (baseline, good, bad)]
+    trail = Trail([baseline, good, bad], list(told))
+    trail.without_harm(driving[1], USUAL)
+    assert trail.fits == [baseline, good]
+    assert trail.diagnoses == told[:2]
+    assert trail.taken_back == ("head_wind",)
+    trail.without_harm(driving[1], USUAL)
+    assert trail.fits == [baseline, good]
+    assert trail.taken_back == ()
+    nowhere = Trail([baseline], told[:1])
+    nowhere.without_harm(driving[1], USUAL)
+    assert nowhere.fits == [baseline]
+
+
 def test_the_story_leads_over_every_effect_of_its_end(
     dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving]
 ) -> None:

@@ -140,6 +140,7 @@ def improve(
                 say=say,
             )
             search.follow(found)
+            found.without_harm(test_driving, rules)
         return found
 
     found = searched()
@@ -289,6 +290,13 @@ def _warnings(fit: Fit, driving: Driving, trail: Trail) -> tuple[str, ...]:
     if trail.stopped:
         found.append(
             f"the time limit ended the search with {', '.join(trail.stopped)} still to be tried"
+        )
+        warn(found[-1])
+    if trail.taken_back:
+        found.append(
+            f"{' and '.join(trail.taken_back)} fitted the training data better, and validation data "
+            "too with parameters that predict them best; as the likelihood fits the model, errors 1 "
+            "to 5 s ahead grow: taken back"
         )
         warn(found[-1])
     if driving.usable_s < _SHORT_S:

@@ -13,7 +13,8 @@ from ..diagnose.diagnose import REFITS
 from ..errors import Interrupted
 from ..estimate import Driving
 from ..identify import Fit
-from ..rules import Rules
+from ..rules import Rules, worse
+from .horizons import changes
 from .steps import (
     alternatives,
     exchanged,
@@ -22,6 +23,7 @@ from .steps import (
     in_common,
     likeliest,
 )
+from .validation import AHEAD
 
 
 @dataclass(eq=False)
@@ -44,6 +46,8 @@ class Trail:
         Parameters of rivals and their standard errors, each refitted in place of what was chosen.
     stopped : tuple of str
         Effects with evidence that the time limit left untried.
+    taken_back : tuple of str
+        Effects of last steps without which the model predicts better (`without_harm`).
     """
 
     fits: list[Fit]
@@ -53,6 +57,7 @@ class Trail:
     nearly: dict[str, tuple[Candidate, ...]] = field(default_factory=dict)
     sizes: dict[str, Size] = field(default_factory=dict)
     stopped: tuple[str, ...] = ()
+    taken_back: tuple[str, ...] = ()
 
     @property
     def fit(self) -> Fit:
@@ -72,6 +77,18 @@ class Trail:
             found = ", ".join(c.id for dx in self.diagnoses[:1] for c in dx.significant[:3])
             return f"no effect was added yet; there is evidence for {found or 'none'}"
         return "; ".join(f"{e}: {_sizes(self.fit, [e])}" for e in effects)
+
+    def without_harm(self, test: Driving, rules: Rules) -> None:
+        """Take back last steps while the model errs more ahead than the baseline, as it is fitted.
+
+        Each step was judged by the parameters that predict best: what they show an effect to take
+        away, those of the likelihood may lose where the effects that belong to it are not found.
+        """
+        last = self.fit.model.effects
+        while len(self.fits) > 1 and worse(changes(self.fits[0], self.fit, test, AHEAD), rules):
+            self.fits.pop()
+            self.diagnoses.pop()
+        self.taken_back = tuple(e for e in last if e not in self.fit.model.effects)
 
     def note_several(self, dx: Diagnosis, chosen: Sequence[str]) -> None:
         """Remember what was chosen together, and what is confounded with each of it."""
