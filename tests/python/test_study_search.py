@@ -40,3 +40,23 @@ def test_what_was_near_the_best_is_refitted_in_the_next_step_too(
     assert trail.fit is not fit
     assert asked == [set(), {c.id for c in dx.significant if c.finished}]
     assert len(asked[1]) > 1
+
+
+def test_steps_with_which_the_model_errs_more_ahead_than_the_baseline_are_taken_back(
+    hidden_fit: Callable[[str, float], Fit],
+) -> None:
+    baseline = hidden_fit("aero_drag.drag_area_m2", 0.6)
+    dx = diagnose(baseline, candidates=["aero_drag"])
+    good = dx.ranking[0].fit
+    assert good is not None
+    windy = good.model.add("head_wind").with_values({"head_wind.speed_mps": 30.0})
+    bad = replace(good, model=windy)
+    told = [replace(dx, fit=f) for f in (baseline, good, bad)]
+    trail = Trail([baseline, good, bad], list(told))
+    trail.without_harm(baseline.driving, USUAL)
+    assert trail.fits == [baseline, good]
+    assert trail.diagnoses == told[:2]
+    assert trail.taken_back == ("head_wind",)
+    trail.without_harm(baseline.driving, USUAL)
+    assert trail.fits == [baseline, good]
+    assert trail.taken_back == ()

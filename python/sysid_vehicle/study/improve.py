@@ -294,11 +294,9 @@ def _warnings(fit: Fit, driving: Driving, trail: Trail) -> tuple[str, ...]:
         warn(found[-1])
     if trail.taken_back:
         found.append(
-            f"{' and '.join(trail.taken_back)} fitted the training data better, and validation data "
-            "too with parameters that predict them best; as the likelihood fits the model, errors 1 "
-            "to 5 s ahead grow: taken back"
+            f"{' and '.join(trail.taken_back)} gained with parameters that predict best; as the "
+            "likelihood fits the model, errors 1 to 5 s ahead grow with it: taken back"
         )
-        warn(found[-1])
     if driving.usable_s < _SHORT_S:
         found.append(
             f"{driving}: too short to tell many effects apart; record {_SHORT_S:.0f} s or more, "
