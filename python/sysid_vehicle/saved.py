@@ -39,7 +39,6 @@ _MOVED: dict[str, str] = {"diagnose.doubt:Beside": "diagnose.reservation:Beside"
 _RENAMED: dict[str, dict[str, str]] = {
     "effects:Effect": {"twins": "confounded_with"},
     "estimate.noise:NoiseModel": {"wander": "disturbance"},
-    "rules.limits:Rules": {"idle": "insignificant"},
     "diagnose.diagnosis:Diagnosis": {"causes": "proposed"},
     "diagnose.proposals:Proposal": {
         "held_out_gain": "validation_gain",

@@ -145,10 +145,15 @@ def test_every_limit_says_what_it_is_and_what_chose_it() -> None:
     for t in told.values():
         assert t["unit"]
         assert t["meaning"]
-        assert t["chosen_by"].startswith(("benchmarks/", "convention"))
+        assert t["chosen_by"].startswith(("benchmarks/", "convention", "numerical"))
     assert all(name in str(USUAL) for name in told)
     assert USUAL.at(None) is USUAL
     assert USUAL.at(0.01).alpha == 0.01
+
+
+def test_few_limits_are_tuned() -> None:
+    tuned = [n for n, t in USUAL.to_dict().items() if t["chosen_by"].startswith("benchmarks/")]
+    assert len(tuned) < 8, tuned
 
 
 @pytest.mark.parametrize(
@@ -157,8 +162,8 @@ def test_every_limit_says_what_it_is_and_what_chose_it() -> None:
         ("alpha", 0.0, "alpha = 0.0: give a number between 0 and 1"),
         ("most", 1.5, "most = 1.5: give a number between 0 and 1"),
         ("sure", float("nan"), "sure = nan: give a number above 0, finite"),
-        ("clear", float("inf"), "clear = inf: give a number above 0, finite"),
-        ("insignificant", "2", "insignificant = '2': give a number above 0, finite"),
+        ("lean", float("inf"), "lean = inf: give a number above 0, finite"),
+        ("price", "2", "price = '2': give a number above 0, finite"),
     ],
 )
 def test_limits_that_mean_nothing_are_refused(limit: str, value: float, words: str) -> None:
@@ -257,5 +262,10 @@ def test_what_follows_from_a_limit_is_none_of_its_own() -> None:
     assert replace(USUAL, credible=0.99).interval == pytest.approx(2.576, abs=1e-3)
     with pytest.raises(InvalidInput, match=r"credible = 1\.0"):
         replace(USUAL, credible=1.0)
+    # Two-sided quantiles of the normal distribution, and half the square of a one-sided one.
+    assert USUAL.insignificant == pytest.approx(2.575829)
+    assert replace(USUAL, level=0.05).insignificant == pytest.approx(1.959964)
+    assert USUAL.apart == pytest.approx(0.5 * 3.090232**2)
+    assert replace(USUAL, strict=0.0227501319).apart == pytest.approx(2.0)
     assert USUAL.explainable == USUAL.taken == pytest.approx(1.0 - USUAL.most)
-    assert len(fields(Rules)) == len(USUAL.to_dict()) == 18
+    assert len(fields(Rules)) == len(USUAL.to_dict()) == 15

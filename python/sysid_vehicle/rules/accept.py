@@ -97,7 +97,7 @@ def accept(measures: Measures, rules: Rules = USUAL) -> bool:
     """
     three = (measures.gain, measures.own_gain, measures.fall)
     falls = measures.fall.value > 0.0
-    speak = sum(g.beyond(rules.lean if falls else rules.clear) for g in three) >= 2
+    speak = sum(g.beyond(rules.lean if falls else rules.interval) for g in three) >= 2
     own = measures.own_gain
     sure = own.value > rules.sure * own.error and measures.plausible and measures.as_sure
     confirmed = (speak and (falls or measures.plausible)) or sure
@@ -120,7 +120,7 @@ def worse(changes: Sequence[Change], rules: Rules = USUAL) -> tuple[Change, ...]
     return tuple(
         c
         for c in changes
-        if c.log_ratio > max(least, rules.clear * c.error)
+        if c.log_ratio > max(least, rules.interval * c.error)
         or (c.channel in lean and c.log_ratio > least)
     )
 

@@ -16,6 +16,9 @@ _NULLS = "benchmarks/exam --draw null=2000"
 _EFFECTS = "benchmarks/exam --draw effect=120 pair=50 --severity 1 2"
 _OUTSIDE = 'benchmarks/exam --draw "group removed=70" outside=40 --severity 0.5 2'
 _CONVENTION = "convention"
+_LEVEL = "convention; rates of false claims: benchmarks/exam --draw null=2000"
+_BREIMAN = "convention: Breiman et al., Classification and Regression Trees (1984), sec. 3.4.3"
+_NUMERICAL = "numerical: what rounding and the end of a search leave"
 
 
 def _limit(value: float, unit: str, meaning: str, chosen_by: str) -> float:
@@ -28,6 +31,9 @@ def _limit(value: float, unit: str, meaning: str, chosen_by: str) -> float:
 class Rules:
     """Every limit that decides what is claimed; printed, a table with units and meanings.
 
+    Seven are tuned, by the benchmarks they name. The others are levels of significance and other
+    conventions, or tolerances of the arithmetic; what follows from those is a property.
+
     Raises
     ------
     InvalidInput
@@ -35,22 +41,22 @@ class Rules:
     """
 
     alpha: float = _limit(
-        0.05, "probability", "of a false claim, over all effects together, per step", _NULLS
+        0.05, "probability", "of a false claim, over all effects together, per step", _LEVEL
     )
     level: float = _limit(
-        0.01, "probability", "below which a single test of a complete model rejects it", _NULLS
+        0.01, "probability", "below which a single test of a complete model rejects it", _LEVEL
     )
     strict: float = _limit(
         1e-3,
         "probability",
         "below which what is left makes names uncertain, and is no disturbance",
-        _OUTSIDE,
+        _LEVEL,
     )
     retained: float = _limit(
         1e-3,
         "share",
         "of an effect that fitted parameters cannot copy; less is not testable",
-        _NULLS,
+        _NUMERICAL,
     )
     lasts: float = _limit(
         5.0, "s", "of usable training data that each effect of a model takes", _EFFECTS
@@ -66,13 +72,7 @@ class Rules:
         "standard errors",
         "by which measures speak for an effect whose error falls, and, in the mean over horizons, "
         "errors ahead of a channel against it",
-        _EFFECTS,
-    )
-    clear: float = _limit(
-        2.0,
-        "standard errors",
-        "the same where it does not fall, and against an effect: errors at one horizon",
-        _EFFECTS,
+        _BREIMAN,
     )
     sure: float = _limit(
         4.5,
@@ -82,7 +82,7 @@ class Rules:
     )
     worse: float = _limit(0.05, "share", "by which no error 1 to 5 s ahead may grow", _EFFECTS)
     nothing: float = _limit(
-        0.5, "probability", "before any data, that one of a sum of effects is none", _NULLS
+        0.5, "probability", "before any data, that one of a sum of effects is none", _CONVENTION
     )
     credible: float = _limit(
         0.95,
@@ -90,14 +90,8 @@ class Rules:
         "that a credible set holds a missing effect, an interval or a bound a parameter",
         _CONVENTION,
     )
-    insignificant: float = _limit(
-        2.6, "standard errors", "from nothing, within which an effect may be needless", _EFFECTS
-    )
-    apart: float = _limit(
-        4.5, "nats", "that tell two models apart, beyond the BIC penalty: 3 sigma", _EFFECTS
-    )
     same: float = _limit(
-        0.05, "twice nats", "between fits that are the same by other names", _EFFECTS
+        0.05, "twice nats", "between fits that are the same by other names", _NUMERICAL
     )
     near: float = _limit(
         0.6, "share", "of the evidence for the best, with which another may replace it", _EFFECTS
@@ -122,13 +116,33 @@ class Rules:
 
     @property
     def interval(self) -> float:
-        """Half the interval of a normal variable that is `credible` [standard errors]."""
+        """Half the interval of a normal variable that is `credible` [standard errors].
+
+        Beyond it measures speak for an effect whose error does not fall, and errors at one horizon
+        against any.
+        """
         return NormalDist().inv_cdf(0.5 + 0.5 * self.credible)
 
     @property
     def bound(self) -> float:
         """The same of a bound on one side [standard errors]."""
         return NormalDist().inv_cdf(self.credible)
+
+    @property
+    def insignificant(self) -> float:
+        """Distance from nothing within which an effect may be needless [standard errors].
+
+        That of a single test at `level`.
+        """
+        return NormalDist().inv_cdf(1.0 - 0.5 * self.level)
+
+    @property
+    def apart(self) -> float:
+        """Log-likelihood that tells two models apart, beyond the BIC penalty [nats].
+
+        That by which a parameter of normal error is shown at `strict` to have one sign.
+        """
+        return 0.5 * NormalDist().inv_cdf(1.0 - self.strict) ** 2
 
     @property
     def explainable(self) -> float:

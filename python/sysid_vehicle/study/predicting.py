@@ -61,7 +61,7 @@ class Predicting:
         return not self.needed or self._falls(self.needed)
 
     def _falls(self, found: Sequence[Change]) -> bool:
-        sure = [c for c in found if abs(c.log_ratio) > self.rules.clear * c.error]
+        sure = [c for c in found if abs(c.log_ratio) > self.rules.interval * c.error]
         falls = any(c.log_ratio < -_WORTH for c in sure)
         return falls and not any(c.log_ratio > _WORTH for c in sure)
 

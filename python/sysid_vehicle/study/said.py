@@ -47,7 +47,7 @@ def nuisances(study: Study) -> list[str]:
             continue
         own = [(p, fit[f"{part.id}.{p.name}"]) for p in part.parameters]
         off = [(abs(e.value - p.null_value), e.std, p.matters) for p, e in own]
-        if any(by >= matters and by > study.rules.clear * std for by, std, matters in off):
+        if any(by >= matters and by > study.rules.interval * std for by, std, matters in off):
             sizes = ", ".join(f"{p.name} {with_error(e.value, e.std)} {p.unit}" for p, e in own)
             found.append(f"Nuisance {part.id} ({part.title}): {sizes}")
     return found
