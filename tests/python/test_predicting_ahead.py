@@ -1,5 +1,6 @@
 """Parameters fitted to predictions of seconds, beside those of the one-step likelihood."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from sysid_vehicle import (
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import predicting_ahead
 from sysid_vehicle.rules import USUAL, Change
-from sysid_vehicle.study.horizons import changes
+from sysid_vehicle.study.horizons import changes, typical_error
 from sysid_vehicle.study.predicting import Predicting
 from sysid_vehicle.study.waterfall import look_ahead
 
@@ -48,6 +49,21 @@ def test_of_the_right_model_both_criteria_tell_the_same_car(
     assert ahead.horizon_s == 2.0
     assert "fitted to 2 s ahead" in str(ahead)
     assert "ahead" not in str(fit)
+
+
+def test_tyres_that_the_likelihood_bends_do_not_hold_the_search_back(
+    hidden_fit: Callable[[str, float], Fit],
+) -> None:
+    """From such a shape alone it ends where the car errs 1 % more."""
+    fit = hidden_fit("tyre_relaxation.relaxation_length_m", 0.6)
+    front = {"B_front": 7.0, "C_front": 0.5, "D_front": 2.2, "E_front": 0.4}
+    rear = {"B_rear": 25.0, "C_rear": 0.5, "D_rear": 2.4, "E_rear": -6.0}
+    bent = replace(fit, model=fit.model.with_values(front | rear))
+    errors = [
+        typical_error(predicting_ahead(f), fit.noise.floor(), fit.driving, (2.0,))
+        for f in (fit, bent)
+    ]
+    assert errors[1] == pytest.approx(errors[0], abs=1e-3)
 
 
 def test_standard_errors_are_those_of_repeated_drives(complete_fits: tuple[Fit, ...]) -> None:

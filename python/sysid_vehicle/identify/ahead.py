@@ -10,11 +10,9 @@ model is the car, both give the same car within their uncertainty, and the likel
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import groupby
-from operator import itemgetter
 
 import numpy as np
 import numpy.typing as npt
@@ -22,74 +20,26 @@ import scipy
 
 from .. import _core
 from .._arrays import FloatArray, as_float64
-from ..errors import InvalidInput
-from ..estimate import Driving, NoiseModel, turning
+from ..errors import InvalidInput, NumericalError
+from ..estimate import Driving, NoiseModel
+from ..estimate.pieces import DrivingProblem
 from ..model import Model
 from .box import free_box, free_prior
 from .estimates import wald
 from .fit import Fit
-from .objective import Penalised
-from .search import minimise
+from .objective import LinearRows, Penalised
+from .search import Box, minimise
+from .windows import Gains, Windows, blocks_of, counting, squares_of, turns_of, windows_of
 
-_MOST = 400  # windows
 # Windows that err by more than so many times the typical error count as lost, but of all windows
 # no more than a tenth: they are left out (trimmed squares, Rousseeuw, JASA 1984). Both are those of
 # windows in which the car turns: beside a straight every corner would be lost.
 _LOST, _KEPT = 3.0, 0.9
 _PASSES, _ROUNDS = 3, 60
 _SETTLED = 1e-3  # observations
-_BLOCK_S, _FEWEST = 10.0, 6  # windows of one such time are wrong alike; fewest such times
-_TINY = 1e-300
 _ERRS = 0.1  # of the motion: what a fair model leaves; a car whose a_y shakes by 4 m/s2 chose it
 _BLIND = 1e4  # standard deviations of a channel: a sensor that corrects nothing
 _STILL = 1e-6  # noise of a motion that is certain
-
-
-_Gains = tuple[_core.FrozenFilter, ...]
-
-
-@dataclass(frozen=True)
-class _Windows:
-    """Prediction errors over windows, whose mean square over a window and channel is near one.
-
-    Logs have rates of their own: a window counts as one observation of each channel, however many
-    samples it has.
-    """
-
-    problems: tuple[_core.Problem, ...]  # one for each length of windows
-    units: tuple[float, ...]
-
-    @property
-    def samples(self) -> int:
-        return sum(problem.samples for problem in self.problems)
-
-    def freeze(self, p: FloatArray, noise: FloatArray) -> _Gains:
-        return tuple(problem.freeze(p, noise) for problem in self.problems)
-
-    def _each(self, gains: _Gains) -> Iterator[tuple[_core.Problem, float, _core.FrozenFilter]]:
-        return zip(self.problems, self.units, gains, strict=True)
-
-    def residuals(self, p: FloatArray, gains: _Gains) -> FloatArray:
-        return np.vstack([one.residuals(p, g) / unit for one, unit, g in self._each(gains)])
-
-    def sensitivities(self, p: FloatArray, gains: _Gains, columns: list[int]) -> FloatArray:
-        each = self._each(gains)
-        return np.vstack([one.sensitivities(p, g, columns) / unit for one, unit, g in each])
-
-    def half_sum_of_squares(self, p: FloatArray, gains: _Gains) -> float:
-        return sum(one.half_sum_of_squares(p, g) / unit**2 for one, unit, g in self._each(gains))
-
-    def normal_equations(
-        self, p: FloatArray, gains: _Gains, columns: list[int]
-    ) -> tuple[float, FloatArray, FloatArray]:
-        cost, descent = 0.0, np.zeros(len(columns))
-        information = np.zeros((len(columns), len(columns)))
-        for one, unit, g in self._each(gains):
-            own = one.normal_equations(p, g, columns)
-            cost += own[0] / unit**2
-            descent += own[1] / unit**2
-            information += own[2] / unit**2
-        return cost, descent, information
 
 
 def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
@@ -98,8 +48,9 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     Each window begins with the smoothed motion, and from there on knows steering and wheel force
     alone. Errors count in standard deviations of their channel over the driving, together with ten
     times the noise of its sensor: beside an accelerometer that shakes other channels decide.
-    Windows in which the model loses the car do not count, a tenth at most. Standard errors are
-    those of windows that are wrong alike for ten seconds (sandwich of Huber and White over such
+    Windows in which the model loses the car do not count, a tenth at most. The search begins from
+    the likelihood's parameters, and once more with the tyres of the vehicle file. Standard errors
+    are those of windows that are wrong alike for ten seconds (sandwich of Huber and White over such
     blocks).
 
     Parameters
@@ -120,40 +71,24 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     """
     if not (np.isfinite(horizon_s) and horizon_s > 0.0):
         raise InvalidInput(f"horizon_s = {horizon_s}: give a time above zero, in seconds")
-    box = free_box(fit.model)
-    driving, model = fit.driving, fit.model
-    windows = _windows_of(driving, horizon_s)
-    turns = _turns(driving, windows)
-    noise = _blind_noise(driving, fit.noise.floor())
-    known = model.parameters
-    prior = free_prior(model)
-    whole = driving.problem(model)
-    p = box.inside(model.vector())
-    for _ in range(_PASSES):
-        # What is not measured is smoothed with the parameters that are being sought.
-        motion = as_float64(whole.trace(p, fit.noise.vector(), True)["state"])
-        every = driving.windows(model, windows, motion)
-        squares = _squares(every.residuals(p, every.freeze(p, noise)), windows)
-        typical = float(np.median(squares[turns]))
-        most = max(_LOST**2 * typical, float(np.quantile(squares[turns], _KEPT)))
-        kept = [w for w, square in zip(windows, squares, strict=True) if square <= most]
-        counted = sorted(kept, key=lambda window: window[::-1])
-        errors = _counting(driving, model, counted, motion, typical)
-        gains = errors.freeze(p, noise)
-        found = minimise(
-            Penalised(errors, prior), p, gains, box, rounds=_ROUNDS, tolerance=_SETTLED
-        )
-        p = box.put(p, found.x)
+    box, model = free_box(fit.model), fit.model
+    ahead = _Ahead.of(fit, horizon_s, box)
+    end = min(ahead.ends(_starts(model, box)), key=lambda e: ahead.trimmed(e.p))
+    for _ in range(_PASSES - 1):
+        end = ahead.searched(end.p)
+    p, errors, gains = end.p, end.errors, end.gains
     information = _information(
         errors.sensitivities(p, gains, box.columns),
         errors.residuals(p, gains).ravel(),
-        np.repeat(_blocks(driving, counted), [_core.CHANNELS * size for _, size in counted]),
+        np.repeat(
+            blocks_of(fit.driving, end.counted), [_core.CHANNELS * size for _, size in end.counted]
+        ),
     )
-    for rows in prior:
+    for rows in ahead.prior:
         stated = rows(p)[1][:, box.columns]
         information = information + stated.T @ stated
     names = model.free_names
-    units = {n: parameter.unit for n, parameter in known.items()}
+    units = {n: parameter.unit for n, parameter in model.parameters.items()}
     x = p[box.columns]
     estimates, covariance = wald(names, units, x, as_float64(information), box)
     return replace(
@@ -161,48 +96,111 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
         model=model.with_values(dict(zip(names, map(float, x), strict=True))),
         estimates=estimates,
         covariance=covariance,
-        log_likelihood=float(whole.freeze(p, fit.noise.vector()).log_likelihood),
-        converged=found.settled,
+        log_likelihood=float(ahead.whole.freeze(p, fit.noise.vector()).log_likelihood),
+        converged=end.settled,
         profiles=(),
         horizon_s=float(horizon_s),
     )
 
 
-def _counting(
-    driving: Driving,
-    model: Model,
-    windows: list[tuple[int, int]],
-    motion: FloatArray,
-    square: float,
-) -> _Windows:
-    """Windows, sorted by their length, of which the typical mean square is known."""
-    alike = [(length, list(few)) for length, few in groupby(windows, key=itemgetter(1))]
-    return _Windows(
-        tuple(driving.windows(model, few, motion) for _, few in alike),
-        tuple(float(np.sqrt(max(square * length, _TINY))) for length, _ in alike),
-    )
+@dataclass(frozen=True)
+class _End:
+    """Where a search over windows ended: all parameters, and what counted."""
+
+    p: FloatArray
+    errors: Windows
+    gains: Gains
+    counted: list[tuple[int, int]]
+    settled: bool
 
 
-def _windows_of(driving: Driving, horizon_s: float) -> list[tuple[int, int]]:
-    """First sample and number of samples of windows that begin half a horizon apart."""
-    found = []
-    for first, end, rate in driving.spans:
-        length = max(round(horizon_s * rate), 1) + 1
-        found += [(k, length) for k in range(first, end - length + 1, max(length // 2, 1))]
-    if not found:
-        raise InvalidInput(
-            f"horizon_s = {horizon_s:g}: no stretch of {driving} is as long; give a shorter one"
+@dataclass(frozen=True)
+class _Ahead:
+    """Predictions over windows of one driving, as functions of all parameters."""
+
+    fit: Fit
+    box: Box
+    whole: DrivingProblem
+    windows: list[tuple[int, int]]
+    turns: npt.NDArray[np.bool_]
+    noise: FloatArray
+    prior: tuple[LinearRows, ...]
+
+    @classmethod
+    def of(cls, fit: Fit, horizon_s: float, box: Box) -> _Ahead:
+        driving = fit.driving
+        windows = windows_of(driving, horizon_s)
+        return cls(
+            fit,
+            box,
+            driving.problem(fit.model),
+            windows,
+            turns_of(driving, windows),
+            _blind_noise(driving, fit.noise.floor()),
+            free_prior(fit.model),
         )
-    if len(found) <= _MOST:
-        return found
-    return [found[i] for i in np.linspace(0, len(found) - 1, _MOST).round().astype(int)]
+
+    def ends(self, starts: list[FloatArray]) -> list[_End]:
+        """Where a search from each start ends, of those that end.
+
+        Raises
+        ------
+        NumericalError
+            The car spins in the model from every one.
+        """
+        found = []
+        for p in starts:
+            with suppress(NumericalError, np.linalg.LinAlgError):
+                found.append(self.searched(p))
+        return found or [self.searched(starts[0])]
+
+    def searched(self, p: FloatArray) -> _End:
+        """Where the errors of the windows that count at a start are least."""
+        driving, model, windows = self.fit.driving, self.fit.model, self.windows
+        squares, motion = self._looked(p)
+        turning = squares[self.turns]
+        typical = float(np.median(turning))
+        most = max(_LOST**2 * typical, float(np.quantile(turning, _KEPT)))
+        kept = [w for w, square in zip(windows, squares, strict=True) if square <= most]
+        counted = sorted(kept, key=lambda window: window[::-1])
+        errors = counting(driving, model, counted, motion, typical)
+        gains = errors.freeze(p, self.noise)
+        found = minimise(
+            Penalised(errors, self.prior),
+            p,
+            gains,
+            self.box,
+            rounds=_ROUNDS,
+            tolerance=_SETTLED,
+        )
+        return _End(self.box.put(p, found.x), errors, gains, counted, found.settled)
+
+    def trimmed(self, p: FloatArray) -> float:
+        """Mean square of the windows in which the car turns, without those that err most."""
+        squares = np.sort(self._looked(p)[0][self.turns])
+        return float(np.mean(squares[: max(int(_KEPT * len(squares)), 1)]))
+
+    def _looked(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mean square of each window, and the motion that they begin with."""
+        # What is not measured is smoothed with the parameters that are being sought.
+        motion = as_float64(self.whole.trace(p, self.fit.noise.vector(), True)["state"])
+        every = self.fit.driving.windows(self.fit.model, self.windows, motion)
+        return squares_of(every.residuals(p, every.freeze(p, self.noise)), self.windows), motion
 
 
-def _turns(driving: Driving, windows: list[tuple[int, int]]) -> npt.NDArray[np.bool_]:
-    """In which windows the car turns half of the time; all, where it does in none."""
-    turned = np.concatenate([[0], np.cumsum(turning(driving))])
-    found = np.array([2 * (turned[at + size] - turned[at]) >= size for at, size in windows])
-    return found if found.any() else ~found
+def _starts(model: Model, box: Box) -> list[FloatArray]:
+    """Parameters of the likelihood, and with the tyres of the vehicle file where all are free.
+
+    Where the likelihood bends the tyres, no search leads back over the shapes between.
+    """
+    p = box.inside(model.vector())
+    axles = ("front", "rear")
+    tyres = [model.parameters[f"{c}_{axle}"].column for axle in axles for c in "BCDE"]
+    if not set(tyres) <= set(box.columns):
+        return [p]
+    other = p.copy()
+    other[tyres] = box.inside(Model(model.vehicle).vector())[tyres]
+    return [p, box.inside(other)]
 
 
 def _blind_noise(driving: Driving, noise: NoiseModel) -> FloatArray:
@@ -221,20 +219,6 @@ def _blind_noise(driving: Driving, noise: NoiseModel) -> FloatArray:
     return as_float64(
         [*(_BLIND * spread), *(_STILL,) * 3, 0.0, 0.0, 0.0, 0.1, 0.1, 0.1, 0.0, 0.0, 5.0]
     )
-
-
-def _squares(errors: FloatArray, windows: list[tuple[int, int]]) -> FloatArray:
-    """Mean square error of each window, over samples and channels that were measured."""
-    begins = np.cumsum([0, *(size for _, size in windows[:-1])])
-    sums = np.add.reduceat((errors**2).sum(axis=1), begins)
-    counts = np.add.reduceat(np.count_nonzero(errors, axis=1), begins)
-    return as_float64(sums / np.maximum(counts, 1))
-
-
-def _blocks(driving: Driving, windows: list[tuple[int, int]]) -> npt.NDArray[np.intp]:
-    """For each window the number of its block, from zero on without gaps."""
-    length = max(min(_BLOCK_S, driving.usable_s / _FEWEST) * driving.mean_rate_hz, 1.0)
-    return np.unique([int(first / length) for first, _ in windows], return_inverse=True)[1]
 
 
 @lru_cache
