@@ -7,6 +7,7 @@ import pytest
 
 from sysid_vehicle.diagnose import Omnibus
 from sysid_vehicle.rules import (
+    UNKNOWN,
     USUAL,
     Added,
     Facts,
@@ -75,6 +76,23 @@ def test_verdicts_where_nothing_was_added() -> None:
     assert said.verdict == "unknown"
     assert said.withdrawn[0].effects == {"mass"}
     assert said.withdrawn[0].because == "ay_mps2: turned round"
+
+
+def test_a_baseline_with_small_errors_is_adequate_where_no_name_stands() -> None:
+    proxy = replace(DRAG, finding="proxy")
+    for alone in (
+        replace(WHOLE, added=(proxy,)),
+        replace(LEFT, added=(replace(MASS, own=UNKNOWN),)),
+    ):
+        assert verdict(alone).verdict == "unknown"
+        small = verdict(replace(alone, small=True))
+        assert small.verdict == "adequate"
+        assert small.withdrawn == verdict(alone).withdrawn
+    # What stands explains more than small errors do, and channels that contradict nothing.
+    assert verdict(replace(WHOLE, small=True)).verdict == "explained"
+    assert verdict(replace(LEFT, small=True)).verdict == "partly_explained"
+    wrong = replace(WHOLE, added=(proxy,), contradictions=("ay_mps2: turned round",), small=True)
+    assert verdict(wrong).verdict == "unknown"
 
 
 def withdrawn(facts: Facts) -> dict[str, str]:

@@ -1,5 +1,6 @@
 """What is said of added effects beside what is left."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -54,6 +55,20 @@ def test_a_model_that_cannot_be_fitted_without_an_effect_tells_of_no_share(
     assert own_shares(richer, ["gyro_scale"], ["gyro_scale"], Driving.of(lap)) == {
         "gyro_scale": (UNKNOWN, UNKNOWN)
     }
+
+
+def test_the_baseline_is_asked_whether_its_errors_matter(
+    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
+    logs = [drive(car, manoeuvres.lap(20.0), seed=seed) for seed in (71, 72)]
+    asked: list[Fit] = []
+    module = sys.modules["sysid_vehicle.study.improve"]
+    monkeypatch.setattr(module, "sufficient", lambda fit, *_: asked.append(fit))
+    study = improve(start, *logs, candidates=["steer_lag"], most_effects=1, starts=1, matters={})
+    assert [a.id for a in study.added] == ["steer_lag"]
+    assert len(asked) == 1
+    assert asked[0] is study.fits[0]
 
 
 @pytest.mark.manual

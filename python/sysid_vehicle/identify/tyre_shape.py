@@ -11,6 +11,7 @@ from .._arrays import FloatArray
 from ..vehicle import magic_formula
 
 _PEAKLESS = 1.0 + 1e-6
+_RELATIVE = 1e-12  # error of the slip at the peak
 
 
 def friction(slip_rad: FloatArray, bcde: FloatArray) -> FloatArray:
@@ -36,7 +37,8 @@ def peak_slip(bcde: FloatArray) -> float:
     wanted = np.tan(0.5 * np.pi / c)
 
     def beyond(x: float) -> float:
-        return float(x - e * (x - np.arctan(x)) - wanted)
+        # Of x less e x nothing would be left where E is near 1, and the root finder would stray.
+        return float((1.0 - e) * x + e * np.arctan(x) - wanted)
 
     # For E below 1 it grows without end and has one root.
     high = 1.0
@@ -44,7 +46,7 @@ def peak_slip(bcde: FloatArray) -> float:
         high *= 2.0
         if high > 1e9:
             return np.inf
-    return float(scipy.optimize.brentq(beyond, 0.0, high, xtol=1e-15 * high)) / b
+    return float(scipy.optimize.brentq(beyond, 0.0, high, xtol=1e-15 * high, rtol=_RELATIVE)) / b
 
 
 def look_alike(bcde: FloatArray, e: float) -> FloatArray:

@@ -86,7 +86,8 @@ class Facts:
         Share of anything that the final model leaves which a function of the driving is shown to
         predict: on training or validation data, and of the same thing on both.
     small : bool
-        Whether no error 0.5 to 5 s ahead on validation data is as large as matters to the user.
+        Whether no error of the baseline 0.5 to 5 s ahead on validation data is as large as matters
+        to the user.
     """
 
     fitted: Tested

@@ -70,7 +70,8 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     What was added may explain all, a part, or only stand in for what is missing. Its residuals
     tell: on the training data, and on all data together, where a stand-in leaves what the right
     effect does not. An uneven road or a coloured sensor keeps the error of the true car above its
-    noise floor: what does not depend on the driving is no effect's to explain.
+    noise floor: what does not depend on the driving is no effect's to explain. Where no name stands
+    there is the baseline alone, which may be as good as its user needs.
     """
     names = frozenset(a.id for a in facts.added)
     if facts.contradictions:
@@ -94,7 +95,7 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     proxies = {a.id for a in facts.added if a.finding == "proxy" or _falls(a, withdrawn)}
     negligible = {a.id for a in facts.added if a.finding == "negligible"}
     if proxies == names or (left and proxies | negligible == names):
-        return Decision("unknown", tuple(withdrawn))
+        return Decision("adequate" if facts.small else "unknown", tuple(withdrawn))
     whole = not left and not proxies
     much = left and share_of(*facts.missing) < rules.most
     return Decision("explained" if whole else "partly_explained", tuple(withdrawn), much)

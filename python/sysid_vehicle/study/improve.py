@@ -93,8 +93,8 @@ def improve(
     matters : mapping, optional
         Errors that matter, such as ``{"yaw_rate": "0.5deg/s"}`` (`sizes_that_matter`); those not
         given have usual sizes. A baseline whose errors 0.5 to 5 s ahead on validation data are all
-        smaller, as the likelihood fits it or as predictions do, is adequate, whatever is left. By
-        default whatever is shown to be left counts.
+        smaller, as the likelihood fits it or as predictions do, is adequate where no name stands,
+        whatever is left. By default whatever is shown to be left counts.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
     progress : bool, optional
@@ -188,7 +188,7 @@ def improve(
             candidate=min((c.p_value for c in last.ranking), default=1.0),
             excited=_excited(train_driving),
             structure=(pattern.anywhere, pattern.everywhere),
-            small=sizes is not None and sufficient(fit, test_driving, sizes) is not None,
+            small=sizes is not None and sufficient(fits[0], test_driving, sizes) is not None,
         )
         if len(fits) > 1 and incomplete(facts, rules):
             named = {a.id for a in facts.added if a.named}

@@ -26,6 +26,8 @@ def next_steps(study: Study) -> tuple[str, ...]:
     """
     if study.train[-1].unrelated:
         return (_MEND,)
+    if study.verdict == "adequate":
+        return ()
     found = [*_of_names(study)]
     if study.verdict in ("unknown", "partly_explained"):
         found += _of_what_is_left(study)
@@ -56,11 +58,12 @@ def _of_what_is_left(study: Study) -> list[str]:
     found = []
     if study.stopped:
         found.append(f"give the search more time: {_few(study.stopped)} were still to be tried")
-    if study.verdict == "unknown" and not study.added and small(study):
+    if study.verdict == "unknown" and small(study):
         usual = ", ".join(f"{name} {size}" for name, size in USUAL_SIZES.items())
         found.append(
-            f"if errors 0.5 to 5 s ahead of less than {usual} do not matter to you, use the model "
-            "as it is: with `matters`, or `--matters`, the verdict counts larger ones alone"
+            f"if errors 0.5 to 5 s ahead of less than {usual} do not matter to you, use the "
+            "baseline as it is: with `matters`, or `--matters`, the verdict counts larger ones "
+            "alone"
         )
     if not study.sensors and not study.checked:
         found.append(

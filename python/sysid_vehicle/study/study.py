@@ -154,6 +154,11 @@ class Study:
                 "disturbance, and something else that is missing"
             )
         seen = self.omnibus.rejects or self.diagnoses[-1].significant or structured(self)
+        if self.verdict == "adequate" and self.added:
+            return (
+                "what was added is no sure name; what the baseline (`study.fits[0]`) leaves can be "
+                "smaller, 0.5 to 5 s ahead, than the errors that matter"
+            )
         if self.verdict == "adequate" and seen:
             if disturbance(self):
                 return "what is left is disturbance: no function of the driving predicts it"
