@@ -25,7 +25,7 @@ from .pieces import DrivingProblem, PiecewiseProblem, cut
 UNITS = {c: CHANNELS[c].unit for c in MEASURED}
 WORDS = dict(zip(MEASURED, ("v_x", "v_y", "yaw rate", "a_x", "a_y"), strict=True))
 
-_WINDOW_S, _SHORTEST = 1.0, 50  # of windows of thinned driving; samples, at least
+_WINDOW_S, _SHORTEST = 2.0, 50  # of windows of thinned driving; samples, at least
 _REACH_S = effect("steer_delay").parameters[0].upper  # either way
 
 _Part = tuple[Log, slice, int]

@@ -28,7 +28,7 @@ from .suspects import explaining
 
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
-_THINNED = 1600  # samples that decide between starts
+_THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
 _OFFSETS = 2  # times that offsets of logs and what they share are found in turn
 
