@@ -104,9 +104,10 @@ def test_noise_is_not_tried_where_its_score_promises_nothing() -> None:
     problem.asked = 0
     assert maximise_noise(problem, best, best, low, high, rounds=9)[0] == pytest.approx(best)
     assert problem.asked == 1
-    found, value = maximise_noise(
+    found, value, stands = maximise_noise(
         problem, best, np.array([0.3, 0.5]), low, high, rounds=9, enough=1e-6
     )
+    assert stands
     assert found == pytest.approx(best, rel=1e-2)
     assert value > at_best - 1e-3
     # Of the last step the likelihood alone is asked.
@@ -118,14 +119,24 @@ def test_noise_is_not_tried_where_its_score_promises_nothing() -> None:
             return told[-1]
 
         start, within = np.array([0.3, 0.5]), (low, high)
-        found, value = maximise_noise(
+        found, value, stands = maximise_noise(
             problem, best, start, *within, rounds=rounds, likelihood=alone
         )
+        assert stands == (rounds == 9)
         asked, problem.asked = problem.asked, 0
         expected = maximise_noise(problem, best, start, *within, rounds=rounds)
         assert np.array_equal(found, expected[0])
         assert (value, asked) == (expected[1], problem.asked)
         assert told or rounds == 9
+    # So it is of a step that is short and promises little: no other one follows.
+    problem.asked, told = 0, []
+    near = best * np.array([1.1, 1.0])
+    found, value, stands = maximise_noise(
+        problem, best, near, *within, rounds=9, likelihood=lambda v: alone(v, told)
+    )
+    assert stands
+    assert (len(told), problem.asked) == (1, 2)
+    assert value > at_best - 1e-3
 
 
 def test_twice_the_sensor_noise_is_learned(truth: Model) -> None:

@@ -1,11 +1,13 @@
 """Exact dynamics of candidates whose score shows little of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, Log, Model, Vehicle, diagnose, drive, identify, manoeuvres
 from sysid_vehicle.diagnose.diagnosis import Candidate
-from sysid_vehicle.diagnose.refits import from_typical, is_hidden_by_noise
+from sysid_vehicle.diagnose.refits import finished, from_typical, is_hidden_by_noise, refitted
 from sysid_vehicle.effects import catalogue
 from sysid_vehicle.model import NUISANCES
 
@@ -34,6 +36,29 @@ def test_a_lag_that_is_not_there_is_not_found(complete_fits: tuple[Fit, ...]) ->
     p = [from_typical(f, scored(f, "tyre_relaxation"), 1).p_value for f in complete_fits]
     assert min(p) > 0.01
     assert np.isfinite(p).all()
+
+
+def test_a_refit_is_never_worse_than_the_model_that_it_contains(fit: Fit) -> None:
+    """Precise sensors tell a tenth of a typical delay from none by hundreds of nats."""
+    one = replace(scored(fit, "sensor_delay"), value=(0.06, 0.02))
+    found = refitted(fit, fit.driving, one)
+    assert found.statistic == 0.0
+    assert found.fit is not None
+    assert found.fit.log_likelihood == pytest.approx(fit.log_likelihood, abs=1e-6)
+    assert found.value == (0.0, 0.0)
+    assert np.isinf(found.std).all()
+    assert finished(fit, found).statistic == 0.0
+
+
+def test_of_two_delays_one_may_not_be_there(truth: Model, start: Model) -> None:
+    car = truth.add("sensor_delay").with_values({"sensor_delay.speeds_s": 0.0})
+    car = car.with_values({"sensor_delay.inertial_s": 0.03})
+    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1)
+    found = refitted(fit, fit.driving, scored(fit, "sensor_delay"))
+    assert found.statistic > 100.0
+    speeds, inertial = found.value
+    assert speeds < 0.002  # below a tenth of what is typical
+    assert abs(inertial - 0.03) < 0.003
 
 
 @pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")  # too short for many effects

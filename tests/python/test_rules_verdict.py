@@ -133,6 +133,18 @@ def test_names_beside_something_that_is_left() -> None:
     assert verdict(only).verdict == "unknown"
 
 
+def test_a_share_for_which_there_was_no_time_is_said_to_be_unknown() -> None:
+    """It keeps no name, and is not said to have been looked for in vain."""
+    shares = {a.id: (a.own, a.own_in_training) for a in LEFT.added if a is MASS}
+    facts = LEFT.with_own(shares, late=["aero_drag"])
+    assert [a.late for a in facts.added] == [False, True]
+    assert set(withdrawn(facts)) == {"aero_drag"}
+    assert "the time limit left unknown" in withdrawn(facts)["aero_drag"]
+    neither = LEFT.with_own({}, late=["aero_drag"])
+    assert "not shown to take a share" in withdrawn(neither)["mass"]
+    assert verdict(neither).verdict == "unknown"
+
+
 def test_beside_much_that_is_left_a_share_is_shown_to_be_worth_a_name() -> None:
     """A car whose tyres are of another form leaves much beside the right effect, too."""
     much = replace(LEFT, missing=(8.0, 5.0), added=(MASS,))

@@ -6,10 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sysid_vehicle import _core
 from sysid_vehicle.errors import NumericalError
 from sysid_vehicle.identify.objective import Objective
 from sysid_vehicle.identify.search import Box
-from sysid_vehicle.identify.settle import climb, risen, rivalled, settle
+from sysid_vehicle.identify.settle import _slope, climb, risen, rivalled, settle
 
 
 class Ridge:
@@ -18,6 +19,8 @@ class Ridge:
     With frozen gains each pair of factors is nearly as good as any other. The likelihood has its
     maximum where one of them is at its bound.
     """
+
+    samples = 1
 
     def errors(self, p: np.ndarray) -> np.ndarray:
         return np.array([30.0 * np.log(p[0] * p[1]), 1e-3 * np.log(p[0] / p[1])])
@@ -50,6 +53,63 @@ def test_the_likelihood_is_climbed_where_frozen_gains_see_no_slope() -> None:
     assert reached == objective.log_likelihood(p, noise)
     assert reached > highest - 0.05
     assert p[1] == box.upper[1]
+
+
+def test_noise_is_not_learned_again_where_parameters_hardly_moved() -> None:
+    """The search ends where it began; the noise was learned there."""
+    problem, noise = Valleys(), np.ones(1)
+    asked: list[float] = []
+    score = problem.noise_score
+    problem.noise_score = lambda p, n: (asked.append(float(p[0])), score(p, n))[1]  # type: ignore[method-assign]
+    objective = Objective(problem, (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
+    box = Box([0], np.array([-2.0]), np.array([2.0]))
+    p, _, converged = settle(objective, np.array([1.0]), noise, box)
+    assert converged
+    assert p[0] == 1.0
+    assert len(asked) == 1
+
+
+def test_noise_is_learned_on_where_its_steps_ran_out() -> None:
+    """Parameters that stand still tell nothing of noise that has not come to a stand."""
+
+    class Far(Valleys):
+        def freeze(self, p: np.ndarray, noise: np.ndarray) -> SimpleNamespace:
+            return SimpleNamespace(log_likelihood=-5.0 * self.off(noise) ** 2)
+
+        def off(self, noise: np.ndarray) -> float:
+            return float(np.log(noise[0] / 1e6))
+
+        def noise_score(
+            self, p: np.ndarray, noise: np.ndarray
+        ) -> tuple[float, np.ndarray, np.ndarray]:
+            slope = np.array([-10.0 * self.off(noise)])
+            return self.freeze(p, noise).log_likelihood, slope, 10.0 * np.eye(1)
+
+    box, wide = Box([0], np.array([-2.0]), np.array([2.0])), np.array([1e9])
+    objective = Objective(Far(), (), 1.0 / wide, wide)  # type: ignore[arg-type]
+    # Six steps of one and a half, as far as one may go, reach 8e3.
+    _, noise, converged = settle(objective, np.array([1.0]), np.ones(1), box)
+    assert converged
+    assert noise == pytest.approx(1e6, rel=0.01)
+
+
+@pytest.mark.parametrize("free", [3, 12])
+def test_the_slope_of_the_likelihood_by_differences(free: int) -> None:
+    """Central ones of few parameters, one-sided ones with the bend taken off of many."""
+    weights = np.linspace(1.0, 3.0, free)
+    at, top = np.full(free, 0.9), np.full(free, 1.0)
+    sets: list[int] = []
+
+    def values_at(trials: np.ndarray) -> np.ndarray:
+        sets.append(len(trials))
+        return -0.5 * ((trials - top) ** 2) @ weights**2
+
+    box = Box(list(range(free)), np.zeros(free) - 5.0, np.full(free, 0.9))  # all at their bounds
+    value = float(values_at(at[None])[0])
+    sets.clear()
+    slope = _slope(values_at, at, value, np.diag(weights**2), box)
+    np.testing.assert_allclose(slope, weights**2 * (top - at), rtol=0.2 if free < 9 else 1e-6)
+    assert sum(sets) == (2 * free if 2 * free <= _core.LANES else free)
 
 
 class Valleys:
@@ -174,7 +234,7 @@ class Refusing(Valleys):
 
 def test_gains_that_were_asked_for_last_are_kept() -> None:
     class Counting:
-        asked = 0
+        samples, asked = 1, 0
 
         def freeze(self, p: np.ndarray, noise: np.ndarray) -> SimpleNamespace:
             self.asked += 1
@@ -191,12 +251,21 @@ def test_gains_that_were_asked_for_last_are_kept() -> None:
     other = replace(objective, problem=Counting())  # type: ignore[arg-type]
     assert other.freeze(p, 2.0 * noise) is not objective.freeze(p, 2.0 * noise)
     assert counting.asked == 3
+    # So are those of the two before them, unless they are too large.
+    assert objective.freeze(np.ones(2), noise) is gains
+    assert counting.asked == 3
+    counting.samples = 10**6
+    objective.freeze(p, 3.0 * noise)
+    assert objective.freeze(np.ones(2), noise) is not gains
+    assert counting.asked == 5
 
 
 def test_parameters_move_only_where_the_likelihood_rises() -> None:
     """The search holds the gains of its start; with gains of its own its end may be worse."""
 
     class Peaked:
+        samples = 1
+
         def __init__(self) -> None:
             self.asked: list[float] = []
 

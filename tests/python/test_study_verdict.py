@@ -1,15 +1,18 @@
 """What is said of added effects beside what is left."""
 
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 from sysid_vehicle import Fit, Log, Model, NumericalError, drive, identify, improve, manoeuvres
+from sysid_vehicle._threads import check_time
+from sysid_vehicle.errors import SysidWarning
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import refit
-from sysid_vehicle.rules import UNKNOWN, USUAL
+from sysid_vehicle.rules import UNKNOWN, USUAL, Share
 from sysid_vehicle.study import own
 from sysid_vehicle.study.improve import _room
 from sysid_vehicle.study.own import own_shares
@@ -114,3 +117,63 @@ def test_effects_of_the_model_take_no_room_of_those_that_may_be_added(
     (told,) = (line for line in str(found).splitlines() if "Nuisance" in line)
     assert "gyro_bias (bias of the yaw-rate sensor): bias_radps 0.0" in told
     assert told.strip() in found._repr_html_()
+
+
+def test_shares_for_which_there_is_no_time_are_left_out(
+    fit: Fit, lap: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two effects one is fitted anew in time."""
+    clock = [0.0]
+    monkeypatch.setattr("time.perf_counter", lambda: clock[0])
+    monkeypatch.setattr(own, "in_parallel", lambda work, items: [work(item) for item in items])
+    monkeypatch.setattr(own, "own_share", lambda *_, **__: Share(0.5, 0.4, 0.6))
+
+    def slow(model: Model, *_: object) -> Fit:
+        clock[0] += 6.0
+        check_time()
+        return fit
+
+    monkeypatch.setattr(own, "refit", slow)
+    both = ["gyro_scale", "gyro_bias"]
+    richer = replace(fit, model=fit.model.add(*both))
+    asked: list[Fit] = []
+    monkeypatch.setattr(own, "at_its_best", lambda fit, _: asked.append(fit) or fit)
+    assert set(own_shares(richer, both, both, Driving.of(lap), 13.0)) == {*both}
+    assert asked
+    # Without a share of the training data validation data are not asked.
+    clock[0] = 0.0
+    monkeypatch.setattr(own, "own_share", lambda *_, **__: Share(0.0, -0.1, 0.1))
+    assert set(own_shares(richer, both, both, Driving.of(lap), 10.0)) == {"gyro_scale"}
+    assert own_shares(richer, both, both, Driving.of(lap), clock[0] - 1.0) == {}
+
+
+def test_what_the_time_limit_leaves_unknown_is_said(
+    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Something is left beside what was added; there is no time to ask what it takes."""
+    car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
+    logs = [drive(car, manoeuvres.lap(20.0), seed=seed) for seed in (71, 72)]
+    module = sys.modules["sysid_vehicle.study.improve"]
+    monkeypatch.setattr(module, "incomplete", lambda *_: True)
+    monkeypatch.setattr(module, "own_shares", lambda *_: {})
+    monkeypatch.setattr(module, "beyond_noise_ahead", lambda *_: never_done())
+    clock = [time.perf_counter]
+
+    def never_done() -> None:
+        begun = clock[0]()
+        monkeypatch.setattr("time.perf_counter", lambda: begun + 1e6)
+        try:
+            check_time()
+        finally:
+            monkeypatch.setattr("time.perf_counter", clock[0])
+
+    with pytest.warns(SysidWarning, match="time limit left unknown"):
+        study = improve(
+            start, *logs, candidates=["steer_lag"], most_effects=1, starts=1, time_limit_s=1e5
+        )
+    assert study.explained is None
+    assert [a.id for a in study.added] == ["steer_lag"]
+    together, alone = study.late_facts
+    assert "together" in together
+    assert "steer_lag alone" in alone
+    assert f"the time limit left unknown {alone}" in str(study)

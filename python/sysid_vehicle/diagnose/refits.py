@@ -12,7 +12,7 @@ from .._threads import before
 from ..effects import Effect
 from ..errors import NumericalError
 from ..estimate import Driving
-from ..identify import Fit, refine, refit
+from ..identify import Fit, refine, refit, unmoved
 from .diagnosis import Candidate
 
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
@@ -22,11 +22,15 @@ def refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
     """The candidate with its exact dynamics, under the noise of the model without it.
 
     Its statistic is what that gains over `fit`, twice the log-likelihood; 0 where the model fails.
+    It is never worse than the model that it contains: where no search is better, it is that one.
     """
     best: Fit | None = None
     for values in (*_starts(c), {}):
-        if not values and best is not None and best.log_likelihood >= fit.log_likelihood:
-            break  # else from the model that it contains, so that it cannot be a worse one
+        if not values and best is not None:
+            # Once more from the model that it contains. Of several lags none is there.
+            lags = c.effect.scored_at_typical and len(c.effect.parameters) > 1
+            if lags or best.log_likelihood >= fit.log_likelihood:
+                break
         model = fit.model.add(c.effect).with_values(values)
         try:
             trial = refit(model, driving, fit.noise)
@@ -34,7 +38,12 @@ def refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
             continue
         if best is None or trial.log_likelihood > best.log_likelihood:
             best = trial
-    return replace(c, statistic=0.0) if best is None else _with_fit(fit, c, best)
+    if best is None:
+        return replace(c, statistic=0.0)
+    if best.log_likelihood < fit.log_likelihood:
+        contained = unmoved(fit.model.add(c.effect), driving, fit.noise)
+        return replace(_with_fit(fit, c, contained), statistic=0.0)
+    return _with_fit(fit, c, best)
 
 
 def in_time(
@@ -45,10 +54,15 @@ def in_time(
 
 
 def finished(fit: Fit, c: Candidate) -> Candidate:
-    """The candidate with noise of its own."""
+    """The candidate with noise of its own, unless that makes it worse than the model without it.
+
+    A lag at its smallest is not quite none.
+    """
     if c.fit is None:
         return c
     found = _with_fit(fit, c, refine(c.fit.model, c.fit.driving, c.fit.noise))
+    if found.statistic < 0.0 <= c.statistic:
+        found = c
     return replace(found, finished=True)
 
 

@@ -5,6 +5,7 @@ from .consistency import Consistency, nees_check, nis_check, whiteness_check
 from .driving import UNITS, Driving
 from .filters import FilterRun, FilterState, LateMeasurements, StateFilter, StateModel
 from .noise import (
+    Learned,
     NoiseModel,
     first_guess,
     generous,
@@ -23,6 +24,7 @@ __all__ = [
     "FilterRun",
     "FilterState",
     "LateMeasurements",
+    "Learned",
     "NoiseModel",
     "StateFilter",
     "StateModel",

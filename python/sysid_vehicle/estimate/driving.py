@@ -25,6 +25,7 @@ from .pieces import DrivingProblem, PiecewiseProblem, cut
 UNITS = {c: CHANNELS[c].unit for c in MEASURED}
 WORDS = dict(zip(MEASURED, ("v_x", "v_y", "yaw rate", "a_x", "a_y"), strict=True))
 
+_WINDOW_S, _SHORTEST = 2.0, 50  # of windows of thinned driving; samples, at least
 _REACH_S = effect("steer_delay").parameters[0].upper  # either way
 
 _Part = tuple[Log, slice, int]
@@ -367,11 +368,12 @@ class Driving:
         whole = self._whole
         if most_samples is None or self.samples <= most_samples:
             return whole
-        # Windows of some seconds, evenly spread, keep every kind of driving in.
+        # Short windows, evenly spread, keep every kind of driving in, and fill the lanes of the
+        # kernels, which each walk one.
         pieces: list[_Part] = []
         share = most_samples / self.samples
         for log, where, at in whole:
-            length = int(4.0 * log.rate_hz)
+            length = max(int(_WINDOW_S * log.rate_hz), _SHORTEST)
             for start in range(where.start, where.stop, max(int(length / share), 1)):
                 stop = min(start + length, where.stop)
                 if stop - start > length // 2 or not pieces:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,9 @@ from .pieces import DrivingProblem
 
 _FAR, _TINY = 1.5, 1e-12  # of a logarithm, in one step
 _LITTLE = 0.05  # nats for which no other step is tried
+# Of a step, nats that it promises and its largest logarithm: what scoring leaves of so little is
+# next to nothing.
+_NEARLY, _SHORT = 1.0, 0.3
 
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
@@ -203,8 +206,24 @@ def learn_noise(
     problem: DrivingProblem, p: FloatArray, start: NoiseModel, vehicle: Vehicle, *, rounds: int = 8
 ) -> tuple[NoiseModel, float]:
     """Noise of maximum likelihood at fixed model parameters, and the log-likelihood."""
-    found, value = maximise_noise(problem, p, start.vector(), *noise_range(vehicle), rounds=rounds)
-    return NoiseModel.from_vector(found), value
+    found = maximise_noise(problem, p, start.vector(), *noise_range(vehicle), rounds=rounds)
+    return NoiseModel.from_vector(found.noise), found.log_likelihood
+
+
+class Learned(NamedTuple):
+    """Noise of maximum likelihood, or what was found on the way there.
+
+    Attributes
+    ----------
+    noise : array, shape (noises,)
+    log_likelihood : float
+    stands : bool
+        Whether another step promises next to nothing; steps had not merely run out.
+    """
+
+    noise: FloatArray
+    log_likelihood: float
+    stands: bool
 
 
 class _Scored(Protocol):
@@ -223,7 +242,7 @@ def maximise_noise(
     rounds: int,
     enough: float = 0.01,
     likelihood: Callable[[FloatArray], float] | None = None,
-) -> tuple[FloatArray, float]:
+) -> Learned:
     """Noise of maximum likelihood at fixed parameters of any model.
 
     Fisher scoring on the logarithms of the noise parameters, each step the best one within a box
@@ -247,11 +266,6 @@ def maximise_noise(
     Notes
     -----
     What is zero at the start is not there, and stays so.
-
-    Returns
-    -------
-    noise : array, shape (noises,)
-    log_likelihood : float
     """
     low, high = np.log(lowest), np.log(highest)
     there_is = start > 0.0
@@ -262,17 +276,21 @@ def maximise_noise(
 
     value, gradient, information = problem.noise_score(p, noise_of(eta))
     reach = _FAR
+    stands = False
     for left in reversed(range(rounds)):
         check_time()
-        promised = _step(gradient, information, low - eta, high - eta, there_is)[1]
+        whole, promised = _step(gradient, information, low - eta, high - eta, there_is)
         if promised < enough:
+            stands = True
             break
         gained = 0.0
+        stands = promised < _NEARLY and float(np.abs(whole).max()) < _SHORT
+        last = likelihood is not None and (left == 0 or stands)
         for _ in range(6):
             step, _ = _step(gradient, information, low - eta, high - eta, there_is, reach)
             trial = np.clip(eta + step, low, high)
             try:
-                if likelihood is not None and left == 0:
+                if likelihood is not None and last:
                     there = (likelihood(noise_of(trial)), gradient, information)
                 else:
                     there = problem.noise_score(p, noise_of(trial))
@@ -286,9 +304,9 @@ def maximise_noise(
             reach *= 0.25
             if promised < _LITTLE:
                 break
-        if gained < max(_LITTLE, enough):
+        if last or gained < max(_LITTLE, enough):
             break
-    return noise_of(eta), float(value)
+    return Learned(noise_of(eta), float(value), stands)
 
 
 def promised_by_noise(

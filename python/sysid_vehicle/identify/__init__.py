@@ -4,7 +4,7 @@ from .ahead import predicting_ahead
 from .box import free_box
 from .estimates import Estimate
 from .fit import Fit
-from .identify import identify, objective_of, profile_fit, refine, refit
+from .identify import identify, objective_of, profile_fit, refine, refit, unmoved
 from .offsets import driving_of
 from .posterior import Posterior
 from .predictive import Prediction, predict
@@ -38,4 +38,5 @@ __all__ = [
     "refine",
     "refit",
     "settle",
+    "unmoved",
 ]

@@ -9,6 +9,10 @@ from ..model import Model
 from .objective import LinearRows, gaussian_prior
 from .search import Box
 
+# Of the typical size of a lag, its smallest. Of several lags of one effect some may not be there
+# at all: precise sensors tell a tenth of a typical delay from none.
+_NEXT_TO_NONE, _ONE_OF_SEVERAL = 0.1, 1e-3
+
 
 def free_box(model: Model) -> Box:
     """The model's free parameters, in the order of their names."""
@@ -17,10 +21,11 @@ def free_box(model: Model) -> Box:
     bounds = np.array([model.bounds(n) for n in names])
     lower = bounds[:, 0].copy()
     for i, n in enumerate(names):
-        # A lag of exactly zero has no derivative; a tenth of its typical size is next to none.
+        # A lag of exactly zero has no derivative.
         part = next((e for e in model.parts if n.startswith(f"{e.id}.")), None)
         if part is not None and part.scored_at_typical:
-            lower[i] = max(lower[i], 0.1 * known[n].typical)
+            least = _NEXT_TO_NONE if len(part.parameters) == 1 else _ONE_OF_SEVERAL
+            lower[i] = max(lower[i], least * known[n].typical)
     return Box([known[n].column for n in names], lower, bounds[:, 1])
 
 

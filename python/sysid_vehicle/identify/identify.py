@@ -201,6 +201,13 @@ def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3)
     return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True, gains)
 
 
+def unmoved(model: Model, driving: Driving, noise: NoiseModel) -> Fit:
+    """A model's values as they stand, with their standard errors: nothing is searched."""
+    objective = objective_of(model, driving.problem(model), driving)
+    starts = Starts.none(model.free_names)
+    return _summary(model, driving, objective, model.vector(), noise, starts, True)
+
+
 def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool | None = None) -> Fit:
     """The same fit at the very bottom of its valley, with intervals of the profile likelihood.
 
@@ -303,7 +310,7 @@ def _on_its_road(fit: Fit) -> Fit:
     best = sloping[int(np.argmax(values))]
     if max(values) < fit.log_likelihood + _HINT:
         return fit
-    learned, value = objective.learn_noise(p, best.vector(), rounds=6)
+    learned, value, _ = objective.learn_noise(p, best.vector(), rounds=6)
     if value < fit.log_likelihood + _SHOWN:
         return fit
     found = _polish(model, driving, p, NoiseModel.from_vector(learned), fit.starts)

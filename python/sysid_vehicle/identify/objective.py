@@ -15,7 +15,9 @@ import numpy as np
 from .._arrays import FloatArray, as_float64
 from .._threads import check_time
 from ..errors import NumericalError
-from ..estimate import maximise_noise, promised_by_noise
+from ..estimate import Learned, maximise_noise, promised_by_noise
+
+_KEPT, _LONG = 3, 100_000  # gains that are kept; samples above which only the last ones are
 
 Rows = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """Further residuals: from all parameters to errors (m,) and minus their derivatives (m, n)."""
@@ -181,15 +183,16 @@ class Objective(Penalised):
     def freeze(self, p: FloatArray, noise: FloatArray) -> Any:
         """Gains of the filter; their log-likelihood is that of the data alone.
 
-        Those asked for last are kept: searches end where the next one begins.
+        Those asked for last are kept: searches end where the next one begins, and go back to where
+        they were.
         """
         check_time()
         for at, under, gains in tuple(self._last):
             if np.array_equal(at, p) and np.array_equal(under, noise):
                 return gains
-        self._last.clear()
         gains = self.problem.freeze(p, noise)
-        self._last.append((p.copy(), noise.copy(), gains))
+        kept = 1 if self.samples > _LONG else _KEPT
+        self._last[:] = [(p.copy(), noise.copy(), gains), *self._last[: kept - 1]]
         return gains
 
     def log_likelihood(self, p: FloatArray, noise: FloatArray) -> float:
@@ -227,7 +230,7 @@ class Objective(Penalised):
 
     def learn_noise(
         self, p: FloatArray, noise: FloatArray, *, rounds: int = 12, enough: float = 0.01
-    ) -> tuple[FloatArray, float]:
+    ) -> Learned:
         """Noise of maximum likelihood at fixed parameters, and the log-likelihood of the data."""
         return maximise_noise(
             self.problem,

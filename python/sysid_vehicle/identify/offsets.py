@@ -90,7 +90,7 @@ def _likeliest(alone: Model, driving: Driving, noise: NoiseModel) -> FloatArray:
     told = as_float64(np.where(told > 0.0, np.clip(told, *within), 0.0))  # no road where none is
     value = -np.inf
     for _ in range(_ROUNDS):
-        told, _ = objective.learn_noise(p, told, rounds=2)
+        told = objective.learn_noise(p, told, rounds=2).noise
         p, gains = moved(objective, p, told, box, rounds=8, tolerance=_STANDS)
         before, value = value, objective.reached(p, gains)
         if value < before + _STANDS:

@@ -216,7 +216,7 @@ def identify_runs(
     q, noise, converged = settle(
         objective, layout.start(common.model.vector()), common.noise.vector(), layout.box
     )
-    noise, _ = objective.learn_noise(q, noise, rounds=1)
+    noise = objective.learn_noise(q, noise, rounds=1).noise
     return _summary(common, drivings, layout, objective, q, noise, converged)
 
 

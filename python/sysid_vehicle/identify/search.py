@@ -198,6 +198,9 @@ def least_within(
     upper: FloatArray,
 ) -> FloatArray:
     """Minimum within bounds of a quadratic, given the eigenvalues, above zero, of its curvature."""
+    alone = vectors @ ((vectors.T @ downhill) / values)
+    if np.all((lower <= alone) & (alone <= upper)):
+        return as_float64(alone)
     root = np.sqrt(values)
     found = scipy.optimize.lsq_linear(
         root[:, None] * vectors.T,

@@ -143,16 +143,18 @@ def settle(
     best = -np.inf
     gains = objective.freeze(p, noise)
     for _ in range(rounds):
-        learned, _ = objective.learn_noise(p, noise, rounds=steps, enough=_LITTLE)
+        learned = objective.learn_noise(p, noise, rounds=steps, enough=_LITTLE)
         steps = 3
-        there = objective.freeze(p, learned)
+        there = objective.freeze(p, learned.noise)
         if there.log_likelihood >= gains.log_likelihood:
-            noise, gains = learned, there
+            noise, gains = learned.noise, there
         value = objective.reached(p, gains)
         if value < best + _STANDS:
             return p, noise, True
         best = value
         p, gains = moved(objective, p, noise, box, method=method, rounds=8)
+        if learned.stands and objective.reached(p, gains) < value + _LITTLE:
+            return p, noise, True  # the noise was learned where the parameters still are
     return p, noise, False
 
 
@@ -261,7 +263,7 @@ def climb(
     for _ in range(_CLIMBS):
         _, seen, information = objective.normal_equations(p, gains, box.columns)
         x = p[box.columns]
-        slope = _slope(values_at, p, information, box)
+        slope = _slope(values_at, p, value, information, box)
         if stride(x, slope, information, _SLIGHT, box)[1] < _GAIN:
             break
         leaning = objective.also(_leaning(p, slope - seen, box))
@@ -295,7 +297,7 @@ def to_the_top(
     for _ in range(_CLIMBED):
         p, begin, reached = climb(objective, p, noise, box)
         stands = reached < begin + _STANDS
-        noise, _ = objective.learn_noise(p, noise, rounds=1 if stands else 3)
+        noise = objective.learn_noise(p, noise, rounds=1 if stands else 3).noise
         if stands:
             break
     return p, noise
@@ -304,21 +306,32 @@ def to_the_top(
 def _slope(
     values_at: Callable[[FloatArray], FloatArray],
     p: FloatArray,
+    value: float,
     information: FloatArray,
     box: Box,
 ) -> FloatArray:
-    """Derivatives by central differences, one-sided at a bound; zero where the model fails."""
-    step = _NUDGE / np.sqrt(np.maximum(np.diag(information), _TINY))
-    step = np.minimum(step, _NARROW * box.width)
+    """Derivatives by differences; zero where the model fails.
+
+    Central ones where both ends of all parameters go through the filter together, in its lanes. Of
+    more parameters from `value`, at `p`, to one end, less what the likelihood bends on the way.
+    """
+    curvature = np.diag(information)
+    step = np.minimum(_NUDGE / np.sqrt(np.maximum(curvature, _TINY)), _NARROW * box.width)
     x = p[box.columns]
-    ends = np.array([np.maximum(x - step, box.lower), np.minimum(x + step, box.upper)])
-    trials = np.tile(p, (2, len(x), 1))
+    low, high = np.maximum(x - step, box.lower), np.minimum(x + step, box.upper)
+    central = 2 * len(x) <= _core.LANES
+    far = np.where(high - x < x - low, low, high)
+    ends = np.array([low, high] if central else [far])
+    trials = np.tile(p, (len(ends), len(x), 1))
     trials[:, np.arange(len(x)), box.columns] = ends
-    # Sets of parameters go through the filter together, as many as it has lanes.
     trials = trials.reshape(-1, p.size)
     together = np.array_split(trials, -(-len(trials) // _core.LANES))
-    low, high = np.reshape(np.concatenate(in_parallel(values_at, together)), (2, -1))
-    slope = (high - low) / np.maximum(ends[1] - ends[0], _TINY)
+    found = np.reshape(np.concatenate(in_parallel(values_at, together)), (len(ends), -1))
+    if central:
+        slope = (found[1] - found[0]) / np.maximum(high - low, _TINY)
+    else:
+        way = far - x
+        slope = (found[0] - value) / np.where(way == 0.0, _TINY, way) + 0.5 * curvature * way
     return as_float64(np.where(np.isfinite(slope), slope, 0.0))
 
 
@@ -365,7 +378,7 @@ def settle_finely(
     value = objective.log_likelihood(p, noise)
     for _ in range(_ROUNDS):
         p, _ = bottom(objective, p, noise, box)
-        noise, _ = objective.learn_noise(p, noise, enough=_STILL)
+        noise = objective.learn_noise(p, noise, enough=_STILL).noise
         before = value
         value = objective.log_likelihood(p, noise)
         if value < before + _STILL:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
@@ -47,6 +47,8 @@ class Added:
         Of the error 1 to 5 s ahead that the final model leaves without it, all else fitted anew,
         what it takes away: on validation and on training data. Only asked where something is
         missing.
+    late : bool
+        Whether the time limit left its own share unknown.
     """
 
     id: str
@@ -55,6 +57,7 @@ class Added:
     moves: frozenset[str] = frozenset()
     own: Share = UNKNOWN
     own_in_training: Share = UNKNOWN
+    late: bool = False
 
     @property
     def named(self) -> bool:
@@ -100,10 +103,13 @@ class Facts:
     structure: tuple[float, float] = (1.0, 0.0)
     small: bool = False
 
-    def with_own(self, own: Mapping[str, tuple[Share, Share]]) -> Facts:
-        """The same with the own shares of effects: on validation data, and on training data."""
+    def with_own(self, own: Mapping[str, tuple[Share, Share]], late: Collection[str] = ()) -> Facts:
+        """The same with the own shares of effects: on validation data, and on training data.
+
+        `late`: effects of which a share is unknown because there was no time for it.
+        """
         told = ((a, *own.get(a.id, (UNKNOWN, UNKNOWN))) for a in self.added)
-        added = tuple(replace(a, own=v, own_in_training=t) for a, v, t in told)
+        added = tuple(replace(a, own=v, own_in_training=t, late=a.id in late) for a, v, t in told)
         return replace(self, added=added)
 
 

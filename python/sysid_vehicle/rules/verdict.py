@@ -14,6 +14,10 @@ _NOT_SHOWN = (
     "beside all else it is not shown to take a share of the error 1 to 5 s ahead on training and "
     "validation data"
 )
+_LATE = (
+    "the time limit left unknown what share of the error 1 to 5 s ahead is its own on training and "
+    "validation data"
+)
 
 
 def excess(test: Tested) -> float:
@@ -87,7 +91,11 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     stand_ins = frozenset(a.id for a in facts.added if a.finding == "proxy")
     withdrawn = []
     if left or stand_ins:
-        withdrawn.append(Withdrawn(names - _standing(facts, rules), _NOT_SHOWN, names))
+        late = frozenset(a.id for a in facts.added if a.late)
+        falling = names - _standing(facts, rules)
+        withdrawn.append(Withdrawn(falling - late, _NOT_SHOWN, names))
+        if falling & late:
+            withdrawn.append(Withdrawn(falling & late, _LATE, names))
     # What only stands in for something else explains nothing, however well it fits, and what cannot
     # be told from that is no better.
     because = f"it acts like {', '.join(sorted(stand_ins))}, which is none either"

@@ -1,13 +1,20 @@
-"""An effect that a study added."""
+"""The effects that a study added."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from .._text import with_error
-from ..identify import Estimate
-from ..rules import Grade
+from ..compare import Comparison
+from ..diagnose import Verdicts
+from ..identify import Estimate, Fit
+from ..rules import Decision, Grade, grade
+from .search import Trail
 
 
 @dataclass(frozen=True)
@@ -79,3 +86,46 @@ class AddedEffect:
             "stands_in": self.stands_in,
             "grade": self.grade,
         }
+
+
+def added_by(
+    trail: Trail,
+    fits: Sequence[Fit],
+    on_test: Sequence[Comparison],
+    told: Verdicts,
+    alone: Verdicts,
+    decision: Decision,
+) -> tuple[AddedEffect, ...]:
+    """The effects of a study in the order in which they were added.
+
+    Parameters
+    ----------
+    trail : Trail
+        Of the search: what else could act in the place of each.
+    fits : sequence of Fit
+        From the baseline to the final model.
+    on_test : sequence of Comparison
+        The same on validation data.
+    told, alone : Verdicts
+        On each effect, in the light of the whole study, and by itself.
+    decision : Decision
+    """
+    added = []
+    final = fits[-1]
+    for (before, after), (poorer, richer) in zip(pairwise(on_test), pairwise(fits), strict=True):
+        for name in (e for e in richer.model.effects if e not in poorer.model.effects):
+            finding, because = told[name].finding, told[name].because
+            others = [e for e in trail.rivals.get(name, ()) if e not in final.model.effects]
+            added.append(
+                AddedEffect(
+                    name,
+                    tuple(e for e in final.estimates if e.name.startswith(f"{name}.")),
+                    before.error,
+                    after.error,
+                    trail.p_values.get(name, np.nan),
+                    tuple(others),
+                    because if finding == "proxy" else "",
+                    grade(alone[name].finding, finding, much_left=decision.much_left),
+                )
+            )
+    return tuple(added)

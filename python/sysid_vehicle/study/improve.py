@@ -7,22 +7,20 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 from warnings import catch_warnings, simplefilter
 
-import numpy as np
-
 from .._arguments import duration, whole
 from .._progress import teller
-from .._threads import in_parallel
-from ..compare import Comparison, compare
-from ..diagnose import Verdicts, considered, instead, judge, omnibus
+from .._threads import before, in_parallel
+from ..compare import compare
+from ..diagnose import considered, instead, judge, omnibus
 from ..effects import effect
 from ..errors import SysidWarning, warn
 from ..estimate import Driving
 from ..identify import Fit, driving_of, explaining, identify
 from ..log import Log, check_excitation, several_logs
 from ..model import Model
-from ..rules import USUAL, Decision, Rules, grade, incomplete, verdict
+from ..rules import USUAL, Rules, incomplete, verdict
 from ..sensors import SensorCheck, made_ready, put_right
-from .added import AddedEffect
+from .added import added_by
 from .clock import in_time
 from .matters import sizes_that_matter, sufficient
 from .own import own_shares
@@ -34,6 +32,7 @@ from .validation import beyond_noise_ahead, serving, set_aside
 from .verdict import facts_of, in_the_light_of
 
 _SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
+_SEARCHED = 0.8  # of the time limit; the rest is for the shares by which names stand
 
 
 @explaining
@@ -87,9 +86,11 @@ def improve(
         channel against another, low-passes of sensors, vibration, and another clock of the wheel
         force; with False not even that.
     time_limit_s : float, optional
-        After so many seconds refits end, wherever they are; of what was refitted by then the best
-        is added if validation data confirm it, the model is judged, and a warning tells what was
-        left out. The baseline is fitted in any case.
+        After so many seconds refits end, wherever they are. Four fifths of the time are for the
+        search: of what was refitted by then the best is added if validation data confirm it. The
+        rest is for the shares of the errors ahead by which names stand where something is left
+        (`AddedEffect`). The model is judged in any case, and warnings tell what was left out. The
+        baseline is fitted in any case.
     matters : mapping, optional
         Errors that matter, such as ``{"yaw_rate": "0.5deg/s"}`` (`sizes_that_matter`); those not
         given have usual sizes. A baseline whose errors 0.5 to 5 s ahead on validation data are all
@@ -114,7 +115,8 @@ def improve(
     most_effects = whole(most_effects, "most_effects")
     rules = rules.at(alpha)
     began = time.perf_counter()
-    ends = began + duration(time_limit_s, "time_limit_s")
+    limit = duration(time_limit_s, "time_limit_s")
+    ends, searched_by = began + limit, began + _SEARCHED * limit
     sizes = None if matters is None else sizes_that_matter(matters)
     train, test, settled = _ready(train, test, sensors)
     exclude = (*exclude, *settled)
@@ -133,7 +135,7 @@ def improve(
                 test_driving,
                 candidates=candidates,
                 most_effects=len(model.effects) + min(most_effects, _room(train_driving, rules)),
-                ends=ends,
+                ends=searched_by,
                 rules=rules,
                 seed=seed,
                 progress=progress,
@@ -146,7 +148,7 @@ def improve(
     found = searched()
     with kept(found):
         clocked = in_time(found.diagnoses[-1], test_driving) if sensors is not False else None
-    if clocked is not None and time.perf_counter() < ends:
+    if clocked is not None and time.perf_counter() < searched_by:
         train_driving, test_driving = clocked
         say("The wheel force has a clock of its own: with it put right everything is done again.")
         found = searched()
@@ -159,11 +161,14 @@ def improve(
         last = diagnoses[-1]
         fitted = last.omnibus if last.fit is fit else omnibus(fit, fit.driving, rules)
         rivals = explained = None
+        late: tuple[str, ...] = ()
         if len(fits) > 1:
             both = serving(fit, test_driving)
             every = _together(fit.driving, driving_of(both, test_driving))
             rivals = instead(both, every, _new(fits), rules)
-            explained = beyond_noise_ahead(fits, test_driving)
+            explained = before(ends, lambda: beyond_noise_ahead(fits, test_driving), None)
+            if explained is None:
+                late = ("the share of the error 1 to 5 s ahead that the effects take together",)
         told = judge(
             fit,
             scored=(last.scores, last.family) if last.fit is fit else None,
@@ -192,7 +197,12 @@ def improve(
         )
         if len(fits) > 1 and incomplete(facts, rules):
             named = {a.id for a in facts.added if a.named}
-            facts = facts.with_own(own_shares(fit, _new(fits), named, test_driving))
+            shares = own_shares(fit, _new(fits), named, test_driving, ends)
+            unknown = [e for e in _new(fits) if e not in shares]
+            facts = facts.with_own(shares, unknown)
+            if unknown:
+                some = ", ".join(unknown)
+                late += (f"the share of the error 1 to 5 s ahead that is due to {some} alone",)
         decision = verdict(facts, rules)
         alone, told = told, in_the_light_of(decision, told)
         return Study(
@@ -202,16 +212,17 @@ def improve(
             train=tuple(on_train),
             test=tuple(on_test),
             validation=test_driving,
-            added=_added(fits, on_test, found, told, alone, decision),
+            added=added_by(found, fits, on_test, told, alone, decision),
             omnibus=fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
             verdicts=told,
-            warnings=_warnings(fit, train_driving, found),
+            warnings=_warnings(fit, train_driving, found, late),
             seconds=time.perf_counter() - began,
             rules=rules,
             explained=explained,
             structure=pattern,
             stopped=found.stopped,
+            late_facts=late,
             checked=bool(sensors),
         )
 
@@ -253,44 +264,15 @@ def _ready(
     return own, None if test is None else rest, ("sensor_delay",) if delayed else ()
 
 
-def _added(
-    fits: list[Fit],
-    on_test: list[Comparison],
-    found: Trail,
-    told: Verdicts,
-    alone: Verdicts,
-    decision: Decision,
-) -> tuple[AddedEffect, ...]:
-    added = []
-    final = fits[-1]
-    for before, after, fit_before, fit_after in zip(
-        on_test[:-1], on_test[1:], fits[:-1], fits[1:], strict=True
-    ):
-        new = [e for e in fit_after.model.effects if e not in fit_before.model.effects]
-        for name in new:
-            estimates = tuple(e for e in final.estimates if e.name.startswith(f"{name}."))
-            group = set(found.rivals.get(name, ())) - set(final.model.effects)
-            added.append(
-                AddedEffect(
-                    name,
-                    estimates,
-                    before.error,
-                    after.error,
-                    found.p_values.get(name, np.nan),
-                    tuple(e for e in found.rivals.get(name, ()) if e in group),
-                    told[name].because if told[name].finding == "proxy" else "",
-                    grade(alone[name].finding, told[name].finding, much_left=decision.much_left),
-                )
-            )
-    return tuple(added)
-
-
-def _warnings(fit: Fit, driving: Driving, trail: Trail) -> tuple[str, ...]:
+def _warnings(fit: Fit, driving: Driving, trail: Trail, late: tuple[str, ...]) -> tuple[str, ...]:
     found = []
     if trail.stopped:
         found.append(
             f"the time limit ended the search with {', '.join(trail.stopped)} still to be tried"
         )
+        warn(found[-1])
+    for fact in late:
+        found.append(f"the time limit left unknown {fact}; without it no name is sure")
         warn(found[-1])
     if trail.taken_back:
         found.append(

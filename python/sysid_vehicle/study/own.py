@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
-from .._threads import in_parallel
+from .._threads import before, in_parallel
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refit
@@ -17,7 +17,11 @@ from .validation import AHEAD, at_its_best
 
 
 def own_shares(
-    final: Fit, effects: Sequence[str], named: Collection[str], test: Driving
+    final: Fit,
+    effects: Sequence[str],
+    named: Collection[str],
+    test: Driving,
+    ends: float = np.inf,
 ) -> dict[str, tuple[Share, Share]]:
     """Find the share of the error 1 to 5 s ahead that is an effect's own.
 
@@ -36,33 +40,43 @@ def own_shares(
         data are not asked.
     test : Driving
         Validation data.
+    ends : float
+        When the work ends, wherever it is, by `time.perf_counter`.
 
     Returns
     -------
     dict
-        By effect, on validation and on training data; unknown where a model fails.
+        By effect, on validation and on training data; unknown where a model fails. Effects for
+        which there was no time are not in it.
     """
-    without = dict(zip(effects, in_parallel(lambda e: _without(final, e), effects), strict=True))
-    left = {e: fit for e, fit in without.items() if fit is not None}
+    late: set[str] = set()
+
+    def in_time(share: Callable[[str], Share | None], asked: Collection[str]) -> dict[str, Share]:
+        told = in_parallel(lambda e: before(ends, lambda: (share(e),), None), asked)
+        late.update(e for e, found in zip(asked, told, strict=True) if found is None)
+        found = {e: one[0] for e, one in zip(asked, told, strict=True) if one is not None}
+        return {e: one for e, one in found.items() if one is not None}
+
+    without: dict[str, Fit] = {}
     moved = {part.id: moving_with(part.moved) for part in final.model.parts}
 
-    def in_training(e: str) -> Share:
-        return own_share(left[e], final, final.driving, AHEAD, channels=moved[e])
+    def on_train(effect: str) -> Share | None:
+        try:
+            fit = refit(final.model.drop(effect), final.driving, final.noise)
+        except (NumericalError, np.linalg.LinAlgError):
+            return None
+        share = own_share(fit, final, final.driving, AHEAD, channels=moved[effect])
+        without[effect] = fit
+        return share
 
-    fitted = dict(zip(left, in_parallel(in_training, left), strict=True))
+    def on_test(effect: str) -> Share:
+        best = at_its_best(final, test)
+        poorer = at_its_best(without[effect], test)
+        return own_share(poorer, best, test, AHEAD, channels=moved[effect])
+
+    fitted = in_time(on_train, effects)
     judged: dict[str, Share] = {}
     if any(fitted[e].low > 0.0 for e in fitted if e in named):
-        best = at_its_best(final, test)
-
-        def on_test(e: str) -> Share:
-            return own_share(at_its_best(left[e], test), best, test, AHEAD, channels=moved[e])
-
-        judged = dict(zip(left, in_parallel(on_test, left), strict=True))
-    return {e: (judged.get(e, UNKNOWN), fitted.get(e, UNKNOWN)) for e in effects}
-
-
-def _without(final: Fit, effect: str) -> Fit | None:
-    try:
-        return refit(final.model.drop(effect), final.driving, final.noise)
-    except (NumericalError, np.linalg.LinAlgError):
-        return None
+        before(ends, lambda: at_its_best(final, test), None)  # once for all of them
+        judged = in_time(on_test, fitted)
+    return {e: (judged.get(e, UNKNOWN), fitted.get(e, UNKNOWN)) for e in effects if e not in late}

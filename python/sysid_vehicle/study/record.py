@@ -27,6 +27,7 @@ def record(study: Study) -> dict[str, Any]:
         "horizons": study.horizons.to_dict(),
         "shares": study.shares.to_dict(),
         "explained": None if study.explained is None else study.explained.to_dict(),
+        "late_facts": list(study.late_facts),
         "ranking": [
             _candidate(c, study.verdicts[c.id], *errors.get(c.id, (None, None)))
             for c in study.diagnoses[0].ranking

@@ -88,11 +88,14 @@ class Study:
         By which effects were claimed.
     explained : Beyond or None
         Of the errors 1 to 5 s ahead on validation data, beyond the noise of the sensors, what the
-        added effects take away together; None where nothing was added.
+        added effects take away together; None where nothing was added, or the time limit came
+        first.
     structure : Structure, optional
         What of that which the final model leaves depends on the driving.
     stopped : tuple of str
         Effects with evidence that the time limit left untried.
+    late_facts : tuple of str
+        What the time limit left unknown of the effects that were added, in words.
     checked : bool
         Whether the logs were put right by a check of the sensors.
     """
@@ -113,6 +116,7 @@ class Study:
     explained: Beyond | None = None
     structure: Structure | None = None
     stopped: tuple[str, ...] = ()
+    late_facts: tuple[str, ...] = ()
     checked: bool = False
 
     @property

@@ -35,12 +35,15 @@ def facts_of(
     on_train : Comparison
         Of the last fit with what it was fitted to.
     explained : Beyond or None
-        What every fit leaves of the errors ahead; None where nothing was added.
+        What every fit leaves of the errors ahead; None where nothing was added, or nobody knows:
+        then all of them may be left.
     fitted, together, candidate, excited, small, structure
         As in `Facts`.
     """
-    missing = (0.0,) if explained is None else explained.squares
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
+    missing: tuple[float, ...] = (1.0,) if added else (0.0,)
+    if explained is not None:
+        missing = explained.squares
     return Facts(
         fitted,
         together,

@@ -13,10 +13,10 @@ namespace sysid {
 /// is missing.
 template <int NY, class U>
 Mat<NY, NY> whitener_of(const U& update, const Vec<NY>& y) {
-    Mat<NY, NY> present = Mat<NY, NY>::Identity();
+    Mat<NY, NY> whitener = update.whitening;
     for (int i = 0; i < NY; ++i)
-        if (std::isnan(y[i])) present(i, i) = 0.0;
-    return update.lower.template triangularView<Eigen::Lower>().solve(present);
+        if (std::isnan(y[i])) whitener(i, i) = 0.0;  // alone in its row and column
+    return whitener;
 }
 
 /// What was read less what was expected; zero where nothing was read.

@@ -97,8 +97,9 @@ Mat<R, NX> carried_back(const Mat<R, NY>& X, const Mat<NY, NX>& H) {
 
 template <int NX, int NY>
 struct Update {
-    Vec<NY> innovation;  // zero where the measurement is missing
-    Mat<NY, NY> lower;   // Cholesky factor of the innovation covariance; 1 on missing diagonals
+    Vec<NY> innovation;     // zero where the measurement is missing
+    Mat<NY, NY> lower;      // Cholesky factor of the innovation covariance; 1 on missing diagonals
+    Mat<NY, NY> whitening;  // its inverse
     Mat<NY, NY> information;  // inverse covariance of the innovation
     Mat<NX, NY> gain;         // zero columns for missing measurements
     Mat<NY, NX> observation;  // zero rows for missing measurements
@@ -173,15 +174,14 @@ bool joseph_update(Vec<NX>& x, Mat<NX, NX>& P, const Mat<NY, NY>& noise, Update<
     const Mat<NY, NX> crossed = transposed<NX, NY>(cross);
     Mat<NY, NY> S = seen(crossed);
     S += noise;
-    Mat<NY, NY> whitening;
-    if (!cholesky<NY>(S, u.lower, whitening)) return false;
-    u.information = transposed_times<NY, NY, NY>(whitening, whitening);
+    if (!cholesky<NY>(S, u.lower, u.whitening)) return false;
+    u.information = transposed_times<NY, NY, NY>(u.whitening, u.whitening);
     u.gain = times<NX, NY, NY>(cross, u.information);
     u.squares = 0.0;
     u.determinant = 1.0;
     for (int i = 0; i < NY; ++i) {
         double whitened = 0.0;
-        for (int j = 0; j <= i; ++j) whitened += whitening(i, j) * u.innovation[j];
+        for (int j = 0; j <= i; ++j) whitened += u.whitening(i, j) * u.innovation[j];
         u.squares += whitened * whitened;
         u.determinant *= u.lower(i, i);
     }

@@ -29,6 +29,8 @@ struct ScoreSample {
 /// `NY` sensors' first, along a run.
 template <int NY, int L>
 class NoiseScore {
+    static_assert(NY == kScoredReadings);
+
   public:
     /// One number for each noise parameter, the sensors first: what follows is done for all of them
     /// at once.
@@ -150,7 +152,6 @@ class NoiseScore {
     LaneScore score() {
         LaneScore all;
         all.states = n_;
-        all.readings = NY;
         all.width = kWide;
         all.mean = mean_.data();
         all.covariance = covariance_.data();

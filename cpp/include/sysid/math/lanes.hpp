@@ -28,9 +28,9 @@ struct LaneUpdate {
     LaneRow* whitener = nullptr;    // of those, a lower triangle
 };
 /// Derivatives of mean and covariance of one filter by `width` parameters of its noise, a multiple
-/// of eight; the first are those of the readings.
+/// of eight; the first are those of the `kScoredReadings` readings.
 struct LaneScore {
-    std::size_t states = 0, readings = 0, width = 0;
+    std::size_t states = 0, width = 0;
     const double* observation = nullptr;  // readings x states
     const double* gain = nullptr;         // states x readings
     const double* whitener = nullptr;     // lower triangle
@@ -42,7 +42,7 @@ struct LaneScore {
     /// diagonal over the root of two, each row followed by that of L^-1 H dx.
     double* rows = nullptr;
 };
-constexpr std::size_t kMostLaneStates = 40, kMostLaneReadings = 8;
+constexpr std::size_t kMostLaneStates = 40, kMostLaneReadings = 8, kScoredReadings = 5;
 
 struct LaneKernels {
     const char* name;
@@ -56,8 +56,8 @@ struct LaneKernels {
     void (*add_product)(double* Y, const double* A, std::ptrdiff_t row_stride,
                         std::ptrdiff_t column_stride, const double* X, std::size_t rows,
                         std::size_t inner, std::size_t width);
-    /// Adds G^T e and the lower triangle of G^T G of `rows` rows of `width` numbers; `e` may be
-    /// nullptr.
+    /// Adds G^T e and the lower triangle of G^T G of `rows` rows of `width` numbers, a multiple of
+    /// eight; what is above that triangle is left undefined. `e` may be nullptr.
     void (*add_squares)(const double* G, const double* e, std::size_t rows, std::size_t width,
                         double* gradient, double* information);
     /// Half the sum of squares of such a regression; where `gradient` is given, adds G^T e and the
