@@ -17,6 +17,52 @@ from .validation import AHEAD_S
 if TYPE_CHECKING:
     from .study import Study
 
+_MEANING = {
+    "adequate": "nothing is missing that this driving can show",
+    "explained": "the effects found explain all that depends on the driving",
+    "partly_explained": "the effects found explain part of it; something else is missing",
+    "unknown": "something is missing and no effect of the catalogue explains it",
+    "not_testable": (
+        "this driving does not excite the lateral motion, and shows next to nothing of tyres, "
+        "steering and load transfer; drive corners, steps and sweeps of the steering"
+    ),
+}
+
+
+def meaning(study: Study) -> str:
+    """The verdict of a study in words."""
+    if study.verdict == "unknown" and study.stopped:
+        return "something is missing; the time limit ended the search for what explains it"
+    if study.verdict == "unknown" and study.added and study.explained is not None:
+        if not study.explained.share > 0.0:
+            return f"something is missing; what was added is no sure name: {NONE_GONE}"
+        return (
+            f"something is missing; what was added takes up {study.explained} of the error 1 to "
+            "5 s ahead, and is no sure name beside what is left"
+        )
+    beyond = study.explained
+    if study.verdict == "partly_explained" and beyond and beyond.share < study.rules.most:
+        return (
+            f"what was added takes up {beyond} of the error 1 to 5 s ahead; the rest is "
+            "disturbance, and something else that is missing"
+        )
+    seen = study.omnibus.rejects or study.diagnoses[-1].significant or structured(study)
+    if study.verdict == "adequate" and study.added:
+        return (
+            "what was added is no sure name; what the baseline (`study.fits[0]`) leaves can be "
+            "smaller, 0.5 to 5 s ahead, than the errors that matter"
+        )
+    if study.verdict == "adequate" and seen:
+        if disturbance(study):
+            return "what is left is disturbance: no function of the driving predicts it"
+        helps = study.predicting is not None and study.predicting.helps
+        how = " with parameters fitted to predictions (`study.predicting.final`)"
+        return (
+            "what is left is smaller, 0.5 to 5 s ahead, than the errors that matter"
+            f"{how if helps else ''}"
+        )
+    return _MEANING[study.verdict]
+
 
 def ahead(study: Study) -> str:
     """Errors some seconds ahead on validation data, in physical units; empty where too short."""

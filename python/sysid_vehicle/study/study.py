@@ -32,7 +32,7 @@ from ..diagnose import (
 from ..estimate import Driving
 from ..identify import Fit, refine
 from ..model import Model
-from ..rules import NONE_GONE, USUAL, Rules, Verdict
+from ..rules import USUAL, Rules, Verdict
 from ..saved import save
 from .added import AddedEffect
 from .beyond import Beyond
@@ -41,22 +41,11 @@ from .horizons import Horizons, horizons
 from .next_steps import next_steps
 from .predicting import Predicting, predicting
 from .record import record
-from .said import ahead, disturbance, in_the_end, nuisances, structured
+from .said import ahead, in_the_end, meaning, nuisances
 from .shares import Shares, shares
 from .structure import Structure
 from .validation import at_its_best
 from .waterfall import Waterfall, waterfall
-
-_MEANING = {
-    "adequate": "nothing is missing that this driving can show",
-    "explained": "the effects found explain all that depends on the driving",
-    "partly_explained": "the effects found explain part of it; something else is missing",
-    "unknown": "something is missing and no effect of the catalogue explains it",
-    "not_testable": (
-        "this driving does not excite the lateral motion, and shows next to nothing of tyres, "
-        "steering and load transfer; drive corners, steps and sweeps of the steering"
-    ),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,37 +131,7 @@ class Study:
     @property
     def meaning(self) -> str:
         """The verdict in words."""
-        if self.verdict == "unknown" and self.stopped:
-            return "something is missing; the time limit ended the search for what explains it"
-        if self.verdict == "unknown" and self.added and self.explained is not None:
-            if not self.explained.share > 0.0:
-                return f"something is missing; what was added is no sure name: {NONE_GONE}"
-            return (
-                f"something is missing; what was added takes up {self.explained} of the error 1 to "
-                "5 s ahead, and is no sure name beside what is left"
-            )
-        beyond = self.explained
-        if self.verdict == "partly_explained" and beyond and beyond.share < self.rules.most:
-            return (
-                f"what was added takes up {beyond} of the error 1 to 5 s ahead; the rest is "
-                "disturbance, and something else that is missing"
-            )
-        seen = self.omnibus.rejects or self.diagnoses[-1].significant or structured(self)
-        if self.verdict == "adequate" and self.added:
-            return (
-                "what was added is no sure name; what the baseline (`study.fits[0]`) leaves can be "
-                "smaller, 0.5 to 5 s ahead, than the errors that matter"
-            )
-        if self.verdict == "adequate" and seen:
-            if disturbance(self):
-                return "what is left is disturbance: no function of the driving predicts it"
-            helps = self.predicting is not None and self.predicting.helps
-            how = " with parameters fitted to predictions (`study.predicting.final`)"
-            return (
-                "what is left is smaller, 0.5 to 5 s ahead, than the errors that matter"
-                f"{how if helps else ''}"
-            )
-        return _MEANING[self.verdict]
+        return meaning(self)
 
     @property
     def steps(self) -> tuple[str, ...]:
@@ -299,18 +258,7 @@ class Study:
     def with_warnings(self, warnings: Sequence[str]) -> Study:
         """The same study with these warnings; what it has worked out so far it keeps."""
         other = replace(self, warnings=tuple(warnings))
-        for slow in (
-            "where",
-            "where_baseline",
-            "late",
-            "errors_with",
-            "unknown",
-            "horizons",
-            "ceiling",
-            "shares",
-            "predicting",
-            "disagreements",
-        ):
+        for slow in (n for n, of in vars(Study).items() if isinstance(of, cached_property)):
             if slow in self.__dict__:
                 other.__dict__[slow] = self.__dict__[slow]
         return other
