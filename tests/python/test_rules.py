@@ -28,7 +28,9 @@ NUMERICAL = {
     "diagnose/changed.py": {"_TRIED", "_ROUNDS"},
     "diagnose/changes_compete.py": {"_SINGULAR", "_MOST"},
     "diagnose/may_change.py": {"_INERTIA"},
-    "diagnose/reference.py": {"_ENOUGH", "_FAR", "_FOLLOWED", "_LOOSE", "_REFREEZES", "_SHARES", "_VAGUE"},
+    "diagnose/reference.py": {
+        "_ENOUGH", "_FAR", "_FOLLOWED", "_LOOSE", "_REFREEZES", "_SHARES", "_VAGUE",
+    },
     "diagnose/causes.py": {"_KEPT", "_LEAST"},
     "diagnose/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
     "diagnose/coordinates.py": {"BLOCK_S"},
