@@ -8,10 +8,12 @@ from . import manoeuvres
 from ._core import __version__
 from .compare import Comparison, compare
 from .diagnose import (
+    Change,
     Diagnosis,
     DriveLimits,
     bias_report,
     ceiling,
+    changed,
     diagnose,
     suggest_manoeuvre,
     unknown,
@@ -39,6 +41,7 @@ from .vehicle import Tyre, Vehicle
 
 __all__ = [
     "AxleForces",
+    "Change",
     "ChannelMap",
     "Comparison",
     "Diagnosis",
@@ -69,6 +72,7 @@ __all__ = [
     "casadi_function",
     "catalogue",
     "ceiling",
+    "changed",
     "check",
     "check_excitation",
     "compare",

@@ -24,6 +24,13 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "sysid_vehicle"
 # Constants of numerical methods and of effort: how finely, how long, how often. They decide no
 # claim. Those of the last group shape how what no name fits is described; no effect is claimed.
 NUMERICAL = {
+    "diagnose/beside_reference.py": {"_RIDGE"},
+    "diagnose/changed.py": {"_TRIED", "_ROUNDS"},
+    "diagnose/changes_compete.py": {"_SINGULAR", "_MOST"},
+    "diagnose/may_change.py": {"_INERTIA"},
+    "diagnose/reference.py": {
+        "_ENOUGH", "_FAR", "_FOLLOWED", "_LOOSE", "_REFREEZES", "_SHARES", "_VAGUE",
+    },
     "diagnose/causes.py": {"_KEPT", "_LEAST"},
     "diagnose/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
     "diagnose/coordinates.py": {"BLOCK_S"},

@@ -2,7 +2,9 @@
 
 from .causes import Causes, CredibleSet
 from .ceiling import Ceiling, Explainable, ceiling
+from .change import Change, EffectChange
 from .change_points import ChangePoint
+from .changed import changed
 from .coherence import INPUTS, Coherence, coherence
 from .constancy import Constancy, constancy
 from .coordinates import blocks
@@ -30,6 +32,7 @@ __all__ = [
     "Candidate",
     "Causes",
     "Ceiling",
+    "Change",
     "ChangePoint",
     "Coherence",
     "Constancy",
@@ -38,6 +41,7 @@ __all__ = [
     "Delay",
     "Diagnosis",
     "DriveLimits",
+    "EffectChange",
     "EffectVerdict",
     "Evidence",
     "Explainable",
@@ -55,6 +59,7 @@ __all__ = [
     "bias_report",
     "blocks",
     "ceiling",
+    "changed",
     "coherence",
     "considered",
     "constancy",

@@ -12,20 +12,21 @@ from .._arrays import FloatArray
 from .._printed import Part, Printed, Table
 from .._style import axes_or_new
 from .._text import brief, with_error
-from ..effects import Effect
+from ..effects import Effect, Parameter
 from ..rules import USUAL, Rules
-from .clocks import CLOCKS, clock_scores
+from .clocks import clock_parameter, clock_scores
 from .directions import Directions
 from .evidence import Evidence
 from .omnibus import Unknown
 from .possible import Size
 from .score import ScoreBoard
-from .single_effects import Hypothesis, Posterior, ScoreModel, Subset
+from .single_effects import Hypothesis, ScoreModel, Subset
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_UNKNOWN = "unknown "
+UNKNOWN = "unknown "
+"""Begins the names of forces, moments and readings that no effect of the catalogue explains."""
 _KEPT = 40  # of the leading subsets
 _LEAST = 1e-6  # probability that is remembered
 
@@ -229,7 +230,7 @@ def causes_of(
         own = slice(start, start + width)
         information[own, own] = np.eye(width)  # to the last digit
         columns = tuple(range(start, start + width))
-        hypotheses.append(Hypothesis(_UNKNOWN + name, columns, (0.0,) * width, 1.0))
+        hypotheses.append(Hypothesis(UNKNOWN + name, columns, (0.0,) * width, 1.0))
         start += width
     for c in clocks:
         hypotheses.append(Hypothesis(c.clock.name, (start,), (0.0,), 1.0))
@@ -241,10 +242,12 @@ def causes_of(
         np.concatenate([ratio, more]),
         rules.nothing,
     )
-    subsets = model.subsets()
     known = replace(model, hypotheses=tuple(h for h in hypotheses if h.name in board.places))
-    posterior = model.posterior(most, subsets[0])
-    return _told(model, posterior, (subsets, known.subsets()), board, scale, rules)
+    parameters: dict[str, tuple[Parameter, ...]] = {
+        c.clock.name: (clock_parameter(c.clock),) for c in clocks
+    }
+    parameters |= {s.effect.id: s.effect.parameters for s in board.scores}
+    return causes_in(model, known, scale, parameters, rules, most=most)
 
 
 def _candidates(board: ScoreBoard) -> tuple[FloatArray, list[Hypothesis], FloatArray]:
@@ -264,20 +267,20 @@ def _candidates(board: ScoreBoard) -> tuple[FloatArray, list[Hypothesis], FloatA
             ]
             continue
         scale[a:b] = [abs(p.typical - p.null_value) for p in effect.parameters]
-        forms = _forms(effect)
+        several = forms(effect)
         hypotheses += [
             Hypothesis(
                 name,
                 tuple(int(a) + i for i in form),
                 tuple(_side(effect, i) for i in form),
-                1.0 / len(forms),
+                1.0 / len(several),
             )
-            for form in forms
+            for form in several
         ]
     return scale, hypotheses, ratio
 
 
-def _forms(effect: Effect) -> list[tuple[int, ...]]:
+def forms(effect: Effect) -> list[tuple[int, ...]]:
     """Parameters that act: of some that have one sign any may be nothing."""
     every = tuple(range(len(effect.parameters)))
     if len(every) == 2 and any(p.one_sided for p in effect.parameters):
@@ -304,15 +307,32 @@ def _unknown(projected: Directions) -> tuple[FloatArray, list[tuple[str, int]], 
     return whole, named, np.repeat(ratios, [width for _, width in named])
 
 
-def _told(
+def causes_in(
     model: ScoreModel,
-    posterior: Posterior,
-    subsets: tuple[Sequence[Subset], Sequence[Subset]],
-    board: ScoreBoard,
+    known: ScoreModel,
     scale: FloatArray,
-    rules: Rules,
+    parameters: Mapping[str, tuple[Parameter, ...]],
+    rules: Rules = USUAL,
+    *,
+    most: int = 6,
 ) -> Causes:
-    """Effects in place of hypotheses, physical units in place of prior standard deviations."""
+    """The posterior of a model of scores, by effects and in physical units.
+
+    Parameters
+    ----------
+    model : ScoreModel
+    known : ScoreModel
+        The same with hypotheses of the catalogue alone.
+    scale : array, shape (n,)
+        Prior standard deviations.
+    parameters : mapping
+        Of each effect whose sizes are told.
+    rules : Rules
+    most : int
+        Effects of the sum.
+    """
+    subsets = model.subsets()
+    posterior = model.posterior(most, subsets[0])
     names = [h.name for h in model.hypotheses]
     by_effect = np.array(
         [[w[[n == e for n in names]].sum() for e in model.effects] for w in posterior.weights]
@@ -333,16 +353,11 @@ def _told(
             likely = {model.effects[i]: float(weights[i]) for i in likeliest if weights[i] > _LEAST}
             sets.append(CredibleSet(effects, tuple(float(weights[i]) for i in few), likely))
     rest = 1.0 - np.prod(1.0 - np.reshape(scattered, (-1, len(model.effects))), axis=0)
-    scored = {s.effect.id: s.effect for s in board.scores}
-    clocks = {c.name for c in CLOCKS}
     sizes: dict[str, Size] = {}
     for h, weights in zip(model.hypotheses, posterior.weights.T, strict=True):
-        if h.name in clocks:
-            null = np.zeros(1)
-        elif h.name in scored and len(h.columns) == len(scored[h.name].parameters):
-            null = np.array([p.null_value for p in scored[h.name].parameters])
-        else:
+        if h.name not in parameters or len(h.columns) != len(parameters[h.name]):
             continue
+        null = np.array([p.null_value for p in parameters[h.name]])
         at = int(np.argmax(weights))
         own = list(h.columns)
         mean, std = (x[at, own] * scale[own] for x in (posterior.means, posterior.stds))
@@ -351,13 +366,8 @@ def _told(
         {model.effects[i]: float(included[i]) for i in order},
         tuple(sets),
         sizes,
-        tuple(subsets[0][:_KEPT]),
-        tuple(subsets[1][:_KEPT]),
-        {
-            e: (("delay_s", "s"),)
-            if e in clocks
-            else tuple((p.name, p.unit) for p in scored[e].parameters)
-            for e in sizes
-        },
+        tuple(subsets[:_KEPT]),
+        tuple(known.subsets()[:_KEPT]),
+        {e: tuple((p.name, p.unit) for p in parameters[e]) for e in sizes},
         {e: float(p) for e, p in zip(model.effects, rest, strict=True) if p > _LEAST},
     )

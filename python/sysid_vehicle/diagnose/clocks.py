@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import _core
 from .._arrays import FloatArray
+from ..effects import Parameter
 from ..estimate.pieces import DrivingProblem
 from ..rules import Rules
 from .delay import later
@@ -48,6 +49,25 @@ class Clock:
 
 
 CLOCKS = (Clock("fx_n", 1, 0.1),)
+
+
+def clock_parameter(clock: Clock) -> Parameter:
+    """The time by which an input is shifted, as a parameter."""
+    most, usual = 5.0 * clock.typical_s, clock.typical_s
+    return Parameter(
+        "delay_s",
+        "s",
+        0.0,
+        usual,
+        0.2 * usual,
+        -most,
+        most,
+        0.3 * usual,
+        2.0 * usual,
+        False,
+        "",
+        -1,
+    )
 
 
 @dataclass(frozen=True, eq=False)

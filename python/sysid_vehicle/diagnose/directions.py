@@ -176,7 +176,7 @@ class Directions:
         T = np.vstack([one.fitted for one in local])
         size = np.maximum(np.linalg.norm(T, axis=0), 1e-300)
         u, s, v = np.linalg.svd(T / size, full_matrices=False)
-        kept = s > COPIED * s[0]
+        kept = s > COPIED * s.max(initial=0.0)
         inverse = ((v[kept].T / s[kept]) @ u[:, kept].T) / size[:, None]
         self._copied = inverse @ np.vstack([one.columns for one in local])
         self._explained = inverse @ np.concatenate([one.residual for one in local])

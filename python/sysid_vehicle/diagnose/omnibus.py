@@ -112,20 +112,29 @@ def not_copied(projected: Directions) -> npt.NDArray[np.bool_]:
 class Unknown:
     """Virtual signals of the driving that act as forces, moments, accelerations, sensor shifts.
 
+    Parameters
+    ----------
+    evidence : Evidence
+    like : Unknown, optional
+        Of other driving, in whose units signals are.
+
     Attributes
     ----------
     names : list of str
         What each column acts on.
+    units : tuple of 2 floats
+        Of turns of the steering and of the pull.
     """
 
-    def __init__(self, evidence: Evidence) -> None:
+    def __init__(self, evidence: Evidence, like: Unknown | None = None) -> None:
         self.evidence = evidence
         driving = evidence.driving
         self._steer = driving.channel("steer_rad")
         turn = self._turned(self._steer, begins(driving))
-        self._turn_std = max(float(np.std(turn)), 1e-9)
         self._pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
-        self._pull_std = max(float(np.nanstd(self._pull)), 1e-9)
+        own = max(float(np.std(turn)), 1e-9), max(float(np.nanstd(self._pull)), 1e-9)
+        self.units: tuple[float, float] = own if like is None else like.units
+        self._turn_std, self._pull_std = self.units
         self.targets: list[int] = []
         self.names: list[str] = []
         heavy = set() if driving.force_known else {"F_x", "a_x"}

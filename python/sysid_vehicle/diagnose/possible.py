@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
-from ..effects import Effect, Parameter
+from ..effects import Parameter
 from ..rules import USUAL, Rules
+
+
+class Sized(Protocol):
+    """What has parameters: an effect, or a change of one."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """In their order."""
+
 
 Size = tuple[tuple[float, ...], tuple[float, ...]]
 """Parameters of an effect, and their standard errors."""
@@ -17,7 +27,7 @@ _OF_A_FACTOR = "_error"  # names of relative errors: what is multiplied by 1 + e
 
 
 def possible(
-    effect: Effect, value: Sequence[float], std: Sequence[float], rules: Rules = USUAL
+    effect: Sized, value: Sequence[float], std: Sequence[float], rules: Rules = USUAL
 ) -> bool:
     """Whether the 95 % intervals of an effect's parameters hold values that a car can have.
 
@@ -26,7 +36,7 @@ def possible(
 
     Parameters
     ----------
-    effect : Effect
+    effect : Effect, or another thing with parameters
     value, std : sequence of float
         Of its parameters, in their order.
     rules : Rules
@@ -39,7 +49,7 @@ def possible(
 
 
 def sizes(
-    effect: Effect, value: Sequence[float], std: Sequence[float], rules: Rules = USUAL
+    effect: Sized, value: Sequence[float], std: Sequence[float], rules: Rules = USUAL
 ) -> list[tuple[Parameter, float, float]]:
     """Parameters that have a size, how far each is from nothing, and the reach of its interval."""
     return [

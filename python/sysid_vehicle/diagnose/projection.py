@@ -29,6 +29,8 @@ def orthonormal_basis(columns: FloatArray) -> FloatArray:
     -------
     array, shape (n, rank)
     """
+    if not columns.shape[1]:
+        return columns
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     u, s, _ = np.linalg.svd(scaled, full_matrices=False)
     kept: FloatArray = u[:, s > COPIED * s[0]]

@@ -1,0 +1,175 @@
+"""What changed since a reference: named with its size, and nothing where nothing did."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import (
+    Change,
+    Fit,
+    InvalidInput,
+    Log,
+    Model,
+    Vehicle,
+    changed,
+    drive,
+    identify,
+    load,
+    manoeuvres,
+)
+from sysid_vehicle._arrays import FloatArray
+from sysid_vehicle.diagnose import evidence
+from sysid_vehicle.diagnose.beside_reference import Differences, Shared, Side
+
+OFFSET = "steer_offset.offset_rad"
+FEW = ("steer_offset", "steer_ratio", "steer_delay", "steer_lag", "yaw_inertia", "side_wind")
+
+
+def later(truth: Model, **values: float) -> Log:
+    """Other driving of the car, with parameters of effects."""
+    told = {name.replace("__", "."): value for name, value in values.items()}
+    more = [n.split(".")[0] for n in told if "." in n and n.split(".")[0] not in truth.effects]
+    car = truth.add(*dict.fromkeys(more)).with_values(told)
+    return drive(car, manoeuvres.handling_course(30.0, lateral_mps2=7.5), seed=42)
+
+
+@pytest.fixture(scope="module")
+def offset(truth: Model, fit: Fit) -> Change:
+    return changed(fit, later(truth, steer_offset__offset_rad=0.006))
+
+
+def inside(change: Change, effect: str, value: float) -> bool:
+    found = change[effect]
+    return abs(found.value[0] - value) < 3.0 * found.std[0]
+
+
+def test_what_changed_is_named_with_its_size(offset: Change) -> None:
+    assert [e.id for e in offset.named] == ["steer_offset"]
+    assert not offset.unknown
+    assert inside(offset, "steer_offset", 0.006)
+    assert offset["steer_offset"].std[0] < 3e-4
+    assert offset["steer_ratio"].said == "unchanged"
+    assert offset.after.model.value(OFFSET) == pytest.approx(0.006, abs=5e-4)
+    assert offset.before.model.effects == ()
+
+
+def test_nothing_is_named_where_nothing_changed(fit: Fit, course: Log) -> None:
+    change = changed(fit, course)
+    assert change.named == ()
+    assert change.unknown == ()
+    assert str(change).startswith("no change is shown")
+    assert change["steer_offset"].said == "unchanged"
+
+
+def test_what_the_reference_left_is_no_change(truth: Model, start: Model) -> None:
+    """The model lacks a relaxation in both drives; the steering is offset in the second alone."""
+    lagging = truth.add("tyre_relaxation").with_values({"tyre_relaxation.relaxation_length_m": 0.4})
+    before = identify(start, drive(lagging, manoeuvres.lap(40.0), seed=7), starts=1)
+    same = changed(before, later(lagging), candidates=(*FEW, "tyre_relaxation"))
+    assert same.named == ()
+    other = changed(before, later(lagging, steer_offset__offset_rad=0.006), candidates=FEW)
+    assert [e.id for e in other.named] == ["steer_offset"]
+    assert inside(other, "steer_offset", 0.006)
+
+
+def test_another_vehicle_file_is_what_changed(car: Vehicle, start: Model, lap: Log) -> None:
+    """The same driving, and a file with a yaw inertia that is too low."""
+    inertia = car.yaw_inertia_kgm2 or car.usual_inertia_kgm2
+    known = start.vehicle.replace(yaw_inertia_kgm2=inertia)
+    before = identify(Model(known), lap, starts=1)
+    low = known.replace(yaw_inertia_kgm2=0.75 * inertia)
+    change = changed(before, lap, vehicle=low, candidates=FEW)
+    assert [e.id for e in change.named] == ["yaw_inertia"]
+    assert inside(change, "yaw_inertia", 1.0 / 3.0)
+
+
+def test_tyres_of_an_axle_may_change(truth: Model, fit: Fit) -> None:
+    worn = later(truth, D_front=0.8 * truth.value("D_front"))
+    change = changed(fit, worn, candidates=FEW)
+    assert [e.id for e in change.named] == ["tyre_front"]
+    assert change["tyre_front"].names == ("B_front", "C_front", "D_front", "E_front")
+
+
+def test_a_change_prints_and_is_kept(offset: Change, tmp_path: Path) -> None:
+    text = str(offset)
+    assert text.startswith("changed: steer_offset: offset_rad +0.00")
+    assert "<table>" in offset._repr_html_()
+    told = offset.to_dict()["effects"]["steer_offset"]
+    assert told["said"] == "changed"
+    assert told["change"]["offset_rad"]["value"] == offset["steer_offset"].value[0]
+    frame = offset.to_pandas()
+    assert frame.loc[OFFSET, "said"] == "changed"
+    offset.before.save(tmp_path / "before.npz")
+    again = load(tmp_path / "before.npz")
+    assert again.log_likelihood == offset.before.log_likelihood
+    with pytest.raises(KeyError, match="there are steer_offset"):
+        offset["no_effect"]
+
+
+def test_drives_with_and_without_wheel_force_do_not_compare(fit: Fit, course: Log) -> None:
+    columns = {c: course[c] for c in course.channels if c != "fx_n"}
+    with pytest.raises(InvalidInput, match="fx_n is known in one of the drivings only"):
+        changed(fit, Log.from_arrays(columns))
+
+
+def test_a_fit_to_predictions_is_no_reference(start: Model, lap: Log, course: Log) -> None:
+    ahead = identify(start, lap, starts=1, horizon_s=1.0)
+    with pytest.raises(InvalidInput, match="identify without horizon_s"):
+        changed(ahead, course)
+
+
+def test_long_driving_is_worked_on_piece_by_piece(
+    fit: Fit, course: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = ("steer_offset", "steer_ratio")
+    whole = changed(fit, course, candidates=few)
+    monkeypatch.setattr(evidence, "HELD", 1000)
+    pieces = changed(fit, course, candidates=few)
+    for effect in few:
+        assert pieces[effect].value == pytest.approx(whole[effect].value, rel=1e-3, abs=1e-7)
+        assert pieces[effect].std == pytest.approx(whole[effect].std, rel=1e-3)
+
+
+class Drawn(Side):
+    """A side whose sensitivities and residuals are given."""
+
+    def __init__(self, G: FloatArray, e: FloatArray, driving: object) -> None:
+        self._G, self._e, self._driven = G, e, driving
+        self.information, self.score = G.T @ G, G.T @ e
+
+    @property
+    def driving(self) -> object:  # type: ignore[override]
+        return self._driven
+
+    def rows(self) -> Iterator[tuple[slice, FloatArray, FloatArray]]:
+        yield slice(0, self._driven.samples), self._G, self._e  # type: ignore[attr-defined]
+
+
+def test_differences_are_those_of_all_unknowns_together(fit: Fit, rng: np.random.Generator) -> None:
+    """Information and score of changes: the Schur complement of least squares over everything."""
+    n, rows = 4, 5 * fit.driving.samples
+    G_before, G_after = rng.normal(size=(2, rows, n))
+    G_after = 0.3 * G_after + G_before
+    e_before, e_after = rng.normal(size=(2, rows))
+    precision, centre = np.array([0.0, 5.0, 50.0, 0.0]), np.array([0.0, 0.2, 0.0, 0.0])
+    shift = np.array([0.0, 0.1, 0.0, -0.2])
+    before, after = Drawn(G_before, e_before, fit.driving), Drawn(G_after, e_after, fit.driving)
+    found = Differences(before, after, shift, Shared(precision, centre))
+    # Unknowns: what both share, then what changed; residuals of the later one begin at the shift.
+    zero = np.zeros((rows, n))
+    whole = np.vstack(
+        [
+            np.hstack([G_before, zero]),
+            np.hstack([G_after, G_after]),
+            np.hstack([np.diag(np.sqrt(precision)), np.zeros((n, n))]),
+        ]
+    )
+    right = np.concatenate([e_before, e_after + G_after @ shift, np.sqrt(precision) * centre])
+    best = np.linalg.lstsq(whole, right, rcond=None)[0][n:]
+    assert np.linalg.solve(found.information, found.score) == pytest.approx(best, rel=1e-6)
+    covariance = np.linalg.inv(whole.T @ whole)[n:, n:]
+    assert np.linalg.inv(found.information) == pytest.approx(covariance, rel=1e-6)
+    ratios = found.ratios(np.eye(n), np.zeros((n, n)))
+    assert np.all((ratios >= 1.0) & (ratios < 2.5))  # the noise is white
