@@ -49,6 +49,7 @@ def test_its_size_is_that_of_the_refit(found: Diagnosis) -> None:
     assert first.statistic == pytest.approx(gain, rel=1e-12)
     # What `compare` prints of the model with it, without it far above.
     assert first.error == compare(first.fit, found.driving).error
+    assert found.error == compare(found.fit, found.driving, noise=found.floor).error
     assert first.error < 1.02 < 1.2 < found.error
     assert all(np.isnan(c.error) == (c.fit is None) for c in found.ranking)
     assert f"{first.error:.3f}" in str(found)

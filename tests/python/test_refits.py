@@ -1,6 +1,8 @@
 """Exact dynamics of candidates whose score shows little of them."""
 
+import sys
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +11,8 @@ from sysid_vehicle import Fit, Log, Model, Vehicle, diagnose, drive, identify, m
 from sysid_vehicle.diagnose.diagnosis import Candidate
 from sysid_vehicle.diagnose.refits import finished, from_typical, is_hidden_by_noise, refitted
 from sysid_vehicle.effects import catalogue
+from sysid_vehicle.identify import refit
+from sysid_vehicle.identify.objective import Objective
 from sysid_vehicle.model import NUISANCES
 
 
@@ -48,6 +52,28 @@ def test_a_refit_is_never_worse_than_the_model_that_it_contains(fit: Fit) -> Non
     assert found.value == (0.0, 0.0)
     assert np.isinf(found.std).all()
     assert finished(fit, found).statistic == 0.0
+
+
+def test_a_refit_ends_with_a_round_that_gains_next_to_nothing(
+    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The maximum with frozen gains and that of the likelihood are not quite the same place."""
+    car = truth.add("mass").with_values({"mass.relative_error": 0.1})
+    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1)
+    module, reached = sys.modules["sysid_vehicle.identify.identify"], []
+
+    def seen(objective: Objective, *rest: Any, **options: Any) -> tuple[np.ndarray, Any]:
+        found, gains = moved(objective, *rest, **options)
+        reached.append(objective.reached(found, gains))
+        return found, gains
+
+    moved = module.moved
+    monkeypatch.setattr(module, "moved", seen)
+    refit(fit.model.add("mass"), fit.driving, fit.noise, rounds=9)
+    gains = np.diff([fit.log_likelihood, *reached])
+    assert gains[0] > 1.0
+    assert (gains[:-1] > 0.05).all()
+    assert 0.0 <= gains[-1] < 0.05
 
 
 def test_of_two_delays_one_may_not_be_there(truth: Model, start: Model) -> None:

@@ -45,7 +45,38 @@ def test_a_bent_valley_is_followed_in_long_steps(begin: float) -> None:
     """Steps that may never leave it take 250 and 280 passes."""
     bent, box = Bent(), Box([0, 1], np.exp([-5.0, -9.0]), np.exp([5.0, 9.0]))
     start = np.exp([begin, begin**2])
-    found = minimise(bent, start, None, box, rounds=200, tolerance=1e-6)  # type: ignore[arg-type]
+    found = minimise(bent, start, None, box, rounds=200, tolerance=1e-8)  # type: ignore[arg-type]
     assert found.settled
     assert np.log(found.x) == pytest.approx([1.0, 1.0], abs=1e-4)
     assert bent.asked < 125
+
+
+class Copying:
+    """Two parameters of which the sum is told well, and the difference a thousandth as well."""
+
+    def __init__(self, errors: tuple[float, float]) -> None:
+        self.errors, self.asked, self.samples = np.array(errors), 0, 2
+        self.by = np.array([[100.0, 100.0], [0.1, -0.1]])
+
+    def half_sum_of_squares(self, p: np.ndarray, _: object) -> float:
+        self.asked += 1
+        return 0.5 * float(np.sum((self.errors - self.by @ p) ** 2))
+
+    def normal_equations(
+        self, p: np.ndarray, gains: object, _: object
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        errors = self.errors - self.by @ p
+        return self.half_sum_of_squares(p, gains), self.by.T @ errors, self.by.T @ self.by
+
+
+def test_steps_that_promise_next_to_nothing_are_not_tried() -> None:
+    box = Box([0, 1], np.full(2, -100.0), np.full(2, 100.0))
+    little = Copying((0.1, 0.1))
+    found = minimise(little, np.zeros(2), None, box, tolerance=0.1)  # type: ignore[arg-type]
+    assert found.settled
+    assert (*found.x,) == (0.0, 0.0)
+    assert little.asked == 1
+    # A damped step promises as little where parameters copy each other, a whole one four nats.
+    much = Copying((0.1, 3.0))
+    found = minimise(much, np.zeros(2), None, box, tolerance=0.1)  # type: ignore[arg-type]
+    assert found.x == pytest.approx([15.0, -15.0], abs=0.1)

@@ -52,7 +52,7 @@ def test_the_likelihood_is_climbed_where_frozen_gains_see_no_slope() -> None:
     p, _, reached = climb(objective, p, noise, box)
     assert reached == objective.log_likelihood(p, noise)
     assert reached > highest - 0.05
-    assert p[1] == box.upper[1]
+    assert p[1] == pytest.approx(box.upper[1], rel=1e-12)
 
 
 def test_noise_is_not_learned_again_where_parameters_hardly_moved() -> None:
@@ -258,6 +258,40 @@ def test_gains_that_were_asked_for_last_are_kept() -> None:
     objective.freeze(p, 3.0 * noise)
     assert objective.freeze(np.ones(2), noise) is not gains
     assert counting.asked == 5
+
+
+def test_normal_equations_that_were_asked_for_last_are_kept() -> None:
+    class Counting(Valleys):
+        asked = 0
+
+        def normal_equations(
+            self, p: np.ndarray, gains: object, columns: object
+        ) -> tuple[float, np.ndarray, np.ndarray]:
+            self.asked += 1
+            return super().normal_equations(p, gains, columns)
+
+    counting, p, gains = Counting(), np.array([0.5]), object()
+    objective = Objective(counting)  # type: ignore[arg-type]
+    first = objective.normal_equations(p, gains, [0])
+    assert objective.normal_equations(p.copy(), gains, [0]) is first
+    assert counting.asked == 1
+    # Not those under other gains, by other parameters, elsewhere, or with further residuals.
+    objective.normal_equations(p, object(), [0])
+    objective.normal_equations(p, gains, [])
+    objective.normal_equations(p, gains, [0])
+    p[0] = 0.7
+    assert objective.normal_equations(p, gains, [0])[0] != first[0]
+    one = objective.also(lambda _: (np.ones(1), np.ones((1, 1))))
+    assert one.normal_equations(p, gains, [0])[0] == pytest.approx(
+        objective.normal_equations(p, gains, [0])[0] + 0.5
+    )
+    before = counting.asked
+    counting.samples = 10**6  # gains of so many samples are not held for them
+    objective.normal_equations(p, gains, [0])
+    objective._linear.clear()
+    objective.normal_equations(p, gains, [0])
+    objective.normal_equations(p, gains, [0])
+    assert counting.asked == before + 2
 
 
 def test_parameters_move_only_where_the_likelihood_rises() -> None:

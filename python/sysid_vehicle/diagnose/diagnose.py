@@ -9,7 +9,7 @@ from dataclasses import replace
 from .._arguments import duration
 from .._progress import with_progress
 from .._threads import Workers
-from ..compare import compare
+from ..compare import one_step_error
 from ..effects import Effect, effect
 from ..errors import InvalidInput
 from ..estimate import Driving
@@ -178,7 +178,7 @@ def _with_errors(dx: Diagnosis) -> Diagnosis:
     """The same with errors, all at one noise floor."""
     errors = dx.errors_on(dx.driving, dx.floor)
     ranking = tuple(replace(c, error=errors.get(c.id, c.error)) for c in dx.ranking)
-    return replace(dx, ranking=ranking, error=compare(dx.fit, dx.driving, noise=dx.floor).error)
+    return replace(dx, ranking=ranking, error=one_step_error(dx.fit, dx.driving, dx.floor))
 
 
 def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple[Effect, ...]:

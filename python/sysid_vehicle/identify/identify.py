@@ -30,6 +30,7 @@ _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 _THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
+_ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
 _OFFSETS = 2  # times that offsets of logs and what they share are found in turn
 
 
@@ -192,11 +193,12 @@ def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3)
     box = free_box(model)
     objective = objective_of(model, driving.problem(model), driving)
     p = box.inside(model.vector())
-    gains = None
+    gains, value = None, -np.inf
     for _ in range(rounds):
-        before = p
+        before, best = p, value
         p, gains = moved(objective, p, noise.vector(), box, rounds=8, tolerance=0.2)
-        if box.near(p, before, 1e-4):
+        value = objective.reached(p, gains)
+        if value < best + _ENOUGH or box.near(p, before, 1e-4):
             break
     return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True, gains)
 

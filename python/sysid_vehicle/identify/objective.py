@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from .._threads import check_time
 from ..errors import NumericalError
 from ..estimate import Learned, maximise_noise, promised_by_noise
 
-_KEPT, _LONG = 3, 100_000  # gains that are kept; samples above which only the last ones are
+# Gains that are kept; samples above which only the last ones are, and no normal equations.
+_KEPT, _LONG = 3, 100_000
 
 Rows = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """Further residuals: from all parameters to errors (m,) and minus their derivatives (m, n)."""
@@ -161,6 +162,15 @@ class Penalised:
         return cost, descent, information
 
 
+class _Linear(NamedTuple):
+    """Normal equations, and where they were asked for."""
+
+    p: FloatArray
+    gains: Any
+    columns: list[int]
+    found: tuple[float, FloatArray, FloatArray]
+
+
 @dataclass(frozen=True)
 class Objective(Penalised):
     """The likelihood of a model with its priors, and of its noise.
@@ -179,6 +189,7 @@ class Objective(Penalised):
     _last: list[tuple[FloatArray, FloatArray, Any]] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
+    _linear: list[_Linear] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def freeze(self, p: FloatArray, noise: FloatArray) -> Any:
         """Gains of the filter; their log-likelihood is that of the data alone.
@@ -194,6 +205,22 @@ class Objective(Penalised):
         kept = 1 if self.samples > _LONG else _KEPT
         self._last[:] = [(p.copy(), noise.copy(), gains), *self._last[: kept - 1]]
         return gains
+
+    def normal_equations(
+        self, p: FloatArray, gains: Any, columns: list[int]
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """Half the sum of squares, direction of descent, Gauss-Newton matrix.
+
+        Those asked for last are kept: where a search ends the next one begins, and standard errors
+        are those of its end.
+        """
+        for last in tuple(self._linear):
+            if last.gains is gains and last.columns == columns and np.array_equal(last.p, p):
+                return last.found
+        found = super().normal_equations(p, gains, columns)
+        if self.samples <= _LONG:
+            self._linear[:] = [_Linear(p.copy(), gains, list(columns), found)]
+        return found
 
     def log_likelihood(self, p: FloatArray, noise: FloatArray) -> float:
         """Of the data, less what the priors cost."""

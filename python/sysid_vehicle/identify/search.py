@@ -18,6 +18,8 @@ from .objective import Problem
 _LEAST_DAMPING = 1e-9
 _ASTRAY = 1.5  # times what a step promised; where it loses more, it was far too long
 _HARDER = 6.0  # times the damping after a step that gained nothing
+# Of the tolerance: a step that promises less is not tried, nor a whole one for so little.
+_NOTHING, _HALF = 0.1, 0.5
 
 
 @dataclass(frozen=True)
@@ -115,9 +117,12 @@ def _gauss_newton(
         if not np.isfinite(cost):
             return Outcome(x, np.inf, False)
         gained, begin = 0.0, x
-        there = None
+        there, little = None, False
         for attempt in range(10):
             trial, promised = stride(begin, gradient, information, damping, box)
+            little = attempt == 0 and promised < _NOTHING * tolerance
+            if little:
+                break
             # Most first steps are taken: the derivatives there cost as much again as the value.
             ahead = linearised(trial) if attempt == 0 else None
             trial_cost = cost_of(trial) if ahead is None else ahead[0]
@@ -135,12 +140,14 @@ def _gauss_newton(
                 damping = max(_eased(damping, gained, promised), _LEAST_DAMPING)
                 break
             damping *= _HARDER
-        if gained == 0.0:
+        if gained == 0.0 and not little:
             return Outcome(x, cost, True)
         if gained < tolerance:
             # Where parameters copy each other damping makes steps short, and a small gain is no
             # end: the whole step has to gain as little.
-            whole, _ = stride(begin, gradient, information, _LEAST_DAMPING, box)
+            whole, promised = stride(begin, gradient, information, _LEAST_DAMPING, box)
+            if promised < gained + _HALF * tolerance:
+                return Outcome(x, cost, True)
             whole_cost = cost_of(whole)
             if not whole_cost < cost - tolerance:
                 return Outcome(x, cost, True)
