@@ -35,10 +35,10 @@ def test_no_refit_outlasts_the_time_limit(
     assert in_time(lambda c: replace(c, statistic=-1.0), 0.0)(c) is c
     clock = count()
     monkeypatch.setattr("time.perf_counter", lambda: float(next(clock)))
-    assert in_time(lambda c: refitted(baseline, baseline.driving, c), 5.5)(c) is c
-    assert in_time(lambda c: finished(baseline, c), 15.5)(dx.ranking[0]) is dx.ranking[0]
+    assert in_time(lambda c: refitted(baseline, baseline.driving, c), 2.5)(c) is c
+    assert in_time(lambda c: finished(baseline, c), 11.5)(dx.ranking[0]) is dx.ranking[0]
     # The look that finds it late, and one more that tells whose time is over.
-    assert next(clock) <= 18
+    assert next(clock) <= 14
 
 
 def test_what_has_no_noise_of_its_own_in_time_is_held_against_the_like(
