@@ -263,7 +263,7 @@ def climb(
     for _ in range(_CLIMBS):
         _, seen, information = objective.normal_equations(p, gains, box.columns)
         x = p[box.columns]
-        slope = _slope(values_at, p, value, information, box)
+        slope = _slope(values_at, p, information, box)
         if stride(x, slope, information, _SLIGHT, box)[1] < _GAIN:
             break
         leaning = objective.also(_leaning(p, slope - seen, box))
@@ -306,14 +306,15 @@ def to_the_top(
 def _slope(
     values_at: Callable[[FloatArray], FloatArray],
     p: FloatArray,
-    value: float,
     information: FloatArray,
     box: Box,
 ) -> FloatArray:
     """Derivatives by differences; zero where the model fails.
 
     Central ones where both ends of all parameters go through the filter together, in its lanes. Of
-    more parameters from `value`, at `p`, to one end, less what the likelihood bends on the way.
+    more parameters from `p` to one end, less what the likelihood bends on the way. The value at `p`
+    comes out of the same lanes: one that was rounded in another way would give a slope to what the
+    driving never felt, and send it to its bound.
     """
     curvature = np.diag(information)
     step = np.minimum(_NUDGE / np.sqrt(np.maximum(curvature, _TINY)), _NARROW * box.width)
@@ -324,14 +325,14 @@ def _slope(
     ends = np.array([low, high] if central else [far])
     trials = np.tile(p, (len(ends), len(x), 1))
     trials[:, np.arange(len(x)), box.columns] = ends
-    trials = trials.reshape(-1, p.size)
+    trials = np.vstack([trials.reshape(-1, p.size), *([] if central else [p])])
     together = np.array_split(trials, -(-len(trials) // _core.LANES))
-    found = np.reshape(np.concatenate(in_parallel(values_at, together)), (len(ends), -1))
+    found = np.concatenate(in_parallel(values_at, together))
     if central:
-        slope = (found[1] - found[0]) / np.maximum(high - low, _TINY)
+        slope = (found[len(x) :] - found[: len(x)]) / np.maximum(high - low, _TINY)
     else:
         way = far - x
-        slope = (found[0] - value) / np.where(way == 0.0, _TINY, way) + 0.5 * curvature * way
+        slope = (found[:-1] - found[-1]) / np.where(way == 0.0, _TINY, way) + 0.5 * curvature * way
     return as_float64(np.where(np.isfinite(slope), slope, 0.0))
 
 
