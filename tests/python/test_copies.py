@@ -70,6 +70,7 @@ def results(fit: Fit, lap: Log, course: Log, truth: Model) -> dict[str, object]:
         "Fit": fit,
         "RunsFit": sv.identify_runs(fit.model, {"a": lap}, starts=1),
         "Comparison": sv.compare(fit, course),
+        "Change": sv.changed(fit, course, candidates=["steer_offset"]),
         "Diagnosis": found,
         "verdicts": sv.verdicts(found),
         "where": sv.where(fit),
@@ -89,7 +90,7 @@ NAMES = (
     *("Driving", "NoiseModel", "SensorNoise", "RoadDisturbance", "DriveLimits", "Fit"),
     *("Comparison", "Diagnosis", "verdicts", "where", "bias_report", "manoeuvre", "drive"),
     *("excitation", "closed loop", "laboratory log", "NumericalError", "Rules"),
-    *("SensorCheck", "AxleForces", "Fleet", "RunsFit"),
+    *("SensorCheck", "AxleForces", "Fleet", "RunsFit", "Change"),
 )
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from sysid_vehicle import Fit, Log
 from sysid_vehicle.estimate import Driving, turning, turning_blocks
-from sysid_vehicle.identify.ahead import _turns, _windows_of
+from sysid_vehicle.identify.windows import turns_of, windows_of
 from sysid_vehicle.rules import worse
 from sysid_vehicle.study.horizons import PREDICTED, changes, horizons
 
@@ -84,10 +84,10 @@ def test_a_long_straight_hides_no_error(fit: Fit, both: Driving, course: Log) ->
 
 
 def test_windows_are_typical_where_the_car_turns(both: Driving) -> None:
-    windows = _windows_of(both, 2.0)
-    turns = _turns(both, windows)
+    windows = windows_of(both, 2.0)
+    turns = turns_of(both, windows)
     ends = np.array([first + size for first, size in windows])
     straight_on = ends <= np.count_nonzero(both.log_number == 0.0)
     assert not turns[straight_on].any()
     assert turns[~straight_on].mean() > 0.7
-    assert _turns(both, [windows[0]]).all()  # where there is nothing else
+    assert turns_of(both, [windows[0]]).all()  # where there is nothing else
