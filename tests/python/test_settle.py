@@ -108,9 +108,38 @@ def test_the_slope_of_the_likelihood_by_differences(free: int) -> None:
     slope = _slope(values_at, at, np.diag(weights**2), box)
     np.testing.assert_allclose(slope, weights**2 * (top - at), rtol=0.2 if free < 9 else 1e-6)
     assert sum(sets) == (2 * free if 2 * free <= _core.LANES else free + 1)
-    # What the driving never felt has no slope at all.
-    weights[1] = 0.0
-    assert _slope(values_at, at, np.diag(weights**2), box)[1] == 0.0
+
+
+class Rounded:
+    """Twelve parameters of which one is never felt; values that come together round otherwise."""
+
+    samples, weights = 1, np.r_[0.0, np.linspace(1.0, 3.0, 11)]
+
+    def freeze(self, p: np.ndarray, noise: np.ndarray) -> SimpleNamespace:
+        return SimpleNamespace(log_likelihood=-self.half_sum_of_squares(p, None))
+
+    def half_sum_of_squares(self, p: np.ndarray, _: object) -> float:
+        return 0.5 * float(((p - 1.0) ** 2) @ self.weights**2)
+
+    def normal_equations(
+        self, p: np.ndarray, gains: object, _: object
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        return (
+            self.half_sum_of_squares(p, gains),
+            self.weights**2 * (1.0 - p),
+            np.diag(self.weights**2),
+        )
+
+    def log_likelihoods(self, sets: np.ndarray, noise: np.ndarray) -> np.ndarray:
+        return np.array([1e-6 - self.half_sum_of_squares(p, None) for p in sets])
+
+
+def test_what_the_driving_never_felt_is_not_sent_to_its_bound() -> None:
+    noise, box = np.ones(1), Box(list(range(12)), np.full(12, -5.0), np.full(12, 5.0))
+    objective = Objective(Rounded(), (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
+    p, _, _ = climb(objective, np.full(12, 0.5), noise, box)
+    assert p[0] == 0.5
+    assert p[1:] == pytest.approx(1.0, abs=0.05)
 
 
 class Valleys:

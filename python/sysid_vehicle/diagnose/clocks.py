@@ -55,18 +55,18 @@ def clock_parameter(clock: Clock) -> Parameter:
     """The time by which an input is shifted, as a parameter."""
     most, usual = 5.0 * clock.typical_s, clock.typical_s
     return Parameter(
-        "delay_s",
-        "s",
-        0.0,
-        usual,
-        0.2 * usual,
-        -most,
-        most,
-        0.3 * usual,
-        2.0 * usual,
-        False,
-        "",
-        -1,
+        name="delay_s",
+        unit="s",
+        null_value=0.0,
+        typical=usual,
+        matters=0.2 * usual,
+        lower=-most,
+        upper=most,
+        typical_low=0.3 * usual,
+        typical_high=2.0 * usual,
+        mirrored=False,
+        scan="",
+        column=-1,
     )
 
 

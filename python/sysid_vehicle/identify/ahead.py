@@ -73,7 +73,8 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
         raise InvalidInput(f"horizon_s = {horizon_s}: give a time above zero, in seconds")
     box, model = free_box(fit.model), fit.model
     ahead = _Ahead.of(fit, horizon_s, box)
-    end = min(ahead.ends(_starts(model, box)), key=lambda e: ahead.trimmed(e.p))
+    ends = ahead.ends(_starts(model, box))
+    end = ends[0] if len(ends) == 1 else min(ends, key=lambda e: ahead.trimmed(e.p))
     for _ in range(_PASSES - 1):
         end = ahead.searched(end.p)
     p, errors, gains = end.p, end.errors, end.gains
