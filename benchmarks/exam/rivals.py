@@ -9,7 +9,7 @@ import truths
 from design import Trial
 
 import sysid_vehicle as sv
-from sysid_vehicle.diagnose.score import score_board
+from sysid_vehicle.diagnose.candidates.score import score_board
 
 _LIMITS = sv.DriveLimits(speed_mps=30.0, lateral_mps2=7.0, duration_s=45.0)
 

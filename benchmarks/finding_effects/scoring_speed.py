@@ -19,7 +19,7 @@ import numpy as np
 from recovery import OTHER_TYRES, SENSORS
 
 import sysid_vehicle as sv
-from sysid_vehicle.diagnose.score import score_board
+from sysid_vehicle.diagnose.candidates.score import score_board
 from sysid_vehicle.identify import refit
 
 

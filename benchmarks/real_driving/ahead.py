@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import sysid_vehicle as sv
-from sysid_vehicle.diagnose.coordinates import begins
+from sysid_vehicle.diagnose.evidence.coordinates import begins
 from sysid_vehicle.estimate import Driving, turning
 from sysid_vehicle.forces._motion import Places, smoothed
 from sysid_vehicle.identify import driving_of

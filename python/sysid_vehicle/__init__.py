@@ -20,7 +20,17 @@ from .diagnose import (
     verdicts,
     where,
 )
-from .effects import Effect, catalogue, effect
+from .effects import (
+    Effect,
+    catalogue,
+    define_effect,
+    effect,
+    forget_effect,
+    installed_effects,
+    load_effects,
+    parameter,
+    state,
+)
 from .errors import Interrupted, InvalidInput, NumericalError, SysidError, SysidWarning
 from .estimate import Driving, NoiseModel
 from .export import casadi_function, export
@@ -29,14 +39,12 @@ from .forces import AxleForces, axle_forces
 from .identify import Fit, RunsFit, identify, identify_runs
 from .log import Log, check_excitation
 from .model import Model
-from .plugins import installed_effects
 from .read import ChannelMap, propose_channels, read_log
 from .rules import Rules
 from .saved import load
 from .sensors import SensorCheck, check
 from .simulate import RoadDisturbance, SensorNoise, drive, example_vehicle
 from .study import Study, improve
-from .user_effects import define_effect, forget_effect, load_effects, parameter, state
 from .vehicle import Tyre, Vehicle
 
 __all__ = [

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._arrays import FloatArray
-from ._text import html_text
+from ._common.arrays import FloatArray
+from ._common.text import html_text
 from .effects import Effect, Parameter, base_parameters, catalogue, effect
 from .errors import InvalidInput
 from .saved import save

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from ._common.files import as_path, write_bytes
 from ._core import __version__
-from ._files import as_path, write_bytes
 from .effects import Effect, effect
 from .errors import InvalidInput
 
@@ -33,14 +33,33 @@ _STATIONS = (
     *("vehicle", "effects", "model", "rules", "log", "estimate", "identify", "compare"),
     *("diagnose", "study"),
 )
-# Where classes have moved to since a version wrote them: old place to new place.
-_MOVED: dict[str, str] = {"diagnose.doubt:Beside": "diagnose.reservation:Beside"}
+# Where modules have moved to since a version wrote their classes: old name to new name.
+_MOVED: dict[str, str] = {
+    "compare.where": "compare.failure_map",
+    "effects": "effects.catalogue",
+    "diagnose.doubt": "diagnose.candidates.reservation",
+    **{
+        f"diagnose.{module}": f"diagnose.{folder}.{module}"
+        for folder, modules in {
+            "evidence": "coordinates evidence",
+            "candidates": "causes clocks constancy diagnosis instead reservation score "
+            "single_effects verdicts",
+            "unexplained": "ceiling change_points coherence delay force_map grammar omnibus "
+            "proposals shape unknown where",
+            "experiment": "hiding information next_drive suggestion",
+            "change": "change",
+        }.items()
+        for module in modules.split()
+    },
+}
+# Classes that have another name since, by their place.
+_CALLED: dict[str, str] = {"rules.accept:Change": "rules.accept:ErrorChange"}
 # Fields that have another name since, by class.
 _RENAMED: dict[str, dict[str, str]] = {
-    "effects:Effect": {"twins": "confounded_with"},
+    "effects.catalogue:Effect": {"twins": "confounded_with"},
     "estimate.noise:NoiseModel": {"wander": "disturbance"},
-    "diagnose.diagnosis:Diagnosis": {"causes": "proposed"},
-    "diagnose.proposals:Proposal": {
+    "diagnose.candidates.diagnosis:Diagnosis": {"causes": "proposed"},
+    "diagnose.unexplained.proposals:Proposal": {
         "held_out_gain": "validation_gain",
         "held_out_error": "validation_gain_std",
     },
@@ -252,8 +271,10 @@ class _Reader:
     def _object(self, told: dict[str, Any]) -> Any:
         if "effect" in told:
             return effect(told["effect"])
-        place = _MOVED.get(told["class"], told["class"])
-        module, _, name = place.partition(":")
+        module, _, name = told["class"].partition(":")
+        place = f"{_MOVED.get(module, module)}:{name}"
+        module, _, name = _CALLED.get(place, place).partition(":")
+        place = f"{module}:{name}"
         if module.split(".")[0] not in _STATIONS:
             raise KeyError(place)
         cls = getattr(importlib.import_module(f"{_PACKAGE}.{module}"), name)

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arguments import real
-from ._arrays import FloatArray
-from ._files import as_path, read_toml, refuse_unknown, write_text
+from ._common.arguments import real
+from ._common.arrays import FloatArray
+from ._common.files import as_path, read_toml, refuse_unknown, write_text
 from .errors import InvalidInput, warn
 
 GRAVITY_MPS2: float = _core.GRAVITY_MPS2

@@ -13,9 +13,7 @@ MAX_LINES = 400
 
 # A module imports from its own layer and from the layers above it in this list, never from below.
 PYTHON_LAYERS = [
-    {"errors", "_arguments", "_arrays", "_core", "_files", "_printed", "_replace", "_style"}
-    | {"_progress", "_tables", "_text", "_threads", "vehicle", "effects", "model", "formula"}
-    | {"_memo", "rules", "saved", "user_effects", "plugins", "_formula_slope", "_user_checks"},
+    {"errors", "_common", "_core", "vehicle", "effects", "model", "rules", "saved"},
     {"log"},
     {"read"},
     {"manoeuvres"},
@@ -39,6 +37,8 @@ PYTHON_LAYERS = [
     {"cli"},
     {"__main__"},
 ]
+# The same for the folders of `diagnose/`; its own modules stand above them all.
+DIAGNOSE_LAYERS = [{"evidence"}, {"unexplained"}, {"candidates"}, {"experiment", "change"}]
 CPP_LAYERS = [
     "math",
     "model",
@@ -156,6 +156,21 @@ def test_python_modules_of_one_layer_form_no_circle() -> None:
         for module in leaves:
             del edges[module]
     assert edges == {}, "these modules import each other in a circle"
+
+
+def test_folders_of_diagnose_import_from_those_above() -> None:
+    rank = {folder: k for k, layer in enumerate(DIAGNOSE_LAYERS) for folder in layer}
+    back, seen = [], set()
+    for path in sorted((PACKAGE / "diagnose").glob("*/*.py")):
+        own = path.parent.name
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level == 2:
+                target = (node.module or "").split(".")[0]
+                seen.add((own, target))
+                if rank.get(target, len(rank)) > rank[own]:
+                    back.append(f"{name(path)}:{node.lineno} imports {target}")
+    assert back == []
+    assert ("candidates", "unexplained") in seen
 
 
 @pytest.mark.parametrize(

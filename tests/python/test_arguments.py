@@ -11,8 +11,8 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle import Fit, InvalidInput, Log, Model, Vehicle, lab
-from sysid_vehicle._arguments import generator, real, whole
-from sysid_vehicle._threads import Workers
+from sysid_vehicle._common.arguments import generator, real, whole
+from sysid_vehicle._common.threads import Workers
 
 
 class Table:

@@ -11,9 +11,10 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from sysid_vehicle import Fit, Log, Model, Vehicle, diagnose, drive, identify, manoeuvres
-from sysid_vehicle.diagnose import Causes, Diagnosis, confirm
-from sysid_vehicle.diagnose.causes import CredibleSet
-from sysid_vehicle.diagnose.single_effects import Hypothesis, ScoreModel
+from sysid_vehicle.diagnose import Causes, Diagnosis
+from sysid_vehicle.diagnose.candidates import confirm
+from sysid_vehicle.diagnose.candidates.causes import CredibleSet
+from sysid_vehicle.diagnose.candidates.single_effects import Hypothesis, ScoreModel
 
 Hidden = Callable[[str, float], Fit]
 

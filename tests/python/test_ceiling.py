@@ -7,7 +7,7 @@ import pytest
 
 from sysid_vehicle import Fit, Log, Model, RoadDisturbance, ceiling, drive, manoeuvres
 from sysid_vehicle.diagnose import Ceiling, Explainable
-from sysid_vehicle.diagnose.ceiling import _ago, _features, _share, ridge
+from sysid_vehicle.diagnose.unexplained.ceiling import _ago, _features, _share, ridge
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.study.structure import structure

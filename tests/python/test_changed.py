@@ -19,9 +19,9 @@ from sysid_vehicle import (
     load,
     manoeuvres,
 )
-from sysid_vehicle._arrays import FloatArray
-from sysid_vehicle.diagnose import evidence
-from sysid_vehicle.diagnose.beside_reference import Differences, Shared, Side
+from sysid_vehicle._common.arrays import FloatArray
+from sysid_vehicle.diagnose.change.beside_reference import Differences, Shared, Side
+from sysid_vehicle.diagnose.evidence import evidence
 
 OFFSET = "steer_offset.offset_rad"
 FEW = ("steer_offset", "steer_ratio", "steer_delay", "steer_lag", "yaw_inertia", "side_wind")

@@ -391,8 +391,8 @@ def test_the_process_leaves_warning_filters_as_they_were(arguments: list[str]) -
 def test_progress_stays_away_from_files(
     arguments: list[str], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sysid_vehicle._progress._SILENT_S", 0.0)
-    monkeypatch.setattr("sysid_vehicle._progress._REFRESH_S", 0.01)
+    monkeypatch.setattr("sysid_vehicle._common.progress._SILENT_S", 0.0)
+    monkeypatch.setattr("sysid_vehicle._common.progress._REFRESH_S", 0.01)
     assert main(["compare", *arguments]) == 0
     out, err = capfd.readouterr()
     assert "\r" not in out + err

@@ -8,7 +8,7 @@ import pytest
 
 from sysid_vehicle import Fit, Model, drive, effect, identify, manoeuvres
 from sysid_vehicle.diagnose import EffectVerdict, Verdicts, constancy, judge
-from sysid_vehicle.diagnose.score import _p_value
+from sysid_vehicle.diagnose.candidates.score import _p_value
 from sysid_vehicle.identify import refine
 
 ROLLING = "rolling_resistance.coefficient"

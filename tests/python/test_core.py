@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Driving, Fit, Log, Model, _core
-from sysid_vehicle._arrays import as_float64
+from sysid_vehicle._common.arrays import as_float64
 from sysid_vehicle.errors import NumericalError
 from sysid_vehicle.identify.identify import objective_of
 

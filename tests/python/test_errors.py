@@ -8,7 +8,7 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle import Fit, InvalidInput, Log, Model, NumericalError, SysidError, _core
-from sysid_vehicle._arrays import as_float64
+from sysid_vehicle._common.arrays import as_float64
 from sysid_vehicle.errors import explained
 from sysid_vehicle.identify.suspects import suspects
 

@@ -14,8 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from sysid_vehicle import InvalidInput, _replace
-from sysid_vehicle._files import check_outputs, read_text, read_toml, write_bytes, write_text
+from sysid_vehicle import InvalidInput
+from sysid_vehicle._common import replace as _replace
+from sysid_vehicle._common.files import check_outputs, read_text, read_toml, write_bytes, write_text
 
 needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="devices, links and limits")
 root = hasattr(os, "geteuid") and os.geteuid() == 0
@@ -142,7 +143,7 @@ def test_a_pipe_is_written_through(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["pipe", "file"])
 def test_the_output_stream_is_written_through(tmp_path: Path, kind: str) -> None:
     code = (
-        "import sys; from sysid_vehicle._files import write_text; print('before');"
+        "import sys; from sysid_vehicle._common.files import write_text; print('before');"
         "write_text('/dev/stdout', 'content\\n'); print('after')"
     )
     told = tmp_path / "told"
@@ -302,8 +303,8 @@ def test_leftovers_of_killed_writers_are_removed_and_those_of_living_ones_stay(
 
 _WRITER = """
 import sys
-from sysid_vehicle import _replace
-from sysid_vehicle._files import write_text
+from sysid_vehicle._common import replace as _replace
+from sysid_vehicle._common.files import write_text
 import os
 if sys.argv[2] == "named":
     del os.O_TMPFILE

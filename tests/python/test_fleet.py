@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle import _memo
+from sysid_vehicle._common import memo as _memo
 from sysid_vehicle.cli import main
 from sysid_vehicle.fleet import Cause, Effect, Row, manifest_jobs
 from sysid_vehicle.fleet.improve_many import run

@@ -8,7 +8,7 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle.diagnose import BiasReport
-from sysid_vehicle.diagnose.replay import Replay
+from sysid_vehicle.diagnose.experiment.replay import Replay
 
 pytestmark = pytest.mark.manual  # refits of many simulated drives
 

@@ -7,7 +7,7 @@ import pytest
 
 from sysid_vehicle import Driving, Fit, Model, drive, manoeuvres
 from sysid_vehicle.diagnose import instead
-from sysid_vehicle.diagnose.instead import _hats, _remembered
+from sysid_vehicle.diagnose.candidates.instead import _hats, _remembered
 
 
 @pytest.fixture(scope="module")

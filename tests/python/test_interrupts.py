@@ -12,7 +12,7 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle import _core
-from sysid_vehicle._threads import Workers
+from sysid_vehicle._common.threads import Workers
 
 # Each piece of work takes more than 20 s of processor time; a signal comes after 0.3 s. A child
 # process runs it: a signal that came too late would end the tests.

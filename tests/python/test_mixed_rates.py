@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, Log, Model, drive, identify, improve, manoeuvres, where
-from sysid_vehicle.diagnose.coherence import coherence
-from sysid_vehicle.diagnose.coordinates import begins, blocks, late, running_time
-from sysid_vehicle.diagnose.evidence import Evidence
-from sysid_vehicle.diagnose.force_map import _means, _places
+from sysid_vehicle.diagnose.evidence.coordinates import begins, blocks, late, running_time
+from sysid_vehicle.diagnose.evidence.evidence import Evidence
+from sysid_vehicle.diagnose.unexplained.coherence import coherence
+from sysid_vehicle.diagnose.unexplained.force_map import _means, _places
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.report.excerpt import worst_excerpt
 from sysid_vehicle.study import look_ahead

@@ -21,9 +21,9 @@ from sysid_vehicle import (
 )
 from sysid_vehicle.cli import main
 from sysid_vehicle.diagnose import NextDrive, separations
-from sysid_vehicle.diagnose.information import information_of
-from sysid_vehicle.diagnose.score import score_board
-from sysid_vehicle.diagnose.suggestion import Suggestion, ground_m, path_m
+from sysid_vehicle.diagnose.candidates.score import score_board
+from sysid_vehicle.diagnose.experiment.information import information_of
+from sysid_vehicle.diagnose.experiment.suggestion import Suggestion, ground_m, path_m
 from sysid_vehicle.simulate import drive_truth
 
 LAG, RELAXATION = effect("steer_lag"), effect("tyre_relaxation")

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from sysid_vehicle import Model, Study, drive, identify, improve, manoeuvres
 from sysid_vehicle.diagnose import Omnibus
-from sysid_vehicle.diagnose.ceiling import Explainable
+from sysid_vehicle.diagnose.unexplained.ceiling import Explainable
 from sysid_vehicle.estimate import Driving
-from sysid_vehicle.rules import Added, Change, Facts, Share, grade, share_of, verdict
+from sysid_vehicle.rules import Added, ErrorChange, Facts, Share, grade, share_of, verdict
 from sysid_vehicle.study import AddedEffect
 from sysid_vehicle.study.beyond import Beyond
 from sysid_vehicle.study.disagree import disagreements
@@ -59,7 +59,7 @@ def test_what_no_effect_explains_is_to_be_looked_at(unknown: Study) -> None:
 def test_what_predicts_better_some_seconds_ahead_is_to_be_used(unknown: Study) -> None:
     found = replace(unknown)
     assert unknown.predicting is not None
-    falls, same = (Change("vy_mps", 2.0, log_ratio, 0.05) for log_ratio in (-0.5, 0.0))
+    falls, same = (ErrorChange("vy_mps", 2.0, log_ratio, 0.05) for log_ratio in (-0.5, 0.0))
     for needed, use in (((falls,), "final"), ((same,), "baseline")):
         found.__dict__["predicting"] = replace(unknown.predicting, better=(falls,), needed=needed)
         assert any(f"use `study.predicting.{use}`" in text for text in next_steps(found))

@@ -9,7 +9,7 @@ import pytest
 
 from sysid_vehicle import Fit, Log, Model, compare, diagnose, drive, identify, identify_runs, load
 from sysid_vehicle import manoeuvres as drives
-from sysid_vehicle.diagnose.evidence import Evidence
+from sysid_vehicle.diagnose.evidence.evidence import Evidence
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.estimate.pieces import PiecewiseProblem
 from sysid_vehicle.identify import driving_of, predicting_ahead

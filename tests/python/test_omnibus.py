@@ -7,8 +7,8 @@ import pytest
 
 from sysid_vehicle import Driving, Fit, Log, Model, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import Omnibus, omnibus
-from sysid_vehicle.diagnose.evidence import Evidence
-from sysid_vehicle.diagnose.omnibus import Unknown
+from sysid_vehicle.diagnose.evidence.evidence import Evidence
+from sysid_vehicle.diagnose.unexplained.omnibus import Unknown
 from sysid_vehicle.identify import refine
 
 

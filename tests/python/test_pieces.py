@@ -128,7 +128,7 @@ def test_a_diagnosis_in_sections_is_the_same(monkeypatch: pytest.MonkeyPatch, fi
     """Scores, colour of the residuals, what is left, causes; with slow states and delays."""
     effects = ("mass", "tyre_temperature", "friction_change", "steer_lag", "tyre_load_sensitivity")
     whole = sv.diagnose(fit, candidates=effects, refits=0)
-    evidence = import_module("sysid_vehicle.diagnose.evidence")
+    evidence = import_module("sysid_vehicle.diagnose.evidence.evidence")
     monkeypatch.setattr(evidence, "HELD", fit.driving.samples // 4 + 1)
     found = sv.diagnose(fit, candidates=effects, refits=0)
     assert len(list(evidence.Evidence(fit, fit.driving).sections())) >= 4

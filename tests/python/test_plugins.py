@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle import effects
 from sysid_vehicle.cli import main
 
 DEFINES = """
@@ -35,7 +34,7 @@ def install(folder: Path, name: str, code: str, entries: str) -> None:
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(effects, "_users", {})
+    monkeypatch.setattr(sys.modules["sysid_vehicle.effects.catalogue"], "_users", {})
     return tmp_path
 
 

@@ -22,7 +22,7 @@ from sysid_vehicle import (
 )
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import predicting_ahead
-from sysid_vehicle.rules import USUAL, Change
+from sysid_vehicle.rules import USUAL, ErrorChange
 from sysid_vehicle.study.horizons import changes, typical_error
 from sysid_vehicle.study.predicting import Predicting
 from sysid_vehicle.study.waterfall import look_ahead
@@ -147,8 +147,8 @@ def test_what_cannot_be_asked_is_refused(fit: Fit, ahead: Fit, lap: Log, start: 
 
 
 def _said(better: float, needed: float | None, fit: Fit) -> Predicting:
-    def change(log_ratio: float) -> tuple[Change, ...]:
-        return (Change("vy_mps", 2.0, log_ratio, 0.05),)
+    def change(log_ratio: float) -> tuple[ErrorChange, ...]:
+        return (ErrorChange("vy_mps", 2.0, log_ratio, 0.05),)
 
     from sysid_vehicle.study.horizons import horizons
 
@@ -164,5 +164,5 @@ def test_it_is_said_what_predicts_better_and_what_is_not_needed(fit: Fit) -> Non
     assert "not needed" in str(_said(-0.5, 0.0, fit))
     # One error that grows is no help.
     both = replace(_said(-0.5, None, fit))
-    grown = replace(both, better=(*both.better, Change("yaw_rate_radps", 2.0, 0.5, 0.05)))
+    grown = replace(both, better=(*both.better, ErrorChange("yaw_rate_radps", 2.0, 0.5, 0.05)))
     assert str(grown) == ""

@@ -10,7 +10,7 @@ import types
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle._progress import doing, teller, watched, with_progress
+from sysid_vehicle._common.progress import doing, teller, watched, with_progress
 
 
 class Terminal(io.StringIO):
@@ -49,8 +49,8 @@ def test_short_work_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_long_work_is_shown_unasked(monkeypatch: pytest.MonkeyPatch) -> None:
     stream = terminal(monkeypatch)
-    monkeypatch.setattr("sysid_vehicle._progress._SILENT_S", 0.05)
-    monkeypatch.setattr("sysid_vehicle._progress._REFRESH_S", 0.02)
+    monkeypatch.setattr("sysid_vehicle._common.progress._SILENT_S", 0.05)
+    monkeypatch.setattr("sysid_vehicle._common.progress._REFRESH_S", 0.02)
     for _ in with_progress(range(3), "things", shown=None):
         time.sleep(0.15)  # a step of its own is shown too
     lines = [line.strip() for line in stream.getvalue().split("\r")]
@@ -61,8 +61,8 @@ def test_long_work_is_shown_unasked(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_line_tells_the_outermost_and_the_innermost(monkeypatch: pytest.MonkeyPatch) -> None:
     stream = terminal(monkeypatch)
-    monkeypatch.setattr("sysid_vehicle._progress._SILENT_S", 0.0)
-    monkeypatch.setattr("sysid_vehicle._progress._REFRESH_S", 0.02)
+    monkeypatch.setattr("sysid_vehicle._common.progress._SILENT_S", 0.0)
+    monkeypatch.setattr("sysid_vehicle._common.progress._REFRESH_S", 0.02)
     monkeypatch.setenv("COLUMNS", "40")
     with doing("study"), doing("fit"), doing("starts", total=8) as task:
         task.advance(8)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from sysid_vehicle.diagnose.projection import (
+from sysid_vehicle.diagnose.evidence.projection import (
     LongRun,
     long_run_ratio,
     long_run_ratios,

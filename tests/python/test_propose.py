@@ -209,7 +209,7 @@ def test_on_the_command_line(
 def test_names_that_toml_cannot_hold() -> None:
     data = {"time\n": np.arange(9.0), "speed": np.arange(9.0)}
     proposal = sv.propose_channels({'speed "x" \\': np.arange(9.0), "time": np.arange(9.0)})
-    import sysid_vehicle._files as files
+    import sysid_vehicle._common.files as files
 
     text = files.tomllib.loads(proposal.to_toml())["channels"]["vx_mps"]["column"]
     assert text == 'speed "x" \\'

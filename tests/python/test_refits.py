@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, Log, Model, Vehicle, diagnose, drive, identify, manoeuvres
-from sysid_vehicle.diagnose.diagnosis import Candidate
-from sysid_vehicle.diagnose.refits import finished, from_typical, is_hidden_by_noise, refitted
+from sysid_vehicle.diagnose.candidates.diagnosis import Candidate
+from sysid_vehicle.diagnose.candidates.refits import (
+    finished,
+    from_typical,
+    is_hidden_by_noise,
+    refitted,
+)
 from sysid_vehicle.effects import catalogue
 from sysid_vehicle.identify import refit
 from sysid_vehicle.identify.objective import Objective

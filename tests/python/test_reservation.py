@@ -23,7 +23,7 @@ from sysid_vehicle import (
 )
 from sysid_vehicle.compare import incoherent, unrelated
 from sysid_vehicle.diagnose import Omnibus
-from sysid_vehicle.diagnose.reservation import confirmed, reservation
+from sysid_vehicle.diagnose.candidates.reservation import confirmed, reservation
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import MEASURED, Driving
 from sysid_vehicle.sensors import made_ready

@@ -11,7 +11,7 @@ import pytest
 from sysid_vehicle import InvalidInput, Rules
 from sysid_vehicle.rules import (
     USUAL,
-    Change,
+    ErrorChange,
     Gain,
     Measures,
     accept,
@@ -24,31 +24,31 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "sysid_vehicle"
 # Constants of numerical methods and of effort: how finely, how long, how often. They decide no
 # claim. Those of the last group shape how what no name fits is described; no effect is claimed.
 NUMERICAL = {
-    "diagnose/beside_reference.py": {"_RIDGE"},
-    "diagnose/changed.py": {"_TRIED", "_ROUNDS"},
-    "diagnose/changes_compete.py": {"_SINGULAR", "_MOST"},
-    "diagnose/may_change.py": {"_INERTIA"},
-    "diagnose/reference.py": {
+    "diagnose/change/beside_reference.py": {"_RIDGE"},
+    "diagnose/change/changed.py": {"_TRIED", "_ROUNDS"},
+    "diagnose/change/changes_compete.py": {"_SINGULAR", "_MOST"},
+    "diagnose/change/may_change.py": {"_INERTIA"},
+    "diagnose/change/reference.py": {
         "_ENOUGH", "_FAR", "_FOLLOWED", "_LOOSE", "_REFREEZES", "_SHARES", "_VAGUE",
     },
-    "diagnose/causes.py": {"_KEPT", "_LEAST"},
-    "diagnose/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
-    "diagnose/coordinates.py": {"BLOCK_S"},
+    "diagnose/candidates/causes.py": {"_KEPT", "_LEAST"},
+    "diagnose/candidates/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
+    "diagnose/evidence/coordinates.py": {"BLOCK_S"},
     "diagnose/diagnose.py": {"REFITS", "_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS"},
-    "diagnose/directions.py": {"_ROWS"},
-    "diagnose/evidence.py": {"HELD", "_AT_ONCE"},
-    "diagnose/information.py": {"_COPIED"},
-    "diagnose/instead.py": {"_MEMORIES_S", "_SHAPES_REMEMBERED"},
-    "diagnose/possible.py": {"_AT_BOUND"},
-    "diagnose/omnibus.py": {"LEAST_LEFT", "_FEW_SHAPES", "_FORCE_SHAPES"},
-    "diagnose/projection.py": {"COPIED", "_SINGULAR", "_LAGS", "_ROWS", "_TERMS"},
-    "diagnose/replay.py": {
+    "diagnose/evidence/directions.py": {"_ROWS"},
+    "diagnose/evidence/evidence.py": {"HELD", "_AT_ONCE"},
+    "diagnose/experiment/information.py": {"_COPIED"},
+    "diagnose/candidates/instead.py": {"_MEMORIES_S", "_SHAPES_REMEMBERED"},
+    "diagnose/candidates/possible.py": {"_AT_BOUND"},
+    "diagnose/unexplained/omnibus.py": {"LEAST_LEFT", "_FEW_SHAPES", "_FORCE_SHAPES"},
+    "diagnose/evidence/projection.py": {"COPIED", "_SINGULAR", "_LAGS", "_ROWS", "_TERMS"},
+    "diagnose/experiment/replay.py": {
         "_RATE_HZ", "_WINDOW_S", "_LOOKS", "_ROUNDS", "_BENDS", "_AS_GOOD",
     },
-    "diagnose/refits.py": {"_BEYOND"},
-    "diagnose/score.py": {"_BLOCK_S", "_DRAWN", "_FEWEST_BLOCKS"},
-    "diagnose/sensitivity.py": {"_AT_ONCE", "_BOUNDED", "_SHARES"},
-    "diagnose/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},
+    "diagnose/candidates/refits.py": {"_BEYOND"},
+    "diagnose/candidates/score.py": {"_BLOCK_S", "_DRAWN", "_FEWEST_BLOCKS"},
+    "diagnose/evidence/sensitivity.py": {"_AT_ONCE", "_BOUNDED", "_SHARES"},
+    "diagnose/candidates/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},
     "study/validation.py": {"AHEAD", "AHEAD_S", "_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
     "study/horizons.py": {"AHEAD", "_FEWEST", "_APART", "_LOST"},
     "study/beyond.py": {"_DRAWS"},
@@ -61,33 +61,33 @@ NUMERICAL = {
     "study/steps.py": {"_ALTERNATIVES"},
     "study/structure.py": {"_AHEAD_S", "_APART", "_FEW"},
     # Descriptions of the unknown, of biases, and of the next drive.
-    "diagnose/ceiling.py": {
+    "diagnose/unexplained/ceiling.py": {
         "_RATE_HZ", "_LAGS_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",
     },
     "study/predicting.py": {"_WORTH"},
-    "diagnose/change_directions.py": {"_BLEND_S", "_SMALL"},
-    "diagnose/change_points.py": {
+    "diagnose/unexplained/change_directions.py": {"_BLEND_S", "_SMALL"},
+    "diagnose/unexplained/change_points.py": {
         "_STEP_S", "_MOST_STEPS", "_LEAST_S", "_INTERVAL", "_NEAR_S", "_FINE", "_MOST",
         "_TOGETHER_S", "_FEWER", "_HOPELESS",
     },
-    "diagnose/coherence.py": {"_WINDOW_S", "_LEVEL"},
-    "diagnose/confirm.py": {"_HOPELESS"},
-    "diagnose/delay.py": {
+    "diagnose/unexplained/coherence.py": {"_WINDOW_S", "_LEVEL"},
+    "diagnose/candidates/confirm.py": {"_HOPELESS"},
+    "diagnose/unexplained/delay.py": {
         "HIGHEST_HZ", "_BANDS", "_LOWEST_HZ", "_SMALL", "_ROUNDS", "_DRAWS", "_NOTABLE",
         "_TINY_RAD",
     },
-    "diagnose/force_map.py": {
+    "diagnose/unexplained/force_map.py": {
         "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_LONGEST_S",
     },
-    "diagnose/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE"},
-    "diagnose/next_drive.py": {"_ENOUGH"},
-    "diagnose/proposals.py": {"_MOST", "_TRIED", "_ALIKE", "_RETAINED", "_VISIBLE"},
-    "diagnose/shape.py": {
+    "diagnose/experiment/hiding.py": {"_WORTH_TELLING", "_NEAR", "_SHARE"},
+    "diagnose/experiment/next_drive.py": {"_ENOUGH"},
+    "diagnose/unexplained/proposals.py": {"_MOST", "_TRIED", "_ALIKE", "_RETAINED", "_VISIBLE"},
+    "diagnose/unexplained/shape.py": {
         "_KNOTS", "_KNOTS_OF_PAIR", "_SIZES", "_SIZES_OF_PAIR", "_SMOOTH", "_FINE", "_DRAWS",
         "_LEVEL", "_FEWEST",
     },
-    "diagnose/suggestion.py": {"_BAND", "_SLOWEST_HZ"},
-    "diagnose/where.py": {"_TELLS"},
+    "diagnose/experiment/suggestion.py": {"_BAND", "_SLOWEST_HZ"},
+    "diagnose/unexplained/where.py": {"_TELLS"},
 }  # fmt: skip
 _NO_LIMIT = (0, 1, -1, 2, 0.5)  # of which halves, squares and signs are made
 
@@ -124,7 +124,7 @@ def test_no_limit_that_decides_a_claim_stands_elsewhere() -> None:
     found = {
         str(path.relative_to(PACKAGE)): set(constants(path.read_text("utf-8")))
         for folder in ("study", "diagnose")
-        for path in (PACKAGE / folder).glob("*.py")
+        for path in (PACKAGE / folder).rglob("*.py")
     }
     new = {path: names - NUMERICAL.get(path, set()) for path, names in found.items()}
     assert {p: n for p, n in new.items() if n} == {}, "a limit belongs into rules/limits.py"
@@ -134,7 +134,9 @@ def test_no_limit_that_decides_a_claim_stands_elsewhere() -> None:
 
 def test_deciding_files_compare_with_no_number_of_their_own() -> None:
     deciding = ["study/steps.py", "study/search.py", "study/verdict.py", "study/improve.py"]
-    deciding += [f"diagnose/{n}.py" for n in ("reservation", "verdicts", "constancy", "possible")]
+    deciding += [
+        f"diagnose/candidates/{n}.py" for n in ("reservation", "verdicts", "constancy", "possible")
+    ]
     deciding += ["rules/accept.py", "rules/verdict.py"]
     found = {p: list(compared_numbers((PACKAGE / p).read_text("utf-8"))) for p in deciding}
     assert {p: n for p, n in found.items() if n} == {}
@@ -218,7 +220,7 @@ def test_what_validation_data_confirm(
     found = Measures(gain(*same), gain(*own), gain(*fall), plausible=True, as_sure=False)
     assert accept(found) is holds
     # Predictions some seconds ahead have a veto.
-    assert not accept(replace(found, changes=(Change("vy_mps", 2.0, 0.2, 0.05),)))
+    assert not accept(replace(found, changes=(ErrorChange("vy_mps", 2.0, 0.2, 0.05),)))
     # What only acts like something is worth having where the error falls.
     assert accept(replace(found, plausible=False)) is (holds and fall[0] > 0.0)
 
@@ -226,7 +228,7 @@ def test_what_validation_data_confirm(
 def test_the_likelihood_has_the_last_word_where_noise_did_not_grow() -> None:
     found = Measures(gain(-90.0), gain(150.0), gain(-90.0), plausible=True, as_sure=True)
     assert accept(found)
-    assert not accept(replace(found, changes=(Change("ay_mps2", 5.0, 0.2, 0.05),)))
+    assert not accept(replace(found, changes=(ErrorChange("ay_mps2", 5.0, 0.2, 0.05),)))
     assert not accept(replace(found, own_gain=gain(90.0)))
     assert accept(replace(found, own_gain=gain(90.0)), replace(USUAL, sure=2.0))
     assert not accept(replace(found, plausible=False))
@@ -244,18 +246,20 @@ def test_one_spin_neither_confirms_nor_refuses() -> None:
 
 
 def test_what_grows_clearly_and_by_more_than_matters() -> None:
-    grown = Change("vy_mps", 2.0, 0.10, 0.02)
+    grown = ErrorChange("vy_mps", 2.0, 0.10, 0.02)
     assert worse((grown,)) == (grown,)
     assert worse((replace(grown, error=0.11),)) == ()
     # Errors of v_y 2 s ahead that grow by 15 %, by two standard errors: none that is kept.
-    assert worse((Change("vy_mps", 2.0, float(np.log(1.15)), 0.068),))
+    assert worse((ErrorChange("vy_mps", 2.0, float(np.log(1.15)), 0.068),))
     assert worse((replace(grown, log_ratio=0.03, error=0.001),)) == ()
     assert worse((replace(grown, log_ratio=-0.5),)) == ()
     assert worse((grown,), replace(USUAL, worse=0.2)) == ()
 
 
 def test_what_a_channel_leans_to_at_all_its_horizons_has_grown() -> None:
-    leaning = [Change("vy_mps", h, g, 0.08) for h, g in ((1.0, 0.10), (2.0, 0.13), (5.0, 0.04))]
+    leaning = [
+        ErrorChange("vy_mps", h, g, 0.08) for h, g in ((1.0, 0.10), (2.0, 0.13), (5.0, 0.04))
+    ]
     assert worse(leaning) == tuple(leaning[:2])
     # One horizon of a channel whose errors do not grow on the whole is chance.
     assert worse([*leaning[:1], replace(leaning[1], log_ratio=-0.1), leaning[2]]) == ()

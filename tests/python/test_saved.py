@@ -1,5 +1,7 @@
 """Results in files: what is read is what was written, and files that cannot be used say so."""
 
+import dataclasses
+import importlib
 import io
 import json
 import zipfile
@@ -74,9 +76,21 @@ def test_an_effect_of_a_user_comes_along(tmp_path: Path) -> None:
     same(sv.drive(read, sv.manoeuvres.step_steer(), seed=1), log)
 
 
-@pytest.mark.parametrize("name", ["fit_v1.npz"])
-def test_files_of_earlier_versions_are_read(name: str) -> None:
-    read = sv.load(OLD / name)
+def test_classes_are_found_where_they_have_moved_to() -> None:
+    read = sv.load(OLD / "diagnosis_v1.npz")  # of before `diagnose` had folders
+    assert isinstance(read, sv.Diagnosis)
+    statistics = {c.id: c.statistic for c in read.ranking}
+    assert statistics["yaw_inertia"] == pytest.approx(2.1, abs=0.05)
+    for module in saved._MOVED.values():
+        found = vars(importlib.import_module(f"sysid_vehicle.{module}")).values()
+        assert any(dataclasses.is_dataclass(c) for c in found), module
+    for place in saved._CALLED.values():
+        module, _, name = place.partition(":")
+        assert hasattr(importlib.import_module(f"sysid_vehicle.{module}"), name)
+
+
+def test_files_of_earlier_versions_are_read() -> None:
+    read = sv.load(OLD / "fit_v1.npz")
     assert isinstance(read, sv.Fit)
     assert read.model.effects == ("steer_lag",)
     assert read["B_front"].value == pytest.approx(read.model.value("B_front"))

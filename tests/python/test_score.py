@@ -10,9 +10,9 @@ from scipy.signal import lfilter
 from scipy.stats import chi2, kstest
 
 from sysid_vehicle import Driving, Fit, Log, Model, catalogue, drive, effect, identify, manoeuvres
-from sysid_vehicle.diagnose.evidence import Evidence
-from sysid_vehicle.diagnose.score import Score, ScoreBoard, score_board, score_board_of
-from sysid_vehicle.diagnose.sensitivity import sensitivities
+from sysid_vehicle.diagnose.candidates.score import Score, ScoreBoard, score_board, score_board_of
+from sysid_vehicle.diagnose.evidence.evidence import Evidence
+from sysid_vehicle.diagnose.evidence.sensitivity import sensitivities
 from sysid_vehicle.identify import refit
 
 Hidden = Callable[[str, float], Fit]

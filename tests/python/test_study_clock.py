@@ -6,7 +6,7 @@ import numpy as np
 
 from sysid_vehicle import Driving, Fit, Log, diagnose
 from sysid_vehicle.diagnose import Diagnosis
-from sysid_vehicle.diagnose.delay import delayed
+from sysid_vehicle.diagnose.unexplained.delay import delayed
 from sysid_vehicle.identify import refine
 from sysid_vehicle.study.clock import in_time
 

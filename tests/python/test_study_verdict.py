@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from sysid_vehicle import Fit, Log, Model, NumericalError, drive, identify, improve, manoeuvres
-from sysid_vehicle._threads import check_time
+from sysid_vehicle._common.threads import check_time
 from sysid_vehicle.errors import SysidWarning
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import refit

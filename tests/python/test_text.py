@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from sysid_vehicle._text import columns, text_table, wrapped
+from sysid_vehicle._common.text import columns, text_table, wrapped
 from sysid_vehicle.cli import main
 
 HEAD = ("effect", "p", "in words")

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from sysid_vehicle import Fit, Log, Model, Vehicle, compare, diagnose, drive, identify
 from sysid_vehicle import manoeuvres as drives
-from sysid_vehicle._threads import Workers, at_most, cores, in_parallel, small_matrices
+from sysid_vehicle._common.threads import Workers, at_most, cores, in_parallel, small_matrices
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.online import SideslipObserver, estimate_sideslip
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Diagnosis, Fit, Model, diagnose, drive, identify, manoeuvres
-from sysid_vehicle._threads import before, check_time, in_parallel
+from sysid_vehicle._common.threads import before, check_time, in_parallel
 from sysid_vehicle.diagnose import Candidate
-from sysid_vehicle.diagnose.refits import finished, in_time, refitted
+from sysid_vehicle.diagnose.candidates.refits import finished, in_time, refitted
 
 ALIKE = ["aero_drag", "rolling_resistance"]
 

@@ -20,9 +20,9 @@ from sysid_vehicle import (
     where,
 )
 from sysid_vehicle.diagnose import Unknown
-from sysid_vehicle.diagnose.evidence import Evidence
-from sysid_vehicle.diagnose.grammar import Form, forms, unit_of_gain
-from sysid_vehicle.diagnose.shape import _band, _posterior, curves
+from sysid_vehicle.diagnose.evidence.evidence import Evidence
+from sysid_vehicle.diagnose.unexplained.grammar import Form, forms, unit_of_gain
+from sysid_vehicle.diagnose.unexplained.shape import _band, _posterior, curves
 from sysid_vehicle.identify import refine
 
 FORCE, MOMENT = 0.6, 0.3  # N and N m, per square of the speed

@@ -15,9 +15,9 @@ import pytest
 import sysid_vehicle as sv
 from sysid_vehicle import _core
 from sysid_vehicle.cli import main
-from sysid_vehicle.diagnose.evidence import Evidence
-from sysid_vehicle.diagnose.sensitivity import sensitivities
-from sysid_vehicle.formula import SIGNALS, TARGETS, trace
+from sysid_vehicle.diagnose.evidence.evidence import Evidence
+from sysid_vehicle.diagnose.evidence.sensitivity import sensitivities
+from sysid_vehicle.effects.formula import SIGNALS, TARGETS, trace
 from sysid_vehicle.identify import refine
 from sysid_vehicle.model import Model
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pickle
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,9 +14,9 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle import _core, lab, published
-from sysid_vehicle._formula_slope import decay_of
+from sysid_vehicle.effects.formula import EVERYTHING, evaluate, trace
+from sysid_vehicle.effects.slope import decay_of
 from sysid_vehicle.estimate.channels import has_channels, logged_channels
-from sysid_vehicle.formula import EVERYTHING, evaluate, trace
 from sysid_vehicle.model import Model
 from sysid_vehicle.simulate._drive import Drive, drive_truth
 
@@ -30,10 +31,9 @@ LOADS = "F_zfl", "F_zfr", "F_zrl", "F_zrr"
 
 @pytest.fixture(autouse=True)
 def no_effects_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sysid_vehicle import effects
-
-    monkeypatch.setattr(effects, "_users", {})
-    monkeypatch.setattr(effects, "_channels", [])
+    catalogue = sys.modules["sysid_vehicle.effects.catalogue"]
+    monkeypatch.setattr(catalogue, "_users", {})
+    monkeypatch.setattr(catalogue, "_channels", [])
 
 
 def heat(**changes: Any) -> sv.Effect:

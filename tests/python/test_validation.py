@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, Log
-from sysid_vehicle._threads import at_most
+from sysid_vehicle._common.threads import at_most
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.study import validation

@@ -16,7 +16,7 @@ from sysid_vehicle import (
     verdicts,
 )
 from sysid_vehicle.diagnose import EffectVerdict, Verdicts, possible
-from sysid_vehicle.diagnose.verdicts import _of_present, judge
+from sysid_vehicle.diagnose.candidates.verdicts import _of_present, judge
 from sysid_vehicle.rules import USUAL
 
 Hidden = Callable[[str, float], Fit]

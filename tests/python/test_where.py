@@ -9,9 +9,9 @@ import pytest
 
 from sysid_vehicle import Driving, Fit, Model, drive, identify, manoeuvres, where
 from sysid_vehicle.diagnose import Where
-from sysid_vehicle.diagnose.change_points import change_points
-from sysid_vehicle.diagnose.coherence import coherence
-from sysid_vehicle.diagnose.evidence import Evidence
+from sysid_vehicle.diagnose.evidence.evidence import Evidence
+from sysid_vehicle.diagnose.unexplained.change_points import change_points
+from sysid_vehicle.diagnose.unexplained.coherence import coherence
 
 
 @pytest.fixture(scope="module")

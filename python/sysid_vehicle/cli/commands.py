@@ -7,19 +7,17 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
-from .._progress import note
-from .._text import text_table
+from .._common.progress import note
+from .._common.text import text_table
 from ..compare import Comparison, compare
 from ..demo import run_demo
 from ..diagnose import where
-from ..effects import catalogue
+from ..effects import catalogue, installed_effects, load_effects
 from ..errors import warn
 from ..identify import Fit, identify
 from ..model import Model
-from ..plugins import installed_effects
 from ..report import RANKING_HEAD, ranking_rows, ranking_title, summary, write_report
 from ..study import Study, improve
-from ..user_effects import load_effects
 from ..vehicle import Vehicle
 from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
 from .log_arguments import read_logs, say_it_runs, written_map

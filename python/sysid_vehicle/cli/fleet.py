@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .._progress import note
+from .._common.progress import note
 from ..fleet import manifest_jobs
 from ..fleet.improve_many import run as improve_all
 from .log_arguments import say_it_runs

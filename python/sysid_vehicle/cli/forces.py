@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from .._style import new_figure
+from .._common.style import new_figure
 from ..forces import COLOURS, axle_forces
 from ..vehicle import Vehicle
 from .log_arguments import add_driving, read_logs

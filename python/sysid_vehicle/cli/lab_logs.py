@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .._style import new_figure
+from .._common.style import new_figure
 from ..errors import warn
 from ..identify import METHODS
 from ..lab import (

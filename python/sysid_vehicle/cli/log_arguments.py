@@ -7,8 +7,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .._files import write_text
-from .._progress import note
+from .._common.files import write_text
+from .._common.progress import note
 from ..errors import warn
 from ..log import Log
 from ..read import ChannelMap, Proposal, propose_channels, read_log

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from typing import Any, TextIO
 
-from .._progress import note
-from .._text import columns, wrapped
+from .._common.progress import note
+from .._common.text import columns, wrapped
 from ..errors import Interrupted, SysidError
 from .commands import COMMANDS
 from .outputs import refuse_outputs

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .._style import new_figure
+from .._common.style import new_figure
 from ..online import (
     MAGIC_FORMULA,
     TWO_PARAMETER,

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .._files import check_outputs, write_json, write_text
-from .._style import svg
+from .._common.files import check_outputs, write_json, write_text
+from .._common.style import svg
 from ..errors import InvalidInput
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .._files import write_text
+from .._common.files import write_text
 from ..errors import InvalidInput
 from ..report import check_page
 from ..sensors import check

@@ -11,8 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from .._files import read_text
-from .._style import new_figure
+from .._common.files import read_text
+from .._common.style import new_figure
 from ..errors import InvalidInput
 from ..published import (
     LoadExperiment,

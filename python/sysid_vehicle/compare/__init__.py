@@ -1,8 +1,8 @@
 """Comparison of a fitted model with driving."""
 
 from .compare import ChannelScore, Comparison, compare, one_step_error
+from .failure_map import FailureMap, Region
 from .unrelated import incoherent, unrelated
-from .where import FailureMap, Region
 
 __all__ = [
     "ChannelScore",

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._arrays import FloatArray
-from .._style import axes_or_new
-from .._tables import dataset, frame
-from .._text import brief, html_list, html_paragraph, html_table, number, text_table
+from .._common.arrays import FloatArray
+from .._common.style import axes_or_new
+from .._common.tables import dataset, frame
+from .._common.text import brief, html_list, html_paragraph, html_table, number, text_table
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..estimate.pieces import traces
 from ..identify import Fit, driving_of, explaining
 from ..log import Log
+from .failure_map import FailureMap, Region
 from .unrelated import incoherent, unrelated
-from .where import FailureMap, Region
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,8 +13,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from .._arrays import FloatArray
-from .._text import number
+from .._common.arrays import FloatArray
+from .._common.text import number
 from ..effects import Effect, effect
 from ..estimate import MEASURED, Driving
 from ..estimate.inputs import white_noise_std

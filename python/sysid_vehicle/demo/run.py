@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from .._arguments import generator
-from .._text import brief
+from .._common.arguments import generator
+from .._common.text import brief
 from ..model import Model
 from ..report import write_report
 from ..study import Study, improve

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .._text import text_table
+from .._common.text import text_table
 from ..compare import Comparison
 from ..effects import effect
 from ..log import Log

@@ -1,29 +1,29 @@
 """Diagnosis: which physical effect a model is missing, or that none explains what is left."""
 
-from .causes import Causes, CredibleSet
-from .ceiling import Ceiling, Explainable, ceiling
-from .change import Change, EffectChange
-from .change_points import ChangePoint
-from .changed import changed
-from .coherence import INPUTS, Coherence, coherence
-from .constancy import Constancy, constancy
-from .coordinates import blocks
-from .delay import Delay
-from .diagnose import considered, diagnose
-from .diagnosis import Candidate, Diagnosis
-from .evidence import Evidence
-from .force_map import ForceMap
-from .hiding import Bias, BiasReport, bias_report
-from .instead import Instead, instead
-from .next_drive import DriveLimits, NextDrive, separations, suggest_manoeuvre
-from .omnibus import Omnibus, omnibus
-from .possible import Size, possible
-from .proposals import Proposal
-from .shape import Curve, Surface
-from .suggestion import Suggestion
-from .unknown import Unknown, unknown
-from .verdicts import EffectVerdict, Verdicts, judge, verdicts
-from .where import Where, where
+from .candidates.causes import Causes, CredibleSet
+from .candidates.constancy import Constancy, constancy
+from .candidates.diagnosis import Candidate, Diagnosis
+from .candidates.instead import Instead, instead
+from .candidates.possible import Size, considered, possible
+from .candidates.verdicts import EffectVerdict, Verdicts, judge, verdicts
+from .change.change import Change, EffectChange
+from .change.changed import changed
+from .diagnose import diagnose
+from .evidence.coordinates import blocks
+from .evidence.evidence import Evidence
+from .experiment.hiding import Bias, BiasReport, bias_report
+from .experiment.next_drive import DriveLimits, NextDrive, separations, suggest_manoeuvre
+from .experiment.suggestion import Suggestion
+from .unexplained.ceiling import Ceiling, Explainable, ceiling
+from .unexplained.change_points import ChangePoint
+from .unexplained.coherence import INPUTS, Coherence, coherence
+from .unexplained.delay import Delay
+from .unexplained.force_map import ForceMap
+from .unexplained.omnibus import Omnibus, omnibus
+from .unexplained.proposals import Proposal
+from .unexplained.shape import Curve, Surface
+from .unexplained.unknown import Unknown, unknown
+from .unexplained.where import Where, where
 
 __all__ = [
     "INPUTS",

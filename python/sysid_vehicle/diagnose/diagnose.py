@@ -6,25 +6,25 @@ import time
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
-from .._arguments import duration
-from .._progress import with_progress
-from .._threads import Workers
+from .._common.arguments import duration
+from .._common.progress import with_progress
+from .._common.threads import Workers
 from ..compare import one_step_error
-from ..effects import Effect, effect
+from ..effects import Effect
 from ..errors import InvalidInput
 from ..estimate import Driving
 from ..identify import Fit, driving_of, explaining
 from ..log import Log
-from ..model import Model
 from ..rules import USUAL, Rules, bic
-from .causes import causes_of
-from .clocks import shifts
-from .diagnosis import Candidate, Diagnosis
-from .evidence import Evidence
-from .omnibus import Omnibus, Unknown, omnibus, omnibus_of
-from .refits import finished as finished_of
-from .refits import from_typical, in_time, is_hidden_by_noise, refitted
-from .score import Score, ScoreBoard, score_board_of
+from .candidates.causes import causes_of
+from .candidates.clocks import shifts
+from .candidates.diagnosis import Candidate, Diagnosis
+from .candidates.possible import considered
+from .candidates.refits import finished as finished_of
+from .candidates.refits import from_typical, in_time, is_hidden_by_noise, refitted
+from .candidates.score import Score, ScoreBoard, score_board_of
+from .evidence.evidence import Evidence
+from .unexplained.omnibus import Omnibus, Unknown, omnibus, omnibus_of
 
 REFITS = 5
 # Of the best statistic: what scores less than this share does not overtake it. States of their own
@@ -179,14 +179,6 @@ def _with_errors(dx: Diagnosis) -> Diagnosis:
     errors = dx.errors_on(dx.driving, dx.floor)
     ranking = tuple(replace(c, error=errors.get(c.id, c.error)) for c in dx.ranking)
     return replace(dx, ranking=ranking, error=one_step_error(dx.fit, dx.driving, dx.floor))
-
-
-def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple[Effect, ...]:
-    """What may be added to a model: all that it lacks, or what is wanted of that."""
-    if candidates is None:
-        return model.candidates
-    wanted = {effect(c).id for c in candidates}
-    return tuple(e for e in model.candidates if e.id in wanted)
 
 
 def _worth_refitting(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..effects import Effect, channels_in_use
 from ..errors import InvalidInput, near_names
 from ..log import Log

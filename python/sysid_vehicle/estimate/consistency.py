@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray, as_float64
-from .._text import html_text
+from .._common.arrays import FloatArray, as_float64
+from .._common.text import html_text
 from ..errors import InvalidInput
 
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
-from .._text import brief
+from .._common.arrays import FloatArray, as_float64
+from .._common.text import brief
 from ..effects import Effect, channels_in_use, effect
 from ..errors import InvalidInput
 from ..log import CHANNELS, MEASURED, Log, several_logs

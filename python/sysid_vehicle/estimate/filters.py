@@ -17,7 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
 
 METHODS = ("ekf", "ukf")

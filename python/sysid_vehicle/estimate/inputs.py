@@ -18,7 +18,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from .._arrays import NORMAL_MAD, FloatArray, as_float64
+from .._common.arrays import NORMAL_MAD, FloatArray, as_float64
 
 _HALF_WIDTHS = (4, 6, 9, 12)
 _DEGREE = 6

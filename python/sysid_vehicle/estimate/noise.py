@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from .._arrays import FloatArray, as_float64
-from .._text import html_text
-from .._threads import check_time
+from .._common.arrays import FloatArray, as_float64
+from .._common.text import html_text
+from .._common.threads import check_time
 from ..errors import NumericalError
 from ..log import MEASURED
 from ..vehicle import GRAVITY_MPS2, Vehicle

@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..errors import NumericalError
 
 LONGEST = 1 << 20

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray
-from .._memo import remembered
+from .._common.arrays import FloatArray
+from .._common.memo import remembered
 from .driving import Driving
 
 _AROUND_S = 0.5  # on either side

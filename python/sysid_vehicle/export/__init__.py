@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .._arguments import expect
-from .._files import as_path, write_bytes, write_text
+from .._common.arguments import expect
+from .._common.files import as_path, write_bytes, write_text
 from ..errors import InvalidInput, warn
 from ..identify import Fit
 from ..model import Model

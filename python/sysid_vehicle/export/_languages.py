@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .._arguments import expect
+from .._common.arguments import expect
 from .._core import __version__
 from ..errors import InvalidInput
 from ..model import Model

@@ -10,10 +10,10 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from .._arguments import expect, whole
-from .._files import as_path, write_text
-from .._progress import with_progress
-from .._threads import cores
+from .._common.arguments import expect, whole
+from .._common.files import as_path, write_text
+from .._common.progress import with_progress
+from .._common.threads import cores
 from ..errors import SysidError, warn
 from ..read import ChannelMap
 from .jobs import Car, Drive, Job, check_options, jobs_of

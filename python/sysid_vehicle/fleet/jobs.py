@@ -9,7 +9,7 @@ from inspect import signature
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from .._files import as_path, refuse_unknown
+from .._common.files import as_path, refuse_unknown
 from ..errors import InvalidInput
 from ..log import Log
 from ..model import Model

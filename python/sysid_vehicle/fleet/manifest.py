@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from .._files import as_path, read_toml, refuse_unknown
+from .._common.files import as_path, read_toml, refuse_unknown
 from ..errors import InvalidInput
 from ..model import Model
 from ..read import ChannelMap

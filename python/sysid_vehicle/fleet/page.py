@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .._style import AFTER, framed, tidy
+from .._common.style import AFTER, framed, tidy
 from ..report.page import bullets, heading, page, paragraph, picture, table
 from .results import Fleet, Row
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .._text import brief, html_paragraph, html_table, number, text_table
+from .._common.text import brief, html_paragraph, html_table, number, text_table
 from ..errors import InvalidInput, near_names
 from ..saved import load
 from ..study import Study

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .._files import as_path, write_bytes, write_json, write_text
+from .._common.files import as_path, write_bytes, write_json, write_text
 from ..errors import InvalidInput
 from ..study import PREDICTED
 from .results import AHEAD_S, Effect, Row, study_file

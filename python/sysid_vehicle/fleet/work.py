@@ -8,14 +8,14 @@ import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from .._memo import forget
-from .._threads import at_most
+from .._common.memo import forget
+from .._common.threads import at_most
+from ..effects import load_effects
 from ..errors import SysidError
 from ..log import Log
 from ..read import read_log
 from ..saved import packed
 from ..study import AddedEffect, Study, horizons, improve
-from ..user_effects import load_effects
 from .jobs import Job
 from .results import AHEAD_S, Effect, Row
 

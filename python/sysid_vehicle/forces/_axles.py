@@ -11,9 +11,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from .._arguments import expect, real, whole
-from .._arrays import FloatArray, as_float64
-from .._progress import doing
+from .._common.arguments import expect, real, whole
+from .._common.arrays import FloatArray, as_float64
+from .._common.progress import doing
 from ..errors import InvalidInput
 from ..log import Log, several_logs
 from ..sensors import SensorCheck, check

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray
-from .._printed import Part, Printed, Table
-from .._style import MEASURED, tidy
-from .._text import HALF_95, brief, number
+from .._common.arrays import FloatArray
+from .._common.printed import Part, Printed, Table
+from .._common.style import MEASURED, tidy
+from .._common.text import HALF_95, brief, number
 from ..errors import InvalidInput, near_names
 from ..sensors import SensorCheck
 from ..vehicle import AXLES, Vehicle

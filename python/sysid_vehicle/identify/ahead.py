@@ -19,7 +19,7 @@ import numpy.typing as npt
 import scipy
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving, NoiseModel
 from ..estimate.pieces import DrivingProblem

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
-from .._text import HALF_95, number
+from .._common.arrays import FloatArray, as_float64
+from .._common.text import HALF_95, number
 from .objective import Objective
 from .profile import Optimum, Profile, profile_all
 from .quantities import Quantity

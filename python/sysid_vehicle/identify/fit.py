@@ -8,9 +8,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from .._arrays import FloatArray
-from .._tables import frame
-from .._text import brief, html_list, html_paragraph, html_table, number, text_table
+from .._common.arrays import FloatArray
+from .._common.tables import frame
+from .._common.text import brief, html_list, html_paragraph, html_table, number, text_table
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save

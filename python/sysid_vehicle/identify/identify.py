@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError, warn
 from ..estimate import Driving, NoiseModel, first_guess, noise_range
 from ..estimate.pieces import DrivingProblem

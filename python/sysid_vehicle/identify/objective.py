@@ -12,8 +12,8 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
-from .._threads import check_time
+from .._common.arrays import FloatArray, as_float64
+from .._common.threads import check_time
 from ..errors import NumericalError
 from ..estimate import Learned, maximise_noise, promised_by_noise
 

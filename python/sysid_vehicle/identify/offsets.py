@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray, as_float64
-from .._memo import remembered
+from .._common.arrays import FloatArray, as_float64
+from .._common.memo import remembered
 from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving, NoiseModel, noise_range
 from ..log import Log

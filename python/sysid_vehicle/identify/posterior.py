@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .._arguments import generator, whole
-from .._arrays import FloatArray, as_float64
-from .._printed import Part, Printed, Table
-from .._progress import with_progress
-from .._tables import frame, imported
-from .._text import brief, number
+from .._common.arguments import generator, whole
+from .._common.arrays import FloatArray, as_float64
+from .._common.printed import Part, Printed, Table
+from .._common.progress import with_progress
+from .._common.tables import frame, imported
+from .._common.text import brief, number
 from ..errors import InvalidInput
 from .box import free_box
 

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
-from .._memo import remembered
+from .._common.arrays import FloatArray, as_float64
+from .._common.memo import remembered
 from ..estimate import Driving, NoiseModel
 from ..estimate.pieces import DrivingProblem
 from ..model import Model

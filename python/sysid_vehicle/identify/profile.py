@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
-from .._progress import with_progress
-from .._style import AFTER, FLOOR, axes_or_new, tidy
-from .._text import HALF_95, number
-from .._threads import Workers
+from .._common.arrays import FloatArray, as_float64
+from .._common.progress import with_progress
+from .._common.style import AFTER, FLOOR, axes_or_new, tidy
+from .._common.text import HALF_95, number
+from .._common.threads import Workers
 from .objective import Objective, Penalised
 from .quantities import Quantity
 from .search import Box

@@ -17,9 +17,9 @@ import numpy as np
 import scipy
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
-from .._printed import Part, Printed, Table
-from .._text import brief, number, with_error
+from .._common.arrays import FloatArray, as_float64
+from .._common.printed import Part, Printed, Table
+from .._common.text import brief, number, with_error
 from ..errors import InvalidInput, near_names
 from ..estimate import Driving, NoiseModel, noise_range
 from ..log import Log

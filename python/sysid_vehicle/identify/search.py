@@ -12,7 +12,7 @@ import numpy.typing as npt
 import scipy
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from .objective import Problem
 
 _LEAST_DAMPING = 1e-9

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
-from .._threads import in_parallel
+from .._common.arrays import FloatArray, as_float64
+from .._common.threads import in_parallel
 from ..errors import NumericalError
 from .objective import LinearRows, Objective
 from .search import Box, minimise, stride

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from .._arrays import FloatArray, as_float64
-from .._progress import with_progress
-from .._style import AFTER, BEFORE, axes_or_new, tidy
-from .._threads import Workers
+from .._common.arrays import FloatArray, as_float64
+from .._common.progress import with_progress
+from .._common.style import AFTER, BEFORE, axes_or_new, tidy
+from .._common.threads import Workers
 from ..errors import NumericalError
 from ..model import Model
 from .search import Box

@@ -9,9 +9,9 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from .._arguments import expect, whole
-from .._progress import doing
-from .._threads import at_most, small_matrices
+from .._common.arguments import expect, whole
+from .._common.progress import doing
+from .._common.threads import at_most, small_matrices
 from ..errors import explained
 from ..estimate import Driving
 from ..log import Log

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ..vehicle import magic_formula
 
 _PEAKLESS = 1.0 + 1e-6

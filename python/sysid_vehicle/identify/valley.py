@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..errors import NumericalError
 from .objective import Problem
 from .search import Box, least_within

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
-from .._arguments import generator
-from .._arrays import FloatArray, as_float64
-from .._printed import Part, Printed
-from .._progress import doing
-from .._style import AFTER, BEFORE, axes_or_new, tidy
-from .._threads import Workers
+from .._common.arguments import generator
+from .._common.arrays import FloatArray, as_float64
+from .._common.printed import Part, Printed
+from .._common.progress import doing
+from .._common.style import AFTER, BEFORE, axes_or_new, tidy
+from .._common.threads import Workers
 from ..errors import InvalidInput, NumericalError
 from ..manoeuvres import peak_lateral_mps2
 from ..model import Model

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .._text import number
+from .._common.text import number
 from ..errors import InvalidInput, near_names
 from ..identify.profile import LEVEL, Optimum, lost_at
 from .tyre_fit import TyreFit

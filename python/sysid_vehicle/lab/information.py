@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..estimate import MEASURED, NoiseModel
 from ..model import Model

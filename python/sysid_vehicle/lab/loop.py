@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .._arguments import generator
-from .._arrays import FloatArray, as_float64
-from .._printed import Part, Printed, Table
-from .._style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
-from .._text import number
+from .._common.arguments import generator
+from .._common.arrays import FloatArray, as_float64
+from .._common.printed import Part, Printed, Table
+from .._common.style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
+from .._common.text import number
 from ..errors import InvalidInput
 from ..log import Log
 from ..simulate import RoadDisturbance

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from .. import _core
-from .._arrays import FloatArray, as_float64, filled
+from .._common.arrays import FloatArray, as_float64, filled
 from ..errors import InvalidInput
 from .tyre_data import GreyBoxVehicle, TyreLog
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray
-from .._printed import Part, Printed, Table
-from .._style import AFTER, BEFORE, MEASURED, TRUTH, axes_or_new, tidy
-from .._text import HALF_95, number
+from .._common.arrays import FloatArray
+from .._common.printed import Part, Printed, Table
+from .._common.style import AFTER, BEFORE, MEASURED, TRUTH, axes_or_new, tidy
+from .._common.text import HALF_95, number
 from ..errors import InvalidInput, near_names
 
 if TYPE_CHECKING:

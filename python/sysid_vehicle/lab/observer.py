@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError
 from ..estimate.inputs import white_noise_std
 from ..vehicle import GRAVITY_MPS2

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from .._arguments import check_not_negative
-from .._arrays import FloatArray, as_float64
+from .._common.arguments import check_not_negative
+from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2, Vehicle
 from .observer import ObserverForm

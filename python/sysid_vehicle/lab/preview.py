@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._printed import Part, Printed, Table
-from .._style import AFTER, BEFORE, FLOOR, MEASURED, axes_or_new, tidy
-from .._text import number
+from .._common.printed import Part, Printed, Table
+from .._common.style import AFTER, BEFORE, FLOOR, MEASURED, axes_or_new, tidy
+from .._common.text import number
 from ..identify.estimates import std_of_data
 from ..model import Model
 from ..vehicle import AXLES

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..identify.objective import Problem
 from ..identify.search import least_within
 

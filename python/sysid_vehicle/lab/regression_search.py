@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..identify.objective import LinearRows, Penalised
 from ..identify.search import Box, minimise
 from .motion import TyreMotion

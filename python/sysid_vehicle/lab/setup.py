@@ -8,7 +8,7 @@ from dataclasses import astuple, dataclass, field
 import numpy as np
 
 from .. import _core
-from .._text import html_text
+from .._common.text import html_text
 from ..errors import InvalidInput
 from ..model import Model
 from ..vehicle import Tyre, Vehicle

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _core
-from .._arguments import check_positive_fields
-from .._arrays import FloatArray, as_float64, filled
+from .._common.arguments import check_positive_fields
+from .._common.arrays import FloatArray, as_float64, filled
 from ..errors import InvalidInput
 from ..log import Log
 from ..vehicle import Vehicle, static_loads

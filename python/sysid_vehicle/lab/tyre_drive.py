@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .._arguments import generator
-from .._arrays import FloatArray, as_float64
+from .._common.arguments import generator
+from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from .observed import READINGS
 from .tyre_data import GreyBoxVehicle, TyreLog

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
-from .._printed import Part, Printed, Table
-from .._style import AFTER, BEFORE, axes_or_new, tidy
-from .._text import HALF_95, number
+from .._common.arrays import FloatArray, as_float64
+from .._common.printed import Part, Printed, Table
+from .._common.style import AFTER, BEFORE, axes_or_new, tidy
+from .._common.text import HALF_95, number
 from ..identify.estimates import Estimate, Estimated
 from ..identify.profile import Profile
 from ..identify.quantities import Quantity, parameter, std_of, tyre_quantity

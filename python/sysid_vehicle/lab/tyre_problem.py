@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..effects import base_parameters, effect
+from ..effects.formula import TARGETS, trace
 from ..errors import InvalidInput, near_names
 from ..estimate import MEASURED, NoiseModel
-from ..formula import TARGETS, trace
 from ..identify.objective import Objective, gaussian_prior
 from ..identify.search import Box
 from .observed import READINGS

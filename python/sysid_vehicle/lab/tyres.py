@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from .._arguments import whole
-from .._arrays import FloatArray, as_float64
-from .._progress import doing
+from .._common.arguments import whole
+from .._common.arrays import FloatArray, as_float64
+from .._common.progress import doing
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..identify.estimates import BETTER_FOUND, box_covariance, profiled_estimates, wald

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
-from .._files import read_text
-from .._printed import Part, Printed, Table
-from .._progress import doing
-from .._style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
-from .._text import number
+from .._common.arrays import FloatArray, as_float64
+from .._common.files import read_text
+from .._common.printed import Part, Printed, Table
+from .._common.progress import doing
+from .._common.style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
+from .._common.text import number
 from ..errors import InvalidInput
 from .observed import READINGS
 from .tyre_data import GreyBoxVehicle, TyreLog

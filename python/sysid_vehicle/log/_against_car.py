@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ..errors import InvalidInput, warn
 from ..vehicle import GRAVITY_MPS2
 from ._laws import EXCITED, LINEAR_MPS2, OFFSET, WINDOW_S, Drive, size_of, spread_of

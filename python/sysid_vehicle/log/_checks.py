@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from .._arrays import FloatArray, filled
+from .._common.arrays import FloatArray, filled
 from ._channels import CHANNELS
 from ._grid import between, own_period
 from ._signals import runs, smoothed

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from .._arrays import NORMAL_MAD, FloatArray
+from .._common.arrays import NORMAL_MAD, FloatArray
 from ..errors import InvalidInput
 from ._laws import Contradiction
 from ._motion import Motion

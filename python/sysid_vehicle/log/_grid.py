@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ..errors import InvalidInput
 from ._channels import CHANNELS
 

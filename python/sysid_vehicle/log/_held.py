@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ._channels import CHANNELS
 
 _FEWEST_CHANGES = 20

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ._laws import Contradiction
 from ._motion import Motion
 from ._regression import Lag, Sides, find_lag, regress

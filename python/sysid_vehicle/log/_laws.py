@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ..errors import InvalidInput
 from ._motion import Motion
 from ._regression import Regression, regress

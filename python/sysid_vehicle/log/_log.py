@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._arguments import expect
-from .._arrays import FloatArray, filled
-from .._files import write_text
-from .._tables import dataset, frame
+from .._common.arguments import expect
+from .._common.arrays import FloatArray, filled
+from .._common.files import write_text
+from .._common.tables import dataset, frame
 from ..errors import InvalidInput, near_names, warn
 from ._build import build
 from ._channels import CHANNELS

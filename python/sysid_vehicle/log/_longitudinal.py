@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ..vehicle import GRAVITY_MPS2
 from ._lags import sideways
 from ._laws import (

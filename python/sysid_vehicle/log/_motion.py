@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .._arrays import FloatArray, filled
+from .._common.arrays import FloatArray, filled
 from ._grid import own_period
 from ._signals import disorder, median_of_five, white_noise
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ..vehicle import GRAVITY_MPS2
 from ._channels import DEG
 from ._clock import clock_notes

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import FloatArray, filled
+from .._common.arrays import FloatArray, filled
 from ._channels import CHANNELS, DEG
 from ._grid import at, between
 from ._laws import Contradiction, Implausible

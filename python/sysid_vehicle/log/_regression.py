@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import NORMAL_MAD, FloatArray
+from .._common.arrays import NORMAL_MAD, FloatArray
 
 _PASSES = 5
 _HUBER = 2.5  # residuals beyond so many robust deviations lose weight

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import NORMAL_MAD, FloatArray, filled
+from .._common.arrays import NORMAL_MAD, FloatArray, filled
 
 # A spike stands out this many times from the local noise, from the quantum of the channel and
 # (as a fraction) from its range: below, it could be a quick but true movement.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .._arguments import check_positive
+from .._common.arguments import check_positive
 from ._curves import Knots
 from ._manoeuvre import Manoeuvre
 

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 import scipy
 
-from .._arguments import check_positive, check_positive_fields
-from .._arrays import FloatArray
+from .._common.arguments import check_positive, check_positive_fields
+from .._common.arrays import FloatArray
 from ..errors import InvalidInput
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
-from .._style import axes_or_new
-from .._text import html_text
+from .._common.arrays import FloatArray, as_float64
+from .._common.style import axes_or_new
+from .._common.text import html_text
 from ..errors import InvalidInput
 from ..vehicle import Vehicle
 from ._curves import Curve

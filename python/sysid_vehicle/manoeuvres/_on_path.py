@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .._arguments import check_positive
+from .._common.arguments import check_positive
 from ..errors import InvalidInput
 from ._curves import Curvature, Knots, Pulse, Pulses, Sweep, constant
 from ._manoeuvre import Manoeuvre

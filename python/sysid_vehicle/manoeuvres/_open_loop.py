@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .._arguments import check_positive
+from .._common.arguments import check_positive
 from ._curves import Knots, Pulse, Pulses, Sweep, constant
 from ._manoeuvre import Manoeuvre
 

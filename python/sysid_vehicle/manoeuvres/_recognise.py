@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .._arrays import FloatArray, filled
+from .._common.arrays import FloatArray, filled
 from ..log import Log
 from ..vehicle import Vehicle
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2, Tyre, Vehicle
 

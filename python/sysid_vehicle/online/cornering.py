@@ -13,9 +13,9 @@ import numpy as np
 import scipy
 
 from .. import _core
-from .._arrays import FloatArray, as_float64
-from .._printed import Told
-from .._style import AFTER, MEASURED, axes_or_new, tidy
+from .._common.arrays import FloatArray, as_float64
+from .._common.printed import Told
+from .._common.style import AFTER, MEASURED, axes_or_new, tidy
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..log import Log

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arguments import generator
-from .._arrays import FloatArray
-from .._printed import Told
+from .._common.arguments import generator
+from .._common.arrays import FloatArray
+from .._common.printed import Told
 from ..errors import InvalidInput
 from ..export import identified_vehicle
 from ..identify import Fit

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._arrays import FloatArray
-from .._printed import Told
-from .._style import AFTER, MEASURED, TRUTH, axes_or_new, new_figure, tidy
-from .._text import text_table
+from .._common.arrays import FloatArray
+from .._common.printed import Told
+from .._common.style import AFTER, MEASURED, TRUTH, axes_or_new, new_figure, tidy
+from .._common.text import text_table
 from ..vehicle import Vehicle
 from .sideslip_settings import SideslipSettings
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator, Mapping
 
 from .. import _core
-from .._files import refuse_unknown
-from .._text import html_text, text_table
+from .._common.files import refuse_unknown
+from .._common.text import html_text, text_table
 from ..errors import InvalidInput
 from ..estimate.inputs import white_noise_std
 from ..log import Log

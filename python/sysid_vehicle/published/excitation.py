@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from .._arguments import check_positive_fields
-from .._arrays import FloatArray, as_float64
+from .._common.arguments import check_positive_fields
+from .._common.arrays import FloatArray, as_float64
 from ..lab.excitation import Excitation
 
 

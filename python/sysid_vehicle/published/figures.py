@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, legend_above, new_figure, tidy
+from .._common.style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, legend_above, new_figure, tidy
 from ..twin.car import SPORTS_CAR
 from .joint import JointExperiment
 from .load import LoadExperiment

@@ -14,8 +14,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from .._arrays import FloatArray
-from .._printed import Told
+from .._common.arrays import FloatArray
+from .._common.printed import Told
 from ..errors import InvalidInput
 from ..manoeuvres import double_lane_change, lap
 from ..twin.calibrate import Box

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .._printed import Told
+from .._common.printed import Told
 from ..errors import InvalidInput
 from ..twin.car import LOAD_NAMES, LOADED_SUV, NOMINAL_SUV, Load, TwinCar
 from ..twin.drives import INPUTS, Drive14, rough_road, swept_steer, urban_cycle

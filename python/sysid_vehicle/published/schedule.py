@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._printed import Told
+from .._common.printed import Told
 from ..errors import InvalidInput
 from ..twin.car import NOMINAL_SUV, Load
 from ..twin.laws import Unknown, unknowns

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..identify.objective import LinearRows
 from ..identify.starts import Runner
 from ..identify.walk import looking_alike

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arguments import whole
-from .._arrays import FloatArray, as_float64
-from .._printed import Part, Printed, Table
-from .._progress import doing
-from .._text import number
+from .._common.arguments import whole
+from .._common.arrays import FloatArray, as_float64
+from .._common.printed import Part, Printed, Table
+from .._common.progress import doing
+from .._common.text import number
 from ..errors import InvalidInput
 from ..identify.search import METHODS
 from ..identify.starts import Starts, space_filling

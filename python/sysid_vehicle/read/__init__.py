@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .._files import as_path
+from .._common.files import as_path
 from ..errors import InvalidInput, warn
 from ..log import Columns, Log
 from ._channel_map import ChannelMap, Source

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._files import read_toml, refuse_unknown
+from .._common.files import read_toml, refuse_unknown
 from ..errors import InvalidInput, near_names
 from ..log import CHANNELS, listed
 from ._recording import Recording

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..log import times_wheelbase
 from ..log._laws import LINEAR_MPS2, cosine
 from ..log._motion import Windows

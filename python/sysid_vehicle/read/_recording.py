@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ..errors import InvalidInput, near_names
 from ..log import CHANNELS, listed
 from ._table import Table

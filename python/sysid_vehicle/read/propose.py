@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import FloatArray
-from .._files import as_path
+from .._common.arrays import FloatArray
+from .._common.files import as_path
 from ..errors import InvalidInput
 from ..log import CHANNELS, Columns, Log, listed
 from ..vehicle import Vehicle

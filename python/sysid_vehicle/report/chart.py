@@ -11,7 +11,7 @@ from html import escape
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 
 Range = tuple[float, float]
 Tick = tuple[float, str]

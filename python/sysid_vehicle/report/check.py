@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .._style import framed
+from .._common.style import framed
 from ..sensors import SensorCheck
 from .page import bullets, heading, page, picture
 

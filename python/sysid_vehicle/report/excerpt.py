@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ..estimate import MEASURED
 from ..estimate.driving import Stretch
 from ..study import Study, look_ahead

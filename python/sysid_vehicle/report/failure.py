@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray
-from .._text import HALF_95
+from .._common.arrays import FloatArray
+from .._common.text import HALF_95
 from ..diagnose import INPUTS, Coherence, Curve, ForceMap, Surface, Where
-from ..diagnose.coordinates import COORDINATES
-from ..diagnose.force_map import UNITS
+from ..diagnose.evidence.coordinates import COORDINATES
+from ..diagnose.unexplained.force_map import UNITS
 from ..model import Model
 from ..study import Study
 from .chart import DIVERGING, Chart, figure, legend, scale

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .._arrays import FloatArray
-from .._text import HALF_95
+from .._common.arrays import FloatArray
+from .._common.text import HALF_95
 from ..diagnose import Causes
 from ..estimate import MEASURED
 from ..model import Model

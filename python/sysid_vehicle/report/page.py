@@ -8,8 +8,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .._style import inline_svg
-from .._text import html_table
+from .._common.style import inline_svg
+from .._common.text import html_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ..estimate import MEASURED
 from ..study import Study, look_ahead
 from .excerpt import Excerpt, worst_excerpt

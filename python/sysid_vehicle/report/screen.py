@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._text import number
+from .._common.text import number
 from ..study import AddedEffect, Study
 from . import figures
 from .page import bars, bullets, panel, paragraph, table

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .._text import html_table, number
+from .._common.text import html_table, number
 from ..diagnose import EffectVerdict, bias_report
 from ..estimate import UNITS
 from ..model import Model

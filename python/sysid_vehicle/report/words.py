@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._text import number
+from .._common.text import number
 from ..identify import Estimate
 from ..study import AddedEffect, Study
 

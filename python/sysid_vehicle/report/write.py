@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from .._files import write_text
-from .._progress import doing
-from .._threads import in_parallel
+from .._common.files import write_text
+from .._common.progress import doing
+from .._common.threads import in_parallel
 from ..model import Model
 from ..study import Study
 from .markdown import markdown

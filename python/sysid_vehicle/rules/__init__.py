@@ -27,7 +27,7 @@
 Nothing here sees a fit or a log: others measure, this decides.
 """
 
-from .accept import Change, Gain, Measures, accept, bic, worse
+from .accept import ErrorChange, Gain, Measures, accept, bic, worse
 from .facts import Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
 from .share import NONE_GONE, UNKNOWN, Share, share_between, share_explained, share_of
@@ -38,8 +38,8 @@ __all__ = [
     "UNKNOWN",
     "USUAL",
     "Added",
-    "Change",
     "Decision",
+    "ErrorChange",
     "Facts",
     "Gain",
     "Grade",

@@ -39,7 +39,7 @@ class Gain:
 
 
 @dataclass(frozen=True)
-class Change:
+class ErrorChange:
     """How an error some seconds ahead changes, median over blocks of the validation data.
 
     Attributes
@@ -73,7 +73,7 @@ class Measures:
         Whether a car can have such a value.
     as_sure : bool
         Whether the richer model, with noise of its own, is no less sure than the poorer one.
-    changes : tuple of Change
+    changes : tuple of ErrorChange
         Of the errors some seconds ahead.
     """
 
@@ -82,7 +82,7 @@ class Measures:
     fall: Gain
     plausible: bool
     as_sure: bool
-    changes: tuple[Change, ...] = ()
+    changes: tuple[ErrorChange, ...] = ()
 
 
 def accept(measures: Measures, rules: Rules = USUAL) -> bool:
@@ -104,7 +104,7 @@ def accept(measures: Measures, rules: Rules = USUAL) -> bool:
     return confirmed and not worse(measures.changes, rules)
 
 
-def worse(changes: Sequence[Change], rules: Rules = USUAL) -> tuple[Change, ...]:
+def worse(changes: Sequence[ErrorChange], rules: Rules = USUAL) -> tuple[ErrorChange, ...]:
     """The errors some seconds ahead that have grown, by more than it matters.
 
     One horizon shows it clearly, or a channel leans to it in the mean over its horizons: errors of
@@ -125,6 +125,6 @@ def worse(changes: Sequence[Change], rules: Rules = USUAL) -> tuple[Change, ...]
     )
 
 
-def _mean(changes: Sequence[Change], channel: str, what: str) -> float:
+def _mean(changes: Sequence[ErrorChange], channel: str, what: str) -> float:
     """Over the horizons of a channel; their errors are nearly those of the same samples."""
     return float(np.mean([getattr(c, what) for c in changes if c.channel == channel]))

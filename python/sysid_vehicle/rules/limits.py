@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .._arguments import real
-from .._text import text_table
+from .._common.arguments import real
+from .._common.text import text_table
 from ..errors import InvalidInput
 
 _NULLS = "benchmarks/exam --draw null=2000"

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray, filled
+from .._common.arrays import FloatArray, filled
 from ..log import Log
 
 _SMOOTH_S = 0.2  # yaw acceleration is that of a parabola over this time

@@ -7,8 +7,8 @@ from contextlib import suppress
 
 import numpy as np
 
-from .._arguments import expect, whole
-from .._progress import doing
+from .._common.arguments import expect, whole
+from .._common.progress import doing
 from ..errors import SysidError
 from ..log import Log, several_logs
 from ..vehicle import Vehicle

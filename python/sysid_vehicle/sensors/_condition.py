@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 import scipy
 
-from .._arrays import ComplexArray, FloatArray
+from .._common.arrays import ComplexArray, FloatArray
 from ..log import Log
 from ._forms import Response
 from ._low_pass import NoiseFit, fitted, with_low_pass

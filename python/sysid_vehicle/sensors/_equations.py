@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ._motion import Basis, Grid, IntArray
 
 

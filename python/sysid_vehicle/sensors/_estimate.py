@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ._colour import Colour, fit_colour, neighbours
 from ._equations import FAULTS, Readings, predict
 from ._motion import QUICK, SLOW, Grid

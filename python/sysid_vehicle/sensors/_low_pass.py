@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 from ._forms import ROAD, Response, count, images_of, parts_of
 from ._spectrum import Spectrum
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._arrays import FloatArray
-from .._style import AFTER, MEASURED, axes_or_new, tidy
-from .._text import html_list, html_paragraph, html_table, number, text_table
+from .._common.arrays import FloatArray
+from .._common.style import AFTER, MEASURED, axes_or_new, tidy
+from .._common.text import html_list, html_paragraph, html_table, number, text_table
 from ..errors import InvalidInput, near_names
 from ..log import Log
 from ..vehicle import Vehicle

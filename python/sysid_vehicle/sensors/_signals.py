@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import FloatArray, filled
+from .._common.arrays import FloatArray, filled
 from ..errors import InvalidInput
 from ..log import CHANNELS, MEASURED, Log, held_rows
 from ..log._signals import runs

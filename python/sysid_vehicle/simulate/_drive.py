@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._arguments import expect, generator
-from .._arrays import FloatArray, as_float64
-from .._printed import Told
+from .._common.arguments import expect, generator
+from .._common.arrays import FloatArray, as_float64
+from .._common.printed import Told
 from ..effects import channels_in_use
 from ..errors import InvalidInput, NumericalError
 from ..log import CHANNELS, MEASURED, Log

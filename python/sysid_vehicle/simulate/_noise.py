@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 import scipy
 
-from .._arguments import check_not_negative
-from .._arrays import FloatArray, as_float64
+from .._common.arguments import check_not_negative
+from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2
 

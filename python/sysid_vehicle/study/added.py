@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .._text import with_error
+from .._common.text import with_error
 from ..compare import Comparison
 from ..diagnose import Verdicts
 from ..identify import Estimate, Fit

@@ -9,8 +9,8 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 import numpy.typing as npt
 
-from .._arguments import generator
-from .._arrays import FloatArray, as_float64
+from .._common.arguments import generator
+from .._common.arrays import FloatArray, as_float64
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import UNKNOWN, Share, share_of

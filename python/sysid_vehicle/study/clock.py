@@ -2,7 +2,8 @@
 
 No sensor of the motion tells when the wheels push, so the check of the sensors leaves the clock of
 that channel alone. The posterior of what is missing has it as a rival of the effects
-(`sysid_vehicle.diagnose.clocks`). Where it stands alone in a credible set the logs are put right.
+(`sysid_vehicle.diagnose.candidates.clocks`). Where it stands alone in a credible set the logs are
+put right.
 """
 
 from __future__ import annotations
@@ -12,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray, filled
+from .._common.arrays import FloatArray, filled
 from ..diagnose import Diagnosis
-from ..diagnose.clocks import CLOCKS, Clock
-from ..diagnose.delay import delayed
-from ..diagnose.evidence import Evidence
+from ..diagnose.candidates.clocks import CLOCKS, Clock
+from ..diagnose.evidence.evidence import Evidence
+from ..diagnose.unexplained.delay import delayed
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, predict, refine

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from .._memo import remembered
-from .._text import with_error
+from .._common.memo import remembered
+from .._common.text import with_error
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Estimate, Fit, driving_of, refine

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._arrays import NORMAL_MAD, FloatArray, as_float64
-from .._memo import remembered
-from .._text import html_table, number, text_table
+from .._common.arrays import NORMAL_MAD, FloatArray, as_float64
+from .._common.memo import remembered
+from .._common.text import html_table, number, text_table
 from ..errors import NumericalError
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_blocks
 from ..identify import Fit
 from ..identify.ahead import of_few
-from ..rules import Change
+from ..rules import ErrorChange
 from .waterfall import all_ahead
 
 _ALONG = ("vx_mps", "ax_mps2")
@@ -258,7 +258,7 @@ def typical_error(
 
 def changes(
     before: Fit, after: Fit, driving: Driving, horizons_s: Sequence[float]
-) -> tuple[Change, ...]:
+) -> tuple[ErrorChange, ...]:
     """How errors some seconds ahead change from one model to another.
 
     Parameters
@@ -270,7 +270,7 @@ def changes(
 
     Returns
     -------
-    tuple of Change
+    tuple of ErrorChange
         By channel and horizon, of those that enough blocks show.
     """
     noise = after.noise.floor()
@@ -291,7 +291,7 @@ def changes(
             middle = float(np.median(ratio))
             scatter = NORMAL_MAD * float(np.median(np.abs(ratio - middle)))
             found.append(
-                Change(
+                ErrorChange(
                     channel,
                     h,
                     middle,

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 from warnings import catch_warnings, simplefilter
 
-from .._arguments import duration, whole
-from .._progress import teller
-from .._threads import before, in_parallel
+from .._common.arguments import duration, whole
+from .._common.progress import teller
+from .._common.threads import before, in_parallel
 from ..compare import compare
 from ..diagnose import considered, instead, judge, omnibus
 from ..effects import effect

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .._arguments import real
+from .._common.arguments import real
 from ..errors import InvalidInput, near_names
 from ..estimate import UNITS, Driving
 from ..identify import Fit

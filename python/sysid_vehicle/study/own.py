@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
-from .._threads import before, in_parallel
+from .._common.threads import before, in_parallel
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refit

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from .._text import number
+from .._common.text import number
 from ..estimate import UNITS
 from ..identify import Fit
-from ..rules import Change, Rules
+from ..rules import ErrorChange, Rules
 from .horizons import Horizons, changes, horizons
 from .validation import AHEAD_S, fitted_ahead, longest_s
 
@@ -33,9 +33,9 @@ class Predicting:
     baseline, final : Fit
         One and the same where nothing was added.
     horizon_s : float
-    better : tuple of Change
+    better : tuple of ErrorChange
         Errors of the final model so far ahead on validation data, against the likelihood's.
-    needed : tuple of Change
+    needed : tuple of ErrorChange
         The same against those of the baseline, both fitted to predictions; empty where nothing was
         added.
     errors : Horizons
@@ -45,8 +45,8 @@ class Predicting:
     baseline: Fit
     final: Fit
     horizon_s: float
-    better: tuple[Change, ...]
-    needed: tuple[Change, ...]
+    better: tuple[ErrorChange, ...]
+    needed: tuple[ErrorChange, ...]
     errors: Horizons
     rules: Rules
 
@@ -60,7 +60,7 @@ class Predicting:
         """Whether what was added is needed so far ahead."""
         return not self.needed or self._falls(self.needed)
 
-    def _falls(self, found: Sequence[Change]) -> bool:
+    def _falls(self, found: Sequence[ErrorChange]) -> bool:
         sure = [c for c in found if abs(c.log_ratio) > self.rules.interval * c.error]
         falls = any(c.log_ratio < -_WORTH for c in sure)
         return falls and not any(c.log_ratio > _WORTH for c in sure)

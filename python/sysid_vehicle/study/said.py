@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._text import number, with_error
+from .._common.text import number, with_error
 from ..estimate import UNITS
 from ..estimate.driving import WORDS
 from ..rules import NONE_GONE

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from .._text import with_error
+from .._common.text import with_error
 from ..diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
 from ..diagnose.diagnose import REFITS
 from ..errors import Interrupted

@@ -3,9 +3,9 @@
 For each channel and horizon four errors on validation data, in physical units: of the baseline, of
 the final model, of the ceiling, and of the sensors. The ceiling is what is left beside any function
 of the driving: the errors of a model are regressed on the histories of steering, speed and
-longitudinal acceleration (`sysid_vehicle.diagnose.ceiling`), on training data, and what that
-regression predicts of validation data is taken off. A regression finds only a part: the true
-ceiling is no higher than this one, and the shares are no larger than these.
+longitudinal acceleration (`sysid_vehicle.diagnose.unexplained.ceiling`), on training data, and
+what that regression predicts of validation data is taken off. A regression finds only a part: the
+true ceiling is no higher than this one, and the shares are no larger than these.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 import numpy.typing as npt
 
-from .._arguments import generator
-from .._arrays import FloatArray, as_float64
-from .._text import html_paragraph, html_table, number, text_table
-from .._threads import in_parallel
-from ..diagnose.ceiling import Inputs, folds, ridge
-from ..diagnose.coordinates import begins
+from .._common.arguments import generator
+from .._common.arrays import FloatArray, as_float64
+from .._common.text import html_paragraph, html_table, number, text_table
+from .._common.threads import in_parallel
+from ..diagnose.evidence.coordinates import begins
+from ..diagnose.unexplained.ceiling import Inputs, folds, ridge
 from ..errors import NumericalError
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_blocks
 from ..identify import Fit, driving_of

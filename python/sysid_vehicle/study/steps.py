@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from .._threads import before
+from .._common.threads import before
 from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter
 from ..errors import NumericalError

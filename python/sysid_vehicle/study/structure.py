@@ -1,9 +1,9 @@
 """How much of what a model leaves depends on the driving, whatever the reason.
 
 Missing forces, and errors one and five seconds ahead, are regressed on the histories of steering,
-speed and longitudinal acceleration (`sysid_vehicle.diagnose.ceiling`), on each data set by itself:
-what is predicted of pieces that the regression did not see depends on the driving. What is left of
-that is disturbance and noise, as far as any function of the driving tells.
+speed and longitudinal acceleration (`sysid_vehicle.diagnose.unexplained.ceiling`), on each data set
+by itself: what is predicted of pieces that the regression did not see depends on the driving. What
+is left of that is disturbance and noise, as far as any function of the driving tells.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import FloatArray
-from .._threads import in_parallel
-from ..diagnose.ceiling import Explainable, Inputs, Whole, left_out, pieces, thinned
-from ..diagnose.force_map import missing_forces
+from .._common.arrays import FloatArray
+from .._common.threads import in_parallel
+from ..diagnose.unexplained.ceiling import Explainable, Inputs, Whole, left_out, pieces, thinned
+from ..diagnose.unexplained.force_map import missing_forces
 from ..errors import NumericalError
 from ..estimate import MEASURED, Driving
 from ..estimate.driving import WORDS

@@ -10,9 +10,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from .._files import write_json
-from .._tables import frame
-from .._text import brief, html_list, html_paragraph, html_table, text_table
+from .._common.files import write_json
+from .._common.tables import frame
+from .._common.text import brief, html_list, html_paragraph, html_table, text_table
 from ..compare import Comparison
 from ..diagnose import (
     INPUTS,

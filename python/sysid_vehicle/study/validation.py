@@ -8,15 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
-from .._memo import remembered
-from .._threads import in_parallel
+from .._common.arrays import FloatArray, as_float64
+from .._common.memo import remembered
+from .._common.threads import in_parallel
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
 from ..estimate import Driving
 from ..identify import Fit, Prediction, driving_of, predict, predicting_ahead
 from ..log import Log, several_logs
-from ..rules import Change, Gain
+from ..rules import ErrorChange, Gain
 from .beyond import Beyond, beyond_noise
 from .horizons import changes, typical_error
 
@@ -144,7 +144,7 @@ def _with_error(difference: FloatArray, test: Driving) -> Gain:
     )
 
 
-def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[Change, ...]:
+def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[ErrorChange, ...]:
     """How errors 1 to 5 s ahead change, both models with the parameters of `at_its_best`."""
     one, other = in_parallel(lambda fit: at_its_best(fit, test), (poorer, richer))
     return changes(one, other, test, AHEAD)

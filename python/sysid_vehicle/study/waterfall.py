@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
-from .._style import AFTER, BEFORE, axes_or_new, tidy
-from .._text import brief, html_table, text_table
+from .._common.arrays import FloatArray, as_float64
+from .._common.style import AFTER, BEFORE, axes_or_new, tidy
+from .._common.text import brief, html_table, text_table
 from ..compare import Comparison
 from ..errors import NumericalError
 from ..estimate import MEASURED, Driving, NoiseModel

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput, near_names
 from .car import LOAD_NAMES, Load, TwinCar
 from .drives import INPUTS, OUTPUTS

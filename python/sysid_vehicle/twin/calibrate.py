@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from .._arguments import generator, whole
-from .._arrays import FloatArray
-from .._printed import Told
-from .._style import AFTER, MEASURED, axes_or_new, tidy
+from .._common.arguments import generator, whole
+from .._common.arrays import FloatArray
+from .._common.printed import Told
+from .._common.style import AFTER, MEASURED, axes_or_new, tidy
 from ..errors import InvalidInput, NumericalError
 
 if TYPE_CHECKING:

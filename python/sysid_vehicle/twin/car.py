@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .. import _core
-from .._arrays import FloatArray
-from .._text import html_text
+from .._common.arrays import FloatArray
+from .._common.text import html_text
 from ..errors import InvalidInput, near_names
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import scipy
 
 from .. import _core
-from .._arguments import generator
-from .._arrays import FloatArray, as_float64
-from .._text import brief
+from .._common.arguments import generator
+from .._common.arrays import FloatArray, as_float64
+from .._common.text import brief
 from ..errors import InvalidInput, NumericalError
 from ..manoeuvres import Manoeuvre
 from .car import Load, TwinCar

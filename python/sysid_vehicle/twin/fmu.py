@@ -22,7 +22,7 @@ from typing import Any, Literal, NoReturn
 
 import numpy as np
 
-from .._arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput, NumericalError, near_names
 
 Kind = Literal["model_exchange", "co_simulation"]

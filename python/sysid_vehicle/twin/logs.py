@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arguments import generator
-from .._arrays import as_float64
+from .._common.arguments import generator
+from .._common.arrays import as_float64
 from ..errors import InvalidInput
 from ..log import Log
 from ..simulate import SensorNoise

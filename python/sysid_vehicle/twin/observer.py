@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from .. import _core
-from .._arguments import whole
-from .._arrays import FloatArray, as_float64
-from .._printed import Told
-from .._style import AFTER, TRUTH, axes_or_new, tidy
+from .._common.arguments import whole
+from .._common.arrays import FloatArray, as_float64
+from .._common.printed import Told
+from .._common.style import AFTER, TRUTH, axes_or_new, tidy
 from ..errors import InvalidInput, NumericalError, warn
 from .car import LOAD_NAMES, Load, TwinCar
 from .checks import checked_rows, checked_step

@@ -18,9 +18,9 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from .._arguments import whole
-from .._arrays import FloatArray, as_float64
-from .._progress import doing
+from .._common.arguments import whole
+from .._common.arrays import FloatArray, as_float64
+from .._common.progress import doing
 from ..errors import InvalidInput, NumericalError
 from .car import LOAD_NAMES
 from .checks import checked_rows, checked_step

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from .._arguments import generator
-from .._arrays import FloatArray
+from .._common.arguments import generator
+from .._common.arrays import FloatArray
 from ..errors import InvalidInput, near_names
 from .drives import INPUTS, OUTPUTS, Drive14
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from .._arrays import FloatArray
+from .._common.arrays import FloatArray
 
 _PIECES = 20  # of the second half: their sums are taken as independent
 _LEAST = 100  # samples that a channel must have

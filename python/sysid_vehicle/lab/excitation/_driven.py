@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..._arguments import check_positive
-from ..._arrays import FloatArray, as_float64
+from ..._common.arguments import check_positive
+from ..._common.arrays import FloatArray, as_float64
 from ...manoeuvres import Knots, Manoeuvre
 from ...manoeuvres._curves import Curve
 from ...vehicle import Vehicle

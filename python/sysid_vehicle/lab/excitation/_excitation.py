@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ..._arrays import FloatArray, as_float64
-from ..._style import axes_or_new, tidy
-from ..._text import html_text
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.style import axes_or_new, tidy
+from ..._common.text import html_text
 from ...errors import InvalidInput
 from ...vehicle import Vehicle
 

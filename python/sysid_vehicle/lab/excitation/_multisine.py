@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..._arguments import check_positive_fields
-from ..._arrays import FloatArray, as_float64
+from ..._common.arguments import check_positive_fields
+from ..._common.arrays import FloatArray, as_float64
 from ...errors import InvalidInput
 
 _ROUNDS = 400

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..._arguments import check_positive_fields
-from ..._arrays import FloatArray, as_float64
+from ..._common.arguments import check_positive_fields
+from ..._common.arrays import FloatArray, as_float64
 from ...errors import InvalidInput
 from ._excitation import Excitation
 from ._multisine import MultiSine

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..._printed import Told
-from ..._progress import doing
-from ..._text import text_table
+from ..._common.printed import Told
+from ..._common.progress import doing
+from ..._common.text import text_table
 from ...errors import InvalidInput
 from .curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
 from .data import MuSlipData

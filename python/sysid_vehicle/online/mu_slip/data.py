@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ..._arguments import generator
-from ..._arrays import FloatArray, as_float64
-from ..._text import brief
+from ..._common.arguments import generator
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.text import brief
 from ...errors import InvalidInput, near_names
 from ...read._csv import read_table
 from .curve import TWO_PARAMETER, MuSlipCurve

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..._arrays import FloatArray
-from ..._progress import doing
-from ..._style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, new_figure, tidy
+from ..._common.arrays import FloatArray
+from ..._common.progress import doing
+from ..._common.style import AFTER, BEFORE, FLOOR, MEASURED, TRUTH, axes_or_new, new_figure, tidy
 from ...errors import InvalidInput
 from .curve import TWO_PARAMETER, MuSlipCurve
 from .results import MuSlipRun

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..._arrays import FloatArray, as_float64
+from ..._common.arrays import FloatArray, as_float64
 from ...errors import InvalidInput
 from .curve import TWO_PARAMETER, MuSlipCurve, MuSlipPrior
 from .data import MuSlipData, at_least_one, check_noise, check_values

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ..._arrays import FloatArray, as_float64
+from ..._common.arrays import FloatArray, as_float64
 from ...errors import InvalidInput
 from .curve import TWO_PARAMETER, MuSlipCurve
 from .data import MuSlipData, at_least_one, check_noise, check_values

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..._arguments import generator
-from ..._arrays import FloatArray, as_float64
-from ..._printed import Told
-from ..._progress import doing
-from ..._style import FLOOR, axes_or_new, tidy
-from ..._text import text_table
+from ..._common.arguments import generator
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.printed import Told
+from ..._common.progress import doing
+from ..._common.style import FLOOR, axes_or_new, tidy
+from ..._common.text import text_table
 from ...errors import InvalidInput
 from .compare import compare_mu_slip
 from .curve import TWO_PARAMETER, MuSlipCurve

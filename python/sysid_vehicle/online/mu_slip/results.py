@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._arrays import FloatArray
-from ..._printed import Told
-from ..._style import AFTER, MEASURED, axes_or_new, tidy
-from ..._text import text_table
+from ..._common.arrays import FloatArray
+from ..._common.printed import Told
+from ..._common.style import AFTER, MEASURED, axes_or_new, tidy
+from ..._common.text import text_table
 from .curve import MuSlipCurve, magic_formula_coefficients
 from .data import MuSlipData
 

@@ -1,0 +1,1 @@
+"""What every station uses: arguments, files, progress, printed text."""

@@ -1,0 +1,1 @@
+"""Effects of the catalogue as candidates: scores, causes, refits, verdicts."""

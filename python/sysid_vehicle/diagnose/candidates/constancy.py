@@ -1,0 +1,145 @@
+"""Does a parameter of an effect have one value everywhere? What is truly there has.
+
+An effect that stands in for another one takes whatever value each piece of driving asks for. So
+its sensitivities are cut into pieces, one for each log or for some seconds of the only one, and the
+pieces are tested beside the whole: a score test of values that differ (Chow, Econometrica 1960),
+the same as Cochran's Q of the pieces' own estimates (Biometrics 1954) with all else fitted anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from ... import _core
+from ..._common.arrays import FloatArray
+from ..._common.text import number
+from ...effects import Effect
+from ...estimate import Driving
+from ...identify import Fit
+from ...rules import USUAL, Rules
+from ..evidence.evidence import Evidence
+from ..evidence.projection import pseudo_inverse, variance_ratio
+
+_PIECE_S = 10.0
+_MOST_PIECES = 6
+
+
+@dataclass(frozen=True)
+class Constancy:
+    """Whether an effect keeps its value throughout the driving.
+
+    Attributes
+    ----------
+    statistic, degrees : float, int
+        Chi-squared where the value is one.
+    p_value : float
+    spread : float
+        Standard deviation of the value over the pieces, beyond what their noise explains, in sizes
+        that matter; the largest of the effect's parameters.
+    values : tuple of float
+        Of the first parameter, piece by piece.
+    rules : Rules
+        By which it holds.
+    """
+
+    effect: Effect
+    statistic: float
+    degrees: int
+    p_value: float
+    spread: float
+    values: tuple[float, ...]
+    rules: Rules = USUAL
+
+    @property
+    def holds(self) -> bool:
+        """Whether one value will do: no evidence of differences, or of none that matters."""
+        return self.p_value > self.rules.level or self.spread < 1.0
+
+    def __str__(self) -> str:
+        if self.holds:
+            return f"{self.effect.id} keeps its value (p = {self.p_value:.2g})"
+        return f"{self.effect.id} does not keep its value: {self.span} (p = {self.p_value:.2g})"
+
+    @property
+    def span(self) -> str:
+        """Between which values the first parameter changes, in words."""
+        low, high = (number(v, 3) for v in (min(self.values), max(self.values)))
+        first = self.effect.parameters[0]
+        return f"{first.name} from {low} to {high} {first.unit}".removesuffix(" 1")
+
+
+def constancy(fit: Fit, rules: Rules = USUAL) -> dict[str, Constancy]:
+    """Test every effect of a fitted model, on what it was fitted to.
+
+    Returns
+    -------
+    dict
+        By id of the effect. Effects whose time or place is itself a parameter are left out, and
+        driving that is one short piece tells nothing.
+    """
+    pieces = _pieces(fit.driving)
+    parts = [e for e in fit.model.parts if e.scanned is None]
+    if len(pieces) < 2 or not parts:
+        return {}
+    evidence = Evidence(fit, fit.driving)
+    names = list(fit.model.free_names)
+    return {
+        part.id: _of_effect(
+            part,
+            evidence,
+            evidence.fitted[:, [names.index(n) for n in part.named]],
+            pieces,
+            rules,
+        )
+        for part in parts
+    }
+
+
+def _pieces(driving: Driving) -> list[FloatArray]:
+    """Masks over the residuals: the logs, or equal parts of the only one."""
+    number = driving.log_number
+    if len(driving.logs) == 1:
+        count = min(int(driving.usable_s / _PIECE_S), _MOST_PIECES)
+        number = np.floor(np.arange(driving.samples) * count / max(driving.samples, 1))
+    return [np.repeat(number == i, _core.CHANNELS) for i in np.unique(number)]
+
+
+def _of_effect(
+    effect: Effect,
+    evidence: Evidence,
+    own: FloatArray,
+    pieces: list[FloatArray],
+    rules: Rules,
+) -> Constancy:
+    fit, e = evidence.fit, evidence.left
+    whole = np.array([fit[n].value - q.null_value for n, q in effect.named.items()])
+    # The pieces add up to the whole, which is fitted: the last one says nothing of its own.
+    cut = np.hstack([own * piece[:, None] for piece in pieces])
+    R = evidence.project(cut)
+    inverse, rank = pseudo_inverse(R.T @ R)
+    S = R.T @ e
+    off = inverse @ S
+    along = R @ off
+    ratio = variance_ratio(along, e - along)
+    statistic = float(S @ off) / ratio
+    width = own.shape[1]
+    by_piece = off.reshape(len(pieces), width)
+    precision = np.array([(own[piece] ** 2).sum(axis=0) for piece in pieces])
+    weights = precision / np.maximum(precision.sum(axis=0), 1e-300)
+    centred = by_piece - (weights * by_piece).sum(axis=0)
+    # What noise alone would scatter, taken off (DerSimonian & Laird, Controlled Trials 1986).
+    excess = max(1.0 - rank / statistic, 0.0) if statistic > 0.0 else 0.0
+    scatter = np.sqrt(excess * (weights * centred**2).sum(axis=0))
+    matters = np.array([q.matters for q in effect.parameters])
+    return Constancy(
+        effect,
+        statistic,
+        rank,
+        float(scipy.stats.chi2.sf(statistic, rank)),
+        float(np.max(scatter / matters)),
+        tuple(float(v) for v in effect.parameters[0].null_value + whole[0] + centred[:, 0]),
+        rules,
+    )

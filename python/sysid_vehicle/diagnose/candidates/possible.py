@@ -1,0 +1,78 @@
+"""Which effects a car may have, and of which size: beyond it they stand for something else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from ...effects import Effect, Parameter, effect
+from ...model import Model
+from ...rules import USUAL, Rules
+
+
+class Sized(Protocol):
+    """What has parameters: an effect, or a change of one."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """In their order."""
+
+
+Size = tuple[tuple[float, ...], tuple[float, ...]]
+"""Parameters of an effect, and their standard errors."""
+
+_AT_BOUND = 1e-5  # of the width between the bounds
+_OF_A_FACTOR = "_error"  # names of relative errors: what is multiplied by 1 + e
+
+
+def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple[Effect, ...]:
+    """What may be added to a model: all that it lacks, or what is wanted of that."""
+    if candidates is None:
+        return model.candidates
+    wanted = {effect(c).id for c in candidates}
+    return tuple(e for e in model.candidates if e.id in wanted)
+
+
+def possible(
+    effect: Sized, value: Sequence[float], std: Sequence[float], rules: Rules = USUAL
+) -> bool:
+    """Whether the 95 % intervals of an effect's parameters hold values that a car can have.
+
+    A search that ends at a bound other than nothing wanted more than any car has. A factor can be
+    as many times smaller as it can be larger: no car turns with a quarter of its yaw inertia.
+
+    Parameters
+    ----------
+    effect : Effect, or another thing with parameters
+    value, std : sequence of float
+        Of its parameters, in their order.
+    rules : Rules
+
+    Returns
+    -------
+    bool
+    """
+    return not any(_impossible(p, d, s, rules) for p, d, s in sizes(effect, value, std, rules))
+
+
+def sizes(
+    effect: Sized, value: Sequence[float], std: Sequence[float], rules: Rules = USUAL
+) -> list[tuple[Parameter, float, float]]:
+    """Parameters that have a size, how far each is from nothing, and the reach of its interval."""
+    return [
+        (p, v - p.null_value, rules.interval * s)
+        for p, v, s in zip(effect.parameters, value, std, strict=True)
+        if not p.scan
+    ]
+
+
+def _impossible(p: Parameter, off: float, reach: float, rules: Rules) -> bool:
+    most = rules.implausible * abs(p.typical - p.null_value)
+    least = most / (1.0 + most) if p.name.endswith(_OF_A_FACTOR) else most
+    low, high = max(p.lower - p.null_value, -least), min(p.upper - p.null_value, most)
+    if np.isinf(reach):
+        at = _AT_BOUND * (p.upper - p.lower)
+        return bool((low < 0.0 and off < low + at) or (high > 0.0 and off > high - at))
+    return bool(off + reach < low or off - reach > high)

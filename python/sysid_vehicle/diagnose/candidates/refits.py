@@ -1,0 +1,116 @@
+"""A candidate's exact dynamics in place of its score."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from ..._common.threads import before
+from ...effects import Effect
+from ...errors import NumericalError
+from ...estimate import Driving
+from ...identify import Fit, refine, refit, unmoved
+from .diagnosis import Candidate
+
+_BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
+
+
+def refitted(fit: Fit, driving: Driving, c: Candidate) -> Candidate:
+    """The candidate with its exact dynamics, under the noise of the model without it.
+
+    Its statistic is what that gains over `fit`, twice the log-likelihood; 0 where the model fails.
+    It is never worse than the model that it contains: where no search is better, it is that one.
+    """
+    best: Fit | None = None
+    for values in (*_starts(c), {}):
+        if not values and best is not None:
+            # Once more from the model that it contains. Of several lags none is there.
+            lags = c.effect.scored_at_typical and len(c.effect.parameters) > 1
+            if lags or best.log_likelihood >= fit.log_likelihood:
+                break
+        model = fit.model.add(c.effect).with_values(values)
+        try:
+            trial = refit(model, driving, fit.noise)
+        except (NumericalError, np.linalg.LinAlgError):
+            continue
+        if best is None or trial.log_likelihood > best.log_likelihood:
+            best = trial
+    if best is None:
+        return replace(c, statistic=0.0)
+    if best.log_likelihood < fit.log_likelihood:
+        contained = unmoved(fit.model.add(c.effect), driving, fit.noise)
+        return replace(_with_fit(fit, c, contained), statistic=0.0)
+    return _with_fit(fit, c, best)
+
+
+def in_time(
+    work: Callable[[Candidate], Candidate], ends: float
+) -> Callable[[Candidate], Candidate]:
+    """The same, but what is not done at `ends`, by `time.perf_counter`, is left as it is."""
+    return lambda c: before(ends, lambda: work(c), c)
+
+
+def finished(fit: Fit, c: Candidate) -> Candidate:
+    """The candidate with noise of its own, unless that makes it worse than the model without it.
+
+    A lag at its smallest is not quite none.
+    """
+    if c.fit is None:
+        return c
+    found = _with_fit(fit, c, refine(c.fit.model, c.fit.driving, c.fit.noise))
+    if found.statistic < 0.0 <= c.statistic:
+        found = c
+    return replace(found, finished=True)
+
+
+def is_hidden_by_noise(effect: Effect) -> bool:
+    """Whether a score may miss the effect: a lag, whose one parameter has no derivative at null.
+
+    A disturbance that was learned without it acts for some time, as the effect does. Under that
+    noise neither score nor refit shows what the effect takes over.
+    """
+    return effect.scored_at_typical and len(effect.parameters) == 1
+
+
+def from_typical(fit: Fit, c: Candidate, tests: int) -> Candidate:
+    """The candidate fitted with noise of its own from its typical size, and tested by likelihood.
+
+    Its p-value is that of the likelihood ratio, on one side where the parameter has one sign, over
+    the variance ratio of its score, corrected for so many tests (Bonferroni).
+    """
+    ((name, p),) = c.effect.named.items()
+    model = fit.model.add(c.effect).with_values({name: p.typical})
+    try:
+        found = _with_fit(fit, c, refine(model, fit.driving, fit.noise))
+    except (NumericalError, np.linalg.LinAlgError):
+        return c
+    ratio = max(found.statistic, 0.0) / max(c.variance_ratio, 1.0)
+    alone = (0.5 if p.one_sided else 1.0) * float(scipy.special.chdtrc(1, ratio))
+    return replace(found, finished=True, p_value=min(tests * alone, 1.0))
+
+
+def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:
+    names = c.effect.named
+    return replace(
+        c,
+        statistic=2.0 * (found.log_likelihood - fit.log_likelihood),
+        value=tuple(found[n].value for n in names),
+        std=tuple(found[n].std for n in names),
+        fit=found,
+    )
+
+
+def _starts(c: Candidate) -> list[dict[str, float]]:
+    predicted = {}
+    for (name, p), v in zip(c.effect.named.items(), c.value, strict=True):
+        reach = np.inf if p.scan else _BEYOND * p.typical
+        value = float(np.clip(v, p.null_value - reach, p.null_value + reach))
+        predicted[name] = float(np.clip(value, p.lower, p.upper))
+    starts = [predicted]
+    lead, first = next(iter(c.effect.named.items()))
+    if len(c.effect.parameters) == 1 and first.another_dynamics(predicted[lead]):
+        starts.append({lead: first.typical})
+    return starts

@@ -1,0 +1,182 @@
+"""What changed between a reference and later driving: the result of `changed`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from ..._common.printed import Part, Printed, Table
+from ..._common.tables import frame
+from ..._common.text import brief, number, with_error
+from ...identify import Fit
+from ...rules import Rules
+from ..candidates.causes import UNKNOWN, Causes, CredibleSet
+
+Said = Literal[
+    "changed", "one of a group", "implausible", "negligible", "unchanged", "not testable"
+]
+
+_NAMED: tuple[Said, ...] = ("changed", "one of a group")
+
+
+@dataclass(frozen=True)
+class EffectChange:
+    """By how much an effect, or the tyres of an axle, differ from the reference.
+
+    Attributes
+    ----------
+    id : str
+        Of the effect; `tyre_front`, `tyre_rear` of the tyres that are fitted.
+    names, units : tuple of str
+        Of its parameters.
+    value, std : tuple of float
+        Differences of its parameters and their standard errors, beside what else changed.
+    bound : tuple of float
+        How far from nothing each difference may be, at 95 %.
+    probability : float
+        Of being among what changed.
+    said : str
+        `changed`; `one of a group` that explain the driving as well; `implausible`: it acts like
+        what changed, with a size that no car has; `negligible`; `unchanged`, with a bound below
+        what matters; or `not testable` with this driving.
+    group : tuple of str
+        The others of the group.
+    """
+
+    id: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    value: tuple[float, ...]
+    std: tuple[float, ...]
+    bound: tuple[float, ...]
+    probability: float
+    said: Said
+    group: tuple[str, ...] = ()
+
+    @property
+    def named(self) -> bool:
+        """Whether it is named, perhaps as one of a group."""
+        return self.said in _NAMED
+
+    @property
+    def size(self) -> str:
+        """The differences with standard errors, in words."""
+        told = [with_error(v, s) for v, s in zip(self.value, self.std, strict=True)]
+        return self._listed([t if t.startswith("-") else f"+{t}" for t in told])
+
+    @property
+    def sentence(self) -> str:
+        """What is said of it, in words."""
+        if self.said == "one of a group":
+            return f"changed, or else {', '.join(self.group)}"
+        if self.said == "implausible":
+            return "acts like what changed, but no car changes so much"
+        if self.said in ("unchanged", "not testable"):
+            below = self._listed([f"below {number(b, 2)}" for b in self.bound])
+            return f"{self.said}: {below} at 95 %"
+        return self.said
+
+    def _listed(self, figures: list[str]) -> str:
+        told = zip(self.names, figures, self.units, strict=True)
+        return ", ".join(f"{n} {x} {u}".removesuffix(" 1") for n, x, u in told)
+
+    def __str__(self) -> str:
+        return f"{self.id}: {self.size}"
+
+
+@dataclass(frozen=True, eq=False)
+class Change(Printed):
+    """What changed since the reference.
+
+    Attributes
+    ----------
+    before : Fit
+        The reference.
+    after : Fit
+        Its model with the changes that were found, on the later driving, under the noise of the
+        reference; nothing else was fitted to the later driving alone.
+    causes : Causes
+        Posterior of a sum of single changes: inclusion probabilities, credible sets. What begins
+        with `unknown` is a change that no effect of the catalogue explains.
+    effects : tuple of EffectChange
+        What is named first, then by probability.
+    rules : Rules
+    """
+
+    before: Fit
+    after: Fit
+    causes: Causes
+    effects: tuple[EffectChange, ...]
+    rules: Rules
+
+    def __getitem__(self, effect: str) -> EffectChange:
+        for e in self.effects:
+            if e.id == effect:
+                return e
+        raise KeyError(f"'{effect}'; there are {', '.join(e.id for e in self.effects)}")
+
+    @property
+    def named(self) -> tuple[EffectChange, ...]:
+        """What may be called changed, the likeliest first; rivals follow each other."""
+        return tuple(e for e in self.effects if e.named)
+
+    @property
+    def unknown(self) -> tuple[CredibleSet, ...]:
+        """Changes that are there and that no effect of the catalogue explains."""
+        return tuple(s for s in self.causes.sets if s.effects[0].startswith(UNKNOWN))
+
+    def _headline(self) -> str:
+        leading = [e for e in self.named if not any(self._before(g, e) for g in e.group)]
+        told = [f"{e}" + (f" (or else {', '.join(e.group)})" if e.group else "") for e in leading]
+        what = f"changed: {'; '.join(told)}" if told else ""
+        if self.unknown:
+            kinds = ", ".join(s.effects[0].removeprefix(UNKNOWN) for s in self.unknown)
+            more = f"something changed that no effect explains, in {kinds}"
+            return f"{what}; beside it {more}" if what else more
+        return what or "no change is shown"
+
+    def _before(self, effect: str, e: EffectChange) -> bool:
+        order = [one.id for one in self.named]
+        return effect in order and order.index(effect) < order.index(e.id)
+
+    _HEAD = ("effect", "probability", "change", "")
+
+    def _rows(self, most: int = 12) -> list[list[str]]:
+        return [[e.id, f"{e.probability:.3f}", e.size, e.sentence] for e in self.effects[:most]]
+
+    __repr__ = brief
+
+    def _parts(self) -> list[Part]:
+        return [self._headline(), Table(self._HEAD, self._rows())]
+
+    def to_pandas(self) -> Any:
+        """A DataFrame of all parameters, by effect and parameter."""
+        rows = [
+            (f"{e.id}.{n}", v, s, b, u, e.probability, e.said)
+            for e in self.effects
+            for n, v, s, b, u in zip(e.names, e.value, e.std, e.bound, e.units, strict=True)
+        ]
+        head = ("parameter", "change", "std", "bound", "unit", "probability", "said")
+        columns = {h: [row[i] for row in rows] for i, h in enumerate(head)}
+        return frame(columns, "parameter")
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures, ready for JSON."""
+        return {
+            "headline": self._headline(),
+            "causes": self.causes.to_dict(),
+            "effects": {
+                e.id: {
+                    "said": e.said,
+                    "probability": e.probability,
+                    "group": list(e.group),
+                    "change": {
+                        n: {"value": v, "std": s, "bound": b, "unit": u}
+                        for n, v, s, b, u in zip(
+                            e.names, e.value, e.std, e.bound, e.units, strict=True
+                        )
+                    },
+                }
+                for e in self.effects
+            },
+        }

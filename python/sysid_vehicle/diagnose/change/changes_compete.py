@@ -1,0 +1,244 @@
+"""What the differences between two drivings say: sizes of changes, and which compete for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..._common.arrays import FloatArray, as_float64
+from ...rules import USUAL, Rules
+from ..candidates.causes import UNKNOWN, Causes, causes_in
+from ..candidates.single_effects import Hypothesis, ScoreModel
+from ..evidence.projection import pseudo_inverse
+from ..unexplained.omnibus import LEAST_LEFT
+from .beside_reference import Differences
+from .may_change import May
+
+_MOST = 6  # effects of the sum
+_SINGULAR = 1e-6  # of the eigenvalues of what an unknown force does
+
+
+class Competition:
+    """Scores of changes, with some put in already, as a sum of single effects.
+
+    Parameters
+    ----------
+    differences : Differences
+    may : sequence of May
+        What may have changed.
+    place : dict of str to int
+        Columns of its parameters; the others are unknown forces and readings.
+    targets : sequence of str
+        Of all columns, what the unknown ones act on.
+    before : array, shape (n,)
+        Information about each column where nothing is shared.
+    samples : int
+        Of the later driving.
+    put : sequence of str
+        Changes that the model of the later driving has already.
+    rules : Rules
+
+    Attributes
+    ----------
+    sizes, stds : dict of str to float
+        By parameter: the change beside what was put in, in place of what acts like it.
+    causes : Causes
+    alone : tuple of str
+        What may have changed by itself, the likeliest first.
+    """
+
+    def __init__(
+        self,
+        differences: Differences,
+        may: Sequence[May],
+        place: dict[str, int],
+        targets: Sequence[str],
+        before: FloatArray,
+        samples: int,
+        put: Sequence[str],
+        rules: Rules = USUAL,
+    ) -> None:
+        self._differences, self._may, self._place = differences, may, place
+        self._put, self._rules = tuple(put), rules
+        self._hypotheses: list[Hypothesis] = []
+        self._turns, self._scale = self._competing(targets, before, float(np.sqrt(samples)))
+        self._information = self._turns.T @ differences.information @ self._turns
+        self._score = self._turns.T @ differences.score
+        # One hypothesis of each name: the form with all parameters comes last.
+        self._whole = {h.name: h for h in self._hypotheses}
+        self._alike = self._likeness()
+        self.sizes: dict[str, float] = {}
+        self.stds: dict[str, float] = {}
+        self._ratio = self._measured()
+        self.causes, self.alone = self._posterior()
+
+    def _competing(
+        self, targets: Sequence[str], before: FloatArray, vague: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """The directions that compete, as sums of columns, and their prior standard deviations."""
+        information = self._differences.information
+        every = np.eye(len(information))
+        columns: list[FloatArray] = []
+        scale: list[float] = []
+        for m in self._may:
+            at = len(columns)
+            columns += [every[:, self._place[n]] for n in m.names]
+            scale += m.scale
+            self._hypotheses += [
+                Hypothesis(
+                    m.id, tuple(at + i for i in form), (0.0,) * len(form), 1.0 / len(m.forms)
+                )
+                for form in m.forms
+            ]
+        unknown = sorted(set(range(len(information))) - set(self._place.values()))
+        for target in dict.fromkeys(targets[i] for i in unknown):
+            own = np.array([i for i in unknown if targets[i] == target])
+            own = own[np.diag(information)[own] > LEAST_LEFT**2 * before[own]]
+            if not len(own):
+                continue
+            size = np.sqrt(np.diag(information)[own])
+            values, vectors = np.linalg.eigh(information[np.ix_(own, own)] / np.outer(size, size))
+            few = values > _SINGULAR * values[-1]
+            turns = np.zeros((len(information), int(few.sum())))
+            turns[own] = vectors[:, few] / np.sqrt(values[few]) / size[:, None]
+            at, width = len(columns), turns.shape[1]
+            of = tuple(range(at, at + width))
+            self._hypotheses.append(Hypothesis(UNKNOWN + target, of, (0.0,) * width, 1.0))
+            columns += list(turns.T)
+            scale += [vague] * width
+        return as_float64(np.column_stack(columns)), as_float64(scale)
+
+    def _likeness(self) -> dict[tuple[str, str], float]:
+        """Largest squared correlation between what two hypotheses can do."""
+        inverses = {
+            n: pseudo_inverse(self._information[np.ix_(h.columns, h.columns)])[0]
+            for n, h in self._whole.items()
+        }
+        found = {}
+        for a, one in self._whole.items():
+            for b, other in self._whole.items():
+                cross = self._information[np.ix_(one.columns, other.columns)]
+                both = inverses[a] @ cross @ inverses[b] @ cross.T
+                found[a, b] = float(np.clip(np.linalg.eigvals(both).real.max(), 0.0, 1.0))
+        return found
+
+    def acts_like(self, effect: str) -> str:
+        """What was put in that the effect is, or acts like; empty where there is none."""
+        if effect in self._put:
+            return effect
+        near = {p: self._alike[effect, p] for p in self._put if effect in self._whole}
+        best = max(near, key=lambda p: near[p], default="")
+        return best if best and near[best] >= self._rules.near else ""
+
+    def _measured(self) -> FloatArray:
+        """Sizes, and the variance ratio of each direction.
+
+        The colour of residuals is asked for without what the changes explain: those that were put
+        in and the one in question together.
+        """
+        n = len(self._score)
+        along, sizes, mine = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, 2))
+        for name, h in self._whole.items():
+            own = list(h.columns)
+            beside = [p for p in self._put if p != name and self._alike[name, p] < self._rules.near]
+            both, inverse = self._solved([*beside, name])
+            size = inverse @ self._score[both]
+            for c in own:
+                i = both.index(c)
+                along[both, c] = inverse[:, i]
+                mine[c] = size[i], np.sqrt(max(inverse[i, i], 0.0))
+            every, inverse = self._solved([*self._put, name])
+            sizes[np.ix_(every, own)] = (inverse @ self._score[every])[:, None]
+            if name.startswith(UNKNOWN):
+                # One score: along all that it explains.
+                along[:, own] = 0.0
+                along[np.ix_(own, own)] = sizes[own, own[0]][:, None]
+        turned = self._turns @ np.hstack([along, np.eye(n)])
+        ratios = self._differences.ratios(turned, self._turns @ np.hstack([sizes, sizes]))
+        for m in self._may:
+            for name, c in zip(m.names, self._whole[m.id].columns, strict=True):
+                self.sizes[name] = float(mine[c, 0])
+                self.stds[name] = float(mine[c, 1] * np.sqrt(ratios[c]))
+        ratio = ratios[n:]
+        for name, h in self._whole.items():
+            own = list(h.columns)
+            ratio[own] = (ratios[:n] if name.startswith(UNKNOWN) else ratio)[own].max()
+        return self._shared(ratio) if self._put else ratio
+
+    def _solved(self, names: Sequence[str]) -> tuple[list[int], FloatArray]:
+        """Columns of some hypotheses, and the inverse of the information about them."""
+        columns = list(dict.fromkeys(c for n in names for c in self._whole[n].columns))
+        return columns, pseudo_inverse(self._information[np.ix_(columns, columns)])[0]
+
+    def _shared(self, ratio: FloatArray) -> FloatArray:
+        """Variance ratios with which rivals compete: as large as those of what they act like.
+
+        Two that explain the same by directions that are nearly one must not be told apart by how
+        the noise happens to look along either.
+        """
+        told = {}
+        for name in self._whole:
+            columns, inverse = self._solved([name])
+            told[name] = float(self._score[columns] @ inverse @ self._score[columns])
+        most = max(told.values())
+        rivals = [n for n, T in told.items() if self._rules.near * most <= T]
+        shared = ratio.copy()
+        for name, h in self._whole.items():
+            least = [
+                np.sqrt(self._alike[name, r]) * ratio[self._whole[r].columns[0]] for r in rivals
+            ]
+            shared[list(h.columns)] = np.maximum(shared[list(h.columns)], max(least))
+        return shared
+
+    def _posterior(self) -> tuple[Causes, tuple[str, ...]]:
+        scale = self._scale
+        model = ScoreModel(
+            tuple(self._hypotheses),
+            as_float64(self._score * scale),
+            as_float64(self._information * np.outer(scale, scale)),
+            self._ratio,
+            self._rules.nothing,
+        )
+        known = replace(
+            model, hypotheses=tuple(h for h in self._hypotheses if not h.name.startswith(UNKNOWN))
+        )
+        alone = tuple(e for s in known.subsets(1) for e in s.effects)
+        parameters = {m.id: m.parameters for m in self._may}
+        return causes_in(model, known, scale, parameters, self._rules, most=_MOST), alone
+
+    def ratio_of(self, put: Sequence[str]) -> float:
+        """Long-run over naive variance of the scores of some changes, the largest."""
+        columns = [c for name in put for c in self._whole[name].columns]
+        return float(self._ratio[columns].max(initial=1.0))
+
+    def price(self, put: Sequence[str], shift: FloatArray) -> float:
+        """Of some changes, by how much they are told better than their priors do [nats].
+
+        With the priors of their sizes, and that of each being the one of all that changed.
+
+        Parameters
+        ----------
+        put : sequence of str
+        shift : array, shape (n,)
+            Sizes by column of the differences.
+        """
+        columns = [c for name in put for c in self._whole[name].columns]
+        scale = self._scale[columns]
+        block = self._information[np.ix_(columns, columns)] * np.outer(scale, scale)
+        known = np.eye(len(columns)) + block / self.ratio_of(put)
+        sizes = (self._turns.T @ shift)[columns] / scale
+        odds = self._rules.nothing / (1.0 - self._rules.nothing) * len(self._whole)
+        occam = 0.5 * float(np.linalg.slogdet(known)[1]) + 0.5 * float(sizes @ sizes)
+        return occam + len(put) * float(np.log(odds))
+
+    def wald(self, effect: str, beside: str, changes: Mapping[str, float]) -> float:
+        """Squared standard errors by which an effect is off nothing, with another one free."""
+        own, other = list(self._whole[effect].columns), list(self._whole[beside].columns)
+        known = self._information
+        copy = known[np.ix_(own, other)] @ pseudo_inverse(known[np.ix_(other, other)])[0]
+        left = known[np.ix_(own, own)] - copy @ known[np.ix_(other, own)]
+        may = next(m for m in self._may if m.id == effect)
+        size = np.array([changes[n] for n in may.names])
+        return float(size @ left @ size)

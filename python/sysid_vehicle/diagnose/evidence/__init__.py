@@ -1,0 +1,1 @@
+"""Scores of the likelihood, their directions, and the algebra that all tests share."""

@@ -1,0 +1,107 @@
+"""What the car was doing at each sample: the axes of maps and the variables of formulas."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..._common.arrays import FloatArray, as_float64
+from ...estimate import Driving
+from ...identify import Fit
+from ...vehicle import slip_angles
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A quantity over which something is drawn.
+
+    Attributes
+    ----------
+    scale : float
+        Factor from SI to the unit of the axis.
+    """
+
+    name: str
+    label: str
+    unit: str
+    scale: float = 1.0
+
+    @property
+    def axis(self) -> str:
+        """Label of an axis."""
+        return f"{self.label} [{self.unit}]"
+
+
+COORDINATES = {
+    c.name: c
+    for c in (
+        Coordinate("vx_mps", "speed", "m/s"),
+        Coordinate("ay_mps2", "lateral acceleration", "m/s2"),
+        Coordinate("ax_mps2", "longitudinal acceleration", "m/s2"),
+        Coordinate("slip_front_rad", "front slip angle", "deg", float(np.degrees(1.0))),
+        Coordinate("slip_rear_rad", "rear slip angle", "deg", float(np.degrees(1.0))),
+        Coordinate("steer_rad", "steering angle", "deg", float(np.degrees(1.0))),
+        Coordinate("yaw_rate_radps", "yaw rate", "rad/s"),
+        Coordinate("time_s", "time driven", "s"),
+    )
+}
+
+
+def coordinates(fit: Fit, driving: Driving, state: FloatArray) -> dict[str, FloatArray]:
+    """Coordinates of every sample, from a filter's or a smoother's states.
+
+    Lateral acceleration is v_x r, longitudinal that of the wheel forces (measured where the force
+    is not known). Time runs on through all stretches.
+    """
+    car = fit.model.vehicle
+    v, side, r = state[:, 0], state[:, 1], state[:, 2]
+    steer = driving.channel("steer_rad")
+    pull = (
+        driving.channel("fx_n") / car.mass_kg if driving.force_known else driving.channel("ax_mps2")
+    )
+    front, rear = slip_angles(car.lf_m, car.lr_m, steer, v, side, r)
+    return {
+        "vx_mps": v,
+        "ay_mps2": v * r,
+        "ax_mps2": pull,
+        "slip_front_rad": front,
+        "slip_rear_rad": rear,
+        "steer_rad": steer,
+        "yaw_rate_radps": r,
+        "time_s": running_time(driving),
+    }
+
+
+def running_time(driving: Driving) -> FloatArray:
+    """Seconds driven until each sample, without what lies between stretches."""
+    return as_float64(np.cumsum(1.0 / driving.sample_rate_hz))
+
+
+BLOCK_S = 5.0
+"""Blocks of driving that are taken as independent, and left out in turns."""
+
+
+def blocks(driving: Driving, seconds: float) -> npt.NDArray[np.intp]:
+    """First samples of blocks of so many seconds driven, whatever the rates of the logs."""
+    middle = running_time(driving) - 0.5 / driving.sample_rate_hz
+    block = np.floor(middle / seconds)
+    return np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1])
+
+
+def begins(driving: Driving) -> npt.NDArray[np.intp]:
+    """First samples of the stretches."""
+    return np.array([span.first for span in driving.spans])
+
+
+def late(
+    signal: FloatArray, begins: npt.NDArray[np.intp], first: float | FloatArray = 0.0
+) -> FloatArray:
+    """The signal one sample later: noise of a measurement must not enter its own prediction.
+
+    The first sample of a stretch, of which nothing was known, gets `first`.
+    """
+    out = np.concatenate([signal[:1], signal[:-1]])
+    out[begins] = first
+    return as_float64(out)

@@ -1,0 +1,1 @@
+"""What to drive next, and what an effect does unnoticed to the fitted parameters."""

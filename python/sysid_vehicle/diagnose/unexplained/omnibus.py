@@ -1,0 +1,234 @@
+"""Is anything left that depends on the driving? A test against flexible unknown forces.
+
+Signals of speed, acceleration and steering, as virtual forces, moments, accelerations and sensor
+shifts, are scored together after projection on all the model can already do (a portmanteau score
+test; Lin, Biometrika 1997). Signals are built from what was known one sample earlier: the noise of
+a measurement must not enter its own prediction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from ... import _core
+from ..._common.arrays import FloatArray, as_float64
+from ...estimate import Driving
+from ...identify import Fit
+from ...rules import USUAL, Rules
+from ...vehicle import GRAVITY_MPS2
+from ..evidence.coordinates import begins, late
+from ..evidence.directions import Ask, Directions
+from ..evidence.evidence import FORCES, READINGS, Evidence, Section
+from ..evidence.projection import pseudo_inverse
+
+_FORCE_SHAPES, _FEW_SHAPES = 12, 4  # signals that act on each force, and on each of the others
+LEAST_LEFT = 1e-3
+"""Share of its size: of a direction of which less is left others can copy it."""
+_TARGETS = {**FORCES, "dv_x/dt": 3, "dv_y/dt": 4, **READINGS}
+
+_FORWARD, _SIDEWAYS, _TURNING = ("vx_mps", "ax_mps2"), ("vy_mps", "ay_mps2"), ("yaw_rate_radps",)
+_MOVES = {
+    **dict.fromkeys(("F_x", "dv_x/dt", "a_x"), _FORWARD),
+    **dict.fromkeys(("F_y", "dv_y/dt", "a_y"), _SIDEWAYS),
+    **dict.fromkeys(("M_z", "r"), _TURNING),
+}
+
+
+@dataclass(frozen=True)
+class Omnibus:
+    """Result of the test.
+
+    Attributes
+    ----------
+    p_value : float
+        Of a complete model.
+    strongest : str
+        Target that carries most of the evidence.
+    rules : Rules
+        By which it rejects.
+    """
+
+    statistic: float
+    degrees: int
+    p_value: float
+    strongest: str
+    rules: Rules = USUAL
+
+    @property
+    def rejects(self) -> bool:
+        """Whether the model is shown to be incomplete, at 1 % usually."""
+        return not self.p_value > self.rules.level
+
+    @property
+    def moves(self) -> tuple[str, ...]:
+        """Measured channels that the strongest target moves first."""
+        return _MOVES[self.strongest]
+
+    def __str__(self) -> str:
+        if not self.rejects:
+            return f"no sign of anything left that depends on the driving (p = {self.p_value:.2g})"
+        return (
+            f"something is left that depends on the driving, mostly in {self.strongest} "
+            f"(p = {self.p_value:.2g})"
+        )
+
+
+def omnibus(fit: Fit, driving: Driving, rules: Rules = USUAL) -> Omnibus:
+    """Test a fitted model, with the effects it has, for anything left."""
+    return omnibus_of(Evidence(fit, driving), rules)
+
+
+def omnibus_of(
+    evidence: Evidence, rules: Rules = USUAL, projected: Directions | None = None
+) -> Omnibus:
+    """The same of residuals that may be known already, and of `Unknown` directions of them."""
+    if projected is None:
+        projected = Directions(evidence, Unknown(evidence))
+    unknown = next(s for s in projected.sources if isinstance(s, Unknown))
+    targets, values, ranks = unknown.tested(projected)
+    ratios = np.maximum(projected.answer(unknown).ratios[: len(ranks)], 1.0)
+    statistics = projected.score[projected.place(unknown)] @ values / ratios
+    return Omnibus(
+        float(statistics[0]),
+        ranks[0],
+        float(scipy.stats.chi2.sf(statistics[0], ranks[0])),
+        targets[int(np.argmax(statistics[1:]))],
+        rules,
+    )
+
+
+def not_copied(projected: Directions) -> npt.NDArray[np.bool_]:
+    """Of which directions the fitted parameters leave something."""
+    after, before = np.diag(projected.information), np.maximum(projected.before, 1e-300)
+    return np.asarray(np.sqrt(after) > LEAST_LEFT * np.sqrt(before))
+
+
+class Unknown:
+    """Virtual signals of the driving that act as forces, moments, accelerations, sensor shifts.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    like : Unknown, optional
+        Of other driving, in whose units signals are.
+
+    Attributes
+    ----------
+    names : list of str
+        What each column acts on.
+    units : tuple of 2 floats
+        Of turns of the steering and of the pull.
+    """
+
+    def __init__(self, evidence: Evidence, like: Unknown | None = None) -> None:
+        self.evidence = evidence
+        driving = evidence.driving
+        self._steer = driving.channel("steer_rad")
+        turn = self._turned(self._steer, begins(driving))
+        self._pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
+        own = max(float(np.std(turn)), 1e-9), max(float(np.nanstd(self._pull)), 1e-9)
+        self.units: tuple[float, float] = own if like is None else like.units
+        self._turn_std, self._pull_std = self.units
+        self.targets: list[int] = []
+        self.names: list[str] = []
+        heavy = set() if driving.force_known else {"F_x", "a_x"}
+        for target, number in _TARGETS.items():
+            if target not in heavy:
+                count = _FORCE_SHAPES if number <= 2 else _FEW_SHAPES
+                self.names += [target] * count
+                self.targets += [number] * count
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.names)
+
+    @property
+    def groups(self) -> list[slice]:
+        """The columns of each target."""
+        firsts = [i for i, n in enumerate(self.names) if n not in self.names[:i]]
+        return [slice(a, b) for a, b in pairwise([*firsts, self.width])]
+
+    def tested(self, projected: Directions) -> tuple[list[str], FloatArray, list[int]]:
+        """Targets of which something is left; least squares along all and along each, their ranks.
+
+        The second has a column for all of them and one for each.
+        """
+        place = projected.place(self)
+        information, S = projected.information[place, place], projected.score[place]
+        kept = np.flatnonzero(not_copied(projected)[place])
+        names = [self.names[i] for i in kept]
+        targets = list(dict.fromkeys(names))
+        tested = [kept, *(kept[[n == t for n in names]] for t in targets)]
+        values, ranks = np.zeros((len(S), len(tested))), []
+        for value, columns in zip(values.T, tested, strict=True):
+            inverse, rank = pseudo_inverse(information[np.ix_(columns, columns)])
+            value[columns] = inverse @ S[columns]
+            ranks.append(rank)
+        return targets, values, ranks
+
+    def spanned(
+        self, projected: Directions
+    ) -> tuple[list[tuple[str, int]], FloatArray, FloatArray]:
+        """Targets and how many directions each has; these, orthonormal; what they explain.
+
+        The second and the third are sums of the columns: of a direction, and of a target.
+        """
+        place = projected.place(self)
+        spans = [
+            (slice(g.start - place.start, g.stop - place.start), turns)
+            for g, turns in projected.spans(not_copied(projected))
+            if turns.shape[1]
+        ]
+        ends = np.cumsum([0, *(turns.shape[1] for _, turns in spans)])
+        whole = np.zeros((self.width, int(ends[-1])))
+        for (group, turns), a, b in zip(spans, ends, ends[1:], strict=False):
+            whole[group, a:b] = turns
+        along = whole * (whole.T @ projected.score[place])
+        explained = np.add.reduceat(along, ends[:-1], axis=1)
+        return [(self.names[g.start], t.shape[1]) for g, t in spans], whole, explained
+
+    def asks(self, projected: Directions) -> Ask:
+        """The colour along all that is tested, then along all that is spanned."""
+        along = np.hstack([self.tested(projected)[1], self.spanned(projected)[2]])
+        return Ask(along, along)
+
+    def of(self, section: Section) -> FloatArray:
+        """Sensitivities of a section's residuals."""
+        fit = self.evidence.fit
+        p, noise = fit.model.vector(), fit.noise.vector()
+
+        def work(problem: _core.Problem, gains: Any, at: slice) -> FloatArray:
+            state = problem.trace(p, noise, False)["state"]
+            return problem.signal_sensitivities(p, gains, self.signals(state, at), self.targets)
+
+        return section.rows(work)
+
+    def signals(self, state: FloatArray, at: slice) -> FloatArray:
+        """Signals as columns, from the filter's states at some samples."""
+        every = begins(self.evidence.driving)
+        # The first sample of a stretch knows nothing.
+        first = np.union1d([0], every[(every > at.start) & (every < at.stop)] - at.start)
+        v, r = state[:, 0], state[:, 2]
+        a = v * r / GRAVITY_MPS2
+        pull = self._pull[at] / self._pull_std
+        w = v / 20.0
+        one = np.ones_like(v)
+        shapes = [one, w**2, a, a**3, a * w**2, a**2, pull, pull * a, pull * np.abs(a), pull**2, r]
+        shapes.append(self._turned(self._steer[at], first) / self._turn_std)
+        # Known one sample earlier.
+        force, few = (late(np.column_stack(c), first) for c in (shapes, [one, w**2, a, pull]))
+        found = [force if self.targets[g.start] <= 2 else few for g in self.groups]
+        return as_float64(np.hstack(found))
+
+    @staticmethod
+    def _turned(steer: FloatArray, first: npt.NDArray[np.intp]) -> FloatArray:
+        turn = steer - late(steer, first)
+        turn[first] = 0.0  # what lay between two stretches is no turn of the wheel
+        return as_float64(turn)

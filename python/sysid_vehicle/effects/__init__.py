@@ -1,0 +1,30 @@
+"""Physical effects: the catalogue of the compiled core, and those that users define."""
+
+from .catalogue import (
+    Effect,
+    OwnState,
+    Parameter,
+    base_parameters,
+    catalogue,
+    channels_in_use,
+    effect,
+)
+from .plugins import Plugin, installed_effects
+from .user import define_effect, forget_effect, load_effects, parameter, state
+
+__all__ = [
+    "Effect",
+    "OwnState",
+    "Parameter",
+    "Plugin",
+    "base_parameters",
+    "catalogue",
+    "channels_in_use",
+    "define_effect",
+    "effect",
+    "forget_effect",
+    "installed_effects",
+    "load_effects",
+    "parameter",
+    "state",
+]

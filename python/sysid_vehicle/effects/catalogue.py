@@ -1,0 +1,351 @@
+"""The catalogue of physical effects, as the compiled core declares it.
+
+Each effect's equation, parameters and null values have their home in `cpp/include/sysid/effects/`;
+nothing is repeated here. Effects that users define stand beside them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from .._common.arguments import expect
+from .._common.arrays import FloatArray, as_float64
+from .._common.text import html_text
+from ..errors import InvalidInput, near_names
+from . import plugins
+
+Steps = tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter: its unit, its box, the value that changes nothing, and telling sizes.
+
+    Attributes
+    ----------
+    null_value : float
+        Value at which the model is exactly the one without the effect.
+    typical, matters : float
+        A size met in practice, and the smallest one worth acting on.
+    lower, upper : float
+        Bounds of the search.
+    column : int
+        Place in the core's parameter vector; no part of what the parameter is.
+    typical_low, typical_high : float
+        Where most cars lie that have the effect.
+    mirrored : bool
+        Whether it changes its sign in a mirror that swaps left and right.
+    scan : str
+        Of a parameter that means nothing while the effect is null: sought over the `time` of the
+        log, or over its typical `range`. Otherwise empty.
+    """
+
+    name: str
+    unit: str
+    null_value: float
+    typical: float
+    matters: float
+    lower: float
+    upper: float
+    typical_low: float
+    typical_high: float
+    mirrored: bool
+    scan: str
+    column: int = field(compare=False)
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether the null value lies on a bound, so that only one sign is possible."""
+        return self.null_value in (self.lower, self.upper)
+
+    def another_dynamics(self, value: float) -> bool:
+        """Whether at a value the car does not move as at the typical one: a lag that hardly lags.
+
+        What is linear there leads to no size of that kind.
+        """
+        return self.one_sided and not 0.5 * self.typical <= value <= 2.0 * self.typical
+
+    def grid(self, duration_s: float) -> FloatArray:
+        """Values at which a scanned parameter is tried in a log of this duration."""
+        if self.scan == "time":
+            return as_float64(duration_s * np.arange(1, 8) / 8.0)
+        ratio = self.typical_high / self.typical_low
+        return as_float64(self.typical_low * ratio ** np.array([0.0, 0.5, 1.0]))
+
+
+@dataclass(frozen=True)
+class OwnState:
+    """A state of an effect that a user defined.
+
+    Attributes
+    ----------
+    name, unit : str
+    rate : tuple
+        Steps of the formula of its derivative by time.
+    decay : tuple
+        Minus the derivative of the rate by the state itself.
+    initial : tuple or None
+        Where a run begins; None where it would rest.
+    """
+
+    name: str
+    unit: str
+    rate: Steps
+    decay: Steps
+    initial: Steps | None = None
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect that a model may lack.
+
+    Attributes
+    ----------
+    index : int
+        Place in the catalogue, or among the effects of users; no part of what the effect is.
+    moves : str
+        Measured channels it moves first.
+    excited_by : str
+        Driving that shows it.
+    scored_at_typical : bool
+        The derivative at the null value does not exist; scored at the typical size.
+    needs_force : bool
+        Visible only where the total wheel force was logged.
+    needs : tuple of str
+        Channels without which a log cannot show it.
+    confounded_with : tuple of str
+        Effects that act alike in most driving; each names the other.
+    through : str
+        Effect through which it chiefly acts, if any: weak in a model without that.
+    breaks : str
+        Law of motion that readings seem to break where it acts, through no fault of theirs:
+        `readings late`, `answers late`, `on a slope`, or empty.
+    same_in_all_logs : bool
+        As a nuisance it is the same in all logs of a car, where others differ from log to log.
+    states : int
+        How many states of its own it adds to the model.
+    acts : tuple
+        Of an effect that a user defined: what its formulas add to, and their steps.
+    channels : tuple of str
+        Of such an effect: columns of the log that its formulas read.
+    own_states : tuple of OwnState
+        Of such an effect.
+    """
+
+    id: str
+    title: str
+    equation: str
+    source: str
+    excited_by: str
+    moves: str
+    parameters: tuple[Parameter, ...]
+    index: int = field(compare=False)
+    scored_at_typical: bool
+    needs_force: bool
+    needs: tuple[str, ...]
+    confounded_with: tuple[str, ...]
+    through: str
+    states: int
+    breaks: str = ""
+    same_in_all_logs: bool = False
+    acts: tuple[tuple[int, Any], ...] = ()
+    channels: tuple[str, ...] = ()
+    own_states: tuple[OwnState, ...] = ()
+
+    def __post_init__(self) -> None:
+        # Before any problem is made for it: its runs hold the channels by number.
+        for name in self.channels:
+            _channel_number(name)
+
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
+        """An effect of the catalogue by its name, whose places may differ; others by value."""
+        if _by_id().get(self.id) == self:
+            return effect, (self.id,)
+        return Effect, tuple(getattr(self, f.name) for f in fields(self))
+
+    def seated(self, taken: set[int]) -> Effect:
+        """The same effect, if a user's at a place that is not taken; that is taken then.
+
+        Raises
+        ------
+        InvalidInput
+            All places are taken.
+        """
+        if not self.acts:
+            return self
+        free = (i for i in (self.index, *range(_core.USER_EFFECTS)) if i >= 0 and i not in taken)
+        place = next(free, None)
+        if place is None:
+            raise InvalidInput(
+                f"effect '{self.id}': there is room for {_core.USER_EFFECTS} effects of your own; "
+                "forget one with forget_effect"
+            )
+        taken.add(place)
+        first = _core.USER_OFFSET + place * _core.USER_PARAMETERS
+        parameters = tuple(replace(p, column=first + i) for i, p in enumerate(self.parameters))
+        return replace(self, index=place, parameters=parameters)
+
+    @property
+    def bit(self) -> int:
+        """The effect's bit in the core's mask; a user's effect has none."""
+        return 0 if self.acts else 1 << self.index
+
+    def core(self) -> tuple[Any, ...]:
+        """What the core takes of a user's effect."""
+        states = [(s.rate, s.decay, s.initial) for s in self.own_states]
+        return self.index, [_channel_number(c) for c in self.channels], self.acts, states
+
+    @property
+    def columns(self) -> list[int]:
+        """Places of its parameters in the core's parameter vector."""
+        return [p.column for p in self.parameters]
+
+    @property
+    def named(self) -> dict[str, Parameter]:
+        """Its parameters by the names that they have in a model."""
+        return {f"{self.id}.{p.name}": p for p in self.parameters}
+
+    @property
+    def moved(self) -> frozenset[str]:
+        """The measured channels that it moves first, one by one."""
+        return frozenset(self.moves.split(", "))
+
+    @property
+    def scanned(self) -> Parameter | None:
+        """Its parameter that means nothing while the effect is null, if there is one."""
+        return next((p for p in self.parameters if p.scan), None)
+
+    @property
+    def form(self) -> str:
+        """How it is scored without a refit; a refit always has the equation as it stands."""
+        if self.scored_at_typical:
+            return "scored by a step to the typical size: no derivative at the null value"
+        if self.scanned is not None:
+            return f"scored by its derivative at the null value, over a grid of {self.scanned.name}"
+        return "scored by its derivative at the null value"
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.id}: {self.title}",
+            f"  equation    {self.equation}",
+            f"  source      {self.source}",
+        ]
+        lines += [
+            f"  parameter   {p.name} [{p.unit}], typically {p.typical:g} "
+            f"({p.typical_low:g} to {p.typical_high:g}), matters from {p.matters:g}, "
+            f"searched from {p.lower:g} to {p.upper:g}, none at {p.null_value:g}"
+            for p in self.parameters
+        ]
+        lines += [
+            f"  form        {self.form}",
+            f"  excited by  {self.excited_by}",
+            f"  moves first {self.moves}",
+            f"  needs       {', '.join(self.needs)}",
+        ]
+        if self.confounded_with:
+            lines.append(f"  acts like   {', '.join(self.confounded_with)}")
+        if self.through:
+            lines.append(f"  through     {self.through}")
+        if self.breaks:
+            lines.append(f"  breaks      laws of motion: {self.breaks}")
+        if self.same_in_all_logs:
+            lines.append("  nuisance    the same in all logs of a car")
+        return "\n".join(lines)
+
+    _repr_html_ = html_text
+
+
+def _parameter(info: dict[str, Any], column: int) -> Parameter:
+    return Parameter(**info, column=column)
+
+
+@cache
+def base_parameters() -> tuple[Parameter, ...]:
+    """The baseline's parameters: eight tyre coefficients and the yaw inertia."""
+    return tuple(_parameter(info, i) for i, info in enumerate(_core.base_parameters()))
+
+
+@cache
+def _by_id() -> dict[str, Effect]:
+    found: dict[str, Effect] = {}
+    for index, info in enumerate(_core.effects()):
+        offset = info.pop("offset")
+        parameters = tuple(_parameter(p, offset + i) for i, p in enumerate(info.pop("parameters")))
+        found[info["id"]] = Effect(**info, parameters=parameters, index=index)
+    return found
+
+
+_users: dict[str, Effect] = {}
+_channels: list[str] = []  # by their number in the core, for as long as the process lives
+
+
+def channels_in_use() -> tuple[str, ...]:
+    """Columns of logs that users' effects read, by their number in the core."""
+    return tuple(_channels)
+
+
+def _channel_number(name: str) -> int:
+    if name not in _channels:
+        if len(_channels) == _core.USER_CHANNELS:
+            raise InvalidInput(
+                f"channel '{name}': there is room for {_core.USER_CHANNELS} channels in one "
+                f"process, taken by {', '.join(_channels)}; start another one"
+            )
+        _channels.append(name)
+    return _channels.index(name)
+
+
+def catalogue() -> tuple[Effect, ...]:
+    """Every effect the software knows, in the core's order; those of users last."""
+    return (*_by_id().values(), *_users.values())
+
+
+def register(made: Effect) -> Effect:
+    """Give a user's effect its place in the core's parameter vector.
+
+    Raises
+    ------
+    InvalidInput
+        All places are taken.
+    """
+    _users[made.id] = made.seated({e.index for e in _users.values() if e.id != made.id})
+    return _users[made.id]
+
+
+def forget(name: str) -> None:
+    """Remove a user's effect."""
+    if name not in _users:
+        raise InvalidInput(f"no effect of yours is called '{name}'{near_names(name, _users)}")
+    del _users[name]
+
+
+def effect(name: str | Effect) -> Effect:
+    """The effect with this id.
+
+    Raises
+    ------
+    InvalidInput
+        No effect has this id; the message names the nearest ones.
+    """
+    if isinstance(name, Effect):
+        return name
+    expect(name, str, "effect")
+    known = {**_by_id(), **_users}
+    if name in known:
+        return known[name]
+    if plugins.run(name):
+        if name in _users:
+            return _users[name]
+        raise InvalidInput(
+            f"effect '{name}': a package names it in its entry points and does not define it"
+        )
+    found = [p.id for p in plugins.installed_effects()]
+    raise InvalidInput(
+        f"no effect is called '{name}'{near_names(name, [*known, *found])}; "
+        "`sysid-vehicle effects` lists them"
+    )
