@@ -19,7 +19,7 @@ from sysid_vehicle.rules import (
     worse,
 )
 
-PACKAGE = Path(__file__).resolve().parents[2] / "python" / "sysid_vehicle"
+PACKAGE = Path(__file__).resolve().parents[3] / "python" / "sysid_vehicle"
 
 # Constants of numerical methods and of effort: how finely, how long, how often. They decide no
 # claim. Those of the last group shape how what no name fits is described; no effect is claimed.

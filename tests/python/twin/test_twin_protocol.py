@@ -235,7 +235,7 @@ def unit(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     version: int = request.param
     folder = tmp_path_factory.mktemp(f"fmu{version}")
     library = folder / f"car{sharedLibraryExtension}"
-    source = Path(__file__).parent / "fmu" / "point_mass.c"
+    source = Path(__file__).parents[1] / "fmu" / "point_mass.c"
     tag = f"-DTAG(name)=fmi{version}##name"
     others = folder / "others.c"
     others.write_text(_missing(version, source.read_text(encoding="utf-8")), encoding="utf-8")

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_copies import same
+from same import same
 
 import sysid_vehicle as sv
 from sysid_vehicle import saved
 from sysid_vehicle.errors import InvalidInput
 
-OLD = Path(__file__).parent / "saved"
+OLD = Path(__file__).parents[1] / "saved"
 
 
 def again(result: Any, tmp_path: Path) -> Any:

@@ -14,7 +14,7 @@ import pytest
 import sysid_vehicle
 from sysid_vehicle import _core
 
-REPO = Path(__file__).resolve().parents[2]
+REPO = Path(__file__).resolve().parents[3]
 CORE = Path(_core.__file__)
 
 # Each of these changes arithmetic for the whole process, ties the build to one kind of machine, or

@@ -19,7 +19,7 @@ from strategies import clean_logs, logs, vehicles
 
 from sysid_vehicle import InvalidInput, Vehicle
 
-CORPUS = sorted((Path(__file__).parent / "corpus").glob("*.json"))
+CORPUS = sorted((Path(__file__).parents[1] / "corpus").glob("*.json"))
 
 LOGS = logs(clean_logs(lengths=st.one_of(st.integers(0, 60), st.integers(100, 800))))
 SLOW_TO_DRAW = [HealthCheck.too_slow, HealthCheck.data_too_large]

@@ -11,7 +11,7 @@ import pytest
 
 from sysid_vehicle.cli.parser import parse
 
-REPO = Path(__file__).resolve().parents[2]
+REPO = Path(__file__).resolve().parents[3]
 README = REPO / "README.md"
 PAGES = [
     README,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-REPO = Path(__file__).resolve().parents[2]
+REPO = Path(__file__).resolve().parents[3]
 PACKAGE = REPO / "python" / "sysid_vehicle"
 MAX_LINES = 400
 
@@ -300,6 +300,14 @@ def test_only_what_users_get_is_listed() -> None:
     """In other modules a name without an underscore says as much."""
     listed = {p for p in PYTHON_FILES if re.search(r"^__all__", p.read_text("utf-8"), re.MULTILINE)}
     assert {p for p in listed if p.name != "__init__.py"} == {PACKAGE / "errors.py"}
+
+
+def test_tests_mirror_the_package() -> None:
+    """The tests of a station stand in the folder of its name."""
+    tests = REPO / "tests/python"
+    assert list(tests.glob("test_*.py")) == []
+    folders = {path.parent.name for path in tests.glob("*/test_*.py")}
+    assert folders - set(RANK) == {"foundation", "project", "benchmarks"}
 
 
 def test_no_file_is_too_long_to_read() -> None:

@@ -327,7 +327,7 @@ def test_dask(garage: Path, done: sv.Fleet, tmp_path: Path) -> None:
 def test_ray(garage: Path, done: sv.Fleet, tmp_path: Path) -> None:
     """With the executor that the how-to makes of its tasks."""
     ray = pytest.importorskip("ray")
-    page = (Path(__file__).parents[2] / "docs/howto/fleets.md").read_text("utf-8")
+    page = (Path(__file__).parents[3] / "docs/howto/fleets.md").read_text("utf-8")
     (code,) = re.findall(r"^class RayExecutor.*?(?=^\S*sv\.)", page, re.MULTILINE | re.DOTALL)
     names: dict[str, Any] = {"ray": ray, "Executor": Executor}
     exec(code, names)
