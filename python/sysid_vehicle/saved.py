@@ -52,8 +52,11 @@ _MOVED: dict[str, str] = {
         for module in modules.split()
     },
 }
-# Classes that have another name since, by their place.
-_CALLED: dict[str, str] = {"rules.accept:Change": "rules.accept:ErrorChange"}
+# Classes that have another name or module since, by their place.
+_CALLED: dict[str, str] = {
+    "rules.accept:Change": "rules.accept:ErrorChange",
+    "diagnose.candidates.diagnosis:Candidate": "diagnose.candidates.candidate:Candidate",
+}
 # Fields that have another name since, by class.
 _RENAMED: dict[str, dict[str, str]] = {
     "effects.catalogue:Effect": {"twins": "confounded_with"},

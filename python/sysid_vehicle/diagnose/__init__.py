@@ -1,8 +1,9 @@
 """Diagnosis: which physical effect a model is missing, or that none explains what is left."""
 
+from .candidates.candidate import Candidate
 from .candidates.causes import Causes, CredibleSet
 from .candidates.constancy import Constancy, constancy
-from .candidates.diagnosis import Candidate, Diagnosis
+from .candidates.diagnosis import Diagnosis
 from .candidates.instead import Instead, instead
 from .candidates.possible import Size, considered, possible
 from .candidates.verdicts import EffectVerdict, Verdicts, judge, verdicts

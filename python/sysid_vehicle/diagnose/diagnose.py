@@ -16,9 +16,10 @@ from ..estimate import Driving
 from ..identify import Fit, driving_of, explaining
 from ..log import Log
 from ..rules import USUAL, Rules, bic
+from .candidates.candidate import Candidate
 from .candidates.causes import causes_of
 from .candidates.clocks import shifts
-from .candidates.diagnosis import Candidate, Diagnosis
+from .candidates.diagnosis import Diagnosis
 from .candidates.possible import considered
 from .candidates.refits import finished as finished_of
 from .candidates.refits import from_typical, in_time, is_hidden_by_noise, refitted

@@ -7,7 +7,7 @@ namespace {
 
 using test::central_difference;
 
-const ObserverCar kCar;
+const ObserverCar kCar{780.0, 1000.0, 1.4, 1.6, 0.3};
 const ObserverVec kState{(ObserverVec() << 18.0, -0.4, 0.3, 200.0, -700.0, 150.0).finished()};
 const ObserverInput kBefore{900.0, 0.03, 110000.0, 130000.0};
 const ObserverInput kNow{-500.0, -0.02, 125000.0, 120000.0};

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, Log, Model, Vehicle, diagnose, drive, identify, manoeuvres
-from sysid_vehicle.diagnose.candidates.diagnosis import Candidate
+from sysid_vehicle.diagnose.candidates.candidate import Candidate
 from sysid_vehicle.diagnose.candidates.refits import (
     finished,
     from_typical,

@@ -17,6 +17,7 @@
 #include <limits>
 
 #include "sysid/lab/actuators.hpp"
+#include "sysid/lab/car.hpp"
 #include "sysid/math/linear.hpp"
 #include "sysid/model/kinematics.hpp"
 
@@ -25,23 +26,6 @@ namespace sysid::lab {
 /// What the observer estimates: motion, and forces [N] and a moment [N m] that the model lacks.
 enum Estimated : int { kEstVx, kEstVy, kEstYawRate, kEstXiX, kEstXiY, kEstXiPsi, kEstimated };
 using Estimate = Vec<kEstimated>;
-
-/// The car as controller and observer believe it to be.
-struct NominalCar {
-    double mass_kg = 0.0;
-    double yaw_inertia_kgm2 = 0.0;
-    double lf_m = 0.0, lr_m = 0.0;
-    double cg_height_m = 0.0;
-    double gravity_mps2 = kGravity;
-    double drag_nspm = 0.0;         // linear drag C_d
-    double stiffness_front = 50.0;  // cornering stiffness per load [1/rad]
-    double stiffness_rear = 50.0;
-
-    /// Axle loads on a level road under a total wheel force.
-    Axles<double> loads(double force_n) const {
-        return axle_loads(mass_kg * gravity_mps2, force_n, cg_height_m, lf_m, lr_m);
-    }
-};
 
 struct AdrcData {
     double speed_gain_ps = 4.0;

@@ -18,10 +18,7 @@ struct LoopObserverData {
 class LoopObserver {
   public:
     LoopObserver(const LoopObserverData& data, const NominalCar& car, double dt)
-        : data_(data),
-          car_(car),
-          believed_car_{car.mass_kg, car.yaw_inertia_kgm2, car.lf_m, car.lr_m, car.drag_nspm},
-          model_(believed_car_, data.form, dt) {
+        : data_(data), car_(car), model_(car, data.form, dt) {
         if (!data.certain_start) return;
         const ObserverStart start = ObserverStart::certain(data.first_speed_mps);
         observer_.emplace(model_, data_.noise, start);
@@ -33,7 +30,7 @@ class LoopObserver {
         last_ = {force_n, steer_rad, front, car_.stiffness_rear * loads.rear};
         if (!observer_)
             observer_.emplace(model_, data_.noise,
-                              ObserverStart::from_reading(y, data_.noise, believed_car_));
+                              ObserverStart::from_reading(y, data_.noise, car_));
         state_ = observer_->step(last_, y);
     }
 
@@ -48,7 +45,6 @@ class LoopObserver {
   private:
     LoopObserverData data_;
     NominalCar car_;
-    ObserverCar believed_car_;
     ObserverModel model_;
     std::optional<Observer> observer_;
     ObserverInput last_;

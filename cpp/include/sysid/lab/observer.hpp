@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "sysid/estimate/kalman.hpp"
+#include "sysid/lab/car.hpp"
 #include "sysid/math/exponential.hpp"
 #include "sysid/model/kinematics.hpp"
 
@@ -41,15 +42,6 @@ struct ObserverForm {
 
     static ObserverForm corrected() { return {}; }
     bool operator==(const ObserverForm&) const = default;
-};
-
-/// What the observer believes of the car.
-struct ObserverCar {
-    double mass_kg = 780.0;
-    double yaw_inertia_kgm2 = 1000.0;
-    double lf_m = 1.4;
-    double lr_m = 1.6;
-    double drag_nspm = 0.3;  // linear in v_x
 };
 
 /// Inputs of one sample; the stiffness is that of the axle, nominal value times load.

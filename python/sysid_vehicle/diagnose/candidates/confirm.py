@@ -10,14 +10,18 @@ Scores beside those before it are asked first: what gains next to nothing there 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .candidate import Candidate
 from .causes import Causes, CredibleSet
-from .diagnosis import Candidate, Diagnosis
 from .refits import refitted
 from .reservation import Beside, beside
 from .score import score_board_of
+
+if TYPE_CHECKING:
+    from .diagnosis import Diagnosis
 
 _HOPELESS = 0.25  # of the price that a refit has to gain: a score below is not refitted
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..._common.printed import Part, Printed, Table
 from ..._common.style import axes_or_new
 from ..._common.tables import frame
-from ..._common.text import brief, with_error
+from ..._common.text import brief
 from ..._common.threads import in_parallel
 from ...compare import one_step_error
 from ...effects import Effect
@@ -20,6 +20,7 @@ from ...estimate import Driving, NoiseModel
 from ...identify import Fit
 from ...rules import Rules
 from ..unexplained.omnibus import Omnibus
+from .candidate import Candidate
 from .causes import Causes
 from .possible import Size, possible
 from .reservation import Beside, beside, confirmed, reservation
@@ -27,58 +28,6 @@ from .score import Score
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """One effect that may be missing.
-
-    Attributes
-    ----------
-    statistic : float
-        Score statistic; after a refit, twice the gain in log-likelihood.
-    p_value : float
-        Of the baseline being complete, corrected for testing all effects.
-    value, std : tuple of float
-        Parameters, predicted or refitted.
-    error : float
-        One-step-ahead error on the diagnosed driving with the effect, as `compare` gives it, in
-        units of `Diagnosis.floor`; NaN where the effect was not refitted.
-    retained : float
-        Share of the effect that the fitted parameters cannot copy.
-    indistinguishable_from : tuple of str
-        Effects that this driving cannot tell from it.
-    fit : Fit or None
-        The model with the effect, where it was refitted.
-    finished : bool
-        Whether noise was learned with it; else it was refitted under the noise of the model without
-        the effect.
-    """
-
-    effect: Effect
-    statistic: float
-    p_value: float
-    value: tuple[float, ...]
-    std: tuple[float, ...]
-    retained: float
-    variance_ratio: float
-    error: float = float("nan")
-    indistinguishable_from: tuple[str, ...] = ()
-    fit: Fit | None = None
-    finished: bool = False
-
-    @property
-    def id(self) -> str:
-        """Id of the effect."""
-        return self.effect.id
-
-    @property
-    def size(self) -> str:
-        """Its parameters with standard errors, in words."""
-        return ", ".join(
-            f"{p.name} {with_error(v, s)} {p.unit}"
-            for p, v, s in zip(self.effect.parameters, self.value, self.std, strict=True)
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from ...effects import Effect
 from ...errors import NumericalError
 from ...estimate import Driving
 from ...identify import Fit, refine, refit, unmoved
-from .diagnosis import Candidate
+from .candidate import Candidate
 
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
 
