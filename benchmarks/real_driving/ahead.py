@@ -16,7 +16,7 @@ import numpy as np
 import sysid_vehicle as sv
 from sysid_vehicle.diagnose.evidence.coordinates import begins
 from sysid_vehicle.estimate import Driving, turning
-from sysid_vehicle.forces._motion import Places, smoothed
+from sysid_vehicle.forces.motion import Places, smoothed
 from sysid_vehicle.identify import driving_of
 
 _BEGIN_S = 0.5  # between windows

@@ -10,9 +10,9 @@ from ..errors import InvalidInput, warn
 from ..identify import Fit
 from ..model import Model
 from ..vehicle import AXLES, Vehicle
-from ._fmu import fmu_bytes
-from ._languages import casadi_function, cpp_text, python_text
-from ._tyres import tir_text
+from .fmu import fmu_bytes
+from .languages import casadi_function, cpp_text, python_text
+from .tyres import tir_text
 
 __all__ = [
     "casadi_function",

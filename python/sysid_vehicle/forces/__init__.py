@@ -1,6 +1,6 @@
 """Axle forces from the motion, before any tyre is assumed."""
 
-from ._axles import axle_forces
-from ._result import COLOURS, AxleForces
+from .axles import axle_forces
+from .result import COLOURS, AxleForces
 
 __all__ = ["COLOURS", "AxleForces", "axle_forces"]

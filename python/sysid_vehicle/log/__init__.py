@@ -1,11 +1,11 @@
 """Driving logs: canonical channels on a uniform grid, checked before they are used."""
 
-from ._against_car import check_car, times_wheelbase
-from ._channels import CHANNELS, MEASURED, Channel
-from ._columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
-from ._held import held_rows
-from ._laws import Contradiction
-from ._log import Log, check_excitation, several_logs
+from .against_car import check_car, times_wheelbase
+from .channels import CHANNELS, MEASURED, Channel
+from .columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
+from .held import held_rows
+from .laws import Contradiction
+from .log import Log, check_excitation, several_logs
 
 __all__ = [
     "CHANNELS",

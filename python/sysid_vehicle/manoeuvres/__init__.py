@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from ._courses import handling_course, lap
-from ._curves import Curvature, Curve, Knots, Pulse, Pulses, Sweep
-from ._manoeuvre import Manoeuvre
-from ._on_path import (
+from .courses import handling_course, lap
+from .curves import Curvature, Curve, Knots, Pulse, Pulses, Sweep
+from .manoeuvre import Manoeuvre
+from .on_path import (
     brake_in_turn,
     constant_radius,
     double_lane_change,
     slalom,
     straight_acceleration,
 )
-from ._open_loop import ramp_steer, sine_sweep, sine_with_dwell, step_steer
-from ._recognise import Recognised, recognise
-from ._steady import peak_lateral_mps2, steady_steer, understeer_gradient
+from .open_loop import ramp_steer, sine_sweep, sine_with_dwell, step_steer
+from .recognise import Recognised, recognise
+from .steady import peak_lateral_mps2, steady_steer, understeer_gradient
 
 __all__ = [
     "Curvature",

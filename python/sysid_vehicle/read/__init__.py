@@ -9,13 +9,13 @@ from typing import Any
 from .._common.files import as_path
 from ..errors import InvalidInput, warn
 from ..log import Columns, Log
-from ._channel_map import ChannelMap, Source
-from ._csv import read_table
-from ._objects import contents_of_object
-from ._recording import Recording
-from ._registry import FORMATS, Format, blamed, read_with, recognised
-from ._table import Table
+from .channel_map import ChannelMap, Source
+from .csv import read_table
+from .objects import contents_of_object
 from .propose import Proposal, propose_channels
+from .recording import Recording
+from .registry import FORMATS, Format, blamed, read_with, recognised
+from .table import Table
 
 __all__ = ["FORMATS", "ChannelMap", "Format", "Proposal", "Source", "propose_channels", "read_log"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ._table import Table, table_of
+from .table import Table, table_of
 
 
 def read(path: Path, dbc: Path | None) -> Table:

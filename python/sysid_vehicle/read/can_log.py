@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidInput
-from ._recording import Entry, Recording, Signal
+from .recording import Entry, Recording, Signal
 
 _BITS_OF_EXTENDED = 1 << 31
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ._recording import Recording
-from ._table import Table
-from ._tree import Leaf, contents_of
+from .recording import Recording
+from .table import Table
+from .tree import Leaf, contents_of
 
 _MATLAB_NUMBERS = (
     "double",

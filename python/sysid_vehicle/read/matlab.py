@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidInput
-from ._recording import Recording
-from ._table import Table
-from ._tree import Leaf, contents_of
+from .recording import Recording
+from .table import Table
+from .tree import Leaf, contents_of
 
 
 def read(path: Path, dbc: Path | None) -> Table | Recording:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InvalidInput
-from ._messages import Taken, recording_of
-from ._recording import Recording
+from .messages import Taken, recording_of
+from .recording import Recording
 
 
 def read(path: Path, dbc: Path | None) -> Recording:

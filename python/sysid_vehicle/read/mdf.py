@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidInput
-from ._recording import Entry, Recording, Signal
+from .recording import Entry, Recording, Signal
 
 _TIME = 1  # kind of a group's master channel, beside angle, distance and index
 

@@ -6,9 +6,9 @@ import csv
 from pathlib import Path
 
 from ..errors import InvalidInput
-from ._csv import table_of_text
-from ._formats import read_text_table
-from ._table import Table
+from .csv import table_of_text
+from .formats import read_text_table
+from .table import Table
 
 _FEWEST = 2  # cells that have a name
 

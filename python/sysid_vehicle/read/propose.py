@@ -14,13 +14,13 @@ from .._common.files import as_path
 from ..errors import InvalidInput
 from ..log import CHANNELS, Columns, Log, listed
 from ..vehicle import Vehicle
-from ._channel_map import ChannelMap, Source
-from ._names import rank
-from ._physics import scales
-from ._recording import Recording
-from ._registry import blamed, recognised
-from ._table import Table
-from ._units import factor_to
+from .channel_map import ChannelMap, Source
+from .names import rank
+from .physics import scales
+from .recording import Recording
+from .registry import blamed, recognised
+from .table import Table
+from .units import factor_to
 
 _RATE_HZ = 50.0  # at which units and signs are looked for
 _FEWEST = 100

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidInput
-from ._csv import is_number
-from ._formats import read_text_table
-from ._table import BadCell, Table
-from ._units import is_unit
+from .csv import is_number
+from .formats import read_text_table
+from .table import BadCell, Table
+from .units import is_unit
 
 _DAY_S = 86400.0
 _TIME = "time"

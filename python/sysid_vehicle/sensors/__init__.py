@@ -1,11 +1,11 @@
 """Sensors: whether the channels of a log agree, before any tyre is assumed."""
 
-from ._check import check
-from ._condition import low_passes
-from ._faults import SensorFault
-from ._ready import made_ready
-from ._result import SensorCheck, put_right
-from ._signals import quantum
+from .check import check
+from .condition import low_passes
+from .faults import SensorFault
+from .ready import made_ready
+from .result import SensorCheck, put_right
+from .signals import quantum
 
 __all__ = [
     "SensorCheck",

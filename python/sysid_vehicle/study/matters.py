@@ -11,7 +11,7 @@ from .._common.arguments import real
 from ..errors import InvalidInput, near_names
 from ..estimate import UNITS, Driving
 from ..identify import Fit
-from ..read._units import factor_to
+from ..read.units import factor_to
 from .horizons import PREDICTED, Horizons, horizons
 from .validation import fitted_ahead
 

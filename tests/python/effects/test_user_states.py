@@ -18,7 +18,7 @@ from sysid_vehicle.effects.formula import EVERYTHING, evaluate, trace
 from sysid_vehicle.effects.slope import decay_of
 from sysid_vehicle.estimate.channels import has_channels, logged_channels
 from sysid_vehicle.model import Model
-from sysid_vehicle.simulate._drive import Drive, drive_truth
+from sysid_vehicle.simulate.drive import Drive, drive_truth
 
 QUIET = sv.SensorNoise.none()
 GAIN = sv.parameter("gain", "N/K", typical=30.0, lower=-500.0, upper=500.0)

@@ -13,7 +13,7 @@ import pytest
 import sysid_vehicle as sv
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.export import cpp_text, fmu_bytes, identified_vehicle, python_text, tir_text
-from sysid_vehicle.export._equations import _ACTS
+from sysid_vehicle.export.equations import _ACTS
 from sysid_vehicle.simulate import drive_truth
 from sysid_vehicle.twin import FMUTwin, FMUVariables
 

@@ -124,7 +124,7 @@ def vehicle(c: dict[str, Any]) -> dict[str, Any]:
         (lambda c: c.update(version="1"), ["version '1'"]),
         (lambda c: c.update(format="other"), ["no saved result of sysid_vehicle"]),
         (lambda c: tyre(c).update({"class": "cli.main:main"}), ["cannot make again"]),
-        (lambda c: tyre(c).update({"class": "log._log:warn"}), ["cannot make again"]),
+        (lambda c: tyre(c).update({"class": "log.log:warn"}), ["cannot make again"]),
         (lambda c: tyre(c).update({"class": "vehicle:Path"}), ["cannot make again"]),
         (lambda c: vehicle(c)["fields"].pop("mass_kg"), ["cannot make again"]),
         (lambda c: vehicle(c)["fields"].update(mass_kg=-1.0), ["mass_kg = -1 is out of range"]),

@@ -11,7 +11,7 @@ import pytest
 
 from sysid_vehicle import Log, Model, drive, lab, manoeuvres, published, read_log
 from sysid_vehicle.errors import InvalidInput, SysidWarning
-from sysid_vehicle.log._regression import find_lag, regress
+from sysid_vehicle.log.regression import find_lag, regress
 
 Columns = dict[str, np.ndarray]
 

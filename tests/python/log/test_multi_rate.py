@@ -9,7 +9,7 @@ from smooth_log import Columns, columns, make
 
 from sysid_vehicle.errors import SysidWarning
 from sysid_vehicle.log import Log
-from sysid_vehicle.log._held import blank_held, held_rows
+from sysid_vehicle.log.held import blank_held, held_rows
 
 
 @pytest.fixture

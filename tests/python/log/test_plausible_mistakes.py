@@ -247,6 +247,6 @@ def test_a_car_that_slides_has_no_wrong_ratio(monkeypatch: pytest.MonkeyPatch) -
         check=False,
     )
     check_car(sliding, mass_kg=1500.0, wheelbase_m=wheelbase_m)
-    monkeypatch.setattr("sysid_vehicle.log._against_car._SETTLING", 0)
+    monkeypatch.setattr("sysid_vehicle.log.against_car._SETTLING", 0)
     with pytest.raises(sv.InvalidInput, match="steer_rad is"):
         check_car(sliding, mass_kg=1500.0, wheelbase_m=wheelbase_m)

@@ -9,8 +9,8 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle import manoeuvres as m
-from sysid_vehicle.manoeuvres._manoeuvre import Manoeuvre
-from sysid_vehicle.manoeuvres._steady import slip_difference
+from sysid_vehicle.manoeuvres.manoeuvre import Manoeuvre
+from sysid_vehicle.manoeuvres.steady import slip_difference
 
 SHORT = m.double_lane_change(speeds_mps=(12.0,), offset_m=2.8, change_m=20.0, between_m=11.0)
 CAR = sv.example_vehicle()

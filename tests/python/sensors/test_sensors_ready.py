@@ -9,9 +9,10 @@ import pytest
 from scipy import signal
 
 import sysid_vehicle as sv
-from sysid_vehicle.sensors import _ready, made_ready
-from sysid_vehicle.sensors._apply import shifted
-from sysid_vehicle.sensors._condition import conditioned, low_passes
+from sysid_vehicle.sensors import made_ready
+from sysid_vehicle.sensors import ready as _ready
+from sysid_vehicle.sensors.apply import shifted
+from sysid_vehicle.sensors.condition import conditioned, low_passes
 
 SPEEDS, INERTIAL = ("vx_mps", "vy_mps"), ("yaw_rate_radps", "ax_mps2", "ay_mps2")
 MOTION = (*SPEEDS, *INERTIAL)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from ...manoeuvres import all as _manoeuvres
-from ._driven import Driven, OnManoeuvre, multi_sine, speed_ramp
-from ._excitation import Excitation
-from ._multisine import MultiSine
-from ._weaving import Weaving
+from .driven import Driven, OnManoeuvre, multi_sine, speed_ramp
+from .excitation import Excitation
+from .multisine import MultiSine
+from .weaving import Weaving
 
 __all__ = [
     "Driven",

@@ -1,0 +1,235 @@
+"""A log against the car's own numbers: wheel force over mass, steering angle over wheelbase.
+
+Channels may agree with each other and not with the vehicle file: a mass in pounds, a steering ratio
+that is not the car's, a length in feet. Identification would put all of that into the tyres.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._common.arrays import FloatArray
+from ..errors import InvalidInput, warn
+from ..vehicle import GRAVITY_MPS2
+from .laws import EXCITED, LINEAR_MPS2, OFFSET, WINDOW_S, Drive, size_of, spread_of
+from .log import Log
+from .longitudinal import ramp_on
+from .motion import Motion
+
+_MOVING = 5.0  # m/s
+_MIN_WINDOWS = 12
+_SETTLING = 1  # windows before and after harder driving
+_FAR = 2.5  # times the usual steering: beyond it an angle counts as that much
+_SURE = 3.0  # deviations
+_COHERENT = 0.6
+# What logs of good cars are off by: the commanded force by its gain and by slopes, the steering by
+# compliance and by tyres.
+_FORCE_STD, _FORCE_FACTOR = 0.45, 1.7
+_STEER_STD, _STEER_FACTOR = 0.2, 2.0
+_STEER_NEVER = 2.8  # whatever the differential
+_UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003  # rad of road wheels per m/s2
+_UNDERSTEER_MOST = 0.008  # rad per m/s2 either way: 4.5 deg/g, more than cars have
+_RATIOS = np.geomspace(1.0 / 128.0, 128.0, 281)
+_BLOCK, _FITTED = 6, 4  # windows that are taken as dependent; what is fitted to them
+# Squares left of the steering, as a multiple of the least and as a share of all, with which a ratio
+# is not excluded: that much may be the curvature of tyres' curves. With more no ratio is told.
+_LEFT, _UNEXPLAINED, _INCOHERENT = 4.0, 0.05, 0.7
+_TINY = 1e-12
+_NEAR = 0.2  # a unit is named where the factor is so near, as a logarithm
+
+_MASS_SLIPS = (
+    (1.0 / 0.45359237, "mass_kg seems to be in pounds: multiply it by 0.4536"),
+    (1e-3, "mass_kg seems to be in tonnes: multiply it by 1000"),
+    (4.4482216, "fx_n seems to be in pounds: put factor = 4.448222 for it in the channel map"),
+    (GRAVITY_MPS2, "fx_n seems to be in kilograms: put factor = 9.80665 for it in the channel map"),
+    (0.1, "fx_n seems to be ten times too large: put factor = 0.1 for it in the channel map"),
+)
+_LENGTH_SLIPS = (
+    (1.0 / 3.2808, "lf_m and lr_m seem to be in feet: multiply them by 0.3048"),
+    (1.0 / 39.37, "lf_m and lr_m seem to be in inches: multiply them by 0.0254"),
+)
+
+
+@dataclass(frozen=True)
+class _Told:
+    """A ratio that should be one, and the interval that surely holds it."""
+
+    ratio: float
+    low: float
+    high: float
+    place: str
+
+    def off(self, factor: float, usual: float) -> bool:
+        """Whether it is surely beyond a factor, where good cars are off by `usual`."""
+        size = abs(math.log(self.ratio))
+        towards_one = math.log(
+            self.ratio / self.low if self.ratio > 1.0 else self.high / self.ratio
+        )
+        return size > math.log(factor) and size > math.hypot(math.log1p(usual), towards_one)
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of its logarithm."""
+        return math.log(self.high / self.low) / (2.0 * _SURE)
+
+
+def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
+    """Refuse a log that is not one of this car: by its mass, by its wheelbase.
+
+    Of a steering angle that is off by less than a steering ratio or a unit it is warned: a locked
+    differential asks for twice the angle as well.
+
+    Raises
+    ------
+    InvalidInput
+        The message names key and channel, what the log tells, and the likely remedy.
+    """
+    columns = {name: log[name] for name in log.channels if name not in log.extras}
+    drive = _driven(columns, log.rate_hz)
+    if drive is None:
+        return
+    mass = _mass(drive, mass_kg) if log.has("fx_n") else None
+    if mass is not None and mass.off(_FORCE_FACTOR, _FORCE_STD):
+        likely = _likely(mass, _MASS_SLIPS) or (
+            "check mass_kg, and that fx_n is the force of all wheels together; leave fx_n out if "
+            "it is only an estimate"
+        )
+        raise InvalidInput(
+            f"{log.name}: mass_kg = {mass_kg:g}, but fx_n moves the car as if it had "
+            f"{mass_kg / mass.ratio:.4g} kg, {mass.place}; {likely}"
+        )
+    steer = _steer(drive, wheelbase_m)
+    if steer is not None and steer.off(_STEER_FACTOR, _STEER_STD):
+        likely = _likely(steer, _LENGTH_SLIPS) or (
+            f"if it was made from the angle of the steering wheel, the steering ratio is about "
+            f"{steer.ratio:.2g} times the one that was taken: put factor = {1.0 / steer.ratio:.3g} "
+            f"times the present one in the channel map; else check lf_m and lr_m"
+        )
+        said = (
+            f"{log.name}: steer_rad is {steer.ratio:.3g} times what a wheelbase of "
+            f"{wheelbase_m:g} m (lf_m + lr_m) asks for, {steer.place}; {likely}"
+        )
+        if abs(math.log(steer.ratio)) > math.log(_STEER_NEVER):
+            raise InvalidInput(said)
+        warn(said)
+
+
+def times_wheelbase(
+    columns: Mapping[str, FloatArray], rate_hz: float, wheelbase_m: float
+) -> float | None:
+    """Steering angle over the one that a wheelbase asks for at low a_y; None where nothing tells.
+
+    Parameters
+    ----------
+    columns : mapping of ndarray, shape (n,)
+        `time_s`, `vx_mps`, `yaw_rate_radps`, `ay_mps2` and `steer_rad` on a uniform grid.
+    rate_hz : float
+        Rate of the grid.
+    wheelbase_m : float
+    """
+    drive = _driven(columns, rate_hz)
+    told = None if drive is None else _steer(drive, wheelbase_m)
+    return None if told is None else told.ratio
+
+
+def _driven(columns: Mapping[str, FloatArray], rate_hz: float) -> Drive | None:
+    motion = Motion(columns, rate_hz)
+    motion.windows(WINDOW_S)
+    rows = motion.usable & (motion.mean(motion.channels["vx_mps"]) > _MOVING)
+    return Drive(motion, rows) if np.count_nonzero(rows) >= _MIN_WINDOWS else None
+
+
+def _mass(drive: Drive, mass_kg: float) -> _Told | None:
+    """Mass of the vehicle file over that of the log, ``dv/dt = F / m - ...``."""
+    ramp, force, found = ramp_on(drive, "fx_n")
+    inverse = float(found.coefficients[0])
+    if spread_of(ramp) < EXCITED or found.coherence < _COHERENT or inverse <= 0.0:
+        return None
+    ratio, deviation = mass_kg * inverse, _SURE * float(found.deviations[0]) / inverse
+    return _Told(ratio, ratio / (1.0 + deviation), ratio * (1.0 + deviation), drive.place(force))
+
+
+def _steer(drive: Drive, wheelbase_m: float) -> _Told | None:
+    """Steering angle over the one of a wheelbase, ``delta = L r / v + K a_y`` at low a_y."""
+    c = drive.motion.channels
+    ay = drive.mean(c["ay_mps2"])
+    hard = np.abs(ay) >= LINEAR_MPS2
+    # A car that slides, or catches itself, does not steer by the wheelbase, whatever its a_y is.
+    gentle = np.convolve(hard, np.ones(2 * _SETTLING + 1), mode="same") < 0.5
+    spare = float(np.count_nonzero(gentle)) / _BLOCK - _FITTED
+    if spare < 1.0 or size_of(ay[gentle]) < EXCITED:
+        return None
+    steer = drive.mean(c["steer_rad"])
+    curvature = drive.mean(c["yaw_rate_radps"] / np.clip(c["vx_mps"], 1.0, None))
+    yaw = drive.change(c["yaw_rate_radps"])
+    # Front tyres that slip ask for any angle at little a_y: no bend decides alone.
+    size = np.abs(steer)
+    usual = _FAR * float(np.median(size[gentle & (np.abs(ay) >= EXCITED)]))
+    even = np.minimum(1.0, usual / np.maximum(size, _TINY))[gentle, None]
+    columns = np.column_stack([steer, wheelbase_m * curvature, ay, np.ones(ay.size)])[gentle]
+    columns *= even
+    yaw = even * yaw[gentle, None]
+    columns -= yaw * (yaw.T @ columns / max(float(np.sum(yaw**2)), _TINY))
+    squares = columns.T @ columns
+    offset = OFFSET * size_of(steer[gentle])
+    noise = float(_left(squares, offset, 0.0).min()) / spare
+    left = _left(squares, offset, noise)
+    best = int(np.argmin(left))
+    whole = float(squares[0, 0])
+    if best in (0, _RATIOS.size - 1) or left[best] > _INCOHERENT * whole:
+        return None
+    most = max(_LEFT * left[best], left[best] + _SURE**2 * noise, _UNEXPLAINED * whole)
+    inside = _RATIOS[left <= most]
+    return _Told(
+        float(_RATIOS[best]), float(inside[0]), float(inside[-1]), drive.place(steer[gentle])
+    )
+
+
+def _left(squares: FloatArray, offset: float, noise: float) -> FloatArray:
+    """Return the squares that each of `_RATIOS` leaves of the steering.
+
+    Beside the ratio stand an understeer gradient, which the ratio scales too, and an offset, both
+    within what cars have: at one speed understeer looks like another wheelbase, on one radius an
+    offset does. Between ratios that explain the steering alike the usual understeer decides, with
+    the weight of the noise.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (4, 4)
+        Products of the steering angle, the one of the wheelbase, a_y, and one.
+    offset : float
+        At most, either way [rad].
+    noise : float
+        Squares that one independent reading leaves [rad2]; zero leaves the usual understeer out.
+    """
+    s = _RATIOS
+    weight = noise / (s * _UNDERSTEER_STD) ** 2
+    k, o = _UNDERSTEER_MOST * np.maximum(s, 1.0), np.full(s.size, offset)
+    aa, ao, oo = squares[2, 2] + weight, squares[2, 3], squares[3, 3]
+    ra = squares[0, 2] - s * squares[1, 2] + weight * s * _UNDERSTEER
+    ro = squares[0, 3] - s * squares[1, 3]
+    alone = squares[0, 0] - 2.0 * s * squares[0, 1] + s**2 * squares[1, 1]
+    alone += weight * (s * _UNDERSTEER) ** 2
+
+    def left(understeer: FloatArray, shift: FloatArray) -> FloatArray:
+        both = aa * understeer**2 + 2.0 * ao * understeer * shift + oo * shift**2
+        result: FloatArray = alone + both - 2.0 * (ra * understeer + ro * shift)
+        return result
+
+    # A convex function over a rectangle is least at its minimum or on an edge.
+    free = np.maximum(aa * oo - ao**2, _TINY * aa * oo)
+    understeer, shift = (oo * ra - ao * ro) / free, (aa * ro - ao * ra) / free
+    inside = (np.abs(understeer) <= k) & (np.abs(shift) <= o)
+    edges = [left(e, np.clip((ro - ao * e) / oo, -o, o)) for e in (-k, k)]
+    edges += [left(np.clip((ra - ao * e) / aa, -k, k), e) for e in (-o, o)]
+    return np.where(inside, left(understeer, shift), np.min(edges, axis=0))
+
+
+def _likely(told: _Told, slips: tuple[tuple[float, str], ...]) -> str:
+    near = [(abs(math.log(told.ratio / factor)), text) for factor, text in slips]
+    off, text = min(near)
+    return text if off < max(_NEAR, told.deviation) else ""

@@ -1,0 +1,143 @@
+"""Checks that warn: holes, frozen sensors, and drives in which nothing happens."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from .._common.arrays import FloatArray, filled
+from .channels import CHANNELS
+from .grid import between, own_period
+from .signals import runs, smoothed
+
+_NAN_BLOCK_S = 0.5
+_FROZEN_S = 1.0
+_MIN_RATE_HZ = 20.0
+_EXCITED_AY_MPS2 = 0.5
+_EXCITED_STEER_RAD = 0.002
+# What a channel must have missed, in its reference's unit, before a constant run counts as frozen.
+_FROZEN_MISSES = {"ay_mps2": 1.0, "yaw_rate_radps": 1.0, "vx_mps": 2.0, "ax_mps2": 2.0}
+
+
+def nan_block_notes(time_s: FloatArray, columns: Mapping[str, FloatArray]) -> list[str]:
+    """Return one note per channel that lacks values for half a second and two of its periods."""
+    notes = []
+    for name, values in columns.items():
+        if name not in CHANNELS:
+            continue
+        holes = runs(np.isnan(values))
+        # Between the samples of a slow channel nothing is missing.
+        longest = max(_NAN_BLOCK_S, 2.0 * own_period(time_s, values)) if holes else 0.0
+        blocks = [(a, b) for a, b in holes if time_s[b - 1] - time_s[a] > longest]
+        if not blocks:
+            continue
+        a, b = blocks[0]
+        effect = (
+            "no run of the model goes across this"
+            if name in ("steer_rad", "fx_n")
+            else "nothing is compared there"
+        )
+        more = f" and in {len(blocks) - 1} more blocks" if len(blocks) > 1 else ""
+        notes.append(
+            f"{name}: no values at {between(a, b, time_s)}{more}; {effect}; check the sensor, "
+            f"or cut the log there"
+        )
+    return notes
+
+
+def low_rate_note(rate_hz: float) -> list[str]:
+    """Return a note if the log is too coarse for the yaw dynamics of a car."""
+    if rate_hz >= _MIN_RATE_HZ:
+        return []
+    note = (
+        f"time_s: the rate is only {rate_hz:.4g} Hz; a car answers to steering within 0.1 to 0.3 s,"
+        f" so record at {_MIN_RATE_HZ:.0f} Hz or more"
+    )
+    return [note]
+
+
+def excitation_note(columns: Mapping[str, FloatArray], rate_hz: float) -> str:
+    """Return why lateral parameters cannot be determined from the log, or ``""``."""
+    width = round(0.5 * rate_hz)
+    ay = np.abs(smoothed(columns["ay_mps2"], width)).max()
+    low, high = np.nanpercentile(columns["steer_rad"], (0.5, 99.5))
+    if ay >= _EXCITED_AY_MPS2 and high - low >= _EXCITED_STEER_RAD:
+        return ""
+    return (
+        f"steer_rad and ay_mps2: not excited (steering varies by {high - low:.2g} rad, lateral "
+        f"acceleration reaches {ay:.2g} m/s2 over the whole log): lateral parameters cannot be "
+        f"determined; drive corners"
+    )
+
+
+def frozen_notes(columns: Mapping[str, FloatArray], rate_hz: float, excited: bool) -> list[str]:
+    """Return one note per channel that is constant while the car demonstrably moves.
+
+    Without lateral excitation the lateral channels may well be constant, so only the others are
+    looked at then.
+    """
+    time_s = columns["time_s"]
+    lateral = ("steer_rad", "yaw_rate_radps", "ay_mps2", "vy_mps")
+    references = _references(columns, rate_hz)
+    notes = []
+    for name in CHANNELS:
+        if name == "time_s" or name not in columns or (name in lateral and not excited):
+            continue
+        values = columns[name]
+        known = values[np.isfinite(values)]
+        if known.min() == known.max():
+            notes.append(
+                f"{name}: constant ({known[0]:.6g}) over all {between(0, values.size, time_s)}; "
+                f"check the sensor and the column"
+                + (", or leave it out" if CHANNELS[name].without else "")
+            )
+        elif name in references:
+            a, b = _longest_frozen(values, references[name], _FROZEN_MISSES[name], rate_hz)
+            if b > a:
+                notes.append(
+                    f"{name}: frozen at {values[a]:.6g} at {between(a, b, time_s)} while the car "
+                    f"moves on; empty these cells so that they count as missing"
+                )
+    return notes
+
+
+def _references(columns: Mapping[str, FloatArray], rate_hz: float) -> dict[str, FloatArray]:
+    """Return for some channels another one that cannot move while they stand still."""
+    width = round(0.2 * rate_hz)
+    references = {
+        "ay_mps2": smoothed(filled(columns["vx_mps"]) * filled(columns["yaw_rate_radps"]), width),
+        "yaw_rate_radps": smoothed(columns["ay_mps2"], width),
+    }
+    if "ax_mps2" in columns:
+        ax = smoothed(columns["ax_mps2"], width)
+        references["vx_mps"] = ax
+        speed = smoothed(columns["vx_mps"], width)
+        references["ax_mps2"] = np.gradient(speed, 1.0 / rate_hz)
+    return references
+
+
+def _longest_frozen(
+    values: FloatArray, reference: FloatArray, miss: float, rate_hz: float
+) -> tuple[int, int]:
+    """Return the longest run of equal values over which `reference` varies by more than `miss`."""
+    shortest = _FROZEN_S * rate_hz
+    best = (0, 0)
+    for a, b in runs(np.diff(values) == 0.0):
+        stop = b + 1
+        if stop - a > max(shortest, best[1] - best[0]) and np.ptp(reference[a:stop]) > miss:
+            best = (a, stop)
+    return best
+
+
+def usable_seconds(columns: Mapping[str, FloatArray], rate_hz: float) -> float:
+    """Return how long the car moves (> 0.5 m/s) with a known steering angle."""
+    moving = np.abs(filled(columns["vx_mps"])) > 0.5
+    return float(np.count_nonzero(moving & np.isfinite(columns["steer_rad"])) / rate_hz)
+
+
+def listing(times: Iterable[float], shown: int = 5) -> str:
+    """Return the first few times as ``1.2, 3.4, ... s``."""
+    times = list(times)
+    text = ", ".join(f"{t:.6g}" for t in times[:shown])
+    return text + (", ... s" if len(times) > shown else " s")

@@ -1,0 +1,164 @@
+"""What the laws of motion say of a drive: the windows, the fits, and how a misfit is told."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._common.arrays import FloatArray
+from ..errors import InvalidInput
+from .motion import Motion
+from .regression import Regression, regress
+
+WINDOW_S = 1.0
+EXCITED = 0.5  # m/s2 that one side must reach before anything is compared
+# Scale errors of good sensors, gravity through roll, and geometry that is not known.
+SCALE_STD = 0.12
+LINEAR_MPS2 = 5.0  # lateral acceleration up to which tyres are nearly linear
+OFFSET = 0.3  # of the steering angle, as a share of its size
+
+_NOT_ONE = 5.0  # deviations from the right unit before another is looked for
+_FITS = 3.0  # deviations within which another unit fits
+_UNNAMED = math.log(2.5)  # a scale that is farther off is refused although no unit explains it
+
+Slip = tuple[str, str, str]
+Slips = tuple[tuple[float, tuple[Slip, ...]], ...]
+VX_KMH: Slip = ("vx_mps", "km/h", "factor = 0.2777778")
+VX_MPH: Slip = ("vx_mps", "miles per hour", "factor = 0.44704")
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Windows of a drive in which the car moves, and what the laws of motion say there."""
+
+    motion: Motion
+    rows: np.ndarray
+
+    def mean(self, values: FloatArray) -> FloatArray:
+        """Means over the windows in use."""
+        result: FloatArray = self.motion.mean(values)[self.rows]
+        return result
+
+    def change(self, values: FloatArray) -> FloatArray:
+        """Mean rates of change over the windows in use [1/s]."""
+        result: FloatArray = self.motion.change(values)[self.rows]
+        return result
+
+    def place(self, driver: FloatArray) -> str:
+        """Return where the driver is largest, for messages."""
+        where = self.motion.times_s[self.rows][int(np.argmax(np.abs(driver)))]
+        return f"most clearly around t = {where:.6g} s"
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """What a channel says against the others.
+
+    Attributes
+    ----------
+    channel : str
+        That is wrong, or the first of several that may be.
+    text : str
+        What is wrong, where, and the likely remedy.
+    late_s : float
+        By how much the channel comes late; negative where it comes early, zero where the time is
+        not what is wrong.
+    on_the_level : bool
+        Whether a road that climbs or falls would explain it.
+    """
+
+    channel: str
+    text: str
+    late_s: float = 0.0
+    on_the_level: bool = False
+
+
+class Implausible(InvalidInput):
+    """A log is refused for the contradiction that it holds."""
+
+    def __init__(self, channel: str, text: str) -> None:
+        super().__init__(text)
+        self.contradiction = Contradiction(channel, text)
+
+
+class KnownUnit(Implausible):
+    """A unit that explains what does not fit."""
+
+
+def ones(drive: Drive) -> FloatArray:
+    """The column of a constant."""
+    return np.ones(np.count_nonzero(drive.rows))
+
+
+def fit(
+    y: FloatArray, columns: list[FloatArray], spread: list[float], mean: list[float] | None = None
+) -> Regression:
+    """Regress with normal priors of these standard deviations on the coefficients."""
+    prior = np.zeros(len(columns)) if mean is None else np.array(mean)
+    return regress(y, np.column_stack(columns), prior, np.array(spread))
+
+
+def size_of(values: FloatArray) -> float:
+    """A size that few values exceed."""
+    return float(np.percentile(np.abs(values), 95))
+
+
+def spread_of(values: FloatArray) -> float:
+    """The same about the median."""
+    return size_of(values - np.median(values))
+
+
+def cosine(x: FloatArray, y: FloatArray) -> float:
+    """Cosine of the angle between two signals, 0 where one is nothing."""
+    size = float(np.linalg.norm(x) * np.linalg.norm(y))
+    return float(x @ y) / size if size > 0.0 else 0.0
+
+
+def wrong_sign(channel: str, what: str, values: FloatArray, drive: Drive) -> Implausible:
+    """What is said of a channel with the opposite sign."""
+    return Implausible(
+        channel,
+        f"{channel}: wrong sign: it {what}, {drive.place(values)} "
+        f"(ISO 8855: x forward, y and yaw to the left); put factor = -1 in the channel map",
+    )
+
+
+def check_scale(
+    ratio: float,
+    deviation: float,
+    usual: float,
+    slips: Slips,
+    channel: str,
+    formula: str,
+    driver: FloatArray,
+    drive: Drive,
+    inverse: bool = False,
+) -> None:
+    """Refuse a coefficient that is far from one, by the unit that explains it best.
+
+    Where no unit explains it, `channel` is told.
+
+    The logarithm of the ratio is taken as normal about that of each unit, with the deviation of
+    the fit and the `usual` one of sensors; compared are the likelihoods.
+    """
+    deviation = math.hypot(usual, deviation / ratio)
+    off = abs(math.log(ratio)) / deviation
+    best, channels = min(slips, key=lambda slip: abs(math.log(ratio / slip[0])))
+    miss = abs(math.log(ratio / best)) / deviation
+    shown = 1.0 / ratio if inverse else ratio
+    if off > _NOT_ONE and miss < _FITS and off**2 - miss**2 > _NOT_ONE**2:
+        units = " and ".join(f"{name}: seems to be in {unit}" for name, unit, _ in channels)
+        remedy = " and ".join(f"{factor} for {name}" for name, _, factor in channels)
+        raise KnownUnit(
+            channels[0][0],
+            f"{units}: {formula} is {shown:.3g} instead of about 1, {drive.place(driver)}; put "
+            f"{remedy} in the channel map",
+        )
+    if off > _NOT_ONE and abs(math.log(ratio)) > _UNNAMED:
+        raise Implausible(
+            channel,
+            f"{formula} is {shown:.3g} instead of about 1, {drive.place(driver)}; check the units "
+            f"of these channels and put their factors in the channel map",
+        )

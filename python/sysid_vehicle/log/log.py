@@ -1,0 +1,380 @@
+"""The driving log: named channels of one run on a uniform time grid."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._common.arguments import expect
+from .._common.arrays import FloatArray, filled
+from .._common.files import write_text
+from .._common.tables import dataset, frame
+from ..errors import InvalidInput, near_names, warn
+from .build import build
+from .channels import CHANNELS
+from .checks import excitation_note
+from .columns import Columns
+from .laws import Contradiction
+from .plausibility import contradictions
+from .signals import runs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_HEADINGS = ("channel", "unit", "min", "max", "missing %")
+_SHOWN = ("vx_mps", "steer_rad", "yaw_rate_radps", "ay_mps2", "ax_mps2", "vy_mps", "fx_n")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Log:
+    """One run of the car; build it with :meth:`from_arrays` or ``read_log``.
+
+    Channels (ISO 8855 axes, SI, radians): ``time_s``, ``vx_mps``, ``vy_mps``, ``yaw_rate_radps``,
+    ``ax_mps2``, ``ay_mps2`` (specific force at the CG, as an accelerometer feels it),
+    ``steer_rad`` (road wheel, positive left), ``fx_n`` (total commanded wheel force, drive
+    positive, brake negative, before drag and rolling resistance). ``vy_mps``, ``ax_mps2`` and
+    ``fx_n`` may be absent, but not both of the latter. Other numeric columns are kept under their
+    own names. NaN is a missing measurement.
+
+    Attributes
+    ----------
+    name : str
+        Name of the run in messages, tables and plots.
+    rate_hz : float
+        Sample rate of the uniform grid.
+    uniform : bool
+        Whether the source was uniform; False if it was resampled or gaps were filled with NaN.
+    corrections : tuple of str
+        What was put right in the channels after they had been read, a sentence each.
+    """
+
+    name: str
+    rate_hz: float
+    uniform: bool
+    _data: dict[str, FloatArray]
+    corrections: tuple[str, ...] = ()
+
+    @classmethod
+    def from_arrays(
+        cls,
+        data: Columns,
+        *,
+        name: str = "log",
+        despike: Iterable[str] = (),
+        check: bool = True,
+    ) -> Log:
+        """Build a log from a mapping of arrays; a DataFrame works as it is.
+
+        Parameters
+        ----------
+        data : mapping of array_like, shape (n,)
+            Canonical channels, and any others.
+        name : str
+            Name of the run.
+        despike : iterable of str
+            Channels in which isolated one-sample spikes and dropouts, short readings that no car
+            reaches, become missing values.
+        check : bool
+            Whether to look for wrong units, wrong signs, frozen sensors, a log that is too short,
+            too slow or without corners. False suits simulated pieces. The order of time, the
+            presence of channels and holes are looked at in any case.
+
+        Raises
+        ------
+        InvalidInput
+            If the data cannot be used; the message names channel, sample, time and remedy.
+
+        Warns
+        -----
+        SysidWarning
+            If the data can be used but something was corrected or looks implausible.
+        """
+        built = build(data, name, despike, check)
+        return cls(name, built.rate_hz, built.uniform, built.channels)
+
+    @property
+    def n(self) -> int:
+        """Number of samples."""
+        return self._data["time_s"].size
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first to the last sample."""
+        time_s = self._data["time_s"]
+        return float(time_s[-1] - time_s[0])
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the canonical channels that are present, then of the other columns."""
+        return tuple(self._data)
+
+    @property
+    def extras(self) -> tuple[str, ...]:
+        """Names of the columns that are not canonical channels."""
+        return tuple(name for name in self._data if name not in CHANNELS)
+
+    @cached_property
+    def contradictions(self) -> tuple[Contradiction, ...]:
+        """What is wrong with the channels by the laws of motion: unit, sign, order, time.
+
+        The same that reading refuses or warns of; a log that was read with ``check=False`` may have
+        some. Empty where the driving does not show it.
+        """
+        with np.errstate(over="ignore"):
+            return contradictions(self._data, self.rate_hz)
+
+    def has(self, channel: str) -> bool:
+        """Tell whether the channel is present."""
+        return channel in self._data
+
+    def __getitem__(self, channel: str) -> FloatArray:
+        """Return a channel as a read-only float64 array of shape (n,).
+
+        Raises
+        ------
+        InvalidInput
+            If the channel is absent; the message gives near names.
+        """
+        try:
+            return self._data[channel]
+        except KeyError:
+            known = CHANNELS.get(channel)
+            hint = near_names(channel, self._data)
+            lost = f"; without it {known.without}" if known is not None and known.without else ""
+            raise InvalidInput(
+                f"{self.name}: there is no channel '{channel}'{hint}{lost}; "
+                f"present are {', '.join(self._data)}"
+            ) from None
+
+    def __len__(self) -> int:
+        return self.n
+
+    def between(self, t0: float, t1: float) -> Log:
+        """Return the part with ``t0 <= time_s <= t1``; time keeps its origin.
+
+        Raises
+        ------
+        InvalidInput
+            If fewer than two samples lie in that range.
+        """
+        time_s = self._data["time_s"]
+        slack = 1e-6 / self.rate_hz
+        first = int(np.searchsorted(time_s, t0 - slack))
+        last = int(np.searchsorted(time_s, t1 + slack))
+        if last - first < 2:
+            raise InvalidInput(
+                f"{self.name}: fewer than two samples lie between {t0:g} and {t1:g} s; the log "
+                f"goes from {time_s[0]:.6g} to {time_s[-1]:.6g} s"
+            )
+        part = {name: values[first:last] for name, values in self._data.items()}
+        name = f"{self.name} [{time_s[first]:.6g} to {time_s[last - 1]:.6g} s]"
+        return Log(name, self.rate_hz, self.uniform, part, self.corrections)
+
+    def corrected(self, channels: Mapping[str, FloatArray], what: Sequence[str]) -> Log:
+        """Return the log with some channels replaced, and with what was done recorded.
+
+        Parameters
+        ----------
+        channels : mapping of ndarray, shape (n,)
+            New values of channels that are present.
+        what : sequence of str
+            Sentences for `corrections`.
+        """
+        data = dict(self._data)
+        for name, values in channels.items():
+            if values.shape != self[name].shape:
+                raise InvalidInput(
+                    f"{self.name}: {name} has {values.size} corrected samples; give {self.n}"
+                )
+            data[name] = np.array(values, dtype=float)
+            data[name].flags.writeable = False
+        return Log(self.name, self.rate_hz, self.uniform, data, (*self.corrections, *what))
+
+    def missing(self) -> dict[str, str]:
+        """Return each absent optional channel with what cannot be seen without it, in words."""
+        return {
+            name: channel.without
+            for name, channel in CHANNELS.items()
+            if channel.without and name not in self._data
+        }
+
+    def stretches(self, min_speed_mps: float = 3.0, min_duration_s: float = 1.0) -> list[slice]:
+        """Return the contiguous sample ranges in which the model can run.
+
+        Parameters
+        ----------
+        min_speed_mps : float
+            The car must be at least this fast; where ``vx_mps`` is missing its neighbours decide.
+        min_duration_s : float
+            Shorter ranges are left out.
+
+        Returns
+        -------
+        list of slice
+            Ranges in which the steering angle and the longitudinal input (``fx_n``, or
+            ``ax_mps2`` in a log without it) are known. Missing measurements break nothing.
+        """
+        drive = "fx_n" if self.has("fx_n") else "ax_mps2"
+        usable = filled(self["vx_mps"]) >= min_speed_mps
+        usable &= np.isfinite(self["steer_rad"]) & np.isfinite(self[drive])
+        shortest = min_duration_s * self.rate_hz - 1e-6
+        return [slice(a, b) for a, b in runs(usable) if b - 1 - a >= shortest]
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write all channels as CSV that ``read_log`` reads; complete or not at all.
+
+        Numbers are written so that they are read back exactly; missing values are empty cells.
+        """
+        columns = [
+            ["" if text == "nan" else text for text in map(repr, values.tolist())]
+            for values in self._data.values()
+        ]
+        lines = [",".join(_quoted(name) for name in self._data)]
+        lines += map(",".join, zip(*columns, strict=True))
+        write_text(path, "\n".join(lines) + "\n")
+
+    def to_pandas(self) -> Any:
+        """A DataFrame of all channels over ``time_s``."""
+        return frame(self._data, "time_s")
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset of all channels over ``time_s``, with units."""
+        units = {name: CHANNELS[name].unit if name in CHANNELS else "" for name in self._data}
+        rest = {n: (("time_s",), v, units[n]) for n, v in self._data.items() if n != "time_s"}
+        return dataset(rest, {"time_s": (self["time_s"], "s")}, self.name)
+
+    def _title(self) -> str:
+        return f"{self.name}: {self.duration_s:.6g} s at {self.rate_hz:.4g} Hz, {self.n} samples"
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        rows: list[tuple[str, ...]] = []
+        for name, values in self._data.items():
+            known = values[np.isfinite(values)]
+            unit = CHANNELS[name].unit if name in CHANNELS else ""
+            low, high = (f"{known.min():.4g}", f"{known.max():.4g}") if known.size else ("", "")
+            rows.append((name, unit, low, high, f"{100.0 * (1.0 - known.size / self.n):.3g}"))
+        return rows
+
+    def __str__(self) -> str:
+        rows = [_HEADINGS, *self._rows()]
+        widths = [max(len(row[k]) for row in rows) for k in range(len(_HEADINGS))]
+        lines = [
+            "  "
+            + "  ".join(
+                text.ljust(width) if k < 2 else text.rjust(width)
+                for k, (text, width) in enumerate(zip(row, widths, strict=True))
+            )
+            for row in rows
+        ]
+        lines += [f"  absent: {name}: {lost}" for name, lost in self.missing().items()]
+        lines += [f"  corrected: {text}" for text in self.corrections]
+        return "\n".join([self._title(), *lines])
+
+    def __repr__(self) -> str:
+        return f"<Log {self._title()}>"
+
+    def _repr_html_(self) -> str:
+        def cells(tag: str, row: Iterable[str]) -> str:
+            return "".join(f"<{tag}>{html.escape(text)}</{tag}>" for text in row)
+
+        body = "".join(f"<tr>{cells('td', row)}</tr>" for row in self._rows())
+        absent = "".join(
+            f"<p>absent: {html.escape(name)}: {html.escape(lost)}</p>"
+            for name, lost in self.missing().items()
+        )
+        absent += "".join(f"<p>corrected: {html.escape(text)}</p>" for text in self.corrections)
+        return (
+            f"<table><caption>{html.escape(self._title())}</caption>"
+            f"<tr>{cells('th', _HEADINGS)}</tr>{body}</table>{absent}"
+        )
+
+    def plot(self, axes: Sequence[Axes] | None = None) -> Sequence[Axes]:
+        """Draw the canonical channels over time, one below the other.
+
+        Parameters
+        ----------
+        axes : sequence of matplotlib Axes, optional
+            One per canonical channel except time; a new figure is made without them.
+
+        Returns
+        -------
+        sequence of matplotlib Axes
+        """
+        names = [name for name in _SHOWN if self.has(name)]
+        if axes is None:
+            from matplotlib import pyplot
+
+            figure, grid = pyplot.subplots(
+                len(names),
+                1,
+                sharex=True,
+                squeeze=False,
+                layout="constrained",
+                figsize=(8.0, 1.4 * len(names)),
+            )
+            figure.suptitle(self.name)
+            axes = list(grid[:, 0])
+        if len(axes) != len(names):
+            raise InvalidInput(f"{self.name}: plot needs {len(names)} axes, got {len(axes)}")
+        for ax, name in zip(axes, names, strict=True):
+            ax.plot(self["time_s"], self[name], linewidth=0.8)
+            ax.set_ylabel(name)
+            ax.grid(visible=True, alpha=0.3)
+        axes[-1].set_xlabel("time_s")
+        return axes
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"' if any(c in name for c in ',"\n') else name
+
+
+def check_excitation(logs: Log | Sequence[Log]) -> bool:
+    """Warn if none of the runs holds corners, so that lateral parameters cannot be determined.
+
+    Parameters
+    ----------
+    logs : Log or sequence of Log
+        Runs that are identified together.
+
+    Returns
+    -------
+    bool
+        Whether at least one run is excited.
+
+    Warns
+    -----
+    SysidWarning
+        If none is; the message tells how far steering and lateral acceleration went.
+    """
+    together = several_logs(logs, "check_excitation")
+    notes = []
+    for log in together:
+        columns: dict[str, Any] = {name: log[name] for name in ("ay_mps2", "steer_rad")}
+        notes.append(excitation_note(columns, log.rate_hz))
+    if not notes or not all(notes):
+        return bool(notes)
+    warn("; ".join(f"{log.name}: {note}" for log, note in zip(together, notes, strict=True)))
+    return False
+
+
+def several_logs(logs: Log | Sequence[Log], function: str = "driving") -> tuple[Log, ...]:
+    """One log or many as many, as they were given to a function.
+
+    Raises
+    ------
+    InvalidInput
+        There is none, or something else; the message says what to make of that.
+    """
+    single = isinstance(logs, Log | str | Mapping) or hasattr(logs, "columns")
+    found: tuple[Any, ...] = tuple(logs) if isinstance(logs, Iterable) and not single else (logs,)
+    if not found:
+        raise InvalidInput(f"{function}: no log was given; pass one Log or a list of them")
+    for log in found:
+        expect(log, Log, function)
+    return found

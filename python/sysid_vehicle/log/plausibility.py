@@ -1,0 +1,306 @@
+"""Wrong units, wrong signs and channels that do not belong together, by the laws of motion.
+
+``d(vy)/dt = ay - vx yaw_rate`` and ``d(vx)/dt = ax + vy yaw_rate`` hold for every car. Each is
+fitted robustly; the coefficient that should be one is compared, with its own uncertainty, with what
+it would be in each unit that logs are written in. A unit is only called wrong if another one is
+far likelier and fits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from .._common.arrays import FloatArray
+from ..vehicle import GRAVITY_MPS2
+from .channels import DEG
+from .clock import clock_notes
+from .lags import lag_notes
+from .laws import (
+    EXCITED,
+    LINEAR_MPS2,
+    OFFSET,
+    SCALE_STD,
+    VX_KMH,
+    VX_MPH,
+    WINDOW_S,
+    Contradiction,
+    Drive,
+    Implausible,
+    KnownUnit,
+    Slips,
+    check_scale,
+    cosine,
+    fit,
+    ones,
+    size_of,
+    spread_of,
+    wrong_sign,
+)
+from .longitudinal import check_force, check_longitudinal, held_speed_note
+from .motion import Motion
+from .ranges import WHITE, blank, check_lost, check_ranges, dropouts
+
+_MOVING = 3.0  # in whatever unit vx has; only windows above are compared
+_MIN_WINDOWS = 8
+_SLIDING = 0.2  # m/s2, the same for the change of vy, which is a small part of ay
+_ABOVE_NOISE = 6.0  # noise of the regressor itself makes every coefficient too small
+_CLEARLY = 1.5  # m/s2 that it must reach before channels are called unrelated
+
+# Lever arms and roll bend the lateral speed more than the accelerations.
+_SLIDE_STD = 0.35
+
+# The wheelbase that answers, from karts to coaches [m], what understeer adds [m/(m/s)^2], how far
+# they vary, and the deviations from them at which the steering angle is none of road wheels.
+_WHEELBASE_M, _WHEELBASE_STD = 2.9, 0.45
+_UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003
+_NOT_A_WHEELBASE = 3.5
+_LEAST_OFFSET_RAD = 1e-6  # a steering angle that stays at zero has no size
+
+_YAW_DEG = ("yaw_rate_radps", "degrees per second", f"factor = {DEG}")
+_AY_G = ("ay_mps2", "g", "factor = 9.80665")
+_VY_KMH = ("vy_mps", "km/h", "factor = 0.2777778")
+_VY_MPH = ("vy_mps", "miles per hour", "factor = 0.44704")
+_RAD, _G = math.pi / 180.0, GRAVITY_MPS2
+
+_LATERAL_SLIPS: Slips = (
+    (_RAD, (_YAW_DEG,)),
+    (1.0 / _G, (_AY_G,)),
+    (1.0 / 3.6, (VX_KMH,)),
+    (0.44704, (VX_MPH,)),
+    (_RAD / _G, (_YAW_DEG, _AY_G)),
+    (_RAD / 3.6, (_YAW_DEG, VX_KMH)),
+    (1.0 / _G / 3.6, (_AY_G, VX_KMH)),
+    (_RAD / _G / 3.6, (_YAW_DEG, _AY_G, VX_KMH)),
+)
+_SLIDING_SLIPS: Slips = ((3.6, (_VY_KMH,)), (1.0 / 0.44704, (_VY_MPH,)))
+
+
+def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[Contradiction]:
+    """Refuse channels in a wrong unit, with a wrong sign, or that belong to another drive.
+
+    Parameters
+    ----------
+    columns : mapping of ndarray, shape (n,)
+        Canonical channels on a uniform grid, `time_s` among them.
+    rate_hz : float
+        Rate of the grid.
+
+    Returns
+    -------
+    list of Contradiction
+        What looks implausible.
+
+    Raises
+    ------
+    InvalidInput
+        For the first channel that cannot be right; the message names channel, time and remedy.
+    """
+    implausible: list[Contradiction] = []
+    clock: list[Contradiction] = []
+    lost = {name: dropouts(name, values) for name, values in columns.items()}
+    given, columns = columns, blank(columns, lost)
+    motion = Motion(columns, rate_hz)
+    motion.windows(WINDOW_S)
+    speed = motion.mean(motion.channels["vx_mps"])
+    rows = motion.usable & (np.abs(speed) > _MOVING)
+    if np.count_nonzero(rows) < _MIN_WINDOWS:
+        return check_ranges(columns, rate_hz) + check_lost(given, lost)
+    drive = Drive(motion, rows)
+    problem: Implausible | None = None
+    try:
+        implausible = check_ranges(columns, rate_hz)
+    except Implausible as error:
+        problem = error  # the unit, if it can be told, says more
+    try:
+        clock = _check_laws(drive)
+    except KnownUnit:
+        raise
+    except Implausible as error:
+        raise problem or error from None
+    if problem is not None:
+        raise problem
+    implausible += check_lost(given, lost)
+    if "fx_n" in columns:
+        implausible += held_speed_note(drive)
+    return implausible + (clock or lag_notes(motion))
+
+
+def contradictions(columns: Mapping[str, FloatArray], rate_hz: float) -> tuple[Contradiction, ...]:
+    """Return what :func:`check_coherence` refuses or doubts."""
+    try:
+        return tuple(check_coherence(columns, rate_hz))
+    except Implausible as error:
+        return (error.contradiction,)
+
+
+def _check_laws(drive: Drive) -> list[Contradiction]:
+    channels = drive.motion.channels
+    speed = drive.mean(channels["vx_mps"])
+    if np.median(speed) < 0.0:
+        raise wrong_sign("vx_mps", "is negative for most of the drive", speed, drive)
+    _check_lateral(drive)
+    clock = clock_notes(drive.motion)
+    if not clock:
+        _check_steer(drive)
+    if "vy_mps" in channels:
+        _check_sliding(drive)
+    if "ax_mps2" in channels:
+        check_longitudinal(drive)
+    if "fx_n" in channels:
+        check_force(drive)
+    return clock
+
+
+def _check_lateral(drive: Drive) -> None:
+    c = drive.motion.channels
+    turn, ay = drive.mean(c["vx_mps"] * c["yaw_rate_radps"]), drive.mean(c["ay_mps2"])
+    if max(size_of(turn), size_of(ay)) < EXCITED:
+        return
+    slide = (
+        [drive.change(c["vy_mps"])]
+        if "vy_mps" in c
+        else [drive.change(c["yaw_rate_radps"]), drive.change(c["vx_mps"] * c["ay_mps2"])]
+    )
+    spread = [np.inf, *[np.inf] * len(slide), 0.5]
+    both = fit(ay, [turn, *slide, ones(drive)], spread)
+    alone = cosine(turn, ay)
+    if both.coherence < 0.3 and abs(alone) < 0.6 and max(spread_of(turn), spread_of(ay)) > _CLEARLY:
+        _refuse_lateral(drive, turn, ay)
+    ratio, deviation = float(both.coefficients[0]), float(both.deviations[0])
+    if alone < -0.5 and ratio < -3.0 * deviation and both.coherence > 0.3:
+        # Two of the three channels agree; the third is the odd one out.
+        steer = drive.mean(c["steer_rad"])
+        odd = "ay_mps2" if cosine(steer, turn) > 0.0 else "yaw_rate_radps"
+        other = "yaw_rate_radps * vx_mps" if odd == "ay_mps2" else "ay_mps2"
+        text = f"moves against both {other} and steer_rad"
+        raise wrong_sign(odd, text, drive.mean(c[odd]), drive)
+    if both.coherence > 0.6 and ratio > 0.0:
+        formula = "ay_mps2 / (vx_mps * yaw_rate_radps)"
+        slips = _LATERAL_SLIPS
+        check_scale(ratio, deviation, SCALE_STD, slips, "ay_mps2", formula, turn, drive)
+
+
+def _refuse_lateral(drive: Drive, turn: FloatArray, ay: FloatArray) -> None:
+    """Say which of the channels does not follow the others, by what the steering asks for."""
+    c = drive.motion.channels
+    if "ax_mps2" in c:
+        ax, ramp = drive.mean(c["ax_mps2"]), drive.change(c["vx_mps"])
+        if cosine(turn, ax) > 0.8 and (spread_of(ay) < EXCITED or cosine(ramp, ay) > 0.3):
+            raise Implausible(
+                "ax_mps2",
+                f"ax_mps2 and ay_mps2: seem to be swapped: ax_mps2 follows vx_mps * yaw_rate_radps "
+                f"and ay_mps2 does not, {drive.place(turn)}; swap the two columns in the channel "
+                f"map",
+            )
+    steer = drive.mean(c["steer_rad"])
+    speed = drive.mean(c["vx_mps"])
+    answers = {
+        "yaw_rate_radps": abs(cosine(steer * speed, drive.mean(c["yaw_rate_radps"]))),
+        "ay_mps2": abs(cosine(steer * speed**2, ay)),
+    }
+    odd = min(answers, key=lambda name: answers[name])
+    other = "vx_mps * yaw_rate_radps" if odd == "ay_mps2" else "ay_mps2 / vx_mps"
+    driver = turn if odd == "ay_mps2" else ay
+    raise Implausible(
+        odd,
+        f"{odd}: does not follow {other}, as it must in every corner, {drive.place(driver)}; check "
+        f"that the column holds what it says, in the order of time",
+    )
+
+
+def _check_steer(drive: Drive) -> None:
+    """Compare the steering angle with the path curvature: the wheelbase that would answer so."""
+    c = drive.motion.channels
+    ay = drive.mean(c["ay_mps2"])
+    speed = np.maximum(np.abs(c["vx_mps"]), 1.0)
+    curvature, steer = drive.mean(c["yaw_rate_radps"] / speed), drive.mean(c["steer_rad"])
+    if size_of(ay) < EXCITED:
+        return
+    gentle = np.abs(ay) < LINEAR_MPS2
+    if (
+        np.count_nonzero(gentle) > max(_MIN_WINDOWS, 0.2 * ay.size)
+        and size_of(ay[gentle]) > EXCITED
+    ):
+        rows = gentle
+    else:
+        rows = np.ones(ay.size, dtype=bool)
+    yaw = drive.change(c["yaw_rate_radps"])
+    columns = [curvature[rows], yaw[rows], np.ones(np.count_nonzero(rows))]
+    # On a circle of one radius only a small offset keeps the slope from being anything.
+    offset = max(OFFSET * size_of(steer[rows]), _LEAST_OFFSET_RAD)
+    answer = fit(steer[rows], columns, [np.inf, np.inf, offset])
+    alone = cosine(curvature[rows], steer[rows])
+    if answer.coherence < 0.25 and abs(alone) < 0.45 and spread_of(ay[rows]) > _CLEARLY:
+        raise Implausible(
+            "steer_rad",
+            f"steer_rad: does not turn with yaw_rate_radps and ay_mps2, {drive.place(ay)}; check "
+            f"that the column holds the steering angle, in the order of time",
+        )
+    base, deviation = float(answer.coefficients[0]), float(answer.deviations[0])
+    if base < -3.0 * deviation and alone < -0.5 and answer.coherence > 0.3:
+        text = "moves against both yaw_rate_radps and ay_mps2"
+        raise wrong_sign("steer_rad", text, steer, drive)
+    if base <= 0.0 or answer.coherence < 0.5:
+        return
+    speed_2 = float(np.median(drive.mean(c["vx_mps"]))) ** 2
+    expected = _WHEELBASE_M + _UNDERSTEER * speed_2
+    spread = math.hypot(_WHEELBASE_STD * _WHEELBASE_M, _UNDERSTEER_STD * speed_2) / expected
+    off = abs(math.log(base / expected)) / math.hypot(spread, deviation / base)
+    if off < _NOT_A_WHEELBASE or 0.2 < base / expected < 5.0:
+        return
+    ratio = base / expected
+    i = int(np.argmax(np.abs(steer)))
+    what = (
+        f"if it is the angle of the steering wheel, put factor = 1 / steering ratio (about "
+        f"{1.0 / ratio:.2g}) in the channel map"
+        if ratio < 32.0
+        else f"if it is in degrees, put factor = {DEG} in the channel map"
+        if ratio < 200.0
+        else f"if it is the angle of the steering wheel in degrees, put factor = {DEG} / steering "
+        f"ratio in the channel map"
+    )
+    size = "large" if ratio > 1.0 else "small"
+    if ratio < 1.0:
+        what = f"check its unit; factor = {1.0 / ratio:.2g} would make it fit"
+    raise Implausible(
+        "steer_rad",
+        f"steer_rad: {steer[i]:.4g} at t = {drive.motion.times_s[drive.rows][i]:.6g} s is too "
+        f"{size} for the yaw rate (a wheelbase of {base:.3g} m would answer so); {what}",
+    )
+
+
+def _check_sliding(drive: Drive) -> None:
+    c = drive.motion.channels
+    slide = drive.change(c["vy_mps"])
+    ay, turn = drive.mean(c["ay_mps2"]), drive.mean(c["vx_mps"] * c["yaw_rate_radps"])
+    expected = ay - turn
+    noise = drive.motion.noise
+    speed = float(np.median(drive.mean(c["vx_mps"])))
+    own = math.hypot(noise["ay_mps2"], speed * noise["yaw_rate_radps"]) / WINDOW_S**0.5
+    if size_of(expected) < max(_SLIDING, _ABOVE_NOISE * own):
+        return
+    # The expected change is the small difference of two large readings, each with an own scale;
+    # and where the speed is not measured at the centre of gravity the yaw rate adds to it.
+    columns = [expected, turn, drive.change(c["yaw_rate_radps"]), ones(drive)]
+    found = fit(slide, columns, [np.inf, 0.06, 1.0, np.inf])
+    ratio, deviation = float(found.coefficients[0]), float(found.deviations[0])
+    if ratio < -4.0 * deviation and found.coherence > 0.3:
+        text = "changes against what ay_mps2 - vx_mps * yaw_rate_radps demands"
+        raise wrong_sign("vy_mps", text, drive.mean(c["vy_mps"]), drive)
+    # Of a channel in disorder nothing of the change is left, and it is white.
+    lost = found.coherence < 0.1 and ratio + 5.0 * deviation < 0.8 and ratio < 0.3
+    clear = spread_of(expected - found.coefficients[1] * turn) > _CLEARLY
+    if lost and (clear or drive.motion.disorder["vy_mps"] > WHITE):
+        raise Implausible(
+            "vy_mps",
+            f"vy_mps: does not change as ay_mps2 - vx_mps * yaw_rate_radps demands, "
+            f"{drive.place(expected)}; check that the column holds the lateral speed, in the "
+            f"order of time, or leave it out",
+        )
+    if found.coherence > 0.5 and ratio > 0.0:
+        formula = "(d vy_mps / dt) / (ay_mps2 - vx_mps * yaw_rate_radps)"
+        slips = _SLIDING_SLIPS
+        check_scale(ratio, deviation, _SLIDE_STD, slips, "vy_mps", formula, slide, drive)

@@ -1,0 +1,253 @@
+"""Channels that each have times of their own, and how they come into one table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .._common.arrays import FloatArray
+from ..errors import InvalidInput, near_names
+from ..log import CHANNELS, listed
+from .table import Table
+
+_SAME_TIME = 0.01  # of the shortest period: nearer samples of two channels are one row
+_LATE_S = 1.0  # messages overtake each other by less; a clock that was set back, by more
+_LISTED_EXTRAS = 1000  # other channels of the groups that are read
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Values with their own times [s], both of shape (n,)."""
+
+    time_s: FloatArray
+    values: FloatArray
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What a file says of a channel before it is read.
+
+    Attributes
+    ----------
+    unit : str
+        As the file states it; empty if it states none.
+    group : str
+        What was sampled together has the same.
+    text : str
+        What else the file tells of it.
+    """
+
+    unit: str = ""
+    group: str = ""
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Channels of a file or an object, each with its own times; read when they are asked for.
+
+    Attributes
+    ----------
+    entries : mapping of Entry
+        By full name, such as ``/imu/data/angular_velocity/z`` or ``Motion.YawRate``.
+    fetch : callable
+        Gives the signals of some full names, and may tell what it noticed.
+    """
+
+    entries: Mapping[str, Entry]
+    fetch: Callable[[list[str], list[str]], Mapping[str, Signal]]
+
+    def resolve(self, name: str, channel: str) -> str:
+        """Return the full name of what a channel map calls `name`: in full, or its last part.
+
+        Raises
+        ------
+        InvalidInput
+            If there is no such channel, or if several have that last part.
+        """
+        if name in self.entries:
+            return name
+        found = [full for full in self.entries if last_part(full) == name]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise InvalidInput(
+                f"{channel}: the channel map names '{name}', which is the last part of "
+                f"{len(found)} channels; name one in full: {listed(found)}"
+            )
+        hint = near_names(name, self.entries)
+        raise InvalidInput(
+            f"{channel}: the channel map names '{name}', which is not in the file{hint}; channels "
+            f"are {listed(self.entries)}"
+        )
+
+    def signals(self, names: list[str], notes: list[str]) -> dict[str, Signal]:
+        """Read some channels, their samples in the order of time."""
+        found = self.fetch(names, notes)
+        told: dict[str, str] = {}
+        result = {name: _ordered(name, found[name], told) for name in names}
+        notes += told.values()
+        return result
+
+    def table(self, wanted: Mapping[str, str], absent: Iterable[str], notes: list[str]) -> Table:
+        """Read the channels of a map, and bring them into rows without touching their values.
+
+        Each row is a time at which at least one channel has a sample; the others are missing there.
+        Samples that are nearer than 1 % of the shortest period share a row. Of the other channels
+        those come along that were sampled together with one that is used.
+
+        Parameters
+        ----------
+        wanted : mapping of str to str
+            Name in the map of each canonical channel that the map names.
+        absent : iterable of str
+            Canonical channels to leave out although the file has their names.
+        notes : list of str
+            Where the warnings go.
+
+        Raises
+        ------
+        InvalidInput
+            If a channel is not there, or its times cannot be used.
+        """
+        source = {channel: self.resolve(name, channel) for channel, name in wanted.items()}
+        skipped = {*absent, "time_s", *wanted}
+        own = [channel for channel in CHANNELS if channel not in skipped]
+        found = {c: full for c in own if (full := self._called(c)) is not None}
+        source.update(found)
+        used = list(dict.fromkeys(source.values()))
+        if not used:
+            raise InvalidInput(
+                f"none of the channels has a name that is known, such as vx_mps; name them in a "
+                f"channel map, which `sysid-vehicle map` or sv.propose_channels proposes "
+                f"(channels are {listed(self.entries)})"
+            )
+        groups = {self.entries[name].group for name in used}
+        beside = [
+            name
+            for name, entry in self.entries.items()
+            if name not in used and entry.group in groups and last_part(name) not in CHANNELS
+        ][:_LISTED_EXTRAS]
+        signals = self.signals(used, notes)
+        empty = [name for name in used if signals[name].time_s.size == 0]
+        if empty:
+            raise InvalidInput(f"{empty[0]}: holds no sample; map another channel, or record it")
+        time_s, rows = common_rows({name: signals[name].time_s for name in used})
+        extras = self._extras(beside, used, signals)
+        columns = {
+            name: _spread(signal.values, rows[name], time_s.size)
+            for name, signal in signals.items()
+        }
+        for name, (like, values) in extras.items():
+            columns[name] = _spread(values, rows[like], time_s.size)
+        # A channel that is found by the last part of its name is called by it from here on.
+        for channel, name in (*wanted.items(), *found.items()):
+            called = name if channel in wanted else channel
+            columns.setdefault(called, columns[source[channel]])
+        units = {n: e.unit for n, e in self.entries.items() if n in columns and e.unit}
+        for channel, full in source.items():
+            if self.entries[full].unit:
+                units[wanted.get(channel, channel)] = self.entries[full].unit
+        columns = {"time_s": time_s, **columns}
+        return Table(tuple(columns), columns, {}, time_s.size, units)
+
+    def _called(self, channel: str) -> str | None:
+        try:
+            return self.resolve(channel, channel)
+        except InvalidInput:
+            return None
+
+    def _extras(
+        self, beside: list[str], used: list[str], signals: Mapping[str, Signal]
+    ) -> dict[str, tuple[str, FloatArray]]:
+        """Values of other channels, each with the used one whose times it has."""
+        if not beside:
+            return {}
+        like = {self.entries[name].group: name for name in reversed(used)}
+        result: dict[str, tuple[str, FloatArray]] = {}
+        for name, signal in self.fetch(beside, []).items():
+            other = like[self.entries[name].group]
+            if np.array_equal(signal.time_s, signals[other].time_s):
+                result[name] = other, signal.values
+        return result
+
+
+def last_part(name: str) -> str:
+    """Return what stands behind the last slash or point of a full name."""
+    return name.rpartition("/")[2].rpartition(".")[2]
+
+
+def common_rows(
+    times: Mapping[str, FloatArray],
+) -> tuple[FloatArray, dict[str, npt.NDArray[np.intp]]]:
+    """Return the rows that several channels share, and the row of each sample.
+
+    Parameters
+    ----------
+    times : mapping of ndarray, shape (n,)
+        Rising times of each channel [s], none empty.
+
+    Returns
+    -------
+    time_s : ndarray, shape (rows,)
+        From the first sample of all on.
+    rows : dict of ndarray of int, shape (n,)
+    """
+    periods = {name: _period(own) for name, own in times.items()}
+    near = _SAME_TIME * min(periods.values())
+    rows_s = np.empty(0)
+    for name in sorted(times, key=lambda n: periods[n]):
+        own = times[name]
+        if rows_s.size:
+            own = own[np.abs(rows_s[_nearest(rows_s, own)] - own) > near]
+        if own.size:
+            rows_s = np.unique(np.concatenate((rows_s, own)))
+    found = {name: _nearest(rows_s, own) for name, own in times.items()}
+    return rows_s - rows_s[0], found
+
+
+def _period(time_s: FloatArray) -> float:
+    return float(np.median(np.diff(time_s))) if time_s.size > 1 else np.inf
+
+
+def _nearest(rows_s: FloatArray, time_s: FloatArray) -> npt.NDArray[np.intp]:
+    right = np.clip(np.searchsorted(rows_s, time_s), 0, rows_s.size - 1)
+    left = np.clip(right - 1, 0, None)
+    closer = np.abs(rows_s[left] - time_s) < np.abs(rows_s[right] - time_s)
+    result: npt.NDArray[np.intp] = np.where(closer, left, right)
+    return result
+
+
+def _spread(values: FloatArray, rows: npt.NDArray[np.intp], n: int) -> FloatArray:
+    result = np.full(n, np.nan)
+    result[rows] = values
+    return result
+
+
+def _ordered(name: str, signal: Signal, told: dict[str, str]) -> Signal:
+    """Return the samples in the order of their times, each time once."""
+    time_s, values = signal.time_s, signal.values
+    step = np.diff(time_s)
+    if not np.isfinite(time_s).all():
+        k = int(np.flatnonzero(~np.isfinite(time_s))[0])
+        raise InvalidInput(f"{name}: its time is not a number at sample {k}; mend the recording")
+    if not step.size or (step > 0.0).all():
+        return signal
+    k = int(np.argmin(step)) + 1
+    if step[k - 1] < -_LATE_S:
+        raise InvalidInput(
+            f"{name}: its time goes back by {-step[k - 1]:.4g} s at sample {k}; the clock was set: "
+            f"cut the recording there and read the parts as separate logs"
+        )
+    order = np.argsort(time_s, kind="stable")
+    swapped = int(np.count_nonzero(step < 0.0))
+    time_s, values = time_s[order], values[order]
+    fresh = np.concatenate(([True], np.diff(time_s) > 0.0))
+    repeated = int(fresh.size - np.count_nonzero(fresh))
+    what = [f"{swapped} samples came late and were sorted"] if swapped else []
+    what += [f"{repeated} samples repeat the time of another and were left out"] if repeated else []
+    told.setdefault(name, f"{name}: {' and '.join(what)}, first at sample {k}; check the recorder")
+    return Signal(time_s[fresh], values[fresh])

@@ -1,0 +1,145 @@
+"""Data compatibility: whether the channels of a log are readings of one and the same motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from .._common.arguments import expect, whole
+from .._common.progress import doing
+from ..errors import SysidError
+from ..log import Log, several_logs
+from ..vehicle import Vehicle
+from .equations import FAULTS, Readings
+from .estimate import Estimate, estimate, noise_of, preferred
+from .faults import Rival, doubted, faults_of
+from .motion import Grid, Stretch
+from .parts import cut
+from .result import SensorCheck
+from .signals import MOVING, Signal, averaged, pieces, readings_of, refuse_mixed_up, signals
+
+_MEAN_S = 0.03  # quick channels enter as means over so long
+# Knots of the motion, in sampling periods. No simple ratio: were the samples always at the same
+# places between the knots, a delay that moves them to better places would seem to be there.
+_STEP_MEANS = 2.3607
+_STEP_SAMPLES = 1.618  # of a channel that is slower than that
+_SEARCHES = 1  # for a better explanation, from one that does without a fault
+_FLOOR = 1e-3  # least noise, of the channel's standard deviation
+
+
+@doing("check of the sensors")
+def check(
+    logs: Log | Sequence[Log], vehicle: Vehicle | None = None, *, seed: int = 0
+) -> SensorCheck:
+    """Check the sensors of a log against each other, before any tyre is assumed.
+
+    The motion is free; speeds, yaw rate and accelerations must only be readings of the same one.
+    What does not fit is laid to time offsets, scales, biases, the place and the direction of the
+    IMU, gravity by roll and pitch, the road, and noise of any colour. Delays are against the yaw
+    rate, places against the speed sensor.
+
+    Parameters
+    ----------
+    logs : Log or sequence of Log
+        Driving with the same sensors.
+    vehicle : Vehicle, optional
+        Says how far the IMU can be from the speed sensor.
+    seed : int
+        Of the draws that teach the noise.
+
+    Returns
+    -------
+    SensorCheck
+
+    Raises
+    ------
+    InvalidInput
+        If the logs hold no driving, or channels are mirrored, swapped or of another unit.
+    NumericalError
+        If the motion cannot be told.
+
+    Notes
+    -----
+    Flight path reconstruction: V. Klein, E. A. Morelli, *Aircraft System Identification*, 2nd ed.,
+    ch. 10; R. V. Jategaonkar, *Flight Vehicle System Identification*, ch. 10.
+    """
+    together = several_logs(logs, "check")
+    if vehicle is not None:
+        expect(vehicle, Vehicle, "check")
+    seed = whole(seed, "seed")
+    stretches = pieces(together)
+    readings = readings_of(together, stretches)
+    refuse_mixed_up(together, readings)
+    have = {r.channel for r in readings}
+    lacking = [c for c in MOVING if c not in have]
+    told = tuple(signal for log in together for signal in signals(log))
+    floors = {r.channel: _floor(r, told) for r in readings}
+    step_s = _step(readings)
+
+    def of(
+        some: Sequence[Readings],
+        where: Sequence[Stretch],
+        without: Sequence[str] = (),
+        begin: dict[str, float] | None = None,
+    ) -> Estimate:
+        means = [averaged(r, _MEAN_S) for r in some]
+        names = [name for name in _names(have) if name not in without]
+        return estimate(means, Grid(where, step_s), names, floors=floors, begin=begin, seed=seed)
+
+    found = of(readings, stretches)
+    parts = []
+    for some in cut(stretches):
+        with suppress(SysidError):  # a part may hold too little
+            parts.append(of(readings_of(together, some), some))
+    means = [averaged(r, _MEAN_S) for r in readings]
+    faults = faults_of(found, lacking, parts)
+    for left in range(_SEARCHES, -1, -1):
+        rivals = {}
+        for without in doubted([fault.name for fault in faults if fault.found]):
+            other = of(readings, stretches, without=without)
+            rivals[without] = Rival(other, preferred(means, found, other))
+        faults = faults_of(found, lacking, parts, rivals)
+        best = min(rivals.values(), key=lambda rival: rival.worse, default=None)
+        if not left or best is None or best.worse >= 0.0:
+            break
+        better = of(readings, stretches, begin=best.estimate.faults)
+        if preferred(means, better, found) <= 0.0:
+            break
+        found = better
+        faults = faults_of(found, lacking, parts)
+    return SensorCheck(
+        logs=tuple(together),
+        faults=faults,
+        signals=told,
+        estimate=found,
+        noise=noise_of(readings, found, floors),
+        readings=tuple(readings),
+        stretches=tuple(stretches),
+        vehicle=vehicle,
+    )
+
+
+def _names(have: set[str]) -> list[str]:
+    """Faults that these channels can show; without both speeds there is little."""
+    names = [name for name, kind in FAULTS.items() if kind.channel in have]
+    if "vy_mps" not in have:
+        # The lateral equation has an unknown of its own then; only its slow part is left.
+        for name in ("delay.speeds", "arm_x", "arm_y", "turn", "delay.ay_mps2"):
+            names.remove(name)
+        names.remove("gain.yaw_rate_radps")
+    if "ax_mps2" not in have:
+        names = [name for name in names if name not in ("arm_y", "delay.vx_mps", "turn")]
+    return names
+
+
+def _floor(readings: Readings, told: Sequence[Signal]) -> float:
+    quanta = [s.quantum for s in told if s.channel == readings.channel]
+    return float(max(_FLOOR * np.std(readings.values), max(quanta, default=0.0) / np.sqrt(12.0)))
+
+
+def _step(readings: Sequence[Readings]) -> float:
+    """Knots no closer than the samples of the slowest channel bear."""
+    periods = [float(np.median(np.diff(r.time_s)[np.diff(r.stretch) == 0])) for r in readings]
+    return max(_STEP_MEANS * _MEAN_S, _STEP_SAMPLES * max(periods))

@@ -1,0 +1,236 @@
+"""A log as its sensors would have written it had they noise that is white.
+
+The likelihood knows white noise and readings of the moment. A sensor's own low-pass makes its
+noise coloured and its readings late, and takes from the forces of the road what tells them from
+noise; where its spectrum tells the filter it is undone, as far as what came after it allows.
+Vibration in a narrow band, in which no car moves, is taken down to the noise beside it, without a
+shift in time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Final
+
+import numpy as np
+import scipy
+
+from .._common.arrays import ComplexArray, FloatArray
+from ..log import Log
+from .forms import Response
+from .low_pass import NoiseFit, fitted, with_low_pass
+from .motion import IntArray
+from .signals import MOVING, own_samples, quantum
+from .spectrum import NoiseSpectrum, Spectrum, spectrum_of, steady
+
+_EDGE_S: Final = 0.5
+_BESIDE_GAP_S: Final = 0.1  # which a filter that is undone carries far no more
+_REGULAR: Final = 0.9  # share of a channel's samples that lie at equal distances
+_DEVICES: Final = (("vx_mps", "vy_mps"), ("yaw_rate_radps", "ax_mps2", "ay_mps2"))  # as a rule
+# Chosen by benchmarks/ladder, seeds 100 to 105 and 200 to 224, and by the measured drives of
+# benchmarks/real_driving: without a filter one brings 4 nats at most, with all imperfections 23 at
+# least; forms that fit leave 1.1 at most, measured drives with steady noise 1.7 or more.
+_EVIDENCE: Final = 10.0  # nats that a filter must bring
+_MISMATCH: Final = 1.3  # of forms that are taken for right
+_DELAY_STD_S: Final = 0.0015  # of a delay that is taken out
+_RAISED: Final = 4.0  # times the power of noise at low frequencies, up to which it comes up
+_DAMPING: Final = (0.5, 0.95)  # Butterworth's is 0.71, Bessel's 0.87; one of 1 may be none in time
+_BAND: Final = 0.45  # of the rate; a corner beyond it is not seen
+
+
+@dataclass(frozen=True, eq=False)
+class _Channel:
+    """A channel of one log whose noise is the same at all times."""
+
+    log: int
+    name: str
+    spectrum: Spectrum
+    plain: NoiseFit
+
+
+def conditioned(logs: Sequence[Log]) -> list[Log]:
+    """The logs with readings whose noise is white, in time with the motion.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Of the same sensors.
+
+    Returns
+    -------
+    list of Log
+        The same logs where their noise is white already.
+    """
+    channels = _channels(logs)
+    found = _filters(channels, logs)
+    return [
+        _put_right(log, [c for c in channels if c.log == number], found)
+        for number, log in enumerate(logs)
+    ]
+
+
+def low_passes(logs: Sequence[Log]) -> dict[str, tuple[Response, float]]:
+    """The low-pass of each channel's sensor where it is told, and the delay's standard error [s].
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Of the same sensors.
+    """
+    found = _filters(_channels(logs), logs)
+    return {name: (f.response, f.fit.delay_std_s) for name, f in found.items()}
+
+
+def _channels(logs: Sequence[Log]) -> list[_Channel]:
+    found = []
+    for (number, log), name in product(enumerate(logs), MOVING):
+        if not log.has(name):
+            continue
+        at, every = own_samples(log[name])
+        if at.size < 2:
+            continue
+        # Few samples are lost as a rule: a straight line takes their place.
+        grid = np.arange(at[0], at[-1] + 1, every)
+        if np.mean(np.isin(at, grid)) < _REGULAR:
+            continue
+        values = np.interp(grid, at, log[name][at])
+        spectrum = spectrum_of(values, log.rate_hz / every, log.rate_hz, quantum(log[name][at]))
+        if spectrum is None:
+            continue
+        plain = fitted([spectrum])
+        if steady(values, spectrum, plain.smooth[0]):
+            found.append(_Channel(number, name, spectrum, plain))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Filtered:
+    channels: tuple[_Channel, ...]
+    fit: NoiseFit
+    response: Response
+
+    @property
+    def told(self) -> bool:
+        """Whether the forms fit, and the delay is known."""
+        lowest_hz = min(c.spectrum.rate_hz for c in self.channels)
+        return (
+            self.fit.mismatch < _MISMATCH
+            and self.fit.delay_std_s < _DELAY_STD_S
+            and _DAMPING[0] < self.response.damping < _DAMPING[1]
+            and self.response.corner_hz < _BAND * lowest_hz
+        )
+
+    def undone(self, channel: _Channel) -> ComplexArray:
+        """Factor at each frequency that undoes the filter.
+
+        Where counting in quanta or folding came after it, only as far as noise allows.
+        """
+        s, white = channel.spectrum, self.fit.white[self.channels.index(channel)]
+        power = self.response.power(s.frequency_hz, s.rows_hz)
+        turn = self.response.turned(s.frequency_hz, s.rows_hz)
+        up = np.minimum(1.0 / np.maximum(power, 1e-12), _RAISED * white[0] / white)
+        result: ComplexArray = np.sqrt(up) * np.exp(1j * turn)
+        return result
+
+    def smooth_of(self, channel: _Channel) -> FloatArray:
+        """Power of a channel's noise without lines."""
+        return self.fit.smooth[self.channels.index(channel)]
+
+
+def _filters(channels: Sequence[_Channel], logs: Sequence[Log]) -> dict[str, _Filtered]:
+    """The filter of each channel; a device has one for all its channels or none.
+
+    One channel shifted by itself would be an error between them. The devices of a logger often
+    filter alike: one filter for both where it explains them as well as two do.
+    """
+    found = []
+    for device in _DEVICES:
+        own = tuple(c for c in channels if c.name in device)
+        if len(own) == sum(log.has(name) for log in logs for name in device):
+            found += [f for f in [_filtered(own)] if f is not None]
+    if len(found) == len(_DEVICES):
+        both = _filtered(tuple(channels))
+        count = sum(c.spectrum.independent for c in channels)
+        if both and both.fit.cost - sum(f.fit.cost for f in found) < 1.5 * np.log(count):
+            found = [both]
+    return {c.name: f for f in found if f.told for c in f.channels}
+
+
+def _filtered(channels: tuple[_Channel, ...]) -> _Filtered | None:
+    """The filter that the noise of some channels speaks for."""
+    count = sum(c.spectrum.independent for c in channels)
+    if not channels:
+        return None
+    # What fits without a filter leaves one nothing to explain.
+    over = sum((c.plain.mismatch - 1.0) * c.spectrum.independent for c in channels)
+    if 0.5 * over + 3.0 * np.sqrt(0.5 * count) < _EVIDENCE:
+        return None
+    fit = with_low_pass([c.spectrum for c in channels])
+    brings = sum(c.plain.cost for c in channels) - fit.cost
+    if fit.response is None or brings < _EVIDENCE * max(fit.mismatch, 1.0):
+        return None
+    return _Filtered(channels, fit, fit.response)
+
+
+def _put_right(log: Log, channels: Sequence[_Channel], filters: dict[str, _Filtered]) -> Log:
+    now: dict[str, FloatArray] = {}
+    what = []
+    for channel in channels:
+        name, s = channel.name, channel.spectrum
+        found = filters.get(name)
+        smooth = found.smooth_of(channel) if found else channel.plain.smooth[0]
+        noise = NoiseSpectrum(s.rate_hz, s.frequency_hz, s.power, smooth)
+        lines = noise.vibration_hz
+        if lines:
+            shown = ", ".join(f"{f:.3g}" for f in lines)
+            what.append(f"{name}: vibration at {shown} Hz taken out")
+        if found:
+            now[name] = _passed(log[name], s, found.undone(channel) * noise.gain)
+            delay, std = 1000.0 * found.response.delay_s, 1000.0 * found.fit.delay_std_s
+            what.append(
+                f"{name}: its noise is that of a low-pass of {found.response.corner_hz:.3g} Hz, "
+                f"{delay:.3g} +- {std:.1g} ms late; undone"
+            )
+        elif lines:
+            now[name] = _passed(log[name], s, noise.gain)
+    return log.corrected(now, what) if now else log
+
+
+def _passed(
+    values: FloatArray, spectrum: Spectrum, factor: ComplexArray | FloatArray
+) -> FloatArray:
+    """Apply a factor over frequency to the channel's own samples."""
+    at, every = own_samples(values)
+    grid = np.arange(at[0], at[-1] + 1, every)
+    whole = np.interp(grid, at, values[at])
+    # The factor is of windows of that many samples; so long is its answer to an impulse.
+    width = 2 * (factor.size - 1)
+    answer = np.roll(np.fft.irfft(factor, width), width // 2)
+    answer = np.append(answer, answer[0])
+    answer[[0, -1]] *= 0.5
+    answer *= np.hanning(answer.size + 2)[1:-1]
+    answer /= answer.sum()
+    half = width // 2
+    padded = np.pad(whole, half, mode="reflect", reflect_type="odd")
+    smooth = scipy.signal.fftconvolve(padded, answer, mode="valid")
+    # At the ends vibration cannot be told from what it adds to.
+    edge = round(_EDGE_S * spectrum.rate_hz)
+    smooth[:edge] = smooth[len(smooth) - edge :] = np.nan
+    if np.iscomplexobj(factor):
+        # What was put into a gap is no reading, and comes up with the noise.
+        nearest = np.abs(grid[:, None] - at[_beside(at, grid)]).min(axis=1)
+        gaps = scipy.ndimage.binary_dilation(
+            nearest >= every, iterations=max(1, round(_BESIDE_GAP_S * spectrum.rate_hz))
+        )
+        smooth[gaps] = np.nan
+    result = values.copy()
+    result[at] = np.interp(at, grid, smooth)
+    return result
+
+
+def _beside(at: IntArray, grid: IntArray) -> IntArray:
+    """Numbers of the samples before and after each place."""
+    after = np.clip(np.searchsorted(at, grid), 1, at.size - 1)
+    return np.stack([after - 1, after], axis=1)

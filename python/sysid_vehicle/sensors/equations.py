@@ -1,0 +1,197 @@
+"""What each sensor reads of a motion, and how that depends on motion and sensor faults.
+
+Kinematics alone: the acceleration of a point of a rigid body that moves in the plane, in axes that
+turn with it (Klein & Morelli, Aircraft System Identification, 2nd ed., ch. 10; Jategaonkar, Flight
+Vehicle System Identification, ch. 10). No tyre, mass or inertia stands in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from .._common.arrays import FloatArray
+from .motion import Basis, Grid, IntArray
+
+
+@dataclass(frozen=True)
+class FaultKind:
+    """A fault of a sensor.
+
+    Attributes
+    ----------
+    name : str
+        `delay.ay_mps2` and the like.
+    channel : str
+        Channel that reads wrongly.
+    typical : float
+        Scale of the Cauchy prior. Its tails are long: a fault that the log shows is not shrunk,
+        and of several that would explain the same the small ones are taken.
+    most : float
+        Standard deviation of a normal prior on top, for what no sensor has.
+    below : float
+        Scale for negative values where these are to be claimed, if it differs: gravity by roll and
+        pitch makes an accelerometer read more, never less.
+    """
+
+    name: str
+    channel: str
+    typical: float
+    most: float = 10.0
+    below: float = 0.0
+
+    def cost(self, value: float, *, one_sided: bool = False) -> float:
+        """How much less likely a value is than none, by the prior [nats]."""
+        scale = self.below if one_sided and value < 0.0 < self.below else self.typical
+        return float(np.log1p((value / scale) ** 2) + 0.5 * (value / self.most) ** 2)
+
+
+FAULTS = {
+    kind.name: kind
+    for kind in (
+        FaultKind("delay.speeds", "vx_mps", 0.03),
+        FaultKind("delay.vx_mps", "vx_mps", 0.003),
+        FaultKind("delay.vy_mps", "vy_mps", 0.003),
+        FaultKind("delay.ay_mps2", "ay_mps2", 0.003),
+        FaultKind("gain.yaw_rate_radps", "yaw_rate_radps", 0.002, 0.03),
+        FaultKind("gain.ax_mps2", "ax_mps2", 0.03, below=0.002),
+        FaultKind("gain.ay_mps2", "ay_mps2", 0.03, below=0.002),
+        FaultKind("bias.yaw_rate_radps", "yaw_rate_radps", 0.003),
+        FaultKind("bias.vy_mps", "vy_mps", 0.05),
+        FaultKind("arm_x", "ay_mps2", 0.4),
+        FaultKind("arm_y", "ax_mps2", 0.15),
+        FaultKind("turn", "ay_mps2", 0.01),
+    )
+}
+_SPEEDS = ("vx_mps", "vy_mps")  # of one device as a rule
+_NEEDS = {
+    "vx_mps": ("vx",),
+    "vy_mps": ("vy",),
+    "yaw_rate_radps": ("yaw",),
+    "ax_mps2": ("vx", "vy", "yaw", "grade"),
+    "ay_mps2": ("vx", "vy", "yaw", "bank"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """The samples of one channel, each at its own time.
+
+    Attributes
+    ----------
+    channel : str
+        Canonical name.
+    stretch : ndarray of int, shape (n,)
+        Stretch of each sample.
+    time_s : ndarray, shape (n,)
+        When it was written.
+    values : ndarray, shape (n,)
+        What was written; never NaN.
+    """
+
+    channel: str
+    stretch: IntArray
+    time_s: FloatArray
+    values: FloatArray
+
+
+def predict(
+    readings: Readings, grid: Grid, x: FloatArray, faults: dict[str, float]
+) -> tuple[FloatArray, scipy.sparse.csr_matrix, dict[str, FloatArray]]:
+    """Return what the channel should read, and the derivatives.
+
+    Returns
+    -------
+    expected : ndarray, shape (n,)
+    by_motion : csr_matrix, shape (n, grid.size)
+    by_fault : dict of ndarray, shape (n,)
+        Of the faults in `faults` that move this channel.
+    """
+    name = readings.channel
+    late_s = faults.get(f"delay.{name}", 0.0)
+    if name in _SPEEDS:
+        late_s += faults.get("delay.speeds", 0.0)
+    time_s = readings.time_s - late_s
+    quick = grid.quick(readings.stretch, time_s)
+    if name in ("ax_mps2", "ay_mps2"):
+        expected, blocks, by_fault, rate = _felt(name, readings, grid, x, faults, quick, time_s)
+    else:
+        signal = _NEEDS[name][0]
+        columns = grid.columns(signal, quick)
+        value, rate = _evaluate(x, columns, quick)[:2]
+        gain = 1.0 + faults.get(f"gain.{name}", 0.0)
+        expected = gain * value + faults.get(f"bias.{name}", 0.0)
+        blocks = [(columns, gain * quick.weights[0])]
+        by_fault = {f"gain.{name}": value, f"bias.{name}": np.ones_like(value)}
+    by_fault[f"delay.{name}"] = -rate
+    if name in _SPEEDS:
+        by_fault["delay.speeds"] = -rate
+    columns = np.concatenate([c for c, _ in blocks], axis=1)
+    weights = np.concatenate([w for _, w in blocks], axis=1)
+    n, k = columns.shape
+    by_motion = scipy.sparse.csr_matrix(
+        (weights.ravel(), columns.ravel(), np.arange(0, n * k + 1, k)), shape=(n, grid.size)
+    )
+    return expected, by_motion, {key: d for key, d in by_fault.items() if key in faults}
+
+
+def _evaluate(
+    x: FloatArray, columns: IntArray, basis: Basis
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    known = x[columns]
+    value, slope, bend = (np.einsum("ij,ij->i", known, w) for w in basis.weights)
+    return value, slope, bend
+
+
+def _felt(
+    name: str,
+    readings: Readings,
+    grid: Grid,
+    x: FloatArray,
+    faults: dict[str, float],
+    quick: Basis,
+    time_s: FloatArray,
+) -> tuple[FloatArray, list[tuple[IntArray, FloatArray]], dict[str, FloatArray], FloatArray]:
+    """What an accelerometer feels: at its place, turned, on a road that is not level."""
+    at = {signal: grid.columns(signal, quick) for signal in ("vx", "vy", "yaw")}
+    vx, dvx, ddvx = _evaluate(x, at["vx"], quick)
+    vy, dvy, ddvy = _evaluate(x, at["vy"], quick)
+    r, dr, ddr = _evaluate(x, at["yaw"], quick)
+    lx, ly, turn = (faults.get(key, 0.0) for key in ("arm_x", "arm_y", "turn"))
+    along = dvx - vy * r - lx * r**2 - ly * dr
+    across = dvy + vx * r + lx * dr - ly * r**2
+    d_along = ddvx - dvy * r - vy * dr - 2 * lx * r * dr - ly * ddr
+    d_across = ddvy + dvx * r + vx * dr + lx * ddr - 2 * ly * r * dr
+    is_x = name == "ax_mps2"
+    gain = 1.0 + faults.get(f"gain.{name}", 0.0)
+    # Shares of the two accelerations in what this axis feels.
+    cx, cy = (gain, turn) if is_x else (-turn, gain)
+    slow_signal = "grade" if is_x else "bank"
+    slow = grid.slow(readings.stretch, time_s)
+    slow_at = grid.columns(slow_signal, slow)
+    level, d_level, _ = _evaluate(x, slow_at, slow)
+    value, slope, _ = quick.weights
+
+    def times(factor: FloatArray, weights: FloatArray) -> FloatArray:
+        return factor[:, None] * weights
+
+    blocks = [
+        (at["vx"], cx * slope + times(cy * r, value)),
+        (at["vy"], times(-cx * r, value) + cy * slope),
+        (
+            at["yaw"],
+            times(cx * (-vy - 2 * lx * r) + cy * (vx - 2 * ly * r), value)
+            + (cy * lx - cx * ly) * slope,
+        ),
+        (slow_at, slow.weights[0]),
+    ]
+    by_fault = {
+        f"gain.{name}": along if is_x else across,
+        "turn": across if is_x else -along,
+        "arm_x": -cx * r**2 + cy * dr,
+        "arm_y": -cx * dr - cy * r**2,
+    }
+    expected = cx * along + cy * across + level
+    return expected, blocks, by_fault, cx * d_along + cy * d_across + d_level

@@ -1,0 +1,245 @@
+"""The faults of a sensor as they are told: values with intervals, or why they cannot be told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from .estimate import Estimate
+from .parts import Z95, scatter
+from .texts import DEG, why_not
+
+_FALSE_CLAIMS = 0.01  # over all faults of one check
+_LEARNED = 0.5  # share of what is known of a fault that has to come from the log
+
+
+@dataclass(frozen=True)
+class SensorFault:
+    """A fault that a sensor may have.
+
+    Attributes
+    ----------
+    name : str
+        Name of the fault, with its unit.
+    channel : str
+        Channel that shows it.
+    title : str
+        What it is, in words.
+    value, std : float
+        Estimate and standard deviation [`unit`].
+    unit : str
+        Unit.
+    told : bool
+        Whether the log tells the fault well enough to say whether it is there.
+    found : bool
+        Whether it is there: different from zero, at a level of 1 % over all faults together, and
+        large enough to matter.
+    why_not : str
+        Why it cannot be told; empty where it can.
+    """
+
+    name: str
+    channel: str
+    title: str
+    value: float
+    std: float
+    unit: str
+    told: bool
+    found: bool
+    why_not: str = ""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Bounds that hold the true value with a probability of 95 %."""
+        return self.value - Z95 * self.std, self.value + Z95 * self.std
+
+    def __str__(self) -> str:
+        scale, unit = _SHOWN.get(self.unit, (1.0, self.unit))
+        low, high = (scale * x for x in self.interval)
+        tail = f" {unit}" if unit else ""
+        return f"{self.title}: {scale * self.value:.3g}{tail} (95 %: {low:.3g} to {high:.3g})"
+
+
+@dataclass(frozen=True)
+class _Told:
+    """A fault as it is told, the sum of estimated ones.
+
+    `enough` is a useful half interval; faults smaller than `negligible` harm nothing.
+    """
+
+    name: str
+    channel: str
+    title: str
+    unit: str
+    of: tuple[str, ...]
+    enough: float
+    negligible: float
+
+
+_SHOWN = {"s": (1000.0, "ms"), "rad": (1.0 / DEG, "deg"), "": (100.0, "%")}
+_TOLD = (
+    _Told("delay_vx_s", "vx_mps", "delay against ax_mps2", "s",
+          ("delay.speeds", "delay.vx_mps"), 0.03, 0.002),
+    _Told("delay_vy_s", "vy_mps", "delay against yaw_rate_radps", "s",
+          ("delay.speeds", "delay.vy_mps"), 0.03, 0.002),
+    _Told("delay_ay_s", "ay_mps2", "delay against yaw_rate_radps", "s",
+          ("delay.ay_mps2",), 0.02, 0.002),
+    _Told("gain_yaw_rate", "yaw_rate_radps", "scale error", "",
+          ("gain.yaw_rate_radps",), 0.02, 0.002),
+    _Told("gain_ax", "ax_mps2", "scale error, or gravity by pitch", "",
+          ("gain.ax_mps2",), 0.04, 0.002),
+    _Told("gain_ay", "ay_mps2", "scale error, or gravity by roll", "",
+          ("gain.ay_mps2",), 0.04, 0.002),
+    _Told("bias_yaw_rate_radps", "yaw_rate_radps", "bias", "rad/s",
+          ("bias.yaw_rate_radps",), 0.01, 0.0005),
+    _Told("bias_vy_mps", "vy_mps", "bias", "m/s", ("bias.vy_mps",), 0.2, 0.02),
+    _Told("imu_forward_m", "ay_mps2", "IMU ahead of the speed sensor", "m", ("arm_x",), 0.3, 0.03),
+    _Told("imu_left_m", "ax_mps2", "IMU left of the speed sensor", "m", ("arm_y",), 0.3, 0.03),
+    _Told("imu_turn_rad", "ay_mps2", "IMU turned to the left of the speed sensor", "rad",
+          ("turn",), 0.03, 0.002),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An explanation without one of the faults, and how much less likely it is [nats]."""
+
+    estimate: Estimate
+    worse: float
+
+    @property
+    def share(self) -> float:
+        """Its probability beside the explanation with the fault."""
+        return 1.0 / (1.0 + math.exp(min(self.worse, 500.0)))
+
+
+def doubted(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """What has to be left out, to see whether the driving can do without the faults found.
+
+    Each fault by itself, and with those that it shares something with: a delay of one device.
+    """
+    of = {told.name: told.of for told in _TOLD if told.name in names}
+    together = (
+        tuple(dict.fromkeys(part for other in of.values() if {*one} & {*other} for part in other))
+        for one in of.values()
+    )
+    return list(dict.fromkeys([*of.values(), *together]))
+
+
+def faults_of(
+    found: Estimate,
+    absent: Sequence[str],
+    parts: Sequence[Estimate] = (),
+    rivals: Mapping[tuple[str, ...], Rival] | None = None,
+) -> tuple[SensorFault, ...]:
+    """Say what an estimate tells of each fault.
+
+    Parameters
+    ----------
+    found : Estimate
+        Of all the driving.
+    absent : sequence of str
+        Channels without which faults cannot be told.
+    parts : sequence of Estimate
+        Of parts of the driving, which have to ask for the same faults.
+    rivals : mapping of Rival, optional
+        Explanations by what they leave out; one that is as likely as `found` makes all faults
+        unsure in which the two differ.
+    """
+    rivals = rivals or {}
+    names = list(found.faults)
+    naive = np.linalg.inv(found.information)
+    rows = [t for t in _TOLD if t.of[-1] in names]
+    critical = float(scipy.stats.norm.isf(0.5 * _FALSE_CLAIMS / len(rows)))
+    result = []
+    for told in _TOLD:
+        if told not in rows:
+            why = why_not(told.name, absent=absent)
+            result.append(
+                SensorFault(
+                    told.name, told.channel, told.title, 0.0, math.inf, told.unit, False, False, why
+                )
+            )
+            continue
+        pick = np.array([1.0 if name in told.of else 0.0 for name in names])
+        value, std = _size(found, pick, found.covariance)
+        at_null = _size(found, pick, found.null_covariance)[1]
+        own = [(*_size(part, pick, part.covariance), part) for part in parts]
+        spread = scatter(
+            [v for v, _, _ in own],
+            [max(s, _size(part, pick, part.null_covariance)[1]) for _, s, part in own],
+        )
+        if spread is not None:
+            std = spread.widened(value, std)
+        std = math.hypot(std, *(_apart(other, told, value) for other in rivals.values()))
+        widest = max(std, at_null)
+        prior = 1.0 / float(np.sum(1.0 / found.prior[pick > 0.0]))
+        others = [rival for without, rival in rivals.items() if {*told.of} <= {*without}]
+        rival = min(others, key=lambda rival: rival.worse, default=None)
+        alone = rival is None or rival.share < _FALSE_CLAIMS
+        claimed = alone and abs(value) > max(critical * widest, told.negligible)
+        variance = float(pick @ naive @ pick)
+        if not claimed:
+            # No fault is as likely: its interval is that of no fault, if that is wider.
+            std, variance = widest, max(variance, at_null**2)
+        learned = 1.0 - variance * prior
+        claimed = claimed and learned > 0.0
+        well = alone and learned > _LEARNED and abs(value) + Z95 * std < told.enough
+        reason = ""
+        if rival is not None and not alone:
+            reason = why_not(told.name, other=_instead(found, rival.estimate, told))
+        elif not (claimed or well):
+            reason = _confounded(told, pick, found, naive, names)
+        result.append(
+            SensorFault(
+                told.name, told.channel, told.title, value, std, told.unit, claimed or well,
+                claimed, reason,
+            )
+        )  # fmt: skip
+    return tuple(result)
+
+
+def _size(found: Estimate, pick: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:
+    """Value and standard deviation of a sum of faults."""
+    value = float(pick @ np.array(list(found.faults.values())))
+    return value, float(np.sqrt(pick @ covariance @ pick))
+
+
+def _apart(rival: Rival, told: _Told, value: float) -> float:
+    """Standard deviation of a fault that takes one of two values."""
+    other = sum(rival.estimate.faults.get(name, 0.0) for name in told.of)
+    return math.sqrt(rival.share) * abs(other - value)
+
+
+def _instead(found: Estimate, rival: Estimate, told: _Told) -> str:
+    """What takes the place of a fault in an explanation without it."""
+    std = np.sqrt(np.diag(found.null_covariance))
+    moved = {
+        name: abs(rival.faults[name] - found.faults[name]) / sigma
+        for name, sigma in zip(found.faults, std, strict=True)
+        if name in rival.faults and name not in told.of
+    }
+    return max(moved, key=lambda name: moved[name])
+
+
+def _confounded(
+    told: _Told,
+    pick: np.ndarray,
+    found: Estimate,
+    naive: np.ndarray,
+    names: Sequence[str],
+) -> str:
+    """What takes the information away: the driving, or another fault."""
+    own = int(np.argmax(pick * np.arange(1, pick.size + 1)))
+    data = max(found.information[own, own] - found.prior[own], 1e-300)
+    alone = 1.0 / math.sqrt(data)
+    if Z95 * alone > told.enough:
+        return why_not(told.name, alone=alone)
+    along = naive @ pick
+    correlation = np.abs(along) / np.sqrt(np.diag(naive) * float(pick @ along))
+    correlation[pick > 0.0] = 0.0
+    return why_not(told.name, other=names[int(np.argmax(correlation))])

@@ -1,0 +1,56 @@
+"""Logs made ready for the likelihood without being asked: noise white, channels in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..errors import SysidError
+from ..log import Log
+from .apply import corrected
+from .check import check
+from .condition import conditioned
+
+_OF_THE_SPEEDS = ("delay_vx_s", "delay_vy_s")  # of one device as a rule
+_DELAYS = (*_OF_THE_SPEEDS, "delay_ay_s")
+_LEVEL_MPS2 = 0.05  # change of gravity within a second, on a road that counts as level
+
+
+def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], list[Log], bool]:
+    """Logs with white noise, whose channels were read at the same moment.
+
+    Biases, scales and places of sensors stay as they are: they are effects of the catalogue, which
+    says more of them. Delays of one channel against another are told by kinematics alone, better
+    than by any model with tyres.
+
+    Parameters
+    ----------
+    logs, others : sequence of Log
+        Of the same sensors; the first ones tell the delays.
+
+    Returns
+    -------
+    logs, others : list of Log
+    delayed : bool
+        Whether a delay was found and taken out.
+    """
+    ready = conditioned([*logs, *others])
+    own, rest = ready[: len(logs)], ready[len(logs) :]
+    try:
+        checked = check(own)
+    except SysidError:
+        return own, rest, False
+    # A driver who steers, brakes and drives against a road that is not level makes speeds and
+    # accelerations seem to come at other times.
+    if max(checked.estimate.road_mps2.values()) > _LEVEL_MPS2:
+        return own, rest, False
+    late = {name: checked[name] for name in _DELAYS}
+    if not any(fault.found for fault in late.values()):
+        return own, rest, False
+    together = any(late[name].found for name in _OF_THE_SPEEDS)
+    values = {
+        name: fault.value
+        for name, fault in late.items()
+        if fault.found or (together and fault.told and name in _OF_THE_SPEEDS)
+    }
+    done = [log.corrected(*corrected(log, values)) for log in ready]
+    return done[: len(logs)], done[len(logs) :], True

@@ -1,0 +1,343 @@
+"""What a check of the sensors found, and a log put right by it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._common.arrays import FloatArray
+from .._common.style import AFTER, MEASURED, axes_or_new, tidy
+from .._common.text import html_list, html_paragraph, html_table, number, text_table
+from ..errors import InvalidInput, near_names
+from ..log import Log
+from ..vehicle import Vehicle
+from .apply import corrected
+from .colour import Colour
+from .equations import Readings
+from .estimate import Estimate
+from .faults import SensorFault
+from .motion import Stretch
+from .signals import MOVING, Signal
+from .texts import ON_CORRECTION, gradient, map_line
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SURE = 3.0  # standard errors of a mean offset
+_HEAD = ("fault", "channel", "value", "95 % interval", "verdict")
+_SIGNAL_HEAD = ("channel", "rate", "held", "quantum", "missing", "noise", "colour")
+# Effects of the catalogue that are not to be looked for any more once their faults are told.
+_SETTLED = {
+    "sensor_delay": ("delay_vx_s", "delay_vy_s", "delay_ay_s"),
+    "speed_sensor_misalignment": ("imu_turn_rad",),
+    "gyro_bias": ("bias_yaw_rate_radps",),
+    "gyro_scale": ("gain_yaw_rate",),
+    "body_attitude": ("gain_ax", "gain_ay"),
+    "accelerometer_scale": ("gain_ax", "gain_ay"),
+}
+_GAINS = {"ax_mps2": "gain_ax", "ay_mps2": "gain_ay", "yaw_rate_radps": "gain_yaw_rate"}
+_DELAYS = {
+    "vx_mps": "delay_vx_s",
+    "vy_mps": "delay_vy_s",
+    "ay_mps2": "delay_ay_s",
+}
+_BIASES = {"yaw_rate_radps": "bias_yaw_rate_radps", "vy_mps": "bias_vy_mps"}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SensorCheck:
+    """What the channels of a log say of each other; made by :func:`sysid_vehicle.check`.
+
+    Attributes
+    ----------
+    logs : tuple of Log
+        What was checked.
+    faults : tuple of SensorFault
+        Every fault with its interval, or why it cannot be told.
+    signals : tuple of Signal
+        Rate, hold and quantum of every channel of every log.
+    estimate : Estimate
+        The estimate behind it: faults, motion, road.
+    noise : dict of (Colour, ndarray)
+        Noise of each channel at its own rate, and what the channel should have read.
+    readings : tuple of Readings
+        The samples that were used.
+    stretches : tuple of Stretch
+        The driving that was used.
+    vehicle : Vehicle or None
+        The car.
+    """
+
+    logs: tuple[Log, ...]
+    faults: tuple[SensorFault, ...]
+    signals: tuple[Signal, ...]
+    estimate: Estimate
+    noise: dict[str, tuple[Colour, FloatArray]]
+    readings: tuple[Readings, ...]
+    stretches: tuple[Stretch, ...]
+    vehicle: Vehicle | None = None
+
+    @property
+    def found(self) -> tuple[SensorFault, ...]:
+        """Faults that are there."""
+        return tuple(fault for fault in self.faults if fault.found)
+
+    @property
+    def not_told(self) -> tuple[SensorFault, ...]:
+        """Faults that this log cannot show."""
+        return tuple(fault for fault in self.faults if not fault.told)
+
+    __iter__ = None  # numbers are no names
+
+    def __getitem__(self, name: str) -> SensorFault:
+        """Return a fault by its name.
+
+        Raises
+        ------
+        InvalidInput
+            If there is none of this name; near names are given.
+        """
+        for fault in self.faults:
+            if fault.name == name:
+                return fault
+        names = [fault.name for fault in self.faults]
+        raise InvalidInput(f"there is no sensor fault '{name}'{near_names(name, names)}")
+
+    @cached_property
+    def settles(self) -> tuple[str, ...]:
+        """Effects of the catalogue that :meth:`apply` has dealt with, or that are not there."""
+        return tuple(
+            effect
+            for effect, names in _SETTLED.items()
+            if all(self[name].told for name in names)
+        )  # fmt: skip
+
+    @property
+    def offsets(self) -> dict[str, tuple[float, float]]:
+        """Mean of what `ax_mps2` and `ay_mps2` read beyond the motion, and its deviation [m/s2].
+
+        Bias of the sensor and mean slope of the road are one.
+        """
+        o = self.estimate.offsets
+        return {"ax_mps2": o["grade"], "ay_mps2": o["bank"]}
+
+    @property
+    def map_lines(self) -> tuple[str, ...]:
+        """Lines for the table ``[channels]`` of a channel map that put right what was found."""
+        lines = []
+        for channel in MOVING:
+            delay, gain, bias = (
+                self._found_value(table.get(channel)) for table in (_DELAYS, _GAINS, _BIASES)
+            )
+            if delay or gain or bias:
+                lines.append(map_line(channel, delay, gain, bias))
+        return tuple(lines)
+
+    def _found_value(self, name: str | None) -> float:
+        return self[name].value if name is not None and self[name].found else 0.0
+
+    def apply(self, log: Log) -> Log:
+        """Return the log with what was found put right, and with what was done recorded.
+
+        Time offsets, biases and scales (gravity by roll and pitch is one) are taken out; the
+        accelerations are those of the speed sensor's place, in its direction. Faults that were not
+        found are left alone; so is the steering angle. Where no wheel force is logged the measured
+        a_x is what drives the car, and its mean beyond the motion is taken out: bias of the sensor
+        and slope of the road are one there. That of a_y is left to the tyres, which can tell them.
+        """
+        values = {fault.name: fault.value for fault in self.found}
+        channels, what = corrected(log, values)
+        bias, std = self.offsets["ax_mps2"]
+        if log.has("ax_mps2") and not log.has("fx_n") and abs(bias) > _SURE * std:
+            channels["ax_mps2"] = channels.get("ax_mps2", log["ax_mps2"]) - bias
+            what.append(f"ax_mps2: {bias:.3g} m/s2 on average beyond the motion taken out")
+        return log.corrected(channels, what)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What follows from the faults, in sentences."""
+        said = []
+        for axis, channel, name in (
+            ("roll", "ay_mps2", "gain_ay"),
+            ("pitch", "ax_mps2", "gain_ax"),
+        ):
+            fault = self[name]
+            if fault.found:
+                low, high = (gradient(x) for x in fault.interval)
+                said.append(
+                    f"{channel}: the scale is that of an accelerometer on a body with a {axis} "
+                    f"gradient of {gradient(fault.value):.3g} deg/g ({low:.3g} to {high:.3g}); "
+                    f"kinematics cannot tell it from a scale error"
+                )
+        for signal in self.signals:
+            if signal.held_rows:
+                said.append(
+                    f"{signal.log}: {signal.channel} repeats each value for "
+                    f"{signal.held_rows:.3g} rows; its first one counts"
+                )
+        arm = self["imu_forward_m"]
+        if self.vehicle is not None and arm.found and abs(arm.value) > self.vehicle.wheelbase_m:
+            said.append(
+                f"the IMU is not {arm.value:.3g} m from the speed sensor in a car with a wheelbase "
+                f"of {self.vehicle.wheelbase_m:.3g} m: look for a delay or for a wrong channel"
+            )
+        if not self.estimate.settled:
+            said.append(
+                "the estimate had not settled after the last round: sensors disagree in a way that "
+                "none of these faults describes; take the intervals with care"
+            )
+        return tuple(said)
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        rows: list[tuple[str, ...]] = []
+        for fault in self.faults:
+            if np.isfinite(fault.std):
+                low, high = fault.interval
+                span = f"{number(low, 3)} to {number(high, 3)} {fault.unit}".rstrip()
+                value = number(fault.value, 3)
+            else:
+                span, value = "", ""
+            verdict = "found" if fault.found else "not there" if fault.told else "cannot be told"
+            rows.append((fault.title, fault.channel, value, span, verdict))
+        return rows
+
+    def _signal_rows(self) -> list[tuple[str, ...]]:
+        rows: list[tuple[str, ...]] = []
+        for s in self.signals:
+            colour = self.noise[s.channel][0] if s.channel in self.noise else None
+            rows.append(
+                (
+                    s.channel,
+                    f"{s.rate_hz:.4g} Hz",
+                    f"{s.held_rows:.3g}" if s.held_rows else "",
+                    f"{s.quantum:.3g}" if s.quantum else "",
+                    f"{100.0 * s.missing:.3g} %" if s.missing > 5e-4 else "",
+                    f"{colour.std:.3g}" if colour else "",
+                    colour.words(s.rate_hz) if colour else "",
+                )
+            )
+        return rows
+
+    def _said(self) -> list[str]:
+        lines = [f"cannot be told: {f.title} ({f.channel}), {f.why_not}" for f in self.not_told]
+        return [*lines, *(f"cannot be told: {text}" for text in ON_CORRECTION)]
+
+    def _offset_lines(self) -> list[str]:
+        return [
+            f"{channel}: {value:.3g} +- {std:.2g} m/s2 on average beyond the motion: bias or slope "
+            f"of the road"
+            for channel, (value, std) in self.offsets.items()
+            if any(r.channel == channel for r in self.readings)
+        ]
+
+    @property
+    def headline(self) -> str:
+        """One sentence."""
+        names = ", ".join(log.name for log in self.logs)
+        if not self.found:
+            return f"{names}: the sensors agree; no fault was found."
+        return f"{names}: {len(self.found)} sensor faults were found."
+
+    def __str__(self) -> str:
+        lines = [self.headline, text_table(_HEAD, self._rows()), ""]
+        lines += [text_table(_SIGNAL_HEAD, self._signal_rows()), ""]
+        lines += [*self._offset_lines(), *self.remarks, *self._said()]
+        if self.map_lines:
+            lines += ["", "For the channel map (multiply factors with those that stand there):"]
+            lines += [f"  {line}" for line in self.map_lines]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<SensorCheck {self.headline}>"
+
+    def _repr_html_(self) -> str:
+        lines = "\n".join(self.map_lines)
+        return "".join(
+            (
+                html_paragraph(self.headline),
+                html_table(_HEAD, self._rows()),
+                html_table(_SIGNAL_HEAD, self._signal_rows()),
+                html_list([*self._offset_lines(), *self.remarks, *self._said()]),
+                f"<pre>{escape(lines)}</pre>" if lines else "",
+            )
+        )
+
+    def residuals(self, channel: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Time, reading and what the motion makes of it, each of shape (n,).
+
+        Raises
+        ------
+        InvalidInput
+            If the channel was not checked.
+        """
+        for r in self.readings:
+            if r.channel == channel:
+                return r.time_s, r.values, self.noise[channel][1]
+        raise InvalidInput(
+            f"{channel} was not checked; checked were {', '.join(r.channel for r in self.readings)}"
+        )
+
+    def plot(self, channel: str = "ay_mps2", ax: Axes | None = None) -> Axes:
+        """Draw what a channel read, and what it should have read of the common motion.
+
+        Parameters
+        ----------
+        channel : str
+            Which.
+        ax : matplotlib Axes, optional
+            Where to draw; a new figure is made without it.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        time_s, values, expected = self.residuals(channel)
+        ax = axes_or_new(ax, 8.0, 2.6)
+        number_of = next(r.stretch for r in self.readings if r.channel == channel)
+        for k in range(len(self.stretches)):
+            at = number_of == k
+            (read,) = ax.plot(time_s[at], values[at], color=MEASURED, linewidth=0.6)
+            (of,) = ax.plot(time_s[at], expected[at], color=AFTER, linewidth=0.9)
+        ax.legend([read, of], ["read", "of the common motion"], fontsize="small")
+        return tidy(ax, xlabel="time_s", ylabel=channel)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Every figure, for JSON."""
+        return {
+            "logs": [log.name for log in self.logs],
+            "faults": {
+                f.name: {
+                    "channel": f.channel,
+                    "value": f.value if np.isfinite(f.std) else None,
+                    "std": f.std if np.isfinite(f.std) else None,
+                    "unit": f.unit,
+                    "found": f.found,
+                    "told": f.told,
+                    "why_not": f.why_not,
+                }
+                for f in self.faults
+            },
+            "offsets_mps2": {k: list(v) for k, v in self.offsets.items()},
+            "noise": {
+                c: {"std": k.std, "white_std": k.white_std, "phi": k.phi.tolist()}
+                for c, (k, _) in self.noise.items()
+            },
+            "signals": [vars(s) for s in self.signals],
+            "settles": list(self.settles),
+            "channel_map": list(self.map_lines),
+            "remarks": list(self.remarks),
+        }
+
+
+def put_right(
+    sensors: SensorCheck | None, logs: Log | Sequence[Log] | None
+) -> Log | Sequence[Log] | None:
+    """The logs, put right where a check is given."""
+    if sensors is None or logs is None:
+        return logs
+    return sensors.apply(logs) if isinstance(logs, Log) else [sensors.apply(log) for log in logs]
