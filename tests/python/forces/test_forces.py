@@ -11,7 +11,8 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle.cli.main import main
-from sysid_vehicle.forces import COLOURS, _motion
+from sysid_vehicle.forces import COLOURS
+from sysid_vehicle.forces import motion as _motion
 from sysid_vehicle.simulate import Drive, drive_truth
 
 mpl.use("Agg")
