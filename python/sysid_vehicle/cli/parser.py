@@ -141,7 +141,8 @@ def _search(parser: argparse.ArgumentParser) -> None:
         "--time-limit",
         type=_seconds,
         metavar="S",
-        help="end refits after S seconds and judge what was found until then",
+        help="end the study after S seconds: every stage has a share of them, and what was left "
+        "out is said; what is printed of it and the report come after",
     )
     parser.add_argument(
         "--matters",

@@ -4,7 +4,8 @@ from .ahead import predicting_ahead
 from .box import free_box
 from .estimates import Estimate
 from .fit import Fit
-from .identify import identify, objective_of, profile_fit, refine, refit, unmoved
+from .identify import identify, profile_fit
+from .maximum import objective_of, refine, refine_above, refit, unmoved
 from .offsets import driving_of
 from .posterior import Posterior
 from .predictive import Prediction, predict
@@ -36,6 +37,7 @@ __all__ = [
     "predicting_ahead",
     "profile_fit",
     "refine",
+    "refine_above",
     "refit",
     "settle",
     "unmoved",

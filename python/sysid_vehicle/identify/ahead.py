@@ -10,7 +10,6 @@ model is the car, both give the same car within their uncertainty, and the likel
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -20,6 +19,7 @@ import scipy
 
 from .. import _core
 from .._common.arrays import FloatArray, as_float64
+from .._common.threads import in_parallel
 from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving, NoiseModel
 from ..estimate.pieces import DrivingProblem
@@ -74,9 +74,16 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     box, model = free_box(fit.model), fit.model
     ahead = _Ahead.of(fit, horizon_s, box)
     ends = ahead.ends(_starts(model, box))
-    end = ends[0] if len(ends) == 1 else min(ends, key=lambda e: ahead.trimmed(e.p))
+    end, look = ends[0], None
+    if len(ends) > 1:
+        looks = in_parallel(lambda e: ahead.looked(e.p), ends)
+        best = min(range(len(ends)), key=lambda i: ahead.trimmed(looks[i]))
+        end, look = ends[best], looks[best]
     for _ in range(_PASSES - 1):
-        end = ahead.searched(end.p)
+        begun = end.p
+        end, look = ahead.searched(begun, look), None
+        if np.array_equal(end.p, begun):
+            break  # from here every pass is the same one
     p, errors, gains = end.p, end.errors, end.gains
     information = _information(
         errors.sensitivities(p, gains, box.columns),
@@ -102,6 +109,9 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
         profiles=(),
         horizon_s=float(horizon_s),
     )
+
+
+_Look = tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -149,16 +159,26 @@ class _Ahead:
         NumericalError
             The car spins in the model from every one.
         """
-        found = []
-        for p in starts:
-            with suppress(NumericalError, np.linalg.LinAlgError):
-                found.append(self.searched(p))
-        return found or [self.searched(starts[0])]
 
-    def searched(self, p: FloatArray) -> _End:
-        """Where the errors of the windows that count at a start are least."""
+        def end(p: FloatArray) -> _End | Exception:
+            try:
+                return self.searched(p)
+            except (NumericalError, np.linalg.LinAlgError) as error:
+                return error
+
+        found = in_parallel(end, starts)
+        ended = [e for e in found if isinstance(e, _End)]
+        if not ended and isinstance(found[0], Exception):
+            raise found[0]
+        return ended
+
+    def searched(self, p: FloatArray, look: _Look | None = None) -> _End:
+        """Where the errors of the windows that count at a start are least.
+
+        `look` is `looked` of the start, where it is known.
+        """
         driving, model, windows = self.fit.driving, self.fit.model, self.windows
-        squares, motion = self._looked(p)
+        squares, motion = self.looked(p) if look is None else look
         turning = squares[self.turns]
         typical = float(np.median(turning))
         most = max(_LOST**2 * typical, float(np.quantile(turning, _KEPT)))
@@ -176,12 +196,12 @@ class _Ahead:
         )
         return _End(self.box.put(p, found.x), errors, gains, counted, found.settled)
 
-    def trimmed(self, p: FloatArray) -> float:
+    def trimmed(self, look: _Look) -> float:
         """Mean square of the windows in which the car turns, without those that err most."""
-        squares = np.sort(self._looked(p)[0][self.turns])
+        squares = np.sort(look[0][self.turns])
         return float(np.mean(squares[: max(int(_KEPT * len(squares)), 1)]))
 
-    def _looked(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def looked(self, p: FloatArray) -> _Look:
         """Mean square of each window, and the motion that they begin with."""
         # What is not measured is smoothed with the parameters that are being sought.
         motion = as_float64(self.whole.trace(p, self.fit.noise.vector(), True)["state"])

@@ -2,35 +2,41 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
-from .. import _core
 from .._common.arrays import FloatArray, as_float64
-from ..errors import InvalidInput, NumericalError, warn
-from ..estimate import Driving, NoiseModel, first_guess, noise_range
-from ..estimate.pieces import DrivingProblem
+from .._common.threads import before
+from ..errors import InvalidInput, warn
+from ..estimate import Driving, NoiseModel, first_guess
 from ..log import Log, check_car, check_excitation
 from ..model import Model
 from .ahead import predicting_ahead
-from .box import free_box, free_prior
-from .estimates import BETTER_FOUND, INTERVALS, profiled_estimates, wald
+from .box import free_box
+from .estimates import BETTER_FOUND, INTERVALS, profiled_estimates
 from .fit import Fit
+from .maximum import (
+    THINNED,
+    log_likelihood_of,
+    objective_of,
+    objectives,
+    on_its_road,
+    refine,
+    summary,
+    top,
+)
 from .objective import Objective
-from .offsets import centred, marginal_information
+from .offsets import centred
 from .search import METHODS, Box, minimise
-from .settle import moved, rivalled, settle, settle_finely, to_the_top
+from .settle import rivalled, settle, settle_finely
 from .starts import Runner, Starts, apart, at_typical_sizes, space_filling
 from .suspects import explaining
 
-_SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
-_HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
-_THINNED = 3000  # samples that decide between starts
-_FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
-_ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
+_STARTED = 0.3  # of the time that a search has, for its starts
 _OFFSETS = 2  # times that offsets of logs and what they share are found in turn
 
 
@@ -106,16 +112,54 @@ def identify(
     if horizon_s and intervals == "profile":
         raise InvalidInput("profile intervals are of the likelihood; leave out horizon_s")
     model = _told(model, fixed, bounds, priors)
-    driving = Driving.of(logs)
-    for log in driving.logs:
-        check_car(log, mass_kg=model.vehicle.mass_kg, wheelbase_m=model.vehicle.wheelbase_m)
-    check_excitation(list(driving.logs))
-    _say_what_is_not_seen(model, driving)
+    fit = maximised(
+        model,
+        Driving.of(logs),
+        starts=starts,
+        method=method,
+        seed=seed,
+        workers=workers,
+        progress=progress,
+    )
+    if intervals == "profile":
+        return profile_fit(fit, workers=workers, progress=progress)
+    return predicting_ahead(fit, horizon_s) if horizon_s else fit
+
+
+def maximised(
+    model: Model,
+    driving: Driving,
+    *,
+    starts: int,
+    method: str = "gauss-newton",
+    seed: int = 0,
+    workers: int | None = None,
+    progress: bool | None = None,
+    ends: float = np.inf,
+) -> Fit:
+    """The maximum of the likelihood from many starts, or the likeliest that was seen in time.
+
+    Parameters
+    ----------
+    model : Model
+    driving : Driving
+    starts, method, seed, workers, progress
+        As in `identify`.
+    ends : float
+        When the search ends, wherever it is, by `time.perf_counter`. The fit has not converged
+        then, and a pass or two over the data are still to come.
+
+    Raises
+    ------
+    InvalidInput, NumericalError
+        As in `identify`.
+    """
+    _check(model, driving)
     names = model.free_names
     box = free_box(model)
     p = model.vector()
     noise = first_guess(driving, model.vehicle)
-    thin = objective_of(model, driving.problem(model, most_samples=_THINNED), driving)
+    thin = objective_of(model, driving.problem(model, most_samples=THINNED), driving)
     frozen = thin.freeze(p, noise.vector())
     # Up to this the log-likelihood is minus half the sum of squares.
     level = frozen.log_likelihood + thin.problem.half_sum_of_squares(p, frozen)
@@ -124,27 +168,67 @@ def identify(
         found = minimise(thin, begin, frozen, box, method=method, tolerance=0.1)
         return box.put(begin, found.x), level - found.cost
 
+    def in_time(begin: FloatArray) -> tuple[FloatArray, float]:
+        found = before(started, lambda: search(begin), None)
+        return found or (begin, level - thin.problem.half_sum_of_squares(begin, frozen))
+
+    now = time.perf_counter()
+    started = now + _STARTED * (ends - now)
     begins = _start_points(model, names, box, starts, seed)
-    ends, values = Runner(box, workers, progress).all_of(search, box.put(p, begins))
-    table = Starts(names, begins, as_float64(ends[:, box.columns]), values)
+    points, values = Runner(box, workers, progress).all_of(in_time, box.put(p, begins))
+    table = Starts(names, begins, as_float64(points[:, box.columns]), values)
     # Which end is the best is told by the noise as it then is, not by that of the start.
-    objective, thinned = _objectives(model, driving)
-    first, *others = apart(ends, values, box)
+    objective, thinned = objectives(model, driving)
+    few = apart(points, values, box)
+
+    def found() -> Fit:
+        return _from_ends(model, driving, objective, thinned, few, table)
+
+    fit = before(ends, found, None)
+    if fit is not None:
+        return fit
+    seen = [s for s in (o.likeliest for o in (objective, *thinned)) if s is not None]
+    every = [(s.p, s.noise) for s in seen] or [(few[0], noise.vector())]
+    likeliest = max(every, key=lambda at: log_likelihood_of(objective, *at))
+    return summary(
+        model, driving, objective, likeliest[0], NoiseModel.from_vector(likeliest[1]), table, False
+    )
+
+
+def _from_ends(
+    model: Model,
+    driving: Driving,
+    objective: Objective,
+    thinned: list[Objective],
+    ends: Sequence[FloatArray],
+    table: Starts,
+) -> Fit:
+    """The maximum, from the best few ends of searches under the noise of a first guess."""
+    box = free_box(model)
+    noise = first_guess(driving, model.vehicle)
+    first, *others = ends
     best = settle(objective, first, noise.vector(), box, thin=thinned)
     for end in others:
         best = rivalled(objective, best, end, box, thinned)
-    fit = _top(model, driving, objective, best, table)
+    fit = top(model, driving, objective, best, table)
     best = at_top = fit.model.vector(), fit.noise.vector(), fit.converged
     for elsewhere in at_typical_sizes(model, at_top[0]):
         best = rivalled(objective, best, elsewhere, box, thinned)
     if best is not at_top:
-        fit = _top(model, driving, objective, best, table)
-    fit = _on_its_road(fit)
+        fit = top(model, driving, objective, best, table)
+    fit = on_its_road(fit)
     if fit.model.offset_names and len(driving.logs) > 1:
         fit = _log_by_log(fit)
-    if intervals == "profile":
-        return profile_fit(fit, workers=workers, progress=progress)
-    return predicting_ahead(fit, horizon_s) if horizon_s else fit
+    return fit
+
+
+def _check(model: Model, driving: Driving) -> None:
+    if not model.free_names:
+        raise InvalidInput("every parameter is fixed: nothing is left to identify; use compare")
+    for log in driving.logs:
+        check_car(log, mass_kg=model.vehicle.mass_kg, wheelbase_m=model.vehicle.wheelbase_m)
+    check_excitation(list(driving.logs))
+    _say_what_is_not_seen(model, driving)
 
 
 def _log_by_log(fit: Fit) -> Fit:
@@ -161,53 +245,7 @@ def _told(
     bounds: Mapping[str, tuple[float, float]],
     priors: Mapping[str, tuple[float, float]],
 ) -> Model:
-    model = model.with_fixed(fixed).with_bounds(bounds).with_priors(priors)
-    if not model.free_names:
-        raise InvalidInput("every parameter is fixed: nothing is left to identify; use compare")
-    return model
-
-
-def objective_of(model: Model, problem: DrivingProblem, driving: Driving) -> Objective:
-    """The likelihood of a problem with the priors of a model's free parameters."""
-    return Objective(problem, free_prior(model), *noise_range(model.vehicle, driving))
-
-
-def refine(
-    model: Model, driving: Driving, noise: NoiseModel, *, inputs: FloatArray | None = None
-) -> Fit:
-    """Go on from a model's values and a noise model that are already near: one start.
-
-    Parameters
-    ----------
-    inputs : array, shape (samples, 2), optional
-        In place of the driving's own steering angle and wheel force.
-    """
-    return _polish(model, driving, model.vector(), noise, Starts.none(model.free_names), inputs)
-
-
-def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3) -> Fit:
-    """Parameters alone, from a model's values, under a noise model that stays as it is.
-
-    The likelihood is never lower than that of the values it starts from.
-    """
-    box = free_box(model)
-    objective = objective_of(model, driving.problem(model), driving)
-    p = box.inside(model.vector())
-    gains, value = None, -np.inf
-    for _ in range(rounds):
-        before, best = p, value
-        p, gains = moved(objective, p, noise.vector(), box, rounds=8, tolerance=0.2)
-        value = objective.reached(p, gains)
-        if value < best + _ENOUGH or box.near(p, before, 1e-4):
-            break
-    return _summary(model, driving, objective, p, noise, Starts.none(model.free_names), True, gains)
-
-
-def unmoved(model: Model, driving: Driving, noise: NoiseModel) -> Fit:
-    """A model's values as they stand, with their standard errors: nothing is searched."""
-    objective = objective_of(model, driving.problem(model), driving)
-    starts = Starts.none(model.free_names)
-    return _summary(model, driving, objective, model.vector(), noise, starts, True)
+    return model.with_fixed(fixed).with_bounds(bounds).with_priors(priors)
 
 
 def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool | None = None) -> Fit:
@@ -221,7 +259,7 @@ def profile_fit(fit: Fit, *, workers: int | None = None, progress: bool | None =
     for _ in range(BETTER_FOUND):
         p, noise, _ = settle_finely(objective, p, noise, box)
         told = NoiseModel.from_vector(noise)
-        fit = _summary(fit.model, fit.driving, objective, p, told, fit.starts, fit.converged)
+        fit = summary(fit.model, fit.driving, objective, p, told, fit.starts, fit.converged)
         estimates, profiles, better = profiled_estimates(
             objective, p, noise, box, fit, workers, progress
         )
@@ -252,103 +290,6 @@ def _start_points(
         else:
             low[i], high[i] = 0.5 * given[i], 2.0 * given[i]
     return np.clip(space_filling(given, low, high, starts, seed), box.lower, box.upper)
-
-
-def _polish(
-    model: Model,
-    driving: Driving,
-    p: FloatArray,
-    noise: NoiseModel,
-    starts: Starts,
-    inputs: FloatArray | None = None,
-) -> Fit:
-    """Noise and parameters of maximum likelihood, from values that are already near."""
-    objective, thinned = _objectives(model, driving, inputs)
-    found = settle(objective, p, noise.vector(), free_box(model), thin=thinned)
-    return _top(model, driving, objective, found, starts)
-
-
-def _objectives(
-    model: Model, driving: Driving, inputs: FloatArray | None = None
-) -> tuple[Objective, list[Objective]]:
-    """The likelihood, and those of fewer samples, the fewest first.
-
-    Noise needs fewer samples than parameters do; the last word has all of them.
-    """
-    objective = objective_of(model, driving.problem(model, other_inputs=inputs), driving)
-    every = objective.samples
-    levels = max(round(np.log(every / _THINNED) / np.log(_FINER)), 1)
-    thinned = [round(_THINNED * (every / _THINNED) ** (n / levels)) for n in range(levels)]
-    few = [driving.problem(model, most_samples=n, other_inputs=inputs) for n in thinned]
-    return objective, [replace(objective, problem=f) for f in few if f.samples < every]
-
-
-def _top(
-    model: Model,
-    driving: Driving,
-    objective: Objective,
-    settled: tuple[FloatArray, FloatArray, bool],
-    starts: Starts,
-) -> Fit:
-    """The maximum, from where a search has settled."""
-    p, noise = to_the_top(objective, *settled[:2], free_box(model))
-    told = NoiseModel.from_vector(noise)
-    return _summary(model, driving, objective, p, told, starts, settled[2])
-
-
-def _on_its_road(fit: Fit) -> Fit:
-    """The same fit where the road is level, another where its slope varies."""
-    model, driving, p = fit.model, fit.driving, fit.model.vector()
-    objective = objective_of(model, driving.problem(model), driving)
-
-    def log_likelihood(noise: NoiseModel) -> float:
-        try:
-            return float(objective.freeze(p, noise.vector()).log_likelihood)
-        except NumericalError:
-            return -np.inf
-
-    sloping = [replace(fit.noise, road=(slope, slope)) for slope in _SLOPES_MPS2]
-    values = [log_likelihood(noise) for noise in sloping]
-    best = sloping[int(np.argmax(values))]
-    if max(values) < fit.log_likelihood + _HINT:
-        return fit
-    learned, value, _ = objective.learn_noise(p, best.vector(), rounds=6)
-    if value < fit.log_likelihood + _SHOWN:
-        return fit
-    found = _polish(model, driving, p, NoiseModel.from_vector(learned), fit.starts)
-    return found if found.log_likelihood > fit.log_likelihood else fit
-
-
-def _summary(
-    model: Model,
-    driving: Driving,
-    objective: Objective,
-    p: FloatArray,
-    noise: NoiseModel,
-    starts: Starts,
-    converged: bool,
-    frozen: _core.FrozenFilter | None = None,
-) -> Fit:
-    box, names = free_box(model), model.free_names
-    if frozen is None:
-        frozen = objective.freeze(p, noise.vector())
-    if driving.offsets:
-        information = marginal_information(model, driving, p, noise)
-    else:
-        _, _, information = objective.normal_equations(p, frozen, box.columns)
-    x = p[box.columns]
-    units = {n: parameter.unit for n, parameter in model.parameters.items()}
-    estimates, covariance = wald(names, units, x, information, box)
-    return Fit(
-        model.with_values(dict(zip(names, map(float, x), strict=True))),
-        noise,
-        estimates,
-        covariance,
-        float(frozen.log_likelihood),
-        driving,
-        starts,
-        converged,
-    )
 
 
 def _say_what_is_not_seen(model: Model, driving: Driving) -> None:

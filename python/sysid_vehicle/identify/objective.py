@@ -162,6 +162,14 @@ class Penalised:
         return cost, descent, information
 
 
+class Seen(NamedTuple):
+    """What the filter has run with, and its log-likelihood, priors included."""
+
+    p: FloatArray
+    noise: FloatArray
+    log_likelihood: float
+
+
 class _Linear(NamedTuple):
     """Normal equations, and where they were asked for."""
 
@@ -190,6 +198,12 @@ class Objective(Penalised):
         default_factory=list, init=False, repr=False, compare=False
     )
     _linear: list[_Linear] = field(default_factory=list, init=False, repr=False, compare=False)
+    _seen: list[Seen] = field(default_factory=list, init=False, repr=False, compare=False)
+
+    @property
+    def likeliest(self) -> Seen | None:
+        """The likeliest of all parameters and noise that the filter has run with."""
+        return self._seen[0] if self._seen else None
 
     def freeze(self, p: FloatArray, noise: FloatArray) -> Any:
         """Gains of the filter; their log-likelihood is that of the data alone.
@@ -202,6 +216,9 @@ class Objective(Penalised):
             if np.array_equal(at, p) and np.array_equal(under, noise):
                 return gains
         gains = self.problem.freeze(p, noise)
+        value = self.reached(p, gains)
+        if not self._seen or value > self._seen[0].log_likelihood:
+            self._seen[:] = [Seen(p.copy(), noise.copy(), value)]
         kept = 1 if self.samples > _LONG else _KEPT
         self._last[:] = [(p.copy(), noise.copy(), gains), *self._last[: kept - 1]]
         return gains

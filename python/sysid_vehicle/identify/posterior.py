@@ -153,7 +153,7 @@ def _ensemble(
 ) -> tuple[FloatArray, FloatArray]:
     """Of the likelihood itself, by the affine-invariant sampler (Goodman & Weare 2010, emcee)."""
     emcee = imported("emcee", "arviz")
-    from .identify import objective_of
+    from .maximum import objective_of
 
     columns = free_box(fit.model).columns
     objective = objective_of(fit.model, fit.driving.problem(fit.model), fit.driving)

@@ -24,7 +24,7 @@ from ..estimate.pieces import DrivingProblem
 from ..model import Model
 from .box import free_box
 from .fit import Fit
-from .identify import objective_of
+from .maximum import objective_of
 from .objective import Penalised
 from .offsets import driving_of
 from .search import Box, minimise

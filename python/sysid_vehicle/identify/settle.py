@@ -101,6 +101,7 @@ def settle(
     thin: Sequence[Objective] = (),
     method: str = "gauss-newton",
     parameters_first: bool = False,
+    led: tuple[FloatArray, FloatArray] | None = None,
     rounds: int = 10,
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Alternate between noise and parameters until the likelihood stands still.
@@ -120,6 +121,8 @@ def settle(
     parameters_first : bool
         Noise learned at poor parameters is large, and large noise makes poor parameters look good
         enough: where they may be poor and the noise is not, they move first.
+    led : (p, noise), optional
+        Where few samples have led already, in place of `thin`.
     rounds : int
 
     Returns
@@ -135,9 +138,9 @@ def settle(
     steps = 6
     if thin:
         # Few samples lead most of the way, unless where it begins is better already.
-        near, told, _ = settle(
-            thin[-1], p, noise, box, thin=thin[:-1], method=method, rounds=rounds
-        )
+        led = settle(thin[-1], p, noise, box, thin=thin[:-1], method=method, rounds=rounds)[:2]
+    if led is not None:
+        near, told = led
         if objective.log_likelihood(near, told) > objective.log_likelihood(p, noise):
             p, noise, steps = near, told, 3
     best = -np.inf

@@ -91,6 +91,9 @@ class Facts:
     small : bool
         Whether no error of the baseline 0.5 to 5 s ahead on validation data is as large as matters
         to the user.
+    unopposed : bool
+        Whether the time limit left unknown if something unknown would do in the place of what was
+        added.
     """
 
     fitted: Tested
@@ -102,6 +105,7 @@ class Facts:
     excited: bool = True
     structure: tuple[float, float] = (1.0, 0.0)
     small: bool = False
+    unopposed: bool = False
 
     def with_own(self, own: Mapping[str, tuple[Share, Share]], late: Collection[str] = ()) -> Facts:
         """The same with the own shares of effects: on validation data, and on training data.

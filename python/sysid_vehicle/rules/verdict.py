@@ -19,6 +19,11 @@ _LATE = (
     "validation data"
 )
 
+_UNOPPOSED = (
+    "the time limit left unknown whether something unknown would do in its place on training and "
+    "validation data"
+)
+
 
 def excess(test: Tested) -> float:
     """Evidence beyond what a complete model shows."""
@@ -96,6 +101,8 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
         withdrawn.append(Withdrawn(falling - late, _NOT_SHOWN, names))
         if falling & late:
             withdrawn.append(Withdrawn(falling & late, _LATE, names))
+    if facts.unopposed:
+        withdrawn.append(Withdrawn(names, _UNOPPOSED, names))
     # What only stands in for something else explains nothing, however well it fits, and what cannot
     # be told from that is no better.
     because = f"it acts like {', '.join(sorted(stand_ins))}, which is none either"

@@ -17,6 +17,7 @@ import numpy as np
 import scipy
 
 from .._common.arrays import FloatArray, as_float64
+from .._common.threads import check_time
 from .colour import Colour, fit_colour, neighbours
 from .equations import FAULTS, Readings, predict
 from .motion import QUICK, SLOW, Grid
@@ -156,6 +157,7 @@ def estimate(
     steps = {signal: grid.steps(signal) for signal in SLOW}
     settled = False
     for count in range(1, _ROUNDS + 1):
+        check_time()
         system = linearise(readings, grid, x, faults, colours, runs)
         rows = _rows(readings, grid, road)
         now = np.array([faults[name] for name in names])

@@ -94,8 +94,15 @@ def parts_of(
     """The parts as the samples show them."""
     if response is None:
         return images[0][1]
+    return folded(images, [response.power(f, s.rows_hz) for f, _ in images], response)
+
+
+def folded(
+    images: list[tuple[FloatArray, FloatArray]], powers: list[FloatArray], response: Response
+) -> FloatArray:
+    """The same where the factor of a response on the power at each image is known."""
     result: FloatArray = np.zeros_like(images[0][1])
-    for f, forms in images:
-        result += forms * response.power(f, s.rows_hz)
+    for (_, forms), power in zip(images, powers, strict=True):
+        result += forms * power
     result[0] += response.after
     return result

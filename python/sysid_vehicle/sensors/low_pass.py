@@ -21,7 +21,8 @@ import numpy.typing as npt
 import scipy
 
 from .._common.arrays import FloatArray
-from .forms import ROAD, Response, count, images_of, parts_of
+from .._common.threads import check_time
+from .forms import ROAD, Response, count, folded, images_of, parts_of
 from .spectrum import Spectrum
 
 _USUAL_DAMPING, _SPREAD = np.sqrt(0.5), 0.2  # Butterworth's, and of its logarithm
@@ -116,6 +117,18 @@ class _Problem:
         return tuple(images_of(s, s.frequency_hz[s.used], self.digital) for s in self.spectra)
 
     @cached_property
+    def _first_alike(self) -> list[int]:
+        """For each spectrum, the first one with the same frequencies: a filter does the same there.
+
+        Those of one device, as a rule.
+        """
+        seen: dict[tuple[float, float, bytes], int] = {}
+        return [
+            seen.setdefault((s.rate_hz, s.rows_hz, s.frequency_hz[s.used].tobytes()), n)
+            for n, s in enumerate(self.spectra)
+        ]
+
+    @cached_property
     def _bounds(self) -> FloatArray:
         middle = self._levels
         bounds: FloatArray = np.array([middle - _LOST, middle + _LOST])
@@ -154,17 +167,31 @@ class _Problem:
     def state(self, x: FloatArray) -> _State:
         """Cost, its slope, and the information, at the parameters."""
         cost, slope, information = 0.0, np.zeros(x.size), np.zeros((x.size, x.size))
-        here = self._response(x)
-        beside = [self._response(x + _STEP * row) for row in np.eye(x.size)[: self._shared]]
+        every = [x, *(x + _STEP * row for row in np.eye(x.size)[: self._shared])]
+        responses = [r for r in map(self._response, every) if r is not None]
+        factors: dict[int, list[list[FloatArray]]] = {}
         powers = []
-        for place, s, images in zip(self._places, self.spectra, self._images, strict=True):
-            amounts, parts = np.exp(x[place]), parts_of(images, here, s)
+        for n, (place, s, images) in enumerate(
+            zip(self._places, self.spectra, self._images, strict=True)
+        ):
+            amounts, parts = np.exp(x[place]), images[0][1]
+            first = self._first_alike[n]
+            if first not in factors:
+                factors[first] = [[r.power(f, s.rows_hz) for f, _ in images] for r in responses]
+            alike = factors[first]
+            if responses:
+                parts = folded(images, alike[0], responses[0])
             model = amounts @ parts + s.floor
             jacobian = np.zeros((x.size, model.size))
             jacobian[place] = amounts[:, None] * parts / model
-            for k, other in enumerate(beside):
-                moved = amounts @ parts_of(images, other, s) + s.floor
-                jacobian[k] = (moved / model - 1.0) / _STEP
+            if responses:
+                before = [amounts @ forms for _, forms in images]
+                for k, other in enumerate(responses[1:]):
+                    moved = sum(
+                        (b * p for b, p in zip(before, alike[k + 1], strict=True)),
+                        amounts[0] * other.after + s.floor,
+                    )
+                    jacobian[k] = (moved / model - 1.0) / _STEP
             ratio = s.power[s.used] / model
             cost += s.weight * float(np.sum(np.log(model) + ratio))
             slope += s.weight * (jacobian @ (1.0 - ratio))
@@ -183,6 +210,7 @@ class _Problem:
         x = np.clip(x, low, high)
         state, damping = self.state(x), 1.0
         for _ in range(_ROUNDS):
+            check_time()
             held = ((x <= low + 1e-9) & (state.slope > 0.0)) | (
                 (x >= high - 1e-9) & (state.slope < 0.0)
             )
@@ -215,6 +243,7 @@ class _Problem:
             needed = np.ones(len(parts), dtype=bool)
             cost, amounts = _amounts(s, parts, np.exp(x[place]))
             while True:
+                check_time()
                 trials = []
                 for k in np.flatnonzero(needed[ROAD]) + 1:
                     without = needed.copy()

@@ -11,17 +11,19 @@ from .._common.arguments import duration, whole
 from .._common.progress import teller
 from .._common.threads import before, in_parallel
 from ..compare import compare
-from ..diagnose import considered, instead, judge, omnibus
+from ..diagnose import Instead, considered, instead, judge, omnibus
 from ..effects import effect
 from ..errors import SysidWarning, warn
 from ..estimate import Driving
-from ..identify import Fit, driving_of, explaining, identify
+from ..identify import Fit, driving_of, explaining
+from ..identify.identify import maximised
 from ..log import Log, check_excitation, several_logs
 from ..model import Model
 from ..rules import USUAL, Rules, incomplete, verdict
 from ..sensors import SensorCheck, made_ready, put_right
 from .added import added_by
 from .clock import in_time
+from .limit import Judging, Schedule
 from .matters import sizes_that_matter, sufficient
 from .own import own_shares
 from .search import Search, Trail, kept
@@ -32,7 +34,16 @@ from .validation import beyond_noise_ahead, serving, set_aside
 from .verdict import facts_of, in_the_light_of
 
 _SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
-_SEARCHED = 0.8  # of the time limit; the rest is for the shares by which names stand
+
+# What a time limit may leave unknown, in words.
+_CHANNELS = "whether the channels were read at the same moments, with noise that is white"
+_BASELINE = "the likeliest parameters of the baseline"
+_CLOCK = "what follows with the wheel force at the time at which the car feels it"
+_RIVALS = "whether something unknown would do in the place of what was added"
+_TOGETHER = "the share of the error 1 to 5 s ahead that the effects take together"
+_ALONE = "the share of the error 1 to 5 s ahead that is due to {} alone"
+_STRUCTURE = "how much of what is left depends on the driving"
+_SMALL = "whether the errors of the baseline are as large as matters"
 
 
 @explaining
@@ -86,11 +97,13 @@ def improve(
         channel against another, low-passes of sensors, vibration, and another clock of the wheel
         force; with False not even that.
     time_limit_s : float, optional
-        After so many seconds refits end, wherever they are. Four fifths of the time are for the
-        search: of what was refitted by then the best is added if validation data confirm it. The
-        rest is for the shares of the errors ahead by which names stand where something is left
-        (`AddedEffect`). The model is judged in any case, and warnings tell what was left out. The
-        baseline is fitted in any case.
+        After so many seconds the study ends, wherever it is, but for some passes over the data:
+        about as long as `compare` and one scoring of all effects take. The check of the sensors,
+        the baseline, the search and the judging have a share each, and what one leaves goes to the
+        next. Sensors that were not checked in time stay as they are; the baseline is the likeliest
+        that was seen; of what was refitted the best is added if validation data confirm it; what
+        was not asked for in judging counts against the names (`AddedEffect`). Warnings tell what
+        was left out.
     matters : mapping, optional
         Errors that matter, such as ``{"yaw_rate": "0.5deg/s"}`` (`sizes_that_matter`); those not
         given have usual sizes. A baseline whose errors 0.5 to 5 s ahead on validation data are all
@@ -115,10 +128,12 @@ def improve(
     most_effects = whole(most_effects, "most_effects")
     rules = rules.at(alpha)
     began = time.perf_counter()
-    limit = duration(time_limit_s, "time_limit_s")
-    ends, searched_by = began + limit, began + _SEARCHED * limit
+    schedule = Schedule.of(began, duration(time_limit_s, "time_limit_s"))
+    judging = Judging(schedule.judging)
     sizes = None if matters is None else sizes_that_matter(matters)
-    train, test, settled = _ready(train, test, sensors)
+    train, test, settled, checked = _ready(train, test, sensors, schedule.sensors)
+    if not checked:
+        judging.left_out.append(_CHANNELS)
     exclude = (*exclude, *settled)
     if exclude:
         left_out = {effect(e).id for e in exclude}
@@ -126,8 +141,15 @@ def improve(
     say = tell if tell is not None else teller(progress)
     train_driving, test_driving = set_aside(train, test)
 
-    def searched() -> Trail:
-        baseline = identify(model, train_driving, starts=starts, seed=seed, progress=progress)
+    def searched(schedule: Schedule) -> Trail:
+        baseline = maximised(
+            model,
+            train_driving,
+            starts=starts,
+            seed=seed,
+            progress=progress,
+            ends=schedule.baseline,
+        )
         found = Trail([baseline])
         with kept(found):
             say(f"Fitted the baseline to {train_driving}.")
@@ -135,7 +157,8 @@ def improve(
                 test_driving,
                 candidates=candidates,
                 most_effects=len(model.effects) + min(most_effects, _room(train_driving, rules)),
-                ends=searched_by,
+                ends=schedule.search,
+                judged_by=schedule.step,
                 rules=rules,
                 seed=seed,
                 progress=progress,
@@ -145,30 +168,34 @@ def improve(
             found.without_harm(test_driving, rules)
         return found
 
-    found = searched()
+    begun = time.perf_counter()
+    found = searched(schedule)
     with kept(found):
-        clocked = in_time(found.diagnoses[-1], test_driving) if sensors is not False else None
-    if clocked is not None and time.perf_counter() < searched_by:
+        clocked = None
+        if sensors is not False:
+            last = found.diagnoses[-1]
+            clocked = before(schedule.search, lambda: in_time(last, test_driving), None)
+    again = schedule.again(time.perf_counter() - begun)
+    if clocked is not None and again is not None:
         train_driving, test_driving = clocked
         say("The wheel force has a clock of its own: with it put right everything is done again.")
-        found = searched()
+        found = searched(again)
+    elif clocked is not None:
+        judging.left_out.append(_CLOCK)
+    if not found.fits[0].converged and time.perf_counter() > schedule.baseline:
+        judging.left_out.append(_BASELINE)
     with kept(found):
         fit, diagnoses = found.fit, found.diagnoses
-        fits = way(found.fits, ends)
+        fits = way(found.fits, schedule.judging)
         floor = fit.noise
         on_train = in_parallel(lambda f: compare(f, f.driving, noise=floor), fits)
         on_test = in_parallel(lambda f: compare(f, test_driving, noise=floor), fits)
         last = diagnoses[-1]
         fitted = last.omnibus if last.fit is fit else omnibus(fit, fit.driving, rules)
         rivals = explained = None
-        late: tuple[str, ...] = ()
         if len(fits) > 1:
-            both = serving(fit, test_driving)
-            every = _together(fit.driving, driving_of(both, test_driving))
-            rivals = instead(both, every, _new(fits), rules)
-            explained = before(ends, lambda: beyond_noise_ahead(fits, test_driving), None)
-            if explained is None:
-                late = ("the share of the error 1 to 5 s ahead that the effects take together",)
+            rivals = judging.asked(_RIVALS, lambda: _rivals(fit, fits, test_driving, rules))
+            explained = judging.asked(_TOGETHER, lambda: beyond_noise_ahead(fits, test_driving))
         told = judge(
             fit,
             scored=(last.scores, last.family) if last.fit is fit else None,
@@ -182,7 +209,10 @@ def improve(
             untried=found.stopped,
             away={} if rivals is None else rivals.away,
         )
-        pattern = structure(fit, test_driving)
+        pattern = judging.asked(_STRUCTURE, lambda: structure(fit, test_driving))
+        small = sizes is not None and judging.asked(
+            _SMALL, lambda: sufficient(fits[0], test_driving, sizes) is not None
+        )
         facts = facts_of(
             fits,
             told,
@@ -192,19 +222,19 @@ def improve(
             together=None if rivals is None else rivals.omnibus,
             candidate=min((c.p_value for c in last.ranking), default=1.0),
             excited=_excited(train_driving),
-            structure=(pattern.anywhere, pattern.everywhere),
-            small=sizes is not None and sufficient(fits[0], test_driving, sizes) is not None,
+            structure=(1.0, 0.0) if pattern is None else (pattern.anywhere, pattern.everywhere),
+            small=bool(small),
+            unopposed=len(fits) > 1 and rivals is None,
         )
         if len(fits) > 1 and incomplete(facts, rules):
             named = {a.id for a in facts.added if a.named}
-            shares = own_shares(fit, _new(fits), named, test_driving, ends)
+            shares = own_shares(fit, _new(fits), named, test_driving, schedule.judging)
             unknown = [e for e in _new(fits) if e not in shares]
             facts = facts.with_own(shares, unknown)
-            if unknown:
-                some = ", ".join(unknown)
-                late += (f"the share of the error 1 to 5 s ahead that is due to {some} alone",)
+            judging.note(unknown, _ALONE)
         decision = verdict(facts, rules)
         alone, told = told, in_the_light_of(decision, told)
+        late = tuple(judging.left_out)
         return Study(
             verdict=decision.verdict,
             fits=tuple(fits),
@@ -249,19 +279,32 @@ def _excited(driving: Driving) -> bool:
         return check_excitation(driving.logs)
 
 
+def _rivals(fit: Fit, fits: Sequence[Fit], test: Driving, rules: Rules) -> Instead:
+    both = serving(fit, test)
+    return instead(both, _together(fit.driving, driving_of(both, test)), _new(fits), rules)
+
+
 def _ready(
     train: Log | Sequence[Log],
     test: Log | Sequence[Log] | None,
     sensors: SensorCheck | Literal[False] | None,
-) -> tuple[Sequence[Log], Log | Sequence[Log] | None, tuple[str, ...]]:
-    """The logs with what their sensors do wrong taken out, and the effects that this settles."""
+    ends: float,
+) -> tuple[Sequence[Log], Log | Sequence[Log] | None, tuple[str, ...], bool]:
+    """The logs with what their sensors do wrong taken out, and the effects that this settles.
+
+    Last comes whether there was time for it until `ends`.
+    """
     logs, others = several_logs(train), () if test is None else several_logs(test)
     if sensors is False:
-        return logs, test, ()
+        return logs, test, (), True
     if sensors is not None:
-        return [sensors.apply(log) for log in logs], put_right(sensors, test), sensors.settles
-    own, rest, delayed = made_ready(logs, others)
-    return own, None if test is None else rest, ("sensor_delay",) if delayed else ()
+        put = [sensors.apply(log) for log in logs], put_right(sensors, test)
+        return *put, sensors.settles, True
+    ready = before(ends, lambda: made_ready(logs, others), None)
+    if ready is None:
+        return logs, test, (), False
+    own, rest, delayed = ready
+    return own, None if test is None else rest, ("sensor_delay",) if delayed else (), True
 
 
 def _warnings(fit: Fit, driving: Driving, trail: Trail, late: tuple[str, ...]) -> tuple[str, ...]:
@@ -272,7 +315,8 @@ def _warnings(fit: Fit, driving: Driving, trail: Trail, late: tuple[str, ...]) -
         )
         warn(found[-1])
     for fact in late:
-        found.append(f"the time limit left unknown {fact}; without it no name is sure")
+        unsure = "without it neither the verdict nor a name is sure"
+        found.append(f"the time limit left unknown {fact}; {unsure}")
         warn(found[-1])
     if trail.taken_back:
         found.append(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 
 from .._common.text import with_error
+from .._common.threads import before
 from ..diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
 from ..diagnose.diagnose import REFITS
 from ..errors import Interrupted
@@ -141,6 +144,8 @@ class Search:
     ends : float
         When refits end, by `time.perf_counter`.
     rules : Rules
+    judged_by : float
+        Until when validation data are asked whether what was refitted holds.
     """
 
     test: Driving
@@ -151,6 +156,7 @@ class Search:
     seed: int
     progress: bool | None
     say: Callable[[str], None]
+    judged_by: float = math.inf
 
     def follow(self, trail: Trail) -> None:
         """Add what is missing to the last model until nothing more is that the driving can show."""
@@ -164,11 +170,11 @@ class Search:
             # What was refitted is not lost; what takes further refits waits for another study.
             step = None
             if self.most_effects:
-                step = first_that_holds(dx, trail.fit, self.test, self.ends)
+                step = first_that_holds(dx, trail.fit, self.test, self.ends, self.judged_by)
             single = None if step is None else step[1]
             several = first_together(dx, self.test, single, self.most_effects, self.ends)
-            if step is None and several is None and time.perf_counter() < self.ends:
-                step = self._beside_another(dx, trail)
+            if step is None and several is None:
+                step = before(self.ends, partial(self._beside_another, dx, trail), None)
             if several is not None:
                 chosen, lean = several
                 trail.note_several(dx, chosen)
@@ -193,9 +199,9 @@ class Search:
                 return
             if any(set(f.model.effects) == effects for f in trail.fits):
                 return
-            before = set(trail.fit.model.effects)
+            known = set(trail.fit.model.effects)
             trail.fits.append(found)
-            more = _more(found, before - effects, effects - before - set(chosen))
+            more = _more(found, known - effects, effects - known - set(chosen))
             self.say(f"Added {' and '.join(chosen)}: {_sizes(found, chosen)}.{more}")
 
     def _beside_another(self, dx: Diagnosis, trail: Trail) -> tuple[Candidate, Fit] | None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from .._common.threads import before
+from .._common.threads import before, in_parallel
 from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter
 from ..errors import NumericalError
@@ -21,14 +21,15 @@ _ALTERNATIVES = 2  # tried in place of one effect
 
 
 def first_that_holds(
-    dx: Diagnosis, fit: Fit, test: Driving, ends: float = np.inf
+    dx: Diagnosis, fit: Fit, test: Driving, ends: float = np.inf, judged_by: float = np.inf
 ) -> tuple[Candidate, Fit] | None:
     """The likeliest candidate that fits better and predicts the validation data better.
 
     One with a value that a car can have comes before one that only acts like something else. Among
     those that the training data cannot tell apart the validation data have a say too. With it
     comes its fit, without what is not significant then; where that takes longer than `ends`, by
-    `time.perf_counter`, the candidate is not judged.
+    `time.perf_counter`, the candidate is not judged. Nor is it where validation data have not
+    answered at `judged_by`.
     """
     rules = dx.rules
     likely = sorted(dx.significant, key=lambda c: not _can_be(c, rules))
@@ -46,10 +47,8 @@ def first_that_holds(
             lean = before(ends, partial(without_insignificant, c.fit, rules), None)
         if lean is None or c.id not in lean.model.effects:
             continue
-        found = _measures(fit, c.fit, _can_be(c, rules), test)
-        if accept(found, rules) and accept(
-            replace(found, changes=changes_ahead(fit, c.fit, test)), rules
-        ):
+        found = before(judged_by, partial(_held, fit, c.fit, _can_be(c, rules), test, rules), None)
+        if found is not None:
             first = first or c
             held[c.id] = (_merit(c.fit) + found.gain.value, c, lean)
     if not held:
@@ -77,18 +76,19 @@ def first_together(
     refits end at `ends`, by `time.perf_counter`.
     """
     rules, fit = dx.rules, dx.fit
-    for names in _leading_subsets(dx, most_effects - len(fit.model.effects)):
-        found = before(ends, partial(_with_subset, dx, names), None)
+    several = _leading_subsets(dx, most_effects - len(fit.model.effects))
+    # Most of them are not added, so that none waits for the verdict on another.
+    refitted = in_parallel(lambda few: before(ends, partial(_with_subset, dx, few), None), several)
+    for names, found in zip(several, refitted, strict=True):
         if found is None or not set(names) <= set(found.model.effects):
             continue
         if not all(_real(found, name, rules) for name in names):
             continue
         if single is not None:
-            if better(found, single, test, rules):
+            if before(ends, partial(better, found, single, test, rules), False):
                 return names, found
-        elif _merit(found) > _merit(fit) + rules.apart and accept(
-            replace(_measures(fit, found, True, test), changes=changes_ahead(fit, found, test)),
-            rules,
+        elif _merit(found) > _merit(fit) + rules.apart and before(
+            ends, partial(_held, fit, found, True, test, rules), None
         ):
             return names, found
     return None
@@ -139,6 +139,15 @@ def _measures(fit: Fit, found: Fit, plausible: bool, test: Driving) -> Measures:
         plausible,
         as_sure(fit, found, test),
     )
+
+
+def _held(fit: Fit, found: Fit, plausible: bool, test: Driving, rules: Rules) -> Measures | None:
+    """What a richer model changes on validation data, where that speaks for it."""
+    measures = _measures(fit, found, plausible, test)
+    if not accept(measures, rules):
+        return None
+    measures = replace(measures, changes=changes_ahead(fit, found, test))
+    return measures if accept(measures, rules) else None
 
 
 def _can_be(c: Candidate, rules: Rules) -> bool:
@@ -230,20 +239,30 @@ def exchanged(
     seen = {frozenset(fit.model.effects)}
     while True:
         best = fit
-        for name in fit.model.effects:
-            near = [c for c in nearly.get(name, ()) if c.id not in fit.model.effects]
-            for others in dict.fromkeys([*((c,) for c in near), tuple(near)]):
-                if not others or len(fit.model.effects) - 1 + len(others) > most_effects:
-                    continue
-                trial = before(ends, partial(_with_others, fit, name, others, rules), None)
-                if trial is None or frozenset(trial.model.effects) in seen:
-                    continue
-                if better(trial, best, test, rules):
-                    best = trial
+        asked = [
+            partial(_with_others, fit, name, others, rules)
+            for name, others in _exchanges(fit, nearly, most_effects)
+        ]
+        for trial in in_parallel(lambda work: before(ends, work, None), asked):
+            if trial is None or frozenset(trial.model.effects) in seen:
+                continue
+            if before(ends, partial(better, trial, best, test, rules), False):
+                best = trial
         if best is fit:
             return fit
         fit = best
         seen.add(frozenset(fit.model.effects))
+
+
+def _exchanges(
+    fit: Fit, nearly: Mapping[str, Sequence[Candidate]], most_effects: int
+) -> Iterator[tuple[str, tuple[Candidate, ...]]]:
+    """Effects of a model, and what may take the place of each."""
+    for name in fit.model.effects:
+        near = [c for c in nearly.get(name, ()) if c.id not in fit.model.effects]
+        for others in dict.fromkeys([*((c,) for c in near), tuple(near)]):
+            if others and len(fit.model.effects) - 1 + len(others) <= most_effects:
+                yield name, others
 
 
 def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules) -> Fit | None:

@@ -8,12 +8,12 @@ is left of that is disturbance and noise, as far as any function of the driving 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from .._common.arrays import FloatArray
+from .._common.arrays import FloatArray, as_float64
 from .._common.threads import in_parallel
 from ..diagnose.unexplained.ceiling import Explainable, Inputs, Whole, left_out, pieces, thinned
 from ..diagnose.unexplained.force_map import missing_forces
@@ -94,21 +94,26 @@ def _of(fit: Fit, driving: Driving) -> Iterator[tuple[str, Explainable]]:
     except NumericalError:  # the model loses the car: of its errors nothing can be told
         return
     rows = thinned(driving)
-    for k, target in enumerate(missing.targets):
-        y = missing.force[rows, k]
-        yield from _named(f"missing {target}", driving, inputs, rows, y - y.mean())
+    force = missing.force[rows]
+    names = [f"missing {target}" for target in missing.targets]
+    yield from _named(names, driving, inputs, rows, as_float64(force - force.mean(axis=0)))
     for seconds, errors in zip(_AHEAD_S, ahead, strict=True):
-        for j, channel in enumerate(MEASURED):
-            there = np.isfinite(errors[:, j]) & np.isfinite(driving.measured[:, j])
-            rows = np.flatnonzero(there)
-            name = f"error of {WORDS[channel]} {seconds:g} s ahead"
-            yield from _named(name, driving, inputs, rows, errors[rows, j])
+        # Channels that were read at the same samples are regressed together.
+        alike: dict[bytes, list[int]] = {}
+        there = np.isfinite(errors) & np.isfinite(driving.measured)
+        for j in range(len(MEASURED)):
+            alike.setdefault(there[:, j].tobytes(), []).append(j)
+        for few in alike.values():
+            rows = np.flatnonzero(there[:, few[0]])
+            names = [f"error of {WORDS[MEASURED[j]]} {seconds:g} s ahead" for j in few]
+            yield from _named(names, driving, inputs, rows, as_float64(errors[rows][:, few]))
 
 
 def _named(
-    name: str, driving: Driving, inputs: FloatArray, rows: Whole, y: FloatArray
+    names: Sequence[str], driving: Driving, inputs: FloatArray, rows: Whole, Y: FloatArray
 ) -> Iterator[tuple[str, Explainable]]:
-    if len(rows) >= _FEW and np.any(y):
-        found = left_out(name, inputs[rows], y, *pieces(driving, rows))
-        if found is not None:
-            yield name, found
+    there = np.flatnonzero(Y.any(axis=0))
+    if len(rows) >= _FEW and len(there):
+        few = [names[int(k)] for k in there]
+        found = left_out(few, inputs[rows], as_float64(Y[:, there]), *pieces(driving, rows))
+        yield from zip(few, found, strict=False)

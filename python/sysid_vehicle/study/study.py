@@ -84,7 +84,7 @@ class Study:
     stopped : tuple of str
         Effects with evidence that the time limit left untried.
     late_facts : tuple of str
-        What the time limit left unknown of the effects that were added, in words.
+        What the time limit left unknown, in words.
     checked : bool
         Whether the logs were put right by a check of the sensors.
     """

@@ -81,7 +81,7 @@ def as_sure(poorer: Fit, richer: Fit, test: Driving) -> bool:
 
 
 # The poorer model of all candidates of a step is the same one.
-@remembered(8)
+@remembered(24)
 def _prediction(fit: Fit, test: Driving, like: Fit) -> Prediction:
     """Of validation data by a fit, with another's noise."""
     return predict(fit, test, like.noise.elsewhere(fit.model.vehicle))

@@ -23,6 +23,7 @@ def facts_of(
     excited: bool,
     small: bool = False,
     structure: tuple[float, float] = (1.0, 0.0),
+    unopposed: bool = False,
 ) -> Facts:
     """Collect what is known of a final model.
 
@@ -37,7 +38,7 @@ def facts_of(
     explained : Beyond or None
         What every fit leaves of the errors ahead; None where nothing was added, or nobody knows:
         then all of them may be left.
-    fitted, together, candidate, excited, small, structure
+    fitted, together, candidate, excited, small, structure, unopposed
         As in `Facts`.
     """
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
@@ -58,6 +59,7 @@ def facts_of(
         excited,
         structure,
         small,
+        unopposed,
     )
 
 

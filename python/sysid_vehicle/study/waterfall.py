@@ -11,6 +11,7 @@ import numpy as np
 from .._common.arrays import FloatArray, as_float64
 from .._common.style import AFTER, BEFORE, axes_or_new, tidy
 from .._common.text import brief, html_table, text_table
+from .._common.threads import check_time
 from ..compare import Comparison
 from ..errors import NumericalError
 from ..estimate import MEASURED, Driving, NoiseModel
@@ -148,6 +149,7 @@ def all_ahead(
     array, shape (horizons, samples, 5)
         NaN where no prediction ends.
     """
+    check_time()
     problem = driving_of(fit, driving).problem(fit.model)
     errors = np.full((len(horizons_s), driving.samples, len(MEASURED)), np.nan)
     for rate in np.unique(driving.sample_rate_hz):

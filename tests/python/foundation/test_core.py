@@ -11,7 +11,7 @@ import pytest
 from sysid_vehicle import Driving, Fit, Log, Model, _core
 from sysid_vehicle._common.arrays import as_float64
 from sysid_vehicle.errors import NumericalError
-from sysid_vehicle.identify.identify import objective_of
+from sysid_vehicle.identify import objective_of
 
 N = 50
 

@@ -52,7 +52,8 @@ NUMERICAL = {
     "study/validation.py": {"AHEAD", "AHEAD_S", "_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
     "study/horizons.py": {"AHEAD", "_FEWEST", "_APART", "_LOST"},
     "study/beyond.py": {"_DRAWS"},
-    "study/improve.py": {"_SEARCHED", "_SHORT_S"},
+    "study/improve.py": {"_SHORT_S"},
+    "study/limit.py": {"_BASELINE", "_SEARCHED", "_SENSORS", "_STEP"},
     "study/next_steps.py": {"_SHOWN"},
     "study/shares.py": {
         "AHEAD", "_LEAST_APART_S", "_APART", "_DRAWS", "_LONG_S", "_FEW",

@@ -145,6 +145,13 @@ def test_a_share_for_which_there_was_no_time_is_said_to_be_unknown() -> None:
     assert verdict(neither).verdict == "unknown"
 
 
+def test_what_competed_with_nothing_unknown_in_time_has_no_sure_name() -> None:
+    assert verdict(WHOLE).verdict == "explained"
+    late = replace(WHOLE, together=None, unopposed=True)
+    assert verdict(late).verdict == "unknown"
+    assert "something unknown would do in its place" in withdrawn(late)["mass"]
+
+
 def test_beside_much_that_is_left_a_share_is_shown_to_be_worth_a_name() -> None:
     """A car whose tyres are of another form leaves much beside the right effect, too."""
     much = replace(LEFT, missing=(8.0, 5.0), added=(MASS,))

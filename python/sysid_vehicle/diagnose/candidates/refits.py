@@ -12,7 +12,7 @@ from ..._common.threads import before
 from ...effects import Effect
 from ...errors import NumericalError
 from ...estimate import Driving
-from ...identify import Fit, refine, refit, unmoved
+from ...identify import Fit, refine, refine_above, refit, unmoved
 from .candidate import Candidate
 
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
@@ -84,9 +84,12 @@ def from_typical(fit: Fit, c: Candidate, tests: int) -> Candidate:
     ((name, p),) = c.effect.named.items()
     model = fit.model.add(c.effect).with_values({name: p.typical})
     try:
-        found = _with_fit(fit, c, refine(model, fit.driving, fit.noise))
+        likelier = refine_above(model, fit.driving, fit)
     except (NumericalError, np.linalg.LinAlgError):
         return c
+    if likelier is None:
+        return c
+    found = _with_fit(fit, c, likelier)
     ratio = max(found.statistic, 0.0) / max(c.variance_ratio, 1.0)
     alone = (0.5 if p.one_sided else 1.0) * float(scipy.special.chdtrc(1, ratio))
     return replace(found, finished=True, p_value=min(tests * alone, 1.0))

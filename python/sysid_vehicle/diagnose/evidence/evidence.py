@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import _core
 from ..._common.arrays import FloatArray, as_float64
-from ..._common.threads import Workers
+from ..._common.threads import Workers, check_time
 from ...estimate import Driving
 from ...estimate.pieces import DrivingProblem, Part, PiecewiseProblem, Work
 from ...identify import Fit
@@ -127,6 +127,7 @@ class Evidence:
 
     def of_parameters(self, *names: str) -> FloatArray:
         """Sensitivities to parameters of the model, free or not."""
+        check_time()
         known = self.fit.model.parameters
         columns = [known[n].column for n in names]
         return self.problem.sensitivities(self.fit.model.vector(), self.frozen, columns)
@@ -144,6 +145,7 @@ class Evidence:
         out = np.empty((len(self.residual), len(numbers)))
 
         def some(at: int) -> None:
+            check_time()
             few = slice(at, at + _AT_ONCE)
             G = problem.signal_sensitivities(p, frozen, as_float64(signals[:, few]), numbers[few])
             out[:, few] = G - basis @ (basis.T @ G) if projected else G
@@ -182,6 +184,7 @@ class Section:
 
     def rows(self, work: Work, name: str = "") -> FloatArray:
         """Rows for each sample, of a problem, its gains and the samples it has."""
+        check_time()
         if self.part is not None:
             return self.part.rows(work, name or None)
         evidence = self.evidence

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from ..._common.arguments import generator
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import html_text
+from ..._common.threads import check_time
 from ...estimate import Driving
 from ...identify import Fit, driving_of, explaining
 from ...log import Log
@@ -224,30 +225,42 @@ def _sizes(gram: FloatArray, across: FloatArray, rows: int) -> FloatArray:
 
 
 def left_out(
-    target: str, X: FloatArray, y: FloatArray, fold: Whole, piece: Whole, *, seed: int = 0
-) -> Explainable | None:
-    """What of a signal's square is predicted in folds that the regression did not see.
+    targets: Sequence[str],
+    X: FloatArray,
+    Y: FloatArray,
+    fold: Whole,
+    piece: Whole,
+    *,
+    seed: int = 0,
+) -> list[Explainable]:
+    """What of the square of signals is predicted in folds that the regressions did not see.
 
     Parameters
     ----------
+    targets : sequence of str
+        A name for each signal.
     X : array, shape (samples, n)
-    y : array, shape (samples,)
+    Y : array, shape (samples, m)
+        The signals; one decomposition of the regressors serves all of them.
     fold, piece : array of int, shape (samples,)
         Of cross-validation, and the blocks that are drawn anew for the interval.
 
     Returns
     -------
-    Explainable or None
-        None where there is one fold only.
+    list of Explainable
+        Empty where there is one fold only.
     """
     parts = [fold == k for k in np.unique(fold)]
     if len(parts) == 1:
-        return None
-    error = np.empty_like(y)
+        return []
+    error = np.empty_like(Y)
     for part in parts:
-        law = ridge(X[~part], y[~part, None], fold[~part])
-        error[part] = y[part] - law.mean - X[part] @ law.size[:, 0]
-    return _share(target, y, error, piece, generator(seed))
+        check_time()
+        law = ridge(X[~part], Y[~part], fold[~part])
+        error[part] = Y[part] - law.mean - X[part] @ law.size
+    return [
+        _share(name, Y[:, k], error[:, k], piece, generator(seed)) for k, name in enumerate(targets)
+    ]
 
 
 def pieces(driving: Driving, rows: Whole) -> tuple[Whole, Whole]:

@@ -1,0 +1,200 @@
+"""The maximum of the likelihood from values that are already near, and the fit that it makes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .. import _core
+from .._common.arrays import FloatArray
+from ..errors import NumericalError
+from ..estimate import Driving, NoiseModel, noise_range
+from ..estimate.pieces import DrivingProblem
+from ..model import Model
+from .box import free_box, free_prior
+from .estimates import wald
+from .fit import Fit
+from .objective import Objective
+from .offsets import marginal_information
+from .settle import moved, settle, to_the_top
+from .starts import Starts
+
+_SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
+_HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
+THINNED = 3000  # samples that decide between starts
+_FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
+# Nats below a poorer model, from where no search comes up to it. Of 36 lags that began at their
+# typical size (exam at 100 Hz, seed 424201) those more than 50 below on few samples ended 60 or
+# more below on all; a climb gains a few.
+_FAR_BELOW_BY_FEW, _FAR_BELOW = 50.0, 20.0
+_ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
+
+
+def objective_of(model: Model, problem: DrivingProblem, driving: Driving) -> Objective:
+    """The likelihood of a problem with the priors of a model's free parameters."""
+    return Objective(problem, free_prior(model), *noise_range(model.vehicle, driving))
+
+
+def refine(
+    model: Model, driving: Driving, noise: NoiseModel, *, inputs: FloatArray | None = None
+) -> Fit:
+    """Go on from a model's values and a noise model that are already near: one start.
+
+    Parameters
+    ----------
+    inputs : array, shape (samples, 2), optional
+        In place of the driving's own steering angle and wheel force.
+    """
+    return polish(model, driving, model.vector(), noise, Starts.none(model.free_names), inputs)
+
+
+def refine_above(model: Model, driving: Driving, fit: Fit) -> Fit | None:
+    """As `refine` under the noise of a poorer fit; None where it ends far below that.
+
+    Few samples, which lead the search most of the way, tell it before all of them are asked.
+    """
+    objective, thinned = objectives(model, driving)
+    box, begin = free_box(model), (model.vector(), fit.noise.vector())
+    led = None
+    if thinned:
+        led = settle(thinned[-1], *begin, box, thin=thinned[:-1])[:2]
+        few = driving.problem(fit.model, most_samples=_counts(objective.samples)[-1])
+        least = objective_of(fit.model, few, driving).log_likelihood(
+            fit.model.vector(), fit.noise.vector()
+        )
+        if thinned[-1].log_likelihood(*led) < least - _FAR_BELOW_BY_FEW:
+            return None
+    found = settle(objective, *begin, box, led=led)
+    if log_likelihood_of(objective, *found[:2]) < fit.log_likelihood - _FAR_BELOW:
+        return None
+    return top(model, driving, objective, found, Starts.none(model.free_names))
+
+
+def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3) -> Fit:
+    """Parameters alone, from a model's values, under a noise model that stays as it is.
+
+    The likelihood is never lower than that of the values it starts from.
+    """
+    box = free_box(model)
+    objective = objective_of(model, driving.problem(model), driving)
+    p = box.inside(model.vector())
+    gains, value = None, -np.inf
+    for _ in range(rounds):
+        before, best = p, value
+        p, gains = moved(objective, p, noise.vector(), box, rounds=8, tolerance=0.2)
+        value = objective.reached(p, gains)
+        if value < best + _ENOUGH or box.near(p, before, 1e-4):
+            break
+    return summary(model, driving, objective, p, noise, Starts.none(model.free_names), True, gains)
+
+
+def unmoved(model: Model, driving: Driving, noise: NoiseModel) -> Fit:
+    """A model's values as they stand, with their standard errors: nothing is searched."""
+    objective = objective_of(model, driving.problem(model), driving)
+    starts = Starts.none(model.free_names)
+    return summary(model, driving, objective, model.vector(), noise, starts, True)
+
+
+def polish(
+    model: Model,
+    driving: Driving,
+    p: FloatArray,
+    noise: NoiseModel,
+    starts: Starts,
+    inputs: FloatArray | None = None,
+) -> Fit:
+    """Noise and parameters of maximum likelihood, from values that are already near."""
+    objective, thinned = objectives(model, driving, inputs)
+    found = settle(objective, p, noise.vector(), free_box(model), thin=thinned)
+    return top(model, driving, objective, found, starts)
+
+
+def objectives(
+    model: Model, driving: Driving, inputs: FloatArray | None = None
+) -> tuple[Objective, list[Objective]]:
+    """The likelihood, and those of fewer samples, the fewest first.
+
+    Noise needs fewer samples than parameters do; the last word has all of them.
+    """
+    objective = objective_of(model, driving.problem(model, other_inputs=inputs), driving)
+    every = objective.samples
+    few = [driving.problem(model, most_samples=n, other_inputs=inputs) for n in _counts(every)]
+    return objective, [replace(objective, problem=f) for f in few if f.samples < every]
+
+
+def _counts(every: int) -> list[int]:
+    """How many of so many samples lead, the fewest first."""
+    levels = max(round(np.log(every / THINNED) / np.log(_FINER)), 1)
+    return [round(THINNED * (every / THINNED) ** (n / levels)) for n in range(levels)]
+
+
+def top(
+    model: Model,
+    driving: Driving,
+    objective: Objective,
+    settled: tuple[FloatArray, FloatArray, bool],
+    starts: Starts,
+) -> Fit:
+    """The maximum, from where a search has settled."""
+    p, noise = to_the_top(objective, *settled[:2], free_box(model))
+    told = NoiseModel.from_vector(noise)
+    return summary(model, driving, objective, p, told, starts, settled[2])
+
+
+def on_its_road(fit: Fit) -> Fit:
+    """The same fit where the road is level, another where its slope varies."""
+    model, driving, p = fit.model, fit.driving, fit.model.vector()
+    objective = objective_of(model, driving.problem(model), driving)
+
+    sloping = [replace(fit.noise, road=(slope, slope)) for slope in _SLOPES_MPS2]
+    values = [log_likelihood_of(objective, p, noise.vector()) for noise in sloping]
+    best = sloping[int(np.argmax(values))]
+    if max(values) < fit.log_likelihood + _HINT:
+        return fit
+    learned, value, _ = objective.learn_noise(p, best.vector(), rounds=6)
+    if value < fit.log_likelihood + _SHOWN:
+        return fit
+    found = polish(model, driving, p, NoiseModel.from_vector(learned), fit.starts)
+    return found if found.log_likelihood > fit.log_likelihood else fit
+
+
+def log_likelihood_of(objective: Objective, p: FloatArray, noise: FloatArray) -> float:
+    """Of the data; minus infinity where the model fails."""
+    try:
+        return float(objective.freeze(p, noise).log_likelihood)
+    except NumericalError:
+        return -np.inf
+
+
+def summary(
+    model: Model,
+    driving: Driving,
+    objective: Objective,
+    p: FloatArray,
+    noise: NoiseModel,
+    starts: Starts,
+    converged: bool,
+    frozen: _core.FrozenFilter | None = None,
+) -> Fit:
+    """A fit with the standard errors of its parameters."""
+    box, names = free_box(model), model.free_names
+    if frozen is None:
+        frozen = objective.freeze(p, noise.vector())
+    if driving.offsets:
+        information = marginal_information(model, driving, p, noise)
+    else:
+        _, _, information = objective.normal_equations(p, frozen, box.columns)
+    x = p[box.columns]
+    units = {n: parameter.unit for n, parameter in model.parameters.items()}
+    estimates, covariance = wald(names, units, x, information, box)
+    return Fit(
+        model.with_values(dict(zip(names, map(float, x), strict=True))),
+        noise,
+        estimates,
+        covariance,
+        float(frozen.log_likelihood),
+        driving,
+        starts,
+        converged,
+    )

@@ -1,0 +1,69 @@
+"""How a study shares out the time that it may take."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from .._common.threads import before
+
+R = TypeVar("R")
+
+# Of the time limit, when each stage ends: what one leaves goes to the next.
+_SENSORS, _BASELINE, _SEARCHED, _STEP = 0.15, 0.4, 0.7, 0.85
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """When each stage of a study ends, wherever it is, by `time.perf_counter`.
+
+    Attributes
+    ----------
+    sensors, baseline, search, judging : float
+    step : float
+        When validation data are asked last whether what the search refitted is added.
+    """
+
+    sensors: float
+    baseline: float
+    search: float
+    step: float
+    judging: float
+
+    @classmethod
+    def of(cls, began: float, limit_s: float) -> Schedule:
+        """The schedule of a study with so many seconds from a time on; they may be infinite."""
+        shares = (_SENSORS, _BASELINE, _SEARCHED, _STEP, 1.0)
+        return cls(*(began + share * limit_s for share in shares))
+
+    def again(self, took_s: float) -> Schedule | None:
+        """The schedule of a second search, as long as the first; None where no time is left."""
+        now = time.perf_counter()
+        left = self.search - now
+        if took_s > left:
+            return None
+        share = (_BASELINE - _SENSORS) / (_SEARCHED - _SENSORS)
+        return replace(self, baseline=now + share * left)
+
+
+class Judging:
+    """Work that is left out where its time is over, and what was left out, in words."""
+
+    def __init__(self, ends: float) -> None:
+        self.ends = ends
+        self.left_out: list[str] = []
+
+    def asked(self, what: str, work: Callable[[], R]) -> R | None:
+        """What work gives; None, and noted, where it is not done in time."""
+        found = before(self.ends, lambda: (work(),), None)
+        if found is None:
+            self.left_out.append(what)
+            return None
+        return found[0]
+
+    def note(self, effects: Sequence[str], what: str) -> None:
+        """Note what is unknown of some effects, if there are any."""
+        if effects:
+            self.left_out.append(what.format(", ".join(effects)))

@@ -1,0 +1,109 @@
+"""What saves time changes no answer: questions that are asked once, together, or not to the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Fit, NumericalError
+from sysid_vehicle._common.threads import at_most
+from sysid_vehicle.diagnose.unexplained.ceiling import left_out
+from sysid_vehicle.identify import ahead, maximum, predicting_ahead, refine, refine_above
+from sysid_vehicle.identify.ahead import _Ahead
+from sysid_vehicle.sensors.low_pass import _Problem
+from sysid_vehicle.sensors.spectrum import spectrum_of
+
+
+def test_signals_that_are_regressed_together_have_the_shares_of_each_alone(
+    rng: np.random.Generator,
+) -> None:
+    X = rng.standard_normal((400, 12))
+    fold, piece = np.arange(400) // 40 % 5, np.arange(400) // 20
+    Y = np.column_stack([X[:, 0], X[:, 1] * 0.2, 0.0 * X[:, 2]]) + rng.standard_normal((400, 3))
+    together = left_out(["a", "b", "c"], X, Y, fold, piece)
+    alone = [left_out([n], X, Y[:, [k]], fold, piece)[0] for k, n in enumerate("abc")]
+    for one, other in zip(together, alone, strict=True):
+        assert one.target == other.target
+        figures = [(e.share, e.low, e.high, e.rms) for e in (one, other)]
+        np.testing.assert_allclose(*figures, rtol=1e-9)
+    assert together[0].share > 0.3 > together[2].share
+    assert left_out(["a"], X, Y[:, [0]], 0 * fold, piece) == []
+
+
+@pytest.mark.parametrize("digital", [None, False, True])
+def test_spectra_of_one_device_add_up(rng: np.random.Generator, digital: bool | None) -> None:
+    """The filter acts on all of them alike; of one with other frequencies too."""
+    several = []
+    for rate in (100.0, 100.0, 50.0):
+        noise = rng.standard_normal(round(60.0 * rate))
+        found = spectrum_of(noise, rate, 100.0)
+        assert found is not None
+        several.append(found)
+    whole = _Problem(tuple(several), digital)
+    x = whole.begin(14.0)
+    x += 0.1 * rng.standard_normal(x.size)
+    shared = 0 if digital is None else 3
+    state, at = whole.state(x), shared
+    for s, power in zip(several, state.powers, strict=True):
+        one = _Problem((s,), digital)
+        width = one.begin(14.0).size - shared
+        own = np.r_[:shared, at : at + width]
+        alone = one.state(x[own])
+        np.testing.assert_allclose(power, alone.powers[0], rtol=1e-12)
+        np.testing.assert_allclose(state.slope[own][shared:], alone.slope[shared:], rtol=1e-8)
+        at += width
+    ends = [whole.state(x + step * np.eye(x.size)[0]).cost for step in (1e-5, -1e-5)]
+    assert state.slope[0] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-2, abs=0.1)
+
+
+def test_a_lag_far_below_is_not_followed_and_any_other_to_the_same_end(
+    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = hidden_fit("steer_lag.time_constant_s", 0.08)
+    model = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.05})
+    found = refine_above(model, fit.driving, fit)
+    assert found is not None
+    assert found.log_likelihood == refine(model, fit.driving, fit.noise).log_likelihood
+    assert found.log_likelihood > fit.log_likelihood + 50.0
+    # Beside the lag itself nothing is left for a second one.
+    other = found.model.add("tyre_relaxation")
+    other = other.with_values({"tyre_relaxation.relaxation_length_m": 1.5})
+    with monkeypatch.context() as patch:
+        for name in ("_FAR_BELOW_BY_FEW", "_FAR_BELOW"):
+            patch.setattr(maximum, name, -np.inf)
+        assert refine_above(other, found.driving, found) is None
+    whole = refine(other, found.driving, found.noise)
+    assert whole.log_likelihood < found.log_likelihood + 10.0
+
+
+def test_where_a_search_begins_is_looked_at_once(fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[bytes] = []
+    looked = _Ahead.looked
+
+    def counted(self: _Ahead, p: np.ndarray) -> Any:
+        seen.append(p.tobytes())
+        return looked(self, p)
+
+    monkeypatch.setattr(_Ahead, "looked", counted)
+    alone = predicting_ahead(fit)
+    assert 4 <= len(set(seen)) == len(seen) <= 6
+    with at_most(1):
+        assert predicting_ahead(fit).model.values == alone.model.values
+
+
+def test_starts_that_all_fail_are_searched_once_each(
+    fit: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[int] = []
+
+    def failing(*_: Any, **__: Any) -> Any:
+        calls.append(1)
+        raise NumericalError("the car spins")
+
+    monkeypatch.setattr(ahead, "minimise", failing)
+    with pytest.raises(NumericalError, match="the car spins"):
+        predicting_ahead(fit)
+    assert len(calls) == 2

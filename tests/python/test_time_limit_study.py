@@ -1,0 +1,104 @@
+"""A study ends in time, in whichever of its stages the time runs out."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Log, Model, _core, drive, improve, manoeuvres
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.identify.identify import maximised
+from sysid_vehicle.sensors import _estimate, _low_pass
+
+CANDIDATES = ["steer_lag", "aero_drag", "rolling_resistance", "yaw_inertia", "gyro_bias"]
+
+KERNELS = (
+    *("freeze", "half_sum_of_squares", "log_likelihoods", "look_ahead", "noise_score"),
+    *("normal_equations", "residuals", "sensitivities", "signal_sensitivities", "trace"),
+)
+
+# Once the time is over: one scoring of all effects, and errors of two models on two data sets.
+PASSES = 25
+
+
+class Clock:
+    """Goes on by one with each pass over the data, and stands still otherwise."""
+
+    def __init__(self) -> None:
+        self.now, self._lock = 0.0, threading.Lock()
+
+    def __call__(self) -> float:
+        return self.now
+
+    def counting(self, work: Callable[..., Any], passes: float = 1.0) -> Callable[..., Any]:
+        def counted(*args: Any, **options: Any) -> Any:
+            with self._lock:
+                self.now += passes
+            return work(*args, **options)
+
+        return counted
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr("time.perf_counter", clock)
+    for name in KERNELS:
+        monkeypatch.setattr(_core.Problem, name, clock.counting(getattr(_core.Problem, name)))
+    monkeypatch.setattr(_estimate, "linearise", clock.counting(_estimate.linearise))
+    problem = _low_pass._Problem
+    monkeypatch.setattr(problem, "state", clock.counting(problem.state, 0.1))
+    return clock
+
+
+@pytest.fixture(scope="module")
+def logs(truth: Model) -> tuple[Log, Log]:
+    car = truth.add("steer_lag", "aero_drag").with_values(
+        {"steer_lag.time_constant_s": 0.08, "aero_drag.drag_area_m2": 0.6}
+    )
+    lap = drive(car, manoeuvres.lap(25.0), seed=41, rate_hz=50.0)
+    return lap, drive(car, manoeuvres.handling_course(25.0, 7.0), seed=42, rate_hz=50.0)
+
+
+@pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")
+@pytest.mark.parametrize(
+    ("limit", "unknown"),
+    [
+        (1.0, "read at the same moments"),
+        (60.0, "parameters of the baseline"),
+        (300.0, None),
+        (700.0, None),
+    ],
+)
+def test_no_stage_of_a_study_outlasts_the_time_limit(
+    limit: float, unknown: str | None, start: Model, logs: tuple[Log, Log], clock: Clock
+) -> None:
+    """Without a limit the same study takes some 1100 passes; what is left out is said."""
+    study = improve(start, *logs, candidates=CANDIDATES, starts=3, time_limit_s=limit)
+    assert clock.now <= limit + PASSES
+    assert study.seconds == clock.now
+    told = "; ".join(study.warnings)
+    assert "the time limit" in told
+    assert study.stopped or study.late_facts
+    if unknown is not None:
+        assert any(unknown in fact for fact in study.late_facts)
+        assert unknown in told
+
+
+def test_a_baseline_that_had_too_little_time_is_the_likeliest_seen(
+    start: Model, logs: tuple[Log, Log], clock: Clock
+) -> None:
+    driving = Driving.of(logs[0])
+    found = []
+    for limit in (0.0, 20.0, 60.0, 120.0, float("inf")):
+        found.append(maximised(start, driving, starts=3, ends=clock.now + limit))
+    values = [fit.log_likelihood for fit in found]
+    assert values == sorted(values)
+    assert values[0] < values[1] < values[-1]
+    assert [fit.converged for fit in found[:2]] == [False, False]
+    assert found[-1].converged
+    assert all(np.isfinite(e.value) for fit in found for e in fit.estimates)
