@@ -32,7 +32,10 @@ ALWAYS = {
     "lateral_load_transfer": "four wheel loads, and tyres that lose grip per load with load",
     "rolling_resistance": "0.011 of each wheel's load",
     "tyre_load_sensitivity": "friction falls by 0.12 per nominal load, stiffness bends over",
-    "tyre_relaxation": "side force waits for the body to roll and the wheel loads to build up",
+    **dict.fromkeys(
+        ("tyre_relaxation", "front_tyre_relaxation", "rear_tyre_relaxation"),
+        "side force waits for the body to roll and the wheel loads to build up",
+    ),
 }
 
 

@@ -31,7 +31,10 @@ ALWAYS = {
     "body_attitude": "the sprung mass rolls and pitches, and the accelerometer with it",
     "combined_slip": "Magic Formula with combined slip, r_bx1 to r_vy6",
     "drive_yaw_moment": "a driven tyre pushes sideways, r_vy1 r_vy5 r_vy6 / p_kx1 = 0.025 N per N",
-    "tyre_relaxation": "camber and its side force wait for the body to roll, about 0.1 s",
+    **dict.fromkeys(
+        ("tyre_relaxation", "front_tyre_relaxation", "rear_tyre_relaxation"),
+        "camber and its side force wait for the body to roll, about 0.1 s",
+    ),
 }
 
 

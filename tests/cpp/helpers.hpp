@@ -57,6 +57,14 @@ inline EffectMask mask_of(const std::vector<std::string>& ids) {
 
 constexpr EffectMask kAllEffects = (EffectMask{1} << kEffectCount) - 1;
 
+/// Effects that lag at any size: those whose derivative at the null value does not exist.
+inline EffectMask lagging_effects() {
+    EffectMask mask = 0;
+    for (std::size_t i = 0; i < kEffectCount; ++i)
+        if (kEffectInfos[i].scored_at_typical) mask |= EffectMask{1} << i;
+    return mask;
+}
+
 /// Position in the flat parameter vector of parameter number `which` of an effect.
 inline std::size_t parameter_of(const std::string& effect, std::size_t which = 0) {
     return kBaseParameterCount + effect_offset(effect_index(effect)) + which;

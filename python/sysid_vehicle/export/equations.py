@@ -15,6 +15,7 @@ from ..model import Model
 from ..vehicle import AXLES, GRAVITY_MPS2
 
 _SHORTEST_LAG = 1e-6  # s, as in `lags.hpp`
+_RELAXATION = f"relaxation_rate = fmin(fabs(v_x) / p0, {1.0 / _SHORTEST_LAG!r})"
 
 Stages = dict[str, list[str]]
 
@@ -52,8 +53,16 @@ _ACTS: dict[str, Stages] = {
     },
     "drive_yaw_moment": {"body": ["moment_z = moment_z + fx * (p0 + p1 * (v_x * r / gravity))"]},
     "force_gain": {"input": ["fx = fx * (1.0 + where(fx < 0.0, p1, p0))"]},
+    "force_lag": {"drive": ["force_lag_rate = (fx - force_lag) / p0", "fx = force_lag"]},
     "force_split": {
         "vehicle": ["brake_front = brake_front + p0", "drive_front = drive_front + p1"]
+    },
+    "front_tyre_relaxation": {
+        "slip": [
+            _RELAXATION,
+            "own_slip_front_rate = relaxation_rate * (alpha_f - own_slip_front)",
+            "alpha_f = own_slip_front",
+        ]
     },
     "gyro_bias": {},
     "gyro_scale": {},
@@ -75,6 +84,13 @@ _ACTS: dict[str, Stages] = {
     "longitudinal_load_transfer": {"vehicle": ["height = height + p0"]},
     "mass": {"vehicle": ["m = m * (1.0 + p0)"]},
     "rear_toe": {"slip": ["alpha_r = alpha_r + p0"]},
+    "rear_tyre_relaxation": {
+        "slip": [
+            _RELAXATION,
+            "own_slip_rear_rate = relaxation_rate * (alpha_r - own_slip_rear)",
+            "alpha_r = own_slip_rear",
+        ]
+    },
     "road_bank": {
         "body": ["gravity_y = gravity_y + gravity * sin(p0)"],
         "loads": [
@@ -102,16 +118,32 @@ _ACTS: dict[str, Stages] = {
     },
     "tyre_relaxation": {
         "slip": [
-            f"relaxation_rate = fmin(fabs(v_x) / p0, {1.0 / _SHORTEST_LAG!r})",
+            _RELAXATION,
             "slip_front_rate = relaxation_rate * (alpha_f - slip_front)",
             "slip_rear_rate = relaxation_rate * (alpha_r - slip_rear)",
             "alpha_f = slip_front",
             "alpha_r = slip_rear",
         ]
     },
+    "wheel_inertia": {
+        "forces": [
+            "pulled = fx_f * cos(delta) - fy_f * sin(delta) + fx_r + force_x",
+            "turning = p0 * m",
+            "along_both = 0.5 * (cos(delta) + 1.0)",
+            "faster = (pulled + m * (v_y * r + gravity_x)) / (m + turning * along_both)",
+            "fx_f = fx_f - 0.5 * turning * faster",
+            "fx_r = fx_r - 0.5 * turning * faster",
+        ]
+    },
     "yaw_inertia": {"vehicle": ["I_z = I_z * (1.0 + p0)"]},
 }
-_STATES = {"steer_lag": ("steer_lag",), "tyre_relaxation": ("slip_front", "slip_rear")}
+_STATES = {  # with their units
+    "force_lag": (("force_lag", "N"),),
+    "front_tyre_relaxation": (("own_slip_front", "rad"),),
+    "rear_tyre_relaxation": (("own_slip_rear", "rad"),),
+    "steer_lag": (("steer_lag", "rad"),),
+    "tyre_relaxation": (("slip_front", "rad"), ("slip_rear", "rad")),
+}
 
 
 @dataclass(frozen=True)
@@ -162,7 +194,7 @@ def equations(model: Model) -> Equations:
             lines += [_named(e, line) for line in _ACTS[e.id].get(stage, [])]
         lines += own
     states = [("v_x", "m/s"), ("v_y", "m/s"), ("r", "rad/s")]
-    states += [(name, "rad") for e in parts for name in _STATES.get(e.id, ())]
+    states += [state for e in parts for state in _STATES.get(e.id, ())]
     silent = tuple(e.id for e in parts if not _ACTS[e.id])
     return Equations(tuple(constants), tuple(states), tuple(lines), silent)
 
@@ -234,6 +266,7 @@ _TYRE = (
 _STAGES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("vehicle", ()),
     ("input", ()),
+    ("drive", ()),
     (
         "steering",
         (

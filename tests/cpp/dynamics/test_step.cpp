@@ -36,15 +36,20 @@ std::vector<double> convergence(EffectMask effects, const Parameters& p, int sub
 }
 
 TEST(Step, ErrorFallsWithTheFourthPowerAndOfLagsBehindEachOtherWithTheSecond) {
-    const EffectMask lags = mask_of({"steer_lag", "tyre_relaxation", "sensor_delay"});
+    const EffectMask lags = lagging_effects();
     const auto motion = convergence(kAllEffects & ~lags, typical_parameters(), 16);
-    const auto all = convergence(kAllEffects, typical_parameters(), 64);
+    const EffectMask axles = mask_of({"front_tyre_relaxation", "rear_tyre_relaxation"});
+    const auto all = convergence(kAllEffects & ~axles, typical_parameters(), 64);
+    const auto twice = convergence(kAllEffects, typical_parameters(), 64);
     for (std::size_t i : {1, 2}) {
         EXPECT_GT(motion[i], 13.0);
         EXPECT_GT(all[i], 4.0);
+        EXPECT_GT(twice[i], 4.0);
     }
     EXPECT_LT(motion[0], 1e-5);
     EXPECT_LT(all[0], 1e-6);
+    // Of slip angles that lag twice it is a thousandth of what a sensor of a_y resolves.
+    EXPECT_LT(twice[0], 1e-3 * kSensorNoise[kAy]);
 }
 
 TEST(Step, LagsOfAnySizeNeedNoShorterSteps) {
@@ -52,12 +57,14 @@ TEST(Step, LagsOfAnySizeNeedNoShorterSteps) {
     // of what sensors read, and what it would do to the size of the effect below half a percent.
     const double dt = 0.01;
     const int fine_steps = 40, samples_finest = 50;
-    for (const char* id : {"steer_lag", "tyre_relaxation", "sensor_delay"}) {
+    for (const EffectInfo& info : kEffectInfos) {
+        if (!info.scored_at_typical) continue;
+        const std::string id = info.id;
         const SingleTrack model{saloon(), mask_of({id})};
         for (double size : {0.0005, 0.002, 0.005, 0.01, 0.03, 0.1}) {
             Parameters p = plain_parameters();
-            const bool length = std::string(id) == "tyre_relaxation";
-            for (std::size_t j = 0; j < kEffectInfos[effect_index(id)].parameter_count(); ++j)
+            const bool length = std::string(info.parameters[0].unit) == "m";
+            for (std::size_t j = 0; j < info.parameter_count(); ++j)
                 p[parameter_of(id, j)] = length ? 20.0 * size : size;
             ModelState<double> x{25.0};
             settle_auxiliary(model, x, kCalm.data(), lively(0.0), p.data());

@@ -89,6 +89,11 @@ TEST_P(Derivatives, AgreeWithDifferencesAnywhere) {
             const Outputs before = (f(here) - f(here - step)) / step;
             const Outputs after = (f(here + step) - f(here)) / step;
             const Outputs middle = central_difference(f, here, step);
+            // What forces of 10 kN lose by rounding shows in how much other steps differ.
+            const Outputs shorter = central_difference(f, here, 0.7 * step);
+            const Outputs longer = central_difference(f, here, 1.4 * step);
+            const Outputs rounding =
+                (shorter - middle).cwiseAbs().cwiseMax((longer - middle).cwiseAbs());
             for (int i = 0; i < kOutputs; ++i) {
                 const double scale =
                     std::abs(middle[i]) + (1.0 + std::abs(f(here)[i])) * 1e-9 / step;
@@ -96,7 +101,8 @@ TEST_P(Derivatives, AgreeWithDifferencesAnywhere) {
                     ++kinks;
                     continue;
                 }
-                EXPECT_NEAR(exact[static_cast<std::size_t>(i)].d[j], middle[i], 1e-5 * scale)
+                EXPECT_NEAR(exact[static_cast<std::size_t>(i)].d[j], middle[i],
+                            1e-5 * scale + rounding[i])
                     << info.parameters[j].name << " = " << here << ", output " << i << ", place "
                     << n << (at.others != 0 ? ", among all others" : ", alone");
             }

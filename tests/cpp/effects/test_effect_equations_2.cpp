@@ -134,5 +134,78 @@ TEST(EffectEquation, SensorsThatAreLateReadWhatWas) {
                         near[static_cast<std::size_t>(i)]);
 }
 
+TEST(EffectEquation, RelaxationOfBothAxlesIsThatOfEach) {
+    Parameters p = plain_parameters();
+    for (const char* id : {"tyre_relaxation", "front_tyre_relaxation", "rear_tyre_relaxation"})
+        p[parameter_of(id)] = 0.4;
+    const auto moved = [&](const std::vector<std::string>& ids) {
+        const SingleTrack model{saloon(), mask_of(ids)};
+        ModelState<double> x{20.0};
+        for (int k = 0; k < 40; ++k)
+            advance(model, x, kCalm.data(), lively(0.01 * k), lively(0.01 * k + 0.01), p.data(),
+                    0.01, 1);
+        return x;
+    };
+    const auto both = moved({"tyre_relaxation"});
+    const auto each = moved({"front_tyre_relaxation", "rear_tyre_relaxation"});
+    for (std::size_t i = 0; i < kMotionStates; ++i) EXPECT_EQ(both[i], each[i]);
+    EXPECT_EQ(each[state_of("front_tyre_relaxation")], both[state_of("tyre_relaxation", 0)]);
+    EXPECT_EQ(each[state_of("rear_tyre_relaxation")], both[state_of("tyre_relaxation", 1)]);
+}
+
+TEST(EffectEquation, RelaxationOfTheFrontDelaysTheYawAndOfTheRearLetsItOvershoot) {
+    // A step of the steering: the front force is late; or the rear one, which holds the tail.
+    Parameters p = plain_parameters();
+    for (const char* id : {"front_tyre_relaxation", "rear_tyre_relaxation"})
+        p[parameter_of(id)] = 0.6;
+    const auto yaw = [&](EffectMask effects, int samples) {
+        const SingleTrack model{saloon(), effects};
+        ModelState<double> x{20.0};
+        const Input step{0.02, 0.0};
+        for (int k = 0; k < samples; ++k)
+            advance(model, x, kCalm.data(), step, step, p.data(), 0.01, 2);
+        return x[2];
+    };
+    const EffectMask front = mask_of({"front_tyre_relaxation"});
+    const EffectMask rear = mask_of({"rear_tyre_relaxation"});
+    EXPECT_LT(yaw(front, 4), 0.8 * yaw(0, 4));
+    EXPECT_GT(yaw(rear, 15), 1.02 * yaw(0, 15));
+    // Where nothing moves any more both are the model without.
+    for (const EffectMask one : {front, rear}) EXPECT_NEAR(yaw(one, 300), yaw(0, 300), 1e-4);
+}
+
+TEST(EffectEquation, ForceLagReaches63PercentAfterOneTimeConstant) {
+    Parameters p = plain_parameters();
+    const double tau = 0.15;
+    p[parameter_of("force_lag")] = tau;
+    p[parameter_of("force_gain")] = 0.1;
+    // What the logged force errs by is wrong before it lags.
+    const SingleTrack model{saloon(), mask_of({"force_lag", "force_gain"})};
+    ModelState<double> x{20.0};
+    const Input step{0.0, 2000.0};
+    advance(model, x, kCalm.data(), step, step, p.data(), tau, 10);
+    EXPECT_NEAR(x[state_of("force_lag")], 2.2 * (1.0 - std::exp(-1.0)), 1e-9);  // [kN]
+    const auto e = evaluate(model, x, step, p);
+    EXPECT_EQ(e.w.fx, 1e3 * x[state_of("force_lag")]);
+    settle_auxiliary(model, x, kCalm.data(), step, p.data());
+    EXPECT_NEAR(x[state_of("force_lag")], 2.2, 1e-12);
+}
+
+TEST(EffectEquation, WheelInertiaTakesItsShareOfTheForce) {
+    for (const Input& u : {kDriving, kBraking}) {
+        const Pair it("wheel_inertia", {0.06}, kCornering, u);
+        // What is taken turns the wheels as fast as the car moves: dv_x/dt = a_x + v_y r.
+        const double taken = 0.06 * 1500.0 * it.on.rate[0];
+        EXPECT_NEAR(it.on.w.fx_f, it.off.w.fx_f - 0.5 * taken, 1e-9);
+        EXPECT_NEAR(it.on.w.fx_r, it.off.w.fx_r - 0.5 * taken, 1e-9);
+        EXPECT_NEAR(it.on.w.a_x,
+                    (it.off.w.a_x * 1500.0 - 0.5 * taken * (1.0 + std::cos(0.06))) / 1500.0, 1e-12);
+        EXPECT_EQ(it.on.w.fz_f, it.off.w.fz_f);
+    }
+    // On a straight it is a car of more mass under the same force and the same drag.
+    const Pair straight("wheel_inertia", {0.06}, {30.0}, {0.0, 2000.0});
+    EXPECT_NEAR(straight.on.w.a_x, straight.off.w.a_x / 1.06, 1e-13);
+}
+
 }  // namespace
 }  // namespace sysid::test

@@ -238,7 +238,9 @@ TEST(Catalogue, StatesOfTheirOwn) {
         const std::string id = kEffectInfos[i].id;
         const std::size_t own = active_states(EffectMask{1} << i).count;
         const std::map<std::string, std::size_t> expected{
-            {"steer_lag", 1}, {"tyre_relaxation", 2}, {"tyre_temperature", 2}, {"sensor_delay", 5}};
+            {"steer_lag", 1},    {"tyre_relaxation", 2},       {"tyre_temperature", 2},
+            {"sensor_delay", 5}, {"front_tyre_relaxation", 1}, {"rear_tyre_relaxation", 1},
+            {"force_lag", 1}};
         EXPECT_EQ(own, expected.count(id) ? expected.at(id) : 0U) << id;
     }
     EXPECT_EQ(active_states(0).count, 0U);

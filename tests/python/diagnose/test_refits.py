@@ -20,6 +20,8 @@ from sysid_vehicle.identify import refit
 from sysid_vehicle.identify.objective import Objective
 from sysid_vehicle.model import NUISANCES
 
+RELAXATIONS = ("tyre_relaxation", "front_tyre_relaxation", "rear_tyre_relaxation")
+
 
 def scored(fit: Fit, name: str) -> Candidate:
     return next(c for c in diagnose(fit, refits=0).ranking if c.id == name)
@@ -27,7 +29,7 @@ def scored(fit: Fit, name: str) -> Candidate:
 
 def test_lags_of_one_parameter_may_hide_in_the_noise() -> None:
     found = {e.id for e in catalogue() if is_hidden_by_noise(e)}
-    assert found == {"tyre_relaxation", "steer_lag"}
+    assert found == {*RELAXATIONS, "steer_lag", "force_lag"}
 
 
 def test_a_lag_is_found_from_its_typical_size(truth: Model, start: Model) -> None:
@@ -39,6 +41,16 @@ def test_a_lag_is_found_from_its_typical_size(truth: Model, start: Model) -> Non
     assert abs(found.value[0] - 0.7) < 4.0 * found.std[0]
     assert found.fit is not None
     assert found.statistic == pytest.approx(2.0 * (found.fit.log_likelihood - fit.log_likelihood))
+
+
+@pytest.mark.parametrize("hidden", RELAXATIONS)
+def test_the_axles_that_relax_are_told_apart(truth: Model, start: Model, hidden: str) -> None:
+    car = truth.add(hidden).with_values({f"{hidden}.relaxation_length_m": 0.6})
+    found = diagnose(identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1))
+    first = found.ranking[0]
+    assert first.id == hidden
+    assert not {*RELAXATIONS} & {*first.indistinguishable_from}
+    assert abs(first.value[0] - 0.6) < 4.0 * first.std[0]
 
 
 def test_a_lag_that_is_not_there_is_not_found(complete_fits: tuple[Fit, ...]) -> None:
@@ -100,7 +112,7 @@ def test_what_the_disturbance_took_over_is_found_in_a_measured_log(
     car, log = double_lane_change
     fit = identify(Model(car).with_nuisances((*NUISANCES, "ins_lever_arm")), log, starts=1)
     assert scored(fit, "tyre_relaxation").p_value > 0.05
-    first = diagnose(fit).ranking[0]
-    assert first.id == "tyre_relaxation"
-    assert first.finished
-    assert first.p_value < 0.01
+    assert scored(fit, "rear_tyre_relaxation").p_value > 0.05
+    both = diagnose(fit).ranking[:2]
+    assert {c.id for c in both} == {"tyre_relaxation", "rear_tyre_relaxation"}
+    assert all(c.finished and c.p_value < 0.01 for c in both)

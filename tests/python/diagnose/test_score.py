@@ -95,6 +95,10 @@ def test_family_p_values_come_from_their_seed(null_boards: list[ScoreBoard]) -> 
         ("steer_offset.offset_rad", 0.002),
         ("yaw_inertia.relative_error", 0.05),
         ("tyre_relaxation.relaxation_length_m", 0.3),
+        ("front_tyre_relaxation.relaxation_length_m", 0.3),
+        ("rear_tyre_relaxation.relaxation_length_m", 0.3),
+        ("force_lag.time_constant_s", 0.1),
+        ("wheel_inertia.mass_share", 0.03),
     ],
 )
 def test_a_small_effect_is_first_and_its_size_predicted(

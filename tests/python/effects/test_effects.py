@@ -53,6 +53,7 @@ def test_twins_name_each_other_and_needs_are_channels() -> None:
 def test_effects_say_what_they_break_and_what_logs_share() -> None:
     broken = {e.id: e.breaks for e in catalogue() if e.breaks}
     late = ("steer_delay", "steer_lag", "steer_compliance", "tyre_relaxation")
+    late = (*late, "front_tyre_relaxation")
     expected = dict.fromkeys(late, "answers late") | {"sensor_delay": "readings late"}
     assert broken == expected | {"road_grade": "on a slope"}
     assert all(f"breaks      laws of motion: {e.breaks}" in str(e) for e in map(effect, broken))

@@ -48,8 +48,7 @@ def test_rates_are_those_of_the_compiled_model(
 ) -> None:
     model = typical(truth, *effects)
     exported = module_of(model)
-    lagging = {"steer_lag": 1, "tyre_relaxation": 2}
-    lags = sum(lagging.get(e, 0) for e in effects)
+    lags = sum(sv.effect(e).states for e in effects)
     for _ in range(20):
         motion = rng.uniform((4.0, -2.0, -0.8), (50.0, 2.0, 0.8))
         steer, force = rng.uniform(-0.15, 0.15), rng.uniform(-9000.0, 6000.0)
@@ -107,7 +106,8 @@ def test_python_over_a_lap(lap_model: sv.Model, driven: Any) -> None:
 
 def test_python_drives_many_cars_at_once(truth: sv.Model) -> None:
     exported = module_of(typical(truth, *ALL))
-    state = np.array([[10.0, 20.0], [0.1, -0.2], [0.1, 0.2], *[[0.01, 0.02]] * 3])
+    lags = sum(sv.effect(e).states for e in ALL)
+    state = np.array([[10.0, 20.0], [0.1, -0.2], [0.1, 0.2], *[[0.01, 0.02]] * lags])
     both = exported["derivatives"](state, np.array([0.1, -0.1]), np.array([-900.0, 900.0]))[0]
     for k, (steer, force) in enumerate(((0.1, -900.0), (-0.1, 900.0))):
         one = exported["derivatives"](state[:, k], steer, force)[0]
@@ -154,8 +154,9 @@ def test_casadi(truth: sv.Model, rng: np.random.Generator) -> None:
     pytest.importorskip("casadi")
     model = typical(truth, *ALL)
     exported, function = module_of(model), sv.casadi_function(model)
+    lags = [0.1] * sum(sv.effect(e).states for e in ALL)
     for _ in range(20):
-        state = rng.uniform((4, -2, -0.8, -0.1, -0.1, -0.1), (50, 2, 0.8, 0.1, 0.1, 0.1))
+        state = rng.uniform((4, -2, -0.8, *(-x for x in lags)), (50, 2, 0.8, *lags))
         given = rng.uniform((-0.15, -9000.0), (0.15, 6000.0))
         rate, a_x, a_y = exported["derivatives"](state, *given)
         found = function(state, given)

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from sysid_vehicle import Driving, Fit, Log, Model, _core
+from sysid_vehicle import Driving, Fit, Log, Model, _core, catalogue
 from sysid_vehicle._common.arrays import as_float64
 from sysid_vehicle.errors import NumericalError
 from sysid_vehicle.identify import objective_of
@@ -143,12 +143,18 @@ def test_a_target_that_is_not_there_is_refused(
 
 def test_effects_that_are_not_there_are_refused() -> None:
     with pytest.raises(ValueError, match="effects: the mask names effects there are none of"):
-        _core.SingleTrack(_core.VehicleData(), 1 << 40, True)
+        _core.SingleTrack(_core.VehicleData(), 1 << len(catalogue()), True)
 
 
 @pytest.mark.parametrize(
     ("name", "shortest"),
-    [("steer_lag.time_constant_s", 1e-6), ("tyre_relaxation.relaxation_length_m", 1e-5)],
+    [
+        ("steer_lag.time_constant_s", 1e-6),
+        ("tyre_relaxation.relaxation_length_m", 1e-5),
+        ("front_tyre_relaxation.relaxation_length_m", 1e-5),
+        ("rear_tyre_relaxation.relaxation_length_m", 1e-5),
+        ("force_lag.time_constant_s", 1e-6),
+    ],
 )
 def test_a_lag_too_short_to_resolve_acts_like_none(
     name: str, shortest: float, fit: Fit, driving: Driving

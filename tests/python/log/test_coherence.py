@@ -154,6 +154,9 @@ class TestLags:
             {"steer_delay.delay_s": 0.1},
             {"steer_lag.time_constant_s": 0.1},
             {"tyre_relaxation.relaxation_length_m": 0.9},
+            {"front_tyre_relaxation.relaxation_length_m": 0.9},
+            {"rear_tyre_relaxation.relaxation_length_m": 0.9},
+            {"force_lag.time_constant_s": 0.2},
             {"speed_sensor_lever_arm.forward_m": 0.8, "speed_sensor_lever_arm.left_m": 0.4},
         ],
     )

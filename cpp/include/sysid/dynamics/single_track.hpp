@@ -122,6 +122,7 @@ struct SingleTrack {
         // Backwards: what the sensors did last to the acceleration is undone first.
         for_each_active_backwards(effects, q,
                                   [&](auto e, const T* own, At) { return e.input(own, w); });
+        each([&](auto e, const T* own, At at) { return e.drive(own, w, lags.from(at)); });
         each([&](auto e, const T* own, At at) { return e.steering(own, w, lags.from(at)); });
         settle_outside_forces<T>(w, external);
         each([&](auto e, const T* own, At) { return e.body(own, w); });
@@ -169,6 +170,7 @@ struct SingleTrack {
         w.r = motion[2];
         w.delta = S(u.steer_rad);
         w.steer_rate = u.steer_rate_radps;
+        w.force_known = force_known;
         w.fx = force_known ? S(u.longitudinal) : S(0.0);
         w.ax_input = force_known ? S(0.0) : S(u.longitudinal);
         w.grip_f = w.grip_r = S(1.0);

@@ -24,12 +24,13 @@ namespace sysid {
 using Catalogue =
     std::tuple<AeroDownforce, AeroDrag, RollingResistance, HeadWind, TyreLoadSensitivity,
                LateralLoadTransfer, LongitudinalLoadTransfer, FrictionChange, TyreTemperature,
-               ForceGain, ForceSplit, CombinedSlip, AligningMoment, RearToe, TyreRelaxation,
-               SteerDelay, SteerOffset, SteerRatio, SteerNonlinearity, SteerLag, SteerCompliance,
-               RoadBank, RoadGrade, SideWind, Mass, YawInertia, LockedDifferential,
-               LimitedSlipDifferential, DriveYawMoment, SensorDelay, CgPosition,
-               SpeedSensorLeverArm, SpeedSensorMisalignment, ImuLeverArm, InsLeverArm, BodyAttitude,
-               AccelerometerBias, GyroScale, GyroBias, AccelerometerScale>;
+               ForceGain, ForceLag, WheelInertia, ForceSplit, CombinedSlip, AligningMoment, RearToe,
+               TyreRelaxation, FrontTyreRelaxation, RearTyreRelaxation, SteerDelay, SteerOffset,
+               SteerRatio, SteerNonlinearity, SteerLag, SteerCompliance, RoadBank, RoadGrade,
+               SideWind, Mass, YawInertia, LockedDifferential, LimitedSlipDifferential,
+               DriveYawMoment, SensorDelay, CgPosition, SpeedSensorLeverArm,
+               SpeedSensorMisalignment, ImuLeverArm, InsLeverArm, BodyAttitude, AccelerometerBias,
+               GyroScale, GyroBias, AccelerometerScale>;
 
 constexpr std::size_t kEffectCount = std::tuple_size_v<Catalogue>;
 

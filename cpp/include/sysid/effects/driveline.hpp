@@ -17,7 +17,7 @@ struct ForceGain : Effect {
         .excited_by = "accelerating and braking on a straight",
         .moves = "vx_mps, ax_mps2",
         .needs = "fx_n, vx_mps",
-        .confounded_with = "aero_drag, rolling_resistance, road_grade, mass",
+        .confounded_with = "aero_drag, rolling_resistance, road_grade, mass, wheel_inertia",
         .parameters = {{.name = "drive_error",
                         .unit = "1",
                         .typical = 0.08,
@@ -36,6 +36,71 @@ struct ForceGain : Effect {
     template <class T, class S>
     static void input(const T* p, Workings<S>& w) {
         w.fx *= 1.0 + if_below(w.fx, 0.0, S(p[1]), S(p[0]));
+    }
+};
+
+/// The wheels push after the log says so: the logged force is what engine and brakes were told to
+/// give, and torque and pressure build up. The state is the force that acts [kN].
+struct ForceLag : Effect {
+    static constexpr EffectInfo info{
+        .id = "force_lag",
+        .title = "lag between the logged and the acting wheel force",
+        .equation = "tau d(F_x')/dt + F_x' = F_x",
+        .source = "Rajamani, Vehicle Dynamics and Control, ch. 5: lag of the lower controller",
+        .excited_by = "steps of throttle and brake on a straight",
+        .moves = "ax_mps2, vx_mps",
+        .needs = "fx_n, vx_mps",
+        .confounded_with = "sensor_delay",
+        .parameters = {{.name = "time_constant_s",
+                        .unit = "s",
+                        .typical = 0.15,
+                        .matters = 0.03,
+                        .bounds = {0.0, 2.0},
+                        .usual = {0.05, 0.5}}},
+        .scored_at_typical = true,
+        .needs_force = true,
+    };
+    static constexpr std::size_t state_count = 1;
+    static constexpr double state_spread = 0.2;  // [kN]
+
+    template <class T, class S>
+    static void drive(const T* p, Workings<S>& w, Lags<S> lags) {
+        if (value_of(p[0]) > 0.0) w.fx = 1e3 * lags.follow(0, 1e-3 * w.fx, S(lag_rate(p[0])));
+    }
+};
+
+/// A part of the logged force turns the wheels and the drive line faster: it moves more mass than
+/// the car has, and the contacts get what is left, half of it taken from each axle. Load transfer
+/// stays that of the logged force, as the moment of the turning wheels acts on it too.
+struct WheelInertia : Effect {
+    static constexpr EffectInfo info{
+        .id = "wheel_inertia",
+        .title = "inertia of wheels and drive line",
+        .equation = "F_x = F_x,logged - e m dv_x/dt, e m = sum J_i / R^2",
+        .source = "Gillespie, Fundamentals of Vehicle Dynamics, ch. 2: mass factor",
+        .excited_by = "accelerating and braking on a straight",
+        .moves = "ax_mps2, vx_mps",
+        .needs = "fx_n, vx_mps",
+        .confounded_with = "force_gain, mass",
+        .parameters = {{.name = "mass_share",
+                        .unit = "1",
+                        .typical = 0.06,
+                        .matters = 0.02,
+                        .bounds = {0.0, 1.0},
+                        .usual = {0.03, 0.12}}},
+        .needs_force = true,
+    };
+
+    template <class T, class S>
+    static void forces(const T* p, Workings<S>& w) {
+        if (!w.force_known) return;
+        const S turning = p[0] * w.m;
+        const S along = 0.5 * (w.cos_delta + 1.0);  // of what both axles lose equally
+        const S pull = w.fx_f * w.cos_delta - w.fy_f * w.sin_delta + w.fx_r + w.force_x;
+        const S beyond = w.v_y * w.r + w.gravity_x;  // of dv_x/dt, beyond what forces do
+        const S taken = turning * (pull + w.m * beyond) / (w.m + turning * along);
+        w.fx_f = w.fx_f - 0.5 * taken;
+        w.fx_r = w.fx_r - 0.5 * taken;
     }
 };
 

@@ -87,6 +87,11 @@ struct Effect {
     static Inactive input(const T* /*p*/, Workings<S>& /*w*/) {
         return {};
     }
+    /// The wheel force that acts; nothing where it is not known.
+    template <class T, class S>
+    static Inactive drive(const T* /*p*/, Workings<S>& /*w*/, Lags<S> /*lags*/) {
+        return {};
+    }
     template <class T, class S>
     static Inactive steering(const T* /*p*/, Workings<S>& /*w*/, Lags<S> /*lags*/) {
         return {};

@@ -32,6 +32,24 @@ struct TyreLoadSensitivity : Effect {
     }
 };
 
+/// The distance over which slip angles relax: the ratio of the tyre's cornering stiffness to the
+/// lateral stiffness of its carcass, so that it grows with the load and falls with the pressure.
+constexpr ParameterInfo kRelaxationLength{.name = "relaxation_length_m",
+                                          .unit = "m",
+                                          .typical = 0.45,
+                                          .matters = 0.1,
+                                          .bounds = {0.0, 3.0},
+                                          .usual = {0.2, 0.7}};
+
+/// Rate at which a slip angle relaxes [1/s].
+template <class T, class S>
+S relaxation_rate(const T& length, const Workings<S>& w) {
+    using std::abs;
+    constexpr double kFastest = 1.0 / kShortestLag;
+    const S rate = abs(w.v_x) / length;
+    return if_below(rate, kFastest, rate, S(kFastest));
+}
+
 /// The slip angle that makes the force follows the geometric one over a rolled distance.
 struct TyreRelaxation : Effect {
     static constexpr EffectInfo info{
@@ -42,13 +60,9 @@ struct TyreRelaxation : Effect {
         .excited_by = "steps and sweeps of the steering at low and high speed",
         .moves = "ay_mps2, yaw_rate_radps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "steer_lag, steer_delay, yaw_inertia",
-        .parameters = {{.name = "relaxation_length_m",
-                        .unit = "m",
-                        .typical = 0.45,
-                        .matters = 0.1,
-                        .bounds = {0.0, 3.0},
-                        .usual = {0.2, 0.7}}},
+        .confounded_with =
+            "steer_lag, steer_delay, yaw_inertia, front_tyre_relaxation, rear_tyre_relaxation",
+        .parameters = {kRelaxationLength},
         .scored_at_typical = true,
         .breaks = Breaks::kAnswersLate,
     };
@@ -56,13 +70,56 @@ struct TyreRelaxation : Effect {
 
     template <class T, class S>
     static void slip(const T* p, Workings<S>& w, Lags<S> lags) {
-        using std::abs;
         if (!(value_of(p[0]) > 0.0)) return;
-        S rate = abs(w.v_x) / p[0];
-        constexpr double kFastest = 1.0 / kShortestLag;
-        rate = if_below(rate, kFastest, rate, S(kFastest));
+        const S rate = relaxation_rate(p[0], w);
         w.alpha_f = lags.follow(0, w.alpha_f, rate);
         w.alpha_r = lags.follow(1, w.alpha_r, rate);
+    }
+};
+
+/// The same of the front axle alone; beside that of both, by how much the front is longer: two
+/// lags behind each other are, to first order, one of their sum.
+struct FrontTyreRelaxation : Effect {
+    static constexpr EffectInfo info{
+        .id = "front_tyre_relaxation",
+        .title = "tyre relaxation length of the front axle",
+        .equation = "(sigma_f / v_x) d(alpha_f')/dt + alpha_f' = alpha_f",
+        .source = "Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (7.18)",
+        .excited_by = "steps and sweeps of the steering at low and high speed",
+        .moves = "yaw_rate_radps, ay_mps2",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "tyre_relaxation, rear_tyre_relaxation, steer_lag, steer_delay",
+        .parameters = {kRelaxationLength},
+        .scored_at_typical = true,
+        .breaks = Breaks::kAnswersLate,
+    };
+    static constexpr std::size_t state_count = 1;
+
+    template <class T, class S>
+    static void slip(const T* p, Workings<S>& w, Lags<S> lags) {
+        if (value_of(p[0]) > 0.0) w.alpha_f = lags.follow(0, w.alpha_f, relaxation_rate(p[0], w));
+    }
+};
+
+/// The same of the rear axle.
+struct RearTyreRelaxation : Effect {
+    static constexpr EffectInfo info{
+        .id = "rear_tyre_relaxation",
+        .title = "tyre relaxation length of the rear axle",
+        .equation = "(sigma_r / v_x) d(alpha_r')/dt + alpha_r' = alpha_r",
+        .source = "Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (7.18)",
+        .excited_by = "steps and sweeps of the steering at low and high speed",
+        .moves = "ay_mps2, yaw_rate_radps",
+        .needs = "steer_rad, vx_mps, yaw_rate_radps",
+        .confounded_with = "tyre_relaxation, front_tyre_relaxation, yaw_inertia",
+        .parameters = {kRelaxationLength},
+        .scored_at_typical = true,
+    };
+    static constexpr std::size_t state_count = 1;
+
+    template <class T, class S>
+    static void slip(const T* p, Workings<S>& w, Lags<S> lags) {
+        if (value_of(p[0]) > 0.0) w.alpha_r = lags.follow(0, w.alpha_r, relaxation_rate(p[0], w));
     }
 };
 

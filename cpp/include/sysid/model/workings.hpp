@@ -28,12 +28,13 @@ struct Workings {
     // motion
     S v_x, v_y, r;
     Given<S> time_s{};  // since the log began
-    // inputs (stages `input` and `steering`)
+    // inputs (stages `input`, `drive` and `steering`)
     S delta;  // road-wheel angle that acts [rad]
     S cos_delta, sin_delta;
     Given<S> steer_rate{};  // of the logged angle [rad/s]
-    S fx;                   // total wheel force [N], or
-    S ax_input;             // measured longitudinal specific force [m/s2] that stands in for it
+    bool force_known = true;
+    S fx;        // total wheel force [N], or
+    S ax_input;  // measured longitudinal specific force [m/s2] that stands in for it
     // forces from outside and gravity in the road plane (stage `body`)
     S force_x, force_y;      // [N]
     S moment_z;              // [N m]
