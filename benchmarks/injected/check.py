@@ -37,11 +37,33 @@ _ROUNDS = 3
 
 def piece(name: str, data: Path, fetched: Path | None, validation: bool = False) -> sv.Log:
     """The liveliest half minute of the first training log, or of the first validation log."""
-    log = logs(name, data, fetched)[int(validation)][0]
+    return liveliest(logs(name, data, fetched)[int(validation)][0])
+
+
+def other_piece(name: str, data: Path, fetched: Path | None, validation: bool) -> sv.Log | None:
+    """Half a minute of other driving than the first training log's liveliest one, if there is any.
+
+    Of the second training log, else of what is left of the first; or of the validation log.
+    """
+    training, later = logs(name, data, fetched)
+    if validation:
+        return liveliest(later[0])
+    if len(training) > 1:
+        return liveliest(training[1])
+    taken = liveliest(training[0])["time_s"]
+    times = training[0]["time_s"]
+    if max(taken[0] - times[0], times[-1] - taken[-1]) < PIECE_S:
+        return None
+    return liveliest(training[0], without=(float(taken[0]), float(taken[-1])))
+
+
+def liveliest(log: sv.Log, without: tuple[float, float] = (np.inf, np.inf)) -> sv.Log:
+    """The half minute with the liveliest lateral acceleration, outside of some time."""
     time_s = log["time_s"]
     if log.duration_s <= PIECE_S:
         return log
     begins = np.arange(time_s[0], time_s[-1] - PIECE_S, 2.0)
+    begins = begins[(begins + PIECE_S <= without[0]) | (begins >= without[1])]
     lively = [
         float(np.nanstd(log["ay_mps2"][(time_s >= b) & (time_s < b + PIECE_S)])) for b in begins
     ]

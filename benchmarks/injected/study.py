@@ -1,7 +1,7 @@
 """Is a fault of the steering or of the vehicle file named by a comparison with the drive before?
 
     python benchmarks/injected/study.py DATA [SET ...] [--fetched FOLDER] [--validation]
-        [--only WORD] [--fits FOLDER] [--json JSON]
+        [--other] [--only WORD] [--fits FOLDER] [--json JSON]
 
 The half minutes of `check.py`, sensors put right. The effects for which a diagnosis has most
 evidence become part of the model, at most three, until nothing more is missing: that is the
@@ -9,6 +9,9 @@ reference. Then each injection (`falsify.py`) is compared with it by `sv.changed
 other driving. Named: the effect that undoes it changed, perhaps as one of a group. Size: the change
 of it lies within the 95 % interval. Wrong name: something else is named, and is of no group with
 it. Not testable: it is not named, and its interval is wider than the injection.
+
+`--other`: the faults are put into another half minute than the reference's, with its sensors put
+right as those of the reference; that of the validation log with `--validation`.
 """
 
 from __future__ import annotations
@@ -25,7 +28,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "real_driving"))
 
 from cars import NAMES, vehicle
-from check import arguments, line, piece, summary
+from check import arguments, line, other_piece, piece, summary
 from falsify import DYNAMIC, Falsified, falsified
 
 import sysid_vehicle as sv
@@ -87,12 +90,13 @@ def wrong(change: sv.Change, effect: str = "") -> list[str]:
 def reference(name: str, args: argparse.Namespace) -> tuple[sv.Fit, tuple[str, ...]]:
     """The model of a half minute that is right as far as it can be, and what the check settles."""
     kept = None
+    validation = args.validation and not args.other
     if args.fits is not None:
-        kept = args.fits / f"{name}_{int(args.validation)}.fit"
+        kept = args.fits / f"{name}_{int(validation)}.fit"
         if kept.exists():
             settled = kept.with_suffix(".settled").read_text(encoding="utf-8")
             return sv.load(kept), tuple(settled.split())
-    log = piece(name, args.data, args.fetched, args.validation)
+    log = piece(name, args.data, args.fetched, validation)
     check = sv.check(log, vehicle(name, args.data))
     first = sv.Model(vehicle(name, args.data)).with_nuisances()
     begun = sv.identify(first, check.apply(log), starts=_STARTS)
@@ -103,8 +107,20 @@ def reference(name: str, args: argparse.Namespace) -> tuple[sv.Fit, tuple[str, .
     return fit, settled
 
 
+def judging(name: str, args: argparse.Namespace, fit: sv.Fit) -> sv.Log | None:
+    """The log that the faults are put into; None where there is no other driving."""
+    if not args.other:
+        (log,) = fit.driving.logs
+        return log
+    log = other_piece(name, args.data, args.fetched, args.validation)
+    if log is None:
+        return None
+    return sv.check(piece(name, args.data, args.fetched), vehicle(name, args.data)).apply(log)
+
+
 def main() -> None:
     parser = arguments(__doc__)
+    parser.add_argument("--other", action="store_true", help="faults in other driving")
     parser.add_argument("--only", default="", metavar="WORD", help="injections with this word")
     parser.add_argument("--fits", type=Path, metavar="FOLDER", help="keeps the references")
     args = parser.parse_args()
@@ -114,7 +130,9 @@ def main() -> None:
     for name in args.sets or NAMES:
         began = time.perf_counter()
         fit, settled = reference(name, args)
-        (log,) = fit.driving.logs
+        log = judging(name, args, fit)
+        if log is None:
+            continue
         print(f"== {log.name}: {', '.join(fit.model.effects)}", flush=True)
         lacked = [e.id for e in fit.model.candidates if e.id not in settled]
         unchanged[name] = wrong(sv.changed(fit, log, candidates=lacked))

@@ -21,7 +21,10 @@ from sysid_vehicle import (
 )
 from sysid_vehicle._common.arrays import FloatArray
 from sysid_vehicle.diagnose.change.beside_reference import Differences, Shared, Side
+from sysid_vehicle.diagnose.change.both_drivings import BothDrivings
+from sysid_vehicle.diagnose.change.may_change import change as change_of
 from sysid_vehicle.diagnose.evidence import evidence
+from sysid_vehicle.estimate import Driving
 
 OFFSET = "steer_offset.offset_rad"
 FEW = ("steer_offset", "steer_ratio", "steer_delay", "steer_lag", "yaw_inertia", "side_wind")
@@ -72,6 +75,48 @@ def test_what_the_reference_left_is_no_change(truth: Model, start: Model) -> Non
     other = changed(before, later(lagging, steer_offset__offset_rad=0.006), candidates=FEW)
     assert [e.id for e in other.named] == ["steer_offset"]
     assert inside(other, "steer_offset", 0.006)
+
+
+def test_what_both_share_need_not_be_nothing(truth: Model, start: Model) -> None:
+    """The steering is late in the first drive and early in the second: nothing is between them."""
+    delay = "steer_delay.delay_s"
+    late = truth.add("steer_delay").with_values({delay: 0.03})
+    before = identify(start, drive(late, manoeuvres.lap(30.0), seed=7), starts=1)
+    change = changed(before, later(truth, steer_delay__delay_s=-0.01), candidates=FEW)
+    assert [e.id for e in change.named] == ["steer_delay"]
+    assert inside(change, "steer_delay", -0.04)
+
+
+def test_a_relative_error_of_what_was_multiplies() -> None:
+    assert change_of("yaw_inertia.relative_error", -0.2, 0.8 / 0.75 - 1.0) == pytest.approx(1 / 3)
+    assert change_of("steer_delay.delay_s", -0.02, 0.03) == pytest.approx(0.05)
+
+
+def test_both_drivings_are_one_problem(fit: Fit, course: Log) -> None:
+    """What the later one has of its own moves nothing in the reference."""
+    model, noise = fit.model.add("steer_offset"), fit.noise.vector()
+    problems = [d.problem(model) for d in (Driving.of(course), fit.driving)]
+    names = ("D_front", "steer_offset.offset_rad")
+    shared, apart = (model.parameters[n].column for n in names)
+    both = BothDrivings(*problems, model.vector(), [shared])
+    p = model.vector()
+    p[[shared, apart]] += [0.01, 0.003]
+    kept = p.copy()
+    kept[apart] = 0.0
+    one, other = (q.freeze(x, noise) for q, x in zip(problems, (p, kept), strict=True))
+    gains = both.freeze(p, noise)
+    assert gains.log_likelihood == pytest.approx(one.log_likelihood + other.log_likelihood)
+    assert both.log_likelihoods(p[None], noise)[0] == pytest.approx(gains.log_likelihood)
+    e, G = both.residuals(p, gains), both.sensitivities(p, gains, [shared, apart])
+    cost, descent, information = both.normal_equations(p, gains, [shared, apart])
+    assert cost == pytest.approx(0.5 * e @ e) == both.half_sum_of_squares(p, gains)
+    assert descent == pytest.approx(G.T @ e, rel=1e-6)
+    assert information == pytest.approx(G.T @ G, rel=1e-6)
+    step = np.zeros_like(p)
+    step[apart] = 1e-5
+    slope = (both.residuals(p - step, gains) - both.residuals(p + step, gains)) / 2e-5
+    assert np.abs(G[:, 1] - slope).max() < 1e-3 * np.abs(slope).max()
+    assert not G[len(problems[0].residuals(p, one).ravel()) :, 1].any()
 
 
 def test_another_vehicle_file_is_what_changed(car: Vehicle, start: Model, lap: Log) -> None:

@@ -28,9 +28,8 @@ NUMERICAL = {
     "diagnose/change/changed.py": {"_TRIED", "_ROUNDS"},
     "diagnose/change/changes_compete.py": {"_SINGULAR", "_MOST"},
     "diagnose/change/may_change.py": {"_INERTIA"},
-    "diagnose/change/reference.py": {
-        "_ENOUGH", "_FAR", "_FOLLOWED", "_LOOSE", "_REFREEZES", "_SHARES", "_VAGUE",
-    },
+    "diagnose/change/maximum.py": {"_ENOUGH", "_REFREEZES", "_STEPS", "_WALKS"},
+    "diagnose/change/reference.py": {"_FAR", "_FOLLOWED", "_LOOSE", "_SHARES", "_VAGUE", "_WORTH"},
     "diagnose/candidates/causes.py": {"_KEPT", "_LEAST"},
     "diagnose/candidates/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
     "diagnose/evidence/coordinates.py": {"BLOCK_S"},

@@ -332,7 +332,8 @@ def causes_in(
         Effects of the sum.
     """
     subsets = model.subsets()
-    posterior = model.posterior(most, subsets[0])
+    # Copies of each other hold each other up where nothing is likelier than both.
+    posterior = model.posterior(most, subsets[0] if subsets[0].log_odds > 0.0 else None)
     names = [h.name for h in model.hypotheses]
     by_effect = np.array(
         [[w[[n == e for n in names]].sum() for e in model.effects] for w in posterior.weights]

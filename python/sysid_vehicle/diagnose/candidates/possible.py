@@ -24,7 +24,8 @@ Size = tuple[tuple[float, ...], tuple[float, ...]]
 """Parameters of an effect, and their standard errors."""
 
 _AT_BOUND = 1e-5  # of the width between the bounds
-_OF_A_FACTOR = "_error"  # names of relative errors: what is multiplied by 1 + e
+OF_A_FACTOR = "_error"
+"""Names of relative errors end so: what is multiplied by 1 + e."""
 
 
 def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple[Effect, ...]:
@@ -70,7 +71,7 @@ def sizes(
 
 def _impossible(p: Parameter, off: float, reach: float, rules: Rules) -> bool:
     most = rules.implausible * abs(p.typical - p.null_value)
-    least = most / (1.0 + most) if p.name.endswith(_OF_A_FACTOR) else most
+    least = most / (1.0 + most) if p.name.endswith(OF_A_FACTOR) else most
     low, high = max(p.lower - p.null_value, -least), min(p.upper - p.null_value, most)
     if np.isinf(reach):
         at = _AT_BOUND * (p.upper - p.lower)

@@ -144,7 +144,8 @@ class _Search:
         """The changes, linearised where those that explain most have been put in exactly."""
         begin = self.reference.fitted(self.start, (), {}, {})
         self.visited[frozenset()] = begin
-        told = self._told(begin)
+        # Lines are drawn from the reference: where nothing may change it goes far from any car.
+        told = self._told(replace(begin, fit=self.start, shift=np.zeros_like(begin.shift)))
         alone = [(e,) for e in told.alone if e in self.can][:_TRIED]
         for few in (self._leading(told, begin), *alone):
             self._visit(few, told)
@@ -273,17 +274,28 @@ class _Search:
             and frozenset({*state.put, s.effects[0]}) not in self.visited  # refused by a refit
         ]
         causes = told.causes.only([*(s for s in exact.values() if s is not None), *rest], {})
-        sizes, stds = dict(told.sizes), dict(told.stds)
+        sizes, stds = (self._of_the_car(told_by, state) for told_by in (told.sizes, told.stds))
         # Of what was put in the exact size: no line is drawn from the reference to there.
         for e in state.put:
             sizes |= self._sizes_in(state, e)
+        for e, m in self.can.items():
+            without, put = frozenset(state.put) - {e}, frozenset({*state.put, e})
+            one, other = self.visited.get(without), self.visited.get(put)
+            if len(m.names) > 1 or one is None or other is None:
+                continue
+            # As many standard errors from nothing as the likelihood ratio says, at most.
+            ((name, size),) = self._sizes_in(other, e).items()
+            rises = 2.0 * (other.reached - one.reached) / told.ratio_of((e,))
+            sizes[name] = size if rises > 0.0 else sizes[name]
+            stds[name] = max(stds[name], abs(sizes[name]) / float(np.sqrt(max(rises, 1.0))))
         for s in (s for s in exact.values() if s is not None):
             for e in s.effects:
                 other = self._in_place(e, s, state)
                 if other is not None and e not in state.put:
                     beside = self._told(other)
                     sizes |= self._sizes_in(other, e)
-                    stds |= {n: beside.stds[n] for n in self.can[e].names}
+                    lines = self._of_the_car(beside.stds, other)
+                    stds |= {n: max(lines[n], stds[n]) for n in self.can[e].names}
         found = [self._of(m, causes, sizes, stds) for m in self.may]
         order = [e for s in causes.sets for e in s.effects]
         found.sort(
@@ -293,6 +305,11 @@ class _Search:
 
     def _sizes_in(self, state: Exact, effect: str) -> dict[str, float]:
         return {n: state.changes[n] for n in self.can[effect].names}
+
+    def _of_the_car(self, told_by: Mapping[str, float], state: Exact) -> dict[str, float]:
+        """Lines tell differences of parameters: of relative errors as shares of what there was."""
+        own = self.reference.factors(state)
+        return {n: x / own.get(n, 1.0) for n, x in told_by.items()}
 
     def _in_place(self, effect: str, of: CredibleSet, state: Exact) -> Exact | None:
         """The state with an effect in place of another one of its set, where it was visited."""

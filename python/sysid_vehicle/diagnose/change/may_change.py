@@ -8,6 +8,7 @@ from ...effects import Effect, Parameter
 from ...model import Model
 from ..candidates.causes import forms
 from ..candidates.clocks import Clock, clock_parameter
+from ..candidates.possible import OF_A_FACTOR
 
 YAW_INERTIA = "yaw_inertia_kgm2"
 # Priors of changed tyres, as shares of their values; E is itself a share.
@@ -47,6 +48,13 @@ def difference(p: Parameter, usual: float) -> Parameter:
     """A change of a parameter, usually so large, as a parameter."""
     width = p.upper - p.lower
     return replace(p, null_value=0.0, typical=usual, lower=-width, upper=width)
+
+
+def change(name: str, before: float, after: float) -> float:
+    """By how much a parameter changed; relative errors multiply."""
+    if name.endswith(OF_A_FACTOR):
+        return (1.0 + after) / (1.0 + before) - 1.0
+    return after - before
 
 
 def of_effect(e: Effect) -> May:

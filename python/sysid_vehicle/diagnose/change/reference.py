@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,17 +17,19 @@ from ...estimate import noise_range
 from ...identify import Fit
 from ...identify.box import free_box
 from ...identify.objective import LinearRows, Objective
-from ...identify.search import Box
-from ...identify.settle import moved
+from ...identify.settle import climb
 from ...model import Model
+from ..candidates.possible import OF_A_FACTOR
 from .beside_reference import Shared, Side
-from .may_change import May
+from .both_drivings import BothDrivings
+from .maximum import along, highest
+from .may_change import May, change
 
-_REFREEZES = 4
-_ENOUGH = 0.05  # nats that a step gains
 _FAR = 3.0  # usual sizes, within which a search begins
 _SHARES = (0.25, 0.5, 1.0, 2.0)  # of the usual size, where it may begin too
+_DELAY = "delay_s"  # how names of delays end
 _FOLLOWED = 2  # of the likeliest starts
+_WORTH = 2.0  # nats, below which nothing is named: it need not be known what both share
 _LOOSE = 2.0  # times the usual change, by which fitted parameters may be off
 _VAGUE = 0.1  # of the information: of the prior of unknown forces that both drivings share
 
@@ -45,8 +48,8 @@ class Exact:
     changes : dict of str to float
         By which parameters of what changed differ from the reference fitted in the same way.
     reached : float
-        Log-likelihood, less what the reference knows of what stays, and what the changes gain of
-        that which the reference left.
+        Log-likelihood of both drivings, less what the changes gain where they are in both the same:
+        what the reference left is no evidence.
     """
 
     put: tuple[str, ...]
@@ -100,6 +103,7 @@ class Reference:
                 precision[i], centre[i] = std**-2, mean - model.value(name)
         self.shared = Shared(as_float64(precision), centre)
         self._fitted: dict[frozenset[str], tuple[Model, float]] = {}
+        self._nothing, self._unchanged = -np.inf, model
         self._alone = self._fit(before, (), {}, {})[1]
 
     def value(self, name: str) -> float:
@@ -109,6 +113,12 @@ class Reference:
             return model.value(name)
         return next(e.named[name].null_value for e in self.effects if name in e.named)
 
+    def factors(self, state: Exact) -> dict[str, float]:
+        """What relative errors multiply by in the reference, fitted as some state is."""
+        own = self._fitted[frozenset(state.put)][0]
+        values = {n: own.value(n) if n in own.parameters else self.value(n) for n in self.names}
+        return {n: 1.0 + v for n, v in values.items() if n.endswith(OF_A_FACTOR)}
+
     def fitted(
         self,
         start: Fit,
@@ -117,10 +127,9 @@ class Reference:
         usual: Mapping[str, float],
         also: Sequence[Mapping[str, float]] = (),
     ) -> Exact:
-        """Later driving with some changes, all else as far as the reference lets it go.
+        """Both drivings with some changes in the later one, all else the same.
 
-        The reference is fitted in the same way: what the changes do for that is no change, and
-        what they gain of it no evidence.
+        Parameters that change have the values in the reference that they have in a fit to it alone.
 
         Parameters
         ----------
@@ -142,15 +151,38 @@ class Reference:
         key = frozenset(put)
         if key not in self._fitted:
             self._fitted[key] = self._own(put, sizes, usual)
-        own, own_reached = self._fitted[key]
+        own = self._fitted[key][0]
         model, reached = self._fit(start, put, sizes, usual, own, also)
         shift = np.zeros(len(self.side.names))
         for n in model.free_names:
             shift[self.place[n]] = model.value(n) - self.value(n)
-        changes = {n: model.value(n) - own.value(n) for n in sizes}
-        share = start.driving.samples / self.before.driving.samples
-        left = share * (own_reached - self._alone)
-        return Exact(tuple(put), replace(start, model=model), shift, changes, reached - left)
+        changes = {n: change(n, own.value(n), model.value(n)) for n in sizes}
+        if put and reached > self._nothing + _WORTH:
+            reached -= max(self._same(start, own, model) - self._nothing, 0.0)
+        elif not put:
+            model, reached = self._climbed(start, model)
+            self._nothing, self._unchanged = reached, model
+        return Exact(tuple(put), replace(start, model=model), shift, changes, reached)
+
+    def _climbed(self, start: Fit, model: Model) -> tuple[Model, float]:
+        """Where nothing changed, all the way: what is lacking there would be called a change."""
+        objective = self._objective(start, model, self.before.model, [], [])
+        noise, box = self.before.noise.vector(), free_box(model)
+        p, _, reached = climb(objective, model.vector(), noise, box)
+        values = {n: float(p[model.parameters[n].column]) for n in model.free_names}
+        return model.with_values(values), reached
+
+    def _same(self, start: Fit, own: Model, apart: Model) -> float:
+        """Log-likelihood of both drivings where what was put in is in both the same."""
+        noise, box = self.before.noise.vector(), free_box(apart)
+        changed = [n for n in apart.free_names if n not in self.before.model.free_names]
+        objective = self._objective(start, apart, own, changed, [])
+        ends = [{n: m.value(n) for n in apart.free_names} for m in (own, apart)]
+        ends.append({n: 0.5 * (ends[0][n] + ends[1][n]) for n in apart.free_names})
+        ends.append(ends[0] | {n: self._unchanged.value(n) for n in self._unchanged.free_names})
+        starts = np.array([box.inside(apart.with_values(e).vector()) for e in ends])
+        best = int(np.argmax(objective.log_likelihoods(starts, noise)))
+        return highest(objective, starts[best], noise, box)[1]
 
     def _own(
         self, put: Sequence[str], sizes: Mapping[str, float], usual: Mapping[str, float]
@@ -173,18 +205,20 @@ class Reference:
         own: Model | None = None,
         also: Sequence[Mapping[str, float]] = (),
     ) -> tuple[Model, float]:
-        """A model with some changes, and its log-likelihood less what is known of all else."""
+        """A model with some changes, and its log-likelihood; beside the reference where given."""
         model = start.model.add(*(e for e in self.effects if e.id in put))
         if own is not None:  # changes begin where the reference ends
             model = model.with_values({n: own.value(n) for n in model.free_names})
-        driving, noise, box = start.driving, self.before.noise.vector(), free_box(model)
-        stays = self._knowledge(start.model, [n for n in start.model.free_names if n not in sizes])
-        noises = noise_range(model.vehicle, driving)
-        objective = Objective(driving.problem(model), (stays,), *noises)
+        noise, box = self.before.noise.vector(), free_box(model)
+        objective = self._objective(start, model, own, list(sizes), list(sizes))
         p, best = box.inside(model.vector()), -np.inf
-        for begin in self._starts(model, objective, sizes, usual, also)[:_FOLLOWED]:
+        starts = self._starts(model, objective, sizes, usual, also, own is not None)
+        for begin in starts[:_FOLLOWED]:
             with suppress(NumericalError, np.linalg.LinAlgError):
-                there, value = _highest(objective, begin, noise, box)
+                there, value = highest(objective, begin, noise, box)
+                for name in (n for n in usual if n.endswith(_DELAY)):
+                    at = model.parameters[name].column
+                    there, value = along(objective, there, value, at, usual[name], noise, box)
                 if value > best:
                     p, best = there, value
         if best == -np.inf:
@@ -199,43 +233,54 @@ class Reference:
         sizes: Mapping[str, float],
         usual: Mapping[str, float],
         also: Sequence[Mapping[str, float]],
+        beside: bool,
     ) -> list[FloatArray]:
-        """Starts, the likeliest first: what lines say leads astray where a change is large."""
+        """Starts, the likeliest first: what lines say leads astray where a change is large.
+
+        With all else as in the reference, and as it is where nothing changed.
+        """
         box, noise = free_box(model), self.before.noise.vector()
         far = {n: _FAR * usual.get(n, 0.0) for n in sizes}
         starts = [*also, {n: float(np.clip(v, -far[n], far[n])) for n, v in sizes.items()}]
         if len(usual) == 1:
             ((name, size),) = usual.items()
             starts += [{name: sign * share * size} for share in _SHARES for sign in (-1.0, 1.0)]
+        near = [model]
+        if beside and sizes:
+            stays = [n for n in self._unchanged.free_names if n not in sizes]
+            near.append(model.with_values({n: self._unchanged.value(n) for n in stays}))
         sets = [
-            box.inside(
-                model.with_values({n: model.value(n) + size for n, size in start.items()}).vector()
-            )
+            box.inside(m.with_values({n: m.value(n) + x for n, x in start.items()}).vector())
+            for m in near
             for start in starts
         ]
         values = objective.log_likelihoods(np.array(sets), noise)
         return [sets[i] for i in np.argsort(-values, kind="stable")]
 
-    def _knowledge(self, model: Model, names: Sequence[str]) -> LinearRows:
-        """What the reference knows of parameters that stay, as further residuals."""
+    def _objective(
+        self,
+        start: Fit,
+        model: Model,
+        own: Model | None,
+        loose: Sequence[str],
+        changed: Sequence[str],
+    ) -> Objective:
+        """The likelihood of a driving with priors of what stays, and that of the reference.
+
+        The reference is not approximated by its information: of tyres in their linear range a
+        line says that they may go where they cannot.
+        """
+        model_before = self.before.model
+        names = [n for n in model_before.free_names if n not in loose]
         at = [self.place[n] for n in names]
-        information = self.side.information[np.ix_(at, at)] + np.diag(self.shared.precision[at])
-        size = np.sqrt(np.maximum(np.diag(information), 1e-300))
-        values, vectors = np.linalg.eigh(information / np.outer(size, size))
-        root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * size
         rows = np.zeros((len(names), _core.PARAMETERS))
-        rows[:, [model.parameters[n].column for n in names]] = root
-        return LinearRows(rows, as_float64(root @ np.array([self.value(n) for n in names])))
-
-
-def _highest(
-    objective: Objective, p: FloatArray, noise: FloatArray, box: Box
-) -> tuple[FloatArray, float]:
-    """The end of a search under given noise, and its log-likelihood."""
-    best = -np.inf
-    for _ in range(_REFREEZES):
-        p, gains = moved(objective, p, noise, box, tolerance=_ENOUGH)
-        before, best = best, objective.reached(p, gains)
-        if best < before + _ENOUGH:
-            break
-    return p, best
+        root = np.sqrt(self.shared.precision[at])
+        rows[np.arange(len(names)), [model_before.parameters[n].column for n in names]] = root
+        centre = [model_before.value(n) + self.shared.centre[self.place[n]] for n in names]
+        stays = LinearRows(rows, as_float64(root * centre))
+        problem: Any = start.driving.problem(model)
+        if own is not None:
+            shared = [own.parameters[n].column for n in own.free_names if n not in changed]
+            before = self.before.driving.problem(own)
+            problem = BothDrivings(problem, before, own.vector(), shared)
+        return Objective(problem, (stays,), *noise_range(model.vehicle, start.driving))

@@ -1,0 +1,97 @@
+"""The likelihood of two drivings of a car together, some parameters of which differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..._common.arrays import FloatArray, as_float64
+
+
+@dataclass(frozen=True, eq=False)
+class _Gains:
+    later: Any
+    before: Any
+    log_likelihood: float
+
+
+@dataclass(frozen=True, eq=False)
+class BothDrivings:
+    """Two drivings as one problem (`identify.objective.Predicting`).
+
+    Parameters
+    ----------
+    later, before : Problem
+        Of models with the same effects.
+    own : array, shape (parameters,)
+        Of `before`.
+    shared : sequence of int
+        Columns of parameters that are in both the same.
+    """
+
+    later: Any
+    before: Any
+    own: FloatArray
+    shared: Sequence[int]
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return int(self.later.samples + self.before.samples)
+
+    def freeze(self, p: FloatArray, noise: FloatArray) -> _Gains:
+        """Gains of both filters."""
+        later, before = self.later.freeze(p, noise), self.before.freeze(self._own(p), noise)
+        return _Gains(later, before, float(later.log_likelihood + before.log_likelihood))
+
+    def residuals(self, p: FloatArray, gains: _Gains) -> FloatArray:
+        """Whitened residuals, those of the later driving first."""
+        one = self.later.residuals(p, gains.later).ravel()
+        return np.concatenate([one, self.before.residuals(self._own(p), gains.before).ravel()])
+
+    def half_sum_of_squares(self, p: FloatArray, gains: _Gains) -> float:
+        """Half the sum of their squares."""
+        one = self.later.half_sum_of_squares(p, gains.later)
+        return float(one + self.before.half_sum_of_squares(self._own(p), gains.before))
+
+    def sensitivities(self, p: FloatArray, gains: _Gains, columns: list[int]) -> FloatArray:
+        """Minus the derivatives of the residuals by the parameters `columns`."""
+        one = self.later.sensitivities(p, gains.later, columns)
+        other = self.before.sensitivities(self._own(p), gains.before, columns)
+        return np.vstack([one, other * self._moves(columns)])
+
+    def normal_equations(
+        self, p: FloatArray, gains: _Gains, columns: list[int]
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """Half the sum of squares, G' e and G' G of the sensitivities G."""
+        one = self.later.normal_equations(p, gains.later, columns)
+        other = self.before.normal_equations(self._own(p), gains.before, columns)
+        moves = self._moves(columns)
+        return (
+            float(one[0] + other[0]),
+            as_float64(one[1] + moves * other[1]),
+            as_float64(one[2] + np.outer(moves, moves) * other[2]),
+        )
+
+    def noise_score(self, p: FloatArray, noise: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Log-likelihood, its derivatives by the noise's logarithms, and their information."""
+        one, other = self.later.noise_score(p, noise), self.before.noise_score(self._own(p), noise)
+        return one[0] + other[0], as_float64(one[1] + other[1]), as_float64(one[2] + other[2])
+
+    def log_likelihoods(self, sets: FloatArray, noise: FloatArray) -> FloatArray:
+        """Of sets of parameters, a row each; minus infinity where one fails."""
+        own = np.array([self._own(p) for p in sets])
+        later = self.later.log_likelihoods(sets, noise)
+        return as_float64(later + self.before.log_likelihoods(own, noise))
+
+    def _own(self, p: FloatArray) -> FloatArray:
+        own = self.own.copy()
+        own[list(self.shared)] = p[list(self.shared)]
+        return own
+
+    def _moves(self, columns: list[int]) -> FloatArray:
+        """Of each column whether it moves the reference."""
+        return as_float64([float(c in self.shared) for c in columns])
