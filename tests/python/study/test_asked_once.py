@@ -8,13 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, NumericalError
+from sysid_vehicle import Fit, Model, NumericalError, diagnose, drive, identify, manoeuvres
 from sysid_vehicle._common.threads import at_most
 from sysid_vehicle.diagnose.unexplained.ceiling import left_out
+from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import ahead, maximum, predicting_ahead, refine, refine_above
 from sysid_vehicle.identify.ahead import _Ahead
 from sysid_vehicle.sensors.low_pass import _Problem
 from sysid_vehicle.sensors.spectrum import spectrum_of
+from sysid_vehicle.study import steps
+from sysid_vehicle.study.steps import alternatives, exchanged
 
 
 def test_signals_that_are_regressed_together_have_the_shares_of_each_alone(
@@ -107,3 +110,35 @@ def test_starts_that_all_fail_are_searched_once_each(
     with pytest.raises(NumericalError, match="the car spins"):
         predicting_ahead(fit)
     assert len(calls) == 2
+
+
+def test_exchanges_are_the_same_for_any_number_of_threads(
+    start: Model, truth: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hidden = {"aero_drag.drag_area_m2": 0.6, "rolling_resistance.coefficient": 0.012}
+    car = truth.add("aero_drag", "rolling_resistance").with_values(hidden)
+    test = Driving.of(drive(car, manoeuvres.handling_course(30.0, lateral_mps2=7.5), seed=62))
+    baseline = identify(start, drive(car, manoeuvres.lap(30.0), seed=61), starts=1)
+    dx = diagnose(baseline, candidates=["aero_drag", "rolling_resistance", "head_wind"])
+    (wind,) = (c for c in dx.ranking if c.id == "head_wind")
+    assert wind.fit is not None
+    near = {"head_wind": alternatives(dx, wind)}
+    tried: list[str] = []
+    plain = steps.better
+
+    def noted(one: Fit, other: Fit, *rest: Any) -> bool:
+        tried.append("+".join(one.model.effects))
+        return plain(one, other, *rest)
+
+    monkeypatch.setattr(steps, "better", noted)
+    found = []
+    for threads in (1, 3):
+        with at_most(threads):
+            found.append(exchanged(wind.fit, near, test, most_effects=4))
+    half = len(tried) // 2
+    assert half > 1
+    assert tried[:half] == tried[half:]
+    one, other = found
+    assert set(one.model.effects) == {"aero_drag", "rolling_resistance"}
+    assert one.model.effects == other.model.effects
+    assert one.log_likelihood == other.log_likelihood

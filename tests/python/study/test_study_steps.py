@@ -1,19 +1,16 @@
 """One step of the way: what stands in for others is exchanged, what is not needed is dropped."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from sysid_vehicle import Diagnosis, Fit, Model, compare, diagnose, drive, identify, manoeuvres
-from sysid_vehicle._common.threads import at_most
 from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
 from sysid_vehicle.rules import USUAL, share_explained
-from sysid_vehicle.study import steps
 from sysid_vehicle.study.search import Search, Trail, _more
 from sysid_vehicle.study.steps import (
     _distance,
@@ -62,32 +59,6 @@ def by_id(dx: Diagnosis, name: str) -> Fit:
     (found,) = (c.fit for c in dx.ranking if c.id == name)
     assert found is not None
     return found
-
-
-def test_exchanges_are_the_same_for_any_number_of_threads(
-    dx: Diagnosis, driving: tuple[Driving, Driving], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (wind,) = (c for c in dx.ranking if c.id == "head_wind")
-    windy, near = by_id(dx, "head_wind"), {"head_wind": alternatives(dx, wind)}
-    tried: list[str] = []
-    plain = steps.better
-
-    def better_(one: Fit, other: Fit, *rest: Any) -> bool:
-        tried.append("+".join(one.model.effects))
-        return plain(one, other, *rest)
-
-    monkeypatch.setattr(steps, "better", better_)
-    found = []
-    for threads in (1, 3):
-        with at_most(threads):
-            found.append(exchanged(windy, near, driving[1], most_effects=4))
-    half = len(tried) // 2
-    assert tried[:half] == tried[half:]
-    assert half > 1
-    one, other = found
-    assert one.model.effects == other.model.effects
-    assert set(one.model.effects) == {"aero_drag", "rolling_resistance"}
-    assert one.log_likelihood == other.log_likelihood
 
 
 @pytest.mark.manual
