@@ -182,7 +182,7 @@ def maximised(
     few = apart(points, values, box)
 
     def found() -> Fit:
-        return _from_ends(model, driving, objective, thinned, few, table)
+        return _from_ends(model, driving, objective, thinned, few, noise, table)
 
     fit = before(ends, found, None)
     if fit is not None:
@@ -201,11 +201,11 @@ def _from_ends(
     objective: Objective,
     thinned: list[Objective],
     ends: Sequence[FloatArray],
+    noise: NoiseModel,
     table: Starts,
 ) -> Fit:
-    """The maximum, from the best few ends of searches under the noise of a first guess."""
+    """The maximum, from the best few ends of searches under this noise."""
     box = free_box(model)
-    noise = first_guess(driving, model.vehicle)
     first, *others = ends
     best = settle(objective, first, noise.vector(), box, thin=thinned)
     for end in others:
