@@ -270,7 +270,7 @@ def test_a_study_uses_what_the_check_settled(
 
     from sysid_vehicle.study import improve as module
 
-    monkeypatch.setitem(vars(sys.modules[module.__module__]), "identify", stop)
+    monkeypatch.setattr(sys.modules[module.__module__], "maximised", stop)
     with pytest.raises(Stop):
         sv.improve(sv.Model(sv.example_vehicle()), faulty.logs[0], faulty.logs[0], sensors=faulty)
     (driving,) = heard

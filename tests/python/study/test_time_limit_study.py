@@ -12,7 +12,8 @@ import pytest
 from sysid_vehicle import Log, Model, _core, drive, improve, manoeuvres
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify.identify import maximised
-from sysid_vehicle.sensors import _estimate, _low_pass
+from sysid_vehicle.sensors import estimate as _estimate
+from sysid_vehicle.sensors import low_pass as _low_pass
 
 CANDIDATES = ["steer_lag", "aero_drag", "rolling_resistance", "yaw_inertia", "gyro_bias"]
 
