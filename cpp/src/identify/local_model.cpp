@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <map>
 
+#include "sysid/math/whole.hpp"
+
 namespace sysid {
 
 namespace {
-
-std::size_t place(int i) { return static_cast<std::size_t>(i); }
 
 double at(const LaneRow* row, std::size_t lane) { return row == nullptr ? 1.0 : row->at[lane]; }
 
@@ -21,7 +21,7 @@ LocalModel::LocalModel(const SingleTrack& model, const double* p, const std::vec
       step_parameters_(states() * model_.moving()),
       read_at_(step_parameters_ + states() * width_),
       read_parameters_(read_at_ + kChannels * model_.moving()) {
-    for (std::size_t j = 0; j < columns.size(); ++j) columns_of_[place(columns[j])].push_back(j);
+    for (std::size_t j = 0; j < columns.size(); ++j) columns_of_[index(columns[j])].push_back(j);
 }
 
 std::vector<double> LocalModel::start(const Run& run) const {

@@ -15,9 +15,9 @@ namespace sysid {
 namespace {
 
 /// States and disturbances after the readings of each sample, in the order of `filter_rows`.
-class Known {
+class FilteredStates {
   public:
-    Known(const Problem& problem, const double* p, const Noise& noise)
+    FilteredStates(const Problem& problem, const double* p, const Noise& noise)
         : width_(filter_rows(problem.model.effects, noise.disturbances()).size()) {
         for (const Run& run : problem.runs) runs_.emplace_back(run.size() * width_);
         const std::vector<Piece> pieces = pieces_of(problem.runs, forgets_s(problem, noise));
@@ -69,7 +69,7 @@ class Predictions {
           readings_(readings),
           errors_(errors),
           samples_(problem.samples()),
-          known_(problem, p, noise),
+          filtered_(problem, p, noise),
           model_(problem.model, p, {}, noise.disturbances()),
           rate_(problem.model.fastest_rate(p, 1.0)),
           state_(model_.moving()) {}
@@ -102,7 +102,7 @@ class Predictions {
     /// What is known at a sample, with no forces.
     double begin(std::size_t k, std::size_t i) const {
         const bool force = i >= model_.states() && i < model_.states() + kMotionStates;
-        return force ? 0.0 : known_.at(number_, k)[i];
+        return force ? 0.0 : filtered_.at(number_, k)[i];
     }
 
     void together(const Run& run, const std::vector<std::size_t>& asked, const std::size_t* starts,
@@ -181,7 +181,7 @@ class Predictions {
     bool readings_;
     double* errors_;
     std::size_t samples_;
-    Known known_;
+    FilteredStates filtered_;
     RecordedModel model_;
     double rate_;
     std::vector<LaneRow> state_;

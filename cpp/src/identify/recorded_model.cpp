@@ -1,12 +1,11 @@
 #include "sysid/identify/recorded_model.hpp"
 
 #include "sysid/math/errors.hpp"
+#include "sysid/math/whole.hpp"
 
 namespace sysid {
 
 namespace {
-
-std::size_t place(int i) { return static_cast<std::size_t>(i); }
 
 InputFor<Recorded> recorded_input(Recorder& to) {
     InputFor<Recorded> u;
@@ -43,7 +42,7 @@ bool same_steps(const Program& a, const Program& b) {
 void RecordedModel::Ready::set(std::size_t first, const LaneRow* values, std::size_t count) {
     for (std::size_t i = 0; i < count; ++i)
         if (const std::int32_t row = program.inputs[first + i]; row >= 0)
-            rows[place(row)] = values[i];
+            rows[index(row)] = values[i];
 }
 
 void RecordedModel::Ready::give(std::size_t which, std::size_t lane, const Input& u) {
@@ -62,7 +61,7 @@ RecordedModel::RecordedModel(const SingleTrack& model, const std::vector<const d
       own_(active_states(model.effects)),
       states_(kMotionStates + own_.count),
       externals_(externals) {
-    for (const int column : columns) wanted_[place(column)] = true;
+    for (const int column : columns) wanted_[index(column)] = true;
     read_ = ready(1, [&](Recorder& to, const double* p) {
         const Moving now = moving(to);
         const InputFor<Recorded> u = recorded_input(to);
@@ -101,21 +100,21 @@ RecordedModel::Ready RecordedModel::ready(std::size_t inputs_given, Record&& rec
     };
     Ready out;
     Program program = program_of(sets_[0]);
-    out.rows.resize(place(program.rows));
+    out.rows.resize(index(program.rows));
     for (const auto& [row, value] : program.uniform)
-        std::fill_n(out.rows[place(row)].at, kLanes, value);
+        std::fill_n(out.rows[index(row)].at, kLanes, value);
     for (std::size_t lane = 1; lane < sets_.size(); ++lane) {
         if (sets_[lane] == sets_[0]) continue;
         const Program other = program_of(sets_[lane]);
         if (!same_steps(program, other)) throw NumericalFailure("the model takes other steps", 0);
-        for (const auto& [row, value] : other.uniform) out.rows[place(row)].at[lane] = value;
+        for (const auto& [row, value] : other.uniform) out.rows[index(row)].at[lane] = value;
     }
-    out.adjoints.resize(place(program.slots * kSweep));
+    out.adjoints.resize(index(program.slots * kSweep));
     out.given.resize(inputs_given);
     for (std::size_t which = 0; which < inputs_given; ++which)
         for (std::size_t i = 0; i < kGiven; ++i)
             if (const std::int32_t row = program.inputs[moving() + which * kGiven + i]; row >= 0)
-                out.given[which].emplace_back(i, place(row));
+                out.given[which].emplace_back(i, index(row));
     out.program = std::move(program);
     return out;
 }

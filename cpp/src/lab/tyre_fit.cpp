@@ -11,11 +11,11 @@ namespace sysid::lab {
 
 namespace {
 
-constexpr double kSlowest = 1.0;  // slip angles are those at this speed below it [m/s]
+constexpr double kSlowestSlip = 1.0;  // slip angles are those at this speed below it [m/s]
 }  // namespace
 
 void TyreLoss::add(const TyreSample& s) {
-    const double speed = std::max(s.v_x, kSlowest);
+    const double speed = std::max(s.v_x, kSlowestSlip);
     const double cosine = projects_steer_ ? std::cos(s.steer_rad) : 1.0;
     const double per_mass = s.a_y_weight / car_.mass_kg;
     const double per_inertia = s.yaw_weight / yaw_inertia_kgm2_;

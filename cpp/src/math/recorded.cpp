@@ -7,17 +7,18 @@
 
 #include "sysid/math/lag_weights.hpp"
 #include "sysid/math/recorder.hpp"
+#include "sysid/math/whole.hpp"
 
 namespace sysid {
 
 namespace {
 
 /// Value and slopes of a step on numbers that are known.
-struct Known {
+struct Evaluated {
     double value, slope_a, slope_b;
 };
 
-Known known(Op op, double a, double b, double constant) {
+Evaluated evaluated(Op op, double a, double b, double constant) {
     switch (op) {
         case Op::kAdd:
             return {a + b, 1.0, 1.0};
@@ -81,7 +82,7 @@ Known known(Op op, double a, double b, double constant) {
 /// What the operators below need of a `Recorded`.
 struct RecordedAccess {
     static Recorded one(Op op, const Recorded& a, double constant = 0.0) {
-        if (a.to_ == nullptr) return known(op, a.v_, 0.0, constant).value;
+        if (a.to_ == nullptr) return evaluated(op, a.v_, 0.0, constant).value;
         Recorder::Node n;
         n.op = op;
         n.a = a.node_;
@@ -90,7 +91,7 @@ struct RecordedAccess {
     }
     static Recorded two(Op op, const Recorded& a, const Recorded& b) {
         Recorder* to = a.to_ != nullptr ? a.to_ : b.to_;
-        if (to == nullptr) return known(op, a.v_, b.v_, 0.0).value;
+        if (to == nullptr) return evaluated(op, a.v_, b.v_, 0.0).value;
         Recorder::Node n;
         n.op = op;
         n.a = to->node_of(a);
@@ -230,7 +231,8 @@ Recorded Recorder::noted(const Node& node) {
     if (n.op == Op::kUniform) {
         n.value = n.constant;
     } else if (n.uniform) {
-        const Known k = known(n.op, at(n.a).value, n.b < 0 ? 0.0 : at(n.b).value, n.constant);
+        const Evaluated k =
+            evaluated(n.op, at(n.a).value, n.b < 0 ? 0.0 : at(n.b).value, n.constant);
         n.value = k.value;
         n.slope_a = k.slope_a;
         n.slope_b = k.slope_b;
@@ -240,12 +242,6 @@ Recorded Recorder::noted(const Node& node) {
     known_.emplace(key, place);
     return {n.value, place, this};
 }
-
-namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
 
 int Recorder::partner_of(int node) const {
     const Node& n = nodes_[index(node)];

@@ -6,7 +6,6 @@ namespace sysid {
 
 namespace {
 
-constexpr double kSlowestMps = 1.0;     // keeps what divides by speed finite
 constexpr double kSteerUnknown = 0.15;  // random walk of its angle [rad/sqrt(s)]
 constexpr double kAtOrigin = 1.5;  // error of the curve's slope there over that at larger slips
 constexpr std::array<double, 3> kDepartures = {0.12, 0.45, 2.0};  // from the model, over the usual
@@ -14,10 +13,6 @@ constexpr double kWeightTimeS = 5.0;    // of readings that decide between them
 constexpr double kGivesUpAfterS = 3.0;  // longer than most faults of a sensor
 constexpr double kAgainstAfterwards = 5.0;
 constexpr double kMostAgainst = 10.0;  // of the log weights, so that none is lost for good
-
-double squared(double v) { return v * v; }
-
-double slope(const TyreCoefficients<double>& t) { return t.B * t.C * t.D; }
 
 /// The same, with `factor` times the errors of model and road.
 ObserverSettings expecting(ObserverSettings s, double factor) {
@@ -253,9 +248,9 @@ void SideslipDual::report() {
     out_.fyr_n = a.mean[ForceModel::kFyr];
     out_.fx_n = a.mean[ForceModel::kFx];
     out_.cf_npr =
-        slope(car_.front) * weight * car_.data.lr_m * std::exp(mean_of(TyreModel::kStiffF));
+        car_.front.slope() * weight * car_.data.lr_m * std::exp(mean_of(TyreModel::kStiffF));
     out_.cr_npr =
-        slope(car_.rear) * weight * car_.data.lf_m * std::exp(mean_of(TyreModel::kStiffR));
+        car_.rear.slope() * weight * car_.data.lf_m * std::exp(mean_of(TyreModel::kStiffR));
     out_.cf_std_npr =
         out_.cf_npr * std::hypot(std_of(TyreModel::kStiffF), kAtOrigin * settings_.error_curve);
     out_.cr_std_npr =

@@ -4,11 +4,8 @@ namespace sysid {
 
 namespace {
 
-constexpr double kSlowestMps = 1.0;
 constexpr double kSharingTime_s = 0.1;
 constexpr double kBlindBraking_mps2 = 5.0;  // how fast a speed may change that is not measured
-
-double slope(const TyreCoefficients<double>& t) { return t.B * t.C * t.D; }
 
 }  // namespace
 
@@ -22,8 +19,8 @@ void SideslipModel::lateral(double steer, double vx, double r, const Input& u, c
     const Axles<S> alpha = slip_angles(S(1.0), tangent, S(r / vx), c.lf_m, c.lr_m, steer);
     if (linear) {
         const Axles<double> rest = static_loads(c.mass_kg * kGravity, c.lf_m, c.lr_m);
-        front = slope(car.front) * rest.front * alpha.front;
-        rear = slope(car.rear) * rest.rear * alpha.rear;
+        front = car.front.slope() * rest.front * alpha.front;
+        rear = car.rear.slope() * rest.rear * alpha.rear;
         return;
     }
     const S one = S(1.0);
@@ -77,8 +74,8 @@ Mat<3, 3> SideslipModel::process_noise(const Input& u) const {
 
 Mat<2, 2> SideslipModel::measurement_noise(const Input& u) const {
     const Axles<double> rest = static_loads(kGravity, car.data.lf_m, car.data.lr_m);  // per mass
-    const double c_f = slope(car.front) * rest.front;
-    const double c_r = slope(car.rear) * rest.rear;
+    const double c_f = car.front.slope() * rest.front;
+    const double c_r = car.rear.slope() * rest.rear;
     const double by_rate = (c_f * car.data.lf_m - c_r * car.data.lr_m) / u.vx * u.yaw_rate_std;
     const double by_steer = c_f * u.steer_std;
     const double ay = settings.ay_mps2, model = settings.model_ay_mps2;
@@ -169,7 +166,7 @@ void SideslipUkf<method>::start(const SensorSample& s) {
     const double r = std::isnan(s.yaw_rate_radps) ? 0.0 : s.yaw_rate_radps;
     const double ax = std::isnan(s.ax_mps2) ? 0.0 : s.ax_mps2;
     const AxleForces loads = axle_forces(car_, ax, 0.0);
-    const double slip_r = vx * r / (kGravity * slope(car_.rear));
+    const double slip_r = vx * r / (kGravity * car_.rear.slope());
     const double beta = std::clamp(car_.data.lr_m * r / vx - slip_r, -0.5, 0.5);
     const double deviation =
         std::isnan(s.yaw_rate_radps) ? 0.1 : std::max(0.03, 0.5 * std::abs(slip_r));
@@ -199,8 +196,8 @@ void SideslipUkf<method>::report(const SensorSample& s) {
         slip_angles(1.0, tangent, input_.yaw_rate / input_.vx, c.lf_m, c.lr_m, input_.steer);
     out_.fyf_n = axle_force<double>(alpha.front, input_.fz_f, now.mean[1], car_.front, 1.0, 1.0);
     out_.fyr_n = axle_force<double>(alpha.rear, input_.fz_r, now.mean[2], car_.rear, 1.0, 1.0);
-    out_.cf_npr = slope(car_.front) * rest.front;
-    out_.cr_npr = slope(car_.rear) * rest.rear;
+    out_.cf_npr = car_.front.slope() * rest.front;
+    out_.cr_npr = car_.rear.slope() * rest.rear;
     out_.mu_f = car_.front.D;
     out_.mu_r = car_.rear.D;
     out_.nis = filter_.nis();

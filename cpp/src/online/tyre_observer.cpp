@@ -19,10 +19,6 @@ constexpr double kSlipStep = 5e-4;  // [rad]
 
 double share_of(double dt, double time_s) { return std::exp(-dt / time_s); }
 
-double squared(double v) { return v * v; }
-
-double slope(const TyreCoefficients<double>& t) { return t.B * t.C * t.D; }
-
 }  // namespace
 
 template <class S>
@@ -143,8 +139,8 @@ void TyreObserver::start(double dt, const SensorSample& s, const TyreModel::Inpu
     const double r = or_zero(s.yaw_rate_radps), ay = or_zero(s.ay_mps2);
     const double share = c.lr_m / car_.wheelbase_m();
     input_ = common;
-    const double slip_f = share * c.mass_kg * ay / (slope(car_.front) * input_.loads.fz_f);
-    const double slip_r = (1.0 - share) * c.mass_kg * ay / (slope(car_.rear) * input_.loads.fz_r);
+    const double slip_f = share * c.mass_kg * ay / (car_.front.slope() * input_.loads.fz_f);
+    const double slip_r = (1.0 - share) * c.mass_kg * ay / (car_.rear.slope() * input_.loads.fz_r);
     const bool first = filter_.samples() == 0 || refuted();
     Vec<15> b = filter_.state().mean, deviation;
     if (first) b.setZero();

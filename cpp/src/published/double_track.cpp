@@ -11,7 +11,7 @@ namespace sysid {
 
 namespace {
 
-constexpr double kSlowest = 2.0;  // [m/s] slip is referred to no lower speed
+constexpr double kSlowestSlip = 2.0;  // [m/s] slip is referred to no lower speed
 
 struct Forces {
     double x, y, moment;
@@ -38,8 +38,8 @@ Forces forces(const DoubleTrackData& c, const std::array<double, 4>& s, double s
         const double angle = front ? steer : 0.0;
         const double v_l = std::cos(angle) * along + std::sin(angle) * across;
         const double rolling = c.radius_m * wheel_speed[i];
-        const double slip = (rolling - v_l) / std::max({rolling, v_l, kSlowest});
-        const double alpha = slip_angle(std::max(along, kSlowest), across, angle);
+        const double slip = (rolling - v_l) / std::max({rolling, v_l, kSlowestSlip});
+        const double alpha = slip_angle(std::max(along, kSlowestSlip), across, angle);
         const PacejkaPair& t = front ? c.front : c.rear;
         fx[i] = load * magic_formula(slip, TyreCoefficients<double>{t.bx, t.cx, t.dx, t.ex});
         fy[i] = load * magic_formula(alpha, TyreCoefficients<double>{t.by, t.cy, t.dy, t.ey});

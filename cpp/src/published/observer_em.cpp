@@ -6,9 +6,6 @@ namespace sysid::lab {
 
 namespace {
 
-constexpr int NX = kObserverStates;
-constexpr int NY = kObserverMeasurements;
-
 class PublishedExpectation {
   public:
     explicit PublishedExpectation(const std::vector<ObserverLog>& logs)
@@ -24,7 +21,8 @@ class PublishedExpectation {
             const ObserverSystem system(log.model, log.inputs, log.readings, noise_);
             ObserverMat before;
             const auto pass = [&](const auto& form) {
-                return extended_kalman_filter<NX, NY, std::decay_t<decltype(form)>>(
+                return extended_kalman_filter<kObserverStates, kObserverMeasurements,
+                                              std::decay_t<decltype(form)>>(
                     system, log.start.mean, log.start.covariance,
                     [&](std::size_t k, const auto& step) {
                         steps[k] = step;
@@ -33,29 +31,32 @@ class PublishedExpectation {
                     },
                     log.start.one_before);
             };
-            sum += noise.sensors.isDiagonal(0.0) ? pass(SequentialUpdate<NX, NY>())
-                                                 : pass(Update<NX, NY>());
+            sum += noise.sensors.isDiagonal(0.0)
+                       ? pass(SequentialUpdate<kObserverStates, kObserverMeasurements>())
+                       : pass(Update<kObserverStates, kObserverMeasurements>());
         }
         return sum;
     }
 
-    NoiseMoments<NX, NY> moments() const {
+    NoiseMoments<kObserverStates, kObserverMeasurements> moments() const {
         constexpr double kRidge = 1e-9;
-        NoiseMoments<NX, NY> out;
+        NoiseMoments<kObserverStates, kObserverMeasurements> out;
         for (std::size_t i = 0; i < logs_.size(); ++i) {
             const ObserverLog& log = logs_[i];
             ObserverForm form = log.model.form();
             form.input_before = form.speed_predicted = true;
             const ObserverModel model = log.model.with_form(form);
-            add_smoothed_moments<NX, NY>(ObserverSystem(model, log.inputs, log.readings, noise_),
-                                         smooth<SmoothedSum::kDifference>(steps_[i], kRidge), out);
+            add_smoothed_moments<kObserverStates, kObserverMeasurements>(
+                ObserverSystem(model, log.inputs, log.readings, noise_),
+                smooth<SmoothedSum::kDifference>(steps_[i], kRidge), out);
         }
         return out;
     }
 
   private:
     const std::vector<ObserverLog>& logs_;
-    std::vector<std::vector<StateStep<NX>>> steps_;  // with the transition of the step before
+    std::vector<std::vector<StateStep<kObserverStates>>>
+        steps_;  // with the transition of the step before
     ObserverNoise noise_;
 };
 
@@ -66,8 +67,8 @@ ObserverEm learn_as_published(const std::vector<ObserverLog>& logs, const Observ
                               const NoiseStructure<kObserverMeasurements>& sensors,
                               const EmOptions& options) {
     PublishedExpectation expectation(logs);
-    return learn_noise<NX, NY>(expectation, {start.process, start.sensors}, process, sensors,
-                               options);
+    return learn_noise<kObserverStates, kObserverMeasurements>(
+        expectation, {start.process, start.sensors}, process, sensors, options);
 }
 
 }  // namespace sysid::lab

@@ -25,6 +25,8 @@ KERNELS = (
 # Once the time is over: one scoring of all effects, and errors of two models on two data sets.
 PASSES = 25
 
+SEARCHED = 0.1  # nats: searches go on while a round gains more than half of this
+
 
 class Clock:
     """Goes on by one with each pass over the data, and stands still otherwise."""
@@ -97,9 +99,10 @@ def test_a_baseline_that_had_too_little_time_is_the_likeliest_seen(
     found = []
     for limit in (0.0, 20.0, 60.0, 120.0, float("inf")):
         found.append(maximised(start, driving, starts=3, ends=clock.now + limit))
-    values = [fit.log_likelihood for fit in found]
-    assert values == sorted(values)
-    assert values[0] < values[1] < values[-1]
+    values = np.array([fit.log_likelihood for fit in found])
+    # Searches that end on their own stop within SEARCHED of the maximum, on whichever side.
+    assert np.all(np.diff(values) > -SEARCHED)
+    assert values[0] + 100.0 < values[1] < values[-1] - 100.0
     assert [fit.converged for fit in found[:2]] == [False, False]
     assert found[-1].converged
     assert all(np.isfinite(e.value) for fit in found for e in fit.estimates)

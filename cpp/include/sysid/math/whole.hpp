@@ -1,5 +1,8 @@
-// Whole numbers from what was computed: a cast of what no integer holds is undefined.
+// Whole numbers: from what was computed, where a cast of what no integer holds is undefined, and as
+// places in a vector.
 #pragma once
+
+#include <cstddef>
 
 namespace sysid {
 
@@ -8,5 +11,8 @@ inline int whole_within(double value, int least, int most) {
     if (!(value > least)) return least;
     return value < most ? static_cast<int>(value) : most;
 }
+
+/// A number that is not negative, as the place of an element.
+inline std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace sysid

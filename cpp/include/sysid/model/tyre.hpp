@@ -8,6 +8,9 @@ namespace sysid {
 template <class S>
 struct TyreCoefficients {
     S B, C, D, E;
+
+    /// Slope of the force over its load at no slip: the cornering stiffness per load [1/rad].
+    S slope() const { return B * C * D; }
 };
 
 /// Magic Formula, Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (4.6) without shifts:

@@ -27,8 +27,11 @@ constexpr std::array<SensorRange, 5> kSensorRanges = {
     SensorRange{"ay_mps2", 80.0, 200.0},
 };
 constexpr double kMostSideslipRad = 1.2;  // beyond it a car spins, and no tyre model holds
+constexpr double kSlowestMps = 1.0;       // keeps what divides by speed finite
 constexpr double kLongestStepS = 0.05;    // longer ones are divided
 constexpr double kForgottenAfterS = 1.0;  // after a longer one the motion is unknown
+
+inline double squared(double v) { return v * v; }
 
 inline std::array<double, 5> readings_of(const SensorSample& s) {
     return {s.steer_rad, s.vx_mps, s.yaw_rate_radps, s.ax_mps2, s.ay_mps2};
