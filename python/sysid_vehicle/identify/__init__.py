@@ -1,11 +1,11 @@
 """Identification of parameters and noise from driving."""
 
 from .ahead import predicting_ahead
-from .box import free_box
+from .box import free_box, objective_of
 from .estimates import Estimate
 from .fit import Fit
 from .identify import identify, profile_fit
-from .maximum import objective_of, refine, refine_above, refit, unmoved
+from .maximum import refine, refine_above, refit, unmoved
 from .offsets import driving_of
 from .posterior import Posterior
 from .predictive import Prediction, predict

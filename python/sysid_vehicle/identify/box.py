@@ -1,12 +1,14 @@
-"""Where the free parameters of a model may lie, and what is known of them beforehand."""
+"""The free parameters of a model: bounds, what is known beforehand, their likelihood."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from .. import _core
+from ..estimate import Driving, noise_range
+from ..estimate.pieces import DrivingProblem
 from ..model import Model
-from .objective import LinearRows, gaussian_prior
+from .objective import LinearRows, Objective, gaussian_prior
 from .search import Box
 
 # Of the typical size of a lag, its smallest. Of several lags of one effect some may not be there
@@ -33,3 +35,8 @@ def free_prior(model: Model) -> tuple[LinearRows, ...]:
     """The priors of the model's free parameters."""
     known = model.parameters
     return gaussian_prior(_core.PARAMETERS, {known[n].column: p for n, p in model.priors.items()})
+
+
+def objective_of(model: Model, problem: DrivingProblem, driving: Driving) -> Objective:
+    """The likelihood of a problem with the priors of a model's free parameters."""
+    return Objective(problem, free_prior(model), *noise_range(model.vehicle, driving))

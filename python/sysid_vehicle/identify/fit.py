@@ -163,7 +163,7 @@ class Fit(Estimated):
             For another method, where emcee is not installed, or where hardly any draw lies within
             the bounds.
         """
-        return posterior(self, count, seed, method, progress)
+        return posterior(self, self.model, self.driving, self.noise, count, seed, method, progress)
 
     def to_pandas(self) -> Any:
         """A DataFrame of the estimates and what follows from them, by parameter."""

@@ -16,13 +16,12 @@ from ..estimate import Driving, NoiseModel, first_guess
 from ..log import Log, check_car, check_excitation
 from ..model import Model
 from .ahead import predicting_ahead
-from .box import free_box
+from .box import free_box, objective_of
 from .estimates import BETTER_FOUND, INTERVALS, profiled_estimates
 from .fit import Fit
 from .maximum import (
     THINNED,
     log_likelihood_of,
-    objective_of,
     objectives,
     on_its_road,
     refine,

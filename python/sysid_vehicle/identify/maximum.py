@@ -9,10 +9,9 @@ import numpy as np
 from .. import _core
 from .._common.arrays import FloatArray
 from ..errors import NumericalError
-from ..estimate import Driving, NoiseModel, noise_range
-from ..estimate.pieces import DrivingProblem
+from ..estimate import Driving, NoiseModel
 from ..model import Model
-from .box import free_box, free_prior
+from .box import free_box, objective_of
 from .estimates import wald
 from .fit import Fit
 from .objective import Objective
@@ -29,11 +28,6 @@ _FINER = 6.0  # times as many samples, or so, when a search goes on with more of
 # more below on all; a climb gains a few.
 _FAR_BELOW_BY_FEW, _FAR_BELOW = 50.0, 20.0
 _ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
-
-
-def objective_of(model: Model, problem: DrivingProblem, driving: Driving) -> Objective:
-    """The likelihood of a problem with the priors of a model's free parameters."""
-    return Objective(problem, free_prior(model), *noise_range(model.vehicle, driving))
 
 
 def refine(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,10 +14,10 @@ from .._common.progress import with_progress
 from .._common.tables import frame, imported
 from .._common.text import brief, number
 from ..errors import InvalidInput
-from .box import free_box
-
-if TYPE_CHECKING:
-    from .fit import Fit
+from ..estimate import Driving, NoiseModel
+from ..model import Model
+from .box import free_box, objective_of
+from .estimates import Estimated
 
 _BATCH, _BATCHES = 4096, 400
 _WALKERS = 4  # of the ensemble, for each parameter
@@ -95,23 +95,31 @@ class Posterior(Printed):
 
 
 def posterior(
-    fit: Fit,
+    fit: Estimated,
+    model: Model,
+    driving: Driving,
+    noise: NoiseModel,
     count: int,
     seed: int | np.random.Generator,
     method: Literal["normal", "ensemble"],
     progress: bool | None,
 ) -> Posterior:
-    """Draw parameters; `Fit.posterior` has the parameters of this call."""
+    """Draw parameters; `Fit.posterior` has the parameters of this call.
+
+    `model`, `driving` and `noise` are those of the fit.
+    """
     count, rng = whole(count, "count", 1), generator(seed)
-    box = free_box(fit.model)
+    box = free_box(model)
     if method == "normal":
         x, density = _normal(fit, box.lower, box.upper, count, rng)
     elif method == "ensemble":
-        x, density = _ensemble(fit, box.lower, box.upper, count, rng, progress)
+        walkers = 2 * (_WALKERS * len(box.columns) // 2)
+        begin, _ = _normal(fit, box.lower, box.upper, walkers, rng)
+        x, density = _ensemble(model, driving, noise, begin[0], count, rng, progress)
     else:
         raise InvalidInput(f"method = {method!r}: choose 'normal' or 'ensemble'")
     quantities = list(fit.quantities.values())
-    p = np.repeat(fit.model.vector()[None], x[..., 0].size, axis=0)
+    p = np.repeat(model.vector()[None], x[..., 0].size, axis=0)
     p[:, box.columns] = x.reshape(-1, x.shape[-1])
     derived = np.array([[q.of(row) for q in quantities[x.shape[-1] :]] for row in p])
     values = np.concatenate([x, derived.reshape(*x.shape[:2], -1)], axis=2)
@@ -120,7 +128,7 @@ def posterior(
 
 
 def _normal(
-    fit: Fit, lower: FloatArray, upper: FloatArray, count: int, rng: np.random.Generator
+    fit: Estimated, lower: FloatArray, upper: FloatArray, count: int, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
     """Of the normal distribution of the fit, within the bounds."""
     mean = np.array([e.value for e in fit.estimates])
@@ -144,21 +152,21 @@ def _normal(
 
 
 def _ensemble(
-    fit: Fit,
-    lower: FloatArray,
-    upper: FloatArray,
+    model: Model,
+    driving: Driving,
+    noise: NoiseModel,
+    begin: FloatArray,
     count: int,
     rng: np.random.Generator,
     progress: bool | None,
 ) -> tuple[FloatArray, FloatArray]:
     """Of the likelihood itself, by the affine-invariant sampler (Goodman & Weare 2010, emcee)."""
     emcee = imported("emcee", "arviz")
-    from .maximum import objective_of
-
-    columns = free_box(fit.model).columns
-    objective = objective_of(fit.model, fit.driving.problem(fit.model), fit.driving)
-    p = fit.model.vector()
-    gains = objective.freeze(p, fit.noise.vector())
+    box = free_box(model)
+    columns, lower, upper = box.columns, box.lower, box.upper
+    objective = objective_of(model, driving.problem(model), driving)
+    p = model.vector()
+    gains = objective.freeze(p, noise.vector())
 
     def log_density(x: FloatArray) -> float:
         if not ((x >= lower) & (x <= upper)).all():
@@ -166,13 +174,11 @@ def _ensemble(
         p[columns] = x
         return -objective.half_sum_of_squares(p, gains)
 
-    n = len(columns)
-    walkers = 2 * (_WALKERS * n // 2)
+    walkers, n = begin.shape
     steps = int(np.ceil(count / walkers / (1.0 - _BURN_IN)))
-    begin, _ = _normal(fit, lower, upper, walkers, rng)
     sampler = emcee.EnsembleSampler(walkers, n, log_density)
     sampler.random_state = np.random.MT19937(rng.integers(2**63)).state
-    steady = sampler.sample(begin[0], iterations=steps)
+    steady = sampler.sample(begin, iterations=steps)
     for _ in with_progress(steady, "draws", total=steps, shown=progress):
         pass
     first = steps - max(int(np.ceil(count / walkers)), 1)

@@ -22,9 +22,8 @@ from .._common.memo import remembered
 from ..estimate import Driving, NoiseModel
 from ..estimate.pieces import DrivingProblem
 from ..model import Model
-from .box import free_box
+from .box import free_box, objective_of
 from .fit import Fit
-from .maximum import objective_of
 from .objective import Penalised
 from .offsets import driving_of
 from .search import Box, minimise

@@ -55,6 +55,10 @@ CPP_LAYERS = [
 
 # `Study.report` writes the report of itself, a convenience; it imports only when it is called.
 EXCEPTIONS = {("study/study.py", "report")}
+# The same inside a folder: `Excitation.preview` says what it will teach, if it is called.
+EXCEPTIONS_INSIDE = {("lab/excitation/excitation.py", "preview")}
+# Parts of a study take the study itself, whose type they name.
+OF_ONE_WHOLE = {"study"}
 # What repeats published experiments is out of everybody's way: only commands offer it.
 ONLY_FOR = {"published": {"cli"}}
 
@@ -152,10 +156,67 @@ def test_python_modules_of_one_layer_form_no_circle() -> None:
             if not is_excepted(path, target)
         }
         edges.setdefault(own_module(path), set()).update(targets - {own_module(path)})
-    while leaves := {module for module, targets in edges.items() if not targets & set(edges)}:
+    assert circle(edges) == set()
+
+
+def circle(edges: dict[str, set[str]]) -> set[str]:
+    """Those that import each other in a circle, or import such."""
+    left = {module: targets - {module} for module, targets in edges.items()}
+    while leaves := {module for module, targets in left.items() if not targets & set(left)}:
         for module in leaves:
-            del edges[module]
-    assert edges == {}, "these modules import each other in a circle"
+            del left[module]
+    return set(left)
+
+
+def imports_inside(folder: Path, path: Path, text: str) -> set[str]:
+    """What a file takes from its folder: modules of it, and folders of their own there."""
+    package = ("sysid_vehicle", *path.relative_to(PACKAGE).parts[:-1])
+    root = ("sysid_vehicle", *folder.relative_to(PACKAGE).parts)
+    found = set()
+    for node in ast.walk(ast.parse(text)):
+        if not isinstance(node, ast.ImportFrom) or not node.level:
+            continue
+        start = package[: len(package) - node.level + 1]
+        base = (*start, *(node.module.split(".") if node.module else ()))
+        for alias in node.names:
+            target = (*base, alias.name)
+            if target[: len(root)] == root:
+                found.update(target[len(root) : len(root) + 1])
+    relative = path.relative_to(PACKAGE).as_posix()
+    return {target for target in found if (relative, target) not in EXCEPTIONS_INSIDE}
+
+
+FOLDERS = sorted({p.parent for p in PACKAGE.glob("*/__init__.py")} - {PACKAGE / "_common"})
+
+
+@pytest.mark.parametrize("folder", [f for f in FOLDERS if f.name not in OF_ONE_WHOLE], ids=name)
+def test_modules_of_one_folder_form_no_circle(folder: Path) -> None:
+    """Imports for types and inside functions too; a folder within counts as one module."""
+    edges: dict[str, set[str]] = {}
+    for path in sorted(folder.rglob("*.py")):
+        own = path.relative_to(folder).parts[0].removesuffix(".py")
+        if own != "__init__":
+            targets = imports_inside(folder, path, path.read_text("utf-8"))
+            edges.setdefault(own, set()).update(targets)
+    assert edges
+    assert circle(edges) == set()
+
+
+def test_the_check_sees_a_circle_inside_a_folder() -> None:
+    folder = PACKAGE / "identify"
+    taken = {
+        "fit": "if TYPE_CHECKING:\n    from .posterior import Posterior",
+        "posterior": "def f():\n    from .maximum import top\nfrom .. import _core",
+        "maximum": "from ..identify.fit import Fit",
+    }
+    edges = {m: imports_inside(folder, folder / f"{m}.py", text) for m, text in taken.items()}
+    assert circle(edges) == {"fit", "posterior", "maximum"}
+    del edges["maximum"]
+    assert circle(edges) == set()
+    lab = PACKAGE / "lab"
+    text = "from ..preview import Preview\nfrom .driven import Driven\nfrom ...log import Log"
+    assert imports_inside(lab, lab / "excitation/weaving.py", text) == {"preview", "excitation"}
+    assert imports_inside(lab, lab / "excitation/excitation.py", text) == {"excitation"}
 
 
 def test_folders_of_diagnose_import_from_those_above() -> None:
