@@ -45,6 +45,7 @@ PYBIND11_MODULE(_core, m) {
     py::register_local_exception_translator(&raise_public);
     register_interrupts(m);
     register_model(m);
+    register_written(m);
     register_simulate(m);
     register_identify(m);
     register_lab_observer(m);

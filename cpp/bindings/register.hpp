@@ -21,6 +21,7 @@ std::vector<Reference> references_of(const Array& array);
 
 void register_interrupts(pybind11::module_& m);
 void register_model(pybind11::module_& m);
+void register_written(pybind11::module_& m);
 void register_simulate(pybind11::module_& m);
 void register_identify(pybind11::module_& m);
 void register_lab_observer(pybind11::module_& m);

@@ -72,6 +72,8 @@ def main_job(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
     yield "signal_sensitivities", (known.signal_sensitivities, signals)
     motion = {"parameters": p, "motion": rows(3, 20.0)[0], "steer": 0.01, "longitudinal": 100.0}
     yield "evaluate", (model.core().evaluate, motion)
+    written = {"model": model.add("steer_lag").core(), "parameters": p, "v_x": 20.0}
+    yield "write_model", (_core.write_model, written)
     user = [(0, [], [(0, [(0, (0, 0, 0), 1.0)])], [])]
     yield (
         "SingleTrack",

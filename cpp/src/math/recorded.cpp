@@ -7,7 +7,6 @@
 
 #include "sysid/math/lag_weights.hpp"
 #include "sysid/math/recorder.hpp"
-#include "sysid/math/whole.hpp"
 
 namespace sysid {
 
@@ -96,12 +95,14 @@ struct RecordedAccess {
         n.op = op;
         n.a = to->node_of(a);
         n.b = to->node_of(b);
-        if ((op == Op::kAdd || op == Op::kMultiply) && n.a > n.b) std::swap(n.a, n.b);
+        const bool either = !to->spells_ && (op == Op::kAdd || op == Op::kMultiply);
+        if (either && n.a > n.b) std::swap(n.a, n.b);
         return to->noted(n);
     }
     static Recorded choice(const Recorded& x, double limit, const Recorded& below,
                            const Recorded& otherwise) {
-        if (same_for_all(x)) return x.v_ < limit ? below : otherwise;
+        if (x.to_ == nullptr || (same_for_all(x) && !x.to_->spells_))
+            return x.v_ < limit ? below : otherwise;
         Recorder::Node n;
         n.op = Op::kIfBelow;
         n.a = x.node_;
@@ -109,6 +110,20 @@ struct RecordedAccess {
         n.c = x.to_->node_of(otherwise);
         n.constant = limit;
         return n.b == n.c ? below : x.to_->noted(n);
+    }
+    static void name(const char* name, const Recorded& x) {
+        if (x.to_ == nullptr || !x.to_->spells_) return;
+        auto& names = x.to_->names_;
+        const auto of = [&](const auto& known) { return known.first == x.node_; };
+        const Op op = x.to_->nodes_[static_cast<std::size_t>(x.node_)].op;
+        if (op != Op::kInput && !std::ranges::any_of(names, of)) names.emplace_back(x.node_, name);
+    }
+    static void part(const char* title, const Recorded& x) {
+        if (x.to_ != nullptr && x.to_->spells_)
+            x.to_->parts_.emplace_back(static_cast<int>(x.to_->nodes_.size()), title);
+    }
+    static bool spells(const Recorded& a, const Recorded& b) {
+        return (a.to_ != nullptr && a.to_->spells_) || (b.to_ != nullptr && b.to_->spells_);
     }
     static bool same_for_all(const Recorded& x) {
         return x.to_ == nullptr || x.to_->nodes_[static_cast<std::size_t>(x.node_)].uniform;
@@ -121,11 +136,17 @@ Recorded operator+(const Recorded& a, const Recorded& b) {
     if (a.to_ != nullptr && b.to_ != nullptr) return RecordedAccess::two(Op::kAdd, a, b);
     const Recorded& varying = a.to_ != nullptr ? a : b;
     const Recorded& constant = a.to_ != nullptr ? b : a;
-    return constant.v_ == 0.0 ? varying : RecordedAccess::one(Op::kPlus, varying, constant.v_);
+    if (constant.v_ == 0.0) return varying;
+    return RecordedAccess::spells(a, b) ? RecordedAccess::two(Op::kAdd, a, b)
+                                        : RecordedAccess::one(Op::kPlus, varying, constant.v_);
 }
 
 Recorded operator-(const Recorded& a, const Recorded& b) {
     if (a.to_ != nullptr && b.to_ != nullptr) return RecordedAccess::two(Op::kSubtract, a, b);
+    if (RecordedAccess::spells(a, b)) {
+        if (a.to_ == nullptr && a.v_ == 0.0) return -b;
+        return b.to_ == nullptr && b.v_ == 0.0 ? a : RecordedAccess::two(Op::kSubtract, a, b);
+    }
     if (b.to_ == nullptr) return a + Recorded(-b.v_);
     return RecordedAccess::one(Op::kTakenFrom, b, a.v_);
 }
@@ -135,13 +156,19 @@ Recorded operator*(const Recorded& a, const Recorded& b) {
     const Recorded& varying = a.to_ != nullptr ? a : b;
     const double constant = a.to_ != nullptr ? b.v_ : a.v_;
     if (constant == 0.0) return 0.0;
-    return constant == 1.0 ? varying : RecordedAccess::one(Op::kTimes, varying, constant);
+    if (constant == 1.0) return varying;
+    return RecordedAccess::spells(a, b) ? RecordedAccess::two(Op::kMultiply, a, b)
+                                        : RecordedAccess::one(Op::kTimes, varying, constant);
 }
 
 Recorded operator/(const Recorded& a, const Recorded& b) {
     if (a.to_ != nullptr && b.to_ != nullptr) return RecordedAccess::two(Op::kDivide, a, b);
-    if (b.to_ == nullptr) return a.to_ == nullptr ? Recorded(a.v_ / b.v_) : a * (1.0 / b.v_);
-    return a.v_ == 0.0 ? Recorded(0.0) : RecordedAccess::one(Op::kUnder, b, a.v_);
+    if (a.to_ == nullptr && b.to_ == nullptr) return a.v_ / b.v_;
+    if (a.to_ == nullptr && a.v_ == 0.0) return 0.0;
+    if (RecordedAccess::spells(a, b))
+        return b.to_ == nullptr && b.v_ == 1.0 ? a : RecordedAccess::two(Op::kDivide, a, b);
+    if (b.to_ == nullptr) return a * (1.0 / b.v_);
+    return RecordedAccess::one(Op::kUnder, b, a.v_);
 }
 
 // Sine and cosine are worked out together: each is the other's slope.
@@ -185,6 +212,14 @@ double value_of(const Recorded& x) {
     return x.v_;
 }
 
+bool spells(const Recorded& x) { return RecordedAccess::spells(x, x); }
+void name_step(const char* name, const Recorded& x) { RecordedAccess::name(name, x); }
+void begin_part(const char* title, const Recorded& x) { RecordedAccess::part(title, x); }
+
+void Recorder::stand_for(double constant, const Recorded& input) {
+    stands_for_[std::bit_cast<std::uint64_t>(constant)] = input.node_;
+}
+
 Recorded Recorder::input(bool active) {
     Node n;
     n.active = active;
@@ -205,6 +240,8 @@ Recorded Recorder::parameter(double value, bool active) {
 
 int Recorder::node_of(const Recorded& x) {
     if (x.to_ != nullptr) return x.node_;
+    const auto stands = stands_for_.find(std::bit_cast<std::uint64_t>(x.v_));
+    if (stands != stands_for_.end()) return stands->second;
     Node n;
     n.op = Op::kUniform;
     n.constant = x.v_;
@@ -220,7 +257,7 @@ Recorded Recorder::noted(const Node& node) {
         if (const Node& old = nodes_[static_cast<std::size_t>(it->second)]; old.same(node))
             return {old.value, it->second, this};
     Node n = node;
-    n.uniform = n.op != Op::kIfBelow;
+    n.uniform = n.op != Op::kIfBelow || spells_;
     n.value = std::numeric_limits<double>::quiet_NaN();
     const auto at = [&](int i) -> const Node& { return nodes_[static_cast<std::size_t>(i)]; };
     for (const int operand : {n.a, n.b, n.c}) {
@@ -230,6 +267,8 @@ Recorded Recorder::noted(const Node& node) {
     }
     if (n.op == Op::kUniform) {
         n.value = n.constant;
+    } else if (n.uniform && n.op == Op::kIfBelow) {
+        n.value = at(at(n.a).value < n.constant ? n.b : n.c).value;
     } else if (n.uniform) {
         const Evaluated k =
             evaluated(n.op, at(n.a).value, n.b < 0 ? 0.0 : at(n.b).value, n.constant);
@@ -241,127 +280,6 @@ Recorded Recorder::noted(const Node& node) {
     const int place = static_cast<int>(nodes_.size()) - 1;
     known_.emplace(key, place);
     return {n.value, place, this};
-}
-
-int Recorder::partner_of(int node) const {
-    const Node& n = nodes_[index(node)];
-    if (n.uniform) return -1;
-    if (n.op == Op::kSin) return node + 1;
-    return n.op == Op::kCos ? node - 1 : -1;
-}
-
-Program Recorder::program(const std::vector<Recorded>& outputs) const {
-    std::vector<bool> needed(nodes_.size(), false), kept(nodes_.size(), false);
-    for (const Recorded& x : outputs)
-        if (x.to_ != nullptr) needed[index(x.node_)] = kept[index(x.node_)] = true;
-    for (std::size_t i = nodes_.size(); i-- > 0;) {
-        if (!needed[i]) continue;
-        if (const int partner = partner_of(static_cast<int>(i)); partner >= 0)
-            needed[index(partner)] = kept[index(partner)] = true;
-        for (const int operand : {nodes_[i].a, nodes_[i].b, nodes_[i].c}) {
-            if (operand < 0) continue;
-            needed[index(operand)] = true;
-            if (!nodes_[i].uniform) kept[index(operand)] = true;
-        }
-    }
-    Program out;
-    std::vector<int> rows(nodes_.size() + 1, -1);
-    for (std::size_t i = 0; i < nodes_.size(); ++i) {
-        const Node& n = nodes_[i];
-        if (!needed[i] || (n.uniform && !kept[i])) continue;
-        rows[i] = out.rows++;
-        if (n.uniform) out.uniform.emplace_back(rows[i], n.value);
-    }
-    for (std::size_t i = 0; i < nodes_.size(); ++i) {
-        const Node& n = nodes_[i];
-        if (rows[i] < 0 || n.uniform || n.op == Op::kInput || n.op == Op::kCos) continue;
-        ForwardStep step;
-        step.op = n.op;
-        step.to = rows[i];
-        step.constant = n.constant;
-        if (n.a >= 0) step.a = rows[index(n.a)];
-        if (n.b >= 0) step.b = rows[index(n.b)];
-        if (n.c >= 0) step.c = rows[index(n.c)];
-        if (n.op == Op::kSin) step.b = rows[index(partner_of(static_cast<int>(i)))];
-        out.steps.push_back(step);
-    }
-    for (const int i : inputs_) out.inputs.push_back(rows[index(i)]);
-    std::vector<int> nodes, group;
-    for (std::size_t o = 0; o < outputs.size(); ++o) {
-        const Recorded& x = outputs[o];
-        int same_as = -1;
-        if (x.to_ == nullptr) {
-            out.outputs.push_back(out.rows++);
-            out.uniform.emplace_back(out.outputs.back(), x.v_);
-        } else {
-            out.outputs.push_back(rows[index(x.node_)]);
-            for (std::size_t i = 0; i < inputs_.size(); ++i)
-                if (inputs_[i] == x.node_ && nodes_[index(x.node_)].active)
-                    same_as = static_cast<int>(i);
-        }
-        out.same_as.push_back(same_as);
-        nodes.push_back(x.node_);
-        if (x.to_ != nullptr && same_as < 0 && nodes_[index(x.node_)].active)
-            group.push_back(static_cast<int>(o));
-    }
-    for (std::size_t first = 0; first < group.size(); first += kSweep) {
-        const std::size_t last = std::min(group.size(), first + kSweep);
-        add_sweep(nodes,
-                  {group.begin() + static_cast<std::ptrdiff_t>(first),
-                   group.begin() + static_cast<std::ptrdiff_t>(last)},
-                  rows, out);
-    }
-    return out;
-}
-
-void Recorder::add_sweep(const std::vector<int>& nodes, const std::vector<int>& outputs,
-                         const std::vector<int>& rows, Program& out) const {
-    Sweep sweep;
-    sweep.outputs = outputs;
-    std::vector<int> slots(nodes_.size(), -1), unused;
-    const auto slot_for = [&](int node) {
-        int& slot = slots[index(node)];
-        if (slot >= 0) return false;
-        if (unused.empty()) {
-            slot = sweep.slots++;
-        } else {
-            slot = unused.back();
-            unused.pop_back();
-        }
-        return true;
-    };
-    for (const int o : outputs) {
-        slot_for(nodes[index(o)]);
-        sweep.seeds.push_back(slots[index(nodes[index(o)])]);
-    }
-    for (std::size_t i = nodes_.size(); i-- > 0;) {
-        const Node& n = nodes_[i];
-        if (slots[i] < 0 || n.op == Op::kInput) continue;
-        BackwardStep step;
-        step.op = n.uniform ? Op::kUniform : n.op;
-        step.slot = slots[i];
-        step.to = rows[i];
-        step.constant = n.constant;
-        step.slope_a = n.slope_a;
-        step.slope_b = n.slope_b;
-        if (n.a >= 0) step.a = rows[index(n.a)];
-        if (n.b >= 0) step.b = rows[index(n.b)];
-        if (const int partner = partner_of(static_cast<int>(i)); partner >= 0)
-            step.b = rows[index(partner)];
-        const auto operand = [&](int node, std::int32_t& slot, bool& first) {
-            if (node < 0 || !nodes_[index(node)].active) return;
-            first = slot_for(node);
-            slot = slots[index(node)];
-        };
-        if (n.op != Op::kIfBelow) operand(n.a, step.slot_a, step.first_a);
-        operand(n.b, step.slot_b, step.first_b);
-        operand(n.c, step.slot_c, step.first_c);
-        sweep.steps.push_back(step);
-        unused.push_back(slots[i]);
-    }
-    for (const int i : inputs_) sweep.inputs.push_back(slots[index(i)]);
-    out.slots = std::max(out.slots, sweep.slots);
-    out.sweeps.push_back(std::move(sweep));
 }
 
 }  // namespace sysid

@@ -22,7 +22,7 @@ from .._core import __version__
 from ..errors import InvalidInput, warn
 from ..model import Model
 from .equations import Equations, equations
-from .languages import cpp_assignments, title
+from .languages import cpp_assignments, title, using
 
 _NAME = "identified_car"
 _INTERFACE = Path(__file__).with_name("fmi3.cpp.in")
@@ -40,8 +40,9 @@ _UNITS = {
     "m/s": 'm="1" s="-1"',
     "m/s2": 'm="1" s="-2"',
     "N": 'kg="1" m="1" s="-2"',
+    "kN": 'kg="1" m="1" s="-2" factor="1000"',
+    "kW": 'kg="1" m="2" s="-3" factor="1000"',
 }
-_START_SPEED = 20.0  # m/s
 _LONGEST_BUILD_S = 120.0
 
 
@@ -80,14 +81,14 @@ def fmu_bytes(model: Model) -> bytes:
 
 
 def _source(model: Model, e: Equations) -> str:
-    states, count = [name for name, _ in e.states], len(e.states)
+    states, count = [state.name for state in e.states], len(e.states)
     about = "\n".join(f"// {line}" for line in title(model, e)).replace("\\", "")
     read = [f"const double {n} = car.p[{k}];" for k, (n, _, _) in enumerate(e.constants)]
     read += [f"const double {name} = x[{k}];" for k, name in enumerate(states)]
     write = [f"rate[{k}] = {name}_rate;" for k, name in enumerate(states)]
     write += ["felt[0] = a_x;", "felt[1] = a_y;", "felt[2] = atan2(v_y, v_x);"]
     body = "\n".join(f"    {line}" for line in (*read, *cpp_assignments(e), *write))
-    starts = ", ".join(repr(value) for value in _starts(e))
+    starts = ", ".join(repr(state.start) for state in e.states)
     parameters = ",\n    ".join(f"{value!r} /* {name} */" for name, value, _ in e.constants)
     held = {
         "about": about,
@@ -96,6 +97,7 @@ def _source(model: Model, e: Equations) -> str:
         "parameters": len(e.constants),
         "outputs": len(_OUTPUTS),
         "starts": starts,
+        "using": using(e, "atan2"),
         "values": parameters,
         "body": body,
         "first_input": _FIRST_INPUT,
@@ -108,10 +110,6 @@ def _source(model: Model, e: Equations) -> str:
     for name, value in held.items():
         text = text.replace(f"@{name}@", str(value))
     return text
-
-
-def _starts(e: Equations) -> list[float]:
-    return [_START_SPEED, *[0.0] * (len(e.states) - 1)]
 
 
 def _token(text: str) -> str:
@@ -128,14 +126,16 @@ def _description(model: Model, e: Equations, source: str) -> str:
     for k, (name, unit, what) in enumerate(_OUTPUTS):
         given = f'unit="{unit}"'
         variables.append(_variable(name, _FIRST_OUTPUT + k, "output", "continuous", given, what))
-    for k, ((name, unit), start) in enumerate(zip(e.states, _starts(e), strict=True)):
-        given = f'unit="{unit}" initial="exact" start="{start!r}"'
-        variables.append(_variable(name, _FIRST_STATE + k, "output", "continuous", given, "state"))
-    for k, (name, _) in enumerate(e.states):
-        given = f'derivative="{_FIRST_STATE + k}"'
-        what = f"rate of {name}"
+    for k, s in enumerate(e.states):
+        given = f'unit={quoteattr(s.unit)} initial="exact" start="{s.start!r}"'
         variables.append(
-            _variable(f"der({name})", _FIRST_RATE + k, "local", "continuous", given, what)
+            _variable(s.name, _FIRST_STATE + k, "output", "continuous", given, "state")
+        )
+    for k, s in enumerate(e.states):
+        given = f'derivative="{_FIRST_STATE + k}"'
+        what = f"rate of {s.name}"
+        variables.append(
+            _variable(f"der({s.name})", _FIRST_RATE + k, "local", "continuous", given, what)
         )
     for k, (name, value, what) in enumerate(e.constants):
         given = f'initial="exact" start="{value!r}"'
@@ -143,6 +143,8 @@ def _description(model: Model, e: Equations, source: str) -> str:
     units = "\n".join(
         f'    <Unit name="{name}"><BaseUnit {base}/></Unit>' for name, base in _UNITS.items()
     )
+    foreign = {s.unit: None for s in e.states if s.unit not in _UNITS}
+    units += "".join(f"\n    <Unit name={quoteattr(unit)}/>" for unit in foreign)
     outputs = [_FIRST_OUTPUT + k for k in range(len(_OUTPUTS))]
     states = [_FIRST_STATE + k for k in range(len(e.states))]
     rates = [_FIRST_RATE + k for k in range(len(e.states))]

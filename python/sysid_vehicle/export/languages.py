@@ -8,6 +8,7 @@ from .._common.arguments import expect
 from .._core import __version__
 from ..errors import InvalidInput
 from ..model import Model
+from .calculation import FUNCTIONS
 from .equations import Equations, equations
 
 _ABOUT = (
@@ -25,7 +26,7 @@ def title(model: Model, e: Equations) -> list[str]:
         f"{name}: single track with Magic Formula tyres, {what}.",
         f"Written by sysid_vehicle {__version__}.",
         *_ABOUT,
-        f"State: {', '.join(f'{state} [{unit}]' for state, unit in e.states)}.",
+        f"State: {', '.join(f'{state.name} [{state.unit}]' for state in e.states)}.",
     ]
     if e.left_out:
         lines.append(f"Left out, because only sensors show it: {', '.join(e.left_out)}.")
@@ -40,25 +41,25 @@ def python_text(model: Model) -> str:
     be arrays of many cars.
     """
     e = equations(model)
-    names = [name for name, _ in e.states]
+    names = [state.name for state in e.states]
     about = "\n".join(title(model, e)).replace("\\", "").replace('"""', "'''")
     constants = "\n".join(f"{name} = {value!r}  # {told}" for name, value, told in e.constants)
-    body = "\n".join(f"    {line}" for line in e.lines)
+    body = "\n".join(f"    {line}" for what, lines in e.sections for line in (f"# {what}", *lines))
+    rates = _listed([f"{name}_rate" for name in names])
     return f'''"""{about}
 """
 
-from numpy import arctan as atan
-from numpy import arctan2 as atan2
-from numpy import array, cos, fabs, fmax, fmin, sin, sqrt, where
+{_imports(e)}
 
 {constants}
 
 
 def derivatives(state, steer, force):
     """Rates of the state, and what accelerometers feel at the centre of gravity: a_x, a_y."""
-    {", ".join(names)} = state
+    {_listed(names)} = state
 {body}
-    return array([{", ".join(f"{name}_rate" for name in names)}]), a_x, a_y
+    rates = {rates}
+    return array({"rates" if e.even else "broadcast_arrays(*rates)"}), a_x, a_y
 
 
 def step(state, before, after, dt, substeps=4):
@@ -79,20 +80,43 @@ def step(state, before, after, dt, substeps=4):
 '''
 
 
+def _imports(e: Equations) -> str:
+    used = e.functions | {"array"} | (set() if e.even else {"broadcast_arrays"})
+    other = {"atan": "arctan", "atan2": "arctan2"}
+    lines = [f"from numpy import {other[name]} as {name}" for name in sorted(used & set(other))]
+    return "\n".join([*lines, f"from numpy import {', '.join(sorted(used - set(other)))}"])
+
+
+def _listed(names: list[str]) -> str:
+    """Names between commas, each on a line of its own where one line is too short."""
+    line = ", ".join(names)
+    if len(line) < 80:
+        return line
+    return "(\n" + "".join(f"        {name},\n" for name in names) + "    )"
+
+
 def cpp_assignments(e: Equations) -> list[str]:
     """Statements of C++ in the order of the equations; each name is declared where it is new."""
     statements, known = [], set()
-    for line in e.lines:
-        name, _, expression = line.partition(" = ")
-        statements.append(f"{'' if name in known else 'double '}{name} = {expression};")
-        known.add(name)
+    for what, lines in e.sections:
+        statements.append(f"// {what}")
+        for line in lines:
+            name, _, expression = line.partition(" = ")
+            statements.append(f"{'' if name in known else 'double '}{name} = {expression};")
+            known.add(name)
     return statements
+
+
+def using(e: Equations, *more: str) -> str:
+    """Declarations of the functions that the equations call, and of some more."""
+    called = sorted({*e.functions, *more} - {"where"})
+    return "\n".join(f"    using std::{name};" for name in called)
 
 
 def cpp_text(model: Model) -> str:
     """Return a header of C++11 that needs the standard library alone."""
     e = equations(model)
-    names = [name for name, _ in e.states]
+    names = [state.name for state in e.states]
     about = "\n".join(f"// {line}" for line in title(model, e)).replace("\\", "")
     constants = "\n".join(
         f"constexpr double {name} = {value!r};  // {told}" for name, value, told in e.constants
@@ -117,14 +141,7 @@ inline double where(bool condition, double yes, double no) {{ return condition ?
 
 /// Rates of the state; felt[0] and felt[1], if given, become a_x and a_y of the centre of gravity.
 inline State derivatives(const State& state, double steer, double force, double* felt = nullptr) {{
-    using std::atan;
-    using std::atan2;
-    using std::cos;
-    using std::fabs;
-    using std::fmax;
-    using std::fmin;
-    using std::sin;
-    using std::sqrt;
+{using(e)}
 {read}
 {text}
     State rate;
@@ -186,11 +203,10 @@ def casadi_function(model: Model) -> Any:
             "CasADi is not installed; pip install 'sysid-vehicle[casadi]'"
         ) from error
     e = equations(model)
-    names = [name for name, _ in e.states]
+    names = [state.name for state in e.states]
     state, given = casadi.SX.sym("state", len(names)), casadi.SX.sym("input", 2)
     known: dict[str, Any] = {
-        **{f: getattr(casadi, f) for f in ("atan", "atan2", "cos", "fabs", "fmax", "fmin")},
-        **{f: getattr(casadi, f) for f in ("sin", "sqrt")},
+        **{f: getattr(casadi, f) for f in FUNCTIONS},
         "where": casadi.if_else,
         **{name: value for name, value, _ in e.constants},
         **{name: state[k] for k, name in enumerate(names)},

@@ -13,7 +13,7 @@ import pytest
 import sysid_vehicle as sv
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.export import cpp_text, fmu_bytes, identified_vehicle, python_text, tir_text
-from sysid_vehicle.export.equations import _ACTS
+from sysid_vehicle.export.equations import equations
 from sysid_vehicle.simulate import drive_truth
 from sysid_vehicle.twin import FMUTwin, FMUVariables
 
@@ -22,7 +22,11 @@ SENSORS = {
     *("imu_lever_arm", "ins_lever_arm", "sensor_delay", "speed_sensor_lever_arm"),
     "speed_sensor_misalignment",
 }
-ALL = tuple(e for e in _ACTS if e not in SENSORS)
+NOT_TOLD = {"friction_change", "steer_delay"}  # what they need: the time, the rate of the steering
+CATALOGUE = tuple(e.id for e in sv.catalogue() if not e.acts)
+ALL = tuple(e for e in CATALOGUE if e not in SENSORS | NOT_TOLD)
+# Its states feed back on what they follow: `settled` does not find where they rest.
+SETTLING = tuple(e for e in ALL if e != "tyre_temperature")
 
 
 def typical(model: sv.Model, *effects: str) -> sv.Model:
@@ -42,7 +46,9 @@ def compiled(model: sv.Model, motion: np.ndarray, steer: float, force: float) ->
     return model.core().evaluate(model.vector(), motion, steer, force).ravel()
 
 
-@pytest.mark.parametrize("effects", [(), *((e,) for e in ALL), ALL], ids=lambda e: "+".join(e)[:30])
+@pytest.mark.parametrize(
+    "effects", [(), *((e,) for e in SETTLING), SETTLING], ids=lambda e: "+".join(e)[:30]
+)
 def test_rates_are_those_of_the_compiled_model(
     truth: sv.Model, effects: tuple[str, ...], rng: np.random.Generator
 ) -> None:
@@ -76,6 +82,22 @@ def settled(
             )
         x = x - zero / np.where(slope == 0.0, 1.0, slope) if lags else x
     return x
+
+
+def test_heat_of_the_tyres_over_seconds_of_a_lap(truth: sv.Model) -> None:
+    """With lags, from where they settle at the start; its states stand in no record of a drive."""
+    model = typical(truth, "tyre_temperature", "steer_lag", "force_lag", "tyre_relaxation")
+    calm = sv.RoadDisturbance(0.0, 0.0, 0.0)
+    driven = drive_truth(model, sv.manoeuvres.lap(60.0), seed=1, disturbance=calm)
+    exported = module_of(model)
+    names = [s.name for s in equations(model).states]
+    state = np.concatenate((driven.states[0, :3], np.zeros(len(names) - 3)))
+    # The wheel force at the start is held as long as it lags.
+    state[names.index("lagging_force")] = 1e-3 * driven.inputs[0, 1]
+    for k in range(1000):
+        state = exported["step"](state, driven.inputs[k], driven.inputs[k + 1], 0.01, substeps=2)
+        np.testing.assert_allclose(state[:3], driven.states[k + 1, :3], rtol=0.0, atol=1e-4)
+    assert state[names.index("sliding_front")] > 0.5  # kW: two percent of the grip
 
 
 @pytest.fixture(scope="module")
@@ -306,11 +328,41 @@ def test_a_vehicle_file(tmp_path: Path, fit: sv.Fit, truth: sv.Model) -> None:
 
 
 def test_what_cannot_be_exported(tmp_path: Path, truth: sv.Model) -> None:
-    for effect in {e.id for e in sv.catalogue()} - set(_ACTS):
+    for effect in sorted(NOT_TOLD):
         with pytest.raises(InvalidInput, match=rf"{effect}: cannot be exported; drop it first"):
             python_text(truth.add(effect))
     with pytest.raises(InvalidInput, match=r"nothing is exported as '\.docx'; end the name in"):
         sv.export(truth, tmp_path / "car.docx")
+
+
+def test_what_only_sensors_show_is_left_out(truth: sv.Model) -> None:
+    found = equations(typical(truth, *sorted(SENSORS)))
+    assert sorted(found.left_out) == sorted(SENSORS)
+    assert found.sections == equations(truth).sections
+    assert found.constants == equations(truth).constants
+
+
+def test_a_lag_of_no_length_is_not_what_sensors_show(truth: sv.Model) -> None:
+    model = truth.add("steer_lag", "gyro_scale").with_values({"steer_lag.time_constant_s": 0.0})
+    found = equations(model)
+    assert found.left_out == ("gyro_scale",)
+    assert [s.name for s in found.states] == ["v_x", "v_y", "r"]
+    assert not [name for name, _, _ in found.constants if name.startswith("steer_lag")]
+
+
+def test_the_text_reads_like_the_equations(truth: sv.Model) -> None:
+    text = python_text(typical(truth, *ALL))
+    assert max(len(line) for line in text.partition("def derivatives")[2].splitlines()) <= 100
+    for line in (
+        "# slip angles",
+        "delta = delta * (1.0 + steer_ratio_ratio_error)",
+        "alpha_f = delta - atan2(v_y + l_f * r, v_x)",
+        "lag_rate = fmin(1.0 / steer_lag_time_constant_s, 4000.0)",
+        "steer_lag_rate = lag_rate * (delta - steer_lag)",
+        "grip_r = grip_r * (1.0 - lateral_load_transfer_loss_rear * term_",
+    ):
+        assert f"\n    {line}" in text
+    assert "accelerometer" not in text.partition("def derivatives")[2].partition('"""\n')[2]
 
 
 def test_a_name_of_several_lines_stays_a_comment(car: sv.Vehicle) -> None:

@@ -172,7 +172,7 @@ def imports_inside(folder: Path, path: Path, text: str) -> set[str]:
     """What a file takes from its folder: modules of it, and folders of their own there."""
     package = ("sysid_vehicle", *path.relative_to(PACKAGE).parts[:-1])
     root = ("sysid_vehicle", *folder.relative_to(PACKAGE).parts)
-    found = set()
+    found: set[str] = set()
     for node in ast.walk(ast.parse(text)):
         if not isinstance(node, ast.ImportFrom) or not node.level:
             continue

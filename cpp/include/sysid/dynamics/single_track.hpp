@@ -48,8 +48,10 @@ struct LoadsSince {
 };
 
 /// A car with its effects; the parameters' values stay outside, so that they can carry derivatives.
-struct SingleTrack {
-    VehicleData car;
+/// `V`: numbers, or what stands for the car's data where the model itself is written down.
+template <class V>
+struct SingleTrackOf {
+    VehicleDataOf<V> car;
     EffectMask effects = 0;
     bool force_known = true;     // false: `Input::longitudinal` is the measured acceleration
     UserEffects user = nullptr;  // those that act; `effects` has no bits of theirs
@@ -116,32 +118,62 @@ struct SingleTrack {
         begin(w, motion, u, p);
         w.user_states = lags.states() + kCatalogueStates;
         const T* q = p + kBaseParameterCount;
-        const auto each = [&](auto&& visit) { for_each_active(effects, q, visit); };
         using At = std::size_t;
+        const auto each = [&](auto&& visit) {
+            if constexpr (!std::is_same_v<S, Recorded>)
+                for_each_active(effects, q, visit);
+            else  // its names follow what each effect does
+                for_each_active(effects, q, [&](auto e, const T* own, At at) {
+                    using Acts = decltype(visit(e, own, at));
+                    if constexpr (std::is_same_v<Acts, Inactive>) {
+                        return Inactive{};
+                    } else {
+                        visit(e, own, at);
+                        name_workings(w);
+                    }
+                });
+        };
+        const auto part = [&](const char* title) {
+            if constexpr (std::is_same_v<S, Recorded>) {
+                name_workings(w);
+                begin_part(title, w.v_x);
+            }
+        };
+        part("car");
         each([&](auto e, const T* own, At) { return e.vehicle(own, w); });
+        part("wheel force");
         // Backwards: what the sensors did last to the acceleration is undone first.
         for_each_active_backwards(effects, q,
                                   [&](auto e, const T* own, At) { return e.input(own, w); });
         each([&](auto e, const T* own, At at) { return e.drive(own, w, lags.from(at)); });
+        part("steering");
         each([&](auto e, const T* own, At at) { return e.steering(own, w, lags.from(at)); });
+        part("forces from outside");
         settle_outside_forces<T>(w, external);
         each([&](auto e, const T* own, At) { return e.body(own, w); });
         user_body(user, q, w);
+        part("slip angles");
         const Axles<S> alpha =
             slip_angles(w.v_x, w.v_y, w.r, plain<T>(w.l_f), plain<T>(w.l_r), w.delta);
         w.alpha_f = alpha.front;
         w.alpha_r = alpha.rear;
         each([&](auto e, const T* own, At at) { return e.slip(own, w, lags.from(at)); });
-        const S mu_f = magic_formula(w.alpha_f, front_tyre(p));
-        const S mu_r = magic_formula(w.alpha_r, rear_tyre(p));
+        part("tyres: lateral force of a unit of load");
+        const S mu_f = named("mu_f", magic_formula(w.alpha_f, front_tyre(p)));
+        const S mu_r = named("mu_r", magic_formula(w.alpha_r, rear_tyre(p)));
+        part("axle loads");
         const Axles<S> known = axle_loads<T>(w, mu_f, u, since);
         each([&](auto e, const T* own, At) { return e.loads(own, w); });
+        part("lateral forces of the axles");
         each([&](auto e, const T* own, At at) { return e.grip(own, w, lags.from(at).states()); });
         w.fy_f = (loads_known ? known.front : w.fz_f) * mu_f * w.grip_f;
         w.fy_r = (loads_known ? known.rear : w.fz_r) * mu_r * w.grip_r;
+        part("forces of the car");
         each([&](auto e, const T* own, At) { return e.forces(own, w); });
         user_forces(user, q, w);
+        part("motion");
         balance<T>(w);
+        part("rates of the states");
         each([&](auto e, const T* own, At at) { return e.follow(own, w, lags.from(at)); });
         user_states(user, q, w, lags.from(kCatalogueStates));
     }
@@ -199,7 +231,7 @@ struct SingleTrack {
         w.fz0_r = S(rest.rear);
         const S c = w.cos_delta = cos(w.delta);
         const S s = w.sin_delta = sin(w.delta);
-        const auto lever = plain<T>(w.h) / (l_f + l_r);
+        const auto lever = named("lever", plain<T>(w.h) / (l_f + l_r));
         Axles<S> told{S(u.loads_n.front), S(u.loads_n.rear)};
         if (since.on) {
             const S& squared = since.speed_squared;
@@ -210,7 +242,7 @@ struct SingleTrack {
         S pull;  // m a_x
         if (force_known) {
             split_force(w);
-            const S known = w.fx_f * c + w.fx_r + w.force_x;
+            const S known = named("known_pull", w.fx_f * c + w.fx_r + w.force_x);
             S front;
             if (since.on)
                 front = (told.front - lever * (known - since.pull)) / (1.0 - lever * (mu_f * s));
@@ -218,7 +250,7 @@ struct SingleTrack {
                 front = told.front;
             else
                 front = (w.fz0_f - lever * known) / (1.0 - lever * (mu_f * s));
-            pull = known - front * (mu_f * s);
+            pull = named("pull", known - named("fz_f_at_first", front) * (mu_f * s));
         } else {
             pull = m * w.ax_input;
             const S front = loads_known ? told.front : w.fz0_f - lever * pull;
@@ -238,7 +270,7 @@ struct SingleTrack {
 
     template <class S>
     static S front_share(const Workings<S>& w, const S& force) {
-        return if_below(force, 0.0, w.brake_front, w.drive_front);
+        return named("front_share", if_below(force, 0.0, w.brake_front, w.drive_front));
     }
 
     template <class S>
@@ -252,7 +284,7 @@ struct SingleTrack {
     void balance(Workings<S>& w) const {
         const S &c = w.cos_delta, &s = w.sin_delta;
         const auto m = plain<T>(w.m);
-        const S front_lateral = w.fy_f * c + w.fx_f * s;
+        const S front_lateral = named("lateral_f", w.fy_f * c + w.fx_f * s);
         w.a_x = force_known ? (w.fx_f * c - w.fy_f * s + w.fx_r + w.force_x) / m : w.ax_input;
         w.a_y = (front_lateral + w.fy_r + w.force_y) / m;
         w.r_dot = (plain<T>(w.l_f) * front_lateral - plain<T>(w.l_r) * w.fy_r + w.moment_z) /
@@ -260,12 +292,15 @@ struct SingleTrack {
     }
 };
 
+using SingleTrack = SingleTrackOf<double>;
+
 // Not inside the class: there they would be inline, and compiled by every user of the model.
 
+template <class V>
 template <class S, class T>
-Workings<S> SingleTrack::evaluate(const S* motion, const S* external, const Lags<S>& lags,
-                                  const InputFor<S>& u, const T* p, S* rate,
-                                  const LoadsSince<S>& since) const {
+Workings<S> SingleTrackOf<V>::evaluate(const S* motion, const S* external, const Lags<S>& lags,
+                                       const InputFor<S>& u, const T* p, S* rate,
+                                       const LoadsSince<S>& since) const {
     // An accelerometer beside the centre of gravity makes the measured a_x, which stands for
     // the force, depend on the yaw acceleration it brings about. Each pass shrinks the error
     // by l_y dr/dt per a_x, a few hundredths.
@@ -279,8 +314,9 @@ Workings<S> SingleTrack::evaluate(const S* motion, const S* external, const Lags
     return w;
 }
 
+template <class V>
 template <class S, class T>
-void SingleTrack::sense(const Workings<S>& w, const T* p, const S* aux, S* y) const {
+void SingleTrackOf<V>::sense(const Workings<S>& w, const T* p, const S* aux, S* y) const {
     y[kVx] = w.v_x;
     y[kVy] = w.v_y;
     y[kYawRate] = w.r;

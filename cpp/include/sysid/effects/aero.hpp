@@ -32,7 +32,7 @@ struct AeroDownforce : Effect {
 
     template <class T, class S>
     static void loads(const T* p, Workings<S>& w) {
-        const S dynamic_pressure = 0.5 * w.rho * w.v_x * w.v_x;
+        const S dynamic_pressure = named("dynamic_pressure", 0.5 * w.rho * w.v_x * w.v_x);
         w.fz_f += p[0] * dynamic_pressure;
         w.fz_r += p[1] * dynamic_pressure;
     }

@@ -81,7 +81,7 @@ namespace detail {
 template <std::size_t... I>
 constexpr std::array<std::size_t, kEffectCount> collect_state_counts(
     std::index_sequence<I...> /*unused*/) {
-    return {std::tuple_element_t<I, Catalogue>::state_count...};
+    return {std::tuple_element_t<I, Catalogue>::info.state_count()...};
 }
 constexpr auto kEffectStateCounts = collect_state_counts(std::make_index_sequence<kEffectCount>{});
 

@@ -57,10 +57,10 @@ struct ForceLag : Effect {
                         .matters = 0.03,
                         .bounds = {0.0, 2.0},
                         .usual = {0.05, 0.5}}},
+        .states = {{"lagging_force", "kN"}},
         .scored_at_typical = true,
         .needs_force = true,
     };
-    static constexpr std::size_t state_count = 1;
     static constexpr double state_spread = 0.2;  // [kN]
 
     template <class T, class S>
@@ -94,11 +94,11 @@ struct WheelInertia : Effect {
     template <class T, class S>
     static void forces(const T* p, Workings<S>& w) {
         if (!w.force_known) return;
-        const S turning = p[0] * w.m;
+        const S turning = named("turning_mass", p[0] * w.m);
         const S along = 0.5 * (w.cos_delta + 1.0);  // of what both axles lose equally
         const S pull = w.fx_f * w.cos_delta - w.fy_f * w.sin_delta + w.fx_r + w.force_x;
         const S beyond = w.v_y * w.r + w.gravity_x;  // of dv_x/dt, beyond what forces do
-        const S taken = turning * (pull + w.m * beyond) / (w.m + turning * along);
+        const S taken = named("taken", turning * (pull + w.m * beyond) / (w.m + turning * along));
         w.fx_f = w.fx_f - 0.5 * taken;
         w.fx_r = w.fx_r - 0.5 * taken;
     }

@@ -39,7 +39,14 @@ struct ParameterInfo {
     Scan scan = Scan::kNone;
 };
 
+/// A state of an effect's own, by the name that exported models give it.
+struct StateInfo {
+    const char* name = nullptr;
+    const char* unit = nullptr;
+};
+
 constexpr std::size_t kMaxEffectParameters = 2;
+constexpr std::size_t kMaxEffectStates = 5;
 
 struct EffectInfo {
     const char* id = nullptr;
@@ -51,6 +58,7 @@ struct EffectInfo {
     const char* needs = nullptr;            // channels a log must have for it to be told at all
     const char* confounded_with = nullptr;  // effects alike in most driving; said by both
     ParameterInfo parameters[kMaxEffectParameters] = {};
+    StateInfo states[kMaxEffectStates] = {};  // each follows something with a first-order lag
     // Derivative at the null value does not exist (a lag of zero): scored at a finite size instead.
     bool scored_at_typical = false;
     // Visible only through a known longitudinal force.
@@ -66,14 +74,17 @@ struct EffectInfo {
         while (n < kMaxEffectParameters && parameters[n].name != nullptr) ++n;
         return n;
     }
+    constexpr std::size_t state_count() const {
+        std::size_t n = 0;
+        while (n < kMaxEffectStates && states[n].name != nullptr) ++n;
+        return n;
+    }
 };
 
 /// What a stage returns at which an effect does not act: it is left out when compiling.
 struct Inactive {};
 
 struct Effect {
-    /// States of the effect's own; each follows something with a first-order lag.
-    static constexpr std::size_t state_count = 0;
     /// Standard deviation of the states when a run begins, in their own unit.
     static constexpr double state_spread = 0.02;
     /// Whether the stage `input` reads the yaw acceleration, which the forces settle only later.

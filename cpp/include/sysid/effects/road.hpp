@@ -35,7 +35,7 @@ struct RoadBank : Effect {
     static void loads(const T* p, Workings<S>& w) {
         using std::cos;
         using std::sin;
-        const S factor = cos(p[0]) + w.v_x * w.r / kGravity * sin(p[0]);
+        const S factor = named("banked", cos(p[0]) + w.v_x * w.r / kGravity * sin(p[0]));
         w.fz_f *= factor;
         w.fz_r *= factor;
     }

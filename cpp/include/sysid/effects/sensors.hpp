@@ -53,10 +53,14 @@ struct SensorDelay : Effect {
                         .matters = 0.004,
                         .bounds = {0.0, 0.5},
                         .usual = {0.005, 0.03}}},
+        .states = {{"late_v_x", "m/s"},
+                   {"late_v_y", "m/s"},
+                   {"late_r", "rad/s"},
+                   {"late_a_x", "m/s2"},
+                   {"late_a_y", "m/s2"}},
         .scored_at_typical = true,
         .breaks = Breaks::kReadingsLate,
     };
-    static constexpr std::size_t state_count = kChannels;
     static constexpr double state_spread = 0.3;
 
     template <class T, class S>

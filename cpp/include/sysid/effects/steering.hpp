@@ -129,10 +129,10 @@ struct SteerLag : Effect {
                         .matters = 0.01,
                         .bounds = {0.0, 0.5},
                         .usual = {0.02, 0.08}}},
+        .states = {{"steer_lag", "rad"}},
         .scored_at_typical = true,
         .breaks = Breaks::kAnswersLate,
     };
-    static constexpr std::size_t state_count = 1;
 
     template <class T, class S>
     static void steering(const T* p, Workings<S>& w, Lags<S> lags) {

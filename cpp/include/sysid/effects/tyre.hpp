@@ -50,23 +50,28 @@ S relaxation_rate(const T& length, const Workings<S>& w) {
     return if_below(rate, kFastest, rate, S(kFastest));
 }
 
+/// What the effects below have in common, beside what is their own.
+constexpr EffectInfo relaxation(EffectInfo own) {
+    own.source = "Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (7.18)";
+    own.excited_by = "steps and sweeps of the steering at low and high speed";
+    own.needs = "steer_rad, vx_mps, yaw_rate_radps";
+    own.parameters[0] = kRelaxationLength;
+    own.scored_at_typical = true;
+    return own;
+}
+
 /// The slip angle that makes the force follows the geometric one over a rolled distance.
 struct TyreRelaxation : Effect {
-    static constexpr EffectInfo info{
+    static constexpr EffectInfo info = relaxation(EffectInfo{
         .id = "tyre_relaxation",
         .title = "tyre relaxation length",
         .equation = "(sigma / v_x) d(alpha')/dt + alpha' = alpha",
-        .source = "Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (7.18)",
-        .excited_by = "steps and sweeps of the steering at low and high speed",
         .moves = "ay_mps2, yaw_rate_radps",
-        .needs = "steer_rad, vx_mps, yaw_rate_radps",
         .confounded_with =
             "steer_lag, steer_delay, yaw_inertia, front_tyre_relaxation, rear_tyre_relaxation",
-        .parameters = {kRelaxationLength},
-        .scored_at_typical = true,
+        .states = {{"slip_front", "rad"}, {"slip_rear", "rad"}},
         .breaks = Breaks::kAnswersLate,
-    };
-    static constexpr std::size_t state_count = 2;
+    });
 
     template <class T, class S>
     static void slip(const T* p, Workings<S>& w, Lags<S> lags) {
@@ -77,51 +82,41 @@ struct TyreRelaxation : Effect {
     }
 };
 
-/// The same of the front axle alone; beside that of both, by how much the front is longer: two
-/// lags behind each other are, to first order, one of their sum.
-struct FrontTyreRelaxation : Effect {
-    static constexpr EffectInfo info{
-        .id = "front_tyre_relaxation",
-        .title = "tyre relaxation length of the front axle",
-        .equation = "(sigma_f / v_x) d(alpha_f')/dt + alpha_f' = alpha_f",
-        .source = "Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (7.18)",
-        .excited_by = "steps and sweeps of the steering at low and high speed",
-        .moves = "yaw_rate_radps, ay_mps2",
-        .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "tyre_relaxation, rear_tyre_relaxation, steer_lag, steer_delay",
-        .parameters = {kRelaxationLength},
-        .scored_at_typical = true,
-        .breaks = Breaks::kAnswersLate,
-    };
-    static constexpr std::size_t state_count = 1;
+enum class Axle { kFront, kRear };
+
+/// The same of one axle alone; beside that of both, by how much it is longer: two lags behind each
+/// other are, to first order, one of their sum.
+template <Axle axle>
+struct OneAxleRelaxation : Effect {
+    static constexpr EffectInfo info =
+        axle == Axle::kFront
+            ? relaxation(EffectInfo{
+                  .id = "front_tyre_relaxation",
+                  .title = "tyre relaxation length of the front axle",
+                  .equation = "(sigma_f / v_x) d(alpha_f')/dt + alpha_f' = alpha_f",
+                  .moves = "yaw_rate_radps, ay_mps2",
+                  .confounded_with =
+                      "tyre_relaxation, rear_tyre_relaxation, steer_lag, steer_delay",
+                  .states = {{"own_slip_front", "rad"}},
+                  .breaks = Breaks::kAnswersLate,
+              })
+            : relaxation(EffectInfo{
+                  .id = "rear_tyre_relaxation",
+                  .title = "tyre relaxation length of the rear axle",
+                  .equation = "(sigma_r / v_x) d(alpha_r')/dt + alpha_r' = alpha_r",
+                  .moves = "ay_mps2, yaw_rate_radps",
+                  .confounded_with = "tyre_relaxation, front_tyre_relaxation, yaw_inertia",
+                  .states = {{"own_slip_rear", "rad"}},
+              });
 
     template <class T, class S>
     static void slip(const T* p, Workings<S>& w, Lags<S> lags) {
-        if (value_of(p[0]) > 0.0) w.alpha_f = lags.follow(0, w.alpha_f, relaxation_rate(p[0], w));
+        S& alpha = axle == Axle::kFront ? w.alpha_f : w.alpha_r;
+        if (value_of(p[0]) > 0.0) alpha = lags.follow(0, alpha, relaxation_rate(p[0], w));
     }
 };
-
-/// The same of the rear axle.
-struct RearTyreRelaxation : Effect {
-    static constexpr EffectInfo info{
-        .id = "rear_tyre_relaxation",
-        .title = "tyre relaxation length of the rear axle",
-        .equation = "(sigma_r / v_x) d(alpha_r')/dt + alpha_r' = alpha_r",
-        .source = "Pacejka, Tire and Vehicle Dynamics (3rd ed.), eq. (7.18)",
-        .excited_by = "steps and sweeps of the steering at low and high speed",
-        .moves = "ay_mps2, yaw_rate_radps",
-        .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "tyre_relaxation, front_tyre_relaxation, yaw_inertia",
-        .parameters = {kRelaxationLength},
-        .scored_at_typical = true,
-    };
-    static constexpr std::size_t state_count = 1;
-
-    template <class T, class S>
-    static void slip(const T* p, Workings<S>& w, Lags<S> lags) {
-        if (value_of(p[0]) > 0.0) w.alpha_r = lags.follow(0, w.alpha_r, relaxation_rate(p[0], w));
-    }
-};
+using FrontTyreRelaxation = OneAxleRelaxation<Axle::kFront>;
+using RearTyreRelaxation = OneAxleRelaxation<Axle::kRear>;
 
 /// Sliding heats the tread, and a tread away from its best temperature grips less. The states are
 /// the sliding powers [kW] of front and rear axle, as late as the tread's temperature follows them;
@@ -152,8 +147,8 @@ struct TyreTemperature : Effect {
                         .bounds = {1.0, 900.0},
                         .usual = {5.0, 60.0},
                         .scan = Scan::kRange}},
+        .states = {{"sliding_front", "kW"}, {"sliding_rear", "kW"}},
     };
-    static constexpr std::size_t state_count = 2;
     static constexpr double state_spread = 0.5;  // [kW]
 
     template <class T, class S>
@@ -172,7 +167,7 @@ struct TyreTemperature : Effect {
 
     template <class S>
     static void apply(const S& left, S& peak, S& grip) {
-        const S kept = if_below(left, 0.05, S(0.05), left);
+        const S kept = named("kept", if_below(left, 0.05, S(0.05), left));
         peak *= kept;
         grip *= kept;
     }

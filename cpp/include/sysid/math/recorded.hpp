@@ -1,10 +1,12 @@
 // A scalar that writes down what is done to it: a model that is written for any scalar becomes a
 // `Program`.
 //
-// Constants are worked out at once, steps that were taken before are not repeated, and what does
-// not depend on the sample keeps its value. A condition may be asked only of such numbers; on
-// others the model uses `if_below`.
+// Constants are worked out at once, unless the recorder spells; steps that were taken before are
+// not repeated, and what does not depend on the sample keeps its value. A condition may be asked
+// only of such numbers; on others the model uses `if_below`.
 #pragma once
+
+#include <type_traits>
 
 #include "sysid/math/given.hpp"
 
@@ -47,6 +49,13 @@ class Recorded {
     /// The value where it is the same for all samples. Throws `std::logic_error` where it is not.
     friend double value_of(const Recorded& x);
 
+    /// Whether names and parts are kept, for a text.
+    friend bool spells(const Recorded& x);
+    /// The name of a step in a text of the calculation; see `named`.
+    friend void name_step(const char* name, const Recorded& x);
+    /// From here on the steps, of whose calculation `x` is, belong to the part of this title.
+    friend void begin_part(const char* title, const Recorded& x);
+
   private:
     friend class Recorder;
     friend struct RecordedAccess;
@@ -56,5 +65,13 @@ class Recorded {
     int node_ = -1;  // a constant has none
     Recorder* to_ = nullptr;
 };
+
+/// Gives a number the name that it has where the calculation is written as text. A name may be
+/// given again to what takes its place. Costs nothing with any other scalar.
+template <class S>
+const S& named(const char* name, const S& x) {
+    if constexpr (std::is_same_v<S, Recorded>) name_step(name, x);
+    return x;
+}
 
 }  // namespace sysid

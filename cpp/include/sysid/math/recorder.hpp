@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstdint>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "sysid/math/program.hpp"
@@ -11,8 +12,33 @@
 
 namespace sysid {
 
+/// A step as it was spelled: `constant` is that of a `kUniform`, the limit of a `kIfBelow`, or -1
+/// of a `kTimes`, which is a change of sign. No other step has one.
+struct SpelledStep {
+    Op op = Op::kInput;
+    int a = -1, b = -1, c = -1;
+    double constant = 0.0;
+};
+
+/// A calculation to be written as text; operands stand before what is made of them.
+struct Spelled {
+    std::vector<SpelledStep> steps;
+    std::vector<int> inputs, outputs;                // their steps
+    std::vector<std::pair<int, const char*>> names;  // of steps, in the order of their giving
+    std::vector<std::pair<int, const char*>> parts;  // first steps and titles
+};
+
 class Recorder {
   public:
+    Recorder() = default;
+    /// One that spells: constants keep the place that they have in the source, conditions on
+    /// parameters stay conditions, names are kept. For `spelled`, not for `program`.
+    struct Spelling {};
+    explicit Recorder(Spelling /*unused*/) : spells_(true) {}
+
+    /// Lets an input stand for a constant wherever the source has it; where it spells.
+    void stand_for(double constant, const Recorded& input);
+
     /// An input that differs from sample to sample; `active` where derivatives by it are wanted.
     Recorded input(bool active);
     /// One that has this value for all samples. Those without derivatives are steps too, so that a
@@ -21,6 +47,9 @@ class Recorder {
 
     /// The steps that lead to these numbers; inputs are numbered in the order of their making.
     Program program(const std::vector<Recorded>& outputs) const;
+
+    /// All steps, as they were spelled.
+    Spelled spelled(const std::vector<Recorded>& outputs);
 
   private:
     friend struct RecordedAccess;
@@ -46,6 +75,9 @@ class Recorder {
     void add_sweep(const std::vector<int>& nodes, const std::vector<int>& outputs,
                    const std::vector<int>& rows, Program& out) const;
 
+    bool spells_ = false;
+    std::vector<std::pair<int, const char*>> names_, parts_;
+    std::unordered_map<std::uint64_t, int> stands_for_;  // constants, by their bits
     std::vector<Node> nodes_;
     std::vector<int> inputs_;
     std::unordered_multimap<std::size_t, int> known_;

@@ -106,11 +106,12 @@ constexpr Known known(Signal which) {
 /// difference of the loads of its wheels: F_z,left = F_z / 2 - h F_y / t. How the body's roll
 /// shares it between the axles is not known.
 template <class S>
-S wheel_load(const S& load, const S& force, const Workings<S>& w, double track, double left) {
+S wheel_load(const S& load, const S& force, const Workings<S>& w, const Given<S>& track,
+             double left) {
     return 0.5 * load - (left / track) * (w.h * force);
 }
 template <class S>
-S wheel_speed(const Workings<S>& w, double track, double left) {
+S wheel_speed(const Workings<S>& w, const Given<S>& track, double left) {
     return w.v_x - (0.5 * left * track) * w.r;
 }
 template <class S>

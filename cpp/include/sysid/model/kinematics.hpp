@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "sysid/math/dual.hpp"
+#include "sysid/math/recorded.hpp"
 
 namespace sysid {
 
@@ -42,7 +43,7 @@ inline Axles<double> small_slip_angles(double beta, double r_per_speed, double l
 /// Axle loads at rest on a level road [N].
 template <class S, class L>
 Axles<S> static_loads(const S& weight, const L& l_f, const L& l_r) {
-    const S per_metre = weight / (l_f + l_r);
+    const S per_metre = named("weight_per_metre", S(weight / named("wheelbase", l_f + l_r)));
     return {per_metre * l_r, per_metre * l_f};
 }
 
@@ -55,8 +56,8 @@ inline Axles<double> axle_loads(double weight, double pull, double h, double l_f
 }
 
 /// 1/2 rho C_dA v |v| [N].
-template <class A, class S>
-S drag_force(double rho, const A& area, const S& v) {
+template <class R, class A, class S>
+S drag_force(const R& rho, const A& area, const S& v) {
     using std::abs;
     return 0.5 * rho * (area * (v * abs(v)));
 }

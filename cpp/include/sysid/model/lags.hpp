@@ -78,7 +78,7 @@ class Lags {
         const std::size_t n = first_ + i;
         switch (stage_) {
             case LagStage::kRates: {
-                const S limited = explicit_rate(rate);
+                const S limited = named("lag_rate", explicit_rate(rate));
                 if (step_.fastest != nullptr)
                     *step_.fastest = std::max(*step_.fastest, value_of(limited));
                 state_rate_[n] = limited * (target - state_[n]);

@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "sysid/math/given.hpp"
+#include "sysid/math/recorded.hpp"
 #include "sysid/model/tyre.hpp"
 
 namespace sysid {
@@ -21,7 +22,7 @@ struct Workings {
     // the car (stage `vehicle`)
     S m, I_z, l_f, l_r;
     S h;                         // height of the centre of gravity [m]
-    double rho = 0.0;            // air density [kg/m3]
+    Given<S> rho{};              // air density [kg/m3]
     S drag_area;                 // C_d A [m2]
     S brake_front, drive_front;  // shares of the front axle in brake and drive force
     S fz0_f, fz0_r;              // static axle loads [N]
@@ -51,10 +52,30 @@ struct Workings {
     S a_x, a_y;  // specific force at the centre of gravity [m/s2]
     S r_dot;     // yaw acceleration [rad/s2]
     // what only formulas of users read
-    double track_f = 0.0, track_r = 0.0;  // [m]
-    const Given<S>* channels = nullptr;   // `kUserChannels` of the log
-    const S* user_states = nullptr;       // `kUserStates`
+    Given<S> track_f{}, track_r{};       // [m]
+    const Given<S>* channels = nullptr;  // `kUserChannels` of the log
+    const S* user_states = nullptr;      // `kUserStates`
 };
+
+/// Where the model is written as text, what has changed since gets its name there.
+template <class S>
+void name_workings(const Workings<S>& w) {
+    if (!spells(w.v_x)) return;
+    named("m", w.m), named("I_z", w.I_z), named("l_f", w.l_f), named("l_r", w.l_r);
+    named("height", w.h), named("drag", w.drag_area);
+    named("brake_front", w.brake_front), named("drive_front", w.drive_front);
+    named("fz0_f", w.fz0_f), named("fz0_r", w.fz0_r);
+    named("delta", w.delta), named("cos_delta", w.cos_delta), named("sin_delta", w.sin_delta);
+    named("fx", w.fx), named("force_x", w.force_x), named("force_y", w.force_y);
+    named("moment_z", w.moment_z);
+    named("gravity_x", w.gravity_x), named("gravity_y", w.gravity_y);
+    named("alpha_f", w.alpha_f), named("alpha_r", w.alpha_r);
+    named("fx_f", w.fx_f), named("fx_r", w.fx_r), named("fz_f", w.fz_f), named("fz_r", w.fz_r);
+    named("peak_f", w.mu_peak_f), named("peak_r", w.mu_peak_r);
+    named("grip_f", w.grip_f), named("grip_r", w.grip_r);
+    named("fy_f", w.fy_f), named("fy_r", w.fy_r);
+    named("a_x", w.a_x), named("a_y", w.a_y), named("r_dot", w.r_dot);
+}
 
 /// Measured channels, in the order of every measurement vector.
 enum Channel : int { kVx = 0, kVy = 1, kYawRate = 2, kAx = 3, kAy = 4 };
