@@ -1,6 +1,10 @@
 // The model as the steps of its calculation, for what is written of it as text.
 #include <pybind11/stl.h>
 
+#include <stdexcept>
+#include <tuple>
+#include <vector>
+
 #include "arrays.hpp"
 #include "register.hpp"
 #include "sysid/dynamics/written_model.hpp"
@@ -54,6 +58,7 @@ using Step = std::tuple<const char*, int, int, int, double>;
 
 std::vector<Step> steps(const WrittenModel& model) {
     std::vector<Step> all;
+    all.reserve(model.calculation.steps.size());
     for (const SpelledStep& s : model.calculation.steps)
         all.emplace_back(name_of(s.op), s.a, s.b, s.c, s.constant);
     return all;
