@@ -71,6 +71,7 @@ def examine(trial: Trial, among: Sequence[str] | None = None) -> Outcome:
 def _told(study: sv.Study) -> Outcome:
     """What the study said."""
     first, last = study.diagnoses[0], study.diagnoses[-1]
+    together = None if study.omnibus_together is None else study.omnibus_together.p_value
     leader, group = None, ()
     if first.significant:
         leader, group = first.ranking[0].id, first.ranking[0].indistinguishable_from
@@ -91,6 +92,9 @@ def _told(study: sv.Study) -> Outcome:
         "left": [c.id for c in last.significant],
         "omnibus_first": first.omnibus.p_value,
         "omnibus_last": study.omnibus.p_value,
+        "omnibus_together": together,
+        "foretold": None if study.foretold is None else study.foretold.to_dict(),
+        "explained": None if study.explained is None else study.explained.to_dict(),
         "train_errors": [c.error for c in study.train],
         "test_errors": [c.error for c in study.test],
         "study_seconds": study.seconds,

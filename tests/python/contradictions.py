@@ -6,7 +6,17 @@ _NONE = "no sign of anything left that depends on the driving"
 _SOME = "something is left that depends on the driving"
 _STILL = "A function of the driving still predicts"
 _DISTURBANCE = "no function of the driving predicts"
-_WHY = ("stand-ins", "There is evidence for", "Something else is wrong", _SOME, _STILL)
+_SLOW = "Slower than any disturbance, and so with a cause"
+_MORE = "the training data foretell"
+_WHY = (
+    "stand-ins",
+    "There is evidence for",
+    "Something else is wrong",
+    _SOME,
+    _STILL,
+    _MORE,
+    _SLOW,
+)
 
 
 def contradictions(text: str) -> list[str]:
@@ -37,6 +47,14 @@ def contradictions(text: str) -> list[str]:
         and "than the errors that" not in text
     ):
         found.append(f"{verdict}, and a function of the driving predicts what is left")
+    if verdict == "adequate" and _MORE in text and "than the errors that" not in text:
+        found.append("adequate, and validation data err more than is foretold")
+    if _SLOW in text and (
+        _DISTURBANCE in text or (verdict == "adequate" and "than the errors that" not in text)
+    ):
+        found.append("a slow force is left, and what is left is disturbance or nothing")
+    if _MORE in text and (_NONE in text or _DISTURBANCE in text):
+        found.append("validation data err more than is foretold, and nothing is left")
     if _STILL in text and (_NONE in text or _DISTURBANCE in text):
         found.append("a function of the driving predicts what is left, and none does")
     if _DISTURBANCE in text and _SOME in text:

@@ -28,8 +28,10 @@ _NEARLY, _SHORT = 1.0, 0.3
 
 _SENSORS = slice(0, 5)
 _MOTION = slice(5, 8)
-_DISTURBANCE = slice(8, 11)
-_TIMES = slice(11, 14)
+DISTURBANCE = slice(8, 11)
+"""Places of the sizes of disturbances in the core's order (`NoiseModel.vector`)."""
+TIMES = slice(11, 14)
+"""The same of their correlation times."""
 _ROAD = slice(14, 16)
 _ROAD_TIME = 16
 
@@ -84,8 +86,8 @@ class NoiseModel:
         return cls(
             tuple(map(float, v[_SENSORS])),
             tuple(map(float, v[_MOTION])),
-            tuple(map(float, v[_DISTURBANCE])),
-            tuple(map(float, v[_TIMES])),
+            tuple(map(float, v[DISTURBANCE])),
+            tuple(map(float, v[TIMES])),
             tuple(map(float, v[_ROAD])),
             float(v[_ROAD_TIME]),
         )

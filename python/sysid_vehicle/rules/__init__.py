@@ -12,7 +12,9 @@
 6. When nothing is added any more, the final model is tested for anything left: at `level` on the
    training data, for one effect more, and at `strict` for anything unknown on all data together.
    What the driving predicts on all data by more than `explainable` is left too; where it predicts
-   nothing, only evidence below `strict` counts.
+   nothing, only evidence below `strict` counts. So is what a baseline errs on validation data
+   beyond what training data foretell, at `strict` and by more than `explainable` (`unforeseen`),
+   and a disturbance of it that lasts as long as any may: slow forces have a cause.
 7. Nothing left: what was added explains it. An added effect is not named if its value is physically
    implausible, or differs between pieces of the driving by a size that matters, or if something
    unknown does all that it does and more.
@@ -20,7 +22,8 @@
    comes back of the error 1 to 5 s ahead, of the motion that it moves, where the final model lacks
    it and all else is fitted anew. It is above `taken` and shown not to be chance, on training and
    on validation data; where less than `most` of that error is gone, the whole interval is above
-   `taken`. Nothing that has no such share takes more, and moves a channel that it moves.
+   `taken`. Nothing that has no such share takes more, and moves a channel that it moves. All that
+   was added together is shown to take a share, of that error or of what could be explained of it.
 9. The verdict follows from what is left and which names stand (`verdict`).
 10. `Rules` holds every limit with unit, meaning, and the benchmark that chose or judges it.
 
@@ -31,7 +34,7 @@ from .accept import ErrorChange, Gain, Measures, accept, bic, worse
 from .facts import Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
 from .share import NONE_GONE, UNKNOWN, Share, share_between, share_explained, share_of
-from .verdict import Grade, excess, grade, incomplete, something_left, verdict
+from .verdict import Grade, excess, grade, incomplete, something_left, unforeseen, verdict
 
 __all__ = [
     "NONE_GONE",
@@ -58,6 +61,7 @@ __all__ = [
     "share_explained",
     "share_of",
     "something_left",
+    "unforeseen",
     "verdict",
     "worse",
 ]

@@ -75,12 +75,15 @@ class Facts:
         For anything left by the final model, on the training data.
     together : Tested or None
         For anything unknown beside what was added, on training and validation data together; None
-        where nothing was added.
+        where the time limit came first.
     candidate : float
         Smallest p-value of an effect that the final model lacks.
     missing : (float, float)
         Squares of errors 1 to 5 s ahead on validation data, beyond the noise of sensors, without
         and with what was added; in one unit.
+    taken_low : float
+        Lower end of the interval of the share of these that what was added takes away, or of what
+        any function of the driving could explain of them.
     contradictions : tuple of str
         Channels that contradict the others, in words.
     excited : bool
@@ -94,18 +97,26 @@ class Facts:
     unopposed : bool
         Whether the time limit left unknown if something unknown would do in the place of what was
         added.
+    unforeseen : bool
+        Whether validation data err by more than the final model, with its disturbances, foretells
+        (`unforeseen`).
+    slow : tuple of str
+        Disturbances of the final model that last as long as any may, in words.
     """
 
     fitted: Tested
     together: Tested | None = None
     candidate: float = 1.0
     missing: tuple[float, float] = (0.0, 0.0)
+    taken_low: float = 1.0
     added: tuple[Added, ...] = ()
     contradictions: tuple[str, ...] = ()
     excited: bool = True
     structure: tuple[float, float] = (1.0, 0.0)
     small: bool = False
     unopposed: bool = False
+    unforeseen: bool = False
+    slow: tuple[str, ...] = ()
 
     def with_own(self, own: Mapping[str, tuple[Share, Share]], late: Collection[str] = ()) -> Facts:
         """The same with the own shares of effects: on validation data, and on training data.

@@ -14,6 +14,10 @@ _NOT_SHOWN = (
     "beside all else it is not shown to take a share of the error 1 to 5 s ahead on training and "
     "validation data"
 )
+_NOT_TOGETHER = (
+    "together, what was added is not shown to take anything off the error 1 to 5 s ahead on "
+    "validation data: the interval of its share reaches nothing"
+)
 _LATE = (
     "the time limit left unknown what share of the error 1 to 5 s ahead is its own on training and "
     "validation data"
@@ -51,17 +55,35 @@ def grade(alone: str, beside: str, *, much_left: bool = False) -> Grade:
     return "confirmed" if beside == "missing" and not much_left else "plausible"
 
 
+def unforeseen(ratio: float, p_value: float, rules: Rules = USUAL) -> bool:
+    """Whether validation data err by more than the training data foretell.
+
+    Parameters
+    ----------
+    ratio : float
+        Of mean squared residuals, in units of the noise with its disturbances.
+    p_value : float
+        Of data that are alike.
+    rules : Rules
+    """
+    return p_value < rules.strict and ratio * (1.0 - rules.explainable) > 1.0
+
+
 def something_left(facts: Facts, rules: Rules = USUAL) -> bool:
     """Whether the final model is shown to be incomplete.
 
     Beyond doubt, or by a share of what it leaves that the driving predicts on all data. Of lesser
     evidence the ceiling has the last word: what no function of the driving predicts on any data is
-    disturbance.
+    disturbance. A baseline alone is asked what it leaves of validation data, too: what training
+    data do not bring about they cannot show. So is it whether its disturbances are none: what lasts
+    is a force, whether it depends on the driving or on the place.
     """
     anywhere, everywhere = facts.structure
+    if not facts.added and (facts.unforeseen or facts.slow):
+        return True
     if everywhere > rules.explainable or _together(facts, rules):
         return True
-    one_more = rules.alpha if facts.together is None else min(rules.alpha, rules.level)
+    one_more = min(rules.alpha, rules.level) if facts.added else rules.alpha
     evidence = (facts.fitted.p_value, rules.level), (facts.candidate, one_more)
     if not all(p > min(rules.strict, level) for p, level in evidence):
         return True
@@ -98,6 +120,8 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     if left or stand_ins:
         late = frozenset(a.id for a in facts.added if a.late)
         falling = names - _standing(facts, rules)
+        if left and not facts.taken_low > 0.0:
+            withdrawn.append(Withdrawn(names - falling, _NOT_TOGETHER, names))
         withdrawn.append(Withdrawn(falling - late, _NOT_SHOWN, names))
         if falling & late:
             withdrawn.append(Withdrawn(falling & late, _LATE, names))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 from warnings import catch_warnings, simplefilter
 
@@ -23,10 +24,12 @@ from ..rules import USUAL, Rules, incomplete, verdict
 from ..sensors import SensorCheck, made_ready, put_right
 from .added import added_by
 from .clock import in_time
+from .foretold import foretold
 from .limit import Judging, Schedule
 from .matters import sizes_that_matter, sufficient
-from .own import own_shares
+from .own import own_shares, shown_together
 from .search import Search, Trail, kept
+from .slow import slow_forces
 from .steps import way
 from .structure import structure
 from .study import Study
@@ -40,6 +43,8 @@ _CHANNELS = "whether the channels were read at the same moments, with noise that
 _BASELINE = "the likeliest parameters of the baseline"
 _CLOCK = "what follows with the wheel force at the time at which the car feels it"
 _RIVALS = "whether something unknown would do in the place of what was added"
+_UNSHOWN = "whether training and validation data together show anything that is left"
+_FORETOLD = "whether validation data err by more than training data foretell"
 _TOGETHER = "the share of the error 1 to 5 s ahead that the effects take together"
 _ALONE = "the share of the error 1 to 5 s ahead that is due to {} alone"
 _STRUCTURE = "how much of what is left depends on the driving"
@@ -192,9 +197,12 @@ def improve(
         on_test = in_parallel(lambda f: compare(f, test_driving, noise=floor), fits)
         last = diagnoses[-1]
         fitted = last.omnibus if last.fit is fit else omnibus(fit, fit.driving, rules)
-        rivals = explained = None
+        explained = None
+        beside = _RIVALS if len(fits) > 1 else _UNSHOWN
+        rivals = judging.asked(beside, lambda: _rivals(fit, fits, test_driving, rules))
+        expected = judging.asked(_FORETOLD, lambda: foretold(fit, test_driving, rules))
+        slow = slow_forces(fit, rules)
         if len(fits) > 1:
-            rivals = judging.asked(_RIVALS, lambda: _rivals(fit, fits, test_driving, rules))
             explained = judging.asked(_TOGETHER, lambda: beyond_noise_ahead(fits, test_driving))
         told = judge(
             fit,
@@ -225,6 +233,8 @@ def improve(
             structure=(1.0, 0.0) if pattern is None else (pattern.anywhere, pattern.everywhere),
             small=bool(small),
             unopposed=len(fits) > 1 and rivals is None,
+            unforeseen=expected is not None and expected.unforeseen,
+            slow=slow,
         )
         if len(fits) > 1 and incomplete(facts, rules):
             named = {a.id for a in facts.added if a.named}
@@ -232,6 +242,11 @@ def improve(
             unknown = [e for e in _new(fits) if e not in shares]
             facts = facts.with_own(shares, unknown)
             judging.note(unknown, _ALONE)
+            if explained is not None:
+                low = judging.asked(
+                    _TOGETHER, lambda: shown_together(explained, fits, test_driving)
+                )
+                facts = replace(facts, taken_low=0.0 if low is None else low)
         decision = verdict(facts, rules)
         alone, told = told, in_the_light_of(decision, told)
         late = tuple(judging.left_out)
@@ -251,6 +266,8 @@ def improve(
             rules=rules,
             explained=explained,
             structure=pattern,
+            foretold=expected,
+            slow=slow,
             stopped=found.stopped,
             late_facts=late,
             checked=bool(sensors),

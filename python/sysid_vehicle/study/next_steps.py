@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .matters import USUAL_SIZES
-from .said import disturbance, small
+from .said import disturbance, only_elsewhere, slow, small
 
 if TYPE_CHECKING:
     from .study import Study
@@ -39,7 +39,8 @@ def next_steps(study: Study) -> tuple[str, ...]:
 def _of_names(study: Study) -> list[str]:
     found = []
     for a in study.added:
-        if a.confounded_with:
+        # Which of two it is that only stands in for something else is no question.
+        if a.confounded_with and a.grade != "alias":
             some = ", ".join(a.confounded_with[:_SHOWN])
             found.append(
                 f"tell {a.id} from {some}: `sysid-vehicle next-drive` designs a drive that "
@@ -64,6 +65,18 @@ def _of_what_is_left(study: Study) -> list[str]:
             f"if errors 0.5 to 5 s ahead of less than {usual} do not matter to you, use the "
             "baseline as it is: with `matters`, or `--matters`, the verdict counts larger ones "
             "alone"
+        )
+    if slow(study):
+        found.append(
+            f"find what brings about the {' and the '.join(study.slow)}: drive the same way again, "
+            "and in the other direction; bank and slope of the road stay with the place, wind with "
+            "the course, what belongs to the car with the driving"
+        )
+    if not study.added and only_elsewhere(study):
+        found.append(
+            "give the fit driving like the validation data too, and validate with other driving "
+            "of that kind: what is missing hardly shows in the training data, and no effect can be "
+            "named that they do not excite"
         )
     if not study.sensors and not study.checked:
         found.append(

@@ -11,8 +11,9 @@ from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refit
 from ..rules import UNKNOWN, Share
-from .beyond import own_share
+from .beyond import Beyond, own_share
 from .horizons import moving_with
+from .shares import shares
 from .validation import AHEAD, at_its_best
 
 
@@ -80,3 +81,24 @@ def own_shares(
         before(ends, lambda: at_its_best(final, test), None)  # once for all of them
         judged = in_time(on_test, fitted)
     return {e: (judged.get(e, UNKNOWN), fitted.get(e, UNKNOWN)) for e in effects if e not in late}
+
+
+def shown_together(explained: Beyond, fits: Sequence[Fit], test: Driving) -> float:
+    """Find the lower end of the share of the error 1 to 5 s ahead that all effects take together.
+
+    Where that of the error itself reaches nothing, as disturbances may do most of it: of what any
+    function of the driving could explain of it, if any is seen to.
+
+    Parameters
+    ----------
+    explained : Beyond
+        What is known of the error itself.
+    fits : sequence of Fit
+        From the baseline to the final model.
+    test : Driving
+        Validation data.
+    """
+    if explained.low > 0.0:
+        return explained.low
+    whole = shares(at_its_best(fits[0], test), at_its_best(fits[-1], test), test).whole
+    return whole.low if whole.known else explained.low

@@ -52,6 +52,8 @@ def record(study: Study) -> dict[str, Any]:
             "p_value": study.omnibus.p_value,
             "strongest": study.omnibus.strongest,
             **_together(study.omnibus_together),
+            "slow": list(study.slow),
+            "foretold": None if study.foretold is None else study.foretold.to_dict(),
             "explainable": study.ceiling.to_dict(),
             "structure": None if study.structure is None else study.structure.to_dict(),
             **({} if study.unknown is None else study.unknown.to_dict()),

@@ -9,7 +9,7 @@ import numpy as np
 from .._common.text import number, with_error
 from ..estimate import UNITS
 from ..estimate.driving import WORDS
-from ..rules import NONE_GONE
+from ..rules import NONE_GONE, share_of
 from .horizons import LATERAL
 from .matters import sizes_that_matter, sufficient
 from .validation import AHEAD_S
@@ -42,11 +42,18 @@ def meaning(study: Study) -> str:
         )
     beyond = study.explained
     if study.verdict == "partly_explained" and beyond and beyond.share < study.rules.most:
+        part = f"{beyond} of the error 1 to 5 s ahead"
+        if not beyond.low > 0.0 and study.shares.whole.known:
+            part = (
+                f"{study.shares.whole} of what any function of the driving could explain of the "
+                "error 1 to 5 s ahead"
+            )
         return (
-            f"what was added takes up {beyond} of the error 1 to 5 s ahead; the rest is "
-            "disturbance, and something else that is missing"
+            f"what was added takes up {part}; the rest is disturbance, and something else that is "
+            "missing"
         )
     seen = study.omnibus.rejects or study.diagnoses[-1].significant or structured(study)
+    seen = seen or elsewhere(study) or slow(study)
     if study.verdict == "adequate" and study.added:
         return (
             "what was added is no sure name; what the baseline (`study.fits[0]`) leaves can be "
@@ -58,8 +65,16 @@ def meaning(study: Study) -> str:
         helps = study.predicting is not None and study.predicting.helps
         how = " with parameters fitted to predictions (`study.predicting.final`)"
         return (
-            "what is left is smaller, 0.5 to 5 s ahead, than the errors that matter"
+            "something is left, and its errors 0.5 to 5 s ahead are smaller, in the median, than "
+            "the errors that matter"
             f"{how if helps else ''}"
+        )
+    if study.verdict == "unknown" and not study.added and only_elsewhere(study):
+        return "something is missing that shows in validation data, and hardly in training data"
+    if study.verdict == "adequate" and _disturbed(study):
+        return (
+            f"{_MEANING['adequate']}; validation data err by {study.test[-1].error:.2g} noise "
+            "floors, by disturbances like those of the training data"
         )
     return _MEANING[study.verdict]
 
@@ -110,7 +125,8 @@ def disturbance(study: Study) -> bool:
         found is not None
         and found.anywhere <= study.rules.explainable
         and study.omnibus.p_value > strict
-        and not _more(study)
+        and not elsewhere(study)
+        and not slow(study)
         and all(c.p_value > strict for c in candidates)
     )
 
@@ -135,7 +151,7 @@ def _left(study: Study) -> str:
         wrong = "; ".join(study.train[-1].unrelated.values())
         return f"{said} Something else is wrong: {wrong}."
     seen = study.omnibus.rejects and not disturbance(study)
-    told = seen or structured(study) or _more(study)
+    told = seen or structured(study) or elsewhere(study) or slow(study)
     if study.verdict not in ("unknown", "partly_explained") or told:
         return said
     # Nothing is left, yet something is missing: what took it up is not what is missing.
@@ -180,17 +196,53 @@ def _on_train(study: Study) -> str:
         )
     if not test.rejects and structured(study):
         return f"the test of unknown forces sees nothing (p = {test.p_value:.2g})."
+    if only_elsewhere(study):
+        return f"training data by themselves show nothing that is left (p = {test.p_value:.2g})."
     return f"{test}."
 
 
 def _on_all(study: Study) -> list[str]:
-    beyond = study.omnibus_together
-    if beyond is None or (not beyond.rejects and structured(study)):
-        return []
-    if beyond.rejects and not _more(study):
-        p = f"p = {beyond.p_value:.2g}"
-        return [f"On all data together: no more than a disturbance may leave ({p})."]
-    return [f"On all data together: {beyond}."]
+    beyond, said = study.omnibus_together, []
+    # A baseline alone is told of what it leaves once.
+    told = beyond is not None and (beyond.rejects or (study.added and not structured(study)))
+    if beyond is not None and told:
+        found = str(beyond)
+        if not _more(study):
+            found = f"no more than a disturbance may leave (p = {beyond.p_value:.2g})"
+        said.append(f"On all data together: {found if beyond.rejects else beyond}.")
+    if _unforeseen(study):
+        said.append(f"{str(study.foretold).capitalize()}.")
+    if slow(study):
+        some = " and a ".join(study.slow)
+        said.append(f"Slower than any disturbance, and so with a cause: a {some}.")
+    return said
+
+
+def elsewhere(study: Study) -> bool:
+    """Whether more is left on all data than the training data show or foretell."""
+    return _more(study) or _unforeseen(study)
+
+
+def only_elsewhere(study: Study) -> bool:
+    """Whether what is left shows with validation data alone."""
+    return elsewhere(study) and not study.omnibus.rejects
+
+
+def slow(study: Study) -> bool:
+    """Whether a baseline takes slow forces for disturbances."""
+    return bool(study.slow) and not study.added
+
+
+def _unforeseen(study: Study) -> bool:
+    return not study.added and study.foretold is not None and study.foretold.unforeseen
+
+
+def _disturbed(study: Study) -> bool:
+    """Whether validation data err by more than noise of the sensors, as is foretold."""
+    if study.foretold is None:
+        return False
+    left = share_of(study.test[-1].error ** 2, 1.0)
+    return left > study.rules.explainable
 
 
 def _more(study: Study) -> bool:

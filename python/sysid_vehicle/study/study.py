@@ -37,6 +37,7 @@ from ..saved import save
 from .added import AddedEffect
 from .beyond import Beyond
 from .disagree import Disagreement, disagreements
+from .foretold import Foretold
 from .horizons import Horizons, horizons
 from .next_steps import next_steps
 from .predicting import Predicting, predicting
@@ -68,7 +69,7 @@ class Study:
     omnibus, omnibus_together : Omnibus
         Whether the final model leaves anything that depends on the driving it was fitted to, and
         whether anything unknown is left beside what was added on training and validation data
-        together; None where nothing was added.
+        together; None where the time limit came first.
     verdicts : Verdicts
         What is to be said of every effect that the baseline lacks.
     seconds : float
@@ -81,6 +82,10 @@ class Study:
         first.
     structure : Structure, optional
         What of that which the final model leaves depends on the driving.
+    foretold : Foretold, optional
+        Whether validation data err by more than the final model foretells with its disturbances.
+    slow : tuple of str
+        Disturbances of the final model that last as long as any may, in words: forces it lacks.
     stopped : tuple of str
         Effects with evidence that the time limit left untried.
     late_facts : tuple of str
@@ -104,6 +109,8 @@ class Study:
     rules: Rules = USUAL
     explained: Beyond | None = None
     structure: Structure | None = None
+    foretold: Foretold | None = None
+    slow: tuple[str, ...] = ()
     stopped: tuple[str, ...] = ()
     late_facts: tuple[str, ...] = ()
     checked: bool = False

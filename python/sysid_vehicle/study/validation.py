@@ -155,6 +155,12 @@ def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
     return beyond_noise(in_parallel(lambda fit: at_its_best(fit, test), fits), test, AHEAD)
 
 
+def as_elsewhere(fit: Fit, test: Driving) -> Fit:
+    """The fit with parameters that serve validation data too, and its noise on other driving."""
+    noise = fit.noise.elsewhere(fit.model.vehicle)
+    return replace(fit, model=_prediction(fit, test, fit).model, noise=noise)
+
+
 # One object for each fit: errors ahead are remembered by it.
 @remembered(16)
 def at_its_best(fit: Fit, test: Driving) -> Fit:

@@ -24,6 +24,8 @@ def facts_of(
     small: bool = False,
     structure: tuple[float, float] = (1.0, 0.0),
     unopposed: bool = False,
+    unforeseen: bool = False,
+    slow: tuple[str, ...] = (),
 ) -> Facts:
     """Collect what is known of a final model.
 
@@ -38,7 +40,7 @@ def facts_of(
     explained : Beyond or None
         What every fit leaves of the errors ahead; None where nothing was added, or nobody knows:
         then all of them may be left.
-    fitted, together, candidate, excited, small, structure, unopposed
+    fitted, together, candidate, excited, small, structure, unopposed, unforeseen, slow
         As in `Facts`.
     """
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
@@ -50,6 +52,7 @@ def facts_of(
         together,
         candidate,
         (missing[0], missing[-1]),
+        1.0 if explained is None else explained.low,
         tuple(
             Added(v.effect.id, v.finding, v.group, v.effect.moved)
             for v in told.all
@@ -60,6 +63,8 @@ def facts_of(
         structure,
         small,
         unopposed,
+        unforeseen,
+        slow,
     )
 
 

@@ -51,6 +51,7 @@ NUMERICAL = {
     "study/validation.py": {"AHEAD", "AHEAD_S", "_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
     "study/horizons.py": {"AHEAD", "_FEWEST", "_APART", "_LOST"},
     "study/beyond.py": {"_DRAWS"},
+    "study/foretold.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
     "study/improve.py": {"_SHORT_S"},
     "study/limit.py": {"_BASELINE", "_SEARCHED", "_SENSORS", "_STEP"},
     "study/next_steps.py": {"_SHOWN"},
@@ -58,6 +59,7 @@ NUMERICAL = {
         "AHEAD", "_LEAST_APART_S", "_APART", "_DRAWS", "_LONG_S", "_FEW",
         "_VISIBLE", "_LOST", "_LEAST", "_QUANTILES",
     },
+    "study/slow.py": {"_AT_LONGEST"},
     "study/steps.py": {"_ALTERNATIVES"},
     "study/structure.py": {"_AHEAD_S", "_APART", "_FEW"},
     # Descriptions of the unknown, of biases, and of the next drive.

@@ -16,6 +16,7 @@ from sysid_vehicle.rules import (
     incomplete,
     share_explained,
     something_left,
+    unforeseen,
     verdict,
 )
 
@@ -78,6 +79,28 @@ def test_verdicts_where_nothing_was_added() -> None:
     assert said.withdrawn[0].because == "ay_mps2: turned round"
 
 
+def test_a_baseline_is_not_adequate_by_the_training_data_alone() -> None:
+    facts = Facts(NONE, NONE)
+    assert verdict(facts).verdict == "adequate"
+    for shown in ({"together": of(5e-4)}, {"unforeseen": True}, {"slow": ("moment of 90 N m",)}):
+        assert verdict(replace(facts, **shown)).verdict == "unknown"
+        assert verdict(replace(facts, small=True, **shown)).verdict == "adequate"
+        # Tyres that never met a slip angle leave chance evidence, and foretell nothing.
+        assert verdict(replace(facts, excited=False, **shown)).verdict == "not_testable"
+    # Lesser evidence may be a disturbance.
+    assert verdict(replace(facts, together=of(0.005))).verdict == "adequate"
+    # Validation data may ask for tyres that no effect stands for: names stand by their own shares.
+    assert verdict(replace(WHOLE, unforeseen=True)).verdict == "explained"
+
+
+def test_validation_data_err_by_more_than_is_foretold_beyond_doubt_and_by_a_share() -> None:
+    assert unforeseen(1.2, 1e-4)
+    assert not unforeseen(1.2, 0.01)
+    assert not unforeseen(1.1, 1e-9)  # long driving shows what is not worth a word
+    assert unforeseen(np.inf, 0.0)
+    assert not unforeseen(0.5, 1.0)
+
+
 def test_a_baseline_with_small_errors_is_adequate_where_no_name_stands() -> None:
     proxy = replace(DRAG, finding="proxy")
     for alone in (
@@ -131,6 +154,17 @@ def test_names_beside_something_that_is_left() -> None:
     assert verdict(little).verdict == "partly_explained"
     only = replace(LEFT, added=(replace(MASS, finding="negligible"),))
     assert verdict(only).verdict == "unknown"
+
+
+def test_no_name_stands_where_all_together_may_take_nothing() -> None:
+    """A share whose interval reaches nothing is no part of what is explained."""
+    facts = replace(LEFT, taken_low=0.0)
+    assert verdict(facts).verdict == "unknown"
+    assert set(withdrawn(facts)) == {"mass", "aero_drag"}
+    assert "its share reaches nothing" in withdrawn(facts)["mass"]
+    assert verdict(replace(LEFT, taken_low=0.05)).verdict == "partly_explained"
+    # Where nothing is left no share is asked for.
+    assert verdict(replace(WHOLE, taken_low=-0.1)).verdict == "explained"
 
 
 def test_a_share_for_which_there_was_no_time_is_said_to_be_unknown() -> None:

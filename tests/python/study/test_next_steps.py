@@ -17,6 +17,7 @@ from sysid_vehicle.rules import Added, ErrorChange, Facts, Share, grade, share_o
 from sysid_vehicle.study import AddedEffect
 from sysid_vehicle.study.beyond import Beyond
 from sysid_vehicle.study.disagree import disagreements
+from sysid_vehicle.study.foretold import Foretold
 from sysid_vehicle.study.next_steps import next_steps
 from sysid_vehicle.study.said import ahead, small
 from sysid_vehicle.study.structure import Structure
@@ -134,6 +135,14 @@ def test_offsets_that_differ_from_log_to_log_are_no_disagreement(truth: Model) -
     assert disagreements(fit, Driving.of(logs[1])) == ()
 
 
+def test_which_of_two_stand_ins_it_is_is_no_question(unknown: Study) -> None:
+    alike = AddedEffect("aero_drag", (), 2.0, 1.0, 1e-9, ("head_wind",), "not with one value")
+    unsure = next_steps(replace(unknown, added=(replace(alike, grade="plausible"),)))
+    sure = next_steps(replace(unknown, added=(replace(alike, grade="alias"),)))
+    assert any("tell aero_drag from head_wind" in step for step in unsure)
+    assert not any("tell aero_drag from head_wind" in step for step in sure)
+
+
 def test_what_is_confounded_is_to_be_told_apart(unknown: Study) -> None:
     drag = AddedEffect("aero_drag", (), 2.0, 1.0, 1e-9, confounded_with=("head_wind",))
     proxy = AddedEffect("mass", (), 2.0, 1.0, 1e-9, stands_in="it is not constant")
@@ -177,20 +186,26 @@ def said(base: Study, rng: random.Random) -> str:
         {"error of v_y 1 s ahead": Explainable("", x + 0.05, x, x + 0.1, 1.0)} for x in (low, high)
     ]
     structure = Structure(*told)
-    validation = drawn_test(rng) if added else None
+    validation = drawn_test(rng)
+    expected = rng.choice((None, Foretold(1.0, 0.5), Foretold(4.0, 1e-9)))
+    slow = rng.choice(((), (), ("force of 113 N sideways", "moment of 90 N m")))
     candidates = rng.choice(P), rng.choice(P)
     missing = (rng.choice(SQUARES), rng.choice(SQUARES)) if added else (0.0, 0.0)
+    share = share_of(*missing)
     unrelated = {"ay_mps2": "ay_mps2 is turned round"} if rng.random() < 0.2 else {}
     facts = Facts(
         drawn_test(rng),
         validation,
         min(candidates),
         missing,
+        share - 0.1,
         added,
         tuple(unrelated.values()),
         excited=rng.random() < 0.8,
         structure=(structure.anywhere, structure.everywhere),
         small=rng.random() < 0.5,
+        unforeseen=expected is not None and expected.unforeseen,
+        slow=slow,
     )
     decision = verdict(facts)
     gone = {e: w.because for w in decision.withdrawn for e in w.effects}
@@ -213,7 +228,6 @@ def said(base: Study, rng: random.Random) -> str:
     )
     last = base.diagnoses[-1]
     ranking = [replace(last.ranking[0], p_value=p, fit=None) for p in candidates]
-    share = share_of(*missing)
     study = replace(
         base,
         verdict=decision.verdict,
@@ -226,6 +240,8 @@ def said(base: Study, rng: random.Random) -> str:
         added=own,
         explained=Beyond(missing, share, share - 0.1, min(share + 0.1, 1.0)) if added else None,
         structure=structure,
+        foretold=expected,
+        slow=slow,
         stopped=("mass",) if rng.random() < 0.3 and min(candidates) < 0.01 else (),
     )
     whole = rng.choice((-0.4, 0.02, 0.95, np.nan))

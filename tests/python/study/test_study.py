@@ -186,7 +186,7 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
     # Where the verdict does not ask for it, the shape of the unknown is not sought.
     assert study.unknown is None
     assert sorted(told["unknown"]) == [
-        *("explainable", "p_value", "strongest", "structure", "together"),
+        *("explainable", "foretold", "p_value", "slow", "strongest", "structure", "together"),
     ]
     assert told["predicting"]["horizon_s"] == 2.0
     assert told["predicting"]["added_is_needed"]
