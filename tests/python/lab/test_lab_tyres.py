@@ -303,7 +303,7 @@ def golden(shared_data: Path, amplitude: str) -> TyreLog:
 
 
 def test_stiffness_from_the_published_drive(shared_data: Path) -> None:
-    log = golden(shared_data, "035").cut(4000, 9000)  # its noise is far below what is asked
+    log = golden(shared_data, "035").cut(4000, 6500)  # its noise is far below what is asked
     fit = identify_tyres(CAR, log, starts=1, profiles=False)
     for axle in ("front", "rear"):
         assert fit[f"BCD_{axle}"].value == pytest.approx(63.36, rel=3e-3)

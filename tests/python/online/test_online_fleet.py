@@ -5,7 +5,7 @@ import pytest
 
 BENCHMARK = ("online", "multibody", "fleet")
 SEED = 77  # of the draw to judge on; nothing was chosen on it
-CARS = 3
+CARS = 2
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -63,9 +62,11 @@ def test_spectra_of_one_device_add_up(rng: np.random.Generator, digital: bool | 
 
 
 def test_a_lag_far_below_is_not_followed_and_any_other_to_the_same_end(
-    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+    start: Model, truth: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fit = hidden_fit("steer_lag.time_constant_s", 0.08)
+    car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
+    # So many samples that a thinned problem leads.
+    fit = identify(start, drive(car, manoeuvres.lap(32.0), seed=5), starts=1)
     model = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.05})
     found = refine_above(model, fit.driving, fit)
     assert found is not None
@@ -117,8 +118,12 @@ def test_exchanges_are_the_same_for_any_number_of_threads(
 ) -> None:
     hidden = {"aero_drag.drag_area_m2": 0.6, "rolling_resistance.coefficient": 0.012}
     car = truth.add("aero_drag", "rolling_resistance").with_values(hidden)
-    test = Driving.of(drive(car, manoeuvres.handling_course(30.0, lateral_mps2=7.5), seed=62))
-    baseline = identify(start, drive(car, manoeuvres.lap(30.0), seed=61), starts=1)
+    course = manoeuvres.handling_course(30.0, lateral_mps2=7.5)
+    train, other = (
+        drive(car, manoeuvre, seed=seed, rate_hz=50.0)
+        for manoeuvre, seed in ((manoeuvres.lap(30.0), 61), (course, 62))
+    )
+    baseline, test = identify(start, train, starts=1), Driving.of(other)
     dx = diagnose(baseline, candidates=["aero_drag", "rolling_resistance", "head_wind"])
     (wind,) = (c for c in dx.ranking if c.id == "head_wind")
     assert wind.fit is not None

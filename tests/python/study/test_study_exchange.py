@@ -43,7 +43,7 @@ def test_two_that_are_confounded_are_tried_against_what_they_have_in_common(
 ) -> None:
     """All motion read elsewhere, and the speed where it was, are an accelerometer elsewhere."""
     car = truth.add("imu_lever_arm").with_values({"imu_lever_arm.forward_m": 0.5})
-    train, test = (drive(car, manoeuvres.lap(15.0), seed=s) for s in (71, 72))
+    train, test = (drive(car, manoeuvres.lap(15.0), seed=s, rate_hz=50.0) for s in (71, 72))
     baseline = identify(start, train, starts=1)
     ranking = diagnose(baseline, candidates=["imu_lever_arm", "cg_position"], refits=0).ranking
     two = ("ins_lever_arm", "speed_sensor_lever_arm")

@@ -25,7 +25,7 @@ def test_what_another_effect_would_do_in_its_place_is_not_its_own(
     car = truth.add("steer_lag", "rolling_resistance").with_values(
         {"steer_lag.time_constant_s": 0.08, "rolling_resistance.coefficient": 0.03}
     )
-    train, test = (drive(car, manoeuvres.lap(30.0), seed=seed) for seed in (3, 13))
+    train, test = (drive(car, manoeuvres.lap(30.0), seed=seed, rate_hz=50.0) for seed in (3, 13))
     asked = ("steer_lag", "rolling_resistance", "head_wind")
     model = start.add(*asked)
     found = own_shares(identify(model, train, starts=1), asked, asked, Driving.of(test))
@@ -64,7 +64,7 @@ def test_the_baseline_is_asked_whether_its_errors_matter(
     truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
-    logs = [drive(car, manoeuvres.lap(20.0), seed=seed) for seed in (71, 72)]
+    logs = [drive(car, manoeuvres.lap(20.0), seed=seed, rate_hz=50.0) for seed in (71, 72)]
     asked: list[Fit] = []
     module = sys.modules["sysid_vehicle.study.improve"]
     monkeypatch.setattr(module, "sufficient", lambda fit, *_: asked.append(fit))
@@ -106,7 +106,7 @@ def test_effects_of_the_model_take_no_room_of_those_that_may_be_added(
     truth: Model, start: Model, altered: Callable[..., Log]
 ) -> None:
     lagging = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.06})
-    logs = [drive(lagging, manoeuvres.lap(20.0), seed=seed) for seed in (71, 72)]
+    logs = [drive(lagging, manoeuvres.lap(20.0), seed=seed, rate_hz=50.0) for seed in (71, 72)]
     turned = [altered(log, yaw_rate_radps=log["yaw_rate_radps"] + 0.01) for log in logs]
     offsets = start.with_nuisances()
     found = improve(offsets, *turned, candidates=["steer_lag"], most_effects=1, starts=1)
@@ -152,7 +152,7 @@ def test_what_the_time_limit_leaves_unknown_is_said(
 ) -> None:
     """Something is left beside what was added; there is no time to ask what it takes."""
     car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
-    logs = [drive(car, manoeuvres.lap(20.0), seed=seed) for seed in (71, 72)]
+    logs = [drive(car, manoeuvres.lap(20.0), seed=seed, rate_hz=50.0) for seed in (71, 72)]
     module = sys.modules["sysid_vehicle.study.improve"]
     monkeypatch.setattr(module, "incomplete", lambda *_: True)
     monkeypatch.setattr(module, "own_shares", lambda *_: {})
