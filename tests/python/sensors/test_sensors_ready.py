@@ -201,7 +201,7 @@ def test_on_a_road_that_wanders_kinematics_tells_no_delays(
     assert checked["delay_vx_s"].found
     assert made_ready([late], [])[2]
     wandering = replace(checked.estimate, road_mps2={"grade": 0.15, "bank": 0.0})
-    monkeypatch.setattr(_ready, "check", lambda logs: replace(checked, estimate=wandering))
+    monkeypatch.setattr(_ready, "checked", lambda *_, **__: replace(checked, estimate=wandering))
     own, _, delayed = made_ready([late], [])
     assert not delayed
     assert own[0] is late
