@@ -105,6 +105,25 @@ TEST_P(SideBySide, PredictionsAreThoseFromOneSampleAfterTheOther) {
     }
 }
 
+TEST_P(SideBySide, SmoothedMeansAreThoseOfTheWholeSmoother) {
+    const Parameters p = typical_parameters();
+    for (const EffectMask effects : {EffectMask{0}, kLagging})
+        for (const Noise& noise : {ordinary_noise(), sloping_noise(), white_noise()}) {
+            const Problem problem = long_run(effects);
+            const Trace smoothed = trace(problem, p.data(), noise, true);
+            std::vector<double> means(problem.samples() * kStatesFull);
+            smoothed_means(problem, p.data(), noise, means.data());
+            for (std::size_t i = 0; i < means.size(); ++i) {
+                EXPECT_EQ(std::isnan(means[i]), std::isnan(smoothed.state[i])) << i;
+                if (!std::isnan(means[i])) {
+                    EXPECT_NEAR(means[i], smoothed.state[i], 1e-6 * (smoothed.state_std[i] + 1e-3))
+                        << i;
+                }
+            }
+            EXPECT_NE(means, smoothed.state);  // other roundings: pieces were used
+        }
+}
+
 TEST_P(SideBySide, FiltersAreThoseOfWholeRuns) {
     bool cut = false;
     for (const EffectMask effects : {EffectMask{0}, kLagging})
