@@ -154,6 +154,15 @@ void register_identify(py::module_& m) {
             },
             py::arg("parameters"), py::arg("noise"), py::arg("smoothed"))
         .def(
+            "smoothed_means",
+            [](const LogwiseProblem& self, const Array& p, const Array& noise) {
+                const double* values = values_of(p);
+                const Noise n = to_noise(noise);
+                return filled(self.samples(), kStatesFull,
+                              [&](double* to) { smoothed_means(self, values, n, to); });
+            },
+            py::arg("parameters"), py::arg("noise"))
+        .def(
             "look_ahead",
             [](const LogwiseProblem& self, const Array& p, const Array& noise,
                const std::vector<std::pair<std::size_t, std::size_t>>& horizons, bool readings) {

@@ -60,6 +60,7 @@ def main_job(vehicle: Vehicle) -> Iterator[tuple[str, Call]]:
     sets = {"parameters": np.tile(p, (5, 1)), "noise": noise}
     yield "log_likelihoods", (known.log_likelihoods, sets)
     yield "trace", (known.trace, {**state, "smoothed": True})
+    yield "smoothed_means", (known.smoothed_means, state)
     yield "look_ahead", (known.look_ahead, {**state, "horizons": [(3, 2), (5, 1)]})
     yield "free_run", (known.free_run, {"parameters": p})
     frozen = known.freeze(p, noise)

@@ -182,6 +182,13 @@ Trace trace(const LogwiseProblem& logged, const double* p, const Noise& noise, b
     return all;
 }
 
+void smoothed_means(const LogwiseProblem& logged, const double* p, const Noise& noise,
+                    double* out) {
+    each(logged, p, [&](const Problem& part, const double* own, std::size_t, std::size_t before) {
+        smoothed_means(part, own, noise, out + before * kStatesFull);
+    });
+}
+
 void look_ahead(const LogwiseProblem& logged, const double* p, const Noise& noise,
                 const std::vector<Horizon>& horizons, double* errors, bool readings) {
     const std::size_t samples = logged.samples();

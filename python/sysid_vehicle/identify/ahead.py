@@ -204,7 +204,7 @@ class _Ahead:
     def looked(self, p: FloatArray) -> _Look:
         """Mean square of each window, and the motion that they begin with."""
         # What is not measured is smoothed with the parameters that are being sought.
-        motion = as_float64(self.whole.trace(p, self.fit.noise.vector(), True)["state"])
+        motion = as_float64(self.whole.smoothed_means(p, self.fit.noise.vector()))
         every = self.fit.driving.windows(self.fit.model, self.windows, motion)
         return squares_of(every.residuals(p, every.freeze(p, self.noise)), self.windows), motion
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..log import Log, several_logs
 from ..vehicle import Vehicle
 from .equations import FAULTS, Readings
 from .estimate import Estimate, estimate, noise_of, preferred
-from .faults import Rival, doubted, faults_of
+from .faults import Rival, SensorFault, doubted, faults_of
 from .motion import Grid, Stretch
 from .parts import cut
 from .result import SensorCheck
@@ -28,8 +28,9 @@ _STEP_SAMPLES = 1.618  # of a channel that is slower than that
 _SEARCHES = 1  # for a better explanation, from one that does without a fault
 _FLOOR = 1e-3  # least noise, of the channel's standard deviation
 
+Told = Callable[[Estimate, Sequence[SensorFault]], bool]
 
-@doing("check of the sensors")
+
 def check(
     logs: Log | Sequence[Log], vehicle: Vehicle | None = None, *, seed: int = 0
 ) -> SensorCheck:
@@ -68,7 +69,22 @@ def check(
     together = several_logs(logs, "check")
     if vehicle is not None:
         expect(vehicle, Vehicle, "check")
-    seed = whole(seed, "seed")
+    return checked(together, vehicle, seed=whole(seed, "seed"))
+
+
+@doing("check of the sensors")
+def checked(
+    together: Sequence[Log],
+    vehicle: Vehicle | None = None,
+    *,
+    seed: int = 0,
+    enough: Told = lambda *_: False,
+) -> SensorCheck:
+    """As `check`, or no more than its first estimate where that is all that was asked for.
+
+    `enough` is asked with this estimate and the faults that it tells. Parts of the driving and
+    explanations without a fault only take claims back, unless one of these is the better one.
+    """
     stretches = pieces(together)
     readings = readings_of(together, stretches)
     refuse_mixed_up(together, readings)
@@ -89,26 +105,29 @@ def check(
         return estimate(means, Grid(where, step_s), names, floors=floors, begin=begin, seed=seed)
 
     found = of(readings, stretches)
-    parts = []
-    for some in cut(stretches):
-        with suppress(SysidError):  # a part may hold too little
-            parts.append(of(readings_of(together, some), some))
-    means = [averaged(r, _MEAN_S) for r in readings]
-    faults = faults_of(found, lacking, parts)
-    for left in range(_SEARCHES, -1, -1):
-        rivals = {}
-        for without in doubted([fault.name for fault in faults if fault.found]):
-            other = of(readings, stretches, without=without)
-            rivals[without] = Rival(other, preferred(means, found, other))
-        faults = faults_of(found, lacking, parts, rivals)
-        best = min(rivals.values(), key=lambda rival: rival.worse, default=None)
-        if not left or best is None or best.worse >= 0.0:
-            break
-        better = of(readings, stretches, begin=best.estimate.faults)
-        if preferred(means, better, found) <= 0.0:
-            break
-        found = better
-        faults = faults_of(found, lacking, parts)
+    faults = faults_of(found, lacking)
+    if not enough(found, faults):
+        parts = []
+        for some in cut(stretches):
+            with suppress(SysidError):  # a part may hold too little
+                parts.append(of(readings_of(together, some), some))
+        if parts:
+            faults = faults_of(found, lacking, parts)
+        means = [averaged(r, _MEAN_S) for r in readings]
+        for left in range(_SEARCHES, -1, -1):
+            rivals = {}
+            for without in doubted([fault.name for fault in faults if fault.found]):
+                other = of(readings, stretches, without=without)
+                rivals[without] = Rival(other, preferred(means, found, other))
+            faults = faults_of(found, lacking, parts, rivals)
+            best = min(rivals.values(), key=lambda rival: rival.worse, default=None)
+            if not left or best is None or best.worse >= 0.0:
+                break
+            better = of(readings, stretches, begin=best.estimate.faults)
+            if preferred(means, better, found) <= 0.0:
+                break
+            found = better
+            faults = faults_of(found, lacking, parts)
     return SensorCheck(
         logs=tuple(together),
         faults=faults,

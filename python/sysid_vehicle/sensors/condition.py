@@ -167,9 +167,11 @@ def _filtered(channels: tuple[_Channel, ...]) -> _Filtered | None:
     over = sum((c.plain.mismatch - 1.0) * c.spectrum.independent for c in channels)
     if 0.5 * over + 3.0 * np.sqrt(0.5 * count) < _EVIDENCE:
         return None
-    fit = with_low_pass([c.spectrum for c in channels])
-    brings = sum(c.plain.cost for c in channels) - fit.cost
-    if fit.response is None or brings < _EVIDENCE * max(fit.mismatch, 1.0):
+    plain = sum(c.plain.cost for c in channels)
+    fit = with_low_pass([c.spectrum for c in channels], plain - _EVIDENCE)
+    if fit is None or fit.response is None:
+        return None
+    if plain - fit.cost < _EVIDENCE * max(fit.mismatch, 1.0):
         return None
     return _Filtered(channels, fit, fit.response)
 

@@ -69,8 +69,8 @@ def fitted(spectra: Sequence[Spectrum]) -> NoiseFit:
     return problem.result(problem.search(problem.begin()))
 
 
-def with_low_pass(spectra: Sequence[Spectrum]) -> NoiseFit:
-    """Fit with one filter for all the spectra.
+def with_low_pass(spectra: Sequence[Spectrum], most: float = np.inf) -> NoiseFit | None:
+    """Fit with one filter for all the spectra; None where none costs less than `most`.
 
     A filter is analogue, or works at the rate of the log before samples are left out.
     """
@@ -80,7 +80,9 @@ def with_low_pass(spectra: Sequence[Spectrum]) -> NoiseFit:
         for corner_hz in _CORNERS_HZ:
             x = problem.search(problem.begin(corner_hz))
             found.append((problem.state(x).cost, problem, x))
-    _, problem, x = min(found, key=lambda item: item[0])
+    cost, problem, x = min(found, key=lambda item: item[0])
+    if not cost < most:
+        return None  # nor does one with fewer parts of the road
     # Parts of the road that bring nothing would still bend the filter: they can only add. That one
     # cannot know whether they are there is part of the delay's uncertainty.
     less = _Problem(problem.spectra, problem.digital, problem.worth(x))

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from ..errors import SysidError
 from ..log import Log
 from .apply import corrected
-from .check import check
+from .check import checked
 from .condition import conditioned
+from .estimate import Estimate
+from .faults import SensorFault
 
 _OF_THE_SPEEDS = ("delay_vx_s", "delay_vy_s")  # of one device as a rule
 _DELAYS = (*_OF_THE_SPEEDS, "delay_ay_s")
@@ -36,16 +38,12 @@ def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], l
     ready = conditioned([*logs, *others])
     own, rest = ready[: len(logs)], ready[len(logs) :]
     try:
-        checked = check(own)
+        found = checked(own, enough=_leaves_the_clocks)
     except SysidError:
         return own, rest, False
-    # A driver who steers, brakes and drives against a road that is not level makes speeds and
-    # accelerations seem to come at other times.
-    if max(checked.estimate.road_mps2.values()) > _LEVEL_MPS2:
+    if _leaves_the_clocks(found.estimate, found.faults):
         return own, rest, False
-    late = {name: checked[name] for name in _DELAYS}
-    if not any(fault.found for fault in late.values()):
-        return own, rest, False
+    late = {name: found[name] for name in _DELAYS}
     together = any(late[name].found for name in _OF_THE_SPEEDS)
     values = {
         name: fault.value
@@ -54,3 +52,13 @@ def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], l
     }
     done = [log.corrected(*corrected(log, values)) for log in ready]
     return done[: len(logs)], done[len(logs) :], True
+
+
+def _leaves_the_clocks(found: Estimate, faults: Sequence[SensorFault]) -> bool:
+    """Whether there is no delay that is to be taken out.
+
+    A driver who steers, brakes and drives against a road that is not level makes speeds and
+    accelerations seem to come at other times.
+    """
+    late = any(fault.found for fault in faults if fault.name in _DELAYS)
+    return not late or max(found.road_mps2.values()) > _LEVEL_MPS2

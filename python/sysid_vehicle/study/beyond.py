@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from warnings import catch_warnings, simplefilter
 
@@ -17,6 +17,7 @@ from ..rules import UNKNOWN, Share, share_of
 from .horizons import PREDICTED, squares_ahead
 
 _DRAWS = 300
+_TOGETHER = 20_000  # blocks of driving, drawn at once
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def beyond_noise(
         return Beyond((0.0,) * len(fits), 1.0, 0.0, 1.0)
     whole = _beyond(squares, sensor, seen)
     draws = generator(seed).integers(0, squares.shape[1], (_DRAWS, squares.shape[1]))
-    shares = [_share(_beyond(squares[:, d], sensor, seen)) for d in draws]
+    shares = [_share(b) for b in in_turn(lambda d: _beyond(squares[:, d], sensor, seen), draws)]
     low, high = np.quantile(shares, (0.025, 0.975))
     return Beyond(tuple(map(float, whole)), _share(whole), float(low), float(high))
 
@@ -106,24 +107,43 @@ def own_share(
     with np.errstate(invalid="ignore", divide="ignore"):
         each = ((beyond[0] - beyond[1]) / np.max(squares, axis=0))[:, seen]
 
-    def mean(rows: FloatArray) -> float:
+    def mean(rows: FloatArray) -> FloatArray:
         with catch_warnings():
             simplefilter("ignore", RuntimeWarning)  # blocks without a prediction this far ahead
-            return float(np.nanmean(np.nanmedian(rows, axis=0)))
+            return as_float64(np.nanmean(median_of_known(rows, axis=-2), axis=-1))
 
     draws = generator(seed).integers(0, len(each), (_DRAWS, len(each)))
-    low, high = np.quantile([mean(each[d]) for d in draws], (0.025, 0.975))
-    return Share(mean(each), float(low), float(high))
+    low, high = np.quantile(in_turn(lambda d: mean(each[d]), draws), (0.025, 0.975))
+    return Share(float(mean(each)), float(low), float(high))
 
 
 def _beyond(squares: FloatArray, sensor: FloatArray, seen: npt.NDArray[np.bool_]) -> FloatArray:
-    with catch_warnings():
-        simplefilter("ignore", RuntimeWarning)  # blocks without a prediction this far ahead
-        middle = np.nanmedian(squares, axis=1)[:, seen]
+    """Of squares (models, ..., blocks, horizons, channels), (..., models)."""
+    middle = median_of_known(squares, axis=-3)[..., seen]
     noise = np.broadcast_to(sensor**2, seen.shape)[seen]
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.maximum(middle - noise, 0.0) / middle[0]
-    return as_float64(np.nan_to_num(ratio, nan=0.0, posinf=0.0).mean(axis=1))
+    means = np.nan_to_num(ratio, nan=0.0, posinf=0.0).mean(axis=-1)
+    return as_float64(np.moveaxis(means, 0, -1))
+
+
+def in_turn(
+    work: Callable[[npt.NDArray[np.intp]], FloatArray], draws: npt.NDArray[np.intp]
+) -> FloatArray:
+    """What work makes of each draw, some of them together."""
+    some = max(_TOGETHER // draws.shape[1], 1)
+    return np.concatenate([work(draws[i : i + some]) for i in range(0, len(draws), some)])
+
+
+def median_of_known(values: FloatArray, axis: int) -> FloatArray:
+    """Median of what is known; as `numpy.nanmedian`, which takes each column by itself."""
+    ordered = np.sort(values, axis=axis)  # what is unknown comes last
+    known = np.sum(~np.isnan(values), axis=axis, keepdims=True)
+    low, high = (
+        np.take_along_axis(ordered, np.maximum(at, 0), axis)
+        for at in ((known - 1) // 2, known // 2)
+    )
+    return as_float64(np.squeeze(0.5 * (low + high), axis))
 
 
 def _share(squares: FloatArray) -> float:

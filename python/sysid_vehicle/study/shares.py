@@ -28,6 +28,7 @@ from ..errors import NumericalError
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_blocks
 from ..identify import Fit, driving_of
 from ..rules import Share, share_between
+from .beyond import in_turn, median_of_known
 
 CHANNELS = ("vy_mps", "yaw_rate_radps", "ay_mps2", "path_m")
 AHEAD = (0.0, 0.5, 1.0, 2.0, 5.0)
@@ -211,7 +212,8 @@ def shares(
     ceiling = _deciles(np.sqrt(best)[None])[:, 0]
     stack = np.stack([squares[0], squares[n - 1], best])
     drawn = generator(seed).integers(0, squares.shape[1], (_DRAWS, squares.shape[1]))
-    middle = np.stack([_middle(stack[:, d]) for d in (slice(None), *drawn)])
+    every = np.vstack([np.arange(squares.shape[1]), drawn])
+    middle = in_turn(lambda d: median_of_known(np.moveaxis(stack[:, d], 1, 0), 2), every)
     long = np.array(horizons_s) >= _LONG_S
     scale = middle[0, 0][long]
     whole = np.nansum(middle[:, :, long] / np.where(scale > 0.0, scale, np.nan), axis=(2, 3))
@@ -246,12 +248,6 @@ def _deciles(errors: FloatArray) -> FloatArray:
             for k, q in enumerate(_QUANTILES):
                 out[(k, *at)] = few[round(q * (len(few) - 1))]
     return as_float64(out)
-
-
-def _middle(squares: FloatArray) -> FloatArray:
-    with catch_warnings():
-        simplefilter("ignore", RuntimeWarning)  # channels without a prediction this far ahead
-        return as_float64(np.nanmedian(squares, axis=1))
 
 
 def _squares(

@@ -105,6 +105,30 @@ TEST_P(SideBySide, PredictionsAreThoseFromOneSampleAfterTheOther) {
     }
 }
 
+TEST_P(SideBySide, SmoothedMeansAreThoseOfTheWholeSmoother) {
+    const Parameters p = typical_parameters();
+    for (const EffectMask effects : {EffectMask{0}, kLagging}) {
+        // States without noise make a covariance singular that the whole smoother inverts: it
+        // leaves out directions that are surer than rounding. Means alone need no inverse.
+        const double close = effects == EffectMask{0} ? 1e-9 : 5e-3;
+        for (const Noise& noise : {ordinary_noise(), sloping_noise(), white_noise()}) {
+            const Problem problem = long_run(effects);
+            const Trace smoothed = trace(problem, p.data(), noise, true);
+            std::vector<double> means(problem.samples() * kStatesFull);
+            smoothed_means(problem, p.data(), noise, means.data());
+            double apart = 0.0;
+            for (std::size_t i = 0; i < means.size(); ++i) {
+                EXPECT_EQ(std::isnan(means[i]), std::isnan(smoothed.state[i])) << i;
+                if (std::isnan(means[i])) continue;
+                const double std = smoothed.state_std[i] + 1e-9;
+                EXPECT_NEAR(means[i], smoothed.state[i], close * std) << i;
+                apart = std::max(apart, std::abs(means[i] - smoothed.state[i]));
+            }
+            EXPECT_GT(apart, 0.0);  // other roundings: pieces were used
+        }
+    }
+}
+
 TEST_P(SideBySide, FiltersAreThoseOfWholeRuns) {
     bool cut = false;
     for (const EffectMask effects : {EffectMask{0}, kLagging})

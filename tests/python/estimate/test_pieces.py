@@ -62,6 +62,7 @@ QUESTIONS: dict[str, Callable[[DrivingProblem, Any, Any, Any], Any]] = {
     "noise score": lambda q, p, g, n: q.noise_score(p, n),
     "filtered": lambda q, p, g, n: tuple(q.trace(p, n, False)[name] for name in TOLD),
     "smoothed": lambda q, p, g, n: tuple(q.trace(p, n, True)[name] for name in TOLD),
+    "smoothed means": lambda q, p, g, n: q.smoothed_means(p, n),
 }
 
 

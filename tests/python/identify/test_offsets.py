@@ -127,6 +127,7 @@ def test_a_shifted_problem_is_that_of_shifted_parameters(
                 problem.trace(p, noise, True)["state"][here],
                 alone.trace(q, noise, True)["state"],
             ),
+            "means": (problem.smoothed_means(p, noise)[here], alone.smoothed_means(q, noise)),
             "ahead": (
                 problem.look_ahead(p, noise, horizons)[:, here],
                 alone.look_ahead(q, noise, horizons),

@@ -180,6 +180,24 @@ def test_a_shift_by_parts_of_a_sample_leaves_white_noise_white(delay_s: float) -
     np.testing.assert_allclose(wave, true, atol=3e-3)
 
 
+def test_where_no_delay_is_found_no_rival_is_sought(
+    log: sv.Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part = log.between(0.0, 30.0)
+    scaled = _with(part, ay_mps2=1.08 * part["ay_mps2"])
+    assert [fault.name for fault in sv.check(scaled).found] == ["gain_ay"]
+
+    def refused(*_: object) -> float:
+        raise RuntimeError("a rival")
+
+    monkeypatch.setitem(_ready.checked.__wrapped__.__globals__, "preferred", refused)
+    with pytest.raises(RuntimeError, match="a rival"):
+        sv.check(scaled)
+    own, _, delayed = made_ready([scaled], [])
+    assert not delayed
+    assert own[0] is scaled
+
+
 def test_late_speeds_are_read_earlier_in_all_logs(log: sv.Log) -> None:
     late = {c: np.interp(log["time_s"] - 0.02, log["time_s"], log[c]) for c in MOTION[:2]}
     own, others, delayed = made_ready([_with(log, **late)], [_with(log, **late)])
@@ -201,7 +219,7 @@ def test_on_a_road_that_wanders_kinematics_tells_no_delays(
     assert checked["delay_vx_s"].found
     assert made_ready([late], [])[2]
     wandering = replace(checked.estimate, road_mps2={"grade": 0.15, "bank": 0.0})
-    monkeypatch.setattr(_ready, "check", lambda logs: replace(checked, estimate=wandering))
+    monkeypatch.setattr(_ready, "checked", lambda *_, **__: replace(checked, estimate=wandering))
     own, _, delayed = made_ready([late], [])
     assert not delayed
     assert own[0] is late

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from sysid_vehicle import Fit, Model, NumericalError, diagnose, drive, identify, manoeuvres
 from sysid_vehicle._common.threads import at_most
@@ -14,8 +15,9 @@ from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import ahead, maximum, predicting_ahead, refine, refine_above
 from sysid_vehicle.identify.ahead import _Ahead
 from sysid_vehicle.sensors.low_pass import _Problem
-from sysid_vehicle.sensors.spectrum import spectrum_of
+from sysid_vehicle.sensors.spectrum import _bias, _of_windows, spectrum_of
 from sysid_vehicle.study import steps
+from sysid_vehicle.study.beyond import median_of_known
 from sysid_vehicle.study.steps import alternatives, exchanged
 
 
@@ -33,6 +35,30 @@ def test_signals_that_are_regressed_together_have_the_shares_of_each_alone(
         np.testing.assert_allclose(*figures, rtol=1e-9)
     assert together[0].share > 0.3 > together[2].share
     assert left_out(["a"], X, Y[:, [0]], 0 * fold, piece) == []
+
+
+def test_medians_that_are_taken_together_are_those_of_each_column(
+    rng: np.random.Generator,
+) -> None:
+    squares = rng.random((2, 4, 13, 3, 5))
+    squares[rng.random(squares.shape) < 0.3] = np.nan
+    squares[rng.random(squares.shape) < 0.05] = np.inf
+    squares[:, :, 0] = 1.0
+    np.testing.assert_array_equal(median_of_known(squares, -3), np.nanmedian(squares, axis=-3))
+    assert np.isnan(median_of_known(np.full((4, 1), np.nan), 0)).all()
+
+
+@pytest.mark.parametrize("width", [200, 201])
+def test_spectra_of_all_windows_are_those_of_one_after_the_other(
+    rng: np.random.Generator, width: int
+) -> None:
+    values = np.cumsum(rng.standard_normal(3001))
+    each = _of_windows(values, 50.0, width)
+    how = {"window": "hann", "nperseg": width, "detrend": "linear"}
+    _, _, known = signal.spectrogram(values, 50.0, noverlap=width // 2, **how)
+    np.testing.assert_allclose(each.T[1:], known[1:], rtol=1e-9)
+    _, median = signal.welch(values, 50.0, average="median", **how)
+    np.testing.assert_allclose(np.median(each, axis=0)[1:] / _bias(len(each)), median[1:])
 
 
 @pytest.mark.parametrize("digital", [None, False, True])

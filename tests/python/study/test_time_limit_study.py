@@ -19,7 +19,8 @@ CANDIDATES = ["steer_lag", "aero_drag", "rolling_resistance", "yaw_inertia", "gy
 
 KERNELS = (
     *("freeze", "half_sum_of_squares", "log_likelihoods", "look_ahead", "noise_score"),
-    *("normal_equations", "residuals", "sensitivities", "signal_sensitivities", "trace"),
+    *("normal_equations", "residuals", "sensitivities", "signal_sensitivities", "smoothed_means"),
+    "trace",
 )
 
 # Once the time is over: one scoring of all effects, and errors of two models on two data sets.

@@ -101,6 +101,10 @@ struct Trace {
 
 Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smoothed);
 
+/// The states that the smoother tells, samples x kStatesFull, without how sure they are: a third of
+/// the work.
+void smoothed_means(const Problem& logged, const double* p, const Noise& noise, double* out);
+
 /// Predictions so many samples ahead, of which one sample in `every` starts one.
 struct Horizon {
     std::size_t ahead = 1;

@@ -98,13 +98,16 @@ class _Regression:
     inverse: FloatArray  # posterior covariance (k, d, d)
     log_determinant: FloatArray
 
+    @cached_property
+    def _std(self) -> FloatArray:
+        return as_float64(np.sqrt(np.einsum("kii->ki", self.inverse)))
+
     def __call__(self, score: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Log Bayes factors against nothing, posterior means and standard deviations."""
         s = score[self.columns]
         mean = np.einsum("kij,kj->ki", self.inverse, s)
-        std = np.sqrt(np.einsum("kii->ki", self.inverse))
         log_bf = 0.5 * (np.einsum("ki,ki->k", s, mean) + self.log_determinant)
-        log_share, cut, narrow = _on_side(mean, std, self.sides)
+        log_share, cut, narrow = _on_side(mean, self._std, self.sides)
         return log_bf + log_share.sum(axis=1), cut, narrow
 
 
@@ -176,13 +179,17 @@ class ScoreModel:
         n = len(self.score)
         means, stds, mixture = np.zeros(n), np.zeros(n), np.zeros(n)
         found = []
+        over = score / self._ratios
         for regression in self._regressions:
-            log_bf, mean, std = regression(score / self._ratios)
+            log_bf, mean, std = regression(over)
             log_odds[regression.which] += log_bf
             # The form with most parameters speaks last: it is the one that is printed.
             means[regression.columns], stds[regression.columns] = mean, std
             found.append((regression, mean))
-        weights = np.exp(log_odds - np.logaddexp(0.0, scipy.special.logsumexp(log_odds)))
+        # Many times for each posterior: scipy's own sum takes as long as all the rest.
+        top = max(float(log_odds.max()), 0.0)
+        weights = np.exp(log_odds - top)
+        weights /= weights.sum() + np.exp(-top)
         for regression, mean in found:
             np.add.at(mixture, regression.columns, weights[regression.which][:, None] * mean)
         return weights, mixture, means, stds
@@ -293,9 +300,11 @@ def _on_side(
 
     Prior and posterior lose their other half: what stays is twice as dense.
     """
+    cut = sides != 0.0
     z = sides * mean / std
-    log_share = np.where(sides != 0.0, np.log(2.0) + scipy.special.log_ndtr(z), 0.0)
-    mills = np.exp(-0.5 * z**2 - 0.5 * np.log(2.0 * np.pi) - scipy.special.log_ndtr(z))
-    mills = np.where(sides != 0.0, mills, 0.0)
+    log_kept = scipy.special.log_ndtr(z)
+    log_share = np.where(cut, np.log(2.0) + log_kept, 0.0)
+    mills = np.exp(-0.5 * z**2 - 0.5 * np.log(2.0 * np.pi) - log_kept)
+    mills = np.where(cut, mills, 0.0)
     narrow = std * np.sqrt(np.clip(1.0 - mills * (mills + z), 0.0, 1.0))
     return log_share, mean + sides * std * mills, narrow

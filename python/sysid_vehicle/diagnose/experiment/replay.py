@@ -271,7 +271,7 @@ class Replay:
             problem = _core.Problem(fit.model.core(force_known=driving.force_known))
             shift = driving.shift(fit.model, log)
             problem.add_run(1.0 / log.rate_hz, inputs[here], measured[here], start_s, shift=shift)
-            motion = problem.trace(fit.model.vector(), fit.noise.vector(), True)["state"][:, :3]
+            motion = problem.smoothed_means(fit.model.vector(), fit.noise.vector())[:, :3]
             every = _every(log)
             parts = np.arange(0, len(motion), every)
             dt, n = every / log.rate_hz, len(parts)
