@@ -68,13 +68,12 @@ class BothDrivings:
     ) -> tuple[float, FloatArray, FloatArray]:
         """Half the sum of squares, G' e and G' G of the sensitivities G."""
         one = self.later.normal_equations(p, gains.later, columns)
-        other = self.before.normal_equations(self._own(p), gains.before, columns)
-        moves = self._moves(columns)
-        return (
-            float(one[0] + other[0]),
-            as_float64(one[1] + moves * other[1]),
-            as_float64(one[2] + np.outer(moves, moves) * other[2]),
-        )
+        few = np.flatnonzero(self._moves(columns))
+        own = [columns[i] for i in few]
+        cost, descent, information = self.before.normal_equations(self._own(p), gains.before, own)
+        one[1][few] += descent
+        one[2][np.ix_(few, few)] += information
+        return float(one[0] + cost), as_float64(one[1]), as_float64(one[2])
 
     def noise_score(self, p: FloatArray, noise: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Log-likelihood, its derivatives by the noise's logarithms, and their information."""

@@ -116,9 +116,12 @@ class Competition:
             n: pseudo_inverse(self._information[np.ix_(h.columns, h.columns)])[0]
             for n, h in self._whole.items()
         }
-        found = {}
+        found: dict[tuple[str, str], float] = {}
         for a, one in self._whole.items():
             for b, other in self._whole.items():
+                if (b, a) in found:
+                    found[a, b] = found[b, a]
+                    continue
                 cross = self._information[np.ix_(one.columns, other.columns)]
                 both = inverses[a] @ cross @ inverses[b] @ cross.T
                 found[a, b] = float(np.clip(np.linalg.eigvals(both).real.max(), 0.0, 1.0))

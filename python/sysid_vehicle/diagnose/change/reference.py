@@ -22,14 +22,15 @@ from ...model import Model
 from ..candidates.possible import OF_A_FACTOR
 from .beside_reference import Shared, Side
 from .both_drivings import BothDrivings
-from .maximum import along, highest
+from .maximum import along, highest, highest_of
 from .may_change import May, change
 
 _FAR = 3.0  # usual sizes, within which a search begins
-_SHARES = (0.25, 0.5, 1.0, 2.0)  # of the usual size, where it may begin too
+_SHARES = (0.5, 1.0, 2.0)  # of the usual size, where it may begin too
 _DELAY = "delay_s"  # how names of delays end
 _FOLLOWED = 2  # of the likeliest starts
 _WORTH = 2.0  # nats, below which nothing is named: it need not be known what both share
+_BEHIND = 200.0  # nats: what lacks more beside others need not be told how much it lacks
 _LOOSE = 2.0  # times the usual change, by which fitted parameters may be off
 _VAGUE = 0.1  # of the information: of the prior of unknown forces that both drivings share
 
@@ -104,6 +105,7 @@ class Reference:
         self.shared = Shared(as_float64(precision), centre)
         self._fitted: dict[frozenset[str], tuple[Model, float]] = {}
         self._nothing, self._unchanged = -np.inf, model
+        self._likeliest = self._best = -np.inf  # of later driving, and less what both share
         self._alone = self._fit(before, (), {}, {})[1]
 
     def value(self, name: str) -> float:
@@ -157,11 +159,13 @@ class Reference:
         for n in model.free_names:
             shift[self.place[n]] = model.value(n) - self.value(n)
         changes = {n: change(n, own.value(n), model.value(n)) for n in sizes}
-        if put and reached > self._nothing + _WORTH:
-            reached -= max(self._same(start, own, model) - self._nothing, 0.0)
-        elif not put:
+        if not put:
             model, reached = self._climbed(start, model)
             self._nothing, self._unchanged = reached, model
+        self._likeliest = max(self._likeliest, reached)
+        if put and reached > max(self._nothing + _WORTH, self._best - _BEHIND):
+            reached -= max(self._same(start, own, model) - self._nothing, 0.0)
+        self._best = max(self._best, reached)
         return Exact(tuple(put), replace(start, model=model), shift, changes, reached)
 
     def _climbed(self, start: Fit, model: Model) -> tuple[Model, float]:
@@ -180,9 +184,10 @@ class Reference:
         ends = [{n: m.value(n) for n in apart.free_names} for m in (own, apart)]
         ends.append({n: 0.5 * (ends[0][n] + ends[1][n]) for n in apart.free_names})
         ends.append(ends[0] | {n: self._unchanged.value(n) for n in self._unchanged.free_names})
-        starts = np.array([box.inside(apart.with_values(e).vector()) for e in ends])
-        best = int(np.argmax(objective.log_likelihoods(starts, noise)))
-        return highest(objective, starts[best], noise, box)[1]
+        starts = [box.inside(apart.with_values(e).vector()) for e in ends]
+        gains = objective.freeze(starts[0], noise)
+        begin = min(starts, key=lambda p: _cost(objective, p, gains))
+        return highest(objective, begin, noise, box)[1]
 
     def _own(
         self, put: Sequence[str], sizes: Mapping[str, float], usual: Mapping[str, float]
@@ -213,9 +218,9 @@ class Reference:
         objective = self._objective(start, model, own, list(sizes), list(sizes))
         p, best = box.inside(model.vector()), -np.inf
         starts = self._starts(model, objective, sizes, usual, also, own is not None)
-        for begin in starts[:_FOLLOWED]:
+        bar = -np.inf if own is None else self._likeliest
+        for there, value in highest_of(objective, starts[:_FOLLOWED], noise, box, best=bar):
             with suppress(NumericalError, np.linalg.LinAlgError):
-                there, value = highest(objective, begin, noise, box)
                 for name in (n for n in usual if n.endswith(_DELAY)):
                     at = model.parameters[name].column
                     there, value = along(objective, there, value, at, usual[name], noise, box)
@@ -254,8 +259,9 @@ class Reference:
             for m in near
             for start in starts
         ]
-        values = objective.log_likelihoods(np.array(sets), noise)
-        return [sets[i] for i in np.argsort(-values, kind="stable")]
+        # Where a search begins is told by the gains of one of them: filters cost far more.
+        gains = objective.freeze(box.inside(model.vector()), noise)
+        return sorted(sets, key=lambda p: _cost(objective, p, gains))
 
     def _objective(
         self,
@@ -284,3 +290,11 @@ class Reference:
             before = self.before.driving.problem(own)
             problem = BothDrivings(problem, before, own.vector(), shared)
         return Objective(problem, (stays,), *noise_range(model.vehicle, start.driving))
+
+
+def _cost(objective: Objective, p: FloatArray, gains: Any) -> float:
+    """Half the sum of squares; infinite where the model fails."""
+    with suppress(NumericalError):
+        cost = objective.half_sum_of_squares(p, gains)
+        return cost if np.isfinite(cost) else np.inf
+    return np.inf
