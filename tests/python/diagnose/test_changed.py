@@ -24,6 +24,8 @@ from sysid_vehicle._common.arrays import FloatArray
 from sysid_vehicle.diagnose.change.beside_reference import Differences, Shared, Side
 from sysid_vehicle.diagnose.change.both_drivings import BothDrivings
 from sysid_vehicle.diagnose.change.may_change import change as change_of
+from sysid_vehicle.diagnose.change.may_change import of_effect
+from sysid_vehicle.diagnose.change.reference import Reference
 from sysid_vehicle.diagnose.evidence import evidence
 from sysid_vehicle.estimate import Driving
 
@@ -63,6 +65,32 @@ def test_what_changed_is_named_with_its_size(offset: Change) -> None:
     assert offset["steer_ratio"].said == "unchanged"
     assert offset.after.model.value(OFFSET) == pytest.approx(0.006, abs=5e-4)
     assert offset.before.model.effects == ()
+
+
+def test_what_would_be_named_is_named(truth: Model, before: Fit, offset: Change) -> None:
+    """A change just as large as the drive is said to name; one that matters little is not."""
+    (ratio,) = offset["steer_ratio"].least
+    assert 3.0 * offset["steer_ratio"].std[0] < ratio < 0.03
+    change = changed(before, later(truth, steer_ratio__ratio_error=ratio), candidates=FEW)
+    assert [e.id for e in change.named] == ["steer_ratio"]
+    matters = before.model.with_nuisances().parameters["steer_offset.offset_rad"].matters
+    assert matters < offset["steer_offset"].least[0] < 2.0 * matters
+
+
+def test_changes_are_judged_at_the_maximum_as_nothing_is(truth: Model, before: Fit) -> None:
+    """A search that holds gains ends below what is a part of its model."""
+    effect = next(e for e in before.model.candidates if e.id == "yaw_inertia")
+    driving = Driving.of(later(truth, D_front=0.9 * truth.value("D_front")))
+    start = replace(before, driving=driving, estimates=(), covariance=np.zeros((0, 0)))
+    reference = Reference(before, [of_effect(effect)], [effect])
+    nothing = reference.fitted(start, (), {}, {})
+    name = "yaw_inertia.relative_error"
+    state = reference.fitted(start, ("yaw_inertia",), {name: 0.0}, {name: 0.25})
+    top = reference.climbed(start, state)
+    assert (nothing.climbed, state.climbed, top.climbed) == (True, False, True)
+    assert top.log_likelihood > state.log_likelihood + 1.0
+    assert top.log_likelihood > nothing.log_likelihood
+    assert reference.climbed(start, top) is top
 
 
 def test_nothing_is_named_where_nothing_changed(fit: Fit, course: Log) -> None:
@@ -141,7 +169,8 @@ def test_another_vehicle_file_is_what_changed(car: Vehicle, start: Model, before
 
 
 def test_tyres_of_an_axle_may_change(truth: Model, before: Fit) -> None:
-    worn = later(truth, D_front=0.8 * truth.value("D_front"))
+    """Fitted beside those of the other axle they go far along a valley that no line tells."""
+    worn = later(truth, D_front=0.9 * truth.value("D_front"))
     change = changed(before, worn, candidates=("steer_ratio", "yaw_inertia"))
     assert [e.id for e in change.named] == ["tyre_front"]
     assert change["tyre_front"].names == ("B_front", "C_front", "D_front", "E_front")
@@ -154,6 +183,7 @@ def test_a_change_prints_and_is_kept(offset: Change, tmp_path: Path) -> None:
     told = offset.to_dict()["effects"]["steer_offset"]
     assert told["said"] == "changed"
     assert told["change"]["offset_rad"]["value"] == offset["steer_offset"].value[0]
+    assert told["change"]["offset_rad"]["least"] == offset["steer_offset"].least[0]
     frame = offset.to_pandas()
     assert frame.loc[OFFSET, "said"] == "changed"
     offset.before.save(tmp_path / "before.npz")

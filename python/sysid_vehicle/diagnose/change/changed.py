@@ -36,6 +36,7 @@ from .reference import Exact, Reference
 
 _TRIED = 5  # of the best single changes, exactly
 _ROUNDS = 4  # times that scores are taken anew
+_CLOSE = 4.0  # nats of evidence, that a search may end below the maximum
 
 
 @explaining
@@ -158,7 +159,7 @@ class _Search:
             for effect in state.put:
                 for rival in self._rivals(effect, told):
                     self._visit(_instead(state.put, effect, rival), told)
-            best = self._best(told, state)
+            best, state = self._best(told, state), self.visited[frozenset(state.put)]
             if best is state:
                 best = self._better(state, told)
             if best.put in seen:
@@ -197,8 +198,13 @@ class _Search:
             self._visit(both, told, (begin | state.changes, begin | other.changes))
             pair = self.visited.get(frozenset(both))
             if pair is not None:
+                # No line tells more of one than the likelihood loses without it.
                 w, v = (
-                    told.wald(a, b, pair.changes) for a, b in ((rival, effect), (effect, rival))
+                    min(
+                        told.wald(a, b, pair.changes),
+                        2.0 * max(pair.log_likelihood - alone.log_likelihood, 0.0),
+                    )
+                    for a, b, alone in ((rival, effect, state), (effect, rival, other))
                 )
                 prices = (told.price(s.put, s.shift) for s in (state, other))
                 odds[rival] = 0.5 * (w - v) / ratio + next(prices) - next(prices)
@@ -259,7 +265,13 @@ class _Search:
         return state.reached / ratio - told.price(state.put, state.shift)
 
     def _best(self, told: Competition, state: Exact) -> Exact:
+        """The state with most evidence, all that come close to it at their maxima."""
         ratio = told.ratio_of(state.put)
+        least = max(self._evidence(s, told, ratio) for s in self.visited.values()) - _CLOSE
+        for key, s in tuple(self.visited.items()):
+            if not s.climbed and self._evidence(s, told, ratio) > least:
+                with suppress(NumericalError, np.linalg.LinAlgError):
+                    self.visited[key] = self.reference.climbed(self.start, s)
         return max(self.visited.values(), key=lambda s: self._evidence(s, told, ratio))
 
     def _change(self, told: Competition, state: Exact) -> Change:
@@ -296,7 +308,7 @@ class _Search:
                     sizes |= self._sizes_in(other, e)
                     lines = self._of_the_car(beside.stds, other)
                     stds |= {n: max(lines[n], stds[n]) for n in self.can[e].names}
-        found = [self._of(m, causes, sizes, stds) for m in self.may]
+        found = [self._of(m, causes, sizes, stds, told) for m in self.may]
         order = [e for s in causes.sets for e in s.effects]
         found.sort(
             key=lambda e: (order.index(e.id) if e.id in order else len(order), -e.probability)
@@ -343,12 +355,21 @@ class _Search:
         return CredibleSet(tuple(names[:few]), tuple(listed.values())[:few], listed)
 
     def _of(
-        self, m: May, causes: Causes, sizes: dict[str, float], stds: dict[str, float]
+        self,
+        m: May,
+        causes: Causes,
+        sizes: dict[str, float],
+        stds: dict[str, float],
+        told: Competition,
     ) -> EffectChange:
         rules, own = self.rules, causes.of(m.id)
         value, std = (tuple(known[n] for n in m.names) for known in (sizes, stds))
         bound = tuple(abs(v) + rules.bound * s for v, s in zip(value, std, strict=True))
         matters = [p.matters for p in m.parameters]
+        least = tuple(
+            max(told.least(s, usual), w + (rules.bound - 1.0) * s)
+            for s, usual, w in zip(std, m.scale, matters, strict=True)
+        )
         group: tuple[str, ...] = ()
         said: Said = "not testable"
         if own is not None:
@@ -362,4 +383,4 @@ class _Search:
             said = "unchanged"
         names, units = zip(*((p.name, p.unit) for p in m.parameters), strict=True)
         probability = causes.inclusion.get(m.id, 0.0)
-        return EffectChange(m.id, names, units, value, std, bound, probability, said, group)
+        return EffectChange(m.id, names, units, value, std, bound, probability, said, group, least)
