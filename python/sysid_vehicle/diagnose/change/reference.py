@@ -257,9 +257,13 @@ class Reference:
         p, best = box.inside(model.vector()), -np.inf
         starts = self._starts(model, objective, sizes, usual, also, own is not None)
         bar = -np.inf if own is None else self._likeliest
-        for there, value in highest_of(objective, starts[:_FOLLOWED], noise, box, best=bar):
+        delays = [n for n in usual if n.endswith(_DELAY)]
+        several = starts[:_FOLLOWED]
+        for there, value in highest_of(
+            objective, several, noise, box, best=bar, every=bool(delays)
+        ):
             with suppress(NumericalError, np.linalg.LinAlgError):
-                for name in (n for n in usual if n.endswith(_DELAY)):
+                for name in delays:
                     at = model.parameters[name].column
                     there, value = along(objective, there, value, at, usual[name], noise, box)
                 if value > best:
