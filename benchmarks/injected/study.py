@@ -8,7 +8,10 @@ evidence become part of the model, at most three, until nothing more is missing:
 reference. Then each injection (`falsify.py`) is compared with it by `sv.changed`, as if it were
 other driving. Named: the effect that undoes it changed, perhaps as one of a group. Size: the change
 of it lies within the 95 % interval. Wrong name: something else is named, and is of no group with
-it. Not testable: it is not named, and its interval is wider than the injection.
+it. Not testable: it is not named, and its interval is wider than the injection. To be named asks
+for more than an interval off nothing, as any of fifty effects may have changed: of injections that
+are as large as `EffectChange.least`, by which `sv.changed` says what it would name, counts are
+given by themselves.
 
 `--other`: the faults are put into another half minute than the reference's, with its sensors put
 right as those of the reference; that of the validation log with `--validation`.
@@ -74,6 +77,7 @@ def judged(injection: Falsified, log: sv.Log, before: sv.Fit, settled: Sequence[
         "wanted": injection.size,
         "std": std,
         "testable": bool(found.named or _SIDES * std < abs(injection.size)),
+        "least": float(found.least[at]),
         "named": found.named,
         "inside": bool(abs(difference - injection.size) < _SIDES * std),
         "wrong": wrong(change, effect),
@@ -146,6 +150,11 @@ def main() -> None:
         if args.json is not None:
             args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     print(summary(rows))
+    large = [r for of in rows.values() for r in of.values() if abs(r["wanted"]) >= r["least"]]
+    print(
+        f"as large as would be named: {len(large)}, named {sum(r['named'] for r in large)}, "
+        f"inside {sum(r['inside'] for r in large)}"
+    )
     print(f"without a fault something is named in {sum(map(bool, unchanged.values()))} drives")
 
 

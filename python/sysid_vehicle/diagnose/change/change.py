@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+
 from ..._common.printed import Part, Printed, Table
 from ..._common.tables import frame
 from ..._common.text import brief, number, with_error
@@ -33,6 +35,9 @@ class EffectChange:
         Differences of its parameters and their standard errors, beside what else changed.
     bound : tuple of float
         How far from nothing each difference may be, at 95 %.
+    least : tuple of float
+        Of each parameter, were it alone, the smallest difference that this driving would have named
+        with a probability of 95 %; infinite where it would have named none.
     probability : float
         Of being among what changed.
     said : str
@@ -52,6 +57,7 @@ class EffectChange:
     probability: float
     said: Said
     group: tuple[str, ...] = ()
+    least: tuple[float, ...] = ()
 
     @property
     def named(self) -> bool:
@@ -152,11 +158,13 @@ class Change(Printed):
     def to_pandas(self) -> Any:
         """A DataFrame of all parameters, by effect and parameter."""
         rows = [
-            (f"{e.id}.{n}", v, s, b, u, e.probability, e.said)
+            (f"{e.id}.{n}", v, s, b, m, u, e.probability, e.said)
             for e in self.effects
-            for n, v, s, b, u in zip(e.names, e.value, e.std, e.bound, e.units, strict=True)
+            for n, v, s, b, m, u in zip(
+                e.names, e.value, e.std, e.bound, e.least, e.units, strict=True
+            )
         ]
-        head = ("parameter", "change", "std", "bound", "unit", "probability", "said")
+        head = ("parameter", "change", "std", "bound", "least", "unit", "probability", "said")
         columns = {h: [row[i] for row in rows] for i, h in enumerate(head)}
         return frame(columns, "parameter")
 
@@ -171,9 +179,15 @@ class Change(Printed):
                     "probability": e.probability,
                     "group": list(e.group),
                     "change": {
-                        n: {"value": v, "std": s, "bound": b, "unit": u}
-                        for n, v, s, b, u in zip(
-                            e.names, e.value, e.std, e.bound, e.units, strict=True
+                        n: {
+                            "value": v,
+                            "std": s,
+                            "bound": b,
+                            "least": m if np.isfinite(m) else None,
+                            "unit": u,
+                        }
+                        for n, v, s, b, m, u in zip(
+                            e.names, e.value, e.std, e.bound, e.least, e.units, strict=True
                         )
                     },
                 }

@@ -232,9 +232,32 @@ class Competition:
         block = self._information[np.ix_(columns, columns)] * np.outer(scale, scale)
         known = np.eye(len(columns)) + block / self.ratio_of(put)
         sizes = (self._turns.T @ shift)[columns] / scale
-        odds = self._rules.nothing / (1.0 - self._rules.nothing) * len(self._whole)
         occam = 0.5 * float(np.linalg.slogdet(known)[1]) + 0.5 * float(sizes @ sizes)
-        return occam + len(put) * float(np.log(odds))
+        return occam + len(put) * self._of_one
+
+    @property
+    def _of_one(self) -> float:
+        """Price of a change, whatever its size: any of all may be it [nats]."""
+        odds = self._rules.nothing / (1.0 - self._rules.nothing) * len(self._whole)
+        return float(np.log(odds))
+
+    def least(self, std: float, usual: float) -> float:
+        """The smallest change of one parameter that is named with probability `Rules.credible`.
+
+        Where its evidence, less what `price` takes off, is as large as a name asks for; and by as
+        many standard errors more as chance may take off that.
+
+        Parameters
+        ----------
+        std, usual : float
+            Standard error, and standard deviation of the prior.
+        """
+        if std >= usual:
+            return np.inf
+        share, rules = (std / usual) ** 2, self._rules
+        asked = float(np.log(rules.credible / (1.0 - rules.credible)))
+        nats = self._of_one + asked + 0.5 * float(np.log1p(1.0 / share))
+        return std * (float(np.sqrt(2.0 * nats / (1.0 - share))) + rules.bound)
 
     def wald(self, effect: str, beside: str, changes: Mapping[str, float]) -> float:
         """Squared standard errors by which an effect is off nothing, with another one free."""

@@ -80,10 +80,12 @@ def highest_of(
     box: Box,
     *,
     best: float = -np.inf,
+    every: bool = False,
 ) -> list[tuple[FloatArray, float]]:
     """Ends of searches from several starts, the likeliest first.
 
     All are followed roughly; what falls behind then, or came to the same end, is not followed on.
+    Over a delay there are many ends, and what falls behind may be near a better one: `every`.
     """
     if len(starts) == 1:
         return [highest(objective, starts[0], noise, box, best=best)]
@@ -96,7 +98,8 @@ def highest_of(
     for p, value in rough:
         top = rough[0][1]
         least = top - max(2.0 * _ROUGH, _HOPELESS * (best - top))
-        if value < least or any(box.near(p, q, SAME_VALLEY) for q, _ in ends):
+        behind = value < least and not every
+        if behind or any(box.near(p, q, SAME_VALLEY) for q, _ in ends):
             continue
         with suppress(NumericalError, np.linalg.LinAlgError):
             ends.append(highest(objective, p, noise, box, best=best))

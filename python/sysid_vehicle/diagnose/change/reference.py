@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,7 +17,7 @@ from ...estimate import noise_range
 from ...identify import Fit
 from ...identify.box import free_box
 from ...identify.objective import LinearRows, Objective
-from ...identify.settle import climb
+from ...identify.settle import climb as to_the_maximum
 from ...model import Model
 from ..candidates.possible import OF_A_FACTOR
 from .beside_reference import Shared, Side
@@ -48,16 +48,22 @@ class Exact:
         By which its parameters differ from those of the reference as it was.
     changes : dict of str to float
         By which parameters of what changed differ from the reference fitted in the same way.
+    log_likelihood : float
+        Of both drivings.
     reached : float
-        Log-likelihood of both drivings, less what the changes gain where they are in both the same:
-        what the reference left is no evidence.
+        The same, less what the changes gain where they are in both the same: what the reference
+        left is no evidence.
+    climbed : bool
+        Whether that is the maximum of the likelihood itself, and not where a search stands still.
     """
 
     put: tuple[str, ...]
     fit: Fit
     shift: FloatArray
     changes: dict[str, float]
+    log_likelihood: float
     reached: float
+    climbed: bool = False
 
 
 class Reference:
@@ -154,29 +160,60 @@ class Reference:
         if key not in self._fitted:
             self._fitted[key] = self._own(put, sizes, usual)
         own = self._fitted[key][0]
-        model, reached = self._fit(start, put, sizes, usual, own, also)
+        if not put:
+            model, value = self._fit(start, put, sizes, usual, own)
+            model, value = self._climbed(start, model, own, [], [])
+            self._nothing, self._unchanged = value, model
+            return self._exact(start, put, sizes, model, value, climbed=True)
+        model, value = self._fit(start, put, sizes, usual, own, also)
+        return self._exact(start, put, sizes, model, value, climbed=False)
+
+    def climbed(self, start: Fit, state: Exact) -> Exact:
+        """The same at the maximum of the likelihood, as is what nothing changed.
+
+        Searches hold gains: they end some nats below it, as much as a change may gain.
+        """
+        if state.climbed:
+            return state
+        own, names = self._fitted[frozenset(state.put)][0], list(state.changes)
+        model, value = self._climbed(start, state.fit.model, own, names, names)
+        return self._exact(start, state.put, names, model, value, climbed=True)
+
+    def _exact(
+        self,
+        start: Fit,
+        put: Sequence[str],
+        names: Iterable[str],
+        model: Model,
+        value: float,
+        *,
+        climbed: bool,
+    ) -> Exact:
+        """What was fitted, less what the changes gain where they are in both the same."""
+        own, reached = self._fitted[frozenset(put)][0], value
+        self._likeliest = max(self._likeliest, value)
+        if put and value > max(self._nothing + _WORTH, self._best - _BEHIND):
+            same = self._same(start, own, model, climb=climbed)
+            reached -= max(same - self._nothing, 0.0)
+        self._best = max(self._best, reached)
         shift = np.zeros(len(self.side.names))
         for n in model.free_names:
             shift[self.place[n]] = model.value(n) - self.value(n)
-        changes = {n: change(n, own.value(n), model.value(n)) for n in sizes}
-        if not put:
-            model, reached = self._climbed(start, model)
-            self._nothing, self._unchanged = reached, model
-        self._likeliest = max(self._likeliest, reached)
-        if put and reached > max(self._nothing + _WORTH, self._best - _BEHIND):
-            reached -= max(self._same(start, own, model) - self._nothing, 0.0)
-        self._best = max(self._best, reached)
-        return Exact(tuple(put), replace(start, model=model), shift, changes, reached)
+        changes = {n: change(n, own.value(n), model.value(n)) for n in names}
+        fit = replace(start, model=model)
+        return Exact(tuple(put), fit, shift, changes, value, reached, climbed)
 
-    def _climbed(self, start: Fit, model: Model) -> tuple[Model, float]:
-        """Where nothing changed, all the way: what is lacking there would be called a change."""
-        objective = self._objective(start, model, self.before.model, [], [])
+    def _climbed(
+        self, start: Fit, model: Model, own: Model, loose: Sequence[str], changed: Sequence[str]
+    ) -> tuple[Model, float]:
+        """From where a search stands still to the maximum of the likelihood itself."""
+        objective = self._objective(start, model, own, loose, changed)
         noise, box = self.before.noise.vector(), free_box(model)
-        p, _, reached = climb(objective, model.vector(), noise, box)
+        p, _, reached = to_the_maximum(objective, model.vector(), noise, box)
         values = {n: float(p[model.parameters[n].column]) for n in model.free_names}
         return model.with_values(values), reached
 
-    def _same(self, start: Fit, own: Model, apart: Model) -> float:
+    def _same(self, start: Fit, own: Model, apart: Model, *, climb: bool) -> float:
         """Log-likelihood of both drivings where what was put in is in both the same."""
         noise, box = self.before.noise.vector(), free_box(apart)
         changed = [n for n in apart.free_names if n not in self.before.model.free_names]
@@ -187,7 +224,8 @@ class Reference:
         starts = [box.inside(apart.with_values(e).vector()) for e in ends]
         gains = objective.freeze(starts[0], noise)
         begin = min(starts, key=lambda p: _cost(objective, p, gains))
-        return highest(objective, begin, noise, box)[1]
+        p, value = highest(objective, begin, noise, box)
+        return to_the_maximum(objective, p, noise, box)[2] if climb else value
 
     def _own(
         self, put: Sequence[str], sizes: Mapping[str, float], usual: Mapping[str, float]
@@ -219,9 +257,13 @@ class Reference:
         p, best = box.inside(model.vector()), -np.inf
         starts = self._starts(model, objective, sizes, usual, also, own is not None)
         bar = -np.inf if own is None else self._likeliest
-        for there, value in highest_of(objective, starts[:_FOLLOWED], noise, box, best=bar):
+        delays = [n for n in usual if n.endswith(_DELAY)]
+        several = starts[:_FOLLOWED]
+        for there, value in highest_of(
+            objective, several, noise, box, best=bar, every=bool(delays)
+        ):
             with suppress(NumericalError, np.linalg.LinAlgError):
-                for name in (n for n in usual if n.endswith(_DELAY)):
+                for name in delays:
                     at = model.parameters[name].column
                     there, value = along(objective, there, value, at, usual[name], noise, box)
                 if value > best:

@@ -1,0 +1,210 @@
+"""The search for what changed: scores lead, exact likelihoods of both drivings decide."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from ...effects import Effect
+from ...errors import NumericalError
+from ...identify import Fit
+from ...rules import Rules
+from ...vehicle import AXLES
+from ..candidates.clocks import CLOCKS
+from ..candidates.possible import considered
+from .beside_reference import Differences, Side
+from .changes_compete import Competition
+from .may_change import YAW_INERTIA, of_clock, of_effect, of_inertia, of_tyre
+from .reference import Exact, Reference
+
+_TRIED = 5  # of the best single changes, exactly
+_ROUNDS = 4  # times that scores are taken anew
+_CLOSE = 4.0  # nats of evidence, that a search may end below the maximum
+
+
+def _instead(put: tuple[str, ...], effect: str, rival: str) -> tuple[str, ...]:
+    return tuple(rival if e == effect else e for e in put)
+
+
+class Search:
+    """The reference once, the later driving wherever leading changes have been put in.
+
+    Parameters
+    ----------
+    before : Fit
+        The reference.
+    start : Fit
+        The same on the later driving.
+    candidates : sequence of str, optional
+        Effects beside those of the model that may have changed.
+    rules : Rules
+
+    Attributes
+    ----------
+    may : list of May
+        What may have changed.
+    can : dict of str to May
+        What of it can be fitted.
+    reference : Reference
+    visited : dict of frozenset to Exact
+        What was fitted, by what was put in.
+    """
+
+    def __init__(
+        self, before: Fit, start: Fit, candidates: Sequence[str | Effect] | None, rules: Rules
+    ) -> None:
+        self.before, self.start, self.rules = before, start, rules
+        model, both = start.model, (before.driving, start.driving)
+        free, lacked = set(model.free_names), {e.id for e in before.model.candidates}
+        effects = tuple(
+            e
+            for e in considered(model, candidates)
+            if e.scanned is None and e.id in lacked and all(d.shows(e) for d in both)
+        )
+        own = (e for e in model.parts if e.scanned is None and free.issuperset(e.named))
+        several = [*map(of_effect, (*own, *effects)), *(of_tyre(model, a) for a in AXLES)]
+        if YAW_INERTIA in free:
+            several.append(of_inertia(model))
+        clocks = [c for c in CLOCKS if c.channel != "fx_n" or start.driving.force_known]
+        fitted = [m for m in several if m.id in {e.id for e in effects} or free.issuperset(m.names)]
+        self.can = {m.id: m for m in fitted}
+        self.may = [*fitted, *map(of_clock, clocks)]
+        self.reference = Reference(before, fitted, effects)
+        self.visited: dict[frozenset[str], Exact] = {}
+
+    def found(self) -> tuple[Competition, Exact]:
+        """What competes where the changes that explain most have been put in, and these."""
+        begin = self.reference.fitted(self.start, (), {}, {})
+        self.visited[frozenset()] = begin
+        # Lines are drawn from the reference: where nothing may change it goes far from any car.
+        told = self.told(replace(begin, fit=self.start, shift=np.zeros_like(begin.shift)))
+        alone = [(e,) for e in told.alone if e in self.can][:_TRIED]
+        for few in (self._leading(told, begin), *alone):
+            self._visit(few, told)
+        state = max(self.visited.values(), key=lambda s: self.evidence(s, told, 1.0))
+        seen: set[tuple[str, ...]] = set()
+        for _ in range(_ROUNDS):
+            told = self.told(state)
+            seen.add(state.put)
+            self._visit(self._leading(told, state), told)
+            for effect in state.put:
+                for rival in self._rivals(effect, told):
+                    self._visit(_instead(state.put, effect, rival), told)
+            best, state = self._best(told, state), self.visited[frozenset(state.put)]
+            if best is state:
+                best = self._better(state, told)
+            if best.put in seen:
+                break
+            state = best
+        return told, state
+
+    def _better(self, state: Exact, told: Competition) -> Exact:
+        """The same with a rival in place of an effect, where both together say it is the rival."""
+        for effect in state.put:
+            odds = self.odds(effect, state, told)
+            best = max(odds, key=lambda e: odds[e])
+            if best != effect:
+                return self.visited[frozenset(_instead(state.put, effect, best))]
+        return state
+
+    def odds(self, effect: str, state: Exact, told: Competition) -> dict[str, float]:
+        """Log-odds of what was fitted in place of an effect that was put in.
+
+        A rival is fitted together with it too, in the reference and in the later driving: which of
+        the two differs tells more than which of them alone is likelier, as what the reference left
+        may speak for one of them.
+        """
+        ratio, odds = told.ratio_of(state.put), {effect: 0.0}
+        here, nothing = self.evidence(state, told, ratio), self.visited[frozenset()]
+        least = self.rules.near * (state.reached - nothing.reached)
+        for rival in self.can:
+            other = self.visited.get(frozenset(_instead(state.put, effect, rival)))
+            if rival in state.put or other is None:
+                continue
+            odds[rival] = self.evidence(other, told, ratio) - here
+            if other.reached - nothing.reached < least:
+                continue
+            both = (*state.put, rival)
+            begin = dict.fromkeys((*state.changes, *other.changes), 0.0)
+            self._visit(both, told, (begin | state.changes, begin | other.changes))
+            pair = self.visited.get(frozenset(both))
+            if pair is not None:
+                # No line tells more of one than the likelihood loses without it.
+                w, v = (
+                    min(
+                        told.wald(a, b, pair.changes),
+                        2.0 * max(pair.log_likelihood - alone.log_likelihood, 0.0),
+                    )
+                    for a, b, alone in ((rival, effect, state), (effect, rival, other))
+                )
+                prices = (told.price(s.put, s.shift) for s in (state, other))
+                odds[rival] = 0.5 * (w - v) / ratio + next(prices) - next(prices)
+        return odds
+
+    def _rivals(self, effect: str, told: Competition) -> list[str]:
+        """What may have changed in its place."""
+        own = told.causes.of(effect)
+        several = (*self.can[effect].rivals, *(() if own is None else own.effects))
+        return [e for e in dict.fromkeys(several) if e in self.can and e != effect]
+
+    def told(self, state: Exact) -> Competition:
+        """What competes beside what was put in."""
+        reference, side = self.reference, self.reference.side
+        later = Side(state.fit, reference.names, reference.effects, like=side)
+        if self.start.model.vehicle != self.before.model.vehicle:
+            # What both share is told in terms of the vehicle file of the later driving.
+            same = replace(self.before, model=state.fit.model)
+            side = Side(same, reference.names, reference.effects, like=side, residuals_of=side)
+        differences = Differences(side, later, state.shift, reference.shared)
+        return Competition(
+            differences,
+            self.may,
+            reference.place,
+            side.names,
+            np.diag(side.information),
+            self.start.driving.samples,
+            state.put,
+            self.rules,
+        )
+
+    def _leading(self, told: Competition, state: Exact) -> tuple[str, ...]:
+        """Of each credible set the likeliest that can be fitted, or what was, if it is like it."""
+        found = []
+        for s in told.causes.sets:
+            known = next((e for e in s.effects if e in state.put), "")
+            known = known or told.acts_like(s.effects[0])
+            found.append(known or next((e for e in s.effects if e in self.can), ""))
+        return tuple(dict.fromkeys(e for e in (*state.put, *found) if e))
+
+    def _visit(
+        self,
+        put: tuple[str, ...],
+        told: Competition,
+        also: Sequence[Mapping[str, float]] = (),
+    ) -> None:
+        if frozenset(put) in self.visited:
+            return
+        usual = {
+            n: u for e in put for n, u in zip(self.can[e].names, self.can[e].scale, strict=True)
+        }
+        with suppress(NumericalError, np.linalg.LinAlgError):
+            told_by_lines = {n: told.sizes[n] for n in usual}
+            exact = self.reference.fitted(self.start, put, told_by_lines, usual, also)
+            self.visited[frozenset(put)] = exact
+
+    def evidence(self, state: Exact, told: Competition, ratio: float) -> float:
+        """Log-likelihood over the variance ratio, less the price of the changes [nats]."""
+        return state.reached / ratio - told.price(state.put, state.shift)
+
+    def _best(self, told: Competition, state: Exact) -> Exact:
+        """The state with most evidence, all that come close to it at their maxima."""
+        ratio = told.ratio_of(state.put)
+        least = max(self.evidence(s, told, ratio) for s in self.visited.values()) - _CLOSE
+        for key, s in tuple(self.visited.items()):
+            if not s.climbed and self.evidence(s, told, ratio) > least:
+                with suppress(NumericalError, np.linalg.LinAlgError):
+                    self.visited[key] = self.reference.climbed(self.start, s)
+        return max(self.visited.values(), key=lambda s: self.evidence(s, told, ratio))
