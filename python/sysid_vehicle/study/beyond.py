@@ -107,14 +107,14 @@ def own_share(
     with np.errstate(invalid="ignore", divide="ignore"):
         each = ((beyond[0] - beyond[1]) / np.max(squares, axis=0))[:, seen]
 
-    def mean(rows: FloatArray) -> FloatArray:
+    def mean(rows: FloatArray) -> FloatArray:  # (draws, blocks, errors)
         with catch_warnings():
             simplefilter("ignore", RuntimeWarning)  # blocks without a prediction this far ahead
             return as_float64(np.nanmean(median_of_known(rows, axis=-2), axis=-1))
 
     draws = generator(seed).integers(0, len(each), (_DRAWS, len(each)))
     low, high = np.quantile(in_turn(lambda d: mean(each[d]), draws), (0.025, 0.975))
-    return Share(float(mean(each)), float(low), float(high))
+    return Share(float(mean(each[None])[0]), float(low), float(high))
 
 
 def _beyond(squares: FloatArray, sensor: FloatArray, seen: npt.NDArray[np.bool_]) -> FloatArray:

@@ -41,9 +41,9 @@ Drives = Callable[[Model, int], tuple[Log, Log]]
 @pytest.fixture(scope="module")
 def drives() -> Drives:
     def make(car: Model, seed: int) -> tuple[Log, Log]:
-        train = drive(car, manoeuvres.lap(30.0), seed=seed)
-        test = drive(car, manoeuvres.handling_course(30.0, lateral_mps2=7.5), seed=seed + 1)
-        return train, test
+        course = manoeuvres.handling_course(30.0, lateral_mps2=7.5)
+        train = drive(car, manoeuvres.lap(30.0), seed=seed, rate_hz=50.0)
+        return train, drive(car, course, seed=seed + 1, rate_hz=50.0)
 
     return make
 
