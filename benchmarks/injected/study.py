@@ -139,8 +139,10 @@ def main() -> None:
             continue
         print(f"== {log.name}: {', '.join(fit.model.effects)}", flush=True)
         lacked = [e.id for e in fit.model.candidates if e.id not in settled]
-        unchanged[name] = wrong(sv.changed(fit, log, candidates=lacked))
-        print(f"  {'nothing':28s} {', '.join(unchanged[name]) or 'nothing'} named", flush=True)
+        same = sv.changed(fit, log, candidates=lacked)
+        unchanged[name] = wrong(same)
+        told = f"{', '.join(unchanged[name]) or 'nothing'} named; {same.alike}"
+        print(f"  {'nothing':28s} {told}", flush=True)
         rows[name] = {}
         for injection in (f for f in DYNAMIC if args.only in f.what):
             row = judged(injection, log, fit, settled)

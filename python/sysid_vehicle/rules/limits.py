@@ -104,6 +104,14 @@ class Rules:
         _OUTSIDE,
     )
 
+    alike: float = _limit(
+        0.5,
+        "share",
+        "of later driving beyond the speeds and lateral accelerations of a reference that lacks "
+        "something, above which no change is named",
+        _CONVENTION,
+    )
+
     def __post_init__(self) -> None:
         for f in fields(self):
             value = real(getattr(self, f.name))

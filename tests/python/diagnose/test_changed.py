@@ -116,6 +116,41 @@ def test_what_the_reference_left_is_no_change(truth: Model, start: Model) -> Non
     assert inside(other, "steer_offset", 0.002)
 
 
+def slow_and_fast(car: Model, **values: float) -> tuple[Log, Log]:
+    slow = drive(car, manoeuvres.slalom(20.0, speed_mps=14.0), seed=7, rate_hz=50.0)
+    changed_car = car.with_values({n.replace("__", "."): v for n, v in values.items()})
+    course = manoeuvres.handling_course(20.0, lateral_mps2=7.5)
+    return slow, drive(changed_car, course, seed=8, rate_hz=50.0)
+
+
+def test_what_a_model_lacks_elsewhere_is_not_called_a_change(truth: Model, start: Model) -> None:
+    """A biased yaw rate in both, which is an offset of the steering that moves with the speed."""
+    biased = truth.add("gyro_bias").with_values({"gyro_bias.bias_radps": 0.01})
+    slow, fast = slow_and_fast(biased)
+    change = changed(identify(start, slow, starts=1), fast, candidates=FEW)
+    assert change.alike.beyond > 0.9
+    assert change.alike.left is not None
+    assert not change.alike.comparable
+    assert change.named == change.unknown == ()
+    assert change["steer_offset"].said == "uncertain"  # it would have been named
+    text = str(change)
+    assert text.startswith("what differs may be what the model lacks")
+    assert "of the later driving is at speeds or lateral accelerations" in text
+    assert "or what the model lacks in other driving" in text
+
+
+def test_other_driving_of_a_model_that_lacks_nothing_is_compared(
+    truth: Model, start: Model
+) -> None:
+    slow, fast = slow_and_fast(truth.add("steer_offset"), steer_offset__offset_rad=0.006)
+    change = changed(identify(start, slow, starts=1), fast, candidates=FEW)
+    assert change.alike.beyond > 0.9
+    assert change.alike.comparable
+    assert [e.id for e in change.named] == ["steer_offset"]
+    assert inside(change, "steer_offset", 0.006)
+    assert str(change).startswith("changed: steer_offset")
+
+
 def test_what_both_share_need_not_be_nothing(truth: Model, start: Model) -> None:
     """The steering is late in the first drive and early in the second: nothing is between them."""
     delay = "steer_delay.delay_s"

@@ -13,9 +13,16 @@ from ..._common.text import brief, number, with_error
 from ...identify import Fit
 from ...rules import Rules
 from ..candidates.causes import UNKNOWN, Causes, CredibleSet
+from .alike import Alike
 
 Said = Literal[
-    "changed", "one of a group", "implausible", "negligible", "unchanged", "not testable"
+    "changed",
+    "one of a group",
+    "uncertain",
+    "implausible",
+    "negligible",
+    "unchanged",
+    "not testable",
 ]
 
 _NAMED: tuple[Said, ...] = ("changed", "one of a group")
@@ -41,9 +48,10 @@ class EffectChange:
     probability : float
         Of being among what changed.
     said : str
-        `changed`; `one of a group` that explain the driving as well; `implausible`: it acts like
-        what changed, with a size that no car has; `negligible`; `unchanged`, with a bound below
-        what matters; or `not testable` with this driving.
+        `changed`; `one of a group` that explain the driving as well; `uncertain`: changed, or what
+        the model lacks in other driving (`Change.alike`); `implausible`: it acts like what changed,
+        with a size that no car has; `negligible`; `unchanged`, with a bound below what matters; or
+        `not testable` with this driving.
     group : tuple of str
         The others of the group.
     """
@@ -75,6 +83,9 @@ class EffectChange:
         """What is said of it, in words."""
         if self.said == "one of a group":
             return f"changed, or else {', '.join(self.group)}"
+        if self.said == "uncertain":
+            others = f", or else {', '.join(self.group)}" if self.group else ""
+            return f"changed{others}, or what the model lacks in other driving"
         if self.said == "implausible":
             return "acts like what changed, but no car changes so much"
         if self.said in ("unchanged", "not testable"):
@@ -106,6 +117,8 @@ class Change(Printed):
         with `unknown` is a change that no effect of the catalogue explains.
     effects : tuple of EffectChange
         What is named first, then by probability.
+    alike : Alike
+        How far the later driving may be compared with the reference.
     rules : Rules
     """
 
@@ -113,6 +126,7 @@ class Change(Printed):
     after: Fit
     causes: Causes
     effects: tuple[EffectChange, ...]
+    alike: Alike
     rules: Rules
 
     def __getitem__(self, effect: str) -> EffectChange:
@@ -129,9 +143,21 @@ class Change(Printed):
     @property
     def unknown(self) -> tuple[CredibleSet, ...]:
         """Changes that are there and that no effect of the catalogue explains."""
+        if not self.alike.comparable:
+            return ()
+        return self._of_no_effect
+
+    @property
+    def _of_no_effect(self) -> tuple[CredibleSet, ...]:
         return tuple(s for s in self.causes.sets if s.effects[0].startswith(UNKNOWN))
 
     def _headline(self) -> str:
+        uncertain = self._of_no_effect or any(e.said == "uncertain" for e in self.effects)
+        if not self.alike.comparable and uncertain:
+            return (
+                f"what differs may be what the model lacks: {self.alike}; compare driving like "
+                "that of the reference, or give the reference driving of both kinds"
+            )
         leading = [e for e in self.named if not any(self._before(g, e) for g in e.group)]
         told = [f"{e}" + (f" (or else {', '.join(e.group)})" if e.group else "") for e in leading]
         what = f"changed: {'; '.join(told)}" if told else ""
@@ -172,6 +198,7 @@ class Change(Printed):
         """All figures, ready for JSON."""
         return {
             "headline": self._headline(),
+            "beyond": self.alike.beyond,
             "causes": self.causes.to_dict(),
             "effects": {
                 e.id: {

@@ -26,6 +26,7 @@ from ...rules import USUAL, Rules
 from ...vehicle import Vehicle
 from ..candidates.causes import Causes, CredibleSet
 from ..candidates.possible import possible
+from .alike import Alike, alike
 from .change import Change, EffectChange, Said
 from .changes_compete import Competition
 from .may_change import YAW_INERTIA, May
@@ -45,7 +46,9 @@ def changed(
     """Tell what of a car changed since a reference: yesterday's log fits the model, today's not.
 
     What the reference left unexplained counts only as far as the later driving leaves more. Both
-    are taken as independent; noise is that of the reference.
+    are taken as independent; noise is that of the reference. Where the reference is shown to lack
+    something, and most of the later driving is at other speeds or lateral accelerations, what is
+    lacking acts otherwise there, and no difference is named a change (`Change.alike`).
 
     Parameters
     ----------
@@ -96,7 +99,8 @@ def changed(
     )
     if len(driving.logs) > 1 and start.model.offset_names:
         start = replace(start, driving=centred(start)[1])
-    return _Said(Search(before, start, candidates, rules)).change()
+    comparable = alike(before, driving, rules)
+    return _Said(Search(before, start, candidates, rules), comparable).change()
 
 
 def _of_vehicle(model: Model, vehicle: Vehicle) -> Model:
@@ -109,8 +113,8 @@ def _of_vehicle(model: Model, vehicle: Vehicle) -> Model:
 class _Said:
     """What is said of everything that may have changed."""
 
-    def __init__(self, search: Search) -> None:
-        self.search = search
+    def __init__(self, search: Search, alike: Alike) -> None:
+        self.search, self.alike = search, alike
         self.told, self.state = search.found()
 
     def change(self) -> Change:
@@ -154,7 +158,9 @@ class _Said:
         found.sort(
             key=lambda e: (order.index(e.id) if e.id in order else len(order), -e.probability)
         )
-        return Change(self.search.before, state.fit, causes, tuple(found), self.search.rules)
+        return Change(
+            self.search.before, state.fit, causes, tuple(found), self.alike, self.search.rules
+        )
 
     def _sizes_in(self, state: Exact, effect: str) -> dict[str, float]:
         return {n: state.changes[n] for n in self.search.can[effect].names}
@@ -220,6 +226,8 @@ class _Said:
                 said = "implausible"
             elif all(abs(v) + s < w for v, s, w in zip(value, std, matters, strict=True)):
                 said, group = "negligible", ()
+            elif not self.alike.comparable:
+                said = "uncertain"
         elif all(b < w for b, w in zip(bound, matters, strict=True)):
             said = "unchanged"
         names, units = zip(*((p.name, p.unit) for p in m.parameters), strict=True)
