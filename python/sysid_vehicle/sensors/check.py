@@ -82,8 +82,8 @@ def checked(
 ) -> SensorCheck:
     """As `check`, or no more than its first estimate where that is all that was asked for.
 
-    `enough` is asked with this estimate and the faults that it tells. Parts of the driving and
-    explanations without a fault only take claims back, unless one of these is the better one.
+    `enough` is asked with this estimate and the faults that it tells. Parts of the driving only
+    take claims back; explanations without a fault do too, unless one of them is the better one.
     """
     stretches = pieces(together)
     readings = readings_of(together, stretches)

@@ -38,12 +38,16 @@ def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], l
     ready = conditioned([*logs, *others])
     own, rest = ready[: len(logs)], ready[len(logs) :]
     try:
-        found = checked(own, enough=_leaves_the_clocks)
+        found = checked(own, enough=_nothing)
     except SysidError:
         return own, rest, False
-    if _leaves_the_clocks(found.estimate, found.faults):
+    # A driver who steers, brakes and drives against a road that is not level makes speeds and
+    # accelerations seem to come at other times.
+    if max(found.estimate.road_mps2.values()) > _LEVEL_MPS2:
         return own, rest, False
     late = {name: found[name] for name in _DELAYS}
+    if not any(fault.found for fault in late.values()):
+        return own, rest, False
     together = any(late[name].found for name in _OF_THE_SPEEDS)
     values = {
         name: fault.value
@@ -54,11 +58,6 @@ def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], l
     return done[: len(logs)], done[len(logs) :], True
 
 
-def _leaves_the_clocks(found: Estimate, faults: Sequence[SensorFault]) -> bool:
-    """Whether there is no delay that is to be taken out.
-
-    A driver who steers, brakes and drives against a road that is not level makes speeds and
-    accelerations seem to come at other times.
-    """
-    late = any(fault.found for fault in faults if fault.name in _DELAYS)
-    return not late or max(found.road_mps2.values()) > _LEVEL_MPS2
+def _nothing(_: Estimate, faults: Sequence[SensorFault]) -> bool:
+    """Whether no fault is told: a delay may come out of what explains another one away."""
+    return not any(fault.found for fault in faults)
