@@ -54,10 +54,10 @@ const char* name_of(Op op) {
     }
 }
 
-using Step = std::tuple<const char*, int, int, int, double>;
+using WrittenStep = std::tuple<const char*, int, int, int, double>;
 
-std::vector<Step> steps(const WrittenModel& model) {
-    std::vector<Step> all;
+std::vector<WrittenStep> steps(const WrittenModel& model) {
+    std::vector<WrittenStep> all;
     all.reserve(model.calculation.steps.size());
     for (const SpelledStep& s : model.calculation.steps)
         all.emplace_back(name_of(s.op), s.a, s.b, s.c, s.constant);

@@ -147,6 +147,7 @@ bool means_in_pieces(const Problem& problem, const double* p, const Noise& noise
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         const Run& run = problem.runs[i];
         std::vector<double> forget;
+        forget.reserve(noise.disturbances());
         for (std::size_t d = 0; d < noise.disturbances(); ++d)
             forget.push_back(noise.forget(d, run.dt));
         if (!means_of_run(run, forget, moving, rows, numbers.data() + first[i] * wide, wide,

@@ -69,7 +69,7 @@ class Recorded {
 /// Gives a number the name that it has where the calculation is written as text. A name may be
 /// given again to what takes its place. Costs nothing with any other scalar.
 template <class S>
-const S& named(const char* name, const S& x) {
+S named(const char* name, const S& x) {
     if constexpr (std::is_same_v<S, Recorded>) name_step(name, x);
     return x;
 }
