@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exported import module_of, typical
 
 import sysid_vehicle as sv
 from sysid_vehicle.errors import InvalidInput, SysidWarning
@@ -27,19 +28,6 @@ CATALOGUE = tuple(e.id for e in sv.catalogue() if not e.acts)
 ALL = tuple(e for e in CATALOGUE if e not in SENSORS | NOT_TOLD)
 # Its states feed back on what they follow: `settled` does not find where they rest.
 SETTLING = tuple(e for e in ALL if e != "tyre_temperature")
-
-
-def typical(model: sv.Model, *effects: str) -> sv.Model:
-    """The model with effects at their typical sizes."""
-    new = model.add(*effects)
-    sizes = {f"{e}.{p.name}": p.typical for e in effects for p in sv.effect(e).parameters}
-    return new.with_values(sizes)
-
-
-def module_of(model: sv.Model) -> dict[str, Any]:
-    space: dict[str, Any] = {}
-    exec(compile(python_text(model), "exported", "exec"), space)
-    return space
 
 
 def compiled(model: sv.Model, motion: np.ndarray, steer: float, force: float) -> np.ndarray:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exported import module_of, typical
 
 import sysid_vehicle as sv
 from sysid_vehicle.effects import Parameter
@@ -74,18 +75,6 @@ def known() -> Iterator[None]:
     yield
     for name in all_of_them:
         sv.forget_effect(name)
-
-
-def typical(model: sv.Model, *effects: str) -> sv.Model:
-    new = model.add(*effects)
-    sizes = {f"{e}.{p.name}": p.typical for e in effects for p in sv.effect(e).parameters}
-    return new.with_values(sizes)
-
-
-def module_of(model: sv.Model) -> dict[str, Any]:
-    space: dict[str, Any] = {}
-    exec(compile(python_text(model), "exported", "exec"), space)
-    return space
 
 
 def test_rates_are_those_of_the_compiled_model(truth: sv.Model, rng: np.random.Generator) -> None:
