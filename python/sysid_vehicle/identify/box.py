@@ -11,9 +11,9 @@ from ..model import Model
 from .objective import LinearRows, Objective, gaussian_prior
 from .search import Box
 
-# Of the typical size of a lag, its smallest. Of several lags of one effect some may not be there
-# at all: precise sensors tell a tenth of a typical delay from none.
-_NEXT_TO_NONE, _ONE_OF_SEVERAL = 0.1, 1e-3
+# Of the typical size of a lag, its smallest: precise sensors tell a twentieth of it from none. Of
+# several lags of one effect some may not be there at all.
+_NEXT_TO_NONE, _ONE_OF_SEVERAL = 0.01, 1e-3
 
 
 def free_box(model: Model) -> Box:

@@ -14,6 +14,7 @@ from .parts import Z95, scatter
 from .texts import DEG, why_not
 
 _FALSE_CLAIMS = 0.01  # over all faults of one check
+_OF_THE_SPEEDS = ("delay_vx_s", "delay_vy_s")
 _LEARNED = 0.5  # share of what is known of a fault that has to come from the log
 
 
@@ -115,6 +116,23 @@ class Rival:
     def share(self) -> float:
         """Its probability beside the explanation with the fault."""
         return 1.0 / (1.0 + math.exp(min(self.worse, 500.0)))
+
+
+def to_put_right(faults: Sequence[SensorFault]) -> dict[str, float]:
+    """Faults that a log is freed of, by name: those found, and what follows from them.
+
+    Both speeds come from one device as a rule: where the delay of one is found, that of the other
+    is taken out as it is estimated, unless that is nearer to none.
+    """
+    values = {fault.name: fault.value for fault in faults if fault.found}
+    known = [values[name] for name in _OF_THE_SPEEDS if name in values]
+    if len(known) == 1:
+        values |= {
+            fault.name: fault.value
+            for fault in faults
+            if fault.name in _OF_THE_SPEEDS and abs(fault.value - known[0]) < abs(fault.value)
+        }
+    return values
 
 
 def doubted(names: Sequence[str]) -> list[tuple[str, ...]]:

@@ -10,10 +10,9 @@ from .apply import corrected
 from .check import checked
 from .condition import conditioned
 from .estimate import Estimate
-from .faults import SensorFault
+from .faults import SensorFault, to_put_right
 
-_OF_THE_SPEEDS = ("delay_vx_s", "delay_vy_s")  # of one device as a rule
-_DELAYS = (*_OF_THE_SPEEDS, "delay_ay_s")
+_DELAYS = ("delay_vx_s", "delay_vy_s", "delay_ay_s")
 _LEVEL_MPS2 = 0.05  # change of gravity within a second, on a road that counts as level
 
 
@@ -45,16 +44,10 @@ def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], l
     # accelerations seem to come at other times.
     if max(found.estimate.road_mps2.values()) > _LEVEL_MPS2:
         return own, rest, False
-    late = {name: found[name] for name in _DELAYS}
-    if not any(fault.found for fault in late.values()):
+    late = to_put_right([found[name] for name in _DELAYS])
+    if not late:
         return own, rest, False
-    together = any(late[name].found for name in _OF_THE_SPEEDS)
-    values = {
-        name: fault.value
-        for name, fault in late.items()
-        if fault.found or (together and fault.told and name in _OF_THE_SPEEDS)
-    }
-    done = [log.corrected(*corrected(log, values)) for log in ready]
+    done = [log.corrected(*corrected(log, late)) for log in ready]
     return done[: len(logs)], done[len(logs) :], True
 
 

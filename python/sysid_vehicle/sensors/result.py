@@ -20,7 +20,7 @@ from .apply import corrected
 from .colour import Colour
 from .equations import Readings
 from .estimate import Estimate
-from .faults import SensorFault
+from .faults import SensorFault, to_put_right
 from .motion import Stretch
 from .signals import MOVING, Signal
 from .texts import ON_CORRECTION, gradient, map_line
@@ -129,29 +129,26 @@ class SensorCheck:
     @property
     def map_lines(self) -> tuple[str, ...]:
         """Lines for the table ``[channels]`` of a channel map that put right what was found."""
-        lines = []
+        values, lines = to_put_right(self.faults), []
         for channel in MOVING:
             delay, gain, bias = (
-                self._found_value(table.get(channel)) for table in (_DELAYS, _GAINS, _BIASES)
+                values.get(table.get(channel, ""), 0.0) for table in (_DELAYS, _GAINS, _BIASES)
             )
             if delay or gain or bias:
                 lines.append(map_line(channel, delay, gain, bias))
         return tuple(lines)
 
-    def _found_value(self, name: str | None) -> float:
-        return self[name].value if name is not None and self[name].found else 0.0
-
     def apply(self, log: Log) -> Log:
         """Return the log with what was found put right, and with what was done recorded.
 
-        Time offsets, biases and scales (gravity by roll and pitch is one) are taken out; the
+        Where the delay of one speed was found, a like one of the other is put right too. Time
+        offsets, biases and scales (gravity by roll and pitch is one) are taken out; the
         accelerations are those of the speed sensor's place, in its direction. Faults that were not
         found are left alone; so is the steering angle. Where no wheel force is logged the measured
         a_x is what drives the car, and its mean beyond the motion is taken out: bias of the sensor
         and slope of the road are one there. That of a_y is left to the tyres, which can tell them.
         """
-        values = {fault.name: fault.value for fault in self.found}
-        channels, what = corrected(log, values)
+        channels, what = corrected(log, to_put_right(self.faults))
         bias, std = self.offsets["ax_mps2"]
         if log.has("ax_mps2") and not log.has("fx_n") and abs(bias) > _SURE * std:
             channels["ax_mps2"] = channels.get("ax_mps2", log["ax_mps2"]) - bias

@@ -13,6 +13,7 @@ from sysid_vehicle.sensors import made_ready
 from sysid_vehicle.sensors import ready as _ready
 from sysid_vehicle.sensors.apply import shifted
 from sysid_vehicle.sensors.condition import conditioned, low_passes
+from sysid_vehicle.sensors.faults import SensorFault, to_put_right
 
 SPEEDS, INERTIAL = ("vx_mps", "vy_mps"), ("yaw_rate_radps", "ax_mps2", "ay_mps2")
 MOTION = (*SPEEDS, *INERTIAL)
@@ -222,3 +223,19 @@ def test_on_a_road_that_wanders_kinematics_tells_no_delays(
     own, _, delayed = made_ready([late], [])
     assert not delayed
     assert own[0] is late
+
+
+def _fault(name: str, value: float, *, found: bool) -> SensorFault:
+    return SensorFault(name, name[6:8], "delay", value, 0.003, "s", True, found)
+
+
+@pytest.mark.parametrize(("other", "follows"), [(0.008, True), (0.004, False), (-0.012, False)])
+def test_a_late_speed_takes_the_other_one_with_it_where_that_is_late_too(
+    other: float, follows: bool
+) -> None:
+    vx, vy = _fault("delay_vx_s", 0.011, found=True), _fault("delay_vy_s", other, found=False)
+    expected = {"delay_vx_s": 0.011} | ({"delay_vy_s": other} if follows else {})
+    assert to_put_right([vx, vy, _fault("delay_ay_s", 0.01, found=False)]) == expected
+    assert to_put_right([vy]) == {}
+    absent = SensorFault("delay_vy_s", "vy_mps", "delay", 0.0, np.inf, "s", False, False)
+    assert to_put_right([vx, absent]) == {"delay_vx_s": 0.011}
