@@ -26,6 +26,8 @@ _DEVICES_S = {
     **dict.fromkeys(INERTIAL, 0.010),
     "steer_rad": 0.010,
 }
+# Effects that a rung brings about: the wheel force is on time where all else is late.
+PRESENT = dict.fromkeys(("late", "all"), ("force_lag",))
 _QUANTA = {
     "vx_mps": 0.02,
     "vy_mps": 0.02,

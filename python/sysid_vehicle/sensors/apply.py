@@ -38,7 +38,8 @@ def corrected(log: Log, found: Mapping[str, float]) -> tuple[dict[str, FloatArra
     ):
         if name in found and log.has(channel):
             now[channel] = shifted(log["time_s"], values(channel), found[name])
-            what.append(f"{channel}: taken {1000.0 * found[name]:.3g} ms later in the file")
+            when = "later" if found[name] > 0.0 else "earlier"
+            what.append(f"{channel}: taken {1000.0 * abs(found[name]):.3g} ms {when} in the file")
     for channel, bias, gain in (
         ("yaw_rate_radps", "bias_yaw_rate_radps", "gain_yaw_rate"),
         ("vy_mps", "bias_vy_mps", ""),

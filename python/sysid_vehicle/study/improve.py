@@ -4,51 +4,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Literal
-from warnings import catch_warnings, simplefilter
 
 from .._common.arguments import duration, whole
 from .._common.progress import teller
-from .._common.threads import before, in_parallel
-from ..compare import compare
-from ..diagnose import Instead, considered, instead, judge, omnibus
+from .._common.threads import before
+from ..diagnose import considered
 from ..effects import effect
-from ..errors import SysidWarning, warn
 from ..estimate import Driving
-from ..identify import Fit, driving_of, explaining
+from ..identify import explaining
 from ..identify.identify import maximised
-from ..log import Log, check_excitation, several_logs
+from ..log import Log, several_logs
 from ..model import Model
-from ..rules import USUAL, Rules, incomplete, verdict
+from ..rules import USUAL, Rules
 from ..sensors import SensorCheck, made_ready, put_right
-from .added import added_by
 from .clock import in_time
-from .foretold import foretold
+from .judge import Judge
 from .limit import Judging, Schedule
-from .matters import sizes_that_matter, sufficient
-from .own import own_shares, shown_together
+from .matters import sizes_that_matter
 from .search import Search, Trail, kept
-from .slow import slow_forces
-from .steps import way
-from .structure import structure
 from .study import Study
-from .validation import beyond_noise_ahead, serving, set_aside
-from .verdict import facts_of, in_the_light_of
-
-_SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
+from .validation import set_aside
 
 # What a time limit may leave unknown, in words.
 _CHANNELS = "whether the channels were read at the same moments, with noise that is white"
 _BASELINE = "the likeliest parameters of the baseline"
 _CLOCK = "what follows with the wheel force at the time at which the car feels it"
-_RIVALS = "whether something unknown would do in the place of what was added"
-_UNSHOWN = "whether training and validation data together show anything that is left"
-_FORETOLD = "whether validation data err by more than training data foretell"
-_TOGETHER = "the share of the error 1 to 5 s ahead that the effects take together"
-_ALONE = "the share of the error 1 to 5 s ahead that is due to {} alone"
-_STRUCTURE = "how much of what is left depends on the driving"
-_SMALL = "whether the errors of the baseline are as large as matters"
 
 
 @explaining
@@ -189,116 +170,22 @@ def improve(
         judging.left_out.append(_CLOCK)
     if not found.fits[0].converged and time.perf_counter() > schedule.baseline:
         judging.left_out.append(_BASELINE)
+    judge = Judge(
+        found,
+        test_driving,
+        asks=judging,
+        rules=rules,
+        lacked=[e.id for e in considered(model, candidates)],
+        sizes=sizes,
+        seed=seed,
+    )
     with kept(found):
-        fit, diagnoses = found.fit, found.diagnoses
-        fits = way(found.fits, schedule.judging)
-        floor = fit.noise
-        on_train = in_parallel(lambda f: compare(f, f.driving, noise=floor), fits)
-        on_test = in_parallel(lambda f: compare(f, test_driving, noise=floor), fits)
-        last = diagnoses[-1]
-        fitted = last.omnibus if last.fit is fit else omnibus(fit, fit.driving, rules)
-        explained = None
-        beside = _RIVALS if len(fits) > 1 else _UNSHOWN
-        rivals = judging.asked(beside, lambda: _rivals(fit, fits, test_driving, rules))
-        expected = judging.asked(_FORETOLD, lambda: foretold(fit, test_driving, rules))
-        slow = slow_forces(fit, rules)
-        if len(fits) > 1:
-            explained = judging.asked(_TOGETHER, lambda: beyond_noise_ahead(fits, test_driving))
-        told = judge(
-            fit,
-            scored=(last.scores, last.family) if last.fit is fit else None,
-            lacked={e.id for e in considered(model, candidates)},
-            groups={e: g for e, g in found.rivals.items() if e in fit.model.effects},
-            acted={c.id for dx in diagnoses for c in dx.significant},
-            rules=rules,
-            seed=seed,
-            refitted=found.sizes,
-            settled=True,
-            untried=found.stopped,
-            away={} if rivals is None else rivals.away,
-        )
-        pattern = judging.asked(_STRUCTURE, lambda: structure(fit, test_driving))
-        small = sizes is not None and judging.asked(
-            _SMALL, lambda: sufficient(fits[0], test_driving, sizes) is not None
-        )
-        facts = facts_of(
-            fits,
-            told,
-            on_train[-1],
-            explained,
-            fitted=fitted,
-            together=None if rivals is None else rivals.omnibus,
-            candidate=min((c.p_value for c in last.ranking), default=1.0),
-            excited=_excited(train_driving),
-            structure=(1.0, 0.0) if pattern is None else (pattern.anywhere, pattern.everywhere),
-            small=bool(small),
-            unopposed=len(fits) > 1 and rivals is None,
-            unforeseen=expected is not None and expected.unforeseen,
-            slow=slow,
-        )
-        if len(fits) > 1 and incomplete(facts, rules):
-            named = {a.id for a in facts.added if a.named}
-            shares = own_shares(fit, _new(fits), named, test_driving, schedule.judging)
-            unknown = [e for e in _new(fits) if e not in shares]
-            facts = facts.with_own(shares, unknown)
-            judging.note(unknown, _ALONE)
-            if explained is not None:
-                low = judging.asked(
-                    _TOGETHER, lambda: shown_together(explained, fits, test_driving)
-                )
-                facts = replace(facts, taken_low=0.0 if low is None else low)
-        decision = verdict(facts, rules)
-        alone, told = told, in_the_light_of(decision, told)
-        late = tuple(judging.left_out)
-        return Study(
-            verdict=decision.verdict,
-            fits=tuple(fits),
-            diagnoses=tuple(diagnoses),
-            train=tuple(on_train),
-            test=tuple(on_test),
-            validation=test_driving,
-            added=added_by(found, fits, on_test, told, alone, decision),
-            omnibus=fitted,
-            omnibus_together=None if rivals is None else rivals.omnibus,
-            verdicts=told,
-            warnings=_warnings(fit, train_driving, found, late),
-            seconds=time.perf_counter() - began,
-            rules=rules,
-            explained=explained,
-            structure=pattern,
-            foretold=expected,
-            slow=slow,
-            stopped=found.stopped,
-            late_facts=late,
-            checked=bool(sensors),
-        )
-
-
-def _together(train: Driving, test: Driving) -> Driving:
-    """All driving; the training data where one of the two lacks the wheel force."""
-    same = train.force_known == test.force_known
-    return Driving.joined((train, test)) if same else train
-
-
-def _new(fits: Sequence[Fit]) -> tuple[str, ...]:
-    """Effects that the last model has and the baseline lacks."""
-    return tuple(e for e in fits[-1].model.effects if e not in fits[0].model.effects)
+        return judge.study(began, checked=bool(sensors))
 
 
 def _room(driving: Driving, rules: Rules) -> int:
     """How many effects the driving is long enough for, one at least."""
     return max(int(driving.usable_s / rules.lasts), 1)
-
-
-def _excited(driving: Driving) -> bool:
-    with catch_warnings():
-        simplefilter("ignore", SysidWarning)  # reading the logs has warned of it
-        return check_excitation(driving.logs)
-
-
-def _rivals(fit: Fit, fits: Sequence[Fit], test: Driving, rules: Rules) -> Instead:
-    both = serving(fit, test)
-    return instead(both, _together(fit.driving, driving_of(both, test)), _new(fits), rules)
 
 
 def _ready(
@@ -322,34 +209,3 @@ def _ready(
         return logs, test, (), False
     own, rest, delayed = ready
     return own, None if test is None else rest, ("sensor_delay",) if delayed else (), True
-
-
-def _warnings(fit: Fit, driving: Driving, trail: Trail, late: tuple[str, ...]) -> tuple[str, ...]:
-    found = []
-    if trail.stopped:
-        found.append(
-            f"the time limit ended the search with {', '.join(trail.stopped)} still to be tried"
-        )
-        warn(found[-1])
-    for fact in late:
-        unsure = "without it neither the verdict nor a name is sure"
-        found.append(f"the time limit left unknown {fact}; {unsure}")
-        warn(found[-1])
-    if trail.taken_back:
-        found.append(
-            f"{' and '.join(trail.taken_back)} gained with parameters that predict best; as the "
-            "likelihood fits the model, errors 1 to 5 s ahead grow with it: taken back"
-        )
-    if driving.usable_s < _SHORT_S:
-        found.append(
-            f"{driving}: too short to tell many effects apart; record {_SHORT_S:.0f} s or more, "
-            "with steps, sweeps and corners near the limit"
-        )
-        warn(found[-1])
-    for log in driving.logs:
-        found += [f"{log.name}: {text}" for text in log.missing().values()]
-    found += [f"{e.name}: {e.note} with this driving" for e in fit.estimates if e.note]
-    if not fit.converged:
-        found.append("the final fit did not converge; its intervals may be too short")
-        warn(found[-1])
-    return tuple(dict.fromkeys(found))

@@ -1,0 +1,238 @@
+"""What is known of the model that a search has led to, and the verdict that follows."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from warnings import catch_warnings, simplefilter
+
+from .._common.threads import in_parallel
+from ..compare import compare
+from ..diagnose import Instead, Omnibus, Verdicts, instead, judge, omnibus
+from ..errors import SysidWarning, warn
+from ..estimate import Driving
+from ..identify import Fit, driving_of
+from ..log import check_excitation
+from ..rules import Facts, Rules, incomplete, verdict
+from .added import added_by
+from .beyond import Beyond
+from .foretold import foretold
+from .limit import Judging
+from .matters import sufficient
+from .own import own_shares, shown_together
+from .search import Trail
+from .slow import slow_forces
+from .steps import way
+from .structure import structure
+from .study import Study
+from .validation import beyond_noise_ahead, serving
+from .verdict import facts_of, in_the_light_of
+
+_SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
+
+# What a time limit may leave unknown, in words.
+_RIVALS = "whether something unknown would do in the place of what was added"
+_UNSHOWN = "whether training and validation data together show anything that is left"
+_FORETOLD = "whether validation data err by more than training data foretell"
+_TOGETHER = "the share of the error 1 to 5 s ahead that the effects take together"
+_ALONE = "the share of the error 1 to 5 s ahead that is due to {} alone"
+_STRUCTURE = "how much of what is left depends on the driving"
+_SMALL = "whether the errors of the baseline are as large as matters"
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Asks what the verdict on a final model depends on.
+
+    Attributes
+    ----------
+    trail : Trail
+        Of the search.
+    test : Driving
+        Validation data.
+    asks : Judging
+        In time, or not at all.
+    lacked : collection of str
+        Effects that were considered.
+    sizes : mapping or None
+        Errors that matter, where a user said which.
+    """
+
+    trail: Trail
+    test: Driving
+    asks: Judging
+    rules: Rules
+    lacked: Collection[str]
+    sizes: Mapping[str, float] | None
+    seed: int
+
+    @property
+    def fit(self) -> Fit:
+        """The final one."""
+        return self.trail.fit
+
+    @cached_property
+    def fits(self) -> list[Fit]:
+        """From the baseline to the final one, an effect more each time."""
+        return way(self.trail.fits, self.asks.ends)
+
+    @cached_property
+    def added(self) -> tuple[str, ...]:
+        """Effects that the final model has and the baseline lacks."""
+        return tuple(e for e in self.fit.model.effects if e not in self.fits[0].model.effects)
+
+    @cached_property
+    def fitted(self) -> Omnibus:
+        """Whether the final model leaves anything of what it was fitted to."""
+        last = self.trail.diagnoses[-1]
+        if last.fit is self.fit:
+            return last.omnibus
+        return omnibus(self.fit, self.fit.driving, self.rules)
+
+    def study(self, began: float, *, checked: bool) -> Study:
+        """Judge the final model.
+
+        Parameters
+        ----------
+        began : float
+            When the study did, by `time.perf_counter`.
+        checked : bool
+            Whether the logs were put right by a check of the sensors.
+        """
+        fit, fits, asks, rules = self.fit, self.fits, self.asks, self.rules
+        floor = fit.noise
+        on_train = in_parallel(lambda f: compare(f, f.driving, noise=floor), fits)
+        on_test = in_parallel(lambda f: compare(f, self.test, noise=floor), fits)
+        rivals = asks.asked(_RIVALS if self.added else _UNSHOWN, self._rivals)
+        expected = asks.asked(_FORETOLD, lambda: foretold(fit, self.test, rules))
+        slow = slow_forces(fit, rules)
+        explained = None
+        if self.added:
+            explained = asks.asked(_TOGETHER, lambda: beyond_noise_ahead(fits, self.test))
+        alone = self._alone(rivals)
+        pattern = asks.asked(_STRUCTURE, lambda: structure(fit, self.test))
+        sizes = self.sizes
+        small = sizes is not None and asks.asked(
+            _SMALL, lambda: sufficient(fits[0], self.test, sizes) is not None
+        )
+        facts = facts_of(
+            fits,
+            alone,
+            on_train[-1],
+            explained,
+            fitted=self.fitted,
+            together=None if rivals is None else rivals.omnibus,
+            candidate=min((c.p_value for c in self.trail.diagnoses[-1].ranking), default=1.0),
+            excited=_excited(fit.driving),
+            structure=(1.0, 0.0) if pattern is None else (pattern.anywhere, pattern.everywhere),
+            small=bool(small),
+            unopposed=bool(self.added) and rivals is None,
+            unforeseen=expected is not None and expected.unforeseen,
+            slow=slow,
+        )
+        if self.added and incomplete(facts, rules):
+            facts = self._with_shares(facts, explained)
+        decision = verdict(facts, rules)
+        told, late = in_the_light_of(decision, alone), tuple(asks.left_out)
+        return Study(
+            verdict=decision.verdict,
+            fits=tuple(fits),
+            diagnoses=tuple(self.trail.diagnoses),
+            train=tuple(on_train),
+            test=tuple(on_test),
+            validation=self.test,
+            added=added_by(self.trail, fits, on_test, told, alone, decision),
+            omnibus=self.fitted,
+            omnibus_together=None if rivals is None else rivals.omnibus,
+            verdicts=told,
+            warnings=_warnings(self.trail, late),
+            seconds=time.perf_counter() - began,
+            rules=rules,
+            explained=explained,
+            structure=pattern,
+            foretold=expected,
+            slow=slow,
+            stopped=self.trail.stopped,
+            late_facts=late,
+            checked=checked,
+        )
+
+    def _rivals(self) -> Instead:
+        both = serving(self.fit, self.test)
+        everywhere = _together(self.fit.driving, driving_of(both, self.test))
+        return instead(both, everywhere, self.added, self.rules)
+
+    def _alone(self, rivals: Instead | None) -> Verdicts:
+        """What is to be said of every effect, each for itself."""
+        trail, last = self.trail, self.trail.diagnoses[-1]
+        return judge(
+            self.fit,
+            scored=(last.scores, last.family) if last.fit is self.fit else None,
+            lacked={*self.lacked},
+            groups={e: g for e, g in trail.rivals.items() if e in self.fit.model.effects},
+            acted={c.id for dx in trail.diagnoses for c in dx.significant},
+            rules=self.rules,
+            seed=self.seed,
+            refitted=trail.sizes,
+            settled=True,
+            untried=trail.stopped,
+            away={} if rivals is None else rivals.away,
+        )
+
+    def _with_shares(self, facts: Facts, explained: Beyond | None) -> Facts:
+        """What is known, with what each effect takes off the errors ahead, and all together."""
+        named = {a.id for a in facts.added if a.named}
+        shares = own_shares(self.fit, self.added, named, self.test, self.asks.ends)
+        unknown = [e for e in self.added if e not in shares]
+        facts = facts.with_own(shares, unknown)
+        self.asks.note(unknown, _ALONE)
+        if explained is None:
+            return facts
+        low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.fits, self.test))
+        return replace(facts, taken_low=0.0 if low is None else low)
+
+
+def _together(train: Driving, test: Driving) -> Driving:
+    """All driving; the training data where one of the two lacks the wheel force."""
+    same = train.force_known == test.force_known
+    return Driving.joined((train, test)) if same else train
+
+
+def _excited(driving: Driving) -> bool:
+    with catch_warnings():
+        simplefilter("ignore", SysidWarning)  # reading the logs has warned of it
+        return check_excitation(driving.logs)
+
+
+def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:
+    fit, found = trail.fit, []
+    driving = fit.driving
+    if trail.stopped:
+        found.append(
+            f"the time limit ended the search with {', '.join(trail.stopped)} still to be tried"
+        )
+        warn(found[-1])
+    for fact in late:
+        unsure = "without it neither the verdict nor a name is sure"
+        found.append(f"the time limit left unknown {fact}; {unsure}")
+        warn(found[-1])
+    if trail.taken_back:
+        found.append(
+            f"{' and '.join(trail.taken_back)} gained with parameters that predict best; as the "
+            "likelihood fits the model, errors 1 to 5 s ahead grow with it: taken back"
+        )
+    if driving.usable_s < _SHORT_S:
+        found.append(
+            f"{driving}: too short to tell many effects apart; record {_SHORT_S:.0f} s or more, "
+            "with steps, sweeps and corners near the limit"
+        )
+        warn(found[-1])
+    for log in driving.logs:
+        found += [f"{log.name}: {text}" for text in log.missing().values()]
+    found += [f"{e.name}: {e.note} with this driving" for e in fit.estimates if e.note]
+    if not fit.converged:
+        found.append("the final fit did not converge; its intervals may be too short")
+        warn(found[-1])
+    return tuple(dict.fromkeys(found))
