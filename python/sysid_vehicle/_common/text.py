@@ -23,6 +23,13 @@ def number(x: float, digits: int = 4) -> str:
     return f"{x:.{digits}g}"
 
 
+def few(names: Sequence[str], most: int = 4) -> str:
+    """The first of some names, and how many there are more."""
+    more = len(names) - most
+    # One more is as short as its count.
+    return ", ".join(names[:most]) + f" and {more} more" if more > 1 else ", ".join(names)
+
+
 def with_error(value: float, std: float) -> str:
     """A value with its standard error, or why it has none."""
     if not isfinite(std):

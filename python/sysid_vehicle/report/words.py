@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._common.text import number
+from .._common.text import few, number
 from ..identify import Estimate
 from ..study import AddedEffect, Study
 
@@ -121,7 +121,7 @@ def ranking_rows(study: Study, which: int = 0, most: int = 10) -> list[list[str]
             f"{p.name} {number(v, 3)} ± {number(s, 2)}{unit(p.unit)}"
             for p, v, s in zip(c.effect.parameters, c.value, c.std, strict=True)
         )
-        confounded = ", ".join(c.indistinguishable_from) or "-"
+        confounded = few(c.indistinguishable_from) or "-"
         rows.append(
             [
                 c.id,

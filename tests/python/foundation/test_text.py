@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from sysid_vehicle._common.text import columns, text_table, wrapped
+from sysid_vehicle._common.text import columns, few, text_table, wrapped
 from sysid_vehicle.cli import main
 
 HEAD = ("effect", "p", "in words")
@@ -65,3 +65,9 @@ def test_a_pipe_gets_lines_as_they_are(capsys: pytest.CaptureFixture[str]) -> No
     assert columns() is None
     assert main(["effects"]) == 0
     assert max(map(len, capsys.readouterr().out.splitlines())) > 120
+
+
+def test_of_many_names_the_first_are_printed() -> None:
+    assert few([]) == ""
+    assert few(["a", "b", "c", "d", "e"]) == "a, b, c, d, e"
+    assert few(["a", "b", "c", "d", "e", "f"]) == "a, b, c, d and 2 more"

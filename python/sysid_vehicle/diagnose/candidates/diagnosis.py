@@ -11,7 +11,7 @@ import numpy as np
 from ..._common.printed import Part, Printed, Table
 from ..._common.style import axes_or_new
 from ..._common.tables import frame
-from ..._common.text import brief
+from ..._common.text import brief, few
 from ..._common.threads import in_parallel
 from ...compare import one_step_error
 from ...effects import Effect
@@ -226,7 +226,7 @@ class Diagnosis(Printed):
                 f"{c.p_value:.2g}",
                 "-" if np.isnan(c.error) else f"{c.error:.3f}",
                 c.size,
-                ", ".join(c.indistinguishable_from),
+                few(c.indistinguishable_from),
             ]
             for c in self.ranking[:most]
         ]
@@ -238,7 +238,7 @@ class Diagnosis(Printed):
             return f"something is wrong that no effect can be named for: {self.reservation}"
         what = f"most likely missing: {self.named.effect.title}"
         if self.named.indistinguishable_from:
-            others = ", ".join(self.named.indistinguishable_from)
+            others = few(self.named.indistinguishable_from)
             what += f" (this driving cannot tell it from {others})"
         # The test against unknown forces is blunter than that of one effect: its silence is none.
         return f"{what}; with it {self.beside.omnibus}" if self.omnibus.rejects else what
