@@ -192,6 +192,7 @@ class SensorCheck:
 
     def _rows(self) -> list[tuple[str, ...]]:
         rows: list[tuple[str, ...]] = []
+        taken = to_put_right(self.faults)
         for fault in self.faults:
             if np.isfinite(fault.std):
                 low, high = fault.interval
@@ -200,6 +201,8 @@ class SensorCheck:
             else:
                 span, value = "", ""
             verdict = "found" if fault.found else "not there" if fault.told else "cannot be told"
+            if fault.name in taken and not fault.found:
+                verdict = "like the other speed"
             rows.append((fault.title, fault.channel, value, span, verdict))
         return rows
 

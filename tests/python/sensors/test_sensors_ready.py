@@ -239,3 +239,15 @@ def test_a_late_speed_takes_the_other_one_with_it_where_that_is_late_too(
     assert to_put_right([vy]) == {}
     absent = SensorFault("delay_vy_s", "vy_mps", "delay", 0.0, np.inf, "s", False, False)
     assert to_put_right([vx, absent]) == {"delay_vx_s": 0.011}
+
+
+def test_a_check_says_what_it_takes_out_with_the_other_speed(log: sv.Log) -> None:
+    check = sv.check(log.between(0.0, 30.0))
+    faults = {f.name: f for f in check.faults}
+    faults["delay_vx_s"] = replace(faults["delay_vx_s"], value=0.011, found=True)
+    faults["delay_vy_s"] = replace(faults["delay_vy_s"], value=0.008, found=False, told=True)
+    late = replace(check, faults=tuple(faults.values()))
+    row = next(line for line in str(late).splitlines() if "delay" in line and "vy_mps" in line)
+    assert row.endswith("like the other speed")
+    assert [line.split()[0] for line in late.map_lines] == ["vx_mps", "vy_mps"]
+    assert [text.split(":")[0] for text in late.apply(log).corrections] == ["vx_mps", "vy_mps"]
