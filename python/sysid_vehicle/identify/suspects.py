@@ -11,6 +11,7 @@ import numpy as np
 
 from .._common.arguments import expect, whole
 from .._common.progress import doing
+from .._common.text import few
 from .._common.threads import at_most, small_matrices
 from ..errors import explained
 from ..estimate import Driving
@@ -40,7 +41,6 @@ _READINGS = {
     "ay_mps2": 50.0,
     "steer_rad": 1.2,
 }
-_SHOWN = 4
 
 
 def suspects(model: Model | None, logs: Sequence[Log]) -> str:
@@ -51,8 +51,7 @@ def suspects(model: Model | None, logs: Sequence[Log]) -> str:
             "check the units and signs of the log, and the masses, lengths and tyres of the "
             "vehicle file"
         )
-    more = f" (and {len(found) - _SHOWN} more)" if len(found) > _SHOWN else ""
-    return "check " + ", ".join(found[:_SHOWN]) + more
+    return f"check {few(found)}"
 
 
 def explaining(function: Callable[_P, _T]) -> Callable[_P, _T]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from .._common.text import few
 from .matters import USUAL_SIZES
 from .said import disturbance, only_elsewhere, slow, small
 
@@ -41,7 +42,7 @@ def _of_names(study: Study) -> list[str]:
     for a in study.added:
         # Which of two it is that only stands in for something else is no question.
         if a.confounded_with and a.grade != "alias":
-            some = ", ".join(a.confounded_with[:_SHOWN])
+            some = few(a.confounded_with)
             found.append(
                 f"tell {a.id} from {some}: `sysid-vehicle next-drive` designs a drive that "
                 "does, or give what is known of them to the vehicle file"
@@ -58,7 +59,7 @@ def _of_names(study: Study) -> list[str]:
 def _of_what_is_left(study: Study) -> list[str]:
     found = []
     if study.stopped:
-        found.append(f"give the search more time: {_few(study.stopped)} were still to be tried")
+        found.append(f"give the search more time: {few(study.stopped)} were still to be tried")
     if study.verdict == "unknown" and small(study):
         usual = ", ".join(f"{name} {size}" for name, size in USUAL_SIZES.items())
         found.append(
@@ -99,7 +100,7 @@ def _of_what_is_left(study: Study) -> list[str]:
     ]
     if open_:
         found.append(
-            f"drive nearer the limit of the tyres: not determined: {_few(open_)}; tyres that are "
+            f"drive nearer the limit of the tyres: not determined: {few(open_)}; tyres that are "
             "open hide what is missing"
         )
     if not study.fit.driving.force_known:
@@ -126,8 +127,3 @@ def _of_what_is_left(study: Study) -> list[str]:
             "that has it: `sv.define_effect`"
         )
     return found
-
-
-def _few(names: tuple[str, ...] | list[str]) -> str:
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return f"{', '.join(names[:_SHOWN])}{more}"
