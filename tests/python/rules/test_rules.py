@@ -56,7 +56,7 @@ NUMERICAL = {
     "study/horizons.py": {"AHEAD", "_FEWEST", "_APART", "_LOST"},
     "study/beyond.py": {"_DRAWS", "_TOGETHER"},
     "study/foretold.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
-    "study/improve.py": {"_SHORT_S"},
+    "study/judge.py": {"_SHORT_S"},
     "study/limit.py": {"_BASELINE", "_SEARCHED", "_SENSORS", "_STEP"},
     "study/next_steps.py": {"_SHOWN"},
     "study/shares.py": {
