@@ -139,7 +139,7 @@ def test_no_limit_that_decides_a_claim_stands_elsewhere() -> None:
 
 
 def test_deciding_files_compare_with_no_number_of_their_own() -> None:
-    deciding = ["study/steps.py", "study/search.py", "study/verdict.py", "study/improve.py"]
+    deciding = ["study/steps.py", "study/search.py", "study/verdict.py", "study/judge.py"]
     deciding += [
         f"diagnose/candidates/{n}.py" for n in ("reservation", "verdicts", "constancy", "possible")
     ]
