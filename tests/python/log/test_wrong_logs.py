@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,11 @@ Change = Callable[[Columns], None]
 
 def drive(steer_scale: float = 1.0, duration_s: float = 40.0, rate_hz: float = 100.0) -> Columns:
     """Drive a linear single-track model (1500 kg, 2.7 m) through curves at varying speed."""
+    return {name: x.copy() for name, x in _driven(steer_scale, duration_s, rate_hz).items()}
+
+
+@cache
+def _driven(steer_scale: float, duration_s: float, rate_hz: float) -> Columns:
     mass, inertia, lf, lr, front, rear = 1500.0, 2500.0, 1.2, 1.5, 1.0e5, 1.2e5
     dt = 1.0 / rate_hz
     time_s = np.arange(round(duration_s * rate_hz)) * dt
@@ -354,6 +360,13 @@ class TestExcitation:
         assert len(caught) == 1
 
 
+@cache
+def _of_others(path: Path, channels: Path) -> Log:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SysidWarning)
+        return read_log(path, channels)
+
+
 @pytest.mark.parametrize(
     ("channel", "factor", "words"),
     [
@@ -389,7 +402,7 @@ def test_spoilt_logs_of_others(
     channels = repo / "benchmarks" / "real_driving" / f"{car}.channels.toml"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SysidWarning)
-        log = read_log(shared_data / file, channels)
+        log = _of_others(shared_data / file, channels)
         spoilt = {name: log[name] for name in log.channels}
         spoilt[channel] = spoilt[channel] * factor
         with pytest.raises(InvalidInput) as caught:
