@@ -46,6 +46,13 @@ double LaneFilter::log_likelihood(std::size_t set) const {
     return sum;
 }
 
+void LaneFilter::write_sample(std::size_t lane, double* to) const {
+    to = write(transition_, lane, to);
+    for (const LaneRow* row : seen_) *to++ = row == nullptr ? 0.0 : row->at[lane];
+    for (const Rows* rows : {&gain_, &whitener_, &innovation_, &state_})
+        to = write(*rows, lane, to);
+}
+
 void LaneFilter::begin(const Piece& piece, double* to) const {
     const Run& run = problem_.runs[piece.run];
     const std::size_t at = piece.begin > 0 ? piece.begin - 1 : 0;

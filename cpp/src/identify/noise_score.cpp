@@ -90,8 +90,7 @@ bool in_pieces(const Problem& problem, const double* p, const Noise& noise, Sum<
     LaneFilter filter(problem, {p}, noise, pieces);
     filter.with_transition = true;
     const std::size_t n = filter.states(), moving = filter.moving();
-    const std::size_t wide = n * (moving + std::size_t{2} * kChannels) + kWhitener + kChannels + n +
-                             LaneFilter::packed(n, 0);
+    const std::size_t wide = filter.sample_size();
     std::size_t room = 0;
     for (const Piece& piece : pieces) room = std::max(room, piece.size());
     std::vector<double> numbers(std::min<std::size_t>(kLanes, pieces.size()) * room * wide);
@@ -99,13 +98,7 @@ bool in_pieces(const Problem& problem, const double* p, const Noise& noise, Sum<
         return numbers.data() + (piece % kLanes * room + at - pieces[piece].begin) * wide;
     };
     filter.keep = [&](const LaneSample& s, std::size_t lane, int /*parts*/) {
-        double* to = place(s.piece, s.at);
-        to = LaneFilter::write(filter.transition(), lane, to);
-        to = filter.write_observation(lane, to);
-        to = LaneFilter::write(filter.gain(), lane, to);
-        to = LaneFilter::write(filter.whitener(), lane, to);
-        to = LaneFilter::write(filter.innovation(), lane, to);
-        LaneFilter::write(filter.state(), lane, to);
+        filter.write_sample(lane, place(s.piece, s.at));
     };
     std::optional<NoiseScore<kChannels, L>> score;
     filter.done = [&](std::size_t first, std::size_t last) {

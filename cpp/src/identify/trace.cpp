@@ -72,8 +72,8 @@ void clear_states(std::size_t samples, double* out) {
     for (std::size_t k = 0; k < samples; ++k) std::fill_n(out + k * kStatesFull, kStatesPlain, 0.0);
 }
 
-/// The backward pass over a run that the filter has gone through: of each sample the transition to
-/// it, the observation, gain, whitener, innovation, mean and covariance, `wide` numbers.
+/// The backward pass over a run that the filter has gone through: of each sample what
+/// `LaneFilter::write_sample` wrote, `wide` numbers.
 ///
 /// Smoothed means alone need no covariance but the filter's: they are what is known at a sample and
 /// that times a sum of later innovations (Bryson & Frazier 1963; de Jong, Biometrika 1988).
@@ -129,18 +129,11 @@ bool means_in_pieces(const Problem& problem, const double* p, const Noise& noise
     filter.with_transition = true;
     const std::vector<std::size_t> first = first_samples(problem);
     const std::vector<int> rows = filter_rows(problem.model.effects, noise.disturbances());
-    const std::size_t n = filter.states(), moving = filter.moving();
-    const std::size_t wide = n * (moving + std::size_t{2} * kChannels) + kWhitener + kChannels + n +
-                             LaneFilter::packed(n, 0);
+    const std::size_t moving = filter.moving();
+    const std::size_t wide = filter.sample_size();
     std::vector<double> numbers(problem.samples() * wide);
     filter.keep = [&](const LaneSample& s, std::size_t lane, int /*parts*/) {
-        double* to = numbers.data() + (first[pieces[s.piece].run] + s.at) * wide;
-        to = LaneFilter::write(filter.transition(), lane, to);
-        to = filter.write_observation(lane, to);
-        to = LaneFilter::write(filter.gain(), lane, to);
-        to = LaneFilter::write(filter.whitener(), lane, to);
-        to = LaneFilter::write(filter.innovation(), lane, to);
-        LaneFilter::write(filter.state(), lane, to);
+        filter.write_sample(lane, numbers.data() + (first[pieces[s.piece].run] + s.at) * wide);
     };
     if (!side_by_side(problem.runs, pieces, filter)) return false;
     clear_states(problem.samples(), out);

@@ -1,6 +1,8 @@
-"""The one place where arrays are converted for the compiled core."""
+"""Arrays for the compiled core, and what is done to those with gaps or drawn anew."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -8,6 +10,7 @@ import numpy.typing as npt
 ComplexArray = npt.NDArray[np.complex128]
 FloatArray = npt.NDArray[np.float64]
 
+_TOGETHER = 20_000  # elements that are drawn at once
 
 NORMAL_MAD = 1.4826
 """Standard deviation of a normal variable over its median absolute deviation."""
@@ -25,3 +28,22 @@ def filled(values: FloatArray) -> FloatArray:
         return values
     index = np.arange(values.size)
     return np.interp(index, index[good], values[good])
+
+
+def in_turn(
+    work: Callable[[npt.NDArray[np.intp]], FloatArray], draws: npt.NDArray[np.intp]
+) -> FloatArray:
+    """What `work` makes of each draw, a row each; some of them together, which takes memory."""
+    some = max(_TOGETHER // draws.shape[1], 1)
+    return np.concatenate([work(draws[i : i + some]) for i in range(0, len(draws), some)])
+
+
+def median_of_known(values: FloatArray, axis: int) -> FloatArray:
+    """Median of what is known; as `numpy.nanmedian`, which takes each column by itself."""
+    ordered = np.sort(values, axis=axis)  # what is unknown comes last
+    known = np.sum(~np.isnan(values), axis=axis, keepdims=True)
+    low, high = (
+        np.take_along_axis(ordered, np.maximum(at, 0), axis)
+        for at in ((known - 1) // 2, known // 2)
+    )
+    return as_float64(np.squeeze(0.5 * (low + high), axis))

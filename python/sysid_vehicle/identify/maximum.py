@@ -25,7 +25,8 @@ THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
 # Nats below a poorer model, from where no search comes up to it. Of 36 lags that began at their
 # typical size (exam at 100 Hz, seed 424201) those more than 50 below on few samples ended 60 or
-# more below on all; a climb gains a few.
+# more below on all; a climb gains a few. This is effort of the search: what is claimed of a model
+# that was fitted is asked of `Rules`.
 _FAR_BELOW_BY_FEW, _FAR_BELOW = 50.0, 20.0
 _ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
 

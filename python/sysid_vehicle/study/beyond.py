@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from warnings import catch_warnings, simplefilter
 
@@ -10,14 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from .._common.arguments import generator
-from .._common.arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64, in_turn, median_of_known
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import UNKNOWN, Share, share_of
 from .horizons import PREDICTED, squares_ahead
 
 _DRAWS = 300
-_TOGETHER = 20_000  # blocks of driving, drawn at once
 
 
 @dataclass(frozen=True)
@@ -125,25 +124,6 @@ def _beyond(squares: FloatArray, sensor: FloatArray, seen: npt.NDArray[np.bool_]
         ratio = np.maximum(middle - noise, 0.0) / middle[0]
     means = np.nan_to_num(ratio, nan=0.0, posinf=0.0).mean(axis=-1)
     return as_float64(np.moveaxis(means, 0, -1))
-
-
-def in_turn(
-    work: Callable[[npt.NDArray[np.intp]], FloatArray], draws: npt.NDArray[np.intp]
-) -> FloatArray:
-    """What work makes of each draw, some of them together."""
-    some = max(_TOGETHER // draws.shape[1], 1)
-    return np.concatenate([work(draws[i : i + some]) for i in range(0, len(draws), some)])
-
-
-def median_of_known(values: FloatArray, axis: int) -> FloatArray:
-    """Median of what is known; as `numpy.nanmedian`, which takes each column by itself."""
-    ordered = np.sort(values, axis=axis)  # what is unknown comes last
-    known = np.sum(~np.isnan(values), axis=axis, keepdims=True)
-    low, high = (
-        np.take_along_axis(ordered, np.maximum(at, 0), axis)
-        for at in ((known - 1) // 2, known // 2)
-    )
-    return as_float64(np.squeeze(0.5 * (low + high), axis))
 
 
 def _share(squares: FloatArray) -> float:

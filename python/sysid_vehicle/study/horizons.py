@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._common.arrays import NORMAL_MAD, FloatArray, as_float64
+from .._common.arrays import NORMAL_MAD, FloatArray, as_float64, median_of_known
 from .._common.memo import remembered
 from .._common.text import html_table, number, text_table
 from ..errors import NumericalError
@@ -252,7 +252,7 @@ def typical_error(
     for by_block in block_errors(fit, noise, driving, tuple(horizons_s)).swapaxes(0, 1):
         by_block = by_block[:, _LATERAL]
         known = ~np.isnan(by_block).all(axis=0)
-        found += list(np.nanmedian(by_block[:, known], axis=0))
+        found += list(median_of_known(by_block[:, known], axis=0))
     return float(np.mean(np.log(found))) if found else np.inf
 
 

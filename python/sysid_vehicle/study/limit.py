@@ -11,7 +11,8 @@ from .._common.threads import before
 
 R = TypeVar("R")
 
-# Of the time limit, when each stage ends: what one leaves goes to the next.
+# Of the time limit, when each stage ends: what one leaves goes to the next. They decide how far a
+# search comes, not what is claimed of what it found: that is asked of `Rules` alone.
 _SENSORS, _BASELINE, _SEARCHED, _STEP = 0.15, 0.4, 0.7, 0.85
 
 

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._common.arguments import generator
-from .._common.arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64, in_turn, median_of_known
 from .._common.text import html_paragraph, html_table, number, text_table
 from .._common.threads import in_parallel
 from ..diagnose.evidence.coordinates import begins
@@ -28,7 +28,6 @@ from ..errors import NumericalError
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_blocks
 from ..identify import Fit, driving_of
 from ..rules import Share, share_between
-from .beyond import in_turn, median_of_known
 
 CHANNELS = ("vy_mps", "yaw_rate_radps", "ay_mps2", "path_m")
 AHEAD = (0.0, 0.5, 1.0, 2.0, 5.0)

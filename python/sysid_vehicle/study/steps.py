@@ -112,8 +112,9 @@ def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
     effects = {c.id: c.effect for c in dx.ranking}
     values: dict[str, float] = {}
     for name in names:
-        sizes = dx.proposed.sizes.get(name, ((), ()))[0]
-        for p, v in zip(effects[name].parameters, sizes, strict=False):
+        if name not in dx.proposed.sizes:
+            continue
+        for p, v in zip(effects[name].parameters, dx.proposed.sizes[name][0], strict=True):
             values[f"{name}.{p.name}"] = float(np.clip(v, p.lower, p.upper))
     model = dx.fit.model.add(*(effects[n] for n in names)).with_values(values)
     try:

@@ -116,4 +116,4 @@ def _named(
     if len(rows) >= _FEW and len(there):
         few = [names[int(k)] for k in there]
         found = left_out(few, inputs[rows], as_float64(Y[:, there]), *pieces(driving, rows))
-        yield from zip(few, found, strict=False)
+        yield from ((e.target, e) for e in found)

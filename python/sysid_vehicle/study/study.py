@@ -296,7 +296,7 @@ class Study:
     def _rows(self) -> list[list[str]]:
         return [
             [label, f"{a.error:.3f}", f"{b.error:.3f}"]
-            for label, a, b in zip(self.steps, self.train, self.test, strict=False)
+            for label, a, b in zip(self.steps, self.train, self.test, strict=True)
         ] + [["noise floor", "1.000", "1.000"]]
 
     __repr__ = brief

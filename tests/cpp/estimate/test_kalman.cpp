@@ -1,42 +1,28 @@
 // The filter against a textbook Kalman filter and against the joint density of all measurements.
-#include "helpers.hpp"
+#include "dense.hpp"
 #include "sysid/estimate/kalman.hpp"
 
 namespace sysid::test {
 namespace {
 
 TEST(Kalman, EqualsTheTextbookFilter) {
-    // Missing rows left out, gain by inversion, P = (I - K H) P: Anderson & Moore, Optimal
-    // Filtering, ch. 3.
     const Small s = small_system(40);
-    Eigen::VectorXd x = kSmallMean;
-    Eigen::MatrixXd P = small_covariance();
+    TextbookFilter textbook{kSmallMean, small_covariance(), {}, {}, {}};
     std::size_t samples = 0;
     extended_kalman_filter<3, 2>(
         s, kSmallMean, small_covariance(), [&](std::size_t k, const FilterStep<3, 2>& step) {
-            if (k > 0) {
-                x = s.A * x + s.b[k];
-                P = s.A * P * s.A.transpose() + s.Q;
-            }
-            EXPECT_LT((step.predicted_mean - x).norm(), 1e-12);
-            EXPECT_LT((step.predicted_covariance - P).norm(), 1e-12);
-            std::vector<int> there;
-            for (int i = 0; i < 2; ++i)
-                if (!std::isnan(s.y[k][i])) there.push_back(i);
-            const Eigen::VectorXd all = s.y[k] - s.H * x - s.d[k];
-            const Eigen::VectorXd e = all(there);
-            const Eigen::MatrixXd H = s.H(there, Eigen::all);
-            const Eigen::MatrixXd S = H * P * H.transpose() + s.R(there, there);
-            const Eigen::MatrixXd K = P * H.transpose() * S.inverse();
-            x += K * e;
-            P = (Eigen::MatrixXd::Identity(3, 3) - K * H) * P;
-            EXPECT_LT((step.mean - x).norm(), 1e-12) << k;
-            EXPECT_LT((step.covariance - P).norm(), 1e-12) << k;
-            EXPECT_EQ(step.update.observed, static_cast<int>(there.size()));
-            for (std::size_t j = 0; j < there.size(); ++j) {
-                const int i = there[j];
-                EXPECT_NEAR(step.update.innovation[i], e[static_cast<int>(j)], 1e-12);
-                EXPECT_LT((step.update.gain.col(i) - K.col(static_cast<int>(j))).norm(), 1e-12);
+            if (k > 0) textbook.predict(s, k);
+            EXPECT_LT((step.predicted_mean - textbook.mean).norm(), 1e-12);
+            EXPECT_LT((step.predicted_covariance - textbook.covariance).norm(), 1e-12);
+            textbook.update(s, k);
+            EXPECT_LT((step.mean - textbook.mean).norm(), 1e-12) << k;
+            EXPECT_LT((step.covariance - textbook.covariance).norm(), 1e-12) << k;
+            const auto observed = static_cast<int>(textbook.there.size());
+            EXPECT_EQ(step.update.observed, observed);
+            for (int j = 0; j < observed; ++j) {
+                const int i = textbook.there[static_cast<std::size_t>(j)];
+                EXPECT_NEAR(step.update.innovation[i], textbook.innovation[j], 1e-12);
+                EXPECT_LT((step.update.gain.col(i) - textbook.gain.col(j)).norm(), 1e-12);
             }
             ++samples;
         });
@@ -64,12 +50,7 @@ TEST(Kalman, LogLikelihoodIsTheDensityOfAllMeasurements) {
     const Small s = small_system(30);
     const double filtered = extended_kalman_filter<3, 2>(s, kSmallMean, small_covariance(),
                                                          [](std::size_t, const auto&) {});
-    const Stacked all = stack(s, kSmallMean, small_covariance());
-    const Eigen::LLT<Eigen::MatrixXd> factor(all.covariance);
-    const Eigen::VectorXd white = factor.matrixL().solve(all.measured - all.mean);
-    const Eigen::VectorXd diagonal = Eigen::MatrixXd(factor.matrixL()).diagonal();
-    const double direct = -0.5 * white.squaredNorm() - diagonal.array().log().sum() -
-                          0.5 * static_cast<double>(all.measured.size()) * kLogTwoPi;
+    const double direct = Stacked(s, kSmallMean, small_covariance()).log_density();
     EXPECT_NEAR(filtered, direct, 1e-10 * std::abs(direct));
 }
 

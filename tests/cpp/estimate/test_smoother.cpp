@@ -1,35 +1,27 @@
 // The smoother against the joint posterior of all states, computed in one go.
-#include "helpers.hpp"
+#include "dense.hpp"
 #include "sysid/estimate/smoother.hpp"
 
 namespace sysid::test {
 namespace {
 
-template <int NX, int NY>
-std::vector<FilterStep<NX, NY>> filtered(const LinearSystem<NX, NY>& s, const Vec<NX>& x,
-                                         const Mat<NX, NX>& P) {
-    std::vector<FilterStep<NX, NY>> steps;
-    extended_kalman_filter<NX, NY>(s, x, P,
-                                   [&](std::size_t, const auto& step) { steps.push_back(step); });
+std::vector<FilterStep<3, 2>> filtered(const Small& s, const Vec<3>& x, const Mat<3, 3>& P) {
+    std::vector<FilterStep<3, 2>> steps;
+    extended_kalman_filter<3, 2>(s, x, P,
+                                 [&](std::size_t, const auto& step) { steps.push_back(step); });
     return steps;
 }
 
-template <int NX, int NY>
-void expect_batch_posterior(const LinearSystem<NX, NY>& s, const Vec<NX>& x, const Mat<NX, NX>& P) {
+void expect_batch_posterior(const Small& s, const Vec<3>& x, const Mat<3, 3>& P) {
     const auto smoothed = smooth(filtered(s, x, P));
-    const Stacked all = stack(s, x, P);
-    const Eigen::MatrixXd cross = all.state_covariance * all.H.transpose();
-    const Eigen::LLT<Eigen::MatrixXd> factor(all.covariance);
-    const Eigen::VectorXd mean = all.states + cross * factor.solve(all.measured - all.mean);
-    const Eigen::MatrixXd covariance =
-        all.state_covariance - cross * factor.solve(cross.transpose());
+    const auto [mean, covariance] = Stacked(s, x, P).posterior();
     ASSERT_EQ(smoothed.size(), s.size());
     for (std::size_t k = 0; k < s.size(); ++k) {
-        const auto at = static_cast<int>(k) * NX;
-        EXPECT_LT((smoothed[k].mean - mean.segment<NX>(at)).norm(), 1e-10) << k;
-        EXPECT_LT((smoothed[k].covariance - covariance.block<NX, NX>(at, at)).norm(), 1e-10) << k;
+        const auto at = 3 * static_cast<int>(k);
+        EXPECT_LT((smoothed[k].mean - mean.segment<3>(at)).norm(), 1e-10) << k;
+        EXPECT_LT((smoothed[k].covariance - covariance.block<3, 3>(at, at)).norm(), 1e-10) << k;
         if (k > 0) {
-            EXPECT_LT((smoothed[k].lag_one - covariance.block<NX, NX>(at, at - NX)).norm(), 1e-10)
+            EXPECT_LT((smoothed[k].lag_one - covariance.block<3, 3>(at, at - 3)).norm(), 1e-10)
                 << k;
         } else {
             EXPECT_EQ(smoothed[k].lag_one.norm(), 0.0);
@@ -56,7 +48,7 @@ TEST(Smoother, NeverLessCertainThanTheFilter) {
     const auto smoothed = smooth(steps);
     for (std::size_t k = 0; k + 1 < steps.size(); ++k) {
         const Mat<3, 3> gained = steps[k].covariance - smoothed[k].covariance;
-        const Vec<3> sizes = gained.selfadjointView<Eigen::Lower>().eigenvalues();
+        const Vec<3> sizes = symmetric_eigenvalues(gained);
         EXPECT_GT(sizes.minCoeff(), -1e-12) << k;
         EXPECT_GT(sizes.maxCoeff(), 1e-4) << k;
     }
@@ -76,8 +68,7 @@ TEST(Smoother, CovarianceStaysOneWhateverTheNoise) {
         for (int trial = 0; trial < 40; ++trial) {
             Small s = small_system(200);
             s.A = Mat<3, 3>::NullaryExpr([&] { return normal(generator); });
-            const double size = s.A.eigenvalues().cwiseAbs().maxCoeff();
-            s.A *= 0.98 / size;
+            s.A *= 0.98 / spectral_radius(s.A);
             s.Q = noise * Vec<3>(1.0, trial % 2 == 0 ? 0.0 : 1.0, 1e-3).asDiagonal();
             const auto steps = filtered(s, kSmallMean, small_covariance());
             const auto smoothed = smooth(steps);
@@ -90,7 +81,7 @@ TEST(Smoother, CovarianceStaysOneWhateverTheNoise) {
                 const Mat<3, 3>& prior = steps[k].predicted_covariance;
                 if (!(prior.diagonal().minCoeff() > 1e-290)) continue;
                 const Mat<3, 3> scaled = in_units_of(prior, P);
-                ASSERT_GE(scaled.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-14)
+                ASSERT_GE(symmetric_eigenvalues(scaled)[0], -1e-14)
                     << noise << ' ' << trial << ' ' << k;
                 if (noise > 1e-300) {
                     ASSERT_LT(scaled.diagonal().maxCoeff(), 1.0 + 1e-8)

@@ -1,11 +1,10 @@
 // The fourteen-degree-of-freedom car against physics it was not written from.
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <complex>
 
+#include "dense.hpp"
 #include "sysid/twin/vehicle14.hpp"
 #include "twin_cars.hpp"
 
@@ -32,8 +31,7 @@ std::vector<double> frequencies(const Vehicle14& car) {
         }
     }
     std::vector<double> out;
-    const Eigen::Matrix<std::complex<double>, 7, 1> values = stiffness.eigenvalues();
-    for (const std::complex<double>& value : values) out.push_back(std::sqrt(value.real()));
+    for (const auto& value : test::eigenvalues(stiffness)) out.push_back(std::sqrt(value.real()));
     std::sort(out.begin(), out.end());
     return out;
 }

@@ -39,13 +39,13 @@ def later(truth: Model, **values: float) -> Log:
     told = {name.replace("__", "."): value for name, value in values.items()}
     more = [n.split(".")[0] for n in told if "." in n and n.split(".")[0] not in truth.effects]
     car = truth.add(*dict.fromkeys(more)).with_values(told)
-    return drive(car, manoeuvres.handling_course(15.0, lateral_mps2=7.5), seed=42)
+    return drive(car, manoeuvres.handling_course(15.0, lateral_mps2=7.5), seed=42, rate_hz=50.0)
 
 
 @pytest.fixture(scope="module")
 def before(start: Model, truth: Model) -> Fit:
     """A reference of half a lap: searches take as long as the driving."""
-    return identify(start, drive(truth, manoeuvres.lap(20.0), seed=1), starts=1)
+    return identify(start, drive(truth, manoeuvres.lap(20.0), seed=1, rate_hz=50.0), starts=1)
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +107,7 @@ def test_nothing_is_named_where_nothing_changed(fit: Fit, course: Log) -> None:
 def test_what_the_reference_left_is_no_change(truth: Model, start: Model) -> None:
     """The model lacks a relaxation in both drives; the steering is offset in the second alone."""
     lagging = truth.add("tyre_relaxation").with_values({"tyre_relaxation.relaxation_length_m": 0.4})
-    before = identify(start, drive(lagging, manoeuvres.lap(20.0), seed=7), starts=1)
+    before = identify(start, drive(lagging, manoeuvres.lap(20.0), seed=7, rate_hz=50.0), starts=1)
     same = changed(before, later(lagging), candidates=("steer_lag", "tyre_relaxation"))
     assert same.named == ()
     few = ("steer_offset", "tyre_relaxation")
@@ -155,7 +155,7 @@ def test_what_both_share_need_not_be_nothing(truth: Model, start: Model) -> None
     """The steering is late in the first drive and early in the second: nothing is between them."""
     delay = "steer_delay.delay_s"
     late = truth.add("steer_delay").with_values({delay: 0.03})
-    before = identify(start, drive(late, manoeuvres.lap(20.0), seed=7), starts=1)
+    before = identify(start, drive(late, manoeuvres.lap(20.0), seed=7, rate_hz=50.0), starts=1)
     change = changed(before, later(truth, steer_delay__delay_s=-0.01), candidates=LATE)
     assert [e.id for e in change.named] == ["steer_delay"]
     assert inside(change, "steer_delay", -0.04)

@@ -301,35 +301,44 @@ def test_leftovers_of_killed_writers_are_removed_and_those_of_living_ones_stay(
     assert set(content(tmp_path)) == {"out.json", other.name}
 
 
-_WRITER = """
-import sys
-from sysid_vehicle._common import replace as _replace
-from sysid_vehicle._common.files import write_text
+# The package is loaded once, which takes longer than all the writing. Each line asks for a writer.
+_WRITERS = """
 import os
+import sys
+from sysid_vehicle._common.files import write_text
 if sys.argv[2] == "named":
     del os.O_TMPFILE
-print("ready", flush=True)
-k = 0
-while True:
-    write_text(sys.argv[1], chr(ord("a") + k % 26) * 200_000)
-    k += 1
+for _ in sys.stdin:
+    writer = os.fork()
+    k = 0
+    while writer == 0:
+        write_text(sys.argv[1], chr(ord("a") + k % 26) * 200_000)
+        k += 1
+    print(writer, flush=True)
+    print(os.waitpid(writer, 0)[1], flush=True)
 """
 
 
 @needs_posix
 def test_killed_writers_leave_whole_files(tmp_path: Path, way: str) -> None:
     target = tmp_path / "out.txt"
-    for k in range(6):
-        with subprocess.Popen(
-            [sys.executable, "-c", _WRITER, str(target), way], stdout=subprocess.PIPE
-        ) as writer:
-            assert writer.stdout is not None
-            writer.stdout.readline()
+    with subprocess.Popen(
+        [sys.executable, "-c", _WRITERS, str(target), way],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as writers:
+        assert writers.stdin is not None
+        assert writers.stdout is not None
+        for k in range(6):
+            print(file=writers.stdin, flush=True)
+            writer = int(writers.stdout.readline())
             time.sleep(0.003 + 0.011 * k)
-            writer.send_signal(signal.SIGKILL)
-        if target.exists():
-            assert len(target.read_text()) == 200_000
-            assert len(set(target.read_text())) == 1
+            os.kill(writer, signal.SIGKILL)
+            assert int(writers.stdout.readline()) == signal.SIGKILL  # it is gone
+            if target.exists():
+                assert len(target.read_text()) == 200_000
+                assert len(set(target.read_text())) == 1
     write_text(target, "last")
     assert content(tmp_path) == {"out.txt": "last"}
 

@@ -3,6 +3,7 @@
 import copy
 import pickle
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 
 import numpy as np
 import pytest
@@ -33,6 +34,12 @@ def sensors(log):
 @pytest.fixture(scope="module")
 def dt(log):
     return np.full(log.n, 1.0 / log.rate_hz)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(vehicle, dt, sensors):
+    """What an observer of a kind makes of the readings as they are."""
+    return cache(lambda kind: SideslipObserver(vehicle, kind=kind).run(dt, sensors))
 
 
 def slips(n):
@@ -136,8 +143,10 @@ FOLLOWED = sorted(KINDS)
 @pytest.mark.parametrize("value", [1e30, -1e30, 200.0, 5e3])
 @pytest.mark.parametrize("column", range(5))
 @pytest.mark.parametrize("kind", FOLLOWED)
-def test_one_absurd_reading_does_little_harm_and_is_told(vehicle, dt, sensors, kind, column, value):
-    clean = SideslipObserver(vehicle, kind=kind).run(dt, sensors)
+def test_one_absurd_reading_does_little_harm_and_is_told(
+    vehicle, dt, sensors, undisturbed, kind, column, value
+):
+    clean = undisturbed(kind)
     at = int(np.argmax(np.abs(sensors[:, 4]) > 3.0))
     spoilt = sensors.copy()
     spoilt[at, column] = value
@@ -151,7 +160,7 @@ def test_one_absurd_reading_does_little_harm_and_is_told(vehicle, dt, sensors, k
 @pytest.mark.parametrize("column", range(5))
 @pytest.mark.parametrize("kind", FOLLOWED)
 def test_absurd_readings_on_and_on_leave_a_doubtful_but_possible_sideslip(
-    vehicle, dt, sensors, kind, column
+    vehicle, dt, sensors, undisturbed, kind, column
 ):
     spoilt = sensors.copy()
     half = len(dt) // 2
@@ -160,15 +169,15 @@ def test_absurd_readings_on_and_on_leave_a_doubtful_but_possible_sideslip(
     assert np.isfinite(found[:, :2]).all()
     assert np.abs(found[:, 0]).max() < 1.2
     assert (found[half:, -1] == 2.0).all()
-    usual = SideslipObserver(vehicle, kind=kind).run(dt, sensors)
+    usual = undisturbed(kind)
     # The dual observer has the longitudinal force from the speed, too.
     least = 0.9 if (kind, column) == ("dual", 3) else 1.0
     assert found[half + 20 :, 1].mean() > least * usual[half + 20 :, 1].mean()
 
 
 @pytest.mark.parametrize("kind", FOLLOWED)
-def test_a_yaw_rate_that_jumps_and_returns_is_refused(vehicle, dt, sensors, kind):
-    clean = SideslipObserver(vehicle, kind=kind).run(dt, sensors)
+def test_a_yaw_rate_that_jumps_and_returns_is_refused(vehicle, dt, sensors, undisturbed, kind):
+    clean = undisturbed(kind)
     at = int(np.argmax(np.abs(sensors[:, 4]) > 3.0))
     spoilt = sensors.copy()
     spoilt[at : at + 3, 2] += 4.0  # no car turns so fast of a sudden

@@ -30,13 +30,15 @@ class LaneFilter {
     // Of the sample that `keep` was called for.
     const Rows& gain() const { return gain_; }          // states x readings
     const Rows& whitener() const { return whitener_; }  // lower triangle
-    const Rows& innovation() const { return innovation_; }
-    /// Readings x states.
-    double* write_observation(std::size_t lane, double* to) const {
-        for (const LaneRow* row : seen_) *to++ = row == nullptr ? 0.0 : row->at[lane];
-        return to;
+    /// The whole sample, one after the other: transition (moving x states; of a first
+    /// sample none), observation, gain, whitener, innovation, mean and the lower triangle of the
+    /// covariance.
+    void write_sample(std::size_t lane, double* to) const;
+    /// How many numbers those are.
+    std::size_t sample_size() const {
+        return transition_.size() + seen_.size() + gain_.size() + kWhitener + kChannels +
+               state_.size();
     }
-    const Rows& transition() const { return transition_; }  // moving x states
     const Rows& state() const { return state_; }
     double deviation(std::size_t i, std::size_t lane) const {
         return std::sqrt(state_[n_ + packed(i, i)].at[lane]);

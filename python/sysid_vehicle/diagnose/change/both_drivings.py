@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
+from ...identify.objective import Predicting, Together
+
+
+class OneDriving(Predicting, Together, Protocol):
+    """The likelihood of one of them, as `Driving.problem` gives it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +29,7 @@ class BothDrivings:
 
     Parameters
     ----------
-    later, before : Problem
+    later, before : OneDriving
         Of models with the same effects.
     own : array, shape (parameters,)
         Of `before`.
@@ -32,8 +37,8 @@ class BothDrivings:
         Columns of parameters that are in both the same.
     """
 
-    later: Any
-    before: Any
+    later: OneDriving
+    before: OneDriving
     own: FloatArray
     shared: Sequence[int]
 

@@ -16,7 +16,7 @@ from ...errors import NumericalError
 from ...estimate import noise_range
 from ...identify import Fit
 from ...identify.box import free_box
-from ...identify.objective import LinearRows, Objective
+from ...identify.objective import LinearRows, Objective, Predicting
 from ...identify.settle import climb as to_the_maximum
 from ...model import Model
 from ..candidates.possible import OF_A_FACTOR
@@ -326,11 +326,12 @@ class Reference:
         rows[np.arange(len(names)), [model_before.parameters[n].column for n in names]] = root
         centre = [model_before.value(n) + self.shared.centre[self.place[n]] for n in names]
         stays = LinearRows(rows, as_float64(root * centre))
-        problem: Any = start.driving.problem(model)
+        later = start.driving.problem(model)
+        problem: Predicting = later
         if own is not None:
             shared = [own.parameters[n].column for n in own.free_names if n not in changed]
             before = self.before.driving.problem(own)
-            problem = BothDrivings(problem, before, own.vector(), shared)
+            problem = BothDrivings(later, before, own.vector(), shared)
         return Objective(problem, (stays,), *noise_range(model.vehicle, start.driving))
 
 
