@@ -14,6 +14,8 @@ from .faults import SensorFault
 
 _OF_THE_SPEEDS = ("delay_vx_s", "delay_vy_s")  # of one device as a rule
 _DELAYS = (*_OF_THE_SPEEDS, "delay_ay_s")
+# Of the part of a_y that is gravity by roll, how late: 2 D/w of a body that rolls at 1 Hz, D = 0.3.
+_ROLL_LATE_S = 0.1
 _LEVEL_MPS2 = 0.05  # change of gravity within a second, on a road that counts as level
 
 
@@ -46,6 +48,10 @@ def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], l
     if max(found.estimate.road_mps2.values()) > _LEVEL_MPS2:
         return own, rest, False
     late = {name: found[name] for name in _DELAYS}
+    gain = found["gain_ay"]
+    # What the body's roll makes late is no delay of the sensor.
+    if gain.found and 0.0 < late["delay_ay_s"].value < _ROLL_LATE_S * gain.value:
+        del late["delay_ay_s"]
     if not any(fault.found for fault in late.values()):
         return own, rest, False
     together = any(late[name].found for name in _OF_THE_SPEEDS)

@@ -196,7 +196,8 @@ TEST(Step, SettledAuxiliaryStatesStandStill) {
     const auto rate = evaluate(model, x, {0.04, 1000.0}, p).rate;
     for (std::size_t i = kMotionStates; i < kModelStates - kUserStates; ++i) {
         EXPECT_NEAR(rate[i], 0.0, 1e-7);
-        EXPECT_GT(std::abs(x[i]), 1e-4);
+        // A body at rest does not turn.
+        EXPECT_TRUE(std::abs(x[i]) > 1e-4 || i == state_of("body_roll", 1)) << i;
     }
     EXPECT_EQ(x[0], 25.0);  // the motion is left alone
 }
@@ -298,7 +299,8 @@ TEST_P(StepDerivatives, OfStateAndPush) {
         for (std::size_t i = 0; i < kModelStates + kExternals; ++i) {
             const bool state = i < kModelStates;
             const bool newtons = i >= kModelStates && i < kModelStates + kGravityX;
-            const double step = newtons ? 10.0 : 4e-4;
+            // A longer one reaches where the friction ellipse is cut off.
+            const double step = newtons ? 10.0 : 4e-5;
             const double middle = state ? at.x[i] : at.external[i - kModelStates];
             const auto difference = central_difference(
                 [&](double value) {
