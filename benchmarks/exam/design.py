@@ -63,6 +63,7 @@ KINEMATIC = (
     "imu_lever_arm",
     "ins_lever_arm",
     "body_attitude",
+    "body_roll",
     "accelerometer_bias",
     "gyro_scale",
     "gyro_bias",

@@ -34,6 +34,7 @@ HIDDEN: dict[str, tuple[float, ...]] = {
     "yaw_inertia": (0.25,),
     "cg_position": (0.08,),
     "imu_lever_arm": (0.5, 0.0),
+    "body_roll": (0.06, 2.0),
     "accelerometer_bias": (0.0, 0.25),
 }
 SENSORS = sv.SensorNoise(

@@ -28,6 +28,7 @@ ALWAYS = {
     "accelerometer_scale": "the accelerometer leans with the body: a_y + g roll, roll about a_y",
     "aero_downforce": "lift areas of -0.3 m2 and -0.4 m2",
     "body_attitude": "the body rolls and pitches on its springs, and the accelerometer with it",
+    "body_roll": "roll about a_y: 1.9 deg/g at 3.9 Hz about the centre of mass, damping ratio 0.36",
     "combined_slip": "one slip for both directions, up to one limit",
     "lateral_load_transfer": "four wheel loads, and tyres that lose grip per load with load",
     "rolling_resistance": "0.011 of each wheel's load",

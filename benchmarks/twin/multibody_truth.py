@@ -29,6 +29,7 @@ import multibody
 ALWAYS = {
     "accelerometer_scale": "the accelerometer leans with the body: a_y + g roll, roll about a_y",
     "body_attitude": "the sprung mass rolls and pitches, and the accelerometer with it",
+    "body_roll": "the sprung mass rolls about an axis below it",
     "combined_slip": "Magic Formula with combined slip, r_bx1 to r_vy6",
     "drive_yaw_moment": "a driven tyre pushes sideways, r_vy1 r_vy5 r_vy6 / p_kx1 = 0.025 N per N",
     **dict.fromkeys(

@@ -38,6 +38,7 @@ _SETTLED = {
     "gyro_bias": ("bias_yaw_rate_radps",),
     "gyro_scale": ("gain_yaw_rate",),
     "body_attitude": ("gain_ax", "gain_ay"),
+    "body_roll": ("gain_ay",),
     "accelerometer_scale": ("gain_ax", "gain_ay"),
 }
 _GAINS = {"ax_mps2": "gain_ax", "ay_mps2": "gain_ay", "yaw_rate_radps": "gain_yaw_rate"}

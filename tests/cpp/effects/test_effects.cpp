@@ -70,7 +70,8 @@ TEST_P(AnyEffect, MovesTheChannelsItNames) {
     Parameters values = info().scored_at_typical ? typical_parameters() : plain_parameters();
     if (by != 0) values[parameter_of(info().through)] = 1.0;
     for (std::size_t j = 0; j < info().parameter_count(); ++j)
-        if (scanned(j)) values[first() + j] = 0.3;  // within this short drive
+        if (scanned(j))  // within this short drive
+            values[first() + j] = std::max(0.3, info().parameters[j].bounds.low);
     const Parameters bare = values;
     for (std::size_t j = 0; j < info().parameter_count(); ++j) {
         if (scanned(j)) continue;
@@ -237,10 +238,14 @@ TEST(Catalogue, StatesOfTheirOwn) {
     for (std::size_t i = 0; i < kEffectCount; ++i) {
         const std::string id = kEffectInfos[i].id;
         const std::size_t own = active_states(EffectMask{1} << i).count;
-        const std::map<std::string, std::size_t> expected{
-            {"steer_lag", 1},    {"tyre_relaxation", 2},       {"tyre_temperature", 2},
-            {"sensor_delay", 5}, {"front_tyre_relaxation", 1}, {"rear_tyre_relaxation", 1},
-            {"force_lag", 1}};
+        const std::map<std::string, std::size_t> expected{{"steer_lag", 1},
+                                                          {"tyre_relaxation", 2},
+                                                          {"tyre_temperature", 2},
+                                                          {"sensor_delay", 5},
+                                                          {"front_tyre_relaxation", 1},
+                                                          {"rear_tyre_relaxation", 1},
+                                                          {"force_lag", 1},
+                                                          {"body_roll", 2}};
         EXPECT_EQ(own, expected.count(id) ? expected.at(id) : 0U) << id;
     }
     EXPECT_EQ(active_states(0).count, 0U);

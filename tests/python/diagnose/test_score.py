@@ -99,6 +99,7 @@ def test_family_p_values_come_from_their_seed(null_boards: list[ScoreBoard]) -> 
         ("rear_tyre_relaxation.relaxation_length_m", 0.3),
         ("force_lag.time_constant_s", 0.1),
         ("wheel_inertia.mass_share", 0.03),
+        ("body_roll.roll_per_g_rad", 0.02),
     ],
 )
 def test_a_small_effect_is_first_and_its_size_predicted(

@@ -26,8 +26,8 @@ SENSORS = {
 NOT_TOLD = {"friction_change", "steer_delay"}  # what they need: the time, the rate of the steering
 CATALOGUE = tuple(e.id for e in sv.catalogue() if not e.acts)
 ALL = tuple(e for e in CATALOGUE if e not in SENSORS | NOT_TOLD)
-# Its states feed back on what they follow: `settled` does not find where they rest.
-SETTLING = tuple(e for e in ALL if e != "tyre_temperature")
+# Their states feed back on what they follow: `settled` does not find where they rest.
+SETTLING = tuple(e for e in ALL if e not in ("tyre_temperature", "body_roll"))
 
 
 def compiled(model: sv.Model, motion: np.ndarray, steer: float, force: float) -> np.ndarray:
@@ -86,6 +86,23 @@ def test_heat_of_the_tyres_over_seconds_of_a_lap(truth: sv.Model) -> None:
         state = exported["step"](state, driven.inputs[k], driven.inputs[k + 1], 0.01, substeps=2)
         np.testing.assert_allclose(state[:3], driven.states[k + 1, :3], rtol=0.0, atol=1e-4)
     assert state[names.index("sliding_front")] > 0.5  # kW: two percent of the grip
+
+
+def test_a_rolling_body_over_seconds_of_a_lap(truth: sv.Model) -> None:
+    model = typical(truth, "body_roll")
+    calm = sv.RoadDisturbance(0.0, 0.0, 0.0)
+    driven = drive_truth(model, sv.manoeuvres.lap(60.0), seed=1, disturbance=calm)
+    exported = module_of(model)
+    names = [s.name for s in equations(model).states]
+    angle, rate = names.index("roll_per_gradient"), names.index("roll_rate_per_gradient")
+    most = 0.0
+    state = np.concatenate((driven.states[0, :3], (0.0, 0.0)))
+    for k in range(2000):
+        state = exported["step"](state, driven.inputs[k], driven.inputs[k + 1], 0.01)
+        np.testing.assert_allclose(state[:3], driven.states[k + 1, :3], rtol=0.0, atol=1e-4)
+        most = max(most, abs(state[rate]))
+    assert most > 0.5  # 1/s: 1.7 deg/s of roll
+    assert 0.1 < abs(state[angle]) < 1.2
 
 
 @pytest.fixture(scope="module")

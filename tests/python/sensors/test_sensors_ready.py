@@ -251,3 +251,19 @@ def test_a_check_says_what_it_takes_out_with_the_other_speed(log: sv.Log) -> Non
     assert row.endswith("like the other speed")
     assert [line.split()[0] for line in late.map_lines] == ["vx_mps", "vy_mps"]
     assert [text.split(":")[0] for text in late.apply(log).corrections] == ["vx_mps", "vy_mps"]
+
+
+def test_a_body_that_rolls_makes_no_sensor_late(truth: sv.Model) -> None:
+    roll = {"body_roll.roll_per_g_rad": 0.09, "body_roll.frequency_hz": 1.5}
+    rolling = truth.add("body_roll").with_values(roll)
+    log = sv.drive(rolling, sv.manoeuvres.lap(60.0), seed=3)
+    late = sv.check(log)["delay_ay_s"]
+    assert late.found  # by kinematics, which know no roll
+    assert 0.002 < late.value < 0.01
+    assert not made_ready([log], [])[2]
+    # A sensor that is later than that is told on the same car.
+    ay = np.interp(log["time_s"] - 0.03, log["time_s"], log["ay_mps2"])
+    own, _, delayed = made_ready([_with(log, ay_mps2=ay)], [])
+    assert delayed
+    (moved,) = (text for text in own[0].corrections if text.startswith("ay_mps2: taken"))
+    assert float(moved.split()[2]) == pytest.approx(35.0, abs=4.0)

@@ -287,7 +287,7 @@ def test_what_leaves_the_evidence_as_it_was_is_a_stand_in(
     """The noise that a wrong gain of the accelerometer seems to be hides it, but not its trace."""
     wrong = {"accelerometer_scale.ax_error": 0.1, "accelerometer_scale.ay_error": 0.1}
     car = truth.add("accelerometer_scale").with_values(wrong)
-    alike = {"accelerometer_scale", "body_attitude", "gyro_scale"}
+    alike = {"accelerometer_scale", "body_attitude", "body_roll", "gyro_scale"}
     others = [e.id for e in catalogue() if e.id not in alike]
     found = improve(start, *drives(car, 51), starts=1, candidates=others, most_effects=2)
     assert found.added

@@ -154,7 +154,7 @@ struct SingleTrackOf {
         user_body(user, q, w);
         part("slip angles");
         const Axles<S> alpha =
-            slip_angles(w.v_x, w.v_y, w.r, plain<T>(w.l_f), plain<T>(w.l_r), w.delta);
+            slip_angles(w.v_x, w.v_road, w.r, plain<T>(w.l_f), plain<T>(w.l_r), w.delta);
         w.alpha_f = alpha.front;
         w.alpha_r = alpha.rear;
         each([&](auto e, const T* own, At at) { return e.slip(own, w, lags.from(at)); });
@@ -198,7 +198,7 @@ struct SingleTrackOf {
         w.track_r = car.track_rear_m;
         w.channels = u.channels.data();
         w.v_x = motion[0];
-        w.v_y = motion[1];
+        w.v_y = w.v_road = motion[1];
         w.r = motion[2];
         w.delta = S(u.steer_rad);
         w.steer_rate = u.steer_rate_radps;

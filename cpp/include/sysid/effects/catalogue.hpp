@@ -29,8 +29,8 @@ using Catalogue =
                SteerRatio, SteerNonlinearity, SteerLag, SteerCompliance, RoadBank, RoadGrade,
                SideWind, Mass, YawInertia, LockedDifferential, LimitedSlipDifferential,
                DriveYawMoment, SensorDelay, CgPosition, SpeedSensorLeverArm,
-               SpeedSensorMisalignment, ImuLeverArm, InsLeverArm, BodyAttitude, AccelerometerBias,
-               GyroScale, GyroBias, AccelerometerScale>;
+               SpeedSensorMisalignment, ImuLeverArm, InsLeverArm, BodyAttitude, BodyRoll,
+               AccelerometerBias, GyroScale, GyroBias, AccelerometerScale>;
 
 constexpr std::size_t kEffectCount = std::tuple_size_v<Catalogue>;
 

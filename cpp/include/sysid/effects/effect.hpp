@@ -58,7 +58,7 @@ struct EffectInfo {
     const char* needs = nullptr;            // channels a log must have for it to be told at all
     const char* confounded_with = nullptr;  // effects alike in most driving; said by both
     ParameterInfo parameters[kMaxEffectParameters] = {};
-    StateInfo states[kMaxEffectStates] = {};  // each follows something with a first-order lag
+    StateInfo states[kMaxEffectStates] = {};  // lags, or an oscillator of two
     // Derivative at the null value does not exist (a lag of zero): scored at a finite size instead.
     bool scored_at_typical = false;
     // Visible only through a known longitudinal force.

@@ -68,7 +68,8 @@ struct TyreRelaxation : Effect {
         .equation = "(sigma / v_x) d(alpha')/dt + alpha' = alpha",
         .moves = "ay_mps2, yaw_rate_radps",
         .confounded_with =
-            "steer_lag, steer_delay, yaw_inertia, front_tyre_relaxation, rear_tyre_relaxation",
+            "steer_lag, steer_delay, yaw_inertia, front_tyre_relaxation, rear_tyre_relaxation, "
+            "body_roll",
         .states = {{"slip_front", "rad"}, {"slip_rear", "rad"}},
         .breaks = Breaks::kAnswersLate,
     });

@@ -116,11 +116,11 @@ S wheel_speed(const Workings<S>& w, const Given<S>& track, double left) {
 }
 template <class S>
 S front_slip(const Workings<S>& w, double left) {
-    return slip_angle(wheel_speed(w, w.track_f, left), S(w.v_y + w.l_f * w.r), w.delta);
+    return slip_angle(wheel_speed(w, w.track_f, left), S(w.v_road + w.l_f * w.r), w.delta);
 }
 template <class S>
 S rear_slip(const Workings<S>& w, double left) {
-    return slip_angle(wheel_speed(w, w.track_r, left), S(w.v_y - w.l_r * w.r), 0.0);
+    return slip_angle(wheel_speed(w, w.track_r, left), S(w.v_road - w.l_r * w.r), 0.0);
 }
 
 template <class S>

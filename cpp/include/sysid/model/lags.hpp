@@ -13,6 +13,7 @@
 #include <cstddef>
 
 #include "sysid/math/lag_weights.hpp"
+#include "sysid/math/swing.hpp"
 
 namespace sysid {
 
@@ -127,6 +128,57 @@ class Lags {
             step_.after[n] = target;
         else
             state_rate_[n] = rate * (target - state_[n]);
+    }
+
+    /// Moves the states `i` and `i + 1` as angle and rate of a damped oscillator that is driven
+    /// towards `target`: s'' + 2 D w s' + w^2 s = w^2 target, with w > 0 [rad/s] and 0 <= D < 1.
+    /// Its free motion is exact for any step, what drives it enters as in the Runge-Kutta rule:
+    /// the fourth order, and Simpson's rule where the target does not depend on the oscillator.
+    /// Lawson, SIAM J. Numer. Anal. 4 (1967), 372-380, eq. (2.4) and the rule of order four.
+    void swing(std::size_t i, const S& target, const S& w, double D) {
+        const std::size_t n = first_ + i;
+        const Swing<S> now{state_[n], state_[n + 1]};
+        if (stage_ == LagStage::kSettle) {
+            step_.after[n] = target;
+            step_.after[n + 1] = S(0.0);
+            return;
+        }
+        if (stage_ == LagStage::kRates) {
+            if (step_.fastest != nullptr) *step_.fastest = std::max(*step_.fastest, value_of(w));
+            state_rate_[n] = now.rate;
+            state_rate_[n + 1] = w * (w * (target - now.angle) - (2.0 * D) * now.rate);
+            return;
+        }
+        const double h = step_.h;
+        const auto rates = [&](const Swing<S>& k) {
+            state_rate_[n] = k.angle;
+            state_rate_[n + 1] = k.rate;
+        };
+        const SwingFree<S> half(w, D, 0.5 * h);
+        const Swing<S> before{step_.before[n], step_.before[n + 1]};
+        const S push = w * w * target;
+        // The rule of the motion makes the next stage, and the end, from these.
+        if (stage_ == LagStage::kStart) step_.target_start[n] = push;
+        const Swing<S> pushed = half({S(0.0), step_.target_start[n]});
+        const Swing<S> kept = half(before);
+        const Swing<S> first = (2.0 / h) * (kept - before) + pushed;
+        if (stage_ == LagStage::kStart) return rates(first);
+        if (stage_ == LagStage::kMiddle) {
+            step_.target_middle[n] = push;
+            return rates((2.0 / h) * (kept - before) + Swing<S>{S(0.0), push});
+        }
+        const Swing<S> lost = (1.0 / h) * (half(kept) - before);
+        if (stage_ == LagStage::kMiddleAgain) {
+            step_.target_again[n] = push;
+            return rates(lost + half({S(0.0), push}));
+        }
+        const S& middle = step_.target_middle[n];
+        const S& again = step_.target_again[n];
+        const Swing<S> second = (2.0 / h) * (kept - before) + Swing<S>{S(0.0), middle};
+        const Swing<S> third = lost + half({S(0.0), again});
+        const Swing<S> whole = 6.0 * lost + half(pushed) + 2.0 * half({S(0.0), middle + again}) +
+                               Swing<S>{S(0.0), push};
+        rates(whole - first - 2.0 * (second + third));
     }
 
     bool settling() const { return stage_ == LagStage::kSettle; }

@@ -28,6 +28,7 @@ struct Workings {
     S fz0_f, fz0_r;              // static axle loads [N]
     // motion
     S v_x, v_y, r;
+    S v_road;           // lateral, of the axles under the centre of gravity over the road [m/s]
     Given<S> time_s{};  // since the log began
     // inputs (stages `input`, `drive` and `steering`)
     S delta;  // road-wheel angle that acts [rad]
@@ -69,6 +70,7 @@ void name_workings(const Workings<S>& w) {
     named("fx", w.fx), named("force_x", w.force_x), named("force_y", w.force_y);
     named("moment_z", w.moment_z);
     named("gravity_x", w.gravity_x), named("gravity_y", w.gravity_y);
+    named("v_road", w.v_road);
     named("alpha_f", w.alpha_f), named("alpha_r", w.alpha_r);
     named("fx_f", w.fx_f), named("fx_r", w.fx_r), named("fz_f", w.fz_f), named("fz_r", w.fz_r);
     named("peak_f", w.mu_peak_f), named("peak_r", w.mu_peak_r);
