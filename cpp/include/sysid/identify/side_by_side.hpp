@@ -22,13 +22,19 @@ struct Piece {
     std::size_t size() const { return end - begin; }
 };
 
-/// Seconds in which a filter with this noise has forgotten where it began. Speed is what it holds
-/// longest: it hardly moves by itself, and is not read well.
+/// Seconds in which a filter with this noise has forgotten where it began: the slowest pole of the
+/// stationary filters of the motion along and across, each with its force and the slope of the
+/// road. What is read of these two alone says which of them it is takes longest to forget.
 double forgets_s(const Problem& problem, const Noise& noise);
+
+/// Samples done one after the other that cost as much as a step of all lanes, of the filter and
+/// along a path with frozen gains.
+constexpr std::size_t kFilterSamples = 4, kPathSamples = 6;
 
 /// How runs are cut so that the lanes are full, into pieces of so many samples at most; nothing
 /// where lanes would gain nothing, because the pieces are not much longer than what is forgotten.
 std::vector<Piece> pieces_of(const std::vector<Run>& runs, double forgotten_s = 0.0,
+                             std::size_t samples_of_step = kFilterSamples,
                              std::size_t most = std::numeric_limits<std::size_t>::max());
 
 /// A sample in a lane. Where it is not to be kept the lane has nothing to do.
