@@ -35,6 +35,8 @@ std::size_t steps_of(const std::vector<Run>& runs, const std::vector<Piece>& pie
             longest = std::max(longest, pieces[i].size());
             if (pieces[i].begin > 0) again = std::max(again, forgotten_s / runs[pieces[i].run].dt);
         }
+        // Ways that meet too late are not walked to their end.
+        if (again > kRounds * static_cast<double>(longest)) again = 1e9;
         steps += longest + static_cast<std::size_t>(std::min(again, 1e9));
     }
     return steps;
@@ -110,6 +112,10 @@ double forgets_s(const Problem& problem, const Noise& noise) {
         }
     }
     return kTimesMet * slowest;
+}
+
+std::size_t filter_samples(const SingleTrack& model) {
+    return active_states(model.effects).count > 0 ? kFilterSamples / 2 : kFilterSamples;
 }
 
 std::vector<Piece> pieces_of(const std::vector<Run>& runs, double forgotten_s,
