@@ -21,7 +21,6 @@ from .estimates import BETTER_FOUND, INTERVALS, profiled_estimates
 from .fit import Fit
 from .maximum import (
     THINNED,
-    led,
     log_likelihood_of,
     objectives,
     on_its_road,
@@ -207,19 +206,15 @@ def _from_ends(
     """The maximum, from the best few ends of searches under this noise."""
     box = free_box(model)
     first, *others = ends
-    if others:
-        best = settle(objective, first, noise.vector(), box, thin=thinned)
-        for end in others:
-            best = rivalled(objective, best, end, box, thinned)
-        begin = best[:2]
-    else:
-        begin = led(objective, thinned, first, noise.vector(), box)
-    fit = top(model, driving, objective, begin, table)
+    best = settle(objective, first, noise.vector(), box, thin=thinned)
+    for end in others:
+        best = rivalled(objective, best, end, box, thinned)
+    fit = top(model, driving, objective, best, table)
     best = at_top = fit.model.vector(), fit.noise.vector(), fit.converged
     for elsewhere in at_typical_sizes(model, at_top[0]):
         best = rivalled(objective, best, elsewhere, box, thinned)
     if best is not at_top:
-        fit = top(model, driving, objective, best[:2], table)
+        fit = top(model, driving, objective, best, table)
     fit = on_its_road(fit)
     if fit.model.offset_names and len(driving.logs) > 1:
         fit = _log_by_log(fit)

@@ -11,14 +11,12 @@ from .._common.arrays import FloatArray
 from ..errors import NumericalError
 from ..estimate import Driving, NoiseModel
 from ..model import Model
-from .ascent import to_the_top
 from .box import free_box, objective_of
 from .estimates import wald
 from .fit import Fit
 from .objective import Objective
 from .offsets import marginal_information
-from .search import Box
-from .settle import moved, settle
+from .settle import moved, settle, to_the_top
 from .starts import Starts
 
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
@@ -51,20 +49,20 @@ def refine_above(model: Model, driving: Driving, fit: Fit) -> Fit | None:
     Few samples, which lead the search most of the way, tell it before all of them are asked.
     """
     objective, thinned = objectives(model, driving)
-    box, begin, least = free_box(model), model.vector(), fit.log_likelihood - _FAR_BELOW
-    p, noise = led(objective, thinned, begin, fit.noise.vector(), box)
+    box, begin = free_box(model), (model.vector(), fit.noise.vector())
+    led = None
     if thinned:
+        led = settle(thinned[-1], *begin, box, thin=thinned[:-1])[:2]
         few = driving.problem(fit.model, most_samples=_counts(objective.samples)[-1])
-        poorer = objective_of(fit.model, few, driving).log_likelihood(
+        least = objective_of(fit.model, few, driving).log_likelihood(
             fit.model.vector(), fit.noise.vector()
         )
-        if thinned[-1].log_likelihood(p, noise) < poorer - _FAR_BELOW_BY_FEW:
+        if thinned[-1].log_likelihood(*led) < least - _FAR_BELOW_BY_FEW:
             return None
-    p, noise, converged = to_the_top(objective, p, noise, box, least=least)
-    if log_likelihood_of(objective, p, noise) < least:
+    found = settle(objective, *begin, box, led=led)
+    if log_likelihood_of(objective, *found[:2]) < fit.log_likelihood - _FAR_BELOW:
         return None
-    told, starts = NoiseModel.from_vector(noise), Starts.none(model.free_names)
-    return summary(model, driving, objective, p, told, starts, converged)
+    return top(model, driving, objective, found, Starts.none(model.free_names))
 
 
 def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3) -> Fit:
@@ -102,20 +100,8 @@ def polish(
 ) -> Fit:
     """Noise and parameters of maximum likelihood, from values that are already near."""
     objective, thinned = objectives(model, driving, inputs)
-    found = led(objective, thinned, p, noise.vector(), free_box(model))
+    found = settle(objective, p, noise.vector(), free_box(model), thin=thinned)
     return top(model, driving, objective, found, starts)
-
-
-def led(
-    objective: Objective, thinned: list[Objective], p: FloatArray, noise: FloatArray, box: Box
-) -> tuple[FloatArray, FloatArray]:
-    """Where the way to the maximum begins: where few samples lead, unless that is worse."""
-    p = box.inside(p)
-    if not thinned:
-        return settle(objective, p, noise, box)[:2]
-    near, told, _ = settle(thinned[-1], p, noise, box, thin=thinned[:-1])
-    better = objective.log_likelihood(near, told) > objective.log_likelihood(p, noise)
-    return (near, told) if better else (p, noise)
 
 
 def objectives(
@@ -141,13 +127,13 @@ def top(
     model: Model,
     driving: Driving,
     objective: Objective,
-    begin: tuple[FloatArray, FloatArray],
+    settled: tuple[FloatArray, FloatArray, bool],
     starts: Starts,
 ) -> Fit:
-    """The maximum, from parameters and noise that are near."""
-    p, noise, converged = to_the_top(objective, *begin, free_box(model))
+    """The maximum, from where a search has settled."""
+    p, noise = to_the_top(objective, *settled[:2], free_box(model))
     told = NoiseModel.from_vector(noise)
-    return summary(model, driving, objective, p, told, starts, converged)
+    return summary(model, driving, objective, p, told, starts, settled[2])
 
 
 def on_its_road(fit: Fit) -> Fit:

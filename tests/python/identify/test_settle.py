@@ -8,10 +8,9 @@ import pytest
 
 from sysid_vehicle import _core
 from sysid_vehicle.errors import NumericalError
-from sysid_vehicle.identify.ascent import _slope, climb, to_the_top
 from sysid_vehicle.identify.objective import Objective
 from sysid_vehicle.identify.search import Box
-from sysid_vehicle.identify.settle import risen, rivalled, settle
+from sysid_vehicle.identify.settle import _slope, climb, risen, rivalled, settle
 
 
 class Ridge:
@@ -54,34 +53,6 @@ def test_the_likelihood_is_climbed_where_frozen_gains_see_no_slope() -> None:
     assert reached == objective.log_likelihood(p, noise)
     assert reached > highest - 0.05
     assert p[1] == pytest.approx(box.upper[1], rel=1e-12)
-
-
-def test_the_top_is_reached_with_noise_unless_it_is_out_of_reach() -> None:
-    noise, box = np.ones(1), Box([0, 1], np.array([0.2, 0.2]), np.array([5.0, 3.0]))
-    objective = Objective(Ridge(), (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
-    highest = objective.log_likelihood(np.array([1.0 / 3.0, 3.0]), noise)
-    begin = np.array([1.3, 0.8])
-    p, _, converged = to_the_top(objective, begin, noise, box)
-    assert converged
-    assert objective.log_likelihood(p, noise) > highest - 0.1
-    assert not to_the_top(objective, begin, noise, box, least=highest + 1e6)[2]
-
-
-class Misleading(Ridge):
-    """Other parameters side by side seem the likelier the larger they are."""
-
-    def log_likelihoods(self, sets: np.ndarray, noise: np.ndarray) -> np.ndarray:
-        return 1e4 * sets.sum(axis=1)
-
-
-def test_where_a_slope_misleads_the_search_without_it_goes_on() -> None:
-    noise, box = np.ones(1), Box([0, 1], np.array([0.2, 0.2]), np.array([5.0, 3.0]))
-    objective = Objective(Misleading(), (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
-    begin = np.array([1.3, 0.8])
-    p, _, converged = to_the_top(objective, begin, noise, box)
-    assert converged
-    assert p[0] * p[1] == pytest.approx(1.0, abs=0.02)
-    assert objective.log_likelihood(p, noise) > objective.log_likelihood(begin, noise) + 0.6
 
 
 def test_noise_is_not_learned_again_where_parameters_hardly_moved() -> None:

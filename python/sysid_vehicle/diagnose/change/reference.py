@@ -15,9 +15,9 @@ from ...effects import Effect
 from ...errors import NumericalError
 from ...estimate import noise_range
 from ...identify import Fit
-from ...identify.ascent import climb as to_the_maximum
 from ...identify.box import free_box
 from ...identify.objective import LinearRows, Objective
+from ...identify.settle import climb as to_the_maximum
 from ...model import Model
 from ..candidates.possible import OF_A_FACTOR
 from .beside_reference import Shared, Side
