@@ -89,7 +89,9 @@ FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise) 
     const Problem& problem = *in_time;
     FrozenFilter filter = empty(problem, noise);
     const double forgotten_s = forgets_s(problem, noise);
-    if (const std::vector<Piece> pieces = pieces_of(problem.runs, forgotten_s); !pieces.empty()) {
+    if (const std::vector<Piece> pieces =
+            pieces_of(problem.runs, forgotten_s, filter_samples(problem.model));
+        !pieces.empty()) {
         LaneFilter walk(problem, {p}, noise, pieces);
         walk.keep = [&](const LaneSample& sample, std::size_t lane, int parts) {
             const std::size_t run = pieces[sample.piece].run;

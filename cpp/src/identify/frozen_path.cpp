@@ -245,7 +245,8 @@ FrozenPath frozen_path(const Problem& problem, const double* p, const FrozenFilt
     const std::size_t moved = kMotionStates + active_states(problem.model.effects).count;
     path.resize(problem.samples(), with_states ? moved + kExternals : 0);
     const double forgotten_s = forgets_s(problem, filter.noise);
-    if (const std::vector<Piece> pieces = pieces_of(problem.runs, forgotten_s); !pieces.empty()) {
+    if (const std::vector<Piece> pieces = pieces_of(problem.runs, forgotten_s, kPathSamples);
+        !pieces.empty()) {
         PathWalk walk(problem, p, pieces, gains, path);
         if (side_by_side(problem.runs, pieces, walk)) return path;
     }

@@ -20,7 +20,8 @@ class FilteredStates {
     FilteredStates(const Problem& problem, const double* p, const Noise& noise)
         : width_(filter_rows(problem.model.effects, noise.disturbances()).size()) {
         for (const Run& run : problem.runs) runs_.emplace_back(run.size() * width_);
-        const std::vector<Piece> pieces = pieces_of(problem.runs, forgets_s(problem, noise));
+        const std::vector<Piece> pieces =
+            pieces_of(problem.runs, forgets_s(problem, noise), filter_samples(problem.model));
         if (!pieces.empty()) {
             LaneFilter walk(problem, {p}, noise, pieces);
             walk.keep = [&](const LaneSample& s, std::size_t lane, int /*parts*/) {

@@ -4,13 +4,15 @@
 #include <cmath>
 #include <utility>
 
+#include "sysid/math/linear.hpp"
+
 namespace sysid {
 
 namespace {
 
 constexpr double kForgotten = 4.5;  // seconds in which a filter forgets its beginning at best
 const double kTimesMet = -std::log(kMet);  // time constants until two ways have met
-constexpr std::size_t kGain = 2;           // steps of all lanes that cost less than so many samples
+constexpr int kDoublings = 30;             // of samples, in which a filter forgets
 
 std::vector<Piece> cut(const std::vector<Run>& runs, std::size_t longest) {
     std::vector<Piece> pieces;
@@ -33,35 +35,91 @@ std::size_t steps_of(const std::vector<Run>& runs, const std::vector<Piece>& pie
             longest = std::max(longest, pieces[i].size());
             if (pieces[i].begin > 0) again = std::max(again, forgotten_s / runs[pieces[i].run].dt);
         }
+        // Ways that meet too late are not walked to their end.
+        if (again > kRounds * static_cast<double>(longest)) again = 1e9;
         steps += longest + static_cast<std::size_t>(std::min(again, 1e9));
     }
     return steps;
 }
 
+/// The motion along one axis, moved by a force that is felt and a slope of the road that is not.
+struct Axis {
+    double motion = 0.0;  // white, per square root of a second
+    double force_mps2 = 0.0, force_s = 1.0, road_mps2 = 0.0, road_s = 1.0;
+    double speed = 0.0, felt = 0.0;  // noise of readings; zero where there is none
+};
+
+bool is_read(const std::vector<Run>& runs, int channel) {
+    return std::any_of(runs.begin(), runs.end(), [&](const Run& run) {
+        return std::any_of(run.measurements.begin(), run.measurements.end(),
+                           [&](const Vec<kChannels>& y) { return !std::isnan(y[channel]); });
+    });
+}
+
+/// Of the slowest pole of its stationary filter. The doubling algorithm gives the product of the
+/// filter's transitions over 1, 2, 4, ... samples (Anderson, Int. J. Control 28, 1978, 295).
+double time_constant_s(const Axis& axis, double dt) {
+    Mat<3, 3> through = Mat<3, 3>::Zero(), read = through, spread = through;
+    through(0, 0) = 1.0;
+    spread(0, 0) = axis.motion * axis.motion * dt;
+    const auto pushed = [&](int i, double deviation, double time_s) {
+        if (deviation <= 0.0) return;
+        const double left = std::exp(-dt / time_s);
+        through(i, 0) = dt;
+        through(i, i) = left;
+        spread(i, i) = deviation * deviation * (1.0 - left * left);
+    };
+    pushed(1, axis.force_mps2, axis.force_s);
+    pushed(2, axis.road_mps2, axis.road_s);
+    read(0, 0) = 1.0 / (axis.speed * axis.speed);
+    if (axis.felt > 0.0) read(1, 1) = 1.0 / (axis.felt * axis.felt);
+    double before = std::log(through.norm()), rate = 0.0, samples = 1.0;
+    for (int n = 0; n < kDoublings && before > -kTimesMet; ++n) {
+        const Mat<3, 3> known = (Mat<3, 3>::Identity() + read * spread).inverse();
+        const Mat<3, 3> half = through * known;
+        const Mat<3, 3> more = through.transpose() * spread * half;
+        read += half * read * through.transpose();
+        spread += more;
+        through = half * through;
+        symmetrise(read);
+        symmetrise(spread);
+        const double now = std::log(through.norm());
+        rate = (before - now) / samples;
+        samples *= 2.0;
+        before = now;
+    }
+    return rate > 0.0 ? dt / rate : std::numeric_limits<double>::infinity();
+}
+
 }  // namespace
 
 double forgets_s(const Problem& problem, const Noise& noise) {
-    // A random walk of q per root of a second, read with r each dt, is known with the time constant
-    // r sqrt(dt) / q. An acceleration with a correlation time tau is in the long run a walk of its
-    // standard deviation times sqrt(2 tau); where tau is longer than that time constant, the filter
-    // follows it with the geometric mean of both.
-    std::vector<std::pair<double, double>> pushed{
-        {noise.disturbance[0] / problem.model.car.mass_kg, noise.time_of(0)}};
-    if (noise.sloping()) pushed.emplace_back(noise.road[0], noise.road_time_s);
-    double slowest = 0.0;
+    double slowest = 0.0, dt = 0.0;
     for (const Run& run : problem.runs) {
-        const double read = noise.sensor[0] * std::sqrt(run.dt);
-        double quickest = read / noise.motion[0];
-        for (const auto& [std_mps2, time_s] : pushed) {
-            const double walk = read / (std_mps2 * std::sqrt(2.0 * time_s));
-            quickest = std::min(quickest, std::max(walk, std::sqrt(walk * time_s)));
+        if (run.dt == dt) continue;
+        dt = run.dt;
+        for (std::size_t i = 0; i < kRoadStates; ++i) {
+            Axis axis;
+            axis.motion = noise.motion[i];
+            axis.force_mps2 = noise.disturbance[i] / problem.model.car.mass_kg;
+            axis.force_s = noise.time_of(i);
+            axis.road_mps2 = noise.road[i];
+            axis.road_s = noise.road_time_s;
+            if (is_read(problem.runs, kVx + static_cast<int>(i)))
+                axis.speed = noise.sensor[kVx + i];
+            if (is_read(problem.runs, kAx + static_cast<int>(i))) axis.felt = noise.sensor[kAx + i];
+            if (axis.speed > 0.0) slowest = std::max(slowest, time_constant_s(axis, dt));
         }
-        slowest = std::max(slowest, quickest);
     }
     return kTimesMet * slowest;
 }
 
-std::vector<Piece> pieces_of(const std::vector<Run>& runs, double forgotten_s, std::size_t most) {
+std::size_t filter_samples(const SingleTrack& model) {
+    return active_states(model.effects).count > 0 ? kFilterSamples / 2 : kFilterSamples;
+}
+
+std::vector<Piece> pieces_of(const std::vector<Run>& runs, double forgotten_s,
+                             std::size_t samples_of_step, std::size_t most) {
     forgotten_s = std::max(forgotten_s, kForgotten);
     std::size_t all = 0, longest = 1;
     for (const Run& run : runs) {
@@ -81,7 +139,7 @@ std::vector<Piece> pieces_of(const std::vector<Run>& runs, double forgotten_s, s
     std::vector<Piece> parts = cut(runs, std::min(high, most));
     const std::size_t steps_whole = steps_of(runs, whole, forgotten_s);
     const std::size_t steps_parts = steps_of(runs, parts, forgotten_s);
-    if (kGain * std::min(steps_whole, steps_parts) >= all) return {};
+    if (samples_of_step * std::min(steps_whole, steps_parts) >= all) return {};
     return steps_parts < steps_whole ? parts : whole;
 }
 

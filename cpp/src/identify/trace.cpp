@@ -123,7 +123,8 @@ bool means_of_run(const Run& run, const std::vector<double>& forget, std::size_t
 }
 
 bool means_in_pieces(const Problem& problem, const double* p, const Noise& noise, double* out) {
-    const std::vector<Piece> pieces = pieces_of(problem.runs, forgets_s(problem, noise));
+    const std::vector<Piece> pieces =
+        pieces_of(problem.runs, forgets_s(problem, noise), filter_samples(problem.model));
     if (pieces.empty()) return false;
     LaneFilter filter(problem, {p}, noise, pieces);
     filter.with_transition = true;

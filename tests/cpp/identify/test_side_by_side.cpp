@@ -11,7 +11,7 @@ constexpr double kClose = 2e-11;  // of whitened residuals
 const auto kLagging = mask_of({"tyre_relaxation", "steer_lag", "aero_drag", "side_wind"});
 
 /// Steps of 50 ms have several parts, more of them where the car is slow.
-Problem long_run(EffectMask effects, std::size_t samples = 620, bool held = false) {
+Problem long_run(EffectMask effects, std::size_t samples = 2480, bool held = false) {
     SingleTrack truth{saloon(), effects};
     truth.loads_known = truth.inputs_held = held;
     Parameters p = typical_parameters();
@@ -28,6 +28,12 @@ Problem long_run(EffectMask effects, std::size_t samples = 620, bool held = fals
 /// The error of a speed that is not read stays.
 Problem without_speed(Problem problem) {
     for (auto& y : problem.runs[0].measurements) y[kVx] = y[kVy] = y[kAx] = std::nan("");
+    return problem;
+}
+
+/// Nothing tells where the motion is.
+Problem unread(Problem problem) {
+    for (auto& y : problem.runs[0].measurements) y.setConstant(std::nan(""));
     return problem;
 }
 
@@ -138,7 +144,7 @@ TEST_P(SideBySide, FiltersAreThoseOfWholeRuns) {
             cut = expect_whole(problem, noise) || cut;
         }
     EXPECT_TRUE(cut);
-    EXPECT_TRUE(expect_whole(long_run(kLagging, 620, true), ordinary_noise()));
+    EXPECT_TRUE(expect_whole(long_run(kLagging, 2480, true), ordinary_noise()));
 }
 
 TEST_P(SideBySide, OtherParametersAndModelsGoTheSameWay) {
@@ -163,6 +169,23 @@ TEST(Pieces, AreNoneWhereTheFilterHoldsTheSpeedForLong) {
     noise.motion[0] = 1e-4;
     noise.disturbance[0] = 1.0;
     EXPECT_TRUE(pieces_of(problem.runs, forgets_s(problem, noise)).empty());
+}
+
+/// Of a force and a slope that are read as one, the slower forgets with the zero of their sum.
+TEST(Pieces, WaitUntilAForceIsToldFromTheSlopeOfTheRoad) {
+    Problem problem = long_run(EffectMask{0});
+    for (auto& y : problem.runs[0].measurements) y[kAx] = y[kAy] = std::nan("");
+    Noise noise = ordinary_noise();
+    noise.sensor.fill(1e-4);
+    noise.motion = {1e-4, 1e-4, 1e-4};
+    const double force_mps2 = 0.3, force_s = 1.0, road_mps2 = 0.2, road_s = 5.0;
+    noise.disturbance.fill(force_mps2 * problem.model.car.mass_kg);
+    noise.correlation_time_s.fill(force_s);
+    noise.road.fill(road_mps2);
+    noise.road_time_s = road_s;
+    const double force = force_mps2 * force_mps2 / force_s, road = road_mps2 * road_mps2 / road_s;
+    const double zero = (force / (road_s * road_s) + road / (force_s * force_s)) / (force + road);
+    EXPECT_NEAR(forgets_s(problem, noise) * std::sqrt(zero) / -std::log(kMet), 1.0, 0.01);
 }
 
 struct Score {
@@ -271,7 +294,7 @@ TEST(SideBySideToo, AForceMakesTheFilterForgetWhereNoWhiteNoiseDoes) {
         SCOPED_TRACE(i);
         const Noise& noise = pushed[i];
         const Problem quick = long_run(i % 2 == 0 ? EffectMask{0} : kLagging);
-        const Problem slow = without_speed(quick);
+        const Problem slow = unread(quick);
         ASSERT_FALSE(pieces_of(quick.runs, forgets_s(quick, noise)).empty());
         EXPECT_TRUE(expect_whole(quick, noise));
         Problem both = quick;  // all in one go, for the sake of the second run
@@ -300,7 +323,7 @@ TEST(SideBySideToo, WhatIsNotForgottenIsDoneInOneGo) {
 }
 
 TEST(SideBySideToo, RunsOfAnyNumberAndLength) {
-    Problem problem = long_run(EffectMask{0}, 400);
+    Problem problem = long_run(EffectMask{0}, 1600);
     const SingleTrack& truth = problem.model;
     for (unsigned i = 0; i < 20; ++i)
         problem.runs.push_back(

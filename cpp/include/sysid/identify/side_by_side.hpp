@@ -22,13 +22,23 @@ struct Piece {
     std::size_t size() const { return end - begin; }
 };
 
-/// Seconds in which a filter with this noise has forgotten where it began. Speed is what it holds
-/// longest: it hardly moves by itself, and is not read well.
+/// Seconds in which a filter with this noise has forgotten where it began: the slowest pole of the
+/// stationary filters of the motion along and across, each with its force and the slope of the
+/// road. What is read of these two alone says which of them it is takes longest to forget.
 double forgets_s(const Problem& problem, const Noise& noise);
+
+/// Samples done one after the other that cost as much as a step of all lanes, along a path with
+/// frozen gains and of the filter.
+constexpr std::size_t kPathSamples = 6, kFilterSamples = 4;
+
+/// The same of the filter of a model. With states of effects a single sample has room for those of
+/// all of them, lanes have no more than there are.
+std::size_t filter_samples(const SingleTrack& model);
 
 /// How runs are cut so that the lanes are full, into pieces of so many samples at most; nothing
 /// where lanes would gain nothing, because the pieces are not much longer than what is forgotten.
 std::vector<Piece> pieces_of(const std::vector<Run>& runs, double forgotten_s = 0.0,
+                             std::size_t samples_of_step = kFilterSamples,
                              std::size_t most = std::numeric_limits<std::size_t>::max());
 
 /// A sample in a lane. Where it is not to be kept the lane has nothing to do.
@@ -42,6 +52,7 @@ struct LaneSample {
 using LaneSamples = std::array<LaneSample, kLanes>;
 
 constexpr double kMet = 1e-12;
+constexpr int kRounds = 8;         // more of them cost as much as no lanes at all
 constexpr std::size_t kMark = 32;  // samples from one comparison of two ways to the next
 
 /// How far apart two values of a state are, in what is tolerated for a standard deviation.
@@ -88,7 +99,6 @@ class LaneGroup {
 /// numbers are the same; `walk.finish(first, last)` gets the pieces of a group that are done.
 template <class Walk>
 bool side_by_side(const std::vector<Run>& runs, const std::vector<Piece>& pieces, Walk& walk) {
-    constexpr int kRounds = 8;  // more of them cost as much as no lanes at all
     std::vector<LaneRow>& state = walk.state();
     const std::size_t numbers = state.size();
     std::vector<double> here(numbers), before(numbers);
