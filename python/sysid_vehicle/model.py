@@ -267,12 +267,14 @@ class Model:
 
     @property
     def candidates(self) -> tuple[Effect, ...]:
-        """Effects of the catalogue that could be added."""
+        """Effects of the catalogue that are considered where no others are named."""
         unknown_inertia = _YAW_INERTIA in self.free_names
         return self.seated(
             e
             for e in catalogue()
-            if e.id not in self.effects and not (unknown_inertia and e.id == "yaw_inertia")
+            if e.id not in self.effects
+            and not e.on_request
+            and not (unknown_inertia and e.id == "yaw_inertia")
         )
 
     def seated(self, others: Iterable[Effect]) -> tuple[Effect, ...]:

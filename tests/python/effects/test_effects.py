@@ -3,7 +3,18 @@
 import numpy as np
 import pytest
 
-from sysid_vehicle import Effect, Fit, InvalidInput, Log, Model, _core, catalogue, effect
+from sysid_vehicle import (
+    Effect,
+    Fit,
+    InvalidInput,
+    Log,
+    Model,
+    _core,
+    catalogue,
+    effect,
+    example_vehicle,
+)
+from sysid_vehicle.diagnose import considered
 from sysid_vehicle.effects import base_parameters
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.estimate.driving import MEASURED
@@ -60,6 +71,17 @@ def test_effects_say_what_they_break_and_what_logs_share() -> None:
     shared = {e.id for e in catalogue() if e.same_in_all_logs}
     assert shared == {e.id for e in catalogue() if e.id.endswith("lever_arm")}
     assert all("the same in all logs of a car" in str(effect(e)) for e in shared)
+
+
+def test_an_effect_on_request_is_a_candidate_where_it_is_named() -> None:
+    asked = {e.id for e in catalogue() if e.on_request}
+    assert asked == {"body_roll"}
+    assert "considered  only where it is named" in str(effect("body_roll"))
+    model = Model(example_vehicle())
+    assert not asked & {e.id for e in model.candidates}
+    assert [e.id for e in considered(model, ["mass", "body_roll"])] == ["mass", "body_roll"]
+    assert considered(model.add("body_roll"), ["body_roll"]) == ()
+    assert considered(model, None) == model.candidates
 
 
 def test_a_scanned_parameter_is_tried_over_the_log_or_its_range() -> None:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ...effects import Effect, Parameter, effect
+from ...effects import Effect, Parameter, catalogue, effect
 from ...model import Model
 from ...rules import USUAL, Rules
 
@@ -29,11 +29,16 @@ OF_A_FACTOR = "_error"
 
 
 def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple[Effect, ...]:
-    """What may be added to a model: all that it lacks, or what is wanted of that."""
+    """What may be added to a model: all that it lacks, or what is wanted of that.
+
+    Effects on request are among it only where they are wanted.
+    """
     if candidates is None:
         return model.candidates
     wanted = {effect(c).id for c in candidates}
-    return tuple(e for e in model.candidates if e.id in wanted)
+    asked = [e for e in catalogue() if e.on_request and e.id not in model.effects]
+    known = sorted((*model.candidates, *model.seated(asked)), key=lambda e: e.index)
+    return tuple(e for e in known if e.id in wanted)
 
 
 def possible(
