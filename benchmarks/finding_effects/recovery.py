@@ -73,7 +73,9 @@ def run(name: str, seed: int) -> bool:
     truth = sv.Model(car).add(name).with_values(values)
     train = sv.drive(truth, sv.manoeuvres.lap(), seed=2 * seed + 1, noise=SENSORS)
     test = sv.drive(truth, sv.manoeuvres.handling_course(), seed=2 * seed + 2, noise=SENSORS)
-    study = sv.improve(sv.Model(car.replace(**OTHER_TYRES)), train, test, seed=seed)
+    known = [e.id for e in sv.catalogue()]
+    other = sv.Model(car.replace(**OTHER_TYRES))
+    study = sv.improve(other, train, test, candidates=known, seed=seed)
     place, good = place_of(name, study.diagnoses[0])
     candidate = next(c for c in study.diagnoses[0].ranking if c.id == name)
     found = next((a for a in study.added if a.id == name), None)

@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2, kstest
 
 from sysid_vehicle import Driving, Fit, Log, Model, catalogue, drive, effect, identify, manoeuvres
+from sysid_vehicle.diagnose import considered
 from sysid_vehicle.diagnose.candidates.score import Score, ScoreBoard, score_board, score_board_of
 from sysid_vehicle.diagnose.evidence.evidence import Evidence
 from sysid_vehicle.diagnose.evidence.sensitivity import sensitivities
@@ -19,7 +20,7 @@ Hidden = Callable[[str, float], Fit]
 
 
 def board(fit: Fit) -> ScoreBoard:
-    return score_board(fit, fit.driving, fit.model.candidates)
+    return score_board(fit, fit.driving, considered(fit.model, [e.id for e in catalogue()]))
 
 
 @pytest.fixture(scope="module")

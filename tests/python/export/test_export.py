@@ -95,14 +95,14 @@ def test_a_rolling_body_over_seconds_of_a_lap(truth: sv.Model) -> None:
     exported = module_of(model)
     names = [s.name for s in equations(model).states]
     angle, rate = names.index("roll_per_gradient"), names.index("roll_rate_per_gradient")
-    most = 0.0
+    leant = rolled = 0.0
     state = np.concatenate((driven.states[0, :3], (0.0, 0.0)))
-    for k in range(2000):
+    for k in range(4000):
         state = exported["step"](state, driven.inputs[k], driven.inputs[k + 1], 0.01)
         np.testing.assert_allclose(state[:3], driven.states[k + 1, :3], rtol=0.0, atol=1e-4)
-        most = max(most, abs(state[rate]))
-    assert most > 0.5  # 1/s: 1.7 deg/s of roll
-    assert 0.1 < abs(state[angle]) < 1.2
+        leant, rolled = max(leant, abs(state[angle])), max(rolled, abs(state[rate]))
+    assert rolled > 0.5  # 1/s: 1.7 deg/s of roll
+    assert 0.3 < leant < 1.2
 
 
 @pytest.fixture(scope="module")
@@ -361,7 +361,7 @@ def test_the_text_reads_like_the_equations(truth: sv.Model) -> None:
     for line in (
         "# slip angles",
         "delta = delta * (1.0 + steer_ratio_ratio_error)",
-        "alpha_f = delta - atan2(v_y + l_f * r, v_x)",
+        "alpha_f = delta - atan2(v_road + l_f * r, v_x)",
         "lag_rate = fmin(1.0 / steer_lag_time_constant_s, 4000.0)",
         "steer_lag_rate = lag_rate * (delta - steer_lag)",
         "grip_r = grip_r * (1.0 - lateral_load_transfer_loss_rear * term_",

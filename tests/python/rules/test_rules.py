@@ -54,7 +54,7 @@ NUMERICAL = {
     "diagnose/candidates/single_effects.py": {"_ROUNDS", "_SETTLED", "_EXTENDED"},
     "study/validation.py": {"AHEAD", "AHEAD_S", "_SHARE", "_PIECE_S", "_FEWEST_PIECES", "_TRIMMED"},
     "study/horizons.py": {"AHEAD", "_FEWEST", "_APART", "_LOST"},
-    "study/beyond.py": {"_DRAWS", "_TOGETHER"},
+    "study/beyond.py": {"_DRAWS"},
     "study/foretold.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
     "study/judge.py": {"_SHORT_S"},
     "study/limit.py": {"_BASELINE", "_SEARCHED", "_SENSORS", "_STEP"},
