@@ -112,7 +112,8 @@ def test_a_late_yaw_rate_is_told_and_no_inertia_is_named(
     ready, _, delayed = made_ready([log], [])
     assert delayed
     (moved,) = (text for text in ready[0].corrections if text.startswith("ay_mps2: taken"))
-    assert float(moved.split()[2]) == pytest.approx(-100.0, abs=10.0)
+    assert float(moved.split()[2]) == pytest.approx(100.0, abs=10.0)
+    assert moved.endswith("ms earlier in the file")
 
 
 @pytest.mark.parametrize(("channel", "factor"), [("fx_n", 1e-3), ("steer_rad", 16.0)])
