@@ -18,6 +18,7 @@ _SECONDS_BELOW = 1.0
 _FINER = ((400.0, "milli", "0.001"), (4e5, "micro", "1e-6"), (np.inf, "nano", "1e-9"))
 _MIN_STEP = 1e-6  # of the usual step: below, two rows are one that was written twice
 _OWN_GAP = 1.5  # a channel is interpolated between samples that are no farther apart, in periods
+_BEATS = 5  # longer steps, evenly spaced, that show a step of no whole number of decimals
 _MAX_GROWTH = 20  # a grid this many times longer than the log means a broken time channel
 
 
@@ -180,6 +181,10 @@ def _is_rounded(time_s: FloatArray, mean_step: float) -> bool:
         quantum = 10.0**-decimals
         ticks = time_s / quantum
         if np.abs(ticks - np.round(ticks)).max() < 1e-3:
+            steps = np.diff(np.round(ticks))
+            usual = np.median(steps)
+            if np.all(steps % usual == 0.0) and np.count_nonzero(steps > usual) < _BEATS:
+                return False  # so few longer steps are lost rows: a rate a hair off is rarer
             index = np.arange(time_s.size)
             line = np.polyval(np.polyfit(index, time_s - time_s[0], 1), index) + time_s[0]
             return bool(quantum < mean_step and np.abs(time_s - line).max() <= 0.55 * quantum)

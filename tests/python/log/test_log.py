@@ -179,6 +179,22 @@ class TestGrid:
         with pytest.raises(InvalidInput, match=r"time_s: goes from -1.7e\+308 to 1.7e\+308"):
             make(data)
 
+    @pytest.mark.parametrize("lost", [[17], [50], [33, 66], [24, 49, 74]])
+    def test_lost_rows_of_a_time_with_few_decimals(self, lost: list[int]) -> None:
+        values = columns(np.setdiff1d(np.arange(100), lost) / 100.0)
+        with pytest.warns(SysidWarning, match=f"lacks rows in {len(lost)} places"):
+            log = make(values)
+        assert log.rate_hz == pytest.approx(100.0)
+        np.testing.assert_allclose(log["vx_mps"], 20.0 + 0.5 * log["time_s"], atol=1e-9)
+
+    @pytest.mark.parametrize("rate_hz", [80.0, 99.0, 60.0, 30.0])
+    def test_an_even_time_that_was_rounded(self, rate_hz: float) -> None:
+        values = columns(np.round(np.arange(1200) / rate_hz, 2))
+        log = make(values)
+        assert log.n == 1200
+        assert log.rate_hz == pytest.approx(rate_hz, rel=1e-3)
+        np.testing.assert_array_equal(log["vx_mps"], values["vx_mps"])
+
     @given(
         start=st.floats(-1e3, 1e5), rate=st.floats(20.0, 1000.0), lost=st.sets(st.integers(1, 98))
     )
