@@ -12,7 +12,7 @@ from .._common.text import text_table
 from ..compare import Comparison, compare
 from ..demo import run_demo
 from ..diagnose import where
-from ..effects import catalogue, installed_effects, load_effects
+from ..effects import catalogue, effect, installed_effects, load_effects
 from ..errors import warn
 from ..identify import Fit, identify
 from ..model import Model
@@ -103,6 +103,9 @@ def _print_where(study: Study) -> None:
 
 def _effects(args: argparse.Namespace, heard: Warnings) -> None:
     _define(args)
+    if args.names:
+        print("\n\n".join(str(effect(name)) for name in args.names))
+        return
     print("\n\n".join(str(e) for e in catalogue()))
     known = {e.id for e in catalogue()}
     others = [str(p) for p in installed_effects() if p.id not in known]

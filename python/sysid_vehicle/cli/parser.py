@@ -81,7 +81,9 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
 
     sideslip.add_parser(commands)
     mu_slip.add_parser(commands)
-    _define(commands.add_parser("effects", help="the catalogue of effects"))
+    effects = commands.add_parser("effects", help="the catalogue of effects")
+    effects.add_argument("names", nargs="*", metavar="EFFECT", help="those to print; all if none")
+    _define(effects)
     lab.add_parser(commands)
     twin.add_parser(commands)
     return parser.parse_args(argv)

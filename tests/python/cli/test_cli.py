@@ -202,16 +202,6 @@ def test_a_channel_map_is_used(
     assert main(["compare", str(log), "--vehicle", car, "--channels", str(mapping)]) == 0
 
 
-def test_effects_lists_the_whole_catalogue(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["effects"]) == 0
-    out = capsys.readouterr().out
-    for e in sv.catalogue():
-        assert f"{e.id}: {e.title}" in out
-        assert e.excited_by in out
-        for p in e.parameters:
-            assert f"{p.name} [{p.unit}]" in out
-
-
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
