@@ -26,8 +26,9 @@ _DEVICES_S = {
     **dict.fromkeys(INERTIAL, 0.010),
     "steer_rad": 0.010,
 }
-# Effects that a rung brings about: the wheel force is on time where all else is late.
-PRESENT = dict.fromkeys(("late", "all"), ("force_lag",))
+# What a rung brings about: the wheel force is on time where all else is late by this at least.
+_ON_TIME = {"force_lag.time_constant_s": min(_DEVICES_S.values())}
+PRESENT = {"late": _ON_TIME, "all": _ON_TIME}
 _QUANTA = {
     "vx_mps": 0.02,
     "vy_mps": 0.02,
