@@ -70,6 +70,7 @@ _VEHICLE_RANGES = {
 }
 
 _CURVE_POINTS = 3001
+_GEARS = ("steering_ratio", "steer_ratio")
 _OPTIONAL = ("yaw_inertia_kgm2", "air_density_kgpm3")
 
 
@@ -268,8 +269,8 @@ class Vehicle:
         ----------
         path : str or Path
             TOML file with the fields of this class as keys and the tables ``[tyre.front]`` and
-            ``[tyre.rear]`` with B, C, D, E. ``air_density_kgpm3``, ``yaw_inertia_kgm2`` and
-            ``name`` may be left out.
+            ``[tyre.rear]`` with B, C, D, E. ``air_density_kgpm3``, ``yaw_inertia_kgm2``, ``name``
+            and the table of a tyre of which nothing is known may be left out.
 
         Raises
         ------
@@ -280,7 +281,8 @@ class Vehicle:
         Warns
         -----
         SysidWarning
-            If ``yaw_inertia_kgm2`` is absent, because it then has to be identified.
+            If ``yaw_inertia_kgm2`` is absent, because it then has to be identified, or the table
+            of a tyre, because the search then begins at that of `Tyre`.
         """
         content = read_toml(path)
         where = str(path)
@@ -292,6 +294,12 @@ class Vehicle:
             raise InvalidInput(f"{where}: 'tyre' must be two tables, [tyre.front] and [tyre.rear]")
         values = {key: content.get(key) for key in _VEHICLE_RANGES}
         missing = [key for key, value in values.items() if value is None and key not in _OPTIONAL]
+        for key in set(content).intersection(_GEARS):
+            raise InvalidInput(
+                f"{where}: {key} is no property of the model, whose steering angle is that of the "
+                f'road wheels; put it into the channel map: steer_rad = {{ column = "...", factor '
+                f"= ... }}, with 1 / {key} in the factor, and remove it here"
+            )
         refuse_unknown(content, _VEHICLE_RANGES, where, likely=missing)
         refuse_unknown(tyre_tables, AXLES, f"{where}, [tyre]")
         for axle in AXLES:
@@ -299,18 +307,19 @@ class Vehicle:
             if not isinstance(table, dict):
                 raise InvalidInput(f"{where}: 'tyre.{axle}' must be a table [tyre.{axle}]")
             refuse_unknown(table, _TYRE_RANGES, f"{where}, [tyre.{axle}]")
-            missing += [f"tyre.{axle}.{key}" for key in _TYRE_RANGES if key not in table]
+            if axle in tyre_tables:
+                missing += [f"tyre.{axle}.{key}" for key in _TYRE_RANGES if key not in table]
         if missing:
             raise InvalidInput(f"{where}: missing keys: {', '.join(missing)}; add them to the file")
         for axle in AXLES:
-            _check_ranges(_TYRE_RANGES, tyre_tables[axle], f"{where}, [tyre.{axle}]")
+            _check_ranges(_TYRE_RANGES, tyre_tables.get(axle, {}), f"{where}, [tyre.{axle}]")
         given = {key: value for key, value in values.items() if value is not None}
         _check_ranges(_VEHICLE_RANGES, given, where)
         try:
             vehicle = cls(
                 **given,
-                tyre_front=Tyre(**tyre_tables["front"]),
-                tyre_rear=Tyre(**tyre_tables["rear"]),
+                tyre_front=Tyre(**tyre_tables.get("front", {})),
+                tyre_rear=Tyre(**tyre_tables.get("rear", {})),
                 name=name,
             )
         except InvalidInput as error:
@@ -319,6 +328,13 @@ class Vehicle:
             warn(
                 f"{where}: yaw_inertia_kgm2 is absent, so it becomes a parameter to identify; "
                 f"add it if it was measured"
+            )
+        absent = [f"[tyre.{axle}]" for axle in AXLES if axle not in tyre_tables]
+        if absent:
+            usual = ", ".join(f"{k} = {v:g}" for k, v in dataclasses.asdict(Tyre()).items())
+            warn(
+                f"{where}: {' and '.join(absent)} absent, so the search begins at usual values, "
+                f"{usual}; add what is known of the tyres"
             )
         return vehicle
 

@@ -92,8 +92,9 @@ def _improve(args: argparse.Namespace, heard: Warnings) -> None:
     print(study.fit)
     if args.json is not None:
         study.to_json(args.json)
-    write_report(study, args.report)
-    print(f"Report: {args.report}")
+    if args.report is not None:
+        write_report(study, args.report)
+        print(f"Report: {args.report}")
 
 
 def _print_where(study: Study) -> None:

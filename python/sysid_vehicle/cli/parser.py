@@ -60,11 +60,11 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     _search(diagnose)
     add_json(diagnose)
 
-    improve = commands.add_parser("improve", help="add what is missing, write a report")
+    improve = commands.add_parser("improve", help="add what is missing, and show what it does")
     _driving(improve)
     _validation(improve)
     _search(improve)
-    add_output(improve, "--report", kind="HTML", help="report to write", required=True)
+    add_output(improve, "--report", kind="HTML", help="report to write")
     add_json(improve)
 
     fleet.add_parser(commands)
