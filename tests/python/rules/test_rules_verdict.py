@@ -167,6 +167,20 @@ def test_no_name_stands_where_all_together_may_take_nothing() -> None:
     assert verdict(replace(WHOLE, taken_low=-0.1)).verdict == "explained"
 
 
+def test_below_the_noise_of_the_sensors_the_likelihood_of_validation_data_decides() -> None:
+    unseen = replace(LEFT, taken_low=-0.1, added=(replace(MASS, own=UNKNOWN, sure=True), DRAG))
+    assert verdict(unseen).verdict == "unknown"
+    low = replace(unseen, buried=True)
+    assert verdict(low).verdict == "partly_explained"
+    assert set(withdrawn(low)) == {"aero_drag"}  # whatever its share is said to be
+    both = replace(low, added=(low.added[0], replace(DRAG, sure=True)))
+    assert withdrawn(both) == {}
+    # Of what is no finding, or not sure, no name stands there either.
+    for wrong in ({"sure": False}, {"finding": "proxy"}, {"finding": "negligible"}):
+        alone = replace(low, added=(replace(low.added[0], **wrong),))
+        assert verdict(alone).verdict == "unknown"
+
+
 def test_a_share_for_which_there_was_no_time_is_said_to_be_unknown() -> None:
     """It keeps no name, and is not said to have been looked for in vain."""
     shares = {a.id: (a.own, a.own_in_training) for a in LEFT.added if a is MASS}
