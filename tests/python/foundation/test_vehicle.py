@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from sysid_vehicle.errors import InvalidInput, SysidWarning
-from sysid_vehicle.vehicle import Tyre, Vehicle
+from sysid_vehicle.tyre import Tyre
+from sysid_vehicle.vehicle import Vehicle
 
 CAR = """
 name = "test car"
