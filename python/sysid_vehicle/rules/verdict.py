@@ -152,10 +152,8 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
 
     Errors below the noise of the sensors have no shares that could be shown. Where the final model
     leaves no larger ones, what is missing in it is small, and the likelihood of validation data
-    decides.
+    decides: on effects that no other could be taken for, beside which no stand-in was added.
     """
-    if facts.buried:
-        return frozenset(a.id for a in facts.added if a.named and a.sure)
     much = share_of(*facts.missing) < rules.most
     least = rules.taken if much else 0.0
     shown = [
@@ -165,9 +163,10 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
         and all(s.value > rules.taken and s.low > least for s in (a.own, a.own_in_training))
     ]
     others = [a for a in facts.added if a not in shown]
-    return frozenset(
-        a.id for a in shown if not any(a.moves & b.moves and _more(b, a) for b in others)
-    )
+    standing = {a.id for a in shown if not any(a.moves & b.moves and _more(b, a) for b in others)}
+    if facts.buried and all(a.finding != "proxy" for a in facts.added):
+        standing |= {a.id for a in facts.added if a.finding == "missing" and a.sure}
+    return frozenset(standing)
 
 
 def _more(one: Added, other: Added) -> bool:

@@ -95,8 +95,8 @@ class Study:
     matters : mapping of str to float, optional
         Errors by channel that matter, where the user said which: else the noise of the sensors.
     buried : bool
-        Whether names stand beside something left whose errors 0.5 to 5 s ahead are smaller than the
-        noise of the sensors.
+        Whether something is left beside what was added, and errs by less, 0.5 to 5 s ahead, than
+        the noise of the sensors.
     """
 
     verdict: Verdict

@@ -46,7 +46,7 @@ def test_a_name_stands_by_its_likelihood_where_no_error_shows() -> None:
     assert abs(length.value - LENGTH_M) < 3.0 * length.std
     assert study.verdict == "partly_explained"
     assert study.buried
-    assert "the likelihood of validation data needs the effects found" in study.meaning
+    assert "effects were found that are a part of it" in study.meaning
     assert "than the noise of the sensors" in study.meaning
     assert contradictions(str(study)) == []
 
