@@ -42,8 +42,8 @@ def meaning(study: Study) -> str:
         )
     if study.verdict == "partly_explained" and study.buried:
         return (
-            "effects were found that are a part of it; what is left errs by less, 0.5 to 5 s ahead, "
-            "than the noise of the sensors"
+            "effects were found that are a part of it; what is left errs by less, 0.5 to 5 s "
+            "ahead, than the noise of the sensors"
         )
     beyond = study.explained
     if study.verdict == "partly_explained" and beyond and beyond.share < study.rules.most:
