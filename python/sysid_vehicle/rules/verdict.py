@@ -119,9 +119,10 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     withdrawn = []
     if left or stand_ins:
         late = frozenset(a.id for a in facts.added if a.late)
-        falling = names - _standing(facts, rules)
-        if left and not facts.taken_low > 0.0 and not facts.buried:
-            withdrawn.append(Withdrawn(names - falling, _NOT_TOGETHER, names))
+        likely = _likely(facts)
+        falling = names - likely - _standing(facts, rules)
+        if left and not facts.taken_low > 0.0:
+            withdrawn.append(Withdrawn(names - likely - falling, _NOT_TOGETHER, names))
         withdrawn.append(Withdrawn(falling - late, _NOT_SHOWN, names))
         if falling & late:
             withdrawn.append(Withdrawn(falling & late, _LATE, names))
@@ -149,10 +150,6 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
     one at a price. Where much is left, what it stands in for may be that: the share must be shown
     to be one worth a name. So may it be what a stand-in takes that moves the same channel, if
     that is the larger part.
-
-    Errors below the noise of the sensors have no shares that could be shown. Where the final model
-    leaves no larger ones, what is missing in it is small, and the likelihood of validation data
-    decides: on effects that no other could be taken for, beside which no stand-in was added.
     """
     much = share_of(*facts.missing) < rules.most
     least = rules.taken if much else 0.0
@@ -163,10 +160,21 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
         and all(s.value > rules.taken and s.low > least for s in (a.own, a.own_in_training))
     ]
     others = [a for a in facts.added if a not in shown]
-    standing = {a.id for a in shown if not any(a.moves & b.moves and _more(b, a) for b in others)}
-    if facts.buried and all(a.finding != "proxy" for a in facts.added):
-        standing |= {a.id for a in facts.added if a.finding == "missing" and a.sure}
-    return frozenset(standing)
+    return frozenset(
+        a.id for a in shown if not any(a.moves & b.moves and _more(b, a) for b in others)
+    )
+
+
+def _likely(facts: Facts) -> frozenset[str]:
+    """Effects whose names stand by the likelihood of validation data.
+
+    Errors below the noise of the sensors have no shares that could be shown. Where the final model
+    leaves no larger ones, what is missing in it is small, and the likelihood decides: on effects
+    that no other could be taken for, beside which no stand-in was added.
+    """
+    if not facts.buried or any(a.finding == "proxy" for a in facts.added):
+        return frozenset()
+    return frozenset(a.id for a in facts.added if a.finding == "missing" and a.sure)
 
 
 def _more(one: Added, other: Added) -> bool:

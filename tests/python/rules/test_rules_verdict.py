@@ -175,7 +175,8 @@ def test_below_the_noise_of_the_sensors_the_likelihood_of_validation_data_decide
     assert withdrawn(low) == {}
     # Shares that are shown all the same count as ever.
     both = replace(low, added=(*low.added, DRAG, replace(DRAG, id="head_wind", own=UNKNOWN)))
-    assert set(withdrawn(both)) == {"head_wind"}
+    assert set(withdrawn(both)) == {"aero_drag", "head_wind"}
+    assert set(withdrawn(replace(both, taken_low=0.05))) == {"head_wind"}
     # What has rivals, is no finding, or is not sure has no name there.
     for wrong in ({"sure": False}, {"finding": "one of a group"}, {"finding": "negligible"}):
         alone = replace(low, added=(replace(low.added[0], **wrong),))
