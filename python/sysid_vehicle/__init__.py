@@ -45,7 +45,8 @@ from .saved import load
 from .sensors import SensorCheck, check
 from .simulate import RoadDisturbance, SensorNoise, drive, example_vehicle
 from .study import Study, improve
-from .vehicle import Tyre, Vehicle
+from .tyre import Tyre
+from .vehicle import Vehicle
 
 __all__ = [
     "AxleForces",

@@ -18,7 +18,8 @@ from ._common.text import html_text
 from .effects import Effect, Parameter, base_parameters, catalogue, effect
 from .errors import InvalidInput
 from .saved import save
-from .vehicle import Tyre, Vehicle
+from .tyre import Tyre
+from .vehicle import Vehicle
 
 NUISANCES = (
     "steer_offset",

@@ -30,7 +30,7 @@ _NUMBERS = "biuf"  # kinds of arrays
 _PACKAGE = __name__.rpartition(".")[0]
 # Stations of the package whose dataclasses may stand in a file.
 _STATIONS = (
-    *("vehicle", "effects", "model", "rules", "log", "estimate", "identify", "compare"),
+    *("tyre", "vehicle", "effects", "model", "rules", "log", "estimate", "identify", "compare"),
     *("diagnose", "study"),
 )
 # Where modules have moved to since a version wrote their classes: old name to new name.
@@ -55,6 +55,7 @@ _MOVED: dict[str, str] = {
 }
 # Classes that have another name or module since, by their place.
 _CALLED: dict[str, str] = {
+    "vehicle:Tyre": "tyre:Tyre",
     "rules.accept:Change": "rules.accept:ErrorChange",
     "diagnose.candidates.diagnosis:Candidate": "diagnose.candidates.candidate:Candidate",
 }

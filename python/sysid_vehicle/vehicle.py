@@ -1,11 +1,10 @@
-"""The car's own numbers (mass, geometry, starting tyre) and their TOML file."""
+"""The car's own numbers (mass, geometry, starting tyres) and their TOML file."""
 
 from __future__ import annotations
 
 import dataclasses
 import html
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._common.arguments import real
 from ._common.arrays import FloatArray
 from ._common.files import as_path, read_toml, refuse_unknown, write_text
 from .errors import InvalidInput, warn
+from .tyre import TYRE_RANGES, USUAL_TYRE, Range, Tyre, check_ranges
 
 GRAVITY_MPS2: float = _core.GRAVITY_MPS2
 """Standard gravity, the same in the core."""
@@ -25,66 +24,22 @@ GRAVITY_MPS2: float = _core.GRAVITY_MPS2
 AXLES = ("front", "rear")
 
 
-@dataclass(frozen=True)
-class _Range:
-    """Closed range of a key (`above` makes the lower end open), and what to check outside it."""
-
-    low: float
-    high: float
-    meaning: str
-    above: bool = False
-
-    def complaint(self, key: str, value: object) -> str | None:
-        number = real(value)
-        if number is None:
-            return f"{key} = {value!r} is not a number; give the {self.meaning} as a plain number"
-        low_ok = number > self.low if self.above else number >= self.low
-        if low_ok and number <= self.high:
-            return None
-        sign = ">" if self.above else ">="
-        return (
-            f"{key} = {number:g} is out of range ({sign} {self.low:g} and <= {self.high:g}); "
-            f"give the {self.meaning}"
-        )
-
-
-_TYRE_RANGES = {
-    "B": _Range(0.0, 200.0, "stiffness factor of the magic formula in 1/rad", above=True),
-    "C": _Range(0.0, 4.0, "shape factor of the magic formula, about 1.4", above=True),
-    "D": _Range(0.0, 5.0, "peak friction coefficient, about 1.0 on dry asphalt", above=True),
-    "E": _Range(-50.0, 1.0, "curvature factor of the magic formula, at most 1"),
-}
-
 _VEHICLE_RANGES = {
-    "mass_kg": _Range(1.0, 50000.0, "total mass in kilograms, driver and fuel included"),
-    "yaw_inertia_kgm2": _Range(0.0, 1e7, "yaw inertia in kg m^2", above=True),
-    "lf_m": _Range(0.001, 20.0, "distance CG to front axle in metres"),
-    "lr_m": _Range(0.001, 20.0, "distance CG to rear axle in metres"),
-    "cg_height_m": _Range(0.0, 5.0, "height of the CG above the road in metres"),
-    "track_front_m": _Range(0.0, 5.0, "front track width in metres", above=True),
-    "track_rear_m": _Range(0.0, 5.0, "rear track width in metres", above=True),
-    "drag_area_m2": _Range(0.0, 50.0, "drag coefficient times frontal area in m^2"),
-    "air_density_kgpm3": _Range(0.0, 2.0, "air density in kg/m^3, 1.225 at sea level", above=True),
-    "brake_front_share": _Range(0.0, 1.0, "front axle's share of the brake force, 0 to 1"),
-    "drive_front_share": _Range(0.0, 1.0, "front axle's share of the drive force, 0 to 1"),
+    "mass_kg": Range(1.0, 50000.0, "total mass in kilograms, driver and fuel included"),
+    "yaw_inertia_kgm2": Range(0.0, 1e7, "yaw inertia in kg m^2", above=True),
+    "lf_m": Range(0.001, 20.0, "distance CG to front axle in metres"),
+    "lr_m": Range(0.001, 20.0, "distance CG to rear axle in metres"),
+    "cg_height_m": Range(0.0, 5.0, "height of the CG above the road in metres"),
+    "track_front_m": Range(0.0, 5.0, "front track width in metres", above=True),
+    "track_rear_m": Range(0.0, 5.0, "rear track width in metres", above=True),
+    "drag_area_m2": Range(0.0, 50.0, "drag coefficient times frontal area in m^2"),
+    "air_density_kgpm3": Range(0.0, 2.0, "air density in kg/m^3, 1.225 at sea level", above=True),
+    "brake_front_share": Range(0.0, 1.0, "front axle's share of the brake force, 0 to 1"),
+    "drive_front_share": Range(0.0, 1.0, "front axle's share of the drive force, 0 to 1"),
 }
 
-_CURVE_POINTS = 3001
+_GEARS = ("steering_ratio", "steer_ratio")
 _OPTIONAL = ("yaw_inertia_kgm2", "air_density_kgpm3")
-
-
-def _check_ranges(ranges: Mapping[str, _Range], values: Mapping[str, object], where: str) -> None:
-    """Raise one :class:`InvalidInput` that lists every value of `values` outside its range."""
-    found = (ranges[key].complaint(key, value) for key, value in values.items())
-    complaints = [text for text in found if text is not None]
-    if complaints:
-        raise InvalidInput(f"{where}: " + "; ".join(complaints))
-
-
-def magic_formula(slip_rad: npt.ArrayLike, B: float, C: float, D: float, E: float) -> FloatArray:
-    """Lateral force per vertical load [-] at slip angles [rad], whatever the coefficients are."""
-    x = B * np.asarray(slip_rad, dtype=float)
-    return np.asarray(D * np.sin(C * np.arctan(x - E * (x - np.arctan(x)))), dtype=float)
 
 
 def slip_angles(
@@ -104,58 +59,6 @@ def static_loads(mass_kg: float, lf_m: float, lr_m: float) -> tuple[float, float
     """Axle loads at rest, front and rear [N]."""
     per_metre = mass_kg * GRAVITY_MPS2 / (lf_m + lr_m)
     return per_metre * lr_m, per_metre * lf_m
-
-
-@dataclass(frozen=True)
-class Tyre:
-    """Magic-formula tyre of one axle: ``F_y = D F_z sin(C atan(Ba - E (Ba - atan(Ba))))``.
-
-    Parameters
-    ----------
-    B : float
-        Stiffness factor [1/rad].
-    C, D, E : float
-        Shape factor, peak friction coefficient, curvature factor [-].
-
-    Raises
-    ------
-    InvalidInput
-        If a coefficient is out of its range (B, C, D > 0, E <= 1).
-
-    Notes
-    -----
-    H. B. Pacejka, *Tire and Vehicle Dynamics*, eq. (4.6), without shifts; ``Ba`` is B times the
-    slip angle in radians.
-    """
-
-    B: float = 10.0
-    C: float = 1.4
-    D: float = 1.0
-    E: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check_ranges(_TYRE_RANGES, dataclasses.asdict(self), "tyre")
-        for key in _TYRE_RANGES:
-            object.__setattr__(self, key, float(getattr(self, key)))
-
-    @property
-    def cornering_stiffness_per_load(self) -> float:
-        """Cornering stiffness per vertical load, ``B C D`` [1/rad]."""
-        return self.B * self.C * self.D
-
-    def friction(self, slip_rad: npt.ArrayLike) -> FloatArray:
-        """Lateral force per vertical load [-] at slip angles [rad]."""
-        return magic_formula(slip_rad, self.B, self.C, self.D, self.E)
-
-    def peak_slip_rad(self, largest_rad: float = 0.6) -> float:
-        """Slip angle of the curve's peak [rad], at most `largest_rad`."""
-        slip = np.linspace(0.0, largest_rad, _CURVE_POINTS)
-        return float(slip[int(np.argmax(self.friction(slip)))])
-
-    def replace(self, **changes: float) -> Tyre:
-        """Return a copy with some coefficients changed."""
-        refuse_unknown(changes, _TYRE_RANGES, "tyre")
-        return dataclasses.replace(self, **changes)
 
 
 @dataclass(frozen=True)
@@ -200,8 +103,8 @@ class Vehicle:
     drag_area_m2: float
     brake_front_share: float
     drive_front_share: float
-    tyre_front: Tyre = Tyre()
-    tyre_rear: Tyre = Tyre()
+    tyre_front: Tyre = USUAL_TYRE
+    tyre_rear: Tyre = USUAL_TYRE
     yaw_inertia_kgm2: float | None = None
     air_density_kgpm3: float = 1.225
     name: str = "vehicle"
@@ -218,7 +121,7 @@ class Vehicle:
         numbers = {key: getattr(self, key) for key in _VEHICLE_RANGES}
         if self.yaw_inertia_kgm2 is None:
             del numbers["yaw_inertia_kgm2"]
-        _check_ranges(_VEHICLE_RANGES, numbers, f"vehicle '{self.name}'")
+        check_ranges(_VEHICLE_RANGES, numbers, f"vehicle '{self.name}'")
         for key, value in numbers.items():
             object.__setattr__(self, key, float(value))
         if self.yaw_inertia_kgm2 is not None:
@@ -268,8 +171,8 @@ class Vehicle:
         ----------
         path : str or Path
             TOML file with the fields of this class as keys and the tables ``[tyre.front]`` and
-            ``[tyre.rear]`` with B, C, D, E. ``air_density_kgpm3``, ``yaw_inertia_kgm2`` and
-            ``name`` may be left out.
+            ``[tyre.rear]`` with B, C, D, E. ``air_density_kgpm3``, ``yaw_inertia_kgm2``, ``name``
+            and the table of a tyre of which nothing is known may be left out.
 
         Raises
         ------
@@ -280,7 +183,8 @@ class Vehicle:
         Warns
         -----
         SysidWarning
-            If ``yaw_inertia_kgm2`` is absent, because it then has to be identified.
+            If ``yaw_inertia_kgm2`` is absent, because it then has to be identified, or the table
+            of a tyre, because the search then begins at that of `Tyre`.
         """
         content = read_toml(path)
         where = str(path)
@@ -292,25 +196,32 @@ class Vehicle:
             raise InvalidInput(f"{where}: 'tyre' must be two tables, [tyre.front] and [tyre.rear]")
         values = {key: content.get(key) for key in _VEHICLE_RANGES}
         missing = [key for key, value in values.items() if value is None and key not in _OPTIONAL]
+        for key in set(content).intersection(_GEARS):
+            raise InvalidInput(
+                f"{where}: {key} is no property of the model, whose steering angle is that of the "
+                f'road wheels; put it into the channel map: steer_rad = {{ column = "...", factor '
+                f"= ... }}, with 1 / {key} in the factor, and remove it here"
+            )
         refuse_unknown(content, _VEHICLE_RANGES, where, likely=missing)
         refuse_unknown(tyre_tables, AXLES, f"{where}, [tyre]")
         for axle in AXLES:
             table = tyre_tables.get(axle, {})
             if not isinstance(table, dict):
                 raise InvalidInput(f"{where}: 'tyre.{axle}' must be a table [tyre.{axle}]")
-            refuse_unknown(table, _TYRE_RANGES, f"{where}, [tyre.{axle}]")
-            missing += [f"tyre.{axle}.{key}" for key in _TYRE_RANGES if key not in table]
+            refuse_unknown(table, TYRE_RANGES, f"{where}, [tyre.{axle}]")
+            if axle in tyre_tables:
+                missing += [f"tyre.{axle}.{key}" for key in TYRE_RANGES if key not in table]
         if missing:
             raise InvalidInput(f"{where}: missing keys: {', '.join(missing)}; add them to the file")
         for axle in AXLES:
-            _check_ranges(_TYRE_RANGES, tyre_tables[axle], f"{where}, [tyre.{axle}]")
+            check_ranges(TYRE_RANGES, tyre_tables.get(axle, {}), f"{where}, [tyre.{axle}]")
         given = {key: value for key, value in values.items() if value is not None}
-        _check_ranges(_VEHICLE_RANGES, given, where)
+        check_ranges(_VEHICLE_RANGES, given, where)
         try:
             vehicle = cls(
                 **given,
-                tyre_front=Tyre(**tyre_tables["front"]),
-                tyre_rear=Tyre(**tyre_tables["rear"]),
+                tyre_front=Tyre(**tyre_tables.get("front", {})),
+                tyre_rear=Tyre(**tyre_tables.get("rear", {})),
                 name=name,
             )
         except InvalidInput as error:
@@ -319,6 +230,13 @@ class Vehicle:
             warn(
                 f"{where}: yaw_inertia_kgm2 is absent, so it becomes a parameter to identify; "
                 f"add it if it was measured"
+            )
+        absent = [f"[tyre.{axle}]" for axle in AXLES if axle not in tyre_tables]
+        if absent:
+            usual = ", ".join(f"{k} = {v:g}" for k, v in dataclasses.asdict(USUAL_TYRE).items())
+            warn(
+                f"{where}: {' and '.join(absent)} absent, so the search begins at usual values, "
+                f"{usual}; add what is known of the tyres"
             )
         return vehicle
 
@@ -332,7 +250,7 @@ class Vehicle:
                 lines.append(f"{key} = {value!r}")
         for axle, tyre in zip(AXLES, (self.tyre_front, self.tyre_rear), strict=True):
             lines += ["", f"[tyre.{axle}]"]
-            lines += [f"{key} = {getattr(tyre, key)!r}" for key in _TYRE_RANGES]
+            lines += [f"{key} = {getattr(tyre, key)!r}" for key in TYRE_RANGES]
         write_text(path, "\n".join(lines) + "\n")
 
     def _rows(self) -> list[tuple[str, str]]:
@@ -341,7 +259,7 @@ class Vehicle:
             value = getattr(self, key)
             rows.append((key, "to identify" if value is None else f"{value:.6g}"))
         for axle, tyre in zip(AXLES, (self.tyre_front, self.tyre_rear), strict=True):
-            numbers = ", ".join(f"{key} {getattr(tyre, key):.6g}" for key in _TYRE_RANGES)
+            numbers = ", ".join(f"{key} {getattr(tyre, key):.6g}" for key in TYRE_RANGES)
             rows.append((f"tyre {axle}", numbers))
         return rows
 

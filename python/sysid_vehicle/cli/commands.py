@@ -19,7 +19,7 @@ from ..model import Model
 from ..report import RANKING_HEAD, ranking_rows, ranking_title, summary, write_report
 from ..study import Study, improve
 from ..vehicle import Vehicle
-from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
+from . import changed, fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
 from .log_arguments import read_logs, say_it_runs, written_map
 from .outputs import write_figures
 
@@ -92,8 +92,9 @@ def _improve(args: argparse.Namespace, heard: Warnings) -> None:
     print(study.fit)
     if args.json is not None:
         study.to_json(args.json)
-    write_report(study, args.report)
-    print(f"Report: {args.report}")
+    if args.report is not None:
+        write_report(study, args.report)
+        print(f"Report: {args.report}")
 
 
 def _print_where(study: Study) -> None:
@@ -125,6 +126,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace, Warnings], None]] = {
     "improve": _improve,
     "improve-many": fleet.run,
     "effects": _effects,
+    "changed": changed.run,
     "next-drive": next_drive.run,
     "check": sensors.run,
     "forces": forces.run,

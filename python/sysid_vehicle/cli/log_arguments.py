@@ -39,6 +39,22 @@ def add_driving(parser: argparse.ArgumentParser) -> None:
     add_reading(parser)
 
 
+def names(text: str) -> tuple[str, ...]:
+    """Return names that stand between commas."""
+    return tuple(name for name in (part.strip() for part in text.split(",")) if name)
+
+
+def add_effects(parser: argparse.ArgumentParser) -> None:
+    """Ask for the effects of a model."""
+    parser.add_argument(
+        "--effects",
+        type=names,
+        default=(),
+        metavar="A,B",
+        help="effects that the model has from the start",
+    )
+
+
 def read_logs(
     paths: Sequence[Path], args: argparse.Namespace, mapping: ChannelMap | None = None
 ) -> list[Log]:

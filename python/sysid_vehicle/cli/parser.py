@@ -7,8 +7,8 @@ from pathlib import Path
 
 from .. import _core
 from ..demo import DEFAULT, RANDOM
-from . import fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
-from .log_arguments import LOG_HELP, add_driving
+from . import changed, fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
+from .log_arguments import LOG_HELP, add_driving, add_effects, names
 from .outputs import add_json, add_output
 
 
@@ -45,13 +45,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
 
     compare = commands.add_parser("compare", help="fit the model to logs, see where it fails")
     _driving(compare)
-    compare.add_argument(
-        "--effects",
-        type=_names,
-        default=(),
-        metavar="A,B",
-        help="effects that the model has from the start",
-    )
+    add_effects(compare)
     add_json(compare)
 
     diagnose = commands.add_parser("diagnose", help="learn which physical effect is missing")
@@ -60,14 +54,15 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     _search(diagnose)
     add_json(diagnose)
 
-    improve = commands.add_parser("improve", help="add what is missing, write a report")
+    improve = commands.add_parser("improve", help="add what is missing, and show what it does")
     _driving(improve)
     _validation(improve)
     _search(improve)
-    add_output(improve, "--report", kind="HTML", help="report to write", required=True)
+    add_output(improve, "--report", kind="HTML", help="report to write")
     add_json(improve)
 
     fleet.add_parser(commands)
+    changed.add_parser(commands)
     next_drive.add_parser(commands)
     sensors.add_parser(commands)
     forces.add_parser(commands)
@@ -127,7 +122,7 @@ def _search(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--exclude",
-        type=_names,
+        type=names,
         default=(),
         metavar="EFFECT,...",
         help="effects not to consider, such as those that the car is known not to have",
@@ -171,7 +166,7 @@ def _count(text: str) -> int:
 
 
 def _sizes(text: str) -> dict[str, str]:
-    pairs = [part.split("=") for part in _names(text)]
+    pairs = [part.split("=") for part in names(text)]
     return {name.strip(): size.strip() for name, size in pairs}
 
 
@@ -180,10 +175,6 @@ def _seconds(text: str) -> float:
     if not 0.0 < value < float("inf"):
         raise ValueError
     return value
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(name for name in (part.strip() for part in text.split(",")) if name)
 
 
 # argparse says "invalid NAME value".

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from .._common.arrays import FloatArray
-from ..vehicle import magic_formula
+from ..tyre import magic_formula
 
 _PEAKLESS = 1.0 + 1e-6
 _RELATIVE = 1e-12  # error of the slip at the peak

@@ -11,7 +11,8 @@ from .. import _core
 from .._common.text import html_text
 from ..errors import InvalidInput
 from ..model import Model
-from ..vehicle import Tyre, Vehicle
+from ..tyre import Tyre
+from ..vehicle import Vehicle
 from .parts import Actuator, Controller, Nominal, Online, Sensors, Simulator
 
 _FORCE = Actuator(-8000.0, 6000.0, 60e3)

@@ -7,7 +7,8 @@ import numpy.typing as npt
 
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput
-from ..vehicle import GRAVITY_MPS2, Tyre, Vehicle
+from ..tyre import Tyre
+from ..vehicle import GRAVITY_MPS2, Vehicle
 
 # Beyond this share of its peak a tyre's curve is too flat to tell a slip angle from a force.
 _USABLE_PEAK = 0.97

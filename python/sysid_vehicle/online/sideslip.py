@@ -12,7 +12,8 @@ from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput, warn
 from ..log import Log
 from ..model import vehicle_data
-from ..vehicle import Tyre, Vehicle
+from ..tyre import Tyre
+from ..vehicle import Vehicle
 from .sideslip_results import SideslipRun
 from .sideslip_settings import SideslipSettings
 

@@ -15,10 +15,11 @@ from .._common.files import read_toml, refuse_unknown
 from ..errors import InvalidInput, near_names
 from ..log import CHANNELS, listed
 from .recording import Recording
+from .sideslip import SIDESLIP, lateral_speed
 from .table import Table
 from .units import WHAT, factor_to, measures, states_nothing
 
-_SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s")
+_SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s", "sideslip")
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,8 @@ class Source:
     """Where a canonical channel comes from: ``value = factor * column + offset``.
 
     `delay_s` is how late the column is [s]: its values are taken from so much later in the file.
+    `sideslip`, for `vy_mps` alone: the column is the sideslip angle, which `factor` makes radians;
+    the lateral speed is ``vx_mps tan(angle)``.
     """
 
     column: str
@@ -33,6 +36,11 @@ class Source:
     offset: float = 0.0
     despike: bool = False
     delay_s: float = 0.0
+    sideslip: bool = False
+
+    def unit_of(self, channel: str) -> str:
+        """The unit to which `factor` brings the column."""
+        return "rad" if self.sideslip else CHANNELS[channel].unit
 
 
 @dataclass(frozen=True)
@@ -68,7 +76,8 @@ class ChannelMap:
         """Read a channel map, a TOML file with the table ``[channels]``.
 
         Each entry is the name of the source column, a table with ``column``, ``factor`` (1),
-        ``offset`` (0), ``despike`` (false) and ``delay_s`` (0), or ``false`` to ignore the channel;
+        ``offset`` (0), ``despike`` (false), ``delay_s`` (0) and, for ``vy_mps``, ``sideslip``
+        (false), or ``false`` to ignore the channel;
         ``time_s = { rate_hz = 100 }`` numbers the rows of a file without time.
 
         Raises
@@ -162,13 +171,15 @@ class ChannelMap:
                 )
             values = _values(table, source.column, channel)
             if (source.factor, source.offset) == (1.0, 0.0):
-                values = values * _stated_factor(table, source.column, channel, notes)
+                values = values * _stated_factor(
+                    table, source.column, channel, source.unit_of(channel), notes
+                )
             with np.errstate(over="ignore", invalid="ignore"):  # what is endless is refused later
                 result[channel] = source.factor * values + source.offset
         if self.rate_hz is not None:
             result["time_s"] = np.arange(table.n) / self.rate_hz
         elif "time_s" not in result and "time_s" in table.counts:
-            factor = _stated_factor(table, "time_s", "time_s", notes)
+            factor = _stated_factor(table, "time_s", "time_s", "s", notes)
             result["time_s"] = factor * _values(table, "time_s", "time_s")
         for channel, source in self.sources.items():
             if source.delay_s and "time_s" in result:
@@ -178,10 +189,25 @@ class ChannelMap:
             if name in result or name in self.absent:
                 continue
             if name in CHANNELS:
-                result[name] = _values(table, name, name) * _stated_factor(table, name, name, notes)
+                factor = _stated_factor(table, name, name, CHANNELS[name].unit, notes)
+                result[name] = factor * _values(table, name, name)
             elif name not in used and table.counts[name] == 1 and name in table.columns:
                 result[name] = table.columns[name]
+        self._slip_to_speed(result)
         return result
+
+    def _slip_to_speed(self, columns: dict[str, npt.NDArray[np.float64]]) -> None:
+        """Make the lateral speed of a sideslip angle, if that is what the map or the file gives."""
+        source = self.sources.get("vy_mps")
+        if source is not None and source.sideslip:
+            angle = columns["vy_mps"]
+        elif SIDESLIP in columns and "vy_mps" not in columns and "vy_mps" not in self.absent:
+            angle = columns[SIDESLIP]
+        else:
+            return
+        if "vx_mps" not in columns or "time_s" not in columns:
+            return  # the log is refused for it
+        columns["vy_mps"] = lateral_speed(columns["time_s"], columns["vx_mps"], angle)
 
 
 def _values(table: Table, column: str, channel: str) -> npt.NDArray[np.float64]:
@@ -204,7 +230,9 @@ def _earlier(
     return result
 
 
-def _stated_factor(table: Table, column: str, channel: str, notes: list[str]) -> float:
+def _stated_factor(
+    table: Table, column: str, channel: str, si_unit: str, notes: list[str]
+) -> float:
     """Return the factor for the unit that the file states for a column; 1 if it states none.
 
     Raises
@@ -212,9 +240,9 @@ def _stated_factor(table: Table, column: str, channel: str, notes: list[str]) ->
     InvalidInput
         If the unit is one of another quantity.
     """
-    if column not in table.units or column in table.seconds:
+    unit = table.unit(column, si_unit)
+    if not unit or column in table.seconds:
         return 1.0
-    unit, si_unit = table.units[column], CHANNELS[channel].unit
     factor = factor_to(si_unit, unit)
     if factor is None and states_nothing(unit):
         return 1.0
@@ -245,16 +273,24 @@ def _source(entry: Mapping[str, Any], channel: str, where: str) -> Source:
     column = entry.get("column", channel)
     if not isinstance(column, str):
         raise InvalidInput(f"{where}: column = {column!r}; give the name of the source column")
-    despike = entry.get("despike", False)
-    if not isinstance(despike, bool):
-        raise InvalidInput(f"{where}: despike = {despike!r}; give true or false")
+    despike, sideslip = (_flag(entry, key, where) for key in ("despike", "sideslip"))
+    if sideslip and channel != "vy_mps":
+        raise InvalidInput(f"{where}: sideslip = true makes a lateral speed; give it for vy_mps")
     factor = _number(entry, "factor", 1.0, where)
     if factor == 0.0:
         raise InvalidInput(f"{where}: factor = 0 would erase the channel; give its unit factor")
     delay_s = _number(entry, "delay_s", 0.0, where)
     if delay_s and channel == "time_s":
         raise InvalidInput(f"{where}: delay_s has no meaning for the time; give it for a channel")
-    return Source(column, factor, _number(entry, "offset", 0.0, where), despike, delay_s)
+    offset = _number(entry, "offset", 0.0, where)
+    return Source(column, factor, offset, despike, delay_s, sideslip)
+
+
+def _flag(entry: Mapping[str, Any], key: str, where: str) -> bool:
+    value = entry.get(key, False)
+    if not isinstance(value, bool):
+        raise InvalidInput(f"{where}: {key} = {value!r}; give true or false")
+    return value
 
 
 def _number(entry: Mapping[str, Any], key: str, default: float, where: str) -> float:

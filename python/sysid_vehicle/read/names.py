@@ -6,6 +6,12 @@ import re
 
 from .units import FACTORS, plain, states_nothing
 
+# Of the car, and not of a tyre.
+_SIDESLIP = (
+    r"^(?!.*\b(fl|fr|rl|rr|front|rear|axle|tyres?|tires?|wheels?|ratio|rate|dot)\b)"
+    r".*(\bslip ?ang\w*|\bside ?slip|\bschwimmwinkel|^beta\b)"
+)
+
 # By channel: patterns of a name in plain words, the surest first.
 _PATTERNS: dict[str, tuple[str, ...]] = {
     "time_s": (r"^time( s)?$", r"^(t|zeit|timestamps?|times?|tout|utc time)$", r"\btime\b"),
@@ -19,6 +25,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
     "vy_mps": (
         r"^v ?y( mps)?$",
         r"twist linear y$|lat\w* (speed|vel\w*)|(speed|vel\w*) (y|lat\w*)$|quergeschw\w*",
+        _SIDESLIP,
     ),
     "yaw_rate_radps": (
         r"yaw ?rate|yaw ?vel\w*|gier ?(rate|geschw\w*)",
@@ -85,6 +92,16 @@ def rank(name: str, unit: str, channel: str) -> float:
     )
     if score == 0.0 or not unit or states_nothing(unit):
         return score
-    fits = plain(unit) in FACTORS[_SI[channel]]
+    fits = plain(unit) in FACTORS[si_unit(channel, name)]
     known = any(plain(unit) in factors for factors in FACTORS.values())
     return score + 2.0 if fits else 0.0 if known else score
+
+
+def si_unit(channel: str, name: str) -> str:
+    """Return the SI unit of what a column of this name measures, if it is that channel's."""
+    return "rad" if channel == "vy_mps" and is_sideslip(name) else _SI[channel]
+
+
+def is_sideslip(name: str) -> bool:
+    """Tell whether a name is that of the sideslip angle."""
+    return re.search(_SIDESLIP, words(name)) is not None

@@ -19,10 +19,12 @@ from ..log import times_wheelbase
 from ..log.laws import LINEAR_MPS2, cosine
 from ..log.motion import Windows
 from ..vehicle import GRAVITY_MPS2
+from .sideslip import against_the_rear_axle, usual_sideslip
 
 _DEG, _G = math.pi / 180.0, GRAVITY_MPS2
-_WINDOW_S = 1.0
+_WINDOW_S, _SHORT_S = 1.0, 0.2
 _MOVING = 0.15  # of the usual speed
+_SIDESLIP = 0.03  # rad, where nothing tells what is usual
 # Factors that are tried where no unit is stated.
 _TRIED = {
     "vx_mps": (1.0, 1.0 / 3.6, 0.44704),
@@ -91,12 +93,63 @@ def scales(
     return Scales(factors, notes, swapped)
 
 
-class _Windows:
-    """Means and changes of channels over windows of a second."""
+def sideways(
+    time_s: FloatArray,
+    columns: Mapping[str, FloatArray],
+    factors: Mapping[str, float],
+    stated: Mapping[str, float],
+    *,
+    angle: bool,
+) -> tuple[float, str]:
+    """Find factor and sign of the lateral speed, or of the sideslip angle, and what to say of it.
 
-    def __init__(self, time_s: FloatArray, columns: Mapping[str, FloatArray]) -> None:
+    Parameters
+    ----------
+    time_s, columns, stated
+        As for `scales`.
+    factors : mapping of float
+        Of the other channels.
+    angle : bool
+        Whether the column is the angle.
+    """
+    drive = _Windows(time_s, columns, _SHORT_S)
+    moves = drive.has("vx_mps", "yaw_rate_radps")
+    column = drive.mean("vy_mps")
+    usual, speed, yaw, rows = np.array(_SIDESLIP), column, column, np.ones(len(column), bool)
+    if moves:
+        speed = factors["vx_mps"] * drive.mean("vx_mps")
+        yaw = factors["yaw_rate_radps"] * drive.mean("yaw_rate_radps")
+        rows = (speed > _MOVING * float(np.median(speed))) & (np.abs(speed * yaw) < LINEAR_MPS2)
+        usual = usual_sideslip(np.maximum(speed, 1.0), yaw)[rows]
+    factor, said = stated.get("vy_mps"), []
+    if angle:
+        said.append("sideslip angle: the lateral speed is vx_mps tan(angle)")
+    if factor is None:
+        factor = abs(factors.get("vx_mps", 1.0))
+        if angle:
+            ratio = _large(column[rows]) / _large(usual)
+            factor = min((1.0, _DEG), key=lambda f: abs(math.log(max(f * ratio, 1e-9))))
+        if factor != 1.0:
+            said.append("unit found by its size" if angle else "unit as that of vx_mps")
+    lateral = factor * column * (speed if angle else 1.0)
+    if moves and against_the_rear_axle(lateral[rows], speed[rows], yaw[rows], 0.5 * _SHORT_S):
+        factor = -factor
+        said.append("turned round: it moves against the path of the rear axle")
+    return factor, "; ".join(said)
+
+
+def _large(values: FloatArray) -> float:
+    return max(float(np.percentile(np.abs(values), 95)), 1e-9) if values.size else 1.0
+
+
+class _Windows:
+    """Means and changes of channels over short windows."""
+
+    def __init__(
+        self, time_s: FloatArray, columns: Mapping[str, FloatArray], window_s: float = _WINDOW_S
+    ) -> None:
         dt = float(np.median(np.diff(time_s)))
-        half = max(1, round(0.5 * _WINDOW_S / dt))
+        half = max(1, round(0.5 * window_s / dt))
         self._windows = Windows(time_s.size, half, 1.0 / dt)
         self._columns = dict(columns)
         self._time_s = time_s

@@ -15,12 +15,12 @@ from ..errors import InvalidInput
 from ..log import CHANNELS, Columns, Log, listed
 from ..vehicle import Vehicle
 from .channel_map import ChannelMap, Source
-from .names import rank
-from .physics import scales
+from .names import is_sideslip, rank, si_unit
+from .physics import scales, sideways
 from .recording import Recording
 from .registry import blamed, recognised
 from .table import Table
-from .units import factor_to
+from .units import factor_to, unit_in_name
 
 _RATE_HZ = 50.0  # at which units and signs are looked for
 _FEWEST = 100
@@ -36,6 +36,12 @@ class Proposed:
     unit: str
     why: str
     others: tuple[str, ...]
+    sideslip: bool = False
+
+    @property
+    def source(self) -> Source:
+        """As a channel map has it."""
+        return Source(self.column, self.factor, sideslip=self.sideslip)
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,7 @@ class Proposal:
     @property
     def channel_map(self) -> ChannelMap:
         """The map, ready for `read_log`."""
-        return ChannelMap({c: Source(p.column, p.factor) for c, p in self.channels.items()})
+        return ChannelMap({c: p.source for c, p in self.channels.items()})
 
     def to_toml(self) -> str:
         """The map as a file to look through and to edit."""
@@ -66,6 +72,7 @@ class Proposal:
             if p.others:
                 lines.append(f"#   or one of: {listed(map(_quoted, p.others))}")
             entry = f"column = {_quoted(p.column)}, factor = {p.factor!r}"
+            entry += ", sideslip = true" if p.sideslip else ""
             lines.append(f"{channel} = {{ {entry} }}")
         for name in self.missing:
             lines.append(f"# {CHANNELS[name].meaning} [{CHANNELS[name].unit}]: nothing was found")
@@ -130,10 +137,10 @@ class _View:
         if isinstance(held, Table):
             self.names += [n for n in held.seconds if n not in self.names]
 
-    def unit(self, name: str) -> str:
+    def unit(self, name: str, si_unit: str) -> str:
         if isinstance(self._held, Recording):
-            return self._held.entries[name].unit
-        return self._held.units.get(name, "")
+            return self._held.entries[name].unit or unit_in_name(name, si_unit)
+        return self._held.unit(name, si_unit)
 
     def is_stamps(self, name: str) -> bool:
         return isinstance(self._held, Table) and name in self._held.seconds
@@ -152,7 +159,7 @@ class _View:
 
 
 def _ranked(view: _View, channel: str) -> list[str]:
-    scored = [(rank(name, view.unit(name), channel), name) for name in view.names]
+    scored = [(rank(n, view.unit(n, si_unit(channel, n)), channel), n) for n in view.names]
     kept = [(score, name) for score, name in scored if score > 0.0]
     return [name for _, name in sorted(kept, key=lambda pair: -pair[0])]
 
@@ -166,19 +173,21 @@ def _proposal(view: _View, chosen: dict[str, list[str]], wheelbase_m: float | No
             first[channel] = free[0]
     stated: dict[str, float] = {}
     for channel, name in first.items():
-        factor = factor_to(CHANNELS[channel].unit, view.unit(name))
+        unit = si_unit(channel, name)
+        factor = factor_to(unit, view.unit(name, unit))
         if factor is not None:
             stated[channel] = factor
         elif name == channel:
             stated[channel] = 1.0
     time = first.get("time_s")
     driven = {c: n for c, n in first.items() if c not in ("time_s", "vy_mps")}
-    held = view.values(list(driven.values()), time)
+    held = view.values([n for c, n in first.items() if c != "time_s"], time)
     factors = dict(stated)
     why: dict[str, str] = {}
     if time is not None:
         factors["time_s"], why["time_s"] = _time_factor(view, time, held, stated.get("time_s"))
-    even = _even({c: held[n] for c, n in driven.items() if n in held}, factors.get("time_s", 1.0))
+    clock = factors.get("time_s", 1.0)
+    even = _even({c: held[n] for c, n in driven.items() if n in held}, clock)
     if even is not None:
         # The sign and the gear of the steering are no matter of its unit: they are always sought.
         known = {c: f for c, f in stated.items() if c in even[1]}
@@ -187,15 +196,22 @@ def _proposal(view: _View, chosen: dict[str, list[str]], wheelbase_m: float | No
             first["ax_mps2"], first["ay_mps2"] = first["ay_mps2"], first["ax_mps2"]
         factors.update(found.factors)
         why.update(found.notes)
+        # By itself: a sensor of sideslip often knows less of the drive than the others.
+        every = _even({c: held[n] for c, n in first.items() if n in held}, clock)
+        if every is not None and "vy_mps" in every[1]:
+            angle = is_sideslip(first["vy_mps"])
+            factors["vy_mps"], why["vy_mps"] = sideways(*every, factors, stated, angle=angle)
     channels = {
         channel: Proposed(
             name,
             factors.get(channel, 1.0),
-            view.unit(name),
-            "; ".join(filter(None, [_by_name(channel, name, view.unit(name)), why.get(channel)])),
+            unit,
+            "; ".join(filter(None, [_by_name(channel, name, unit), why.get(channel)])),
             tuple(n for n in chosen[channel] if n != name)[:5],
+            channel == "vy_mps" and is_sideslip(name),
         )
         for channel, name in first.items()
+        for unit in (view.unit(name, si_unit(channel, name)),)
     }
     needed = [c for c in CHANNELS if CHANNELS[c].required and c not in channels]
     if view.has_times:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput
 from ..log import as_floats, as_seconds, named_columns
+from .units import unit_in_name
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,10 @@ class Table:
     def counts(self) -> Counter[str]:
         """How many columns have a name."""
         return Counter(self.names)
+
+    def unit(self, name: str, si_unit: str) -> str:
+        """Return the unit that the file states for a column of some quantity; empty if none."""
+        return self.units.get(name) or unit_in_name(name, si_unit)
 
     def column(self, name: str) -> FloatArray:
         """Return one column.

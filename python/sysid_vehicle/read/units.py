@@ -6,6 +6,7 @@ One table is all that converts; a unit that it does not have is never guessed.
 from __future__ import annotations
 
 import math
+import re
 
 from ..vehicle import GRAVITY_MPS2
 
@@ -97,6 +98,7 @@ WHAT = {
     "Hz": "a frequency",
     "%": "a share",
 }
+_AT_END = re.compile(r"[\[({]([^\[\](){}]+)[\])}]\s*$")
 _NONE = {"", "-", "1", "none", "n/a", "na", "[]", "unitless", "no_unit", "nounit"}
 
 
@@ -123,6 +125,15 @@ def states_nothing(text: str) -> bool:
 def factor_to(si_unit: str, text: str) -> float | None:
     """Return the factor from the unit in a file to that of a channel; None if it is not known."""
     return FACTORS.get(si_unit, {}).get(plain(text))
+
+
+def unit_in_name(name: str, si_unit: str) -> str:
+    """Return the unit in brackets at the end of a name, ``Speed [km/h]``, if it is of that kind.
+
+    Anything else in brackets, such as a place or an axle, states no unit.
+    """
+    found = _AT_END.search(name)
+    return found[1] if found and factor_to(si_unit, found[1]) is not None else ""
 
 
 def measures(text: str) -> str:

@@ -49,6 +49,9 @@ class Added:
         missing.
     late : bool
         Whether the time limit left its own share unknown.
+    sure : bool
+        Whether the likelihood of validation data is shown to be higher with it (`Rules.interval`),
+        all else fitted anew. Only asked where what is left is `buried`.
     """
 
     id: str
@@ -58,6 +61,7 @@ class Added:
     own: Share = UNKNOWN
     own_in_training: Share = UNKNOWN
     late: bool = False
+    sure: bool = False
 
     @property
     def named(self) -> bool:
@@ -93,7 +97,9 @@ class Facts:
         predict: on training or validation data, and of the same thing on both.
     small : bool
         Whether no error of the baseline 0.5 to 5 s ahead on validation data is as large as matters
-        to the user.
+        to the user; where nobody said, as the noise of its sensor.
+    buried : bool
+        Whether no such error of the final model is as large as the noise of its sensor.
     unopposed : bool
         Whether the time limit left unknown if something unknown would do in the place of what was
         added.
@@ -114,17 +120,27 @@ class Facts:
     excited: bool = True
     structure: tuple[float, float] = (1.0, 0.0)
     small: bool = False
+    buried: bool = False
     unopposed: bool = False
     unforeseen: bool = False
     slow: tuple[str, ...] = ()
 
-    def with_own(self, own: Mapping[str, tuple[Share, Share]], late: Collection[str] = ()) -> Facts:
+    def with_own(
+        self,
+        own: Mapping[str, tuple[Share, Share]],
+        late: Collection[str] = (),
+        sure: Collection[str] = (),
+    ) -> Facts:
         """The same with the own shares of effects: on validation data, and on training data.
 
-        `late`: effects of which a share is unknown because there was no time for it.
+        `late`: effects of which a share is unknown because there was no time for it. `sure`: those
+        that the likelihood of validation data shows.
         """
         told = ((a, *own.get(a.id, (UNKNOWN, UNKNOWN))) for a in self.added)
-        added = tuple(replace(a, own=v, own_in_training=t, late=a.id in late) for a, v, t in told)
+        added = tuple(
+            replace(a, own=v, own_in_training=t, late=a.id in late, sure=a.id in sure)
+            for a, v, t in told
+        )
         return replace(self, added=added)
 
 

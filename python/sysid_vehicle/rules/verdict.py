@@ -119,9 +119,10 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     withdrawn = []
     if left or stand_ins:
         late = frozenset(a.id for a in facts.added if a.late)
-        falling = names - _standing(facts, rules)
+        likely = _likely(facts)
+        falling = names - likely - _standing(facts, rules)
         if left and not facts.taken_low > 0.0:
-            withdrawn.append(Withdrawn(names - falling, _NOT_TOGETHER, names))
+            withdrawn.append(Withdrawn(names - likely - falling, _NOT_TOGETHER, names))
         withdrawn.append(Withdrawn(falling - late, _NOT_SHOWN, names))
         if falling & late:
             withdrawn.append(Withdrawn(falling & late, _LATE, names))
@@ -162,6 +163,18 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
     return frozenset(
         a.id for a in shown if not any(a.moves & b.moves and _more(b, a) for b in others)
     )
+
+
+def _likely(facts: Facts) -> frozenset[str]:
+    """Effects whose names stand by the likelihood of validation data.
+
+    Errors below the noise of the sensors have no shares that could be shown. Where the final model
+    leaves no larger ones, what is missing in it is small, and the likelihood decides: on effects
+    that no other could be taken for, beside which no stand-in was added.
+    """
+    if not facts.buried or any(a.finding == "proxy" for a in facts.added):
+        return frozenset()
+    return frozenset(a.id for a in facts.added if a.finding == "missing" and a.sure)
 
 
 def _more(one: Added, other: Added) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..vehicle import Tyre, Vehicle
+from ..tyre import Tyre
+from ..vehicle import Vehicle
 
 
 def example_vehicle() -> Vehicle:

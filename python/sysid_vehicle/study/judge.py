@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from warnings import catch_warnings, simplefilter
 
-from .._common.threads import in_parallel
+from .._common.threads import before, in_parallel
 from ..compare import compare
 from ..diagnose import Instead, Omnibus, Verdicts, instead, judge, omnibus
 from ..errors import SysidWarning, warn
@@ -20,14 +20,14 @@ from .added import added_by
 from .beyond import Beyond
 from .foretold import foretold
 from .limit import Judging
-from .matters import sufficient
-from .own import own_shares, shown_together
+from .matters import buried, sufficient
+from .own import own_shares, shown_together, sure_of
 from .search import Trail
 from .slow import slow_forces
 from .steps import way
 from .structure import structure
 from .study import Study
-from .validation import beyond_noise_ahead, serving
+from .validation import at_its_best, beyond_noise_ahead, serving
 from .verdict import facts_of, in_the_light_of
 
 _SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
@@ -113,10 +113,7 @@ class Judge:
             explained = asks.asked(_TOGETHER, lambda: beyond_noise_ahead(fits, self.test))
         alone = self._alone(rivals)
         pattern = asks.asked(_STRUCTURE, lambda: structure(fit, self.test))
-        sizes = self.sizes
-        small = sizes is not None and asks.asked(
-            _SMALL, lambda: sufficient(fits[0], self.test, sizes) is not None
-        )
+        small = asks.asked(_SMALL, lambda: self._small(slow))
         facts = facts_of(
             fits,
             alone,
@@ -157,6 +154,8 @@ class Judge:
             stopped=self.trail.stopped,
             late_facts=late,
             checked=checked,
+            matters=self.sizes,
+            buried=facts.buried,
         )
 
     def _rivals(self) -> Instead:
@@ -181,12 +180,25 @@ class Judge:
             away={} if rivals is None else rivals.away,
         )
 
+    def _small(self, slow: tuple[str, ...]) -> bool:
+        """Whether no error of the baseline matters; slow forces err by more the further ahead."""
+        first = self.fits[0]
+        if self.sizes is not None:
+            return sufficient(first, self.test, self.sizes) is not None
+        return not slow and buried(at_its_best(first, self.test), self.test, self.fit.noise)
+
     def _with_shares(self, facts: Facts, explained: Beyond | None) -> Facts:
         """What is known, with what each effect takes off the errors ahead, and all together."""
+        fit, test, ends = self.fit, self.test, self.asks.ends
         named = {a.id for a in facts.added if a.named}
-        shares = own_shares(self.fit, self.added, named, self.test, self.asks.ends)
+        shares = own_shares(fit, self.added, named, test, ends)
         unknown = [e for e in self.added if e not in shares]
-        facts = facts.with_own(shares, unknown)
+
+        below = bool(named) and before(
+            ends, lambda: buried(at_its_best(fit, test), test, fit.noise), False
+        )
+        sure = sure_of(fit, sorted(named), test, self.rules, ends) if below else frozenset()
+        facts = replace(facts.with_own(shares, unknown, sure), buried=below)
         self.asks.note(unknown, _ALONE)
         if explained is None:
             return facts

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
 from .._common.arguments import real
 from ..errors import InvalidInput, near_names
-from ..estimate import UNITS, Driving
+from ..estimate import UNITS, Driving, NoiseModel
 from ..identify import Fit
 from ..read.units import factor_to
-from .horizons import PREDICTED, Horizons, horizons
+from .horizons import AHEAD, PREDICTED, Horizons, horizons, squares_ahead
 from .validation import fitted_ahead
 
 _NAMES = {
@@ -89,3 +91,28 @@ def sufficient(fit: Fit, test: Driving, sizes: Mapping[str, float]) -> Fit | Non
         if found is not None and within(horizons([found], [""], test), sizes):
             return found
     return None
+
+
+def buried(fit: Fit, test: Driving, noise: NoiseModel) -> bool:
+    """Whether errors 0.5 to 5 s ahead are smaller than the noise of the sensors, beyond it.
+
+    In the mean square: a corner in which the model fails counts, where a median would not see it.
+    What a model lacks may be taken for noise: none counts for more than the usual sizes.
+
+    Parameters
+    ----------
+    fit : Fit
+    test : Driving
+        Validation data.
+    noise : NoiseModel
+        Of the best model there is.
+    """
+    squares, sensor, seen = squares_ahead((replace(fit, noise=noise),), test, AHEAD)
+    if not seen.any():
+        return False
+    usual = sizes_that_matter({})
+    most = np.minimum(sensor, [usual[c] for c in PREDICTED])
+    with catch_warnings():
+        simplefilter("ignore", RuntimeWarning)  # horizons that no block reaches
+        beyond = np.nanmean(squares[0], axis=0) - sensor**2
+    return bool(np.all((beyond < most**2)[seen]))

@@ -6,15 +6,16 @@ from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
+from .._common.memo import remembered
 from .._common.threads import before, in_parallel
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refit
-from ..rules import UNKNOWN, Share
+from ..rules import UNKNOWN, Rules, Share
 from .beyond import Beyond, own_share
 from .horizons import moving_with
 from .shares import shares
-from .validation import AHEAD, at_its_best
+from .validation import AHEAD, at_its_best, gain_in_log_likelihood
 
 
 def own_shares(
@@ -58,21 +59,18 @@ def own_shares(
         found = {e: one[0] for e, one in zip(asked, told, strict=True) if one is not None}
         return {e: one for e, one in found.items() if one is not None}
 
-    without: dict[str, Fit] = {}
     moved = {part.id: moving_with(part.moved) for part in final.model.parts}
 
     def on_train(effect: str) -> Share | None:
-        try:
-            fit = refit(final.model.drop(effect), final.driving, final.noise)
-        except (NumericalError, np.linalg.LinAlgError):
+        fit = _without(final, effect)
+        if fit is None:
             return None
-        share = own_share(fit, final, final.driving, AHEAD, channels=moved[effect])
-        without[effect] = fit
-        return share
+        return own_share(fit, final, final.driving, AHEAD, channels=moved[effect])
 
     def on_test(effect: str) -> Share:
-        best = at_its_best(final, test)
-        poorer = at_its_best(without[effect], test)
+        fit = _without(final, effect)
+        assert fit is not None  # its share of the training data is known
+        best, poorer = at_its_best(final, test), at_its_best(fit, test)
         return own_share(poorer, best, test, AHEAD, channels=moved[effect])
 
     fitted = in_time(on_train, effects)
@@ -81,6 +79,43 @@ def own_shares(
         before(ends, lambda: at_its_best(final, test), None)  # once for all of them
         judged = in_time(on_test, fitted)
     return {e: (judged.get(e, UNKNOWN), fitted.get(e, UNKNOWN)) for e in effects if e not in late}
+
+
+# Twice the effects of any study so far.
+@remembered(16)
+def _without(final: Fit, effect: str) -> Fit | None:
+    """The final model without an effect, fitted anew under its noise; None where it fails."""
+    try:
+        return refit(final.model.drop(effect), final.driving, final.noise)
+    except (NumericalError, np.linalg.LinAlgError):
+        return None
+
+
+def sure_of(
+    final: Fit, effects: Sequence[str], test: Driving, rules: Rules, ends: float = np.inf
+) -> frozenset[str]:
+    """Find the effects without which validation data are less likely (`Rules.interval`).
+
+    Parameters
+    ----------
+    final : Fit
+    effects : sequence of str
+        Those that are asked for.
+    test : Driving
+        Validation data.
+    rules : Rules
+    ends : float
+        As for `own_shares`; what there was no time for is not sure.
+    """
+
+    def sure(effect: str) -> bool:
+        poorer = _without(final, effect)
+        if poorer is None:
+            return False
+        return gain_in_log_likelihood(poorer, final, test).beyond(rules.interval)
+
+    told = in_parallel(lambda e: before(ends, lambda: sure(e), False), effects)
+    return frozenset(e for e, shown in zip(effects, told, strict=True) if shown)
 
 
 def shown_together(explained: Beyond, fits: Sequence[Fit], test: Driving) -> float:

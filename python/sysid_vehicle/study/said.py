@@ -40,6 +40,11 @@ def meaning(study: Study) -> str:
             f"something is missing; what was added takes up {study.explained} of the error 1 to "
             "5 s ahead, and is no sure name beside what is left"
         )
+    if study.verdict == "partly_explained" and study.buried:
+        return (
+            "effects were found that are a part of it; what is left errs by less, 0.5 to 5 s "
+            "ahead, than the noise of the sensors"
+        )
     beyond = study.explained
     if study.verdict == "partly_explained" and beyond and beyond.share < study.rules.most:
         part = f"{beyond} of the error 1 to 5 s ahead"
@@ -57,7 +62,7 @@ def meaning(study: Study) -> str:
     if study.verdict == "adequate" and study.added:
         return (
             "what was added is no sure name; what the baseline (`study.fits[0]`) leaves can be "
-            "smaller, 0.5 to 5 s ahead, than the errors that matter"
+            f"smaller, 0.5 to 5 s ahead, than {_matters(study)}"
         )
     if study.verdict == "adequate" and seen:
         if disturbance(study):
@@ -65,8 +70,7 @@ def meaning(study: Study) -> str:
         helps = study.predicting is not None and study.predicting.helps
         how = " with parameters fitted to predictions (`study.predicting.final`)"
         return (
-            "something is left, and its errors 0.5 to 5 s ahead are smaller, in the median, than "
-            "the errors that matter"
+            f"something is left, and its errors 0.5 to 5 s ahead are smaller than {_matters(study)}"
             f"{how if helps else ''}"
         )
     if study.verdict == "unknown" and not study.added and only_elsewhere(study):
@@ -77,6 +81,10 @@ def meaning(study: Study) -> str:
             "floors, by disturbances like those of the training data"
         )
     return _MEANING[study.verdict]
+
+
+def _matters(study: Study) -> str:
+    return "the noise of the sensors" if study.matters is None else "the errors that matter"
 
 
 def ahead(study: Study) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
@@ -92,6 +92,11 @@ class Study:
         What the time limit left unknown, in words.
     checked : bool
         Whether the logs were put right by a check of the sensors.
+    matters : mapping of str to float, optional
+        Errors by channel that matter, where the user said which: else the noise of the sensors.
+    buried : bool
+        Whether something is left beside what was added, and errs by less, 0.5 to 5 s ahead, than
+        the noise of the sensors.
     """
 
     verdict: Verdict
@@ -114,6 +119,8 @@ class Study:
     stopped: tuple[str, ...] = ()
     late_facts: tuple[str, ...] = ()
     checked: bool = False
+    matters: Mapping[str, float] | None = None
+    buried: bool = False
 
     @property
     def fit(self) -> Fit:

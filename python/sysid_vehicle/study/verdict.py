@@ -62,9 +62,9 @@ def facts_of(
         excited,
         structure,
         small,
-        unopposed,
-        unforeseen,
-        slow,
+        unopposed=unopposed,
+        unforeseen=unforeseen,
+        slow=slow,
     )
 
 

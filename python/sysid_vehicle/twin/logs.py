@@ -13,7 +13,8 @@ from .._common.arrays import as_float64
 from ..errors import InvalidInput
 from ..log import Log
 from ..simulate import SensorNoise
-from ..vehicle import Tyre, Vehicle
+from ..tyre import Tyre
+from ..vehicle import Vehicle
 from .car import Load, TwinCar
 from .drives import WHEELS, Drive14
 

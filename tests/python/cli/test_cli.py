@@ -135,6 +135,23 @@ def test_improve_finds_the_effect_and_writes_json_and_report(
     assert not list(folder.glob(".*")), "temporary files are left"
 
 
+def test_improve_without_report_prints_alone(
+    improved: tuple[Path, dict[str, Any]],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    folder, result = improved
+    monkeypatch.setattr(commands, "improve", lambda *_, **__: STUDIES[0][1])
+    there = sorted(folder.iterdir())
+    car = str(folder / "car.toml")
+    capsys.readouterr()
+    assert main(["improve", str(folder / "lap.csv"), "--vehicle", car]) == 0
+    told = capsys.readouterr().out
+    assert f"Verdict: {result['verdict']}" in told
+    assert "Report:" not in told
+    assert sorted(folder.iterdir()) == there
+
+
 def test_diagnose_prints_the_ranking_and_has_the_keys_of_improve(
     improved: tuple[Path, dict[str, Any]],
     capsys: pytest.CaptureFixture[str],
@@ -244,19 +261,11 @@ def test_what_cannot_be_used_is_one_line_and_status_2(
 
 
 @pytest.mark.parametrize(
-    "argv",
-    [
-        [],
-        ["fly"],
-        ["compare"],
-        ["improve", "log.csv", "--vehicle", "car.toml"],
-        ["demo", "--seed", "-1"],
-        ["demo", "--seed", "two"],
-    ],
+    "words", ["", "fly", "compare", "improve log.csv", "demo --seed -1", "demo --seed two"]
 )
-def test_wrong_usage_is_status_2(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_usage_is_status_2(words: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
-        main(argv)
+        main(words.split())
     assert stopped.value.code == 2
     assert "usage:" in capsys.readouterr().err
 

@@ -110,7 +110,7 @@ def spoilt(path: Path, change: Callable[[dict[str, Any]], Any]) -> None:
 
 
 def tyre(c: dict[str, Any]) -> dict[str, Any]:
-    return next(o for o in c["objects"] if o["class"] == "vehicle:Tyre")
+    return next(o for o in c["objects"] if o["class"] == "tyre:Tyre")
 
 
 def vehicle(c: dict[str, Any]) -> dict[str, Any]:
@@ -133,6 +133,8 @@ def vehicle(c: dict[str, Any]) -> dict[str, Any]:
         # Of versions that keep less, or more: there is a default, or it is left.
         (lambda c: tyre(c)["fields"].pop("D"), []),
         (lambda c: vehicle(c)["fields"].update(colour="red"), []),
+        # Where the class stood before.
+        (lambda c: tyre(c).update({"class": "vehicle:Tyre"}), []),
     ],
 )
 def test_files_that_cannot_be_used(

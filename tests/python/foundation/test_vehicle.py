@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from sysid_vehicle.errors import InvalidInput, SysidWarning
-from sysid_vehicle.vehicle import Tyre, Vehicle
+from sysid_vehicle.tyre import Tyre
+from sysid_vehicle.vehicle import Vehicle
 
 CAR = """
 name = "test car"
@@ -119,6 +120,11 @@ def test_all_missing_keys_are_named_at_once(car_file: Path) -> None:
         ("yaw_inertia_kgm2 = 2500.0", "yaw_inertia_kgm2 = 2.5", ["yaw_inertia_kgm2", "2700"]),
         ("B = 12.0", "B = 0.0", ["[tyre.rear]", "B = 0", "> 0"]),
         ("E = -0.5", "E = 1.5", ["[tyre.rear]", "E = 1.5", "<= 1"]),
+        (
+            "lf_m = 1.2",
+            "lf_m = 1.2\nsteering_ratio = 15",
+            ["steering_ratio", "channel map", "steer_rad"],
+        ),
         ('name = "test car"', "name = 3", ["name = 3", "quotes"]),
         ("lf_m = 1.2", "lf_m 1.2", ["not a TOML file", "line 5"]),
     ],
@@ -129,6 +135,18 @@ def test_mistakes_are_named(car_file: Path, old: str, new: str, words: list[str]
         Vehicle.from_toml(car_file)
     for word in ["car.vehicle.toml", *words]:
         assert word in str(caught.value)
+
+
+def test_a_tyre_of_which_nothing_is_known_may_be_left_out(car_file: Path) -> None:
+    head, tyres = CAR.split("[tyre.front]")
+    car_file.write_text(head + "[tyre.rear]" + tyres.split("[tyre.rear]")[1])
+    with pytest.warns(SysidWarning, match=r"\[tyre\.front\] absent, .* B = 10, C = 1\.4") as heard:
+        car = Vehicle.from_toml(car_file)
+    assert (car.tyre_front, car.tyre_rear) == (Tyre(), Tyre(12.0, 1.3, 1.1, -0.5))
+    assert len(heard) == 1
+    car_file.write_text(head)
+    with pytest.warns(SysidWarning, match=r"\[tyre\.front\] and \[tyre\.rear\] absent"):
+        assert Vehicle.from_toml(car_file).tyre_rear == Tyre()
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ MAX_LINES = 400
 
 # A module imports from its own layer and from the layers above it in this list, never from below.
 PYTHON_LAYERS = [
-    {"errors", "_common", "_core", "vehicle", "effects", "model", "rules", "saved"},
+    {"errors", "_common", "_core", "tyre", "vehicle", "effects", "model", "rules", "saved"},
     {"log"},
     {"read"},
     {"manoeuvres"},

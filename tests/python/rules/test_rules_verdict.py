@@ -167,6 +167,25 @@ def test_no_name_stands_where_all_together_may_take_nothing() -> None:
     assert verdict(replace(WHOLE, taken_low=-0.1)).verdict == "explained"
 
 
+def test_below_the_noise_of_the_sensors_the_likelihood_of_validation_data_decides() -> None:
+    unseen = replace(LEFT, taken_low=-0.1, added=(replace(MASS, own=UNKNOWN, sure=True),))
+    assert verdict(unseen).verdict == "unknown"
+    low = replace(unseen, buried=True)
+    assert verdict(low).verdict == "partly_explained"
+    assert withdrawn(low) == {}
+    # Shares that are shown all the same count as ever.
+    both = replace(low, added=(*low.added, DRAG, replace(DRAG, id="head_wind", own=UNKNOWN)))
+    assert set(withdrawn(both)) == {"aero_drag", "head_wind"}
+    assert set(withdrawn(replace(both, taken_low=0.05))) == {"head_wind"}
+    # What has rivals, is no finding, or is not sure has no name there.
+    for wrong in ({"sure": False}, {"finding": "one of a group"}, {"finding": "negligible"}):
+        alone = replace(low, added=(replace(low.added[0], **wrong),))
+        assert verdict(alone).verdict == "unknown"
+    # A stand-in beside it shows that what is missing is something else.
+    beside = replace(low, added=(low.added[0], replace(DRAG, finding="proxy", sure=True)))
+    assert verdict(beside).verdict == "unknown"
+
+
 def test_a_share_for_which_there_was_no_time_is_said_to_be_unknown() -> None:
     """It keeps no name, and is not said to have been looked for in vain."""
     shares = {a.id: (a.own, a.own_in_training) for a in LEFT.added if a is MASS}

@@ -1,0 +1,42 @@
+"""The command `changed`: what of a car changed between two drives."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..diagnose import changed
+from ..identify import identify
+from ..model import Model
+from ..vehicle import Vehicle
+from .log_arguments import LOG_HELP, add_driving, add_effects, read_logs
+from .outputs import add_json, write_figures
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "changed", help="what of a car changed since the drives that its model fits"
+    )
+    add_driving(parser)
+    parser.add_argument(
+        "--after", nargs="+", required=True, type=Path, metavar="LOG", help=f"later: {LOG_HELP}"
+    )
+    parser.add_argument(
+        "--vehicle-after",
+        type=Path,
+        metavar="TOML",
+        help="vehicle file of the later drives, where it is another one",
+    )
+    add_effects(parser)
+    add_json(parser)
+
+
+def run(args: argparse.Namespace, heard: list[str]) -> None:
+    """Fit the earlier drives, compare the later ones with them, print, write."""
+    model = Model(Vehicle.from_toml(args.vehicle), args.effects)
+    later = None if args.vehicle_after is None else Vehicle.from_toml(args.vehicle_after)
+    before, after = (read_logs(logs, args) for logs in (args.logs, args.after))
+    found = changed(identify(model, before), after, vehicle=later)
+    print(found)
+    write_figures(args.json, found.to_dict(), heard)
