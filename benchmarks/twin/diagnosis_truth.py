@@ -5,7 +5,9 @@ python benchmarks/twin/diagnosis_truth.py [HIDDEN ...] [--seeds 1] [--first 0] [
 A single track with the workshop's numbers against driving of the built-in sports car: as it is, and
 with drag, downforce, payload or a steering lag that the baseline does not know of. Two sets of
 manoeuvres. A claim is right if what it names is in the car; it is an effect that was added and that
-the verdicts do not take back as a proxy or as negligible. With --keep, what was done is added to a
+the verdicts do not take back as a proxy or as negligible. Below each study stands what became of
+what is hidden, and what the final model gains where it is given by hand (`lost.py`): what does not
+make driving that no fit saw likelier is not testable. With --keep, what was done is added to a
 file, line by line, and not done again.
 """
 
@@ -17,6 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lost import MISSING, lost, testable
 from scipy.stats import binomtest
 
 import sysid_vehicle as sv
@@ -72,7 +75,6 @@ SETS = {
         manoeuvres.lap(lateral_mps2=8.0),
     ),
 }
-MISSING = ("missing", "one of a group")
 Done = dict[str, Any]
 
 
@@ -123,6 +125,7 @@ def study(truth: Truth, name: str, which: str, seed: int) -> Done:
             for v in done.verdicts.all
             if v.finding not in ("absent", "not testable")
         },
+        "lost": lost(done, truth.cases[name].named),
     }
 
 
@@ -146,6 +149,20 @@ def line_of(truth: Truth, done: Done) -> str:
         f"{done['hidden']:13s} {done['driving']:12s} {done['seed']:3d} {done['verdict']:17s} "
         f"{before:6.2f} -> {after:5.2f}  " + ", ".join(shown)
     )
+
+
+def lost_lines(done: Done) -> list[str]:
+    """What became of each name of what is hidden, and what the driving shows of it."""
+    found = []
+    for name, what in done.get("lost", {}).items():
+        gains = "the model fails with it"
+        if "training" in what:
+            sizes = zip(what["value"], what["std"], strict=True)
+            gains = ", ".join(f"{v:.3g} +- {s:.2g}" for v, s in sizes)
+            gains += f": {what['training']:.0f} nats, {what['validation']:.0f} on validation data"
+            gains += f", own share {' and '.join(x or 'unknown' for x in what['own'])}"
+        found.append(f"    {name}: {what['fate']}; by hand {gains}")
+    return found
 
 
 def told(text: str, outcomes: Iterable[bool]) -> None:
@@ -178,6 +195,8 @@ def summary(truth: Truth, all_done: list[Done]) -> None:
     )
     told("hidden effects named", (names(d, False) for d in sought))
     told("the same, rivals counted", (names(d, True) for d in sought))
+    told("hidden effects that are testable", (testable(d.get("lost", {})) for d in sought))
+    told("  of these named", (names(d, False) for d in sought if testable(d.get("lost", {}))))
     for name in truth.cases:
         told(f"  {name}", (names(d, True) for d in sought if d["hidden"] == name))
     said = [(d, n) for d in all_done for n, (f, _) in d["verdicts"].items() if f in MISSING]
@@ -224,7 +243,7 @@ def run(truth: Truth, says: str) -> None:
                     with args.keep.open("a", encoding="utf-8") as file:
                         file.write(json.dumps(done) + "\n")
                 all_done.append(done)
-                print(line_of(truth, done), flush=True)
+                print("\n".join([line_of(truth, done), *lost_lines(done)]), flush=True)
     summary(truth, all_done)
 
 
