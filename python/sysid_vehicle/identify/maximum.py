@@ -12,11 +12,12 @@ from ..errors import NumericalError
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from .box import free_box, objective_of
+from .climb import to_the_top
 from .estimates import wald
 from .fit import Fit
 from .objective import Objective
 from .offsets import marginal_information
-from .settle import moved, settle, to_the_top
+from .settle import moved, settle
 from .starts import Starts
 
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
