@@ -209,12 +209,12 @@ def _from_ends(
     best = settle(objective, first, noise.vector(), box, thin=thinned)
     for end in others:
         best = rivalled(objective, best, end, box, thinned)
-    fit = top(model, driving, objective, best, table)
+    fit = top(model, driving, objective, best, table, thinned)
     best = at_top = fit.model.vector(), fit.noise.vector(), fit.converged
     for elsewhere in at_typical_sizes(model, at_top[0]):
         best = rivalled(objective, best, elsewhere, box, thinned)
     if best is not at_top:
-        fit = top(model, driving, objective, best, table)
+        fit = top(model, driving, objective, best, table, thinned)
     fit = on_its_road(fit)
     if fit.model.offset_names and len(driving.logs) > 1:
         fit = _log_by_log(fit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +13,13 @@ from ..errors import NumericalError
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from .box import free_box, objective_of
+from .climb import to_the_top
 from .estimates import wald
 from .fit import Fit
 from .objective import Objective
 from .offsets import marginal_information
-from .settle import moved, settle, to_the_top
+from .other_noise import likelier_noise
+from .settle import moved, settle
 from .starts import Starts
 
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
@@ -25,8 +28,8 @@ THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
 # Nats below a poorer model, from where no search comes up to it. Of 36 lags that began at their
 # typical size (exam at 100 Hz, seed 424201) those more than 50 below on few samples ended 60 or
-# more below on all; a climb gains a few. This is effort of the search: what is claimed of a model
-# that was fitted is asked of `Rules`.
+# more below on all; on those drives a climb gains a few. This is effort of the search: what is
+# claimed of a model that was fitted is asked of `Rules`.
 _FAR_BELOW_BY_FEW, _FAR_BELOW = 50.0, 20.0
 _ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
 
@@ -63,7 +66,7 @@ def refine_above(model: Model, driving: Driving, fit: Fit) -> Fit | None:
     found = settle(objective, *begin, box, led=led)
     if log_likelihood_of(objective, *found[:2]) < fit.log_likelihood - _FAR_BELOW:
         return None
-    return top(model, driving, objective, found, Starts.none(model.free_names))
+    return top(model, driving, objective, found, Starts.none(model.free_names), thinned)
 
 
 def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3) -> Fit:
@@ -102,7 +105,7 @@ def polish(
     """Noise and parameters of maximum likelihood, from values that are already near."""
     objective, thinned = objectives(model, driving, inputs)
     found = settle(objective, p, noise.vector(), free_box(model), thin=thinned)
-    return top(model, driving, objective, found, starts)
+    return top(model, driving, objective, found, starts, thinned)
 
 
 def objectives(
@@ -130,9 +133,15 @@ def top(
     objective: Objective,
     settled: tuple[FloatArray, FloatArray, bool],
     starts: Starts,
+    thinned: Sequence[Objective] = (),
 ) -> Fit:
-    """The maximum, from where a search has settled."""
-    p, noise = to_the_top(objective, *settled[:2], free_box(model))
+    """The maximum, from where a search has settled, whichever time scale its noise began with.
+
+    `thinned` is the likelihood of fewer samples, the fewest first.
+    """
+    box = free_box(model)
+    at_top = to_the_top(objective, *settled[:2], box)
+    p, noise = likelier_noise(objective, at_top, box, next(iter(thinned), objective))
     told = NoiseModel.from_vector(noise)
     return summary(model, driving, objective, p, told, starts, settled[2])
 

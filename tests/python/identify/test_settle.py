@@ -8,9 +8,10 @@ import pytest
 
 from sysid_vehicle import _core
 from sysid_vehicle.errors import NumericalError
+from sysid_vehicle.identify.climb import _slope, climb
 from sysid_vehicle.identify.objective import Objective
 from sysid_vehicle.identify.search import Box
-from sysid_vehicle.identify.settle import _slope, climb, risen, rivalled, settle
+from sysid_vehicle.identify.settle import risen, rivalled, settle
 
 
 class Ridge:
@@ -53,6 +54,39 @@ def test_the_likelihood_is_climbed_where_frozen_gains_see_no_slope() -> None:
     assert reached == objective.log_likelihood(p, noise)
     assert reached > highest - 0.05
     assert p[1] == pytest.approx(box.upper[1], rel=1e-12)
+
+
+class Narrow:
+    """A sum that is known, and a filter whose spread tells the difference, within narrow limits.
+
+    With frozen gains the difference is next to nothing in a box that is wide.
+    """
+
+    samples, by = 1, -np.array([[30.0, 30.0], [1e-3, -1e-3]])
+
+    def freeze(self, p: np.ndarray, noise: np.ndarray) -> SimpleNamespace:
+        spread = -2.0 * (p[0] - p[1] - 3.0) ** 2
+        return SimpleNamespace(log_likelihood=spread - self.half_sum_of_squares(p, None))
+
+    def half_sum_of_squares(self, p: np.ndarray, _: object) -> float:
+        return 0.5 * float(np.sum((self.by @ p) ** 2))
+
+    def normal_equations(
+        self, p: np.ndarray, gains: object, _: object
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        descent = -self.by.T @ self.by @ p
+        return self.half_sum_of_squares(p, gains), descent, self.by.T @ self.by
+
+
+def test_a_climb_that_is_led_astray_goes_on_in_shorter_steps() -> None:
+    """Eighteen nats are to be had; three hundredths of the way to the bound are far beyond them."""
+    noise, box = np.ones(1), Box([0, 1], np.full(2, -1e3), np.full(2, 1e3))
+    objective = Objective(Narrow(), (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
+    p, begin, reached = climb(objective, np.zeros(2), noise, box)
+    assert begin == pytest.approx(-18.0)
+    assert reached == objective.log_likelihood(p, noise)
+    assert reached > -0.1
+    assert p == pytest.approx([1.5, -1.5], abs=0.1)
 
 
 def test_noise_is_not_learned_again_where_parameters_hardly_moved() -> None:

@@ -16,8 +16,8 @@ from ...errors import NumericalError
 from ...estimate import noise_range
 from ...identify import Fit
 from ...identify.box import free_box
+from ...identify.climb import climb as to_the_maximum
 from ...identify.objective import LinearRows, Objective, Predicting
-from ...identify.settle import climb as to_the_maximum
 from ...model import Model
 from ..candidates.possible import OF_A_FACTOR
 from .beside_reference import Shared, Side

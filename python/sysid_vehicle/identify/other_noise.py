@@ -1,0 +1,120 @@
+"""Whether noise of another time scale leads parameters to a better maximum.
+
+Disturbances take up what a model does not explain. Where that has a slow and a fast part a
+disturbance follows either, and parameters explain what it leaves: two maxima of the likelihood of
+both together, although at the parameters of either the noise has one alone. Searches that move
+parameters and noise in turn end at the one that is nearer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from .._common.arrays import FloatArray
+from ..errors import NumericalError
+from ..estimate import Learned
+from ..estimate.noise import DISTURBANCE, TIMES
+from .climb import to_the_top
+from .objective import Objective
+from .search import Box, stride
+from .settle import settle
+
+_APART = 5.0  # times as long, or as short, is the correlation time that is tried
+_OTHER = 2.0  # times: what is nearer is the same maximum
+_WORTH = 10.0  # nats on few samples that a disturbance takes up, or its time scale is nothing
+_STEPS = 3  # of the noise, the time held
+_TWICE = 2.0  # times what a step of the parameters promises
+_STANDS = 0.5  # nats
+_SLIGHT = 1e-6  # damping of a step that shows what is to be had
+_BELOW_BY_FEW, _FAR_BELOW = 5.0, 20.0  # nats, from where nothing comes up
+
+
+def likelier_noise(
+    objective: Objective,
+    at_top: tuple[FloatArray, FloatArray],
+    box: Box,
+    few: Objective,
+) -> tuple[FloatArray, FloatArray]:
+    """Parameters and noise of a maximum, or of a likelier one with noise of other time scales.
+
+    One disturbance at a time is given another correlation time. Where the other noise, learned with
+    this time held, and a step of the parameters under it make up what that costs on few samples,
+    both are searched from there. All samples are asked where few lead to another maximum.
+
+    Parameters
+    ----------
+    objective : Objective
+    at_top : (p, noise)
+        Of the maximum that was found.
+    box : Box
+    few : Objective
+        The same on fewer samples.
+
+    Returns
+    -------
+    p : array, shape (parameters,)
+    noise : array, shape (noises,)
+        Never less likely than those that are given.
+    """
+    best, value = at_top, objective.log_likelihood(*at_top)
+    here = few.learn_noise(*at_top, rounds=_STEPS)
+    known, least = [here.noise], few.log_likelihood(at_top[0], here.noise) - _BELOW_BY_FEW
+    for place, time_s in _other_times(few, at_top[0], here):
+        try:
+            noise = _with_time(few, at_top[0], here, place, time_s, box)
+            if noise is None:
+                continue
+            p, told, _ = settle(few, at_top[0], noise, box, parameters_first=True)
+            if any(_same(told, other) for other in known):
+                continue
+            known.append(told)
+            if few.log_likelihood(p, told) < least:
+                continue
+            p, told, _ = settle(objective, p, told, box)
+            if objective.log_likelihood(p, told) < value - _FAR_BELOW:
+                continue
+            rival = to_the_top(objective, p, told, box)
+            reached = objective.log_likelihood(*rival)
+        except (NumericalError, np.linalg.LinAlgError):
+            continue
+        if reached > value:
+            best, value = rival, reached
+    return best
+
+
+def _other_times(few: Objective, p: FloatArray, here: Learned) -> Iterator[tuple[int, float]]:
+    """Places of correlation times in the noise, and other times; of disturbances that are there."""
+    noise = here.noise
+    places = np.arange(noise.size)
+    for size, place in zip(places[DISTURBANCE], places[TIMES], strict=True):
+        least = noise.copy()
+        least[size] = few.lowest[size]
+        if few.log_likelihoods(p[None], least)[0] > few.log_likelihood(p, noise) - _WORTH:
+            continue
+        for times in (1.0 / _APART, _APART):
+            time_s = float(np.clip(times * noise[place], few.lowest[place], few.highest[place]))
+            if max(time_s / noise[place], noise[place] / time_s) >= _OTHER:
+                yield int(place), time_s
+
+
+def _with_time(
+    few: Objective, p: FloatArray, here: Learned, place: int, time_s: float, box: Box
+) -> FloatArray | None:
+    """Noise with that correlation time; None where it costs more than can come back."""
+    lowest, highest = few.lowest.copy(), few.highest.copy()
+    lowest[place] = highest[place] = time_s
+    held = replace(few, lowest=lowest, highest=highest)
+    learned = held.learn_noise(p, here.noise, rounds=_STEPS)
+    gains = few.freeze(p, learned.noise)
+    _, slope, information = few.normal_equations(p, gains, box.columns)
+    _, promised = stride(p[box.columns], slope, information, _SLIGHT, box)
+    lost = here.log_likelihood - learned.log_likelihood
+    return learned.noise if lost < _TWICE * promised + _STANDS else None
+
+
+def _same(noise: FloatArray, other: FloatArray) -> bool:
+    """Whether no correlation time is another one."""
+    return bool(np.all(np.abs(np.log(noise[TIMES] / other[TIMES])) < np.log(_OTHER)))

@@ -1,0 +1,72 @@
+"""The maximum of the likelihood is the same whatever time scale the noise begins with."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Model, Vehicle, effect, manoeuvres
+from sysid_vehicle.errors import NumericalError
+from sysid_vehicle.estimate import Driving, first_guess
+from sysid_vehicle.identify import Fit, refine
+from sysid_vehicle.identify.box import free_box
+from sysid_vehicle.identify.maximum import objectives
+from sysid_vehicle.identify.other_noise import likelier_noise
+from sysid_vehicle.simulate import RoadDisturbance, drive
+
+FAST_S, SLOW_S = 0.02, 0.7
+
+
+class TwoScales(RoadDisturbance):
+    """A slow disturbance, and a fast one of twice its size."""
+
+    def sample(self, n: int, rate_hz: float, rng: np.random.Generator) -> np.ndarray:
+        slow = super().sample(n, rate_hz, rng)
+        fast = RoadDisturbance(fy_n=340.0, mz_nm=1130.0, correlation_time_s=FAST_S)
+        return slow + fast.sample(n, rate_hz, rng)
+
+
+@pytest.fixture(scope="module")
+def driving(car: Vehicle) -> Driving:
+    """A lap of a car with a locking differential, which the fitted model lacks."""
+    name = "limited_slip_differential"
+    (size,) = effect(name).parameters
+    truth = Model(car).add(name).with_values({f"{name}.{size.name}": 2.0 * size.typical})
+    rough = TwoScales(fy_n=155.0, mz_nm=518.0, correlation_time_s=SLOW_S)
+    return Driving.of(
+        drive(truth, manoeuvres.lap(25.0, 7.0), seed=509, rate_hz=50.0, disturbance=rough)
+    )
+
+
+def begun(driving: Driving, car: Vehicle, time_s: float) -> Fit:
+    """The fit whose noise begins with this time scale of lateral disturbances."""
+    noise = replace(first_guess(driving, car), correlation_time_s=(0.3, time_s, time_s))
+    return refine(Model(car).add("front_tyre_relaxation"), driving, noise)
+
+
+def test_slow_noise_leads_to_the_maximum_of_fast_noise(driving: Driving, car: Vehicle) -> None:
+    """Eight nats lower a moment of 0.2 s takes up what the parameters could explain."""
+    fast = begun(driving, car, FAST_S)
+    assert fast.noise.correlation_time_s[2] < 0.06
+    for time_s in (0.05, 1.0):
+        slow = begun(driving, car, time_s)
+        assert slow.log_likelihood > fast.log_likelihood - 1.0
+        assert slow.noise.correlation_time_s[2] < 0.06
+
+
+def test_where_other_noise_fails_what_was_found_stays(
+    driving: Driving, car: Vehicle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = begun(driving, car, FAST_S)
+    objective, _ = objectives(fit.model, driving)
+    at_top = fit.model.vector(), fit.noise.vector()
+    asked = []
+
+    def failing(*_: object, **__: object) -> None:
+        asked.append(1)
+        raise NumericalError("the car spins")
+
+    monkeypatch.setitem(likelier_noise.__globals__, "_with_time", failing)
+    p, noise = likelier_noise(objective, at_top, free_box(fit.model), objective)
+    assert asked
+    assert (p, noise) == at_top
