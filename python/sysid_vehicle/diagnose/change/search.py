@@ -104,7 +104,18 @@ class Search:
             if best.put in seen:
                 break
             state = best
-        return self._shown(told, state)
+        return self._settled(told, state)
+
+    def _settled(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
+        """What will be named has been put in, and not a rival of it: sizes are told beside it."""
+        seen: set[tuple[str, ...]] = set()
+        while state.put not in seen and len(seen) < _ROUNDS:
+            seen.add(state.put)
+            best = self._better(state, told)
+            if best is not state:
+                state, told = best, self.told(best)
+            told, state = self._shown(told, state)
+        return told, state
 
     def _shown(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
         """With what lines and likelihoods both tell, and nothing else.
