@@ -209,14 +209,14 @@ class Differences:
         ----------
         along, sizes : array, shape (n, k)
             Of each score the sum of columns that it is of, and the change that is taken off before.
-        of : array, shape (n, k)
-            The change that each score is to tell.
+        of : array, shape (n, m)
+            The changes that the first m scores are to tell, and so the next m, and on.
         """
         mean = np.einsum("ij,ij->j", along, self.score[:, None] - self.information @ sizes)
         found = LongRun(self.samples, along.shape[1])
         sums = []
-        cuts = self._pieces.first
-        own_score, own_information = np.zeros((2, len(cuts), of.shape[1]))
+        cuts, few = self._pieces.first, of.shape[1]
+        own_score, own_information = np.zeros((2, len(cuts), few))
         for side, shared in ((self._reference, 0.0), (self._later, 1.0)):
             first = blocks(side.driving, BLOCK_S)
             own = np.zeros((len(first), along.shape[1]))
@@ -230,10 +230,12 @@ class Differences:
                 found.add(terms)
                 np.add.at(own, _block_of(first, where), terms)
                 if side is self._reference:
-                    at = _block_of(cuts, where)
-                    np.add.at(own_score, at, score_terms(G, left, off, of))
+                    at = np.repeat(_block_of(cuts, where), _core.CHANNELS)
                     for k in np.unique(at):
-                        S = G[np.repeat(at == k, _core.CHANNELS)] @ of
+                        rows = slice(*np.searchsorted(at, [k, k + 1]))
+                        S = G[rows] @ of
+                        R = left[rows, None] - G[rows] @ off[:, :few]
+                        own_score[k] += np.einsum("ij,ij->j", S, R)
                         own_information[k] += np.einsum("ij,ij->j", S, S)
             sums.append(own)
         naive = np.maximum(np.einsum("ij,ij->j", along, self.information @ along), 1e-300)
@@ -242,8 +244,10 @@ class Differences:
         by_block = (every**2).sum(axis=0) / naive / chance
         long_run = np.maximum(found.ratios(naive), 1.0)
         variance = self._unlike * self._pieces.variance(own_score, own_information)
-        told = np.einsum("ij,ij->j", along, self.information @ of)
-        return as_float64(np.maximum(long_run, by_block) + variance * told**2 / naive)
+        many = along.shape[1] // few
+        told = np.einsum("ij,ij->j", along, np.tile(self.information @ of, many))
+        unlike = np.tile(variance, many) * told**2 / naive
+        return as_float64(np.maximum(long_run, by_block) + unlike)
 
 
 def _block_of(first: npt.NDArray[np.intp], where: slice) -> npt.NDArray[np.intp]:

@@ -162,8 +162,8 @@ class Competition:
                 along[np.ix_(own, own)] = sizes[own, own[0]][:, None]
                 told[np.ix_(own, own)] = along[np.ix_(own, own)]
         turned = self._turns @ np.hstack([along, np.eye(n)])
-        off, of = np.hstack([sizes, sizes]), np.hstack([told, np.eye(n)])
-        ratios = self._differences.ratios(turned, self._turns @ off, self._turns @ of)
+        off = self._turns @ np.hstack([sizes, sizes])
+        ratios = self._differences.ratios(turned, off, self._turns @ told)
         for m in self._may:
             for name, c in zip(m.names, self._whole[m.id].columns, strict=True):
                 self.sizes[name] = float(mine[c, 0])
