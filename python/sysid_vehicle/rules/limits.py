@@ -104,14 +104,6 @@ class Rules:
         _OUTSIDE,
     )
 
-    alike: float = _limit(
-        0.5,
-        "share",
-        "of later driving beyond the speeds and lateral accelerations of a reference that lacks "
-        "something, above which no change is named",
-        _CONVENTION,
-    )
-
     def __post_init__(self) -> None:
         for f in fields(self):
             value = real(getattr(self, f.name))
@@ -135,6 +127,11 @@ class Rules:
     def bound(self) -> float:
         """The same of a bound on one side [standard errors]."""
         return NormalDist().inv_cdf(self.credible)
+
+    @property
+    def told(self) -> float:
+        """Evidence beyond which a claim is `credible`, were it as likely as not before [nats]."""
+        return float(np.log(self.credible / (1.0 - self.credible)))
 
     @property
     def insignificant(self) -> float:

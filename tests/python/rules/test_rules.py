@@ -30,10 +30,10 @@ NUMERICAL = {
     "diagnose/change/maximum.py": {
         *("_ENOUGH", "_HOPELESS", "_REFREEZES", "_ROUGH", "_STEPS", "_WALKS"),
     },
-    "diagnose/change/reference.py": {
-        *("_BEHIND", "_FAR", "_FOLLOWED", "_LOOSE", "_SHARES", "_VAGUE", "_WORTH"),
-    },
+    "diagnose/change/pieces.py": {"_OUTERMOST", "_PIECES", "_POINTS"},
+    "diagnose/change/reference.py": {"_FOLLOWED", "_LOOSE", "_VAGUE"},
     "diagnose/change/search.py": {"_CLOSE", "_ROUNDS", "_TRIED"},
+    "diagnose/change/together.py": {"_FAR", "_SHARES"},
     "diagnose/candidates/causes.py": {"_KEPT", "_LEAST"},
     "diagnose/candidates/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
     "diagnose/evidence/coordinates.py": {"BLOCK_S"},
@@ -285,4 +285,4 @@ def test_what_follows_from_a_limit_is_none_of_its_own() -> None:
     assert USUAL.apart == pytest.approx(0.5 * 3.090232**2)
     assert replace(USUAL, strict=0.0227501319).apart == pytest.approx(2.0)
     assert USUAL.explainable == USUAL.taken == pytest.approx(1.0 - USUAL.most)
-    assert len(fields(Rules)) == len(USUAL.to_dict()) == 16
+    assert len(fields(Rules)) == len(USUAL.to_dict()) == 15

@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from ... import _core
 from ..._common.arrays import FloatArray, as_float64
 from ...effects import Effect
 from ...estimate import Driving
@@ -34,6 +35,7 @@ from ..evidence.evidence import Evidence, Section
 from ..evidence.projection import LongRun, score_terms
 from ..evidence.sensitivity import sensitivities
 from ..unexplained.omnibus import Unknown
+from .pieces import Pieces
 
 _RIDGE = 1e-9  # of the diagonal: of copies of each other any one will do
 
@@ -157,6 +159,10 @@ class Differences:
     shift : array, shape (n,)
         By which parameters of the model of `later` differ already.
     known : Shared
+    pieces : Pieces
+        Of the reference.
+    unlike : float
+        How far the later driving is from it (`Alike`).
 
     Attributes
     ----------
@@ -170,8 +176,11 @@ class Differences:
         later: Side,
         shift: FloatArray,
         known: Shared,
+        pieces: Pieces,
+        unlike: float,
     ) -> None:
         self._reference, self._later, self._shift = reference, later, shift
+        self._pieces, self._unlike = pieces, unlike
         precision = known.precision
         score = later.score + later.information @ shift
         whole = later.information + reference.information + np.diag(precision)
@@ -189,36 +198,56 @@ class Differences:
         """Of both drivings."""
         return self._reference.driving.samples + self._later.driving.samples
 
-    def ratios(self, along: FloatArray, sizes: FloatArray) -> FloatArray:
-        """Long-run over naive variance of scores, at least 1.
+    def ratios(self, along: FloatArray, sizes: FloatArray, of: FloatArray) -> FloatArray:
+        """Variance of scores over what white noise would give them, at least 1.
 
-        The larger one of `LongRun` and of blocks that are taken as independent: what a model lacks
-        acts for as long as a manoeuvre does.
+        That of their long-run sums or of blocks that are taken as independent, whichever is
+        larger: what a model lacks acts for as long as a manoeuvre does. And what it acts otherwise
+        in driving of another kind, as pieces of the reference tell.
 
         Parameters
         ----------
         along, sizes : array, shape (n, k)
             Of each score the sum of columns that it is of, and the change that is taken off before.
+        of : array, shape (n, m)
+            The changes that the first m scores are to tell, and so the next m, and on.
         """
         mean = np.einsum("ij,ij->j", along, self.score[:, None] - self.information @ sizes)
         found = LongRun(self.samples, along.shape[1])
         sums = []
+        cuts, few = self._pieces.first, of.shape[1]
+        own_score, own_information = np.zeros((2, len(cuts), few))
         for side, shared in ((self._reference, 0.0), (self._later, 1.0)):
             first = blocks(side.driving, BLOCK_S)
             own = np.zeros((len(first), along.shape[1]))
             known = self._common - shared * self._shift
             turned = shared * np.eye(len(known)) - self._response
             for where, G, e in side.rows():
-                terms = score_terms(G, e - G @ known, turned @ sizes, turned @ along)
+                left = e - G @ known
+                off = turned @ sizes
+                terms = score_terms(G, left, off, turned @ along)
                 terms -= mean / self.samples
                 found.add(terms)
                 np.add.at(own, _block_of(first, where), terms)
+                if side is self._reference:
+                    at = np.repeat(_block_of(cuts, where), _core.CHANNELS)
+                    for k in np.unique(at):
+                        rows = slice(*np.searchsorted(at, [k, k + 1]))
+                        S = G[rows] @ of
+                        R = left[rows, None] - G[rows] @ off[:, :few]
+                        own_score[k] += np.einsum("ij,ij->j", S, R)
+                        own_information[k] += np.einsum("ij,ij->j", S, S)
             sums.append(own)
         naive = np.maximum(np.einsum("ij,ij->j", along, self.information @ along), 1e-300)
         every = np.vstack(sums)
         chance = 1.0 + 2.0 * np.sqrt(2.0 / max(len(every), 1))
         by_block = (every**2).sum(axis=0) / naive / chance
-        return as_float64(np.maximum(np.maximum(found.ratios(naive), by_block), 1.0))
+        long_run = np.maximum(found.ratios(naive), 1.0)
+        variance = self._unlike * self._pieces.variance(own_score, own_information)
+        many = along.shape[1] // few
+        told = np.einsum("ij,ij->j", along, np.tile(self.information @ of, many))
+        unlike = np.tile(variance, many) * told**2 / naive
+        return as_float64(np.maximum(long_run, by_block) + unlike)
 
 
 def _block_of(first: npt.NDArray[np.intp], where: slice) -> npt.NDArray[np.intp]:

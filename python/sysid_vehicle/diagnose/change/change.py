@@ -13,12 +13,11 @@ from ..._common.text import brief, number, with_error
 from ...identify import Fit
 from ...rules import Rules
 from ..candidates.causes import UNKNOWN, Causes, CredibleSet
-from .alike import Alike
+from .pieces import Alike
 
 Said = Literal[
     "changed",
     "one of a group",
-    "uncertain",
     "implausible",
     "negligible",
     "unchanged",
@@ -48,10 +47,9 @@ class EffectChange:
     probability : float
         Of being among what changed.
     said : str
-        `changed`; `one of a group` that explain the driving as well; `uncertain`: changed, or what
-        the model lacks in other driving (`Change.alike`); `implausible`: it acts like what changed,
-        with a size that no car has; `negligible`; `unchanged`, with a bound below what matters; or
-        `not testable` with this driving.
+        `changed`; `one of a group` that explain the driving as well; `implausible`: it acts like
+        what changed, with a size that no car has; `negligible`; `unchanged`, with a bound below
+        what matters; or `not testable` with this driving.
     group : tuple of str
         The others of the group.
     """
@@ -79,13 +77,15 @@ class EffectChange:
         return self._listed([t if t.startswith("-") else f"+{t}" for t in told])
 
     @property
+    def sure(self) -> str:
+        """Its probability in words: of a change that is beyond doubt no more than 99 %."""
+        return f"{min(int(100.0 * self.probability), 99)} % sure"
+
+    @property
     def sentence(self) -> str:
         """What is said of it, in words."""
         if self.said == "one of a group":
             return f"changed, or else {', '.join(self.group)}"
-        if self.said == "uncertain":
-            others = f", or else {', '.join(self.group)}" if self.group else ""
-            return f"changed{others}, or what the model lacks in other driving"
         if self.said == "implausible":
             return "acts like what changed, but no car changes so much"
         if self.said in ("unchanged", "not testable"):
@@ -118,7 +118,8 @@ class Change(Printed):
     effects : tuple of EffectChange
         What is named first, then by probability.
     alike : Alike
-        How far the later driving may be compared with the reference.
+        How like the reference the later driving is; where it is not, intervals are as much wider
+        as estimates differ between pieces of the reference.
     rules : Rules
     """
 
@@ -143,23 +144,11 @@ class Change(Printed):
     @property
     def unknown(self) -> tuple[CredibleSet, ...]:
         """Changes that are there and that no effect of the catalogue explains."""
-        if not self.alike.comparable:
-            return ()
-        return self._of_no_effect
-
-    @property
-    def _of_no_effect(self) -> tuple[CredibleSet, ...]:
         return tuple(s for s in self.causes.sets if s.effects[0].startswith(UNKNOWN))
 
     def _headline(self) -> str:
-        uncertain = self._of_no_effect or any(e.said == "uncertain" for e in self.effects)
-        if not self.alike.comparable and uncertain:
-            return (
-                f"what differs may be what the model lacks: {self.alike}; compare driving like "
-                "that of the reference, or give the reference driving of both kinds"
-            )
         leading = [e for e in self.named if not any(self._before(g, e) for g in e.group)]
-        told = [f"{e}" + (f" (or else {', '.join(e.group)})" if e.group else "") for e in leading]
+        told = [f"{e} ({', or else '.join((e.sure, *e.group))})" for e in leading]
         what = f"changed: {'; '.join(told)}" if told else ""
         if self.unknown:
             kinds = ", ".join(s.effects[0].removeprefix(UNKNOWN) for s in self.unknown)
@@ -171,15 +160,18 @@ class Change(Printed):
         order = [one.id for one in self.named]
         return effect in order and order.index(effect) < order.index(e.id)
 
-    _HEAD = ("effect", "probability", "change", "")
+    _HEAD = ("what", "by how much", "how sure", "")
 
-    def _rows(self, most: int = 12) -> list[list[str]]:
-        return [[e.id, f"{e.probability:.3f}", e.size, e.sentence] for e in self.effects[:most]]
+    def _rows(self, most: int = 8) -> list[list[str]]:
+        few = self.effects[: max(most, len(self.named))]
+        return [[e.id, e.size, e.sure.removesuffix(" sure"), e.sentence] for e in few]
 
     __repr__ = brief
 
     def _parts(self) -> list[Part]:
-        return [self._headline(), Table(self._HEAD, self._rows())]
+        other = [f"{self.alike}: intervals allow for what the model lacks there"]
+        told = other if self.alike.beyond > self.rules.taken else []
+        return [self._headline(), *told, Table(self._HEAD, self._rows())]
 
     def to_pandas(self) -> Any:
         """A DataFrame of all parameters, by effect and parameter."""

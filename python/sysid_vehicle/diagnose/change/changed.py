@@ -26,7 +26,6 @@ from ...rules import USUAL, Rules
 from ...vehicle import Vehicle
 from ..candidates.causes import Causes, CredibleSet
 from ..candidates.possible import possible
-from .alike import Alike, alike
 from .change import Change, EffectChange, Said
 from .changes_compete import Competition
 from .may_change import YAW_INERTIA, May
@@ -46,9 +45,9 @@ def changed(
     """Tell what of a car changed since a reference: yesterday's log fits the model, today's not.
 
     What the reference left unexplained counts only as far as the later driving leaves more. Both
-    are taken as independent; noise is that of the reference. Where the reference is shown to lack
-    something, and most of the later driving is at other speeds or lateral accelerations, what is
-    lacking acts otherwise there, and no difference is named a change (`Change.alike`).
+    are taken as independent; noise is that of the reference. What a model lacks acts otherwise at
+    other speeds or lateral accelerations: as far as the later driving is there (`Change.alike`),
+    standard errors hold what estimates differ by between pieces of the reference.
 
     Parameters
     ----------
@@ -99,8 +98,7 @@ def changed(
     )
     if len(driving.logs) > 1 and start.model.offset_names:
         start = replace(start, driving=centred(start)[1])
-    comparable = alike(before, driving, rules)
-    return _Said(Search(before, start, candidates, rules), comparable).change()
+    return _Said(Search(before, start, candidates, rules)).change()
 
 
 def _of_vehicle(model: Model, vehicle: Vehicle) -> Model:
@@ -113,13 +111,13 @@ def _of_vehicle(model: Model, vehicle: Vehicle) -> Model:
 class _Said:
     """What is said of everything that may have changed."""
 
-    def __init__(self, search: Search, alike: Alike) -> None:
-        self.search, self.alike = search, alike
+    def __init__(self, search: Search) -> None:
+        self.search = search
         self.told, self.state = search.found()
 
     def change(self) -> Change:
         """Exact likelihoods decide on what was put in, scores on all else."""
-        told, state = self.told, self.state
+        search, told, state = self.search, self.told, self.state
         ratio = told.ratio_of(state.put)
         exact = {e: self._exact(e, state, told, ratio) for e in state.put}
         rest = [
@@ -158,9 +156,7 @@ class _Said:
         found.sort(
             key=lambda e: (order.index(e.id) if e.id in order else len(order), -e.probability)
         )
-        return Change(
-            self.search.before, state.fit, causes, tuple(found), self.alike, self.search.rules
-        )
+        return Change(search.before, state.fit, causes, tuple(found), search.alike, search.rules)
 
     def _sizes_in(self, state: Exact, effect: str) -> dict[str, float]:
         return {n: state.changes[n] for n in self.search.can[effect].names}
@@ -226,8 +222,6 @@ class _Said:
                 said = "implausible"
             elif all(abs(v) + s < w for v, s, w in zip(value, std, matters, strict=True)):
                 said, group = "negligible", ()
-            elif not self.alike.comparable:
-                said = "uncertain"
         elif all(b < w for b, w in zip(bound, matters, strict=True)):
             said = "unchanged"
         names, units = zip(*((p.name, p.unit) for p in m.parameters), strict=True)

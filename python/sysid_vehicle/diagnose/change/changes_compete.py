@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from ..._common.arrays import FloatArray, as_float64
 from ...rules import USUAL, Rules
@@ -143,6 +144,7 @@ class Competition:
         """
         n = len(self._score)
         along, sizes, mine = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, 2))
+        told = np.eye(n)
         for name, h in self._whole.items():
             own = list(h.columns)
             beside = [p for p in self._put if p != name and self._alike[name, p] < self._rules.near]
@@ -158,8 +160,10 @@ class Competition:
                 # One score: along all that it explains.
                 along[:, own] = 0.0
                 along[np.ix_(own, own)] = sizes[own, own[0]][:, None]
+                told[np.ix_(own, own)] = along[np.ix_(own, own)]
         turned = self._turns @ np.hstack([along, np.eye(n)])
-        ratios = self._differences.ratios(turned, self._turns @ np.hstack([sizes, sizes]))
+        off = self._turns @ np.hstack([sizes, sizes])
+        ratios = self._differences.ratios(turned, off, self._turns @ told)
         for m in self._may:
             for name, c in zip(m.names, self._whole[m.id].columns, strict=True):
                 self.sizes[name] = float(mine[c, 0])
@@ -169,6 +173,24 @@ class Competition:
             own = list(h.columns)
             ratio[own] = (ratios[:n] if name.startswith(UNKNOWN) else ratio)[own].max()
         return self._shared(ratio) if self._put else ratio
+
+    def off_nothing(self, effect: str, changes: Mapping[str, float]) -> float:
+        """Of a change that was put in, the p-value of nothing by lines, beside the others.
+
+        Lines know unknown forces that both drivings share, which no likelihood of named effects
+        does: that gains from what the model lacks by whatever is fitted.
+        """
+        beside = [p for p in self._put if p != effect and self._alike[effect, p] < self._rules.near]
+        both, inverse = self._solved([*beside, effect])
+        columns = list(self._whole[effect].columns)
+        own = [both.index(c) for c in columns]
+        size = np.array([changes[n] for n in self._of(effect).names])
+        known, rank = pseudo_inverse(inverse[np.ix_(own, own)])
+        wald = float(size @ known @ size) / float(self._ratio[columns].max())
+        return float(scipy.stats.chi2.sf(wald, rank))
+
+    def _of(self, effect: str) -> May:
+        return next(m for m in self._may if m.id == effect)
 
     def _solved(self, names: Sequence[str]) -> tuple[list[int], FloatArray]:
         """Columns of some hypotheses, and the inverse of the information about them."""
@@ -255,8 +277,7 @@ class Competition:
         if std >= usual:
             return np.inf
         share, rules = (std / usual) ** 2, self._rules
-        asked = float(np.log(rules.credible / (1.0 - rules.credible)))
-        nats = self._of_one + asked + 0.5 * float(np.log1p(1.0 / share))
+        nats = self._of_one + rules.told + 0.5 * float(np.log1p(1.0 / share))
         return std * (float(np.sqrt(2.0 * nats / (1.0 - share))) + rules.bound)
 
     def wald(self, effect: str, beside: str, changes: Mapping[str, float]) -> float:
@@ -265,6 +286,5 @@ class Competition:
         known = self._information
         copy = known[np.ix_(own, other)] @ pseudo_inverse(known[np.ix_(other, other)])[0]
         left = known[np.ix_(own, own)] - copy @ known[np.ix_(other, own)]
-        may = next(m for m in self._may if m.id == effect)
-        size = np.array([changes[n] for n in may.names])
+        size = np.array([changes[n] for n in self._of(effect).names])
         return float(size @ left @ size)

@@ -5,32 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from ... import _core
 from ..._common.arrays import FloatArray, as_float64
 from ...effects import Effect
 from ...errors import NumericalError
-from ...estimate import noise_range
 from ...identify import Fit
 from ...identify.box import free_box
 from ...identify.climb import climb as to_the_maximum
-from ...identify.objective import LinearRows, Objective, Predicting
 from ...model import Model
+from ...rules import USUAL, Rules
 from ..candidates.possible import OF_A_FACTOR
 from .beside_reference import Shared, Side
-from .both_drivings import BothDrivings
 from .maximum import along, highest, highest_of
 from .may_change import May, change
+from .together import Together, cost, starts_of
 
-_FAR = 3.0  # usual sizes, within which a search begins
-_SHARES = (0.5, 1.0, 2.0)  # of the usual size, where it may begin too
 _DELAY = "delay_s"  # how names of delays end
 _FOLLOWED = 2  # of the likeliest starts
-_WORTH = 2.0  # nats, below which nothing is named: it need not be known what both share
-_BEHIND = 200.0  # nats: what lacks more beside others need not be told how much it lacks
 _LOOSE = 2.0  # times the usual change, by which fitted parameters may be off
 _VAGUE = 0.1  # of the information: of the prior of unknown forces that both drivings share
 
@@ -76,6 +69,7 @@ class Reference:
         What may have changed, clocks of inputs apart.
     effects : sequence of Effect
         Those of them that the model lacks.
+    rules : Rules
 
     Attributes
     ----------
@@ -88,8 +82,14 @@ class Reference:
         Effects that the model lacks are about as large as usual, or nothing.
     """
 
-    def __init__(self, before: Fit, may: Sequence[May], effects: Sequence[Effect]) -> None:
-        self.before, self.effects = before, tuple(effects)
+    def __init__(
+        self,
+        before: Fit,
+        may: Sequence[May],
+        effects: Sequence[Effect],
+        rules: Rules = USUAL,
+    ) -> None:
+        self.before, self.effects, self._rules = before, tuple(effects), rules
         model = before.model
         names = dict.fromkeys([*(n for m in may for n in m.names), *model.free_names])
         self.names = tuple(names)
@@ -109,6 +109,7 @@ class Reference:
                 mean, std = model.priors[name]
                 precision[i], centre[i] = std**-2, mean - model.value(name)
         self.shared = Shared(as_float64(precision), centre)
+        self._both = Together(before, self.place, self.shared)
         self._fitted: dict[frozenset[str], tuple[Model, float]] = {}
         self._nothing, self._unchanged = -np.inf, model
         self._likeliest = self._best = -np.inf  # of later driving, and less what both share
@@ -192,7 +193,9 @@ class Reference:
         """What was fitted, less what the changes gain where they are in both the same."""
         own, reached = self._fitted[frozenset(put)][0], value
         self._likeliest = max(self._likeliest, value)
-        if put and value > max(self._nothing + _WORTH, self._best - _BEHIND):
+        # What gains too little to be named, or to replace the best: what it shares is not asked.
+        leads = max(self._best - self._nothing, 0.0)
+        if put and value - self._nothing > max(self._rules.told, self._rules.near * leads):
             same = self._same(start, own, model, climb=climbed)
             reached -= max(same - self._nothing, 0.0)
         self._best = max(self._best, reached)
@@ -207,7 +210,7 @@ class Reference:
         self, start: Fit, model: Model, own: Model, loose: Sequence[str], changed: Sequence[str]
     ) -> tuple[Model, float]:
         """From where a search stands still to the maximum of the likelihood itself."""
-        objective = self._objective(start, model, own, loose, changed)
+        objective = self._both.objective(start, model, own, loose, changed)
         noise, box = self.before.noise.vector(), free_box(model)
         p, _, reached = to_the_maximum(objective, model.vector(), noise, box)
         values = {n: float(p[model.parameters[n].column]) for n in model.free_names}
@@ -217,13 +220,13 @@ class Reference:
         """Log-likelihood of both drivings where what was put in is in both the same."""
         noise, box = self.before.noise.vector(), free_box(apart)
         changed = [n for n in apart.free_names if n not in self.before.model.free_names]
-        objective = self._objective(start, apart, own, changed, [])
+        objective = self._both.objective(start, apart, own, changed, [])
         ends = [{n: m.value(n) for n in apart.free_names} for m in (own, apart)]
         ends.append({n: 0.5 * (ends[0][n] + ends[1][n]) for n in apart.free_names})
         ends.append(ends[0] | {n: self._unchanged.value(n) for n in self._unchanged.free_names})
         starts = [box.inside(apart.with_values(e).vector()) for e in ends]
         gains = objective.freeze(starts[0], noise)
-        begin = min(starts, key=lambda p: _cost(objective, p, gains))
+        begin = min(starts, key=lambda p: cost(objective, p, gains))
         p, value = highest(objective, begin, noise, box)
         return to_the_maximum(objective, p, noise, box)[2] if climb else value
 
@@ -253,9 +256,10 @@ class Reference:
         if own is not None:  # changes begin where the reference ends
             model = model.with_values({n: own.value(n) for n in model.free_names})
         noise, box = self.before.noise.vector(), free_box(model)
-        objective = self._objective(start, model, own, list(sizes), list(sizes))
+        objective = self._both.objective(start, model, own, list(sizes), list(sizes))
         p, best = box.inside(model.vector()), -np.inf
-        starts = self._starts(model, objective, sizes, usual, also, own is not None)
+        unchanged = self._unchanged if own is not None else None
+        starts = starts_of(model, objective, noise, sizes, usual, also, unchanged)
         bar = -np.inf if own is None else self._likeliest
         delays = [n for n in usual if n.endswith(_DELAY)]
         several = starts[:_FOLLOWED]
@@ -272,72 +276,3 @@ class Reference:
             raise NumericalError(f"the model with {', '.join(put)} cannot be evaluated")
         values = {n: float(p[model.parameters[n].column]) for n in model.free_names}
         return model.with_values(values), best
-
-    def _starts(
-        self,
-        model: Model,
-        objective: Objective,
-        sizes: Mapping[str, float],
-        usual: Mapping[str, float],
-        also: Sequence[Mapping[str, float]],
-        beside: bool,
-    ) -> list[FloatArray]:
-        """Starts, the likeliest first: what lines say leads astray where a change is large.
-
-        With all else as in the reference, and as it is where nothing changed.
-        """
-        box, noise = free_box(model), self.before.noise.vector()
-        far = {n: _FAR * usual.get(n, 0.0) for n in sizes}
-        starts = [*also, {n: float(np.clip(v, -far[n], far[n])) for n, v in sizes.items()}]
-        if len(usual) == 1:
-            ((name, size),) = usual.items()
-            starts += [{name: sign * share * size} for share in _SHARES for sign in (-1.0, 1.0)]
-        near = [model]
-        if beside and sizes:
-            stays = [n for n in self._unchanged.free_names if n not in sizes]
-            near.append(model.with_values({n: self._unchanged.value(n) for n in stays}))
-        sets = [
-            box.inside(m.with_values({n: m.value(n) + x for n, x in start.items()}).vector())
-            for m in near
-            for start in starts
-        ]
-        # Where a search begins is told by the gains of one of them: filters cost far more.
-        gains = objective.freeze(box.inside(model.vector()), noise)
-        return sorted(sets, key=lambda p: _cost(objective, p, gains))
-
-    def _objective(
-        self,
-        start: Fit,
-        model: Model,
-        own: Model | None,
-        loose: Sequence[str],
-        changed: Sequence[str],
-    ) -> Objective:
-        """The likelihood of a driving with priors of what stays, and that of the reference.
-
-        The reference is not approximated by its information: of tyres in their linear range a
-        line says that they may go where they cannot.
-        """
-        model_before = self.before.model
-        names = [n for n in model_before.free_names if n not in loose]
-        at = [self.place[n] for n in names]
-        rows = np.zeros((len(names), _core.PARAMETERS))
-        root = np.sqrt(self.shared.precision[at])
-        rows[np.arange(len(names)), [model_before.parameters[n].column for n in names]] = root
-        centre = [model_before.value(n) + self.shared.centre[self.place[n]] for n in names]
-        stays = LinearRows(rows, as_float64(root * centre))
-        later = start.driving.problem(model)
-        problem: Predicting = later
-        if own is not None:
-            shared = [own.parameters[n].column for n in own.free_names if n not in changed]
-            before = self.before.driving.problem(own)
-            problem = BothDrivings(later, before, own.vector(), shared)
-        return Objective(problem, (stays,), *noise_range(model.vehicle, start.driving))
-
-
-def _cost(objective: Objective, p: FloatArray, gains: Any) -> float:
-    """Half the sum of squares; infinite where the model fails."""
-    with suppress(NumericalError):
-        cost = objective.half_sum_of_squares(p, gains)
-        return cost if np.isfinite(cost) else np.inf
-    return np.inf

@@ -18,6 +18,7 @@ from ..candidates.possible import considered
 from .beside_reference import Differences, Side
 from .changes_compete import Competition
 from .may_change import YAW_INERTIA, of_clock, of_effect, of_inertia, of_tyre
+from .pieces import Pieces
 from .reference import Exact, Reference
 
 _TRIED = 5  # of the best single changes, exactly
@@ -51,12 +52,16 @@ class Search:
     reference : Reference
     visited : dict of frozenset to Exact
         What was fitted, by what was put in.
+    alike : Alike
+        How like the reference the later driving is.
     """
 
     def __init__(
         self, before: Fit, start: Fit, candidates: Sequence[str | Effect] | None, rules: Rules
     ) -> None:
         self.before, self.start, self.rules = before, start, rules
+        self._pieces = Pieces(before.driving)
+        self.alike = self._pieces.alike(start.driving)
         model, both = start.model, (before.driving, start.driving)
         free, lacked = set(model.free_names), {e.id for e in before.model.candidates}
         effects = tuple(
@@ -72,7 +77,7 @@ class Search:
         fitted = [m for m in several if m.id in {e.id for e in effects} or free.issuperset(m.names)]
         self.can = {m.id: m for m in fitted}
         self.may = [*fitted, *map(of_clock, clocks)]
-        self.reference = Reference(before, fitted, effects)
+        self.reference = Reference(before, fitted, effects, rules)
         self.visited: dict[frozenset[str], Exact] = {}
 
     def found(self) -> tuple[Competition, Exact]:
@@ -99,6 +104,50 @@ class Search:
             if best.put in seen:
                 break
             state = best
+        return self._settled(told, state)
+
+    def _settled(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
+        """What will be named has been put in, and not a rival of it: sizes are told beside it."""
+        seen: set[tuple[str, ...]] = set()
+        while state.put not in seen and len(seen) < _ROUNDS:
+            seen.add(state.put)
+            best = self._better(state, told)
+            if best is not state:
+                state, told = best, self.told(best)
+            told, state = self._shown(told, state)
+        return told, state
+
+    def _shown(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
+        """With what lines and likelihoods both tell, and nothing else.
+
+        A likelihood gains by what the model lacks, whatever is fitted; and no line holds far away.
+        """
+        for _ in range(_ROUNDS):
+            while state.put:
+                p_values = {e: told.off_nothing(e, state.changes) for e in state.put}
+                least = max(p_values, key=lambda e: p_values[e])
+                rest = tuple(e for e in state.put if e != least)
+                if p_values[least] <= 1.0 - self.rules.credible:
+                    break
+                self._visit(rest, told)
+                if frozenset(rest) not in self.visited:
+                    break
+                state = self.visited[frozenset(rest)]
+                told = self.told(state)
+            more = [e for e in self._leading(told, state) if e not in state.put]
+            tried = [(*state.put, e) for e in more]
+            tried = [put for put in tried if frozenset(put) not in self.visited]
+            if not tried:
+                break
+            for put in tried:
+                self._visit(put, told)
+            found = [self.visited[frozenset(p)] for p in tried if frozenset(p) in self.visited]
+            ratio = told.ratio_of(state.put)
+            best = max((state, *found), key=lambda s: self.evidence(s, told, ratio))
+            if best is state:
+                break
+            state = best
+            told = self.told(state)
         return told, state
 
     def _better(self, state: Exact, told: Competition) -> Exact:
@@ -158,7 +207,9 @@ class Search:
             # What both share is told in terms of the vehicle file of the later driving.
             same = replace(self.before, model=state.fit.model)
             side = Side(same, reference.names, reference.effects, like=side, residuals_of=side)
-        differences = Differences(side, later, state.shift, reference.shared)
+        differences = Differences(
+            side, later, state.shift, reference.shared, self._pieces, self.alike.unlike
+        )
         return Competition(
             differences,
             self.may,
