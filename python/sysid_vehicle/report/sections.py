@@ -153,7 +153,7 @@ def _ahead(study: Study, samples: Samples | None, truth: Model | None) -> list[s
     channels = [c for c in study.horizons.channels if c in LATERAL] or study.horizons.channels[:1]
     shares = study.shares
     return [
-        paragraph(shares.sentence),
+        paragraph(f"{shares.sentence} {shares.CAPTION}"),
         html_table(shares.HEAD, shares.rows()),
         figures.ahead(
             study,

@@ -83,6 +83,10 @@ class Shares:
         *("ahead by", "channel", "baseline", "with effects", "ceiling", "sensor noise", "unit"),
         "explained",
     )
+    CAPTION = (
+        "Errors on validation data, with the parameters that predict them best: median (first to "
+        "last decile of the driving)."
+    )
 
     def rows(self) -> list[list[str]]:
         """Cells of the printed table, under `HEAD`."""
@@ -99,6 +103,7 @@ class Shares:
             ]
             for i, h in enumerate(self.horizons_s)
             for j, c in enumerate(self.channels)
+            if not np.isnan(self.baseline[1, i, j])
         ]
 
     @property
@@ -130,10 +135,11 @@ class Shares:
         )
 
     def __str__(self) -> str:
-        return f"{text_table(self.HEAD, self.rows())}\n{self.sentence}"
+        return f"{self.CAPTION}\n{text_table(self.HEAD, self.rows())}\n{self.sentence}"
 
     def _repr_html_(self) -> str:
-        return html_table(self.HEAD, self.rows()) + html_paragraph(self.sentence)
+        table = html_table(self.HEAD, self.rows())
+        return html_paragraph(self.CAPTION) + table + html_paragraph(self.sentence)
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON; None where there are none."""

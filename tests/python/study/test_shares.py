@@ -128,3 +128,7 @@ def test_a_channel_that_was_not_measured_is_left_out(fit: Fit, course: Log) -> N
         "ay_mps2": True,
         "path_m": False,
     }
+    told = shares(fit, fit, driving, horizons_s=(0.5,))
+    assert {row[1] for row in told.rows()} == {"yaw rate", "a_y"}
+    assert str(told).startswith("Errors on validation data, with the parameters that predict them")
+    assert told.CAPTION in told._repr_html_()
