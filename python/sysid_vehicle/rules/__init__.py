@@ -26,7 +26,7 @@
    was added together is shown to take a share, of that error or of what could be explained of it.
    Where the final model errs by less than the noise of the sensors (`buried`), no share can be
    shown: an effect without rivals, and without a stand-in beside it, keeps its name if the
-   likelihood of validation data needs it (`interval`).
+   likelihood of validation data needs it (`interval`), unless training data show more (`strict`).
 9. The verdict follows from what is left and which names stand (`verdict`).
 10. `Rules` holds every limit with unit, meaning, and the benchmark that chose or judges it.
 

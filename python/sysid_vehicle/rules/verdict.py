@@ -119,7 +119,7 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     withdrawn = []
     if left or stand_ins:
         late = frozenset(a.id for a in facts.added if a.late)
-        likely = _likely(facts)
+        likely = _likely(facts, rules)
         falling = names - likely - _standing(facts, rules)
         if left and not facts.taken_low > 0.0:
             withdrawn.append(Withdrawn(names - likely - falling, _NOT_TOGETHER, names))
@@ -165,14 +165,16 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
     )
 
 
-def _likely(facts: Facts) -> frozenset[str]:
+def _likely(facts: Facts, rules: Rules) -> frozenset[str]:
     """Effects whose names stand by the likelihood of validation data.
 
     Errors below the noise of the sensors have no shares that could be shown. Where the final model
     leaves no larger ones, what is missing in it is small, and the likelihood decides: on effects
-    that no other could be taken for, beside which no stand-in was added.
+    that no other could be taken for, beside which no stand-in was added, and unless the training
+    data show something else beyond doubt. What is left shows on all data together, then.
     """
-    if not facts.buried or any(a.finding == "proxy" for a in facts.added):
+    shown = min(facts.fitted.p_value, facts.candidate) <= rules.strict
+    if not facts.buried or shown or any(a.finding == "proxy" for a in facts.added):
         return frozenset()
     return frozenset(a.id for a in facts.added if a.finding == "missing" and a.sure)
 

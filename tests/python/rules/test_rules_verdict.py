@@ -168,7 +168,9 @@ def test_no_name_stands_where_all_together_may_take_nothing() -> None:
 
 
 def test_below_the_noise_of_the_sensors_the_likelihood_of_validation_data_decides() -> None:
-    unseen = replace(LEFT, taken_low=-0.1, added=(replace(MASS, own=UNKNOWN, sure=True),))
+    """Something is left on all data together, which training data do not show."""
+    left = replace(LEFT, fitted=of(0.02), together=of(1e-9))
+    unseen = replace(left, taken_low=-0.1, added=(replace(MASS, own=UNKNOWN, sure=True),))
     assert verdict(unseen).verdict == "unknown"
     low = replace(unseen, buried=True)
     assert verdict(low).verdict == "partly_explained"
@@ -184,6 +186,9 @@ def test_below_the_noise_of_the_sensors_the_likelihood_of_validation_data_decide
     # A stand-in beside it shows that what is missing is something else.
     beside = replace(low, added=(low.added[0], replace(DRAG, finding="proxy", sure=True)))
     assert verdict(beside).verdict == "unknown"
+    # So do training data that show more beyond doubt.
+    for shown in ({"fitted": of(5e-4)}, {"candidate": 5e-4}):
+        assert verdict(replace(low, **shown)).verdict == "unknown"
 
 
 def test_a_share_for_which_there_was_no_time_is_said_to_be_unknown() -> None:
