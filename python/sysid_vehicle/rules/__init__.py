@@ -37,7 +37,16 @@ from .accept import ErrorChange, Gain, Measures, accept, bic, worse
 from .facts import Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
 from .share import NONE_GONE, UNKNOWN, Share, share_between, share_explained, share_of
-from .verdict import Grade, excess, grade, incomplete, something_left, unforeseen, verdict
+from .verdict import (
+    Grade,
+    excess,
+    grade,
+    incomplete,
+    little,
+    something_left,
+    unforeseen,
+    verdict,
+)
 
 __all__ = [
     "NONE_GONE",
@@ -60,6 +69,7 @@ __all__ = [
     "excess",
     "grade",
     "incomplete",
+    "little",
     "share_between",
     "share_explained",
     "share_of",

@@ -34,7 +34,22 @@ def excess(test: Tested) -> float:
     return max(test.statistic - test.degrees, 0.0)
 
 
-def grade(alone: str, beside: str, *, much_left: bool = False) -> Grade:
+def little(first: float, before: float, after: float, last: float, rules: Rules = USUAL) -> bool:
+    """Whether an effect takes little of what all that was added takes off the validation error.
+
+    A small misfit is explained by whatever effect fits it best, and its evidence grows with the
+    data: what takes little may be any of them.
+
+    Parameters
+    ----------
+    first, before, after, last : float
+        Errors of the baseline, without and with the effect, and of the final model.
+    rules : Rules
+    """
+    return before**2 - after**2 < rules.taken * (first**2 - last**2)
+
+
+def grade(alone: str, beside: str, *, much_left: bool = False, takes_little: bool = False) -> Grade:
     """How sure the name of an added effect is.
 
     Parameters
@@ -43,16 +58,20 @@ def grade(alone: str, beside: str, *, much_left: bool = False) -> Grade:
         What is said of it by itself, and beside what is left.
     much_left : bool
         As in `Decision`.
+    takes_little : bool
+        Of the error (`little`).
 
     Returns
     -------
     str
-        `confirmed`; `plausible`, where rivals cannot be told from it, its size hardly matters, or
-        too much is left to be sure; `alias` of what only acts like something else.
+        `confirmed`; `plausible`, where rivals cannot be told from it, its size hardly matters, it
+        takes little of the error, or too much is left to be sure; `alias` of what only acts like
+        something else.
     """
     if alone == "proxy":
         return "alias"
-    return "confirmed" if beside == "missing" and not much_left else "plausible"
+    sure = beside == "missing" and not much_left and not takes_little
+    return "confirmed" if sure else "plausible"
 
 
 def unforeseen(ratio: float, p_value: float, rules: Rules = USUAL) -> bool:

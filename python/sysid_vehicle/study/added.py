@@ -13,7 +13,7 @@ from .._common.text import with_error
 from ..compare import Comparison
 from ..diagnose import Verdicts
 from ..identify import Estimate, Fit
-from ..rules import Decision, Grade, grade
+from ..rules import USUAL, Decision, Grade, Rules, grade, little
 from .search import Trail
 
 
@@ -35,6 +35,8 @@ class AddedEffect:
         What tells that it only stands in for what is missing; empty where it is named.
     grade : str
         `confirmed`, `plausible` or `alias` (`rules.grade`).
+    takes_little : bool
+        Of what all that was added takes off the error on validation data (`rules.little`).
     """
 
     id: str
@@ -45,6 +47,7 @@ class AddedEffect:
     confounded_with: tuple[str, ...] = ()
     stands_in: str = ""
     grade: Grade = "plausible"
+    takes_little: bool = False
 
     @property
     def name(self) -> str:
@@ -65,6 +68,8 @@ class AddedEffect:
                 "only stands in for something else" if sure else "may stand in for something else"
             )
             said.append(f"it {what}: {self.stands_in}")
+        elif self.takes_little:
+            said.append("the error hardly falls with it: something else may explain so little")
         return "; ".join(said)
 
     def __str__(self) -> str:
@@ -85,6 +90,7 @@ class AddedEffect:
             "confounded_with": list(self.confounded_with),
             "stands_in": self.stands_in,
             "grade": self.grade,
+            "takes_little": self.takes_little,
         }
 
 
@@ -95,6 +101,7 @@ def added_by(
     told: Verdicts,
     alone: Verdicts,
     decision: Decision,
+    rules: Rules = USUAL,
 ) -> tuple[AddedEffect, ...]:
     """The effects of a study in the order in which they were added.
 
@@ -109,10 +116,12 @@ def added_by(
     told, alone : Verdicts
         On each effect, in the light of the whole study, and by itself.
     decision : Decision
+    rules : Rules
     """
     added = []
-    final = fits[-1]
+    final, ends = fits[-1], (on_test[0].error, on_test[-1].error)
     for (before, after), (poorer, richer) in zip(pairwise(on_test), pairwise(fits), strict=True):
+        small = little(ends[0], before.error, after.error, ends[1], rules)
         for name in (e for e in richer.model.effects if e not in poorer.model.effects):
             finding, because = told[name].finding, told[name].because
             others = [e for e in trail.rivals.get(name, ()) if e not in final.model.effects]
@@ -125,7 +134,13 @@ def added_by(
                     trail.p_values.get(name, np.nan),
                     tuple(others),
                     because if finding == "proxy" else "",
-                    grade(alone[name].finding, finding, much_left=decision.much_left),
+                    grade(
+                        alone[name].finding,
+                        finding,
+                        much_left=decision.much_left,
+                        takes_little=small,
+                    ),
+                    small,
                 )
             )
     return tuple(added)

@@ -140,7 +140,7 @@ class Judge:
             train=tuple(on_train),
             test=tuple(on_test),
             validation=self.test,
-            added=added_by(self.trail, fits, on_test, told, alone, decision),
+            added=added_by(self.trail, fits, on_test, told, alone, decision, rules),
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
             verdicts=told,

@@ -14,6 +14,7 @@ from sysid_vehicle.rules import (
     Share,
     grade,
     incomplete,
+    little,
     share_explained,
     something_left,
     unforeseen,
@@ -253,6 +254,16 @@ def test_grades_of_names() -> None:
     assert grade("negligible", "negligible") == "plausible"
     assert grade("proxy", "proxy") == "alias"
     assert grade("missing", "missing", much_left=True) == "plausible"
+    assert grade("missing", "missing", takes_little=True) == "plausible"
+
+
+def test_what_takes_little_of_the_fall_in_error_is_no_confirmed_name() -> None:
+    assert not little(2.0, 2.0, 1.0, 1.0)  # the only one
+    assert little(2.0, 1.1, 1.0, 1.0)  # 0.21 of 3
+    assert not little(2.0, 1.2, 1.0, 1.0)
+    assert little(2.0, 1.0, 1.1, 1.1)
+    assert not little(1.0, 1.0, 1.0, 1.0)  # nothing falls: it is not told
+    assert not little(2.0, 1.1, 1.0, 1.0, replace(USUAL, most=0.95))
 
 
 def test_the_share_explained_is_of_what_is_beyond_the_noise_floor() -> None:

@@ -142,6 +142,7 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
         "p_value",
         "parameters",
         "stands_in",
+        "takes_little",
     ]
     assert added["confounded_with"] == list(study.added[0].confounded_with)
     assert added["stands_in"] == ""
