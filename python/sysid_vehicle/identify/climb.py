@@ -17,7 +17,7 @@ from .settle import risen
 _GAIN = 0.05  # nats
 _STANDS = 0.5  # nats
 _CLIMBS = 10  # steps
-_CLIMBED, _STEPS = 15, 3  # times, with noise learned anew, of so many steps each
+_CLIMBED, _STEPS = 22, 2  # times, with noise learned anew, of so many steps each
 _NUDGE = 0.02  # standard errors by which the likelihood is differentiated
 _NARROW = 0.01  # of the box, which is narrower than that for what the data do not tell
 _SLIGHT = 1e-6  # damping at which a step shows what is to be had
@@ -55,13 +55,20 @@ def climb(
     begin, reached : float
         Log-likelihoods of the start and there, priors included; the second is never the lower one.
     """
+    p, begin, reached, _ = _climbed(objective, p, noise, box, steps, False)
+    return p, begin, reached
+
+
+def _climbed(
+    objective: Objective, p: FloatArray, noise: FloatArray, box: Box, steps: int, astray: bool
+) -> tuple[FloatArray, float, float, bool]:
+    """As `climb`; the last, in and out, is whether searches are led astray here."""
 
     def values_at(trials: FloatArray) -> FloatArray:
         return objective.log_likelihoods(trials, noise)
 
     gains = objective.freeze(p, noise)
     begin = value = objective.reached(p, gains)
-    astray = False
     for _ in range(steps):
         _, seen, information = objective.normal_equations(p, gains, box.columns)
         x = p[box.columns]
@@ -78,9 +85,10 @@ def climb(
         if astray:
             p, gains = _damped(objective, p, gains, noise, (slope, information), box)
             value = objective.reached(p, gains)
-        if value < least:
+        # Damped steps that gain little creep, and hardly any are worth what they cost.
+        if value < least + (_STANDS - _GAIN if astray else 0.0):
             break
-    return p, begin, value
+    return p, begin, value, astray
 
 
 def _damped(
@@ -130,8 +138,9 @@ def to_the_top(
     p : array, shape (parameters,)
     noise : array, shape (noises,)
     """
+    astray = False
     for _ in range(_CLIMBED):
-        p, begin, reached = climb(objective, p, noise, box, steps=_STEPS)
+        p, begin, reached, astray = _climbed(objective, p, noise, box, _STEPS, astray)
         noise = objective.learn_noise(p, noise, rounds=1).noise
         if reached < begin + _STANDS:
             break
