@@ -94,7 +94,8 @@ def improve(
         Errors that matter, such as ``{"yaw_rate": "0.5deg/s"}`` (`sizes_that_matter`); those not
         given have usual sizes. A baseline whose errors 0.5 to 5 s ahead on validation data are all
         smaller, as the likelihood fits it or as predictions do, is adequate where no name stands,
-        whatever is left. By default whatever is shown to be left counts.
+        whatever is left. By default the noise of the sensors counts, at most the usual sizes, in
+        the mean square, and slow forces count whatever their size.
     workers : int, optional
         Threads; by default as many as there are cores. The result is the same for any number.
     progress : bool, optional
