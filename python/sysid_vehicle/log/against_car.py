@@ -15,10 +15,11 @@ import numpy as np
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput, warn
 from ..vehicle import GRAVITY_MPS2
-from .laws import EXCITED, LINEAR_MPS2, OFFSET, WINDOW_S, Drive, size_of, spread_of
+from .laws import EXCITED, LINEAR_MPS2, OFFSET, WINDOW_S, Drive, spread_of
 from .log import Log
 from .longitudinal import ramp_on
 from .motion import Motion
+from .regression import size_of
 
 _MOVING = 5.0  # m/s
 _MIN_WINDOWS = 12

@@ -10,7 +10,7 @@ import numpy as np
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput
 from .motion import Motion
-from .regression import Regression, regress
+from .regression import Regression, regress, size_of
 
 WINDOW_S = 1.0
 EXCITED = 0.5  # m/s2 that one side must reach before anything is compared
@@ -98,11 +98,6 @@ def fit(
     """Regress with normal priors of these standard deviations on the coefficients."""
     prior = np.zeros(len(columns)) if mean is None else np.array(mean)
     return regress(y, np.column_stack(columns), prior, np.array(spread))
-
-
-def size_of(values: FloatArray) -> float:
-    """A size that few values exceed."""
-    return float(np.percentile(np.abs(values), 95))
 
 
 def spread_of(values: FloatArray) -> float:

@@ -20,11 +20,10 @@ from .laws import (
     cosine,
     fit,
     ones,
-    size_of,
     spread_of,
     wrong_sign,
 )
-from .regression import Regression
+from .regression import Regression, size_of
 
 _CLEARLY_RAMP, _CLEARLY_DRIVEN, _CLEARLY_FELT = (
     0.8,
@@ -54,8 +53,9 @@ def check_longitudinal(drive: Drive) -> None:
     if ratio < -4.0 * deviation and found.coherence > 0.3 and cosine(ramp, ax) < -0.3:
         text = "moves against the change of vx_mps"
         raise wrong_sign("ax_mps2", text, ax, drive)
+    # What corners explain of either is no sign that the other must follow.
     if found.coherence < 0.15 and (
-        spread_of(ramp) > _CLEARLY_RAMP or spread_of(ax) > _CLEARLY_FELT
+        found.remaining > _CLEARLY_RAMP or found.driving > _CLEARLY_FELT
     ):
         raise Implausible(
             "ax_mps2",
@@ -111,7 +111,7 @@ def check_force(drive: Drive) -> None:
     if inverse < -4.0 * deviation and found.coherence > 0.3 and cosine(ramp, force) < -0.3:
         text = "moves against the change of vx_mps"
         raise wrong_sign("fx_n", text, force, drive)
-    if found.coherence < 0.15 and spread_of(ramp) > _CLEARLY_DRIVEN:
+    if found.coherence < 0.15 and found.remaining > _CLEARLY_DRIVEN:
         raise Implausible(
             "fx_n",
             f"fx_n: does not follow the acceleration, {drive.place(ramp)}; check that the column "

@@ -35,18 +35,19 @@ from .laws import (
     cosine,
     fit,
     ones,
-    size_of,
     spread_of,
     wrong_sign,
 )
 from .longitudinal import check_force, check_longitudinal, held_speed_note
 from .motion import Motion
 from .ranges import WHITE, blank, check_lost, check_ranges, dropouts
+from .regression import size_of
 
 _MOVING = 3.0  # in whatever unit vx has; only windows above are compared
 _MIN_WINDOWS = 8
 _SLIDING = 0.2  # m/s2, the same for the change of vy, which is a small part of ay
 _ABOVE_NOISE = 6.0  # noise of the regressor itself makes every coefficient too small
+_HOLDS = 0.2  # of what it demands: a law that holds this closely needs no regression
 _CLEARLY = 1.5  # m/s2 that it must reach before channels are called unrelated
 
 # Lever arms and roll bend the lateral speed more than the accelerations.
@@ -281,6 +282,9 @@ def _check_sliding(drive: Drive) -> None:
     speed = float(np.median(drive.mean(c["vx_mps"])))
     own = math.hypot(noise["ay_mps2"], speed * noise["yaw_rate_radps"]) / WINDOW_S**0.5
     if size_of(expected) < max(_SLIDING, _ABOVE_NOISE * own):
+        return
+    # At one speed the change of yaw rate has the same shape, and a regression would have to choose.
+    if spread_of(slide - expected) < _HOLDS * spread_of(expected):
         return
     # The expected change is the small difference of two large readings, each with an own scale;
     # and where the speed is not measured at the centre of gravity the yaw rate adds to it.

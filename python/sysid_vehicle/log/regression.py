@@ -37,6 +37,10 @@ class Regression:
         Robust standard deviation of the residuals.
     coherence : float
         Squared correlation of `y` with the first column, the other columns taken out of both.
+    remaining : float
+        Size of `y` once the other columns are taken out, which few rows exceed.
+    driving : float
+        The same of the first column.
     """
 
     coefficients: FloatArray
@@ -44,6 +48,8 @@ class Regression:
     weights: FloatArray
     scale: float
     coherence: float
+    remaining: float
+    driving: float
 
 
 @dataclass(frozen=True)
@@ -83,7 +89,7 @@ def regress(y: FloatArray, x: FloatArray, mean: FloatArray, spread: FloatArray) 
         scale = NORMAL_MAD * float(np.median(np.abs(residual - np.median(residual)))) + _TINY
         weights = np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(residual), _TINY))
     _, deviations = _sandwich(x, y - x @ b, spread, weights, scale)
-    return Regression(b, deviations, weights, scale, _coherence(y, x, weights))
+    return Regression(b, deviations, weights, scale, *_alone(y, x, weights))
 
 
 def find_lag(sides: Sides, mean: FloatArray, spread: FloatArray, usable: np.ndarray) -> Lag:
@@ -191,11 +197,20 @@ def _misfit(
     return float(start.weights @ np.square(y - x @ b) + start.scale**2 * prior)
 
 
-def _coherence(y: FloatArray, x: FloatArray, weights: FloatArray) -> float:
+def _alone(y: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
+    """Return coherence, remaining and driving: `y` and the first column without the others."""
     root = np.sqrt(weights)
-    others = x[:, 1:] * root[:, None]
-    pair = np.column_stack([y, x[:, 0]]) * root[:, None]
-    if others.shape[1]:
-        pair = pair - others @ np.linalg.lstsq(others, pair, rcond=None)[0]
-    size = float(pair[:, 0] @ pair[:, 0]) * float(pair[:, 1] @ pair[:, 1])
-    return float(pair[:, 0] @ pair[:, 1]) ** 2 / size if size > 0.0 else 0.0
+    pair = np.column_stack([y, x[:, 0]])
+    weighted = pair * root[:, None]
+    if x.shape[1] > 1:
+        taken = np.linalg.lstsq(x[:, 1:] * root[:, None], weighted, rcond=None)[0]
+        pair, weighted = pair - x[:, 1:] @ taken, weighted - x[:, 1:] * root[:, None] @ taken
+    size = float(weighted[:, 0] @ weighted[:, 0]) * float(weighted[:, 1] @ weighted[:, 1])
+    product = float(weighted[:, 0] @ weighted[:, 1]) ** 2
+    remaining, driving = (size_of(column) for column in pair.T)
+    return product / size if size > 0.0 else 0.0, remaining, driving
+
+
+def size_of(values: FloatArray) -> float:
+    """A size that few values exceed."""
+    return float(np.percentile(np.abs(values), 95))

@@ -80,6 +80,20 @@ def test_force_against_the_drag_of_tight_corners_is_right(seed: int, noise: floa
     assert read(strategies.car_columns(634, 50.0, seed, 8.0, 9.0, noise)) is not None
 
 
+@pytest.mark.parametrize("left_out", [(), ("vy_mps",), ("ax_mps2",), ("vy_mps", "ax_mps2")])
+def test_corners_alone_are_no_acceleration_that_the_force_must_follow(
+    left_out: tuple[str, ...],
+) -> None:
+    """The force varies by 0.3 m/s2, what corners add to the change of speed by 1.3."""
+    columns = strategies.car_columns(1599, 50.0, 2371589828, 9.0, 9.0, 5.0)
+    assert read({name: columns[name] for name in columns if name not in left_out}) is not None
+
+
+def test_a_lateral_speed_that_holds_its_law_is_right_where_yaw_acceleration_looks_alike() -> None:
+    """At constant speed both have one shape; without noise a regression takes either."""
+    assert read(strategies.car_columns(1810, 20.0, 2579258742, 9.009, 9.0, 0.0)) is not None
+
+
 @given(strategies.clean_logs(lengths=st.integers(50, 500)), st.integers(0, 10**6), st.data())
 def test_uneven_time_loses_no_channel(
     columns: strategies.Columns, seed: int, data: st.DataObject
