@@ -18,8 +18,10 @@ NOTEBOOKS = sorted((REPO / "notebooks").glob("*.ipynb"))
 # Files of the tree that are pages of the site.
 PAGES = {
     "CHANGELOG.md": "changelog.md",
-    "benchmarks/exam/README.md": "benchmarks/exam.md",
-    "benchmarks/real_driving/README.md": "benchmarks/real_driving.md",
+    **{
+        path.relative_to(REPO).as_posix(): f"benchmarks/{path.parent.name}.md"
+        for path in sorted(REPO.glob("benchmarks/*/README.md"))
+    },
     **{f"notebooks/{path.name}": f"tutorials/{path.stem}.md" for path in NOTEBOOKS},
 }
 # Modules whose public names the reference holds, beside the package itself and its errors.

@@ -17,6 +17,7 @@ PAGES = [
     README,
     *(REPO / name for name in ("ARCHITECTURE.md", "CONTRIBUTING.md")),
     *sorted((REPO / "docs").rglob("*.md")),
+    *sorted((REPO / "benchmarks").rglob("*.md")),
 ]
 MODULES = {"sv": "sysid_vehicle"} | {
     name: f"sysid_vehicle.{name}" for name in ("lab", "online", "twin", "published")
