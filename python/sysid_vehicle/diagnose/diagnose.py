@@ -17,10 +17,10 @@ from ..identify import Fit, driving_of, explaining
 from ..log import Log
 from ..rules import USUAL, Rules, bic
 from .candidates.candidate import Candidate
-from .candidates.causes import causes_of
 from .candidates.clocks import shifts
 from .candidates.diagnosis import Diagnosis
 from .candidates.possible import considered
+from .candidates.posterior import causes_of
 from .candidates.refits import finished as finished_of
 from .candidates.refits import from_typical, in_time, is_hidden_by_noise, refitted
 from .candidates.score import Score, ScoreBoard, score_board_of

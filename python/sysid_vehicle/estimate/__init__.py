@@ -3,7 +3,8 @@
 from ..log import MEASURED
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
 from .driving import UNITS, Driving
-from .filters import FilterRun, FilterState, LateMeasurements, StateFilter, StateModel
+from .filters import FilterRun, FilterState, StateFilter, StateModel
+from .late import LateMeasurements
 from .noise import (
     Learned,
     NoiseModel,

@@ -20,16 +20,14 @@ from ..sensors import quantum
 from . import pieces
 from .channels import check_channels, has_channels, logged_channels
 from .inputs import quiet
-from .pieces import DrivingProblem, PiecewiseProblem, cut
+from .leads import cut
+from .pieces import DrivingProblem, PiecewiseProblem
+from .samples import Samples, between, thinned
 
 UNITS = {c: CHANNELS[c].unit for c in MEASURED}
 WORDS = dict(zip(MEASURED, ("v_x", "v_y", "yaw rate", "a_x", "a_y"), strict=True))
 
-_WINDOW_S, _SHORTEST = 2.0, 50  # of windows of thinned driving; samples, at least
 _REACH_S = effect("steer_delay").parameters[0].upper  # either way
-
-_Part = tuple[Log, slice, int]
-"""Log, samples of it, and the place of the first among all usable samples."""
 
 
 class Span(NamedTuple):
@@ -255,13 +253,13 @@ class Driving:
         core = model.core(force_known=self.force_known)
         longest = pieces.LONGEST if longest is None else longest
         if most_samples is not None or self.samples <= longest:
-            return self._problem(model, core, self._pieces(most_samples), other_inputs)
+            return self._problem(model, core, thinned(self._whole, most_samples), other_inputs)
         # Noise is taken out of the whole signal: a cut is no corner.
         inputs = self._whole_inputs if other_inputs is None else other_inputs
         channels = self.channels() if channels_in_use() else None
 
         def some(core: _core.SingleTrack, begin: int, end: int) -> _core.Problem:
-            return self._problem(model, core, self._between(begin, end), inputs, channels)
+            return self._problem(model, core, between(self._whole, begin, end), inputs, channels)
 
         return PiecewiseProblem(some, core, cut(self.spans, longest))
 
@@ -278,7 +276,9 @@ class Driving:
             v_x, v_y [m/s], yaw rate [rad/s] with which the windows begin.
         """
         core = model.core(force_known=self.force_known)
-        parts = [part for first, size in windows for part in self._between(first, first + size)]
+        parts = [
+            part for first, size in windows for part in between(self._whole, first, first + size)
+        ]
         channels = self.channels() if channels_in_use() else None
         return self._problem(model, core, parts, self._whole_inputs, channels, motion)
 
@@ -286,7 +286,7 @@ class Driving:
         self,
         model: Model,
         core: _core.SingleTrack,
-        parts: list[_Part],
+        parts: list[Samples],
         other_inputs: FloatArray | None,
         channels: FloatArray | None = None,
         motion: FloatArray | None = None,
@@ -346,39 +346,12 @@ class Driving:
         return steer[max(begin - reach, 0) : begin].tolist(), steer[end : end + reach].tolist()
 
     @cached_property
-    def _whole(self) -> list[_Part]:
-        """Log, samples and place among all usable samples of each stretch."""
+    def _whole(self) -> list[Samples]:
+        """The samples of each stretch."""
         return [
-            (self.logs[s.log], s.where, span.first)
+            Samples(self.logs[s.log], s.where, span.first)
             for s, span in zip(self.stretches, self.spans, strict=True)
         ]
-
-    def _between(self, begin: int, end: int) -> list[_Part]:
-        """What lies between two of all usable samples."""
-        found: list[_Part] = []
-        for log, where, at in self._whole:
-            first, last = max(begin - at, 0), min(end - at, where.stop - where.start)
-            if first < last:
-                some = slice(where.start + first, where.start + last)
-                found.append((log, some, at + first))
-        return found
-
-    def _pieces(self, most_samples: int | None) -> list[_Part]:
-        """Logs, samples of them, and the place of the first among all usable samples."""
-        whole = self._whole
-        if most_samples is None or self.samples <= most_samples:
-            return whole
-        # Short windows, evenly spread, keep every kind of driving in, and fill the lanes of the
-        # kernels, which each walk one.
-        pieces: list[_Part] = []
-        share = most_samples / self.samples
-        for log, where, at in whole:
-            length = max(int(_WINDOW_S * log.rate_hz), _SHORTEST)
-            for start in range(where.start, where.stop, max(int(length / share), 1)):
-                stop = min(start + length, where.stop)
-                if stop - start > length // 2 or not pieces:
-                    pieces.append((log, slice(start, stop), at + start - where.start))
-        return pieces
 
     __repr__ = brief
 

@@ -16,21 +16,18 @@ from typing import Any
 import numpy as np
 import scipy
 
-from .. import _core
 from .._common.arrays import FloatArray, as_float64
 from .._common.printed import Part, Printed, Table
 from .._common.text import brief, number, with_error
 from ..errors import InvalidInput, near_names
-from ..estimate import Driving, NoiseModel, noise_range
+from ..estimate import Driving, NoiseModel
 from ..log import Log
 from ..model import Model
-from .box import free_box
 from .estimates import Estimate, wald
 from .fit import Fit
 from .identify import identify
-from .mapped import Copied, Mapped
-from .objective import Objective, gaussian_prior
-from .search import Box
+from .objective import Objective
+from .runs_layout import RunsLayout
 from .settle import settle
 from .starts import Starts
 from .suspects import explaining
@@ -211,7 +208,7 @@ def identify_runs(
     common = identify(model, every, starts=starts, seed=seed, workers=workers, progress=progress)
     logs = iter(common.driving.each_log())  # with the offsets of each
     drivings = {run: Driving.joined(islice(logs, len(own))) for run, own in together.items()}
-    layout = _Layout.of(common.model, tuple(runs), vary, tie)
+    layout = RunsLayout.of(common.model, tuple(runs), vary, tie)
     objective = layout.objective(drivings)
     q, noise, converged = settle(
         objective, layout.start(common.model.vector()), common.noise.vector(), layout.box
@@ -242,82 +239,10 @@ def _check(
             raise InvalidInput(f"{name} is tied to {other}, which is tied itself")
 
 
-@dataclass(frozen=True)
-class _Layout:
-    """Places of all parameters: those of the core, then the values of all runs but the first."""
-
-    model: Model
-    runs: tuple[str, ...]
-    vary: tuple[str, ...]
-    tie: Mapping[str, str]
-    shared: tuple[str, ...]
-    box: Box
-
-    @classmethod
-    def of(
-        cls, model: Model, runs: tuple[str, ...], vary: tuple[str, ...], tie: Mapping[str, str]
-    ) -> _Layout:
-        shared = tuple(n for n in model.free_names if n not in vary and n not in tie)
-        whole, names = free_box(model), list(model.free_names)
-        place = {n: i for i, n in enumerate(names)}
-        order = [place[n] for n in shared] + [place[n] for n in vary for _ in runs]
-        core = [whole.columns[place[n]] for n in shared]
-        own = [
-            whole.columns[place[n]] if r == 0 else _core.PARAMETERS + (r - 1) * len(vary) + k
-            for k, n in enumerate(vary)
-            for r in range(len(runs))
-        ]
-        return cls(
-            model, runs, vary, dict(tie), shared,
-            Box(core + own, whole.lower[order], whole.upper[order]),
-        )  # fmt: skip
-
-    @property
-    def size(self) -> int:
-        return _core.PARAMETERS + (len(self.runs) - 1) * len(self.vary)
-
-    def column(self, name: str) -> int:
-        return self.model.parameters[name].column
-
-    def source(self, run: int) -> np.ndarray[Any, np.dtype[np.intp]]:
-        """Where a run's parameters stand."""
-        source = np.arange(_core.PARAMETERS, dtype=np.intp)
-        if run > 0:
-            for k, name in enumerate(self.vary):
-                source[self.column(name)] = _core.PARAMETERS + (run - 1) * len(self.vary) + k
-        for name, other in self.tie.items():
-            source[self.column(name)] = source[self.column(other)]
-        return source
-
-    def start(self, p: FloatArray) -> FloatArray:
-        own = [p[self.column(n)] for _ in self.runs[1:] for n in self.vary]
-        return as_float64([*p, *own])
-
-    def objective(self, drivings: Mapping[str, Driving]) -> Objective:
-        """The likelihood of all runs, with the model's priors for every run's own values."""
-        parts = tuple(
-            Copied(drivings[run].problem(self.model), self.source(i))
-            for i, run in enumerate(self.runs)
-        )
-        places = dict(zip(self._every, self.box.columns, strict=True))
-        stated = {c: self.model.priors[n] for (n, _), c in places.items() if n in self.model.priors}
-        whole = Driving.joined(drivings.values())
-        return Objective(
-            Mapped(parts),
-            gaussian_prior(self.size, stated),
-            *noise_range(self.model.vehicle, whole),
-        )
-
-    @property
-    def _every(self) -> list[tuple[str, str]]:
-        """Name and run of everything in the box; no run where it is common."""
-        return [(n, "") for n in self.shared] + [(n, r) for n in self.vary for r in self.runs]
-
-
 def _summary(
     common: Fit,
     drivings: Mapping[str, Driving],
-    layout: _Layout,
+    layout: RunsLayout,
     objective: Objective,
     q: FloatArray,
     noise: FloatArray,
@@ -327,8 +252,8 @@ def _summary(
     _, _, information = objective.normal_equations(q, frozen, layout.box.columns)
     x = q[layout.box.columns]
     parameters = common.model.parameters
-    labels = [f"{n} [{r}]" if r else n for n, r in layout._every]
-    units = {label: parameters[n].unit for label, (n, _) in zip(labels, layout._every, strict=True)}
+    labels = [f"{n} [{r}]" if r else n for n, r in layout.every]
+    units = {label: parameters[n].unit for label, (n, _) in zip(labels, layout.every, strict=True)}
     estimates, covariance = wald(labels, units, x, information, layout.box)
     told = NoiseModel.from_vector(noise)
     at = len(layout.shared)

@@ -5,7 +5,8 @@ from .channels import CHANNELS, MEASURED, Channel
 from .columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
 from .held import held_rows
 from .laws import Contradiction
-from .log import Log, check_excitation, several_logs
+from .log import Log
+from .together import check_excitation, several_logs
 
 __all__ = [
     "CHANNELS",

@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._common.arguments import expect
 from .._common.arrays import FloatArray, filled
 from .._common.files import write_text
 from .._common.tables import dataset, frame
-from ..errors import InvalidInput, near_names, warn
+from ..errors import InvalidInput, near_names
 from .build import build
 from .channels import CHANNELS
-from .checks import excitation_note
 from .columns import Columns
 from .laws import Contradiction
 from .plausibility import contradictions
@@ -332,49 +330,3 @@ class Log:
 
 def _quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"' if any(c in name for c in ',"\n') else name
-
-
-def check_excitation(logs: Log | Sequence[Log]) -> bool:
-    """Warn if none of the runs holds corners, so that lateral parameters cannot be determined.
-
-    Parameters
-    ----------
-    logs : Log or sequence of Log
-        Runs that are identified together.
-
-    Returns
-    -------
-    bool
-        Whether at least one run is excited.
-
-    Warns
-    -----
-    SysidWarning
-        If none is; the message tells how far steering and lateral acceleration went.
-    """
-    together = several_logs(logs, "check_excitation")
-    notes = []
-    for log in together:
-        columns: dict[str, Any] = {name: log[name] for name in ("ay_mps2", "steer_rad")}
-        notes.append(excitation_note(columns, log.rate_hz))
-    if not notes or not all(notes):
-        return bool(notes)
-    warn("; ".join(f"{log.name}: {note}" for log, note in zip(together, notes, strict=True)))
-    return False
-
-
-def several_logs(logs: Log | Sequence[Log], function: str = "driving") -> tuple[Log, ...]:
-    """One log or many as many, as they were given to a function.
-
-    Raises
-    ------
-    InvalidInput
-        There is none, or something else; the message says what to make of that.
-    """
-    single = isinstance(logs, Log | str | Mapping) or hasattr(logs, "columns")
-    found: tuple[Any, ...] = tuple(logs) if isinstance(logs, Iterable) and not single else (logs,)
-    if not found:
-        raise InvalidInput(f"{function}: no log was given; pass one Log or a list of them")
-    for log in found:
-        expect(log, Log, function)
-    return found

@@ -19,9 +19,10 @@ import scipy
 from .._common.arrays import FloatArray, as_float64
 from .._common.threads import check_time
 from .colour import Colour, fit_colour, neighbours
+from .covariance import covariance_of, inflated
 from .equations import FAULTS, Readings, predict
 from .motion import QUICK, SLOW, Grid
-from .system import Band, Linearised, Normal, drawn, linearise, normal_equations
+from .system import Band, Linearised, drawn, linearise, normal_equations
 
 _ROUNDS = 30
 _LEAST_ROUNDS = 8
@@ -35,7 +36,6 @@ _ROUGH = {"vx": 300.0, "vy": 300.0, "yaw": 100.0}
 _ROAD_MPS2 = 0.05  # change of gravity along or across within a second, to begin with
 _LEAST_ROAD_MPS2 = 1e-4
 _ROAD_ROUNDS = 3  # the road is learned in every third round only
-_BLOCKS_S = (2.0, 10.0)  # errors further apart are taken as independent
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,14 +196,14 @@ def estimate(
             readings, grid, calm, dict(zip(names, at.tolist(), strict=True)), colours, runs
         )
         equations = normal_equations(there, rows, calm, prior, at)
-        return _covariance(
+        return covariance_of(
             readings, replace(there, white=system.white, weights=system.weights), equations
         )
 
     inverse = as_float64(np.linalg.inv(normal.information))
     return Estimate(
         faults,
-        _inflated(_covariance(readings, system, normal), np.diag(smooth(now))),
+        inflated(covariance_of(readings, system, normal), np.diag(smooth(now))),
         normal.information,
         smooth(np.zeros(len(names))),
         np.diag(prior),
@@ -332,45 +332,6 @@ def _road(rows: scipy.sparse.csr_matrix, x: FloatArray, band: Band, now: float) 
     quick = float(change @ change) / max(seen, 0.3 * rows.shape[0])
     best = min(em, quick) if seen > 0.05 * rows.shape[0] else em
     return float(np.sqrt(max(best, _LEAST_ROAD_MPS2**2)))
-
-
-def _meat(
-    readings: Sequence[Readings], system: Linearised, across: FloatArray, block_s: float
-) -> FloatArray:
-    """Sum over blocks of time of the squared scores of the faults, free of the motion."""
-    k = across.shape[1]
-    sums: dict[tuple[int, int], FloatArray] = {}
-    for r in readings:
-        c = r.channel
-        own = system.by_faults[c] - system.motion[c] @ across
-        scores = own * (system.weights[c] * system.white[c])[:, None]
-        block = np.floor(r.time_s / block_s).astype(np.intp)
-        keys, at = np.unique(np.stack([r.stretch, block], 1), axis=0, return_inverse=True)
-        total = np.zeros((len(keys), k))
-        np.add.at(total, np.ravel(at), scores)
-        for key, row in zip(map(tuple, keys.tolist()), total, strict=True):
-            sums[key] = sums.get(key, 0.0) + row
-    stacked = np.array(list(sums.values()))
-    result: FloatArray = stacked.T @ stacked
-    return result
-
-
-def _covariance(readings: Sequence[Readings], system: Linearised, normal: Normal) -> FloatArray:
-    """Covariance of the faults, with the errors' dependence over time allowed for."""
-    inverse = as_float64(np.linalg.inv(normal.information))
-    robust = [
-        np.diag(inverse @ _meat(readings, system, normal.across, block) @ inverse)
-        for block in _BLOCKS_S
-    ]
-    return _inflated(inverse, np.max(robust, axis=0))
-
-
-def _inflated(naive: FloatArray, robust: FloatArray) -> FloatArray:
-    """Covariance whose variances are the larger of two; few blocks make the second one noisy."""
-    ratio = np.clip(robust / np.diag(naive), 1.0, None)
-    scale = np.sqrt(ratio)
-    result: FloatArray = naive * np.outer(scale, scale)
-    return result
 
 
 def _offsets(

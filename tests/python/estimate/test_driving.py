@@ -7,6 +7,7 @@ import pytest
 
 from sysid_vehicle import Driving, InvalidInput, Log, Model, SysidWarning
 from sysid_vehicle.estimate import MEASURED
+from sysid_vehicle.estimate.samples import thinned
 
 
 @pytest.fixture
@@ -86,6 +87,6 @@ def test_a_thinned_problem_keeps_windows_from_everywhere(lap: Log, truth: Model)
     thin = driving.problem(truth, most_samples=1500)
     assert 0.8 * 1500 < thin.samples < 1.2 * 1500
     assert driving.problem(truth, most_samples=10**6).samples == driving.samples
-    starts = [where.start for _, where, _ in driving._pieces(1500)]
+    starts = [where.start for _, where, _ in thinned(driving._whole, 1500)]
     assert starts[0] == 0
     assert starts[-1] > 0.6 * driving.samples

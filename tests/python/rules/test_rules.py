@@ -34,7 +34,6 @@ NUMERICAL = {
     "diagnose/change/reference.py": {"_FOLLOWED", "_LOOSE", "_VAGUE"},
     "diagnose/change/search.py": {"_CLOSE", "_ROUNDS", "_TRIED"},
     "diagnose/change/together.py": {"_FAR", "_SHARES"},
-    "diagnose/candidates/causes.py": {"_KEPT", "_LEAST"},
     "diagnose/candidates/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
     "diagnose/evidence/coordinates.py": {"BLOCK_S"},
     "diagnose/diagnose.py": {"REFITS", "_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS"},
@@ -43,6 +42,7 @@ NUMERICAL = {
     "diagnose/experiment/information.py": {"_COPIED"},
     "diagnose/candidates/instead.py": {"_MEMORIES_S", "_SHAPES_REMEMBERED"},
     "diagnose/candidates/possible.py": {"_AT_BOUND"},
+    "diagnose/candidates/posterior.py": {"_KEPT", "_LEAST"},
     "diagnose/unexplained/omnibus.py": {"LEAST_LEFT", "_FEW_SHAPES", "_FORCE_SHAPES"},
     "diagnose/evidence/projection.py": {"COPIED", "_SINGULAR", "_LAGS", "_ROWS", "_TERMS"},
     "diagnose/experiment/replay.py": {

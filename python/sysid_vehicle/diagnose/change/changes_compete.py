@@ -10,7 +10,8 @@ import scipy
 
 from ..._common.arrays import FloatArray, as_float64
 from ...rules import USUAL, Rules
-from ..candidates.causes import UNKNOWN, Causes, causes_in
+from ..candidates.causes import UNKNOWN, Causes
+from ..candidates.posterior import causes_in
 from ..candidates.single_effects import Hypothesis, ScoreModel
 from ..evidence.projection import pseudo_inverse
 from ..unexplained.omnibus import LEAST_LEFT

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 from ...effects import Effect, Parameter
 from ...model import Model
-from ..candidates.causes import forms
 from ..candidates.clocks import Clock, clock_parameter
 from ..candidates.possible import OF_A_FACTOR
+from ..candidates.posterior import forms
 
 YAW_INERTIA = "yaw_inertia_kgm2"
 # Priors of changed tyres, as shares of their values; E is itself a share.

@@ -13,7 +13,8 @@ from ... import _core
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.threads import Workers, check_time
 from ...estimate import Driving
-from ...estimate.pieces import DrivingProblem, Part, PiecewiseProblem, Work
+from ...estimate.leads import Part, Work
+from ...estimate.pieces import DrivingProblem, PiecewiseProblem
 from ...identify import Fit
 from .projection import orthonormal_basis, pseudo_inverse, variance_ratio
 

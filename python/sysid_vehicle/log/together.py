@@ -1,0 +1,57 @@
+"""Runs of one car that are used together: one log or many, and whether any holds corners."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from .._common.arguments import expect
+from ..errors import InvalidInput, warn
+from .checks import excitation_note
+from .log import Log
+
+
+def several_logs(logs: Log | Sequence[Log], function: str = "driving") -> tuple[Log, ...]:
+    """One log or many as many, as they were given to a function.
+
+    Raises
+    ------
+    InvalidInput
+        There is none, or something else; the message says what to make of that.
+    """
+    single = isinstance(logs, Log | str | Mapping) or hasattr(logs, "columns")
+    found: tuple[Any, ...] = tuple(logs) if isinstance(logs, Iterable) and not single else (logs,)
+    if not found:
+        raise InvalidInput(f"{function}: no log was given; pass one Log or a list of them")
+    for log in found:
+        expect(log, Log, function)
+    return found
+
+
+def check_excitation(logs: Log | Sequence[Log]) -> bool:
+    """Warn if none of the runs holds corners, so that lateral parameters cannot be determined.
+
+    Parameters
+    ----------
+    logs : Log or sequence of Log
+        Runs that are identified together.
+
+    Returns
+    -------
+    bool
+        Whether at least one run is excited.
+
+    Warns
+    -----
+    SysidWarning
+        If none is; the message tells how far steering and lateral acceleration went.
+    """
+    together = several_logs(logs, "check_excitation")
+    notes = []
+    for log in together:
+        columns: dict[str, Any] = {name: log[name] for name in ("ay_mps2", "steer_rad")}
+        notes.append(excitation_note(columns, log.rate_hz))
+    if not notes or not all(notes):
+        return bool(notes)
+    warn("; ".join(f"{log.name}: {note}" for log, note in zip(together, notes, strict=True)))
+    return False
