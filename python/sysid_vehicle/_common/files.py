@@ -48,6 +48,21 @@ def as_path(path: object) -> Path:
     return Path(name)
 
 
+def read_bytes(path: str | Path, most: int = -1) -> bytes:
+    """Return the bytes of a file, or so many of its first ones.
+
+    Raises
+    ------
+    InvalidInput
+        If the file is not there or cannot be read.
+    """
+    try:
+        with as_path(path).open("rb") as file:
+            return file.read(most)
+    except OSError as error:
+        raise InvalidInput(f"{path}: cannot be read ({error.strerror}); check the path") from error
+
+
 def read_text(path: str | Path) -> str:
     """Return the text of a UTF-8 file (other bytes are read as Latin-1).
 
@@ -56,10 +71,7 @@ def read_text(path: str | Path) -> str:
     InvalidInput
         If the file is not there or cannot be read.
     """
-    try:
-        raw = as_path(path).read_bytes()
-    except OSError as error:
-        raise InvalidInput(f"{path}: cannot be read ({error.strerror}); check the path") from error
+    raw = read_bytes(path)
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError:

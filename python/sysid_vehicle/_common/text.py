@@ -37,6 +37,11 @@ def with_error(value: float, std: float) -> str:
     return f"{number(value, 3)} +- {number(std, 2)}"
 
 
+def unit_after(unit: str) -> str:
+    """What stands behind a figure: a blank and its unit, nothing for a pure number."""
+    return "" if unit == "1" else f" {unit}"
+
+
 def columns() -> int | None:
     """How many characters a line of the terminal holds; None where nothing is shown in one."""
     shown = sys.stdout is not None and sys.stdout.isatty()
@@ -127,8 +132,9 @@ def html_text(text: object) -> str:
     return f"<pre>{escape(str(text))}</pre>"
 
 
-def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def html_table(head: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> str:
     """The same as an HTML table."""
+    title = f"<caption>{escape(caption)}</caption>" if caption else ""
     top = "".join(f"<th>{escape(h)}</th>" for h in head)
     body = "".join("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in r) + "</tr>" for r in rows)
-    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+    return f"<table>{title}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"

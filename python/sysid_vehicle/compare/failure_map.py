@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._common.arrays import FloatArray, filled
+from .._common.arrays import FloatArray, filled, usual_range
 from .._common.style import axes_or_new
 from ..estimate import Driving
 
@@ -74,8 +74,8 @@ class FailureMap:
         a = filled(driving.channel("ay_mps2"))
         known = count > 0.0
         v, a, squares, count = v[known], a[known], squares[known], count[known]
-        edges_v = np.linspace(*_range(v), cells[0] + 1)
-        reach = max(abs(x) for x in _range(a))
+        edges_v = np.linspace(*usual_range(v), cells[0] + 1)
+        reach = max(abs(x) for x in usual_range(a))
         edges_a = np.linspace(-reach, reach, cells[1] + 1)
         where = (v, a)
         edges = (edges_v, edges_a)
@@ -121,8 +121,3 @@ class FailureMap:
         ax.figure.colorbar(mesh, ax=ax, label="error / noise floor")
         ax.set(xlabel="lateral acceleration [m/s2]", ylabel="speed [m/s]")
         return ax
-
-
-def _range(x: FloatArray) -> tuple[float, float]:
-    low, high = np.percentile(x, [0.2, 99.8])
-    return (float(low), float(high)) if high > low else (float(low) - 0.5, float(low) + 0.5)

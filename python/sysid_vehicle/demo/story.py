@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from .._common.text import text_table
+from .._common.text import text_table, unit_after
 from ..compare import Comparison
 from ..effects import effect
 from ..log import Log
 from ..model import Model
-from ..report.words import effect_found, interval, quantity, summary, unit
+from ..report.words import effect_found, interval, quantity, summary
 from ..study import Study
 
 _RIVALS = 6
@@ -91,7 +91,13 @@ def revelation(study: Study, truth: Model) -> str:
         true = {n: truth.value(n) for n in truth.names} | study.fit.values_of(truth)
         shown = [e for e in study.fit.estimates if e.name.startswith(f"{hidden.id}.")]
         rows = [
-            [e.name, quantity(true[e.name]), quantity(e.value), interval(e), unit(e.unit).strip()]
+            [
+                e.name,
+                quantity(true[e.name]),
+                quantity(e.value),
+                interval(e),
+                unit_after(e.unit).strip(),
+            ]
             for e in (*shown, *study.fit.derived)
         ]
         own = next(a for a in study.added if a.id == hidden.id)
@@ -103,7 +109,7 @@ def revelation(study: Study, truth: Model) -> str:
         return "\n".join(lines)
     for p in hidden.parameters:
         value = truth.value(f"{hidden.id}.{p.name}")
-        lines.append(f"  {p.name} = {quantity(value)}{unit(p.unit)}")
+        lines.append(f"  {p.name} = {quantity(value)}{unit_after(p.unit)}")
     lines.append(f"Not found: {_why_not(study, hidden.id)}")
     return "\n".join(lines)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .._common.text import brief, html_paragraph, html_table, number, text_table
+from .._common.text import brief, html_paragraph, html_table, number, text_table, unit_after
 from ..errors import InvalidInput, near_names
 from ..saved import load
 from ..study import Study
@@ -147,11 +147,10 @@ class Cause:
     @property
     def sizes(self) -> str:
         """Its parameters in words."""
-        told = (
-            f"{n} {number(m, 3)} ({number(low, 3)} to {number(high, 3)}) {unit}"
+        return ", ".join(
+            f"{n} {number(m, 3)} ({number(low, 3)} to {number(high, 3)}){unit_after(unit)}"
             for n, (m, low, high, unit) in self.parameters.items()
         )
-        return ", ".join(t.removesuffix(" 1") for t in told)
 
 
 @dataclass(frozen=True)

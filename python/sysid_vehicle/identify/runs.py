@@ -18,7 +18,7 @@ import scipy
 
 from .._common.arrays import FloatArray, as_float64
 from .._common.printed import Part, Printed, Table
-from .._common.text import brief, number, with_error
+from .._common.text import brief, number, unit_after, with_error
 from ..errors import InvalidInput, near_names
 from ..estimate import Driving, NoiseModel
 from ..log import Log
@@ -60,9 +60,8 @@ class Difference:
     p_value: float
 
     def __str__(self) -> str:
-        unit = "" if self.unit == "1" else f" {self.unit}"
         return (
-            f"{self.name} differs by {with_error(self.most, self.most_std)}{unit} "
+            f"{self.name} differs by {with_error(self.most, self.most_std)}{unit_after(self.unit)} "
             f"(p {_equals(self.p_value)})"
         )
 

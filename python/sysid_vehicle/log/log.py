@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +13,7 @@ import numpy as np
 from .._common.arrays import FloatArray, filled
 from .._common.files import write_text
 from .._common.tables import dataset, frame
+from .._common.text import html_paragraph, html_table
 from ..errors import InvalidInput, near_names
 from .build import build
 from .channels import CHANNELS
@@ -259,6 +259,10 @@ class Log:
             rows.append((name, unit, low, high, f"{100.0 * (1.0 - known.size / self.n):.3g}"))
         return rows
 
+    def _remarks(self) -> list[str]:
+        absent = [f"absent: {name}: {lost}" for name, lost in self.missing().items()]
+        return absent + [f"corrected: {text}" for text in self.corrections]
+
     def __str__(self) -> str:
         rows = [_HEADINGS, *self._rows()]
         widths = [max(len(row[k]) for row in rows) for k in range(len(_HEADINGS))]
@@ -270,27 +274,14 @@ class Log:
             )
             for row in rows
         ]
-        lines += [f"  absent: {name}: {lost}" for name, lost in self.missing().items()]
-        lines += [f"  corrected: {text}" for text in self.corrections]
-        return "\n".join([self._title(), *lines])
+        return "\n".join([self._title(), *lines, *(f"  {text}" for text in self._remarks())])
 
     def __repr__(self) -> str:
         return f"<Log {self._title()}>"
 
     def _repr_html_(self) -> str:
-        def cells(tag: str, row: Iterable[str]) -> str:
-            return "".join(f"<{tag}>{html.escape(text)}</{tag}>" for text in row)
-
-        body = "".join(f"<tr>{cells('td', row)}</tr>" for row in self._rows())
-        absent = "".join(
-            f"<p>absent: {html.escape(name)}: {html.escape(lost)}</p>"
-            for name, lost in self.missing().items()
-        )
-        absent += "".join(f"<p>corrected: {html.escape(text)}</p>" for text in self.corrections)
-        return (
-            f"<table><caption>{html.escape(self._title())}</caption>"
-            f"<tr>{cells('th', _HEADINGS)}</tr>{body}</table>{absent}"
-        )
+        table = html_table(_HEADINGS, self._rows(), self._title())
+        return table + "".join(map(html_paragraph, self._remarks()))
 
     def plot(self, axes: Sequence[Axes] | None = None) -> Sequence[Axes]:
         """Draw the canonical channels over time, one below the other.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 from pathlib import Path
 
+from .._common.files import read_bytes
 from ..errors import InvalidInput
 
 _ARRAYS = "and give a dict of its one-dimensional arrays to read_log in place of the path"
@@ -39,12 +40,7 @@ def read_text_table(path: str | Path) -> str:
     InvalidInput
         If the file cannot be read, or is none of text; the message says what it is.
     """
-    try:
-        raw = Path(path).read_bytes()
-    except OSError as error:
-        raise InvalidInput(f"{path}: cannot be read ({error.strerror}); check the path") from error
-    except ValueError as error:  # a NUL in the path
-        raise InvalidInput(f"{str(path)!r}: cannot be read ({error}); check the path") from error
+    raw = read_bytes(path)
     for signature, what, remedy in _SIGNATURES:
         if raw.startswith(signature):
             raise InvalidInput(f"{path}: is {what}, not CSV; {remedy}")

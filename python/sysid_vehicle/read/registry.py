@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from .._common.files import read_bytes
 from ..errors import InvalidInput
 from .recording import Recording
 from .table import Table
@@ -152,13 +153,7 @@ def recognised(path: Path) -> Format | None:
         return next(
             (f for f in FORMATS if "/" in f.suffixes and (path / "metadata.yaml").exists()), None
         )
-    try:
-        with path.open("rb") as file:
-            begin = file.read(_BEGINNING)
-    except OSError as error:
-        raise InvalidInput(f"{path}: cannot be read ({error.strerror}); check the path") from error
-    except ValueError as error:  # a NUL in the path
-        raise InvalidInput(f"{str(path)!r}: cannot be read ({error}); check the path") from error
+    begin = read_bytes(path, _BEGINNING)
     for entry in FORMATS:
         if any(begin.startswith(signature) for signature in entry.signatures):
             return entry

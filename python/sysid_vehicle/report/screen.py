@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._common.text import number
+from .._common.text import number, unit_after
 from ..study import AddedEffect, Study
 from . import figures
 from .page import bars, bullets, panel, paragraph, table
 from .samples import Samples
-from .words import errors, interval, quantity, shown_in, stages, summary, unit
+from .words import errors, interval, quantity, shown_in, stages, summary
 
 _AHEAD_S = 1.0
 _CANDIDATES = 5
@@ -98,7 +98,7 @@ def _added(study: Study) -> str:
 
 def _effect(study: Study, added: AddedEffect) -> str:
     sizes = ", ".join(
-        f"{e.name.split('.')[1]} {quantity(e.value)}{unit(e.unit)} (95 %: {interval(e)})"
+        f"{e.name.split('.')[1]} {quantity(e.value)}{unit_after(e.unit)} (95 %: {interval(e)})"
         for e in added.parameters
     )
     at = study.horizons.horizons_s.index(_AHEAD_S)

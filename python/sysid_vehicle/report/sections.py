@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .._common.text import html_table, number
+from .._common.text import html_table, number, unit_after
 from ..diagnose import EffectVerdict, bias_report
 from ..estimate import UNITS
 from ..model import Model
@@ -16,7 +16,7 @@ from .failure import unknown, where_and_when
 from .page import bullets, fold, heading, paragraph, table
 from .samples import Samples
 from .tyres import identified_curves, model_curves
-from .words import RANKING_HEAD, interval, quantity, ranking_rows, stages, summary, unit
+from .words import RANKING_HEAD, interval, quantity, ranking_rows, stages, summary
 
 
 def _where(study: Study, samples: Samples | None, truth: Model | None) -> list[str]:
@@ -177,7 +177,7 @@ def _parameters(study: Study, samples: Samples | None, truth: Model | None) -> l
         real |= {name: quantity(value) for name, value in fit.values_of(truth).items()}
     rows = []
     for e in (*fit.estimates, *fit.derived):
-        row = [e.name, quantity(e.value), interval(e), unit(e.unit).strip(), e.note or "-"]
+        row = [e.name, quantity(e.value), interval(e), unit_after(e.unit).strip(), e.note or "-"]
         rows.append(row if truth is None else [*row, real.get(e.name, "-")])
     head = ["parameter", "value", "95 % interval", "unit", "note"]
     parts = [table(head if truth is None else [*head, "truth"], rows)]

@@ -6,16 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._common.text import few, number
+from .._common.text import few, number, unit_after
 from ..identify import Estimate
 from ..study import AddedEffect, Study
 
 RANKING_HEAD = ("effect", "statistic", "p", "validation error with it", "size", "cannot tell from")
-
-
-def unit(name: str) -> str:
-    """Print a unit: nothing for a pure number."""
-    return "" if name == "1" else f" {name}"
 
 
 @dataclass(frozen=True)
@@ -57,7 +52,7 @@ def quantity(x: float) -> str:
 def effect_found(added: AddedEffect) -> str:
     """Print an added effect with its parameters and their 95 % intervals."""
     sizes = "; ".join(
-        f"{e.name.split('.')[1]} = {quantity(e.value)}{unit(e.unit)} (95 %: {interval(e)})"
+        f"{e.name.split('.')[1]} = {quantity(e.value)}{unit_after(e.unit)} (95 %: {interval(e)})"
         for e in added.parameters
     )
     return f"{added.id}: {sizes}" + (f"; {added.reserve}" if added.reserve else "")
@@ -118,7 +113,7 @@ def ranking_rows(study: Study, which: int = 0, most: int = 10) -> list[list[str]
     known = study.errors_with[which]
     for c in study.diagnoses[which].ranking[:most]:
         size = ", ".join(
-            f"{p.name} {number(v, 3)} ± {number(s, 2)}{unit(p.unit)}"
+            f"{p.name} {number(v, 3)} ± {number(s, 2)}{unit_after(p.unit)}"
             for p, v, s in zip(c.effect.parameters, c.value, c.std, strict=True)
         )
         confounded = few(c.indistinguishable_from) or "-"

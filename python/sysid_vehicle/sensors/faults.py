@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from .._common.text import HALF_95
 from .estimate import Estimate
-from .parts import Z95, scatter
+from .parts import scatter
 from .texts import DEG, why_not
 
 _FALSE_CLAIMS = 0.01  # over all faults of one check
@@ -56,7 +57,7 @@ class SensorFault:
     @property
     def interval(self) -> tuple[float, float]:
         """Bounds that hold the true value with a probability of 95 %."""
-        return self.value - Z95 * self.std, self.value + Z95 * self.std
+        return self.value - HALF_95 * self.std, self.value + HALF_95 * self.std
 
     def __str__(self) -> str:
         scale, unit = _SHOWN.get(self.unit, (1.0, self.unit))
@@ -206,7 +207,7 @@ def faults_of(
             std, variance = widest, max(variance, at_null**2)
         learned = 1.0 - variance * prior
         claimed = claimed and learned > 0.0
-        well = alone and learned > _LEARNED and abs(value) + Z95 * std < told.enough
+        well = alone and learned > _LEARNED and abs(value) + HALF_95 * std < told.enough
         reason = ""
         if rival is not None and not alone:
             reason = why_not(told.name, other=_instead(found, rival.estimate, told))
@@ -255,7 +256,7 @@ def _confounded(
     own = int(np.argmax(pick * np.arange(1, pick.size + 1)))
     data = max(found.information[own, own] - found.prior[own], 1e-300)
     alone = 1.0 / math.sqrt(data)
-    if Z95 * alone > told.enough:
+    if HALF_95 * alone > told.enough:
         return why_not(told.name, alone=alone)
     along = naive @ pick
     correlation = np.abs(along) / np.sqrt(np.diag(naive) * float(pick @ along))

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from .._common.text import HALF_95
 from .motion import Stretch
 
 _PART_S = 60.0  # a shorter one may find another explanation by chance
 _MOST = 4
 _SHORTEST_S = 5.0
-Z95 = 1.959964
 _APART = 3.0  # standard deviations between the whole and the mean of its parts
 
 
@@ -76,7 +76,7 @@ def scatter(values: Sequence[float], stds: Sequence[float]) -> Scatter | None:
     between = max(0.0, (q - (n - 1)) / float(w.sum() - (w @ w) / w.sum()))
     w = 1.0 / (variance + between)
     # Few parts tell their scatter badly.
-    student = float(scipy.stats.t.isf(0.025, n - 1)) / Z95
+    student = float(scipy.stats.t.isf(0.025, n - 1)) / HALF_95
     return Scatter(
         float(w @ v / w.sum()), float(w.sum() ** -0.5), student * float(np.sqrt(between / n))
     )

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 
 from ..._common.printed import Part, Printed, Table
 from ..._common.style import axes_or_new
-from ..._common.text import brief, with_error
+from ..._common.text import brief, unit_after, with_error
 from .possible import Size
 from .single_effects import Subset
 
@@ -41,6 +42,16 @@ class CredibleSet:
     effects: tuple[str, ...]
     probabilities: tuple[float, ...]
     weights: dict[str, float] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, log_odds: Mapping[str, float], probability: float) -> CredibleSet:
+        """The likeliest that reach a probability together, where one of all acts."""
+        names = sorted(log_odds, key=lambda e: -log_odds[e])
+        odds = np.array([log_odds[e] for e in names])
+        weights = np.exp(odds - scipy.special.logsumexp(odds))
+        few = int(np.argmax(np.cumsum(weights) >= probability)) + 1
+        told = dict(zip(names, map(float, weights), strict=True))
+        return cls(tuple(names[:few]), tuple(told.values())[:few], told)
 
     def __str__(self) -> str:
         pairs = zip(self.effects, self.probabilities, strict=True)
@@ -119,7 +130,7 @@ class Causes(Printed):
         if effect not in self.sizes:
             return "-"
         told = zip(self.units[effect], *self.sizes[effect], strict=True)
-        return ", ".join(f"{n} {with_error(v, s)} {u}".removesuffix(" 1") for (n, u), v, s in told)
+        return ", ".join(f"{n} {with_error(v, s)}{unit_after(u)}" for (n, u), v, s in told)
 
     def _headline(self) -> str:
         if not self.sets:

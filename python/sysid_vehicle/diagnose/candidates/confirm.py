@@ -102,9 +102,4 @@ def _leading(best: Candidate, dx: Diagnosis, proposed: CredibleSet | None) -> Cr
             log_odds[e] = float(np.log(scored[e] / scored[best.id]))
         elif e in best.indistinguishable_from:
             log_odds[e] = 0.0  # it was not refitted, and its score is no other
-    order = sorted(log_odds, key=lambda e: -log_odds[e])
-    weights = np.exp([log_odds[e] - log_odds[order[0]] for e in order])
-    weights /= weights.sum()
-    few = int(np.argmax(np.cumsum(weights) >= dx.rules.credible)) + 1
-    told = dict(zip(order, map(float, weights), strict=True))
-    return CredibleSet(tuple(order[:few]), tuple(told.values())[:few], told)
+    return CredibleSet.of(log_odds, dx.rules.credible)

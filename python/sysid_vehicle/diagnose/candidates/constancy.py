@@ -15,7 +15,7 @@ import scipy
 
 from ... import _core
 from ..._common.arrays import FloatArray
-from ..._common.text import number
+from ..._common.text import number, unit_after
 from ...effects import Effect
 from ...estimate import Driving
 from ...identify import Fit
@@ -68,7 +68,7 @@ class Constancy:
         """Between which values the first parameter changes, in words."""
         low, high = (number(v, 3) for v in (min(self.values), max(self.values)))
         first = self.effect.parameters[0]
-        return f"{first.name} from {low} to {high} {first.unit}".removesuffix(" 1")
+        return f"{first.name} from {low} to {high}{unit_after(first.unit)}"
 
 
 def constancy(fit: Fit, rules: Rules = USUAL) -> dict[str, Constancy]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..._common.arguments import expect
 from ..._common.progress import doing
-from ..._common.text import brief, html_table, number, with_error
+from ..._common.text import brief, html_table, number, unit_after, with_error
 from ...effects import Effect
 from ...identify import Fit
 from ...rules import USUAL, Rules
@@ -351,7 +351,7 @@ def _bound(
 
 def _listed(effect: Effect, figures: list[str]) -> str:
     return ", ".join(
-        f"{p.name} {x} {p.unit}".removesuffix(" 1")
+        f"{p.name} {x}{unit_after(p.unit)}"
         for p, x in zip(effect.parameters, figures, strict=False)
         if not p.scan
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._common.printed import Part, Printed, Table
 from ..._common.tables import frame
-from ..._common.text import brief, number, with_error
+from ..._common.text import brief, number, unit_after, with_error
 from ...identify import Fit
 from ...rules import Rules
 from ..candidates.causes import UNKNOWN, Causes, CredibleSet
@@ -95,7 +95,7 @@ class EffectChange:
 
     def _listed(self, figures: list[str]) -> str:
         told = zip(self.names, figures, self.units, strict=True)
-        return ", ".join(f"{n} {x} {u}".removesuffix(" 1") for n, x, u in told)
+        return ", ".join(f"{n} {x}{unit_after(u)}" for n, x, u in told)
 
     def __str__(self) -> str:
         return f"{self.id}: {self.size}"

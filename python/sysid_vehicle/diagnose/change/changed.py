@@ -184,18 +184,13 @@ class _Said:
             for e, weight in linear.weights.items():
                 if e not in log_odds and min(weight, own) > 0.0:
                     log_odds[e] = float(np.log(weight / own))
-        names = sorted(log_odds, key=lambda e: -log_odds[e])
-        odds = np.array([log_odds[e] for e in names])
         without = self.search.visited.get(others)
         if without is not None:
             absent = self.search.evidence(without, told, ratio) - here
-            whole = scipy.special.logsumexp(odds)
+            whole = scipy.special.logsumexp(list(log_odds.values()))
             if whole - np.logaddexp(whole, absent) < np.log(self.search.rules.credible):
                 return None
-        weights = np.exp(odds - scipy.special.logsumexp(odds))
-        few = int(np.argmax(np.cumsum(weights) >= self.search.rules.credible)) + 1
-        listed = dict(zip(names, map(float, weights), strict=True))
-        return CredibleSet(tuple(names[:few]), tuple(listed.values())[:few], listed)
+        return CredibleSet.of(log_odds, self.search.rules.credible)
 
     def _of(
         self,

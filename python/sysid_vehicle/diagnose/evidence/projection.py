@@ -37,13 +37,16 @@ def orthonormal_basis(columns: FloatArray) -> FloatArray:
     return kept
 
 
-def pseudo_inverse(information: FloatArray) -> tuple[FloatArray, int]:
-    """Inverse of an information matrix without directions it says nothing of, and its rank."""
+def pseudo_inverse(information: FloatArray, least: float = _SINGULAR) -> tuple[FloatArray, int]:
+    """Inverse of an information matrix without directions it says nothing of, and its rank.
+
+    It says nothing of those whose eigenvalue is below so much of the largest.
+    """
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     if len(scale) == 1:
         return 1.0 / np.outer(scale, scale), 1
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    kept = values > _SINGULAR * values[-1]
+    kept = values > least * values[-1]
     inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
     return inverse / np.outer(scale, scale), int(kept.sum())
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.progress import with_progress
-from ..._common.text import HALF_95, brief, html_table, number, text_table
+from ..._common.text import HALF_95, brief, html_table, number, text_table, unit_after
 from ..._common.threads import Workers
 from ...effects import Effect, base_parameters, effect
 from ...errors import InvalidInput, NumericalError
@@ -62,7 +62,7 @@ class Bias:
 
     def __str__(self) -> str:
         size = " and ".join(
-            f"{p.name} {number(v, 3)} {p.unit}".removesuffix(" 1")
+            f"{p.name} {number(v, 3)}{unit_after(p.unit)}"
             for p, v in zip(self.effect.parameters, self.size, strict=True)
             if v != 0.0
         )

@@ -23,6 +23,7 @@ from ...errors import InvalidInput
 from ...estimate import Driving
 from ...identify import Fit
 from ..evidence.evidence import Evidence
+from ..evidence.projection import pseudo_inverse
 from ..evidence.sensitivity import sensitivities
 
 _COPIED = 1e-12  # share of a column's square that others leave, below which it is their copy
@@ -92,11 +93,7 @@ class Information:
     def _solve(self, which: list[int], right: FloatArray) -> FloatArray:
         """Least squares with the block `which`, whose columns may copy each other."""
         block = self.matrix[np.ix_(which, which)]
-        scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
-        values, vectors = np.linalg.eigh(block / np.outer(scale, scale))
-        kept = values > _COPIED * values[-1]
-        inner = vectors[:, kept].T @ (right / scale[:, None])
-        return as_float64((vectors[:, kept] / values[kept]) @ inner / scale[:, None])
+        return as_float64(pseudo_inverse(block, _COPIED)[0] @ right)
 
 
 def information_of(fit: Fit, driving: Driving, effects: Sequence[Effect]) -> Information:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from ..._common.arrays import FloatArray, as_float64
+from ..._common.arrays import FloatArray, as_float64, usual_range
 from ..._common.style import axes_or_new, tidy
 from ..._common.text import HALF_95, brief, html_text
 from ...estimate import Driving
@@ -256,11 +256,9 @@ def _map(
 
 
 def _edges(x: FloatArray, cells: int, one_sided: bool) -> FloatArray:
-    low, high = np.percentile(x, [0.2, 99.8])
+    low, high = usual_range(x)
     if not one_sided:
         low, high = -max(abs(low), abs(high)), max(abs(low), abs(high))
-    if high <= low:
-        low, high = low - 0.5, low + 0.5
     return as_float64(np.linspace(low, high, cells + 1))
 
 
