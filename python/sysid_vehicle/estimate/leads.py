@@ -9,19 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
+from threading import Lock
 from typing import Any
 
 import numpy as np
 
 from .. import _core
-from .._common.arrays import FloatArray
+from .._common.arrays import FloatArray, as_float64
 
 _LEAD_S = 8.0  # at first
 _MET = 1e-10  # of the largest value, up to which a lead may change results
 _TRIED = 0.75  # of the lead, with which it is compared
 _SEEN = 64  # samples on which they are compared
+_LONGER = 1.25  # times as long is the next lead, so that few filters serve all that is asked
+_KEPT = 0.5  # of a piece: longer leads are those of single effects, and would fill the memory
 
 
 Build = Callable[[_core.SingleTrack, int, int], _core.Problem]
@@ -83,6 +85,8 @@ class Part:
         self._model, self._p, self._noise = model, p, noise
         self._most = piece.begin - piece.run
         self._leads = {} if leads is None else leads
+        self._filters: dict[tuple[int, int], tuple[_core.Problem, _core.FrozenFilter]] = {}
+        self._filtering = Lock()
         self.lead = min(self._most, round(_LEAD_S * piece.rate_hz)) if lead is None else lead
         if lead is None:
             self.lead = self._enough(lambda q, g, _: q.residuals(p, g), self.lead, None)
@@ -98,19 +102,15 @@ class Part:
         lead = self.lead or round(_LEAD_S * self.piece.rate_hz)
         return min(lead, self.piece.last - self.piece.end)
 
-    @cached_property
+    @property
     def filtered(self) -> tuple[_core.Problem, _core.FrozenFilter]:
         """The problem with the lead, and its gains."""
         return self._frozen(self.lead, self.piece.end)
 
-    @cached_property
+    @property
     def head(self) -> tuple[_core.Problem, _core.FrozenFilter] | None:
         """The same of the lead alone; None where there is none."""
         return self._frozen(self.lead, self.piece.begin) if self.lead else None
-
-    @cached_property
-    def _shorter(self) -> tuple[_core.Problem, _core.FrozenFilter]:
-        return self._frozen(self._tried(self.lead), self._seen)
 
     def rows(self, work: Work, name: Hashable = None) -> FloatArray:
         """What is worked out for each of its samples.
@@ -121,8 +121,7 @@ class Part:
         lead = min(max(self.lead, self._leads.get(name, 0)), self._most)
         while True:
             out = self._some(work, lead, self.piece.end)
-            scale = np.maximum(np.abs(out.reshape(len(out), -1)).max(axis=0), 1e-300)
-            longer = self._enough(work, lead, out, scale)
+            longer = self._enough(work, lead, out, _size(out)) if lead < self._most else lead
             if longer == lead:
                 break
             lead = longer
@@ -149,9 +148,15 @@ class Part:
             if worst <= _MET**_TRIED:
                 break
             needed = np.log(_MET) / np.log(worst) if worst < 0.5 else np.inf
-            lead = min(self._most, max(int(1.1 * _TRIED * lead * min(needed, 2.0)), 5 * lead // 4))
+            lead = self._grown(max(1.1 * _TRIED * lead * min(needed, 2.0), 1.1 * lead))
             found = None
         return lead
+
+    def _grown(self, least: float) -> int:
+        """The next lead that is at least so long."""
+        first = round(_LEAD_S * self.piece.rate_hz)
+        steps = np.ceil(np.log(least / first) / np.log(_LONGER))
+        return int(min(self._most, np.ceil(first * _LONGER**steps)))
 
     @property
     def _seen(self) -> int:
@@ -162,17 +167,26 @@ class Part:
         return max(round(_TRIED * lead), 2)
 
     def _frozen(self, lead: int, end: int) -> tuple[_core.Problem, _core.FrozenFilter]:
+        """The problem with another lead, up to a sample, and its gains."""
+        if lead > _KEPT * (self.piece.end - self.piece.begin) and lead > self.lead:
+            return self._filtered(lead, end)
+        with self._filtering:
+            if (lead, end) not in self._filters:
+                self._filters[lead, end] = self._filtered(lead, end)
+            return self._filters[lead, end]
+
+    def _filtered(self, lead: int, end: int) -> tuple[_core.Problem, _core.FrozenFilter]:
         problem = self._build(self._model, self.piece.begin - lead, end)
         return problem, problem.freeze(self._p, self._noise)
 
     def _some(self, work: Work, lead: int, end: int) -> FloatArray:
         """Rows of the samples from the piece's first on, worked out with some lead."""
-        if (lead, end) == (self.lead, self.piece.end):
-            known = self.filtered
-        elif (lead, end) == (self._tried(self.lead), self._seen):
-            known = self._shorter
-        else:
-            known = self._frozen(lead, end)
         begin = self.piece.begin - lead
-        rows = work(*known, slice(begin, end))
+        rows = work(*self._frozen(lead, end), slice(begin, end))
         return rows[len(rows) // (end - begin) * lead :]
+
+
+def _size(rows: FloatArray) -> FloatArray:
+    """The largest size in each column, never zero."""
+    columns = rows.reshape(len(rows), -1)
+    return as_float64(np.maximum(np.maximum(columns.max(axis=0), -columns.min(axis=0)), 1e-300))

@@ -109,16 +109,22 @@ def test_a_car_that_cannot_follow_says_so(blind: sv.Fit) -> None:
     assert "not stated: " in str(report)
 
 
-def test_without_force_and_lateral_speed(truth: sv.Model, start: sv.Model) -> None:
+@pytest.mark.parametrize("seed", [3, 5, 6])
+def test_without_force_and_lateral_speed(truth: sv.Model, start: sv.Model, seed: int) -> None:
+    """What is stated is right; where tyres that fit as well would give other figures, it is not."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sv.SysidWarning)
-        fit = sv.identify(start, lap(truth, 3, without=("fx_n", "vy_mps")), starts=2)
+        fit = sv.identify(start, lap(truth, seed, without=("fx_n", "vy_mps")), starts=2)
         report = sv.bias_report(fit, ["aero_drag", "steer_ratio"])
         found = actual(truth, start, report, "steer_ratio", without=("fx_n", "vy_mps"))
     assert max(abs(report["aero_drag"].relative[s]) for s in STIFFNESS) < 0.01
-    told = [report["steer_ratio"].relative[s] for s in STIFFNESS]
+    told = report["steer_ratio"]
     assert max(map(abs, found)) > 0.02
-    assert told == pytest.approx(found, rel=0.2, abs=0.01)
+    if seed == 3:
+        assert told.relative == {}
+        assert "tyres that fit as well" in told.because
+    else:
+        assert [told.relative[s] for s in STIFFNESS] == pytest.approx(found, rel=0.2, abs=0.01)
 
 
 def test_a_long_drive_is_done_again_in_windows(blind: sv.Fit) -> None:

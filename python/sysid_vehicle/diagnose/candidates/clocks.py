@@ -125,7 +125,7 @@ class Shifts:
             ]
             return np.column_stack([here - t for t in there]) / [c.typical_s for c in self.clocks]
 
-        return section.rows(work)
+        return section.rows(work, "clocks")
 
 
 def clock_scores(projected: Directions, rules: Rules) -> list[ClockScore]:

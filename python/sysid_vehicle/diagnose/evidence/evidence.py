@@ -183,11 +183,14 @@ class Section:
         """Whether these are all samples."""
         return self.part is None
 
-    def rows(self, work: Work, name: str = "") -> FloatArray:
-        """Rows for each sample, of a problem, its gains and the samples it has."""
+    def rows(self, work: Work, name: str) -> FloatArray:
+        """Rows for each sample, of a problem, its gains and the samples it has.
+
+        What has one name needs one lead in all sections.
+        """
         check_time()
         if self.part is not None:
-            return self.part.rows(work, name or None)
+            return self.part.rows(work, name)
         evidence = self.evidence
         assert isinstance(evidence.problem, _core.Problem)
         return work(evidence.problem, evidence.frozen, self.where)
@@ -198,7 +201,7 @@ class Section:
         if self.whole:
             return self.evidence.residual
         p = self.evidence.fit.model.vector()
-        return self.rows(lambda q, gains, _: q.residuals(p, gains)).ravel()
+        return self.rows(lambda q, gains, _: q.residuals(p, gains), "residuals").ravel()
 
     @cached_property
     def fitted(self) -> FloatArray:
@@ -207,7 +210,9 @@ class Section:
             return self.evidence.fitted
         model = self.evidence.fit.model
         columns = [model.parameters[n].column for n in model.free_names]
-        return self.rows(lambda q, gains, _: q.sensitivities(model.vector(), gains, columns))
+        return self.rows(
+            lambda q, gains, _: q.sensitivities(model.vector(), gains, columns), "fitted"
+        )
 
     @cached_property
     def basis(self) -> FloatArray:

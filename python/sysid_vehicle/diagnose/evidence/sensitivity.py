@@ -67,7 +67,9 @@ class Sensitivities:
         def together(few: tuple[Effect, ...]) -> None:
             columns = [i for c in few for i in c.columns]
             core = model.core(force_known=known, also=few)
-            found = section.rows(lambda q, g, _: q.with_model(core).sensitivities(p, g, columns))
+            found = section.rows(
+                lambda q, g, _: q.with_model(core).sensitivities(p, g, columns), few[0].id
+            )
             at = 0
             for c in few:
                 out[:, self.places[c.id]] = found[:, at : at + len(c.columns)]

@@ -208,7 +208,7 @@ class Unknown:
             state = problem.trace(p, noise, False)["state"]
             return problem.signal_sensitivities(p, gains, self.signals(state, at), self.targets)
 
-        return section.rows(work)
+        return section.rows(work, "unknown")
 
     def signals(self, state: FloatArray, at: slice) -> FloatArray:
         """Signals as columns, from the filter's states at some samples."""
