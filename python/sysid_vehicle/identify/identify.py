@@ -34,6 +34,7 @@ from .search import METHODS, Box, minimise
 from .settle import rivalled, settle, settle_finely
 from .starts import Runner, Starts, apart, at_typical_sizes, space_filling
 from .suspects import explaining
+from .usual_tyres import from_usual_tyres
 
 _STARTED = 0.3  # of the time that a search has, for its starts
 _OFFSETS = 2  # times that offsets of logs and what they share are found in turn
@@ -210,6 +211,11 @@ def _from_ends(
     for end in others:
         best = rivalled(objective, best, end, box, thinned)
     fit = top(model, driving, objective, best, table, thinned)
+    known = fit.model.vector(), fit.noise.vector()
+    usual = from_usual_tyres(objective, known, noise.vector(), box, thinned)
+    if usual is not None:
+        rival = top(model, driving, objective, usual, table, thinned)
+        fit = rival if rival.log_likelihood > fit.log_likelihood else fit
     best = at_top = fit.model.vector(), fit.noise.vector(), fit.converged
     for elsewhere in at_typical_sizes(model, at_top[0]):
         best = rivalled(objective, best, elsewhere, box, thinned)

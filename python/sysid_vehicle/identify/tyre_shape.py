@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import scipy
 
-from .._common.arrays import FloatArray
-from ..tyre import magic_formula
+from .._common.arrays import FloatArray, as_float64
+from ..tyre import Tyre, magic_formula
 
 _PEAKLESS = 1.0 + 1e-6
 _RELATIVE = 1e-12  # error of the slip at the peak
@@ -47,6 +47,12 @@ def peak_slip(bcde: FloatArray) -> float:
         if high > 1e9:
             return np.inf
     return float(scipy.optimize.brentq(beyond, 0.0, high, xtol=1e-15 * high, rtol=_RELATIVE)) / b
+
+
+def of_usual_shape(bcde: FloatArray) -> FloatArray:
+    """The tyre of usual C, D and E that has the same stiffness."""
+    usual = Tyre()
+    return as_float64([stiffness(bcde) / (usual.C * usual.D), usual.C, usual.D, usual.E])
 
 
 def look_alike(bcde: FloatArray, e: float) -> FloatArray:

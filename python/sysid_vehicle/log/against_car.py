@@ -21,7 +21,8 @@ from .longitudinal import ramp_on
 from .motion import Motion
 from .regression import size_of
 
-_MOVING = 5.0  # m/s
+_MOVING = 5.0  # m/s, with a wheelbase of `_USUAL_M`: slip and curvature are alike at like v^2 / L
+_USUAL_M = 2.6
 _MIN_WINDOWS = 12
 _SETTLING = 1  # windows before and after harder driving
 _FAR = 2.5  # times the usual steering: beyond it an angle counts as that much
@@ -90,7 +91,7 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
         The message names key and channel, what the log tells, and the likely remedy.
     """
     columns = {name: log[name] for name in log.channels if name not in log.extras}
-    drive = _driven(columns, log.rate_hz)
+    drive = _driven(columns, log.rate_hz, wheelbase_m)
     if drive is None:
         return
     mass = _mass(drive, mass_kg) if log.has("fx_n") else None
@@ -132,15 +133,16 @@ def times_wheelbase(
         Rate of the grid.
     wheelbase_m : float
     """
-    drive = _driven(columns, rate_hz)
+    drive = _driven(columns, rate_hz, wheelbase_m)
     told = None if drive is None else _steer(drive, wheelbase_m)
     return None if told is None else told.ratio
 
 
-def _driven(columns: Mapping[str, FloatArray], rate_hz: float) -> Drive | None:
+def _driven(columns: Mapping[str, FloatArray], rate_hz: float, wheelbase_m: float) -> Drive | None:
     motion = Motion(columns, rate_hz)
     motion.windows(WINDOW_S)
-    rows = motion.usable & (motion.mean(motion.channels["vx_mps"]) > _MOVING)
+    moving = _MOVING * math.sqrt(min(wheelbase_m / _USUAL_M, 1.0))
+    rows = motion.usable & (motion.mean(motion.channels["vx_mps"]) > moving)
     return Drive(motion, rows) if np.count_nonzero(rows) >= _MIN_WINDOWS else None
 
 

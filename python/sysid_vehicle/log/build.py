@@ -19,6 +19,7 @@ from .ranges import dropouts
 from .signals import fill_short_gaps, spikes
 
 _MIN_USABLE_S = 5.0
+_CLOCK_S = 1e6  # a time that begins later is that of a clock, counted from a date
 _FILL_S = 0.1
 _FILL_SLOW_S = 0.25  # an input that is sampled more slowly is not interpolated
 
@@ -50,6 +51,8 @@ def _build(data: Columns, despike: tuple[str, ...], check: bool, notes: list[str
     if time_s.size < 2:
         raise InvalidInput(f"time_s: only {time_s.size} sample(s); give a log of at least two")
     check_time(time_s)
+    if abs(time_s[0]) > _CLOCK_S:
+        time_s = time_s - time_s[0]
     if check:
         columns = blank_held(columns, 1.0 / float(np.median(np.diff(time_s))), notes)
     notes += checks.nan_block_notes(time_s, columns)

@@ -67,12 +67,15 @@ class Contradiction:
         not what is wrong.
     on_the_level : bool
         Whether a road that climbs or falls would explain it.
+    by_the_car : bool
+        Whether the car's own numbers settle it.
     """
 
     channel: str
     text: str
     late_s: float = 0.0
     on_the_level: bool = False
+    by_the_car: bool = False
 
 
 class Implausible(InvalidInput):

@@ -72,7 +72,8 @@ class Log:
         Parameters
         ----------
         data : mapping of array_like, shape (n,)
-            Canonical channels, and any others.
+            Canonical channels, and any others. Times of a clock, which begin beyond 1e6 s, are
+            counted from the first, as time stamps are.
         name : str
             Name of the run.
         despike : iterable of str

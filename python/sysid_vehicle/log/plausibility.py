@@ -58,6 +58,7 @@ _SLIDE_STD = 0.35
 _WHEELBASE_M, _WHEELBASE_STD = 2.9, 0.45
 _UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003
 _NOT_A_WHEELBASE = 3.5
+_MODEL_CAR_M = 0.1  # the shortest wheelbase of a car on a scale, 1:24
 _LEAST_OFFSET_RAD = 1e-6  # a steering angle that stays at zero has no size
 
 _YAW_DEG = ("yaw_rate_radps", "degrees per second", f"factor = {DEG}")
@@ -101,6 +102,7 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[C
     """
     implausible: list[Contradiction] = []
     clock: list[Contradiction] = []
+    steer: list[Contradiction] = []
     lost = {name: dropouts(name, values) for name, values in columns.items()}
     given, columns = columns, blank(columns, lost)
     motion = Motion(columns, rate_hz)
@@ -116,43 +118,43 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[C
     except Implausible as error:
         problem = error  # the unit, if it can be told, says more
     try:
-        clock = _check_laws(drive)
+        clock, steer = _check_laws(drive)
     except KnownUnit:
         raise
     except Implausible as error:
         raise problem or error from None
     if problem is not None:
         raise problem
-    implausible += check_lost(given, lost)
+    implausible += steer + check_lost(given, lost)
     if "fx_n" in columns:
         implausible += held_speed_note(drive)
     return implausible + (clock or lag_notes(motion))
 
 
 def contradictions(columns: Mapping[str, FloatArray], rate_hz: float) -> tuple[Contradiction, ...]:
-    """Return what :func:`check_coherence` refuses or doubts."""
+    """Return what :func:`check_coherence` refuses or doubts, whatever car it was."""
     try:
-        return tuple(check_coherence(columns, rate_hz))
+        return tuple(c for c in check_coherence(columns, rate_hz) if not c.by_the_car)
     except Implausible as error:
         return (error.contradiction,)
 
 
-def _check_laws(drive: Drive) -> list[Contradiction]:
+def _check_laws(drive: Drive) -> tuple[list[Contradiction], list[Contradiction]]:
+    """Refuse what breaks a law; return notes on the clock of the steering, and on its size."""
     channels = drive.motion.channels
     speed = drive.mean(channels["vx_mps"])
     if np.median(speed) < 0.0:
         raise wrong_sign("vx_mps", "is negative for most of the drive", speed, drive)
     _check_lateral(drive)
     clock = clock_notes(drive.motion)
-    if not clock:
-        _check_steer(drive)
+    steer = [] if clock else _check_steer(drive)
     if "vy_mps" in channels:
         _check_sliding(drive)
     if "ax_mps2" in channels:
         check_longitudinal(drive)
     if "fx_n" in channels:
         check_force(drive)
-    return clock
+    return clock, steer
 
 
 def _check_lateral(drive: Drive) -> None:
@@ -212,14 +214,14 @@ def _refuse_lateral(drive: Drive, turn: FloatArray, ay: FloatArray) -> None:
     )
 
 
-def _check_steer(drive: Drive) -> None:
+def _check_steer(drive: Drive) -> list[Contradiction]:
     """Compare the steering angle with the path curvature: the wheelbase that would answer so."""
     c = drive.motion.channels
     ay = drive.mean(c["ay_mps2"])
     speed = np.maximum(np.abs(c["vx_mps"]), 1.0)
     curvature, steer = drive.mean(c["yaw_rate_radps"] / speed), drive.mean(c["steer_rad"])
     if size_of(ay) < EXCITED:
-        return
+        return []
     gentle = np.abs(ay) < LINEAR_MPS2
     if (
         np.count_nonzero(gentle) > max(_MIN_WINDOWS, 0.2 * ay.size)
@@ -245,15 +247,26 @@ def _check_steer(drive: Drive) -> None:
         text = "moves against both yaw_rate_radps and ay_mps2"
         raise wrong_sign("steer_rad", text, steer, drive)
     if base <= 0.0 or answer.coherence < 0.5:
-        return
+        return []
     speed_2 = float(np.median(drive.mean(c["vx_mps"]))) ** 2
     expected = _WHEELBASE_M + _UNDERSTEER * speed_2
     spread = math.hypot(_WHEELBASE_STD * _WHEELBASE_M, _UNDERSTEER_STD * speed_2) / expected
     off = abs(math.log(base / expected)) / math.hypot(spread, deviation / base)
     if off < _NOT_A_WHEELBASE or 0.2 < base / expected < 5.0:
-        return
+        return []
     ratio = base / expected
     i = int(np.argmax(np.abs(steer)))
+    told = (
+        f"steer_rad: {steer[i]:.4g} at t = {drive.motion.times_s[drive.rows][i]:.6g} s is "
+        f"{'large' if ratio > 1.0 else 'small'} for the yaw rate: a wheelbase of {base:.3g} m "
+        f"would answer so"
+    )
+    if ratio < 1.0:
+        fits = f"check its unit; factor = {1.0 / ratio:.2g} would make it fit a car of usual size"
+        if base > _MODEL_CAR_M:
+            text = f"{told}; if this is no model car, {fits}"
+            return [Contradiction("steer_rad", text, by_the_car=True)]
+        raise Implausible("steer_rad", f"{told}; {fits}")
     what = (
         f"if it is the angle of the steering wheel, put factor = 1 / steering ratio (about "
         f"{1.0 / ratio:.2g}) in the channel map"
@@ -263,14 +276,7 @@ def _check_steer(drive: Drive) -> None:
         else f"if it is the angle of the steering wheel in degrees, put factor = {DEG} / steering "
         f"ratio in the channel map"
     )
-    size = "large" if ratio > 1.0 else "small"
-    if ratio < 1.0:
-        what = f"check its unit; factor = {1.0 / ratio:.2g} would make it fit"
-    raise Implausible(
-        "steer_rad",
-        f"steer_rad: {steer[i]:.4g} at t = {drive.motion.times_s[drive.rows][i]:.6g} s is too "
-        f"{size} for the yaw rate (a wheelbase of {base:.3g} m would answer so); {what}",
-    )
+    raise Implausible("steer_rad", f"{told}; {what}")
 
 
 def _check_sliding(drive: Drive) -> None:

@@ -14,7 +14,11 @@ _SIDESLIP = (
 
 # By channel: patterns of a name in plain words, the surest first.
 _PATTERNS: dict[str, tuple[str, ...]] = {
-    "time_s": (r"^time( s)?$", r"^(t|zeit|timestamps?|times?|tout|utc time)$", r"\btime\b"),
+    "time_s": (
+        r"^time( s)?$",
+        r"^(t|zeit|(time ?)?stamps?( s| sec\w*)?|times?|tout|utc time)$",
+        r"\btime\b|^(header )?stamp\b|^(sec(ond)?s|elapsed|epoch)\b",
+    ),
     "vx_mps": (
         r"^v ?x( mps)?$",
         r"twist linear x$|(long\w*|forward) (speed|vel\w*)|(speed|vel\w*) (x|long\w*)$",

@@ -124,6 +124,9 @@ def propose_channels(
             for channel in CHANNELS
             if not (channel == "time_s" and view.has_times) and (found := _ranked(view, channel))
         }
+        if "time_s" not in chosen and not view.has_times:
+            rising = [name for name in view.rising if not any(name in c for c in chosen.values())]
+            chosen = {"time_s": rising, **chosen} if len(rising) == 1 else chosen
         return _proposal(view, chosen, None if vehicle is None else vehicle.wheelbase_m)
 
 
@@ -141,6 +144,12 @@ class _View:
         if isinstance(self._held, Recording):
             return self._held.entries[name].unit or unit_in_name(name, si_unit)
         return self._held.unit(name, si_unit)
+
+    @property
+    def rising(self) -> list[str]:
+        """Columns of a table that rise from each row to the next."""
+        columns = self._held.columns if isinstance(self._held, Table) else {}
+        return [n for n, x in columns.items() if x.size >= _FEWEST and (np.diff(x) > 0.0).all()]
 
     def is_stamps(self, name: str) -> bool:
         return isinstance(self._held, Table) and name in self._held.seconds
@@ -220,6 +229,8 @@ def _proposal(view: _View, chosen: dict[str, list[str]], wheelbase_m: float | No
 
 
 def _by_name(channel: str, name: str, unit: str) -> str:
+    if not rank(name, unit, channel):
+        return "the only column that always rises"
     text = "by its name" if name != channel else "so called"
     return f"{text}, the file states '{unit}'" if unit else text
 

@@ -331,3 +331,10 @@ def test_building_a_long_log_is_quick() -> None:
     start = time.process_time()
     make(long)
     assert time.process_time() - start < 1.0
+
+
+def test_times_of_a_clock_are_counted_from_the_first(data: Columns) -> None:
+    log = make({**data, "time_s": data["time_s"] + 1.7e9})
+    np.testing.assert_allclose(log["time_s"], data["time_s"], atol=1e-6)
+    assert log.rate_hz == pytest.approx(100.0)
+    assert make({**data, "time_s": data["time_s"] + 5e5})["time_s"][0] == 5e5

@@ -174,6 +174,16 @@ def test_steering_that_is_not_of_this_car_is_told(minute: sv.Log, truth: sv.Mode
     assert "times what a wheelbase of 2.6 m asks for: check both" in proposed.why
 
 
+@pytest.mark.parametrize("name", ["stamp", "header.stamp", "elapsed [s]", "Seconds", "n"])
+def test_a_clock_of_any_name(right: sv.Log, name: str) -> None:
+    data = {name: right["time_s"] + 1.7e9, "speed": right["vx_mps"], "count": np.ones(right.n)}
+    found = sv.propose_channels(data).channels["time_s"]
+    assert (found.column, found.factor) == (name, 1.0)
+    assert ("the only column that always rises" in found.why) == (name == "n")
+    data["other"] = 2.0 * right["time_s"]
+    assert ("time_s" in sv.propose_channels(data).channels) == (name != "n")
+
+
 def test_what_is_not_found_is_left_to_fill_in() -> None:
     data = {"time": np.arange(200) * 0.01, "speed": np.full(200, 20.0), "x1": np.zeros(200)}
     proposal = sv.propose_channels(data)

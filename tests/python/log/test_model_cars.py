@@ -1,0 +1,46 @@
+"""A car on a scale has a short wheelbase: the car's own numbers tell it from a wrong unit."""
+
+import numpy as np
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle.log import Log, check_car
+from sysid_vehicle.log.plausibility import contradictions
+
+
+def columns(wheelbase_m: float, seconds: float = 40.0) -> dict[str, np.ndarray]:
+    """A neutral car of this wheelbase at 3 to 6 m/s, in bends of up to 4 m/s2."""
+    rng = np.random.default_rng(3)
+    time_s = np.arange(0.0, seconds, 0.01)
+    speed = 4.5 + 1.2 * np.sin(0.4 * time_s)
+    ay = 2.0 * np.sin(1.3 * time_s) + 2.0 * np.sin(0.5 * time_s)
+    yaw_rate = ay / speed
+    return {
+        "time_s": time_s,
+        "vx_mps": speed + 0.02 * rng.standard_normal(time_s.size),
+        "yaw_rate_radps": yaw_rate + 0.01 * rng.standard_normal(time_s.size),
+        "ax_mps2": 0.48 * np.cos(0.4 * time_s) + 0.1 * rng.standard_normal(time_s.size),
+        "ay_mps2": ay + 0.1 * rng.standard_normal(time_s.size),
+        "steer_rad": wheelbase_m * yaw_rate / speed + 0.0005 * ay,
+    }
+
+
+def test_a_model_car_is_read_with_a_note() -> None:
+    with pytest.warns(sv.SysidWarning, match=r"steer_rad: .* small .* if this is no model car"):
+        log = Log.from_arrays(columns(0.33))
+    assert not [c for c in contradictions(columns(0.33), log.rate_hz) if c.channel == "steer_rad"]
+    check_car(log, mass_kg=3.7, wheelbase_m=0.33)
+
+
+def test_its_numbers_must_be_those_of_the_log() -> None:
+    with pytest.warns(sv.SysidWarning, match="model car"):
+        log = Log.from_arrays(columns(0.33))
+    with pytest.raises(sv.InvalidInput, match=r"steer_rad is 0.1.* wheelbase of 2.7 m"):
+        check_car(log, mass_kg=1500.0, wheelbase_m=2.7)
+    with pytest.raises(sv.InvalidInput, match=r"steer_rad is .* wheelbase of 0.1 m"):
+        check_car(log, mass_kg=3.7, wheelbase_m=0.1)
+
+
+def test_no_car_is_so_short() -> None:
+    with pytest.raises(sv.InvalidInput, match=r"steer_rad: .* small for the yaw rate.*its unit"):
+        Log.from_arrays(columns(0.05))
