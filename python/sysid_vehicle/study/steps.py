@@ -13,7 +13,7 @@ from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter
 from ..errors import NumericalError
 from ..estimate import Driving
-from ..identify import Estimate, Fit, refine, refit
+from ..identify import Estimate, Fit, refine, refine_while, refit
 from ..rules import USUAL, Measures, Rules, accept, bic, worse
 from .validation import as_sure, changes_ahead, error_falls, fall_in_error, gain_in_log_likelihood
 
@@ -106,14 +106,12 @@ def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:
 def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
     """The model with several effects, refitted; None where that fails, or no car has the values.
 
-    Parameters alone come first, under the noise of the model without them: that takes a fraction of
-    the time, and shows where the values lead.
+    Parameters come first, under the noise of the model without them: that shows where they lead
+    at a fraction of the time. Where an effect comes to nothing on the way the refit does not go on.
     """
     effects = {c.id: c.effect for c in dx.ranking}
     values: dict[str, float] = {}
-    for name in names:
-        if name not in dx.proposed.sizes:
-            continue
+    for name in (n for n in names if n in dx.proposed.sizes):
         for p, v in zip(effects[name].parameters, dx.proposed.sizes[name][0], strict=True):
             values[f"{name}.{p.name}"] = float(np.clip(v, p.lower, p.upper))
     model = dx.fit.model.add(*(effects[n] for n in names)).with_values(values)
@@ -121,9 +119,16 @@ def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
         near = refit(model, dx.fit.driving, dx.fit.noise)
         if not all(_real(near, name, dx.rules) for name in names):
             return None
-        return without_insignificant(refine(near.model, near.driving, near.noise), dx.rules)
+        some = partial(_none_at_nothing, names)
+        found = refine_while(near.model, near.driving, near.noise, some)
+        return found and without_insignificant(found, dx.rules)
     except (NumericalError, np.linalg.LinAlgError):
         return None
+
+
+def _none_at_nothing(names: Sequence[str], fit: Fit) -> bool:
+    """Whether every one of some effects is away from nothing, if not yet significant."""
+    return all(_strength(fit, name) > 1.0 for name in names)
 
 
 def _sound(c: Candidate, rules: Rules) -> bool:
