@@ -26,12 +26,8 @@ from sysid_vehicle.sensors.low_pass import _Problem
 from sysid_vehicle.sensors.spectrum import _bias, _of_windows, spectrum_of
 from sysid_vehicle.study import steps
 from sysid_vehicle.study.beyond import median_of_known
-from sysid_vehicle.study.steps import (
-    _none_at_nothing,
-    alternatives,
-    exchanged,
-    without_insignificant,
-)
+from sysid_vehicle.study.steps import alternatives, exchanged, without_insignificant
+from sysid_vehicle.study.together import _none_at_nothing
 
 
 def test_signals_that_are_regressed_together_have_the_shares_of_each_alone(
