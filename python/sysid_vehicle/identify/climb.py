@@ -34,11 +34,13 @@ _TINY = 1e-300
 _DAMPINGS = (1e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 10.0, 100.0)  # of steps tried together
 _STIFF = 1e3  # root of nats
 FAR_BELOW = 20.0
-"""Nats below another maximum, from where no climb comes up to it.
+"""Nats below another maximum, from where neither a lag nor noise of another time climbs up to it.
 
 Of 36 lags that began at their typical size (exam at 100 Hz, seed 424201) those more than 50 below
-on few samples ended 60 or more below on all; on those drives a climb gains a few. This is effort of
-the search: what is claimed of a model that was fitted is asked of `Rules`.
+on few samples ended 60 or more below on all. From where they settle climbs take lags and such noise
+up by 1 to 4 nats on two measured cars, effects of sensors by up to 97, several effects together by
+up to 260: those are not given up for so little. This is effort of the search: what is claimed of a
+model that was fitted is asked of `Rules`.
 """
 
 
