@@ -76,14 +76,14 @@ class Judge:
         return self.trail.fit
 
     @property
-    def ends(self) -> list[Fit]:
+    def outer(self) -> list[Fit]:
         """The baseline and the final model; one and the same where nothing was found."""
         return list(dict.fromkeys((self.trail.fits[0], self.fit)))
 
     @cached_property
     def added(self) -> tuple[str, ...]:
         """Effects that the final model has and the baseline lacks."""
-        return tuple(e for e in self.fit.model.effects if e not in self.ends[0].model.effects)
+        return tuple(e for e in self.fit.model.effects if e not in self.outer[0].model.effects)
 
     @cached_property
     def fitted(self) -> Omnibus:
@@ -103,19 +103,19 @@ class Judge:
         checked : bool
             Whether the logs were put right by a check of the sensors.
         """
-        fit, ends, asks, rules = self.fit, self.ends, self.asks, self.rules
-        on_train = self._compared(ends)
+        fit, outer, asks, rules = self.fit, self.outer, self.asks, self.rules
+        on_train = self._compared(outer)
         rivals = asks.asked(_RIVALS if self.added else _UNSHOWN, self._rivals)
         explained = None
         if self.added:
-            explained = asks.asked(_TOGETHER, lambda: beyond_noise_ahead(ends, self.test))
+            explained = asks.asked(_TOGETHER, lambda: beyond_noise_ahead(outer, self.test))
         expected = asks.asked(_FORETOLD, lambda: foretold(fit, self.test, rules))
         slow = slow_forces(fit, rules)
         alone = self._alone(rivals)
         pattern = asks.asked(_STRUCTURE, lambda: structure(fit, self.test))
         small = asks.asked(_SMALL, lambda: self._small(slow))
         facts = facts_of(
-            ends,
+            outer,
             alone,
             on_train[fit],
             explained,
@@ -207,7 +207,7 @@ class Judge:
 
     def _small(self, slow: tuple[str, ...]) -> bool:
         """Whether no error of the baseline matters; slow forces err by more the further ahead."""
-        first = self.ends[0]
+        first = self.outer[0]
         if self.sizes is not None:
             return sufficient(first, self.test, self.sizes) is not None
         return not slow and buried(at_its_best(first, self.test), self.test, self.fit.noise)
@@ -227,7 +227,7 @@ class Judge:
         self.asks.note(unknown, _ALONE)
         if explained is None:
             return facts
-        low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.ends, self.test))
+        low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.outer, self.test))
         return replace(facts, taken_low=0.0 if low is None else low)
 
 
