@@ -20,6 +20,7 @@ template double filter_run(const RunSystem<kMotionStates>&, const KeepStep<kMoti
 template double filter_run(const RunSystem<kStatesPlain>&, const KeepStep<kStatesPlain>&);
 template double filter_run(const RunSystem<kStatesFew>&, const KeepStep<kStatesFew>&);
 template double filter_run(const RunSystem<kStatesSome>&, const KeepStep<kStatesSome>&);
+template double filter_run(const RunSystem<kStatesSeveral>&, const KeepStep<kStatesSeveral>&);
 template double filter_run(const RunSystem<kStatesMost>&, const KeepStep<kStatesMost>&);
 
 }  // namespace sysid

@@ -5,7 +5,7 @@ from .box import free_box, objective_of
 from .estimates import Estimate
 from .fit import Fit
 from .identify import identify, profile_fit
-from .maximum import refine, refine_above, refit, unmoved
+from .maximum import refine, refine_above, refine_while, refit, unmoved
 from .offsets import driving_of
 from .posterior import Posterior
 from .predictive import Prediction, predict
@@ -38,6 +38,7 @@ __all__ = [
     "profile_fit",
     "refine",
     "refine_above",
+    "refine_while",
     "refit",
     "settle",
     "unmoved",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..errors import NumericalError
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from .box import free_box, objective_of
-from .climb import to_the_top
+from .climb import FAR_BELOW, to_the_top
 from .estimates import wald
 from .fit import Fit
 from .objective import Objective
@@ -26,11 +26,7 @@ _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
-# Nats below a poorer model, from where no search comes up to it. Of 36 lags that began at their
-# typical size (exam at 100 Hz, seed 424201) those more than 50 below on few samples ended 60 or
-# more below on all; on those drives a climb gains a few. This is effort of the search: what is
-# claimed of a model that was fitted is asked of `Rules`.
-_FAR_BELOW_BY_FEW, _FAR_BELOW = 50.0, 20.0
+_FAR_BELOW_BY_FEW = 50.0  # nats on few samples, chosen as `FAR_BELOW`
 _ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
 
 
@@ -64,9 +60,33 @@ def refine_above(model: Model, driving: Driving, fit: Fit) -> Fit | None:
         if thinned[-1].log_likelihood(*led) < least - _FAR_BELOW_BY_FEW:
             return None
     found = settle(objective, *begin, box, led=led)
-    if log_likelihood_of(objective, *found[:2]) < fit.log_likelihood - _FAR_BELOW:
+    if log_likelihood_of(objective, *found[:2]) < fit.log_likelihood - FAR_BELOW:
         return None
     return top(model, driving, objective, found, Starts.none(model.free_names), thinned)
+
+
+def refine_while(
+    model: Model, driving: Driving, noise: NoiseModel, goes_on: Callable[[Fit], bool]
+) -> Fit | None:
+    """As `refine`; None where a fit on the way to the maximum is not worth going on from.
+
+    Parameters
+    ----------
+    goes_on : callable
+        Asked after each part of the climb.
+    """
+    objective, thinned = objectives(model, driving)
+    box, starts = free_box(model), Starts.none(model.free_names)
+    settled = settle(objective, model.vector(), noise.vector(), box, thin=thinned)
+
+    def worth(p: FloatArray, noise: FloatArray) -> bool:
+        told = NoiseModel.from_vector(noise)
+        return goes_on(summary(model, driving, objective, p, told, starts, settled[2]))
+
+    at_top = to_the_top(objective, *settled[:2], box, worth)
+    if not worth(*at_top):
+        return None
+    return _likeliest(model, driving, objective, at_top, starts, thinned, settled[2])
 
 
 def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3) -> Fit:
@@ -139,11 +159,24 @@ def top(
 
     `thinned` is the likelihood of fewer samples, the fewest first.
     """
-    box = free_box(model)
-    at_top = to_the_top(objective, *settled[:2], box)
-    p, noise = likelier_noise(objective, at_top, box, next(iter(thinned), objective))
+    at_top = to_the_top(objective, *settled[:2], free_box(model))
+    return _likeliest(model, driving, objective, at_top, starts, thinned, settled[2])
+
+
+def _likeliest(
+    model: Model,
+    driving: Driving,
+    objective: Objective,
+    at_top: tuple[FloatArray, FloatArray],
+    starts: Starts,
+    thinned: Sequence[Objective],
+    converged: bool,
+) -> Fit:
+    """The fit of a maximum, or of a likelier one with noise of other time scales."""
+    few = next(iter(thinned), objective)
+    p, noise = likelier_noise(objective, at_top, free_box(model), few)
     told = NoiseModel.from_vector(noise)
-    return summary(model, driving, objective, p, told, starts, settled[2])
+    return summary(model, driving, objective, p, told, starts, converged)
 
 
 def on_its_road(fit: Fit) -> Fit:

@@ -17,9 +17,9 @@ from .._common.arrays import FloatArray
 from ..errors import NumericalError
 from ..estimate import Learned
 from ..estimate.noise import DISTURBANCE, TIMES
-from .climb import to_the_top
+from .climb import FAR_BELOW, to_the_top
 from .objective import Objective
-from .search import Box, stride
+from .search import SLIGHT, Box, stride
 from .settle import settle
 
 _APART = 5.0  # times as long, or as short, is the correlation time that is tried
@@ -28,8 +28,7 @@ _WORTH = 10.0  # nats on few samples that a disturbance takes up, or its time sc
 _STEPS = 3  # of the noise, the time held
 _TWICE = 2.0  # times what a step of the parameters promises
 _STANDS = 0.5  # nats
-_SLIGHT = 1e-6  # damping of a step that shows what is to be had
-_BELOW_BY_FEW, _FAR_BELOW = 5.0, 20.0  # nats, from where nothing comes up
+_BELOW_BY_FEW = 5.0  # nats on few samples, from where nothing comes up
 
 
 def likelier_noise(
@@ -74,7 +73,7 @@ def likelier_noise(
             if few.log_likelihood(p, told) < least:
                 continue
             p, told, _ = settle(objective, p, told, box)
-            if objective.log_likelihood(p, told) < value - _FAR_BELOW:
+            if objective.log_likelihood(p, told) < value - FAR_BELOW:
                 continue
             rival = to_the_top(objective, p, told, box)
             reached = objective.log_likelihood(*rival)
@@ -110,7 +109,7 @@ def _with_time(
     learned = held.learn_noise(p, here.noise, rounds=_STEPS)
     gains = few.freeze(p, learned.noise)
     _, slope, information = few.normal_equations(p, gains, box.columns)
-    _, promised = stride(p[box.columns], slope, information, _SLIGHT, box)
+    _, promised = stride(p[box.columns], slope, information, SLIGHT, box)
     lost = here.log_likelihood - learned.log_likelihood
     return learned.noise if lost < _TWICE * promised + _STANDS else None
 

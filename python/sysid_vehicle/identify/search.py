@@ -16,6 +16,8 @@ from .._common.arrays import FloatArray, as_float64
 from .objective import Problem
 
 _LEAST_DAMPING = 1e-9
+SLIGHT = 1e-6
+"""Damping of a step that shows what is to be had."""
 _ASTRAY = 1.5  # times what a step promised; where it loses more, it was far too long
 _HARDER = 6.0  # times the damping after a step that gained nothing
 # Of the tolerance: a step that promises less is not tried, nor a whole one for so little.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -101,6 +101,7 @@ def added_by(
     told: Verdicts,
     alone: Verdicts,
     decision: Decision,
+    shared: Collection[str] = (),
     rules: Rules = USUAL,
 ) -> tuple[AddedEffect, ...]:
     """The effects of a study in the order in which they were added.
@@ -116,6 +117,8 @@ def added_by(
     told, alone : Verdicts
         On each effect, in the light of the whole study, and by itself.
     decision : Decision
+    shared : collection of str
+        Effects of which nobody knows what each takes of the error: none is sure.
     rules : Rules
     """
     added = []
@@ -138,9 +141,18 @@ def added_by(
                         alone[name].finding,
                         finding,
                         much_left=decision.much_left,
-                        takes_little=small,
+                        takes_little=small or name in shared,
                     ),
                     small,
                 )
             )
     return tuple(added)
+
+
+def of_one_step(fits: Sequence[Fit]) -> tuple[str, ...]:
+    """Effects that came together with others in one step."""
+    steps = [
+        [e for e in richer.model.effects if e not in poorer.model.effects]
+        for poorer, richer in pairwise(fits)
+    ]
+    return tuple(e for step in steps if len(step) > 1 for e in step)

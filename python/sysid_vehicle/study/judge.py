@@ -8,15 +8,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from warnings import catch_warnings, simplefilter
 
+from .._common.text import few
 from .._common.threads import before, in_parallel
-from ..compare import compare
+from ..compare import Comparison, compare
 from ..diagnose import Instead, Omnibus, Verdicts, instead, judge, omnibus
 from ..errors import SysidWarning, warn
 from ..estimate import Driving
 from ..identify import Fit, driving_of
 from ..log import check_excitation
 from ..rules import Facts, Rules, incomplete, verdict
-from .added import added_by
+from .added import added_by, of_one_step
 from .beyond import Beyond
 from .foretold import foretold
 from .limit import Judging
@@ -40,6 +41,7 @@ _TOGETHER = "the share of the error 1 to 5 s ahead that the effects take togethe
 _ALONE = "the share of the error 1 to 5 s ahead that is due to {} alone"
 _STRUCTURE = "how much of what is left depends on the driving"
 _SMALL = "whether the errors of the baseline are as large as matters"
+_STEPS = "what each of {} takes of the validation error in its turn"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +75,15 @@ class Judge:
         """The final one."""
         return self.trail.fit
 
-    @cached_property
-    def fits(self) -> list[Fit]:
-        """From the baseline to the final one, an effect more each time."""
-        return way(self.trail.fits, self.asks.ends)
+    @property
+    def outer(self) -> list[Fit]:
+        """The baseline and the final model; one and the same where nothing was found."""
+        return list(dict.fromkeys((self.trail.fits[0], self.fit)))
 
     @cached_property
     def added(self) -> tuple[str, ...]:
         """Effects that the final model has and the baseline lacks."""
-        return tuple(e for e in self.fit.model.effects if e not in self.fits[0].model.effects)
+        return tuple(e for e in self.fit.model.effects if e not in self.outer[0].model.effects)
 
     @cached_property
     def fitted(self) -> Omnibus:
@@ -101,23 +103,21 @@ class Judge:
         checked : bool
             Whether the logs were put right by a check of the sensors.
         """
-        fit, fits, asks, rules = self.fit, self.fits, self.asks, self.rules
-        floor = fit.noise
-        on_train = in_parallel(lambda f: compare(f, f.driving, noise=floor), fits)
-        on_test = in_parallel(lambda f: compare(f, self.test, noise=floor), fits)
+        fit, outer, asks, rules = self.fit, self.outer, self.asks, self.rules
+        on_train = self._compared(outer)
         rivals = asks.asked(_RIVALS if self.added else _UNSHOWN, self._rivals)
-        expected = asks.asked(_FORETOLD, lambda: foretold(fit, self.test, rules))
-        slow = slow_forces(fit, rules)
         explained = None
         if self.added:
-            explained = asks.asked(_TOGETHER, lambda: beyond_noise_ahead(fits, self.test))
+            explained = asks.asked(_TOGETHER, lambda: beyond_noise_ahead(outer, self.test))
+        expected = asks.asked(_FORETOLD, lambda: foretold(fit, self.test, rules))
+        slow = slow_forces(fit, rules)
         alone = self._alone(rivals)
         pattern = asks.asked(_STRUCTURE, lambda: structure(fit, self.test))
         small = asks.asked(_SMALL, lambda: self._small(slow))
         facts = facts_of(
-            fits,
+            outer,
             alone,
-            on_train[-1],
+            on_train[fit],
             explained,
             fitted=self.fitted,
             together=None if rivals is None else rivals.omnibus,
@@ -132,15 +132,20 @@ class Judge:
         if self.added and incomplete(facts, rules):
             facts = self._with_shares(facts, explained)
         decision = verdict(facts, rules)
+        fits, shared = self._way()
+        on_train |= self._compared([f for f in fits if f not in on_train])
+        on_test = self._compared(fits, self.test)
         told, late = in_the_light_of(decision, alone), tuple(asks.left_out)
         return Study(
             verdict=decision.verdict,
             fits=tuple(fits),
             diagnoses=tuple(self.trail.diagnoses),
-            train=tuple(on_train),
-            test=tuple(on_test),
+            train=tuple(on_train[f] for f in fits),
+            test=tuple(on_test[f] for f in fits),
             validation=self.test,
-            added=added_by(self.trail, fits, on_test, told, alone, decision, rules),
+            added=added_by(
+                self.trail, fits, [on_test[f] for f in fits], told, alone, decision, shared, rules
+            ),
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
             verdicts=told,
@@ -157,6 +162,26 @@ class Judge:
             matters=self.sizes,
             buried=facts.buried,
         )
+
+    def _compared(
+        self, fits: Sequence[Fit], driving: Driving | None = None
+    ) -> dict[Fit, Comparison]:
+        """Errors of fits at the noise floor of the final model, by default of their own driving."""
+        noise = self.fit.noise
+        found = in_parallel(lambda f: compare(f, driving or f.driving, noise=noise), fits)
+        return dict(zip(fits, found, strict=True))
+
+    def _way(self) -> tuple[list[Fit], tuple[str, ...]]:
+        """From the baseline to the final model, an effect more each time.
+
+        It comes last: the fits between are a story, and may take longer than all that is claimed.
+        The second are effects of one step, as there was no time for the fits between them: nobody
+        knows which of them takes little of the error.
+        """
+        fits = way(self.trail.fits, self.asks.ends)
+        shared = of_one_step(fits) if time.perf_counter() > self.asks.ends else ()
+        self.asks.note(shared, _STEPS)
+        return fits, shared
 
     def _rivals(self) -> Instead:
         both = serving(self.fit, self.test)
@@ -182,7 +207,7 @@ class Judge:
 
     def _small(self, slow: tuple[str, ...]) -> bool:
         """Whether no error of the baseline matters; slow forces err by more the further ahead."""
-        first = self.fits[0]
+        first = self.outer[0]
         if self.sizes is not None:
             return sufficient(first, self.test, self.sizes) is not None
         return not slow and buried(at_its_best(first, self.test), self.test, self.fit.noise)
@@ -202,7 +227,7 @@ class Judge:
         self.asks.note(unknown, _ALONE)
         if explained is None:
             return facts
-        low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.fits, self.test))
+        low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.outer, self.test))
         return replace(facts, taken_low=0.0 if low is None else low)
 
 
@@ -221,14 +246,8 @@ def _excited(driving: Driving) -> bool:
 def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:
     fit, found = trail.fit, []
     driving = fit.driving
-    if trail.stopped:
-        found.append(
-            f"the time limit ended the search with {', '.join(trail.stopped)} still to be tried"
-        )
-        warn(found[-1])
-    for fact in late:
-        unsure = "without it neither the verdict nor a name is sure"
-        found.append(f"the time limit left unknown {fact}; {unsure}")
+    if trail.stopped or late:
+        found.append(_cut_short(trail.stopped, late))
         warn(found[-1])
     if trail.taken_back:
         found.append(
@@ -248,3 +267,14 @@ def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:
         found.append("the final fit did not converge; its intervals may be too short")
         warn(found[-1])
     return tuple(dict.fromkeys(found))
+
+
+def _cut_short(stopped: Sequence[str], late: Sequence[str]) -> str:
+    """What the time limit left out, in one line."""
+    cut = []
+    if stopped:
+        cut.append(f"ended the search with {few(stopped)} still to be tried")
+    if late:
+        cut.append(f"left unknown {'; '.join(late)}")
+    unsure = "; without that neither the verdict nor a name is sure" if late else ""
+    return f"the time limit {', and '.join(cut)}{unsure}"

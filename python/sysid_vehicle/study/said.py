@@ -31,7 +31,8 @@ _MEANING = {
 
 def meaning(study: Study) -> str:
     """The verdict of a study in words."""
-    if study.verdict == "unknown" and study.stopped:
+    judged = study.added and study.explained is not None
+    if study.verdict == "unknown" and study.stopped and not judged:
         return "something is missing; the time limit ended the search for what explains it"
     if study.verdict == "unknown" and study.added and study.explained is not None:
         if not study.explained.share > 0.0:

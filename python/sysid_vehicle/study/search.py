@@ -22,10 +22,10 @@ from .steps import (
     alternatives,
     exchanged,
     first_that_holds,
-    first_together,
     in_common,
     likeliest,
 )
+from .together import first_together
 from .validation import AHEAD
 
 
@@ -168,11 +168,11 @@ class Search:
                 trail.stopped = tuple(c.id for c in dx.significant)
                 return
             # What was refitted is not lost; what takes further refits waits for another study.
-            step = None
+            step, by = None, (self.ends, self.judged_by)
             if self.most_effects:
-                step = first_that_holds(dx, trail.fit, self.test, self.ends, self.judged_by)
+                step = first_that_holds(dx, trail.fit, self.test, *by)
             single = None if step is None else step[1]
-            several = first_together(dx, self.test, single, self.most_effects, self.ends)
+            several = first_together(dx, self.test, single, self.most_effects, *by)
             if step is None and several is None:
                 step = before(self.ends, partial(self._beside_another, dx, trail), None)
             if several is not None:

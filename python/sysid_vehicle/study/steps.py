@@ -13,7 +13,7 @@ from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter
 from ..errors import NumericalError
 from ..estimate import Driving
-from ..identify import Estimate, Fit, refine, refit
+from ..identify import Estimate, Fit, refine
 from ..rules import USUAL, Measures, Rules, accept, bic, worse
 from .validation import as_sure, changes_ahead, error_falls, fall_in_error, gain_in_log_likelihood
 
@@ -34,7 +34,7 @@ def first_that_holds(
     rules = dx.rules
     likely = sorted(dx.significant, key=lambda c: not _can_be(c, rules))
     first: Candidate | None = None
-    held: dict[str, tuple[float, Candidate, Fit]] = {}
+    holding: dict[str, tuple[float, Candidate, Fit]] = {}
     for c in likely:
         if first and (
             c.id not in first.indistinguishable_from or _can_be(c, rules) != _can_be(first, rules)
@@ -47,83 +47,19 @@ def first_that_holds(
             lean = before(ends, partial(without_insignificant, c.fit, rules), None)
         if lean is None or c.id not in lean.model.effects:
             continue
-        found = before(judged_by, partial(_held, fit, c.fit, _can_be(c, rules), test, rules), None)
+        found = before(judged_by, partial(held, fit, c.fit, _can_be(c, rules), test, rules), None)
         if found is not None:
             first = first or c
-            held[c.id] = (_merit(c.fit) + found.gain.value, c, lean)
-    if not held:
+            holding[c.id] = (merit(c.fit) + found.gain.value, c, lean)
+    if not holding:
         return None
-    _, chosen, lean = max(held.values(), key=lambda h: h[0])
+    _, chosen, lean = max(holding.values(), key=lambda h: h[0])
     return chosen, lean
 
 
 def likeliest(dx: Diagnosis) -> Candidate | None:
     """The candidate that fits best, of those with evidence for them and a value a car can have."""
     return next((c for c in dx.significant if _sound(c, dx.rules) and _can_be(c, dx.rules)), None)
-
-
-def first_together(
-    dx: Diagnosis, test: Driving, single: Fit | None, most_effects: int, ends: float = np.inf
-) -> tuple[tuple[str, ...], Fit] | None:
-    """Effects that are added together: the posterior names them, refit and validation confirm them.
-
-    Of the leading subsets those with two effects or more are refitted with their exact dynamics,
-    the scores being linearised at a fit that lacks all of them. One is added in place of the best
-    single effect where it is `better` than that; where no single effect holds, where validation
-    data confirm it.
-
-    `single` is the fit with the single effect that holds; the model may have `most_effects`, and
-    refits end at `ends`, by `time.perf_counter`.
-    """
-    rules, fit = dx.rules, dx.fit
-    several = _leading_subsets(dx, most_effects - len(fit.model.effects))
-    # Most of them are not added, so that none waits for the verdict on another.
-    refitted = in_parallel(lambda few: before(ends, partial(_with_subset, dx, few), None), several)
-    for names, found in zip(several, refitted, strict=True):
-        if found is None or not set(names) <= set(found.model.effects):
-            continue
-        if not all(_real(found, name, rules) for name in names):
-            continue
-        if single is not None:
-            if before(ends, partial(better, found, single, test, rules), False):
-                return names, found
-        elif _merit(found) > _merit(fit) + rules.apart and before(
-            ends, partial(_held, fit, found, True, test, rules), None
-        ):
-            return names, found
-    return None
-
-
-def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:
-    """Subsets of two effects or more with more evidence than any single one, the best first."""
-    named = [s for s in dx.proposed.known if len(s.effects) <= room]
-    alone = max((s.log_odds for s in named if len(s.effects) == 1), default=0.0)
-    least = max(alone, 0.0) + dx.rules.apart
-    several = [s for s in named if len(s.effects) > 1 and s.log_odds > least]
-    return [s.effects for s in several[:_ALTERNATIVES]]
-
-
-def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
-    """The model with several effects, refitted; None where that fails, or no car has the values.
-
-    Parameters alone come first, under the noise of the model without them: that takes a fraction of
-    the time, and shows where the values lead.
-    """
-    effects = {c.id: c.effect for c in dx.ranking}
-    values: dict[str, float] = {}
-    for name in names:
-        if name not in dx.proposed.sizes:
-            continue
-        for p, v in zip(effects[name].parameters, dx.proposed.sizes[name][0], strict=True):
-            values[f"{name}.{p.name}"] = float(np.clip(v, p.lower, p.upper))
-    model = dx.fit.model.add(*(effects[n] for n in names)).with_values(values)
-    try:
-        near = refit(model, dx.fit.driving, dx.fit.noise)
-        if not all(_real(near, name, dx.rules) for name in names):
-            return None
-        return without_insignificant(refine(near.model, near.driving, near.noise), dx.rules)
-    except (NumericalError, np.linalg.LinAlgError):
-        return None
 
 
 def _sound(c: Candidate, rules: Rules) -> bool:
@@ -142,7 +78,7 @@ def _measures(fit: Fit, found: Fit, plausible: bool, test: Driving) -> Measures:
     )
 
 
-def _held(fit: Fit, found: Fit, plausible: bool, test: Driving, rules: Rules) -> Measures | None:
+def held(fit: Fit, found: Fit, plausible: bool, test: Driving, rules: Rules) -> Measures | None:
     """What a richer model changes on validation data, where that speaks for it."""
     measures = _measures(fit, found, plausible, test)
     if not accept(measures, rules):
@@ -294,7 +230,7 @@ def better(one: Fit, other: Fit, test: Driving, rules: Rules = USUAL) -> bool:
     effects of a size that matters is preferred, and then the one with fewer effects.
     """
     ones, others = set(one.model.effects), set(other.model.effects)
-    if not all(_real(one, name, rules) for name in ones - others):
+    if not all(real(one, name, rules) for name in ones - others):
         return False
     ahead = lead(one, other, test)
     simpler = (_mattering(one), len(ones)) < (_mattering(other), len(others))
@@ -306,7 +242,7 @@ def better(one: Fit, other: Fit, test: Driving, rules: Rules = USUAL) -> bool:
 def lead(one: Fit, other: Fit, test: Driving) -> float:
     """Log-likelihood, less the price of the parameters, that one fit is ahead on all driving."""
     gain = gain_in_log_likelihood(other, one, test, same_noise=True)
-    return _merit(one) - _merit(other) + gain.value
+    return merit(one) - merit(other) + gain.value
 
 
 def _mattering(fit: Fit) -> int:
@@ -322,7 +258,7 @@ def _mattering(fit: Fit) -> int:
     )
 
 
-def _real(fit: Fit, name: str, rules: Rules) -> bool:
+def real(fit: Fit, name: str, rules: Rules) -> bool:
     """Whether an effect of the model has a value that a car can have."""
     found = next(e for e in fit.model.parts if e.id == name)
     estimates = [fit[f"{name}.{p.name}"] for p in found.parameters]
@@ -340,9 +276,9 @@ def without_insignificant(fit: Fit, rules: Rules = USUAL) -> Fit:
         insignificant = _insignificant(fit, rules) - kept
         if not insignificant:
             return fit
-        weakest = min(sorted(insignificant), key=lambda name: _strength(fit, name))
+        weakest = min(sorted(insignificant), key=lambda name: strength(fit, name))
         without = refine(fit.model.drop(weakest), fit.driving, fit.noise)
-        if _merit(without) + rules.apart < _merit(fit):
+        if merit(without) + rules.apart < merit(fit):
             kept.add(weakest)
         else:
             fit = without
@@ -373,14 +309,15 @@ def way(fits: Sequence[Fit], ends: float = np.inf) -> list[Fit]:
 def _insignificant(fit: Fit, rules: Rules) -> set[str]:
     """Effects of the model that cannot be told from nothing."""
     sought = (e.id for e in fit.model.parts if e.id not in fit.model.nuisances)
-    return {name for name in sought if _strength(fit, name) < rules.insignificant}
+    return {name for name in sought if strength(fit, name) < rules.insignificant}
 
 
-def _merit(fit: Fit) -> float:
+def merit(fit: Fit) -> float:
+    """Log-likelihood less the Bayesian price of the parameters."""
     return bic(fit.log_likelihood, len(fit.estimates), fit.driving.samples)
 
 
-def _strength(fit: Fit, name: str) -> float:
+def strength(fit: Fit, name: str) -> float:
     """Largest distance of the effect's parameters from their null values, in standard errors."""
     return max(
         _distance(e, fit.model.parameters[e.name])

@@ -86,6 +86,32 @@ def test_sets_of_parameters_have_the_likelihoods_of_each(fit: Fit) -> None:
         objective.problem.log_likelihoods(sets[:, :-1], noise)  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize(
+    "effects",
+    [
+        ("steer_lag",),
+        ("tyre_relaxation", "steer_lag"),
+        ("sensor_delay",),
+        ("sensor_delay", "tyre_relaxation", "steer_lag"),
+        ("sensor_delay", "tyre_relaxation", "steer_lag", "force_lag", "body_roll"),
+    ],
+)
+def test_one_filter_has_room_for_the_states_that_lanes_have(
+    effects: tuple[str, ...], fit: Fit, driving: Driving
+) -> None:
+    """Filters of one set are compiled for some numbers of states, those in lanes have any."""
+    model = fit.model.add(*effects)
+    lags = {e.id: e for e in model.parts if e.id in effects}
+    model = model.with_values(
+        {f"{e}.{p.name}": p.typical for e, part in lags.items() for p in part.parameters}
+    )
+    noise, problem, p = fit.noise.vector(), driving.problem(model), model.vector()
+    noise[_core.NOISE_PARAMETERS - 3 :] = (0.1, 0.2, 5.0)  # a road of varying slope
+    one = problem.freeze(p, noise).log_likelihood
+    lanes = problem.log_likelihoods(np.tile(p, (4, 1)), noise)
+    np.testing.assert_allclose(lanes, one, rtol=1e-9)
+
+
 @pytest.mark.parametrize("column", [-1, _core.PARAMETERS])
 def test_a_parameter_that_is_not_there_is_refused(
     column: int, problem: _core.Problem, fit: Fit

@@ -66,6 +66,7 @@ NUMERICAL = {
     "study/slow.py": {"_AT_LONGEST"},
     "study/steps.py": {"_ALTERNATIVES"},
     "study/structure.py": {"_AHEAD_S", "_APART", "_FEW"},
+    "study/together.py": {"_LEAST", "_SUBSETS"},
     # Descriptions of the unknown, of biases, and of the next drive.
     "diagnose/unexplained/ceiling.py": {
         "_RATE_HZ", "_LAGS_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",
@@ -139,7 +140,7 @@ def test_no_limit_that_decides_a_claim_stands_elsewhere() -> None:
 
 
 def test_deciding_files_compare_with_no_number_of_their_own() -> None:
-    deciding = ["study/steps.py", "study/search.py", "study/verdict.py", "study/judge.py"]
+    deciding = [f"study/{n}.py" for n in ("steps", "together", "search", "verdict", "judge")]
     deciding += [
         f"diagnose/candidates/{n}.py" for n in ("reservation", "verdicts", "constancy", "possible")
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,21 @@ from sysid_vehicle import Fit, Model, NumericalError, diagnose, drive, identify,
 from sysid_vehicle._common.threads import at_most
 from sysid_vehicle.diagnose.unexplained.ceiling import left_out
 from sysid_vehicle.estimate import Driving
-from sysid_vehicle.identify import ahead, maximum, predicting_ahead, refine, refine_above
+from sysid_vehicle.identify import (
+    ahead,
+    maximum,
+    predicting_ahead,
+    refine,
+    refine_above,
+    refine_while,
+)
 from sysid_vehicle.identify.ahead import _Ahead
 from sysid_vehicle.sensors.low_pass import _Problem
 from sysid_vehicle.sensors.spectrum import _bias, _of_windows, spectrum_of
 from sysid_vehicle.study import steps
 from sysid_vehicle.study.beyond import median_of_known
-from sysid_vehicle.study.steps import alternatives, exchanged
+from sysid_vehicle.study.steps import alternatives, exchanged, without_insignificant
+from sysid_vehicle.study.together import _none_at_nothing
 
 
 def test_signals_that_are_regressed_together_have_the_shares_of_each_alone(
@@ -102,11 +111,31 @@ def test_a_lag_far_below_is_not_followed_and_any_other_to_the_same_end(
     other = found.model.add("tyre_relaxation")
     other = other.with_values({"tyre_relaxation.relaxation_length_m": 1.5})
     with monkeypatch.context() as patch:
-        for name in ("_FAR_BELOW_BY_FEW", "_FAR_BELOW"):
+        for name in ("_FAR_BELOW_BY_FEW", "FAR_BELOW"):
             patch.setattr(maximum, name, -np.inf)
         assert refine_above(other, found.driving, found) is None
     whole = refine(other, found.driving, found.noise)
     assert whole.log_likelihood < found.log_likelihood + 10.0
+
+
+def test_effects_that_are_fitted_together_are_left_where_one_comes_to_nothing(
+    start: Model, truth: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
+    fit = identify(start, drive(car, manoeuvres.lap(32.0), seed=5), starts=1)
+    lag = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.05})
+    both = lag.add("tyre_relaxation").with_values({"tyre_relaxation.relaxation_length_m": 0.3})
+    whole = refine(lag, fit.driving, fit.noise)
+    alone = refine_while(lag, fit.driving, fit.noise, partial(_none_at_nothing, ["steer_lag"]))
+    assert alone is not None
+    assert alone.log_likelihood == whole.log_likelihood
+    # The true lag leaves nothing for another: that would be dropped after the whole refit.
+    end = refine(both, fit.driving, fit.noise)
+    assert not _none_at_nothing(both.effects, end)
+    assert set(without_insignificant(end).model.effects) == {"steer_lag"}
+    monkeypatch.setattr(maximum, "likelier_noise", pytest.fail)
+    together = partial(_none_at_nothing, both.effects)
+    assert refine_while(both, fit.driving, fit.noise, together) is None
 
 
 def test_where_a_search_begins_is_looked_at_once(fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,19 +14,17 @@ from sysid_vehicle.rules import USUAL, share_explained
 from sysid_vehicle.study.search import Search, Trail, _more
 from sysid_vehicle.study.steps import (
     _distance,
-    _leading_subsets,
     _mattering,
-    _with_subset,
     alternatives,
     better,
     exchanged,
     first_that_holds,
-    first_together,
     lead,
     likeliest,
     way,
     without_insignificant,
 )
+from sysid_vehicle.study.together import _leading_subsets, _with_subset, first_together
 from sysid_vehicle.study.validation import (
     error_falls,
     fall_in_error,
@@ -212,8 +210,8 @@ def test_what_was_refitted_when_the_time_is_over_is_added(
     clock = iter([0.0])
     monkeypatch.setattr("time.perf_counter", lambda: next(clock, 2.0))
     monkeypatch.setattr(Search, "_diagnosis", lambda _, fit, *__: replace(dx, fit=fit))
-    for refits in ("_with_subset", "_with_others"):
-        monkeypatch.setattr(f"sysid_vehicle.study.steps.{refits}", pytest.fail)
+    for refits in ("together._with_subset", "steps._with_others"):
+        monkeypatch.setattr(f"sysid_vehicle.study.{refits}", pytest.fail)
     trail = Trail([baseline])
     replace(search(driving[1], 4, []), ends=1.0).follow(trail)
     held = first_that_holds(dx, baseline, driving[1])

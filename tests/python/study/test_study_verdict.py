@@ -178,4 +178,5 @@ def test_what_the_time_limit_leaves_unknown_is_said(
     together, alone = study.late_facts
     assert "together" in together
     assert "steer_lag alone" in alone
-    assert f"the time limit left unknown {alone}" in str(study)
+    said = f"Warning: the time limit left unknown {together}; {alone}; without that neither"
+    assert [said in line for line in str(study).splitlines() if "time limit left" in line] == [True]

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
-from sysid_vehicle import Log, Model, _core, drive, improve, manoeuvres
+from sysid_vehicle import Fit, Log, Model, _core, drive, improve, manoeuvres
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify.identify import maximised
 from sysid_vehicle.sensors import estimate as _estimate
 from sysid_vehicle.sensors import low_pass as _low_pass
+from sysid_vehicle.study import judge
+from sysid_vehicle.study.search import Search, Trail
 
 CANDIDATES = ["steer_lag", "aero_drag", "rolling_resistance", "yaw_inertia", "gyro_bias"]
 
@@ -107,3 +109,36 @@ def test_a_baseline_that_had_too_little_time_is_the_likeliest_seen(
     assert [fit.converged for fit in found[:2]] == [False, False]
     assert found[-1].converged
     assert all(np.isfinite(e.value) for fit in found for e in fit.estimates)
+
+
+@pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")
+def test_what_was_added_is_judged_whatever_the_search_takes(
+    start: Model, logs: tuple[Log, Log], clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The search takes all of its time, and the fits between its ends take all that is left."""
+    follow, judging = Search.follow, 0.15
+
+    def until_its_end(self: Search, trail: Trail) -> None:
+        follow(self, trail)
+        clock.now = max(clock.now, self.judged_by)
+
+    def never_done(fits: Sequence[Fit], ends: float) -> list[Fit]:
+        clock.now = ends + 1.0
+        return [fits[0], fits[-1]]
+
+    monkeypatch.setattr(Search, "follow", until_its_end)
+    monkeypatch.setattr(judge, "way", never_done)
+    limit = 5000.0
+    study = improve(start, *logs, candidates=CANDIDATES[:2], starts=3, time_limit_s=limit)
+    assert (1.0 - judging) * limit < clock.now <= limit + PASSES
+    assert study.verdict == "explained"
+    assert study.explained is not None
+    assert not study.stopped
+    (late,) = study.late_facts
+    assert late == "what each of aero_drag, steer_lag takes of the validation error in its turn"
+    told = [text for text in study.warnings if "time limit" in text]
+    assert told == [
+        f"the time limit left unknown {late}; without that neither the verdict nor a name is sure"
+    ]
+    # Which of the two takes little nobody knows.
+    assert {a.id: a.grade for a in study.added} == dict.fromkeys(CANDIDATES[:2], "plausible")

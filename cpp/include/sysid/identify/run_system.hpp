@@ -162,10 +162,12 @@ class RunSystem {
     Mat<kChannels, kChannels> sensors_;
 };
 
-/// State sizes for models without states of the effects' own, with a few, with some, and with all;
-/// `kMotionStates` where white noise alone disturbs the first of these.
+/// State sizes for models without states of the effects' own, with a few, with some, with delays of
+/// all sensors on a road of varying slope, and with all; `kMotionStates` where white noise alone
+/// disturbs the first of these. What a sample costs grows with the cube.
 constexpr int kStatesFew = kStatesPlain + 3;
 constexpr int kStatesSome = kStatesPlain + 6;
+constexpr int kStatesSeveral = kStatesPlain + 12;
 constexpr int kStatesMost =
     (kStatesFull + kRoadStates + kWideStatePass - 1) / kWideStatePass * kWideStatePass;
 
@@ -178,6 +180,7 @@ auto with_state_size(EffectMask effects, const Noise& noise, Use&& use) {
     if (own == 0) return use(std::integral_constant<int, kStatesPlain>{});
     if (own <= 3) return use(std::integral_constant<int, kStatesFew>{});
     if (own <= 6) return use(std::integral_constant<int, kStatesSome>{});
+    if (own <= 12) return use(std::integral_constant<int, kStatesSeveral>{});
     return use(std::integral_constant<int, kStatesMost>{});
 }
 
@@ -192,6 +195,8 @@ extern template double filter_run(const RunSystem<kMotionStates>&, const KeepSte
 extern template double filter_run(const RunSystem<kStatesPlain>&, const KeepStep<kStatesPlain>&);
 extern template double filter_run(const RunSystem<kStatesFew>&, const KeepStep<kStatesFew>&);
 extern template double filter_run(const RunSystem<kStatesSome>&, const KeepStep<kStatesSome>&);
+extern template double filter_run(const RunSystem<kStatesSeveral>&,
+                                  const KeepStep<kStatesSeveral>&);
 extern template double filter_run(const RunSystem<kStatesMost>&, const KeepStep<kStatesMost>&);
 
 }  // namespace sysid

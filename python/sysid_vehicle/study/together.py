@@ -1,0 +1,91 @@
+"""Several effects that are added in one step, as none of them shows alone what it takes away."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from .._common.threads import before
+from ..diagnose import Diagnosis
+from ..errors import NumericalError
+from ..estimate import Driving
+from ..identify import Fit, refine_while, refit
+from .steps import better, held, merit, real, strength, without_insignificant
+
+_SUBSETS = 2  # that are refitted
+_LEAST = 1.0  # standard errors from nothing, below which the refit of a subset does not go on
+
+
+def first_together(
+    dx: Diagnosis,
+    test: Driving,
+    single: Fit | None,
+    most_effects: int,
+    ends: float = np.inf,
+    judged_by: float = np.inf,
+) -> tuple[tuple[str, ...], Fit] | None:
+    """Effects that are added together: the posterior names them, refit and validation confirm them.
+
+    Of the leading subsets those with two effects or more are refitted with their exact dynamics,
+    the scores being linearised at a fit that lacks all of them. One is added in place of the best
+    single effect where it is `better` than that; where no single effect holds, where validation
+    data confirm it.
+
+    `single` is the fit with the single effect that holds; the model may have `most_effects`. Refits
+    end at `ends`, by `time.perf_counter`; validation data have answered at `judged_by`.
+    """
+    rules, fit = dx.rules, dx.fit
+    for names in _leading_subsets(dx, most_effects - len(fit.model.effects)):
+        # One after the other: those that are not added mostly end soon, and one is all it takes.
+        found = before(ends, partial(_with_subset, dx, names), None)
+        if found is None or not set(names) <= set(found.model.effects):
+            continue
+        if not all(real(found, name, rules) for name in names):
+            continue
+        if single is not None:
+            if before(judged_by, partial(better, found, single, test, rules), False):
+                return names, found
+        elif merit(found) > merit(fit) + rules.apart and before(
+            judged_by, partial(held, fit, found, True, test, rules), None
+        ):
+            return names, found
+    return None
+
+
+def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:
+    """Subsets of two effects or more with more evidence than any single one, the best first."""
+    named = [s for s in dx.proposed.known if len(s.effects) <= room]
+    alone = max((s.log_odds for s in named if len(s.effects) == 1), default=0.0)
+    least = max(alone, 0.0) + dx.rules.apart
+    several = [s for s in named if len(s.effects) > 1 and s.log_odds > least]
+    return [s.effects for s in several[:_SUBSETS]]
+
+
+def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
+    """The model with several effects, refitted; None where that fails, or no car has the values.
+
+    Parameters come first, under the noise of the model without them: that shows where they lead
+    at a fraction of the time. Where an effect comes to nothing on the way the refit does not go on.
+    """
+    effects = {c.id: c.effect for c in dx.ranking}
+    values: dict[str, float] = {}
+    for name in (n for n in names if n in dx.proposed.sizes):
+        for p, v in zip(effects[name].parameters, dx.proposed.sizes[name][0], strict=True):
+            values[f"{name}.{p.name}"] = float(np.clip(v, p.lower, p.upper))
+    model = dx.fit.model.add(*(effects[n] for n in names)).with_values(values)
+    try:
+        near = refit(model, dx.fit.driving, dx.fit.noise)
+        if not all(real(near, name, dx.rules) for name in names):
+            return None
+        some = partial(_none_at_nothing, names)
+        found = refine_while(near.model, near.driving, near.noise, some)
+        return found and without_insignificant(found, dx.rules)
+    except (NumericalError, np.linalg.LinAlgError):
+        return None
+
+
+def _none_at_nothing(names: Sequence[str], fit: Fit) -> bool:
+    """Whether every one of some effects is away from nothing, if not yet significant."""
+    return all(strength(fit, name) > _LEAST for name in names)
