@@ -21,7 +21,7 @@ from .beyond import Beyond
 from .foretold import foretold
 from .limit import Judging
 from .matters import buried, sufficient
-from .own import own_shares, shown_together, sure_of
+from .own import own_shares, shown_together, sure_of, together_by_motion
 from .search import Trail
 from .slow import slow_forces
 from .steps import way
@@ -203,7 +203,11 @@ class Judge:
         if explained is None:
             return facts
         low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.fits, self.test))
-        return replace(facts, taken_low=0.0 if low is None else low)
+        facts = replace(facts, taken_low=0.0 if low is None else low)
+        motions = self.asks.asked(
+            _TOGETHER, lambda: together_by_motion(self.fits, self.added, self.test)
+        )
+        return facts if motions is None else facts.with_motions(motions)
 
 
 def _together(train: Driving, test: Driving) -> Driving:

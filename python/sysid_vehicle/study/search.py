@@ -17,7 +17,7 @@ from ..errors import Interrupted
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import Rules, worse
-from .horizons import changes
+from .held import changes_of
 from .steps import (
     alternatives,
     exchanged,
@@ -88,7 +88,7 @@ class Trail:
         away, those of the likelihood may lose where the effects that belong to it are not found.
         """
         last = self.fit.model.effects
-        while len(self.fits) > 1 and worse(changes(self.fits[0], self.fit, test, AHEAD), rules):
+        while len(self.fits) > 1 and worse(changes_of(self.fits[0], self.fit, test, AHEAD), rules):
             self.fits.pop()
             self.diagnoses.pop()
         self.taken_back = tuple(e for e in last if e not in self.fit.model.effects)

@@ -18,7 +18,8 @@ from ..identify import Fit, Prediction, driving_of, predict, predicting_ahead
 from ..log import Log, several_logs
 from ..rules import ErrorChange, Gain
 from .beyond import Beyond, beyond_noise
-from .horizons import changes, typical_error
+from .held import changes_of
+from .horizons import typical_error
 
 _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6
@@ -147,7 +148,7 @@ def _with_error(difference: FloatArray, test: Driving) -> Gain:
 def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[ErrorChange, ...]:
     """How errors 1 to 5 s ahead change, both models with the parameters of `at_its_best`."""
     one, other = in_parallel(lambda fit: at_its_best(fit, test), (poorer, richer))
-    return changes(one, other, test, AHEAD)
+    return changes_of(one, other, test, AHEAD)
 
 
 def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
