@@ -1,8 +1,8 @@
-"""What effects do to errors ahead of the motion that they do not move: nothing but by other tyres.
+"""What effects along the car do to lateral errors ahead.
 
-A drag that is added leaves the forces along the car alone with less noise, and the tyres are
-fitted anew under it. Where the lateral model is not the car these are another compromise, which
-serves the corners of validation data better or worse by chance.
+A drag changes the speed ahead, and leaves less noise along the car, under which the tyres are
+fitted anew. Where the lateral model is not the car, a speed that is wrong may serve its errors, and
+other tyres are another compromise: single channels and horizons grow by chance.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ import numpy as np
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import ErrorChange
-from .horizons import PREDICTED, changes, moving_with
+from .horizons import LATERAL, changes, moving_with
 
 
-def moved_between(one: Fit, other: Fit) -> frozenset[str]:
-    """Predicted channels of the motions that effects move which only one of two models has."""
+def along_alone(one: Fit, other: Fit) -> bool:
+    """Whether effects that only one of two models has move the car along it and no other way."""
     parts = {part.id: part.moved for fit in (one, other) for part in fit.model.parts}
     which = set(one.model.effects) ^ set(other.model.effects)
-    return frozenset(c for e in which for c in moving_with(parts[e]))
+    moved = {c for e in which for c in moving_with(parts[e])}
+    return bool(moved) and moved.isdisjoint(LATERAL)
 
 
 def changes_of(
@@ -30,8 +31,9 @@ def changes_of(
 ) -> tuple[ErrorChange, ...]:
     """How errors some seconds ahead change from one model to another, by what effects do.
 
-    As `changes`; but errors of a motion that no effect moves which one of the models lacks are
-    those with the parameters of the model before, where these predict that motion better.
+    As `changes`. Where nothing but effects along the car tells the models apart, lateral errors
+    are one figure, the mean over channels and horizons, with the parameters of the model before
+    where these predict better.
 
     Parameters
     ----------
@@ -41,21 +43,26 @@ def changes_of(
     horizons_s : sequence of float
     """
     found = changes(before, after, driving, horizons_s)
-    others = set(PREDICTED) - moved_between(before, after)
-    if set(before.model.effects) == set(after.model.effects) or not any(
-        c.channel in others and c.log_ratio > 0.0 for c in found
-    ):
+    lateral = _lateral(found)
+    if lateral is None or not along_alone(before, after):
         return found
-    shared = set(before.model.free_names) & set(after.model.free_names)
-    held = after.model.with_values({name: before.model.value(name) for name in shared})
-    beside = changes(before, replace(after, model=held), driving, horizons_s)
+    if lateral.log_ratio > 0.0:
+        shared = set(before.model.free_names) & set(after.model.free_names)
+        held = after.model.with_values({name: before.model.value(name) for name in shared})
+        beside = _lateral(changes(before, replace(after, model=held), driving, horizons_s))
+        if beside is not None:
+            lateral = min(lateral, beside, key=lambda c: c.log_ratio)
+    return (*(c for c in found if c.channel not in LATERAL), lateral)
 
-    def grows(told: Sequence[ErrorChange]) -> float:
-        return float(np.sum([c.log_ratio for c in told if c.channel in others]))
 
-    if grows(beside) >= grows(found):
-        return found
-    return (
-        *(c for c in found if c.channel not in others),
-        *(c for c in beside if c.channel in others),
+def _lateral(found: Sequence[ErrorChange]) -> ErrorChange | None:
+    """The mean change of lateral errors; their standard errors are nearly of the same samples."""
+    some = [c for c in found if c.channel in LATERAL]
+    if not some:
+        return None
+    return ErrorChange(
+        "lateral motion",
+        max(c.horizon_s for c in some),
+        float(np.mean([c.log_ratio for c in some])),
+        float(np.mean([c.error for c in some])),
     )

@@ -10,7 +10,7 @@ from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import Share, worse
 from sysid_vehicle.study.apart import apart
 from sysid_vehicle.study.beyond import own_share, taken_of
-from sysid_vehicle.study.held import changes_of, moved_between
+from sysid_vehicle.study.held import along_alone, changes_of
 from sysid_vehicle.study.horizons import LATERAL, changes, moving_with
 from sysid_vehicle.study.own import together_by_motion
 from sysid_vehicle.study.validation import AHEAD
@@ -64,19 +64,25 @@ def test_what_one_motion_lacks_says_nothing_of_the_other(
     assert after > before
 
 
-def test_an_effect_answers_for_the_motion_that_it_moves(fit: Fit, course: Log) -> None:
+def test_lateral_errors_are_one_figure_beside_an_effect_along_the_car(
+    fit: Fit, course: Log
+) -> None:
     """Beside a drag the tyres are fitted anew, to another compromise."""
     driving = Driving.of(course)
-    stiff = fit.model.value("B_front")
+    other_tyres = {"B_front": 0.7 * fit.model.value("B_front")}
     drag = fit.model.add("aero_drag").with_values({"aero_drag.drag_area_m2": 0.0})
-    other = replace(fit, model=drag.with_values({"B_front": 0.7 * stiff}))
-    assert moved_between(fit, other) == ALONG
+    other = replace(fit, model=drag.with_values(other_tyres))
+    assert along_alone(fit, other)
     assert {c.channel for c in worse(changes(fit, other, driving, AHEAD))} & {*LATERAL}
-    assert {c.channel for c in worse(changes_of(fit, other, driving, AHEAD))} <= ALONG
-    # What it does itself along the car counts.
-    strong = replace(other, model=other.model.with_values({"aero_drag.drag_area_m2": 3.0}))
-    assert worse(changes_of(fit, strong, driving, AHEAD))
+    told = changes_of(fit, other, driving, AHEAD)
+    assert "lateral motion" not in {c.channel for c in worse(told)}
+    (lateral,) = (c for c in told if c.channel not in ALONG)
+    assert lateral.log_ratio == pytest.approx(0.0, abs=0.01)
+    # What it does itself, along the car or by the speed, counts.
+    strong = replace(fit, model=drag.with_values({"aero_drag.drag_area_m2": 6.0}))
+    assert {c.channel for c in worse(changes_of(fit, strong, driving, AHEAD))} > ALONG
     # So do tyres beside what moves the lateral motion, and without any effect.
-    ratio = fit.model.add("steer_ratio").with_values({"B_front": 0.7 * stiff})
-    for model in (ratio, fit.model.with_values({"B_front": 0.7 * stiff})):
-        assert worse(changes_of(fit, replace(fit, model=model), driving, AHEAD))
+    for model in (fit.model.add("steer_ratio"), fit.model):
+        found = replace(fit, model=model.with_values(other_tyres))
+        assert not along_alone(fit, found)
+        assert changes_of(fit, found, driving, AHEAD) == changes(fit, found, driving, AHEAD)
