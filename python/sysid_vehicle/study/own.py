@@ -145,8 +145,9 @@ def together_by_motion(
 ) -> dict[str, tuple[tuple[float, float], float]]:
     """Find what all effects together take off the error 1 to 5 s ahead, motion by motion.
 
-    What the lateral model lacks says nothing of a mass, nor the other way round. Where the interval
-    of a share of lateral errors reaches nothing, that of what could be explained counts.
+    What the lateral model lacks says nothing of a mass, nor the other way round. The share is that
+    of `own_share`, block against block. Where its interval reaches nothing for lateral errors, that
+    of what could be explained counts.
 
     Parameters
     ----------
@@ -168,7 +169,7 @@ def together_by_motion(
     found: dict[frozenset[str], tuple[tuple[float, float], float]] = {}
     for channels in {parts[e] for e in added}:
         taken = taken_of(first, last, test, AHEAD, channels)
-        low = taken.low
+        low = own_share(first, last, test, AHEAD, channels=channels).low
         if not low > 0.0 and not channels.isdisjoint(LATERAL):
             low = shown_together(taken, (first, last), test)
         found[channels] = (taken.squares[0], taken.squares[-1]), low
