@@ -237,7 +237,8 @@ def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:
     if trail.taken_back:
         found.append(
             f"{' and '.join(trail.taken_back)} gained with parameters that predict best; as the "
-            "likelihood fits the model, errors 1 to 5 s ahead grow with it: taken back"
+            "likelihood fits the model, and whatever it leaves open, errors 1 to 5 s ahead grow "
+            "with it: taken back"
         )
     if driving.usable_s < _SHORT_S:
         found.append(

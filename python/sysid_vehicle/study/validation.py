@@ -88,6 +88,8 @@ def _prediction(fit: Fit, test: Driving, like: Fit) -> Prediction:
     return predict(fit, test, like.noise.elsewhere(fit.model.vehicle))
 
 
+# The baseline is asked beside every step that is taken back.
+@remembered(4)
 def serving(fit: Fit, test: Driving) -> Fit:
     """The fit with parameters that serve validation data too, as far as it left them unsure.
 
