@@ -24,9 +24,9 @@ from ..identify.ahead import of_few
 from ..rules import ErrorChange
 from .waterfall import all_ahead
 
-_ALONG = ("vx_mps", "ax_mps2")
+ALONG = ("vx_mps", "ax_mps2")
 LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2")
-PREDICTED = (*_ALONG, *LATERAL)
+PREDICTED = (*ALONG, *LATERAL)
 _LATERAL = [PREDICTED.index(c) for c in LATERAL]
 AHEAD = (0.5, 1.0, 2.0, 5.0)
 _FEWEST = 5  # blocks that show a change
@@ -125,7 +125,7 @@ def moving_with(channels: Collection[str]) -> frozenset[str]:
 
     What moves the yaw rate moves v_y and a_y within a second, and the speed hardly at all.
     """
-    motions = (m for m in (_ALONG, LATERAL) if not set(m).isdisjoint(channels))
+    motions = (m for m in (ALONG, LATERAL) if not set(m).isdisjoint(channels))
     return frozenset(c for motion in motions for c in motion)
 
 

@@ -13,13 +13,13 @@ from .._common.memo import remembered
 from .._common.threads import in_parallel
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
-from ..estimate import Driving
+from ..estimate import MEASURED, Driving
 from ..identify import Fit, Prediction, driving_of, predict, predicting_ahead
 from ..log import Log, several_logs
 from ..rules import ErrorChange, Gain
 from .beyond import Beyond, beyond_noise
-from .held import changes_of
-from .horizons import typical_error
+from .held import along_alone, changes_of
+from .horizons import ALONG, typical_error
 
 _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6
@@ -105,15 +105,19 @@ def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> Gain:
     """By how much the sum of squared errors falls on validation data.
 
     Both models are measured by the noise floor of the richer one: noise of its own can make a model
-    likelier whose forces explain less than before. The error comes from pieces (`_with_error`).
-    Where a model fails there is no fall.
+    likelier whose forces explain less than before. Where nothing but effects along the car tells
+    the models apart its speed and acceleration along it count: lateral errors fall and grow with
+    tyres that were fitted anew. The error comes from pieces (`_with_error`). Where a model fails
+    there is no fall.
     """
     floor = richer.noise.floor().vector()
+    counted = ALONG if along_alone(poorer, richer) else MEASURED
+    columns = [MEASURED.index(c) for c in counted]
 
     def squares(fit: Fit) -> FloatArray:
         own = driving_of(fit, test)
         trace = own.problem(fit.model).trace(fit.model.vector(), floor, False)
-        return as_float64(np.sum(trace["whitened"] ** 2, axis=1))
+        return as_float64(np.sum(trace["whitened"][:, columns] ** 2, axis=1))
 
     try:
         before, after = in_parallel(squares, (poorer, richer))

@@ -1,5 +1,6 @@
 """Errors ahead count where two models differ, and of the motion that an effect moves."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from sysid_vehicle.study.beyond import own_share, taken_of
 from sysid_vehicle.study.held import along_alone, changes_of
 from sysid_vehicle.study.horizons import LATERAL, changes, moving_with
 from sysid_vehicle.study.own import together_by_motion
-from sysid_vehicle.study.validation import AHEAD
+from sysid_vehicle.study.validation import AHEAD, fall_in_error
 
 ALONG = moving_with({"vx_mps"})
 
@@ -86,3 +87,17 @@ def test_lateral_errors_are_one_figure_beside_an_effect_along_the_car(
         found = replace(fit, model=model.with_values(other_tyres))
         assert not along_alone(fit, found)
         assert changes_of(fit, found, driving, AHEAD) == changes(fit, found, driving, AHEAD)
+
+
+def test_the_error_falls_along_the_car_beside_other_tyres(
+    fit: Fit, course: Log, altered: Callable[..., Log]
+) -> None:
+    """A drag that is there is not refused for lateral errors of tyres fitted anew."""
+    slower = fit.model.add("aero_drag").with_values({"aero_drag.drag_area_m2": 0.5})
+    driving = Driving.of(altered(course, fx_n=course["fx_n"] + 0.3 * course["vx_mps"] ** 2))
+    tyres = {"B_front": 0.9 * fit.model.value("B_front")}
+    there = replace(fit, model=slower.with_values(tyres))
+    lateral = replace(fit, model=fit.model.with_values(tyres))
+    assert fall_in_error(fit, lateral, driving).value < 0.0
+    assert fall_in_error(fit, there, driving).value > 0.0
+    assert fall_in_error(there, fit, driving).value < 0.0
