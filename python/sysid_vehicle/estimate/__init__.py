@@ -15,7 +15,7 @@ from .noise import (
     noise_range,
     promised_by_noise,
 )
-from .turning import turning, turning_blocks
+from .turning import equal_blocks, moving, turning, turning_blocks
 
 __all__ = [
     "MEASURED",
@@ -29,10 +29,12 @@ __all__ = [
     "NoiseModel",
     "StateFilter",
     "StateModel",
+    "equal_blocks",
     "first_guess",
     "generous",
     "learn_noise",
     "maximise_noise",
+    "moving",
     "nees_check",
     "nis_check",
     "noise_range",

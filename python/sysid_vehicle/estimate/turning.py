@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from .._common.arrays import FloatArray
+from .._common.arrays import FloatArray, as_float64
 from .._common.memo import remembered
 from .driving import Driving
 
@@ -43,11 +43,30 @@ def turning(driving: Driving) -> _Bools:
     side = np.clip(v * r, -_MOST_MPS2, _MOST_MPS2)
     found = np.zeros(driving.samples, dtype=bool)
     for motion in (side / v, side):
-        known = np.isfinite(motion)
-        squares = np.where(known, motion, 0.0) ** 2
-        least = _LEAST**2 * float(squares.sum()) / max(int(known.sum()), 1)
-        found |= _around(squares, known.astype(float), driving) >= least
+        found |= moving(as_float64(motion**2), driving)
     return found
+
+
+def moving(squares: FloatArray, driving: Driving) -> _Bools:
+    """At which samples something moves.
+
+    In the second around them it has a quarter at least of its root mean square over all the
+    driving.
+
+    Parameters
+    ----------
+    squares : array, shape (samples,)
+        NaN where nothing is known.
+    driving : Driving
+
+    Returns
+    -------
+    array of bool, shape (samples,)
+    """
+    known = np.isfinite(squares)
+    squares = as_float64(np.where(known, squares, 0.0))
+    least = _LEAST**2 * float(squares.sum()) / max(int(known.sum()), 1)
+    return _around(squares, known.astype(float), driving) >= least
 
 
 def _around(squares: FloatArray, known: FloatArray, driving: Driving) -> FloatArray:
@@ -68,7 +87,19 @@ def turning_blocks(driving: Driving) -> npt.NDArray[np.intp]:
 
     Where the car turns for less than half a minute there are six shorter ones.
     """
-    seconds = np.cumsum(turning(driving) / driving.sample_rate_hz)
+    return equal_blocks(as_float64(turning(driving)), driving)
+
+
+def equal_blocks(share: FloatArray, driving: Driving) -> npt.NDArray[np.intp]:
+    """First samples of blocks that hold about five seconds each; six blocks at least.
+
+    Parameters
+    ----------
+    share : array, shape (samples,)
+        Of each sample, that counts.
+    driving : Driving
+    """
+    seconds = np.cumsum(share / driving.sample_rate_hz)
     count = max(round(float(seconds[-1]) / _BLOCK_S), _FEWEST)
     middle = seconds - 0.5 / driving.sample_rate_hz
     block = np.maximum(np.floor(count * middle / seconds[-1]), 0.0)

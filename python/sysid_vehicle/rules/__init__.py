@@ -5,7 +5,8 @@
 2. The best are refitted, and lags whatever they score where the best one leaves something
    (`strict`). A refit counts if it gains `price` BIC penalties, or ln n in nats.
 3. It is accepted if the validation data confirm it (`accept`): two of three measures speak for it
-   (`lean`, `interval`), or its likelihood alone (`sure`); no error 1 to 5 s ahead grows (`worse`).
+   (`lean`, `interval`), or its likelihood alone (`sure`); no error 1 to 5 s ahead grows by what it
+   does (`worse`).
 4. Effects whose likelihoods differ by less than `apart` are confounded; validation data choose. An
    accepted effect gives way to others of its kind (`near`) that lead by `apart`, or are simpler.
 5. An effect within `insignificant` standard errors of nothing is dropped unless BIC needs it.

@@ -47,6 +47,10 @@ class Added:
         Of the error 1 to 5 s ahead that the final model leaves without it, all else fitted anew,
         what it takes away: on validation and on training data. Only asked where something is
         missing.
+    missing : (float, float) or None
+        As `Facts.missing`, of the motion that it moves; None where nobody asked.
+    taken_low : float or None
+        As `Facts.taken_low`, of the motion that it moves.
     late : bool
         Whether the time limit left its own share unknown.
     sure : bool
@@ -60,6 +64,8 @@ class Added:
     moves: frozenset[str] = frozenset()
     own: Share = UNKNOWN
     own_in_training: Share = UNKNOWN
+    missing: tuple[float, float] | None = None
+    taken_low: float | None = None
     late: bool = False
     sure: bool = False
 
@@ -142,6 +148,14 @@ class Facts:
             for a, v, t in told
         )
         return replace(self, added=added)
+
+    def with_motions(self, told: Mapping[str, tuple[tuple[float, float], float]]) -> Facts:
+        """The same with `missing` and `taken_low` of the motion that each effect moves."""
+        added = (
+            replace(a, missing=told[a.id][0], taken_low=told[a.id][1]) if a.id in told else a
+            for a in self.added
+        )
+        return replace(self, added=tuple(added))
 
 
 @dataclass(frozen=True)

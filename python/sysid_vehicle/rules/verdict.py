@@ -15,8 +15,8 @@ _NOT_SHOWN = (
     "validation data"
 )
 _NOT_TOGETHER = (
-    "together, what was added is not shown to take anything off the error 1 to 5 s ahead on "
-    "validation data: the interval of its share reaches nothing"
+    "together, what was added is not shown to take anything off the error 1 to 5 s ahead of this "
+    "motion on validation data: the interval of its share reaches nothing"
 )
 _LATE = (
     "the time limit left unknown what share of the error 1 to 5 s ahead is its own on training and "
@@ -140,8 +140,9 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
         late = frozenset(a.id for a in facts.added if a.late)
         likely = _likely(facts, rules)
         falling = names - likely - _standing(facts, rules)
-        if left and not facts.taken_low > 0.0:
-            withdrawn.append(Withdrawn(names - likely - falling, _NOT_TOGETHER, names))
+        if left:
+            nothing = frozenset(a.id for a in facts.added if not _together_low(a, facts) > 0.0)
+            withdrawn.append(Withdrawn(nothing - likely - falling, _NOT_TOGETHER, names))
         withdrawn.append(Withdrawn(falling - late, _NOT_SHOWN, names))
         if falling & late:
             withdrawn.append(Withdrawn(falling & late, _LATE, names))
@@ -166,22 +167,26 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
     Evidence grows with the data, whatever small misfit an effect serves; a share does not. It is
     that of the effect beside all others, which were fitted anew without it: what one of them, or
     the tyres, would do in its place is not its own. A stand-in serves one manoeuvre, and the next
-    one at a price. Where much is left, what it stands in for may be that: the share must be shown
-    to be one worth a name. So may it be what a stand-in takes that moves the same channel, if
-    that is the larger part.
+    one at a price. Where much is left of the motion that it moves, what it stands in for may be
+    that: the share must be shown to be one worth a name. So may it be what a stand-in takes that
+    moves the same channel, if that is the larger part.
     """
-    much = share_of(*facts.missing) < rules.most
-    least = rules.taken if much else 0.0
-    shown = [
-        a
-        for a in facts.added
-        if a.named
-        and all(s.value > rules.taken and s.low > least for s in (a.own, a.own_in_training))
-    ]
+
+    def worth(a: Added) -> bool:
+        much = share_of(*(facts.missing if a.missing is None else a.missing)) < rules.most
+        least = rules.taken if much else 0.0
+        return all(s.value > rules.taken and s.low > least for s in (a.own, a.own_in_training))
+
+    shown = [a for a in facts.added if a.named and worth(a)]
     others = [a for a in facts.added if a not in shown]
     return frozenset(
         a.id for a in shown if not any(a.moves & b.moves and _more(b, a) for b in others)
     )
+
+
+def _together_low(effect: Added, facts: Facts) -> float:
+    """Lower end of the share that all effects take together of the motion that one moves."""
+    return facts.taken_low if effect.taken_low is None else effect.taken_low
 
 
 def _likely(facts: Facts, rules: Rules) -> frozenset[str]:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
-import numpy.typing as npt
 
 from .._common.arguments import generator
 from .._common.arrays import FloatArray, as_float64, in_turn, median_of_known
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import UNKNOWN, Share, share_of
-from .horizons import PREDICTED, squares_ahead
+from .apart import apart
+from .horizons import squares_ahead
 
 _DRAWS = 300
 
@@ -47,6 +47,9 @@ class Beyond:
         return {"share": self.share, "low": self.low, "high": self.high}
 
 
+_UNSEEN = Beyond((0.0, 0.0), 1.0, 0.0, 1.0)
+
+
 def beyond_noise(
     fits: Sequence[Fit], driving: Driving, horizons_s: Sequence[float], *, seed: int = 0
 ) -> Beyond:
@@ -63,12 +66,10 @@ def beyond_noise(
     """
     squares, sensor, seen = squares_ahead(fits, driving, horizons_s)
     if not seen.any():  # too short for any prediction
-        return Beyond((0.0,) * len(fits), 1.0, 0.0, 1.0)
-    whole = _beyond(squares, sensor, seen)
-    draws = generator(seed).integers(0, squares.shape[1], (_DRAWS, squares.shape[1]))
-    shares = [_share(b) for b in in_turn(lambda d: _beyond(squares[:, d], sensor, seen), draws)]
-    low, high = np.quantile(shares, (0.025, 0.975))
-    return Beyond(tuple(map(float, whole)), _share(whole), float(low), float(high))
+        return replace(_UNSEEN, squares=(0.0,) * len(fits))
+    return _taken(
+        squares[:, :, seen], as_float64(np.broadcast_to(sensor**2, seen.shape)[seen]), seed
+    )
 
 
 def own_share(
@@ -82,9 +83,10 @@ def own_share(
 ) -> Share:
     """Work out what a model takes off the errors of one that lacks a part of it.
 
-    Block against block, so that neither counts more for driving that it loses: mean over channels
-    and horizons of the median over blocks of what is taken off beyond the noise of the sensors,
-    over the larger of the two squares. With a 95 % interval from draws of the blocks.
+    Where the two predict something else (`apart`), and block against block, so that neither counts
+    more for driving that it loses: mean over channels and horizons of the median over blocks of
+    what is taken off beyond the noise of the sensors, over the larger of the two squares. With a
+    95 % interval from draws of the blocks.
 
     Parameters
     ----------
@@ -97,14 +99,12 @@ def own_share(
     seed : int
         Of the draws.
     """
-    squares, sensor, seen = squares_ahead((without, final), driving, horizons_s)
-    counted = seen & np.isin(PREDICTED, list(channels))
-    seen = counted if counted.any() else seen
-    if not seen.any():
+    squares, noise = apart(without, final, driving, horizons_s, channels)
+    if not squares.size:
         return UNKNOWN
-    beyond = np.maximum(squares - sensor**2, 0.0)
+    beyond = np.maximum(squares - noise, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        each = ((beyond[0] - beyond[1]) / np.max(squares, axis=0))[:, seen]
+        each = (beyond[0] - beyond[1]) / np.max(squares, axis=0)
 
     def mean(rows: FloatArray) -> FloatArray:  # (draws, blocks, errors)
         with catch_warnings():
@@ -112,14 +112,54 @@ def own_share(
             return as_float64(np.nanmean(median_of_known(rows, axis=-2), axis=-1))
 
     draws = generator(seed).integers(0, len(each), (_DRAWS, len(each)))
-    low, high = np.quantile(in_turn(lambda d: mean(each[d]), draws), (0.025, 0.975))
+    # A draw in which the models differ nowhere tells nothing for the effect.
+    found = np.nan_to_num(in_turn(lambda d: mean(each[d]), draws))
+    low, high = np.quantile(found, (0.025, 0.975))
     return Share(float(mean(each[None])[0]), float(low), float(high))
 
 
-def _beyond(squares: FloatArray, sensor: FloatArray, seen: npt.NDArray[np.bool_]) -> FloatArray:
-    """Of squares (models, ..., blocks, horizons, channels), (..., models)."""
-    middle = median_of_known(squares, axis=-3)[..., seen]
-    noise = np.broadcast_to(sensor**2, seen.shape)[seen]
+def taken_of(
+    first: Fit,
+    last: Fit,
+    driving: Driving,
+    horizons_s: Sequence[float],
+    channels: Collection[str],
+    *,
+    seed: int = 0,
+) -> Beyond:
+    """Work out what a model takes off the errors of the baseline in some channels.
+
+    Where the two predict something else: as `beyond_noise` of these alone.
+
+    Parameters
+    ----------
+    first, last : Fit
+        The latter's noise starts every prediction.
+    driving : Driving
+    horizons_s : sequence of float
+    channels : collection of str
+        Those that count; where none of them is predicted, all.
+    seed : int
+        Of the draws.
+    """
+    squares, noise = apart(first, last, driving, horizons_s, channels)
+    if not squares.size:
+        return _UNSEEN
+    return _taken(squares, noise, seed)
+
+
+def _taken(squares: FloatArray, noise: FloatArray, seed: int) -> Beyond:
+    """Of squares (models, blocks, errors)."""
+    whole = _beyond(squares, noise)
+    draws = generator(seed).integers(0, squares.shape[1], (_DRAWS, squares.shape[1]))
+    shares = [_share(b) for b in in_turn(lambda d: _beyond(squares[:, d], noise), draws)]
+    low, high = np.quantile(shares, (0.025, 0.975))
+    return Beyond(tuple(map(float, whole)), _share(whole), float(low), float(high))
+
+
+def _beyond(squares: FloatArray, noise: FloatArray) -> FloatArray:
+    """Of squares (models, ..., blocks, errors), (..., models)."""
+    middle = median_of_known(squares, axis=-2)
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.maximum(middle - noise, 0.0) / middle[0]
     means = np.nan_to_num(ratio, nan=0.0, posinf=0.0).mean(axis=-1)

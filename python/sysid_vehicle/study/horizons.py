@@ -24,9 +24,9 @@ from ..identify.ahead import of_few
 from ..rules import ErrorChange
 from .waterfall import all_ahead
 
-_ALONG = ("vx_mps", "ax_mps2")
+ALONG = ("vx_mps", "ax_mps2")
 LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2")
-PREDICTED = (*_ALONG, *LATERAL)
+PREDICTED = (*ALONG, *LATERAL)
 _LATERAL = [PREDICTED.index(c) for c in LATERAL]
 AHEAD = (0.5, 1.0, 2.0, 5.0)
 _FEWEST = 5  # blocks that show a change
@@ -111,7 +111,7 @@ class Horizons:
         }
 
 
-def _explainable(driving: Driving) -> tuple[str, ...]:
+def explainable(driving: Driving) -> tuple[str, ...]:
     """Channels whose errors ahead effects can explain.
 
     Where the wheel force is not known the speed ahead is the integral of the measured acceleration,
@@ -125,7 +125,7 @@ def moving_with(channels: Collection[str]) -> frozenset[str]:
 
     What moves the yaw rate moves v_y and a_y within a second, and the speed hardly at all.
     """
-    motions = (m for m in (_ALONG, LATERAL) if not set(m).isdisjoint(channels))
+    motions = (m for m in (ALONG, LATERAL) if not set(m).isdisjoint(channels))
     return frozenset(c for motion in motions for c in motion)
 
 
@@ -151,7 +151,7 @@ def horizons(
     horizons_s : sequence of float
     """
     noise = fits[-1].noise.floor()
-    channels = tuple(c for c in _explainable(driving) if c in driving.present)
+    channels = tuple(c for c in explainable(driving) if c in driving.present)
     columns = [PREDICTED.index(c) for c in channels]
     by_block = np.stack(
         [block_errors(f, noise, driving, tuple(horizons_s))[:, :, columns] for f in fits]
@@ -196,7 +196,7 @@ def block_errors(
     array, shape (blocks, horizons, 5)
         NaN where nothing is predicted, infinite where the model lost the car.
     """
-    return _by_block(_ahead(fit, noise, driving, horizons_s), driving)
+    return _by_block(errors_ahead(fit, noise, driving, horizons_s), driving)
 
 
 def squares_ahead(
@@ -211,17 +211,26 @@ def squares_ahead(
     sensor = np.array([noise.sensor[MEASURED.index(c)] for c in PREDICTED])
     squares = np.stack([block_errors(f, noise, driving, tuple(horizons_s)) for f in fits]) ** 2
     seen = np.isfinite(squares).any(axis=(0, 1))
-    seen &= np.isin(PREDICTED, _explainable(driving))
-    # What a model loses is as wrong as anything that was seen, and much more.
+    seen &= np.isin(PREDICTED, explainable(driving))
+    return lost_as_large(as_float64(squares)), as_float64(sensor), seen
+
+
+def lost_as_large(squares: FloatArray) -> FloatArray:
+    """Squares of errors, (models, blocks, horizons, channels), with a number for a lost car.
+
+    It is as wrong as anything that was seen, and much more.
+    """
     most = np.max(squares, axis=(0, 1), initial=0.0, where=np.isfinite(squares))
-    squares = np.where(np.isinf(squares), _LOST**2 * most, squares)
-    return as_float64(squares), as_float64(sensor), seen
+    return as_float64(np.where(np.isinf(squares), _LOST**2 * most, squares))
 
 
-def _ahead(
+def errors_ahead(
     fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: tuple[float, ...]
 ) -> FloatArray:
-    """Errors of the predicted channels, (horizons, samples, 5), infinite where the model fails."""
+    """Errors of the predicted channels, (horizons, samples, 5), infinite where the model fails.
+
+    NaN where no prediction ends, or nothing was measured.
+    """
     columns = [MEASURED.index(c) for c in PREDICTED]
     try:
         e = all_ahead(fit, noise, driving, horizons_s, apart=_APART)[:, :, columns]
@@ -278,7 +287,7 @@ def changes(
     both = [block_errors(fit, noise, driving, tuple(horizons_s)) for fit in (before, after)]
     for i, h in enumerate(horizons_s):
         one, other = (errors[:, i] for errors in both)
-        for channel in _explainable(driving):
+        for channel in explainable(driving):
             j = PREDICTED.index(channel)
             known = (one[:, j] > 0.0) & (other[:, j] > 0.0)
             # Of a block that both models lose there is nothing to be learnt.

@@ -22,7 +22,7 @@ from .beyond import Beyond
 from .foretold import foretold
 from .limit import Judging
 from .matters import buried, sufficient
-from .own import own_shares, shown_together, sure_of
+from .own import own_shares, shown_together, sure_of, together_by_motion
 from .search import Trail
 from .slow import slow_forces
 from .steps import way
@@ -228,7 +228,11 @@ class Judge:
         if explained is None:
             return facts
         low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.outer, self.test))
-        return replace(facts, taken_low=0.0 if low is None else low)
+        facts = replace(facts, taken_low=0.0 if low is None else low)
+        motions = self.asks.asked(
+            _TOGETHER, lambda: together_by_motion(self.outer, self.added, self.test)
+        )
+        return facts if motions is None else facts.with_motions(motions)
 
 
 def _together(train: Driving, test: Driving) -> Driving:
@@ -252,7 +256,8 @@ def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:
     if trail.taken_back:
         found.append(
             f"{' and '.join(trail.taken_back)} gained with parameters that predict best; as the "
-            "likelihood fits the model, errors 1 to 5 s ahead grow with it: taken back"
+            "likelihood fits the model, and whatever it leaves open, errors 1 to 5 s ahead grow "
+            "with it: taken back"
         )
     if driving.usable_s < _SHORT_S:
         found.append(

@@ -12,8 +12,8 @@ from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refit
 from ..rules import UNKNOWN, Rules, Share
-from .beyond import Beyond, own_share
-from .horizons import moving_with
+from .beyond import Beyond, own_share, taken_of
+from .horizons import LATERAL, moving_with
 from .shares import shares
 from .validation import AHEAD, at_its_best, gain_in_log_likelihood
 
@@ -30,7 +30,8 @@ def own_shares(
     The model without it is fitted anew under the same noise: tyres and the other effects take up
     what they can. On validation data both models have the parameters of `at_its_best`. Errors of
     the motion that it moves count, along the car or lateral: others it cannot take away, and what
-    parameters fitted anew change there is none of its doing.
+    parameters fitted anew change there is none of its doing. They count where the two models
+    predict something else (`apart`).
 
     Parameters
     ----------
@@ -137,3 +138,39 @@ def shown_together(explained: Beyond, fits: Sequence[Fit], test: Driving) -> flo
         return explained.low
     whole = shares(at_its_best(fits[0], test), at_its_best(fits[-1], test), test).whole
     return whole.low if whole.known else explained.low
+
+
+def together_by_motion(
+    fits: Sequence[Fit], added: Sequence[str], test: Driving
+) -> dict[str, tuple[tuple[float, float], float]]:
+    """Find what all effects together take off the error 1 to 5 s ahead, motion by motion.
+
+    What the lateral model lacks says nothing of a mass, nor the other way round. The share is that
+    of `own_share`, block against block. Where its interval reaches nothing for lateral errors, that
+    of what could be explained counts.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        From the baseline to the final model.
+    added : sequence of str
+        Effects.
+    test : Driving
+        Validation data.
+
+    Returns
+    -------
+    dict
+        By effect, of the motion that it moves: squares of the errors of the baseline and of the
+        final model, and the lower end of the share.
+    """
+    first, last = (at_its_best(fit, test) for fit in (fits[0], fits[-1]))
+    parts = {part.id: moving_with(part.moved) for part in fits[-1].model.parts}
+    found: dict[frozenset[str], tuple[tuple[float, float], float]] = {}
+    for channels in {parts[e] for e in added}:
+        taken = taken_of(first, last, test, AHEAD, channels)
+        low = own_share(first, last, test, AHEAD, channels=channels).low
+        if not low > 0.0 and not channels.isdisjoint(LATERAL):
+            low = shown_together(taken, (first, last), test)
+        found[channels] = (taken.squares[0], taken.squares[-1]), low
+    return {e: found[parts[e]] for e in added}

@@ -17,7 +17,7 @@ from ..errors import Interrupted
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import Rules, worse
-from .horizons import changes
+from .held import changes_of
 from .steps import (
     alternatives,
     exchanged,
@@ -26,7 +26,7 @@ from .steps import (
     likeliest,
 )
 from .together import first_together
-from .validation import AHEAD
+from .validation import AHEAD, serving
 
 
 @dataclass(eq=False)
@@ -86,9 +86,16 @@ class Trail:
 
         Each step was judged by the parameters that predict best: what they show an effect to take
         away, those of the likelihood may lose where the effects that belong to it are not found.
+        What the fit left open does not speak against it: tyres that never met a slip angle take
+        any value, with an effect and without.
         """
         last = self.fit.model.effects
-        while len(self.fits) > 1 and worse(changes(self.fits[0], self.fit, test, AHEAD), rules):
+
+        def harms() -> bool:
+            one, other = (serving(fit, test) for fit in (self.fits[0], self.fit))
+            return bool(worse(changes_of(one, other, test, AHEAD), rules))
+
+        while len(self.fits) > 1 and harms():
             self.fits.pop()
             self.diagnoses.pop()
         self.taken_back = tuple(e for e in last if e not in self.fit.model.effects)

@@ -13,12 +13,13 @@ from .._common.memo import remembered
 from .._common.threads import in_parallel
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
-from ..estimate import Driving
+from ..estimate import MEASURED, Driving
 from ..identify import Fit, Prediction, driving_of, predict, predicting_ahead
 from ..log import Log, several_logs
 from ..rules import ErrorChange, Gain
 from .beyond import Beyond, beyond_noise
-from .horizons import changes, typical_error
+from .held import along_alone, changes_of
+from .horizons import ALONG, typical_error
 
 _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6
@@ -87,6 +88,8 @@ def _prediction(fit: Fit, test: Driving, like: Fit) -> Prediction:
     return predict(fit, test, like.noise.elsewhere(fit.model.vehicle))
 
 
+# The baseline is asked beside every step that is taken back.
+@remembered(4)
 def serving(fit: Fit, test: Driving) -> Fit:
     """The fit with parameters that serve validation data too, as far as it left them unsure.
 
@@ -102,15 +105,19 @@ def fall_in_error(poorer: Fit, richer: Fit, test: Driving) -> Gain:
     """By how much the sum of squared errors falls on validation data.
 
     Both models are measured by the noise floor of the richer one: noise of its own can make a model
-    likelier whose forces explain less than before. The error comes from pieces (`_with_error`).
-    Where a model fails there is no fall.
+    likelier whose forces explain less than before. Where nothing but effects along the car tells
+    the models apart its speed and acceleration along it count: lateral errors fall and grow with
+    tyres that were fitted anew. The error comes from pieces (`_with_error`). Where a model fails
+    there is no fall.
     """
     floor = richer.noise.floor().vector()
+    counted = ALONG if along_alone(poorer, richer) else MEASURED
+    columns = [MEASURED.index(c) for c in counted]
 
     def squares(fit: Fit) -> FloatArray:
         own = driving_of(fit, test)
         trace = own.problem(fit.model).trace(fit.model.vector(), floor, False)
-        return as_float64(np.sum(trace["whitened"] ** 2, axis=1))
+        return as_float64(np.sum(trace["whitened"][:, columns] ** 2, axis=1))
 
     try:
         before, after = in_parallel(squares, (poorer, richer))
@@ -147,7 +154,7 @@ def _with_error(difference: FloatArray, test: Driving) -> Gain:
 def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[ErrorChange, ...]:
     """How errors 1 to 5 s ahead change, both models with the parameters of `at_its_best`."""
     one, other = in_parallel(lambda fit: at_its_best(fit, test), (poorer, richer))
-    return changes(one, other, test, AHEAD)
+    return changes_of(one, other, test, AHEAD)
 
 
 def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:

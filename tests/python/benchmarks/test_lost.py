@@ -18,7 +18,10 @@ def lost(program: SimpleNamespace) -> SimpleNamespace:
 
 
 def study(
-    effects: tuple[str, ...] = (), finding: str = "absent", seen: tuple[tuple[str, ...], ...] = ()
+    effects: tuple[str, ...] = (),
+    finding: str = "absent",
+    seen: tuple[tuple[str, ...], ...] = (),
+    warnings: tuple[str, ...] = (),
 ) -> SimpleNamespace:
     """A study with a final model, what its verdicts say of drag, and models on the way."""
     drag = SimpleNamespace(effect=SimpleNamespace(id="aero_drag"), finding=finding, because="so")
@@ -29,6 +32,7 @@ def study(
             SimpleNamespace(fit=SimpleNamespace(model=SimpleNamespace(effects=e)), significant=())
             for e in seen
         ],
+        warnings=warnings,
     )
 
 
@@ -38,6 +42,8 @@ def test_it_says_how_an_effect_was_lost(lost: SimpleNamespace) -> None:
     assert lost.fate(study((drag,), "proxy"), drag) == "added, proxy: so"
     assert "dropped" in lost.fate(study((), seen=((), (drag,))), drag)
     assert lost.fate(study((), seen=((),)), drag) == "no evidence for it"
+    back = "mass and aero_drag gained with parameters that predict best; errors grow: taken back"
+    assert "taken back" in lost.fate(study((), seen=((),), warnings=(back,)), drag)
 
 
 def test_what_is_in_the_car_is_shown_by_driving_that_brings_it_about(

@@ -223,6 +223,23 @@ def test_beside_much_that_is_left_a_share_is_shown_to_be_worth_a_name() -> None:
     assert verdict(replace(much, added=(unsure,))).verdict == "unknown"
 
 
+def test_what_is_left_of_one_motion_spoils_no_name_of_the_other() -> None:
+    unsure = replace(DRAG, own=Share(0.3, 0.05, 0.5))
+    much = replace(LEFT, missing=(8.0, 5.0), added=(unsure,))
+    assert set(withdrawn(much)) == {"aero_drag"}
+    told = much.with_motions({"aero_drag": ((2.0, 0.1), 0.9)})
+    assert withdrawn(told) == {}
+    assert verdict(told).verdict == "partly_explained"
+    assert verdict(told).much_left
+    assert withdrawn(much.with_motions({"aero_drag": ((2.0, 1.0), 0.4)})) == withdrawn(much)
+    # Nor does what all take together.
+    nothing = replace(LEFT, taken_low=-0.1).with_motions({"aero_drag": ((2.0, 0.1), 0.9)})
+    assert set(withdrawn(nothing)) == {"mass"}
+    one = LEFT.with_motions({"aero_drag": ((2.0, 2.1), -0.2), "mass": ((2.0, 0.1), 0.9)})
+    assert set(withdrawn(one)) == {"aero_drag"}
+    assert "its share reaches nothing" in withdrawn(one)["aero_drag"]
+
+
 @pytest.mark.parametrize(
     "wrong",
     [

@@ -60,3 +60,26 @@ def test_steps_with_which_the_model_errs_more_ahead_than_the_baseline_are_taken_
     trail.without_harm(baseline.driving, USUAL)
     assert trail.fits == [baseline, good]
     assert trail.taken_back == ()
+
+
+def test_what_a_fit_left_open_does_not_speak_against_a_step(
+    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Parameters that serve validation data count, as far as the fit left them unsure."""
+    baseline = hidden_fit("aero_drag.drag_area_m2", 0.6)
+    dx = diagnose(baseline, candidates=["aero_drag"])
+    good = dx.ranking[0].fit
+    assert good is not None
+    windy = good.model.add("head_wind").with_values({"head_wind.speed_mps": 30.0})
+    lost = replace(good, model=windy)
+    trail = Trail([baseline, lost], [replace(dx, fit=f) for f in (baseline, lost)])
+    served = {id(lost): good}
+    monkeypatch.setattr(
+        "sysid_vehicle.study.search.serving", lambda fit, _: served.get(id(fit), fit)
+    )
+    trail.without_harm(baseline.driving, USUAL)
+    assert trail.fit is lost
+    assert trail.taken_back == ()
+    served.clear()
+    trail.without_harm(baseline.driving, USUAL)
+    assert trail.fits == [baseline]

@@ -92,7 +92,7 @@ def test_two_models_are_judged_side_by_side(
 
     for name in ("at_its_best", "_prediction"):
         monkeypatch.setattr(validation, name, waiting)
-    for name in ("changes", "beyond_noise"):
+    for name in ("changes_of", "beyond_noise"):
         monkeypatch.setattr(validation, name, lambda *told, **_: told)
     richer = replace(fit)
     with at_most(2):
