@@ -17,7 +17,7 @@ from .._common.arrays import FloatArray
 from ..errors import NumericalError
 from ..estimate.noise import DISTURBANCE
 from .objective import Objective
-from .search import Box, stride
+from .search import SLIGHT, Box, stride
 from .settle import settle
 from .starts import SAME_VALLEY
 from .tyre_shape import of_usual_shape
@@ -26,7 +26,6 @@ _SMALL = 0.1  # of what disturbances are first taken to be: these hide no tyre
 _MORE = 10.0  # nats: what one maximum gains on few samples by being fitted to them alone
 _ROUNDS = 4  # of the noise
 _TWICE = 2.0  # times what a step of the parameters promises
-_SLIGHT = 1e-6  # damping of a step that shows what is to be had
 _AXLES = (slice(0, 4), slice(4, 8))
 
 
@@ -66,7 +65,7 @@ def from_usual_tyres(
         learned = few.learn_noise(begin, noise, rounds=_ROUNDS)
         gains = few.freeze(begin, learned.noise)
         _, slope, information = few.normal_equations(begin, gains, box.columns)
-        _, promised = stride(begin[box.columns], slope, information, _SLIGHT, box)
+        _, promised = stride(begin[box.columns], slope, information, SLIGHT, box)
         if learned.log_likelihood + _TWICE * promised < least:
             return None
         p, told, converged = settle(few, begin, learned.noise, box)

@@ -35,10 +35,11 @@ def excess(test: Tested) -> float:
 
 
 def little(first: float, before: float, after: float, last: float, rules: Rules = USUAL) -> bool:
-    """Whether an effect takes little of what all that was added takes off the validation error.
+    """Whether an effect takes little of the validation error, and of what all that was added takes.
 
     A small misfit is explained by whatever effect fits it best, and its evidence grows with the
-    data: what takes little may be any of them.
+    data: what takes little may be any of them. Beside a large effect that came first a share of the
+    whole fall is small for any other: what takes a tenth of the error that it found is not little.
 
     Parameters
     ----------
@@ -46,7 +47,8 @@ def little(first: float, before: float, after: float, last: float, rules: Rules 
         Errors of the baseline, without and with the effect, and of the final model.
     rules : Rules
     """
-    return before**2 - after**2 < rules.taken * (first**2 - last**2)
+    of_the_fall = before**2 - after**2 < rules.taken * (first**2 - last**2)
+    return of_the_fall and before - after < rules.taken * before
 
 
 def grade(alone: str, beside: str, *, much_left: bool = False, takes_little: bool = False) -> Grade:

@@ -36,7 +36,8 @@ class AddedEffect:
     grade : str
         `confirmed`, `plausible` or `alias` (`rules.grade`).
     takes_little : bool
-        Of what all that was added takes off the error on validation data (`rules.little`).
+        Of the error on validation data, and of what all that was added takes off it
+        (`rules.little`).
     """
 
     id: str

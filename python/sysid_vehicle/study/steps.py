@@ -47,7 +47,9 @@ def first_that_holds(
             lean = before(ends, partial(without_insignificant, c.fit, rules), None)
         if lean is None or c.id not in lean.model.effects:
             continue
-        found = before(judged_by, partial(held, fit, c.fit, _can_be(c, rules), test, rules), None)
+        found = before(
+            judged_by, partial(speaks_for, fit, c.fit, _can_be(c, rules), test, rules), None
+        )
         if found is not None:
             first = first or c
             holding[c.id] = (merit(c.fit) + found.gain.value, c, lean)
@@ -78,7 +80,9 @@ def _measures(fit: Fit, found: Fit, plausible: bool, test: Driving) -> Measures:
     )
 
 
-def held(fit: Fit, found: Fit, plausible: bool, test: Driving, rules: Rules) -> Measures | None:
+def speaks_for(
+    fit: Fit, found: Fit, plausible: bool, test: Driving, rules: Rules
+) -> Measures | None:
     """What a richer model changes on validation data, where that speaks for it."""
     measures = _measures(fit, found, plausible, test)
     if not accept(measures, rules):

@@ -12,7 +12,7 @@ from ..diagnose import Diagnosis
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refine_while, refit
-from .steps import better, held, merit, real, strength, without_insignificant
+from .steps import better, merit, real, speaks_for, strength, without_insignificant
 
 _SUBSETS = 2  # that are refitted
 _LEAST = 1.0  # standard errors from nothing, below which the refit of a subset does not go on
@@ -48,7 +48,7 @@ def first_together(
             if before(judged_by, partial(better, found, single, test, rules), False):
                 return names, found
         elif merit(found) > merit(fit) + rules.apart and before(
-            judged_by, partial(held, fit, found, True, test, rules), None
+            judged_by, partial(speaks_for, fit, found, True, test, rules), None
         ):
             return names, found
     return None

@@ -38,7 +38,7 @@ def test_it_is_the_integral_over_the_parameters(
     p = found.model.vector()
     centre = p[whole.box.columns].copy()
     _, _, learnt = problem.normal_equations(p, problem.freeze(p, noise), whole.box.columns)
-    units = whole.units(centre)
+    units = whole.box.units(centre)
     root = np.linalg.cholesky(
         np.linalg.inv(whole.information + 10.0 * learnt * np.outer(units, units))
     )

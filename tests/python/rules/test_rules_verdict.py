@@ -278,6 +278,8 @@ def test_what_takes_little_of_the_fall_in_error_is_no_confirmed_name() -> None:
     assert not little(2.0, 2.0, 1.0, 1.0)  # the only one
     assert little(2.0, 1.1, 1.0, 1.0)  # 0.21 of 3
     assert not little(2.0, 1.2, 1.0, 1.0)
+    assert not little(10.6, 2.7, 1.0, 1.0)  # a twentieth of the fall, but most of what was left
+    assert little(10.6, 1.05, 1.0, 1.0)
     assert little(2.0, 1.0, 1.1, 1.1)
     assert not little(1.0, 1.0, 1.0, 1.0)  # nothing falls: it is not told
     assert not little(2.0, 1.1, 1.0, 1.0, replace(USUAL, most=0.95))

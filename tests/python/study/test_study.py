@@ -22,7 +22,7 @@ from sysid_vehicle import (
     improve,
     manoeuvres,
 )
-from sysid_vehicle.rules import Gain, share_explained
+from sysid_vehicle.rules import Gain
 from sysid_vehicle.study.beyond import Beyond
 from sysid_vehicle.study.shares import shares
 from sysid_vehicle.study.validation import error_falls, gain_in_log_likelihood, set_aside
@@ -266,15 +266,12 @@ def test_what_no_candidate_explains_is_not_explained(
 def test_one_effect_that_leaves_something_is_none(
     start: Model, truth: Model, drives: Drives
 ) -> None:
-    """A wrong mass takes up most of what an accelerometer's wrong gain leaves."""
+    """A wrong mass would take up most of what an accelerometer's wrong gain leaves."""
     wrong = {"accelerometer_scale.ax_error": 0.05, "accelerometer_scale.ay_error": 0.05}
     car = truth.add("accelerometer_scale").with_values(wrong)
     found = improve(start, *drives(car, 51), starts=1, candidates=["mass"])
-    assert [a.id for a in found.added] == ["mass"]
-    assert share_explained(found.train[0].error, found.train[-1].error) > 0.8
     assert found.verdict == "unknown"
     assert found.verdicts["mass"].finding == "proxy"
-    assert "of the error 1 to 5 s ahead" in found.verdicts["mass"].sentence
     assert contradictions(str(found)) == []
     both = improve(start, *drives(car, 51), starts=1, candidates=["mass", "accelerometer_scale"])
     assert [a.id for a in both.added] == ["accelerometer_scale"]
@@ -302,9 +299,10 @@ def test_what_leaves_the_evidence_as_it_was_is_a_stand_in(
 def test_two_hidden_effects_are_both_found(start: Model, truth: Model, drives: Drives) -> None:
     hidden = {"aero_drag.drag_area_m2": 0.45, "steer_offset.offset_rad": 0.006}
     car = truth.add("aero_drag", "steer_offset").with_values(hidden)
-    found = improve(start, *drives(car, 41), starts=1)
+    found = improve(start, *drives(car, 141), starts=1)
     assert found.verdict == "explained"
     assert set(found.model.effects) == {"aero_drag", "steer_offset"}
+    assert {a.grade for a in found.added} == {"confirmed"}
     errors = [c.error for c in found.test]
     assert errors == sorted(errors, reverse=True)
     for name, value in hidden.items():

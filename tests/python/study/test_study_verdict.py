@@ -91,7 +91,9 @@ def test_tyres_that_the_fit_never_saw_do_not_speak_against_the_right_effect(
     )
     assert [a.id for a in study.added] == ["accelerometer_scale"]
     assert study.test[-1].error > 2.0  # the lap is beyond what the fit knows of the tyres
-    assert study.verdict == "explained"
+    # A sine at constant speed tells nothing of the gain along the car.
+    assert study.verdict in ("explained", "partly_explained")
+    assert [a.grade for a in study.added] == ["confirmed"]
     assert study.omnibus_together is not None
     assert not study.omnibus_together.rejects
 
