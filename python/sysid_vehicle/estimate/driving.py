@@ -80,8 +80,10 @@ class Driving:
         found = cls(several, all(log.has("fx_n") for log in several))
         if not found.stretches:
             names = ", ".join(log.name for log in several)
+            least = min(log.least_speed_mps for log in several)
             raise InvalidInput(
-                f"{names}: no stretch of 1 s or more at 3 m/s or faster has the inputs it needs"
+                f"{names}: no stretch of 1 s or more at {least:.3g} m/s or faster has the inputs "
+                f"it needs"
             )
         return found
 

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 _HEADINGS = ("channel", "unit", "min", "max", "missing %")
 _SHOWN = ("vx_mps", "steer_rad", "yaw_rate_radps", "ay_mps2", "ax_mps2", "vy_mps", "fx_n")
 
+# Speeds at which the model is run, and the share of its usual top speed for a slow car.
+_LEAST_MPS, _LEAST_ANY_MPS, _LEAST_SHARE = 3.0, 1.0, 0.4
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Log:
@@ -203,13 +206,26 @@ class Log:
             if channel.without and name not in self._data
         }
 
-    def stretches(self, min_speed_mps: float = 3.0, min_duration_s: float = 1.0) -> list[slice]:
+    @property
+    def least_speed_mps(self) -> float:
+        """Slowest speed at which the model is run: 3 m/s, less where all the driving is slow.
+
+        Tyres slip little below, and slip angles are noise. Cars on a scale slip at less: it is 0.4
+        of a speed that is seldom exceeded then, and 1 m/s at least.
+        """
+        usual = float(np.nanpercentile(np.append(self["vx_mps"], 0.0), 95.0))
+        return min(_LEAST_MPS, max(_LEAST_SHARE * usual, _LEAST_ANY_MPS))
+
+    def stretches(
+        self, min_speed_mps: float | None = None, min_duration_s: float = 1.0
+    ) -> list[slice]:
         """Return the contiguous sample ranges in which the model can run.
 
         Parameters
         ----------
-        min_speed_mps : float
-            The car must be at least this fast; where ``vx_mps`` is missing its neighbours decide.
+        min_speed_mps : float, optional
+            The car must be at least this fast, `least_speed_mps` by default; where ``vx_mps`` is
+            missing its neighbours decide.
         min_duration_s : float
             Shorter ranges are left out.
 
@@ -220,7 +236,8 @@ class Log:
             ``ax_mps2`` in a log without it) are known. Missing measurements break nothing.
         """
         drive = "fx_n" if self.has("fx_n") else "ax_mps2"
-        usable = filled(self["vx_mps"]) >= min_speed_mps
+        least = self.least_speed_mps if min_speed_mps is None else min_speed_mps
+        usable = filled(self["vx_mps"]) >= least
         usable &= np.isfinite(self["steer_rad"]) & np.isfinite(self[drive])
         shortest = min_duration_s * self.rate_hz - 1e-6
         return [slice(a, b) for a, b in runs(usable) if b - 1 - a >= shortest]

@@ -32,9 +32,19 @@ def test_no_log_is_refused() -> None:
 
 
 def test_a_log_too_slow_to_use_is_refused(short: Log, altered: Callable[..., Log]) -> None:
-    slow = altered(short, vx_mps=np.full(short.n, 2.0))
-    with pytest.raises(InvalidInput, match=r"lap .*no stretch of 1 s or more at 3 m/s or faster"):
+    slow = altered(short, vx_mps=np.full(short.n, 0.8))
+    with pytest.raises(InvalidInput, match=r"lap .*no stretch of 1 s or more at 1 m/s or faster"):
         Driving.of(slow)
+
+
+def test_where_all_is_slow_less_speed_is_enough(short: Log, altered: Callable[..., Log]) -> None:
+    assert short.least_speed_mps == 3.0
+    vx = np.full(short.n, 2.0)
+    vx[:100] = 0.5
+    slow = altered(short, vx_mps=vx)
+    assert slow.least_speed_mps == 1.0
+    assert Driving.of(slow).samples == short.n - 100
+    assert altered(short, vx_mps=np.full(short.n, 5.0)).least_speed_mps == pytest.approx(2.0)
 
 
 def test_slow_parts_are_left_out(short: Log, truth: Model, altered: Callable[..., Log]) -> None:
