@@ -229,7 +229,7 @@ def _proposal(view: _View, chosen: dict[str, list[str]], wheelbase_m: float | No
 
 
 def _by_name(channel: str, name: str, unit: str) -> str:
-    if not rank(name, unit, channel):
+    if channel == "time_s" and not rank(name, unit, channel):
         return "the only column that always rises"
     text = "by its name" if name != channel else "so called"
     return f"{text}, the file states '{unit}'" if unit else text

@@ -111,6 +111,7 @@ def test_swapped_accelerations_are_found(right: sv.Log) -> None:
     proposal = sv.propose_channels(renamed(right, names))
     assert proposal.channels["ay_mps2"].column == "/imu/linear_acceleration/x"
     assert "swapped against its name" in proposal.channels["ay_mps2"].why
+    assert "rises" not in proposal.to_toml()
     found(renamed(right, names), right)
 
 
