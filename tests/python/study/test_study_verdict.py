@@ -182,3 +182,26 @@ def test_what_the_time_limit_leaves_unknown_is_said(
     assert "steer_lag alone" in alone
     said = f"Warning: the time limit left unknown {together}; {alone}; without that neither"
     assert [said in line for line in str(study).splitlines() if "time limit left" in line] == [True]
+
+
+@pytest.mark.manual
+@pytest.mark.parametrize("seed", [41, 141])
+def test_two_hidden_effects_are_both_found(
+    start: Model, truth: Model, drives: Drives, seed: int
+) -> None:
+    """With the first seed a compliance of three standard errors comes before the offset and stays.
+
+    It must not be confirmed.
+    """
+    hidden = {"aero_drag.drag_area_m2": 0.45, "steer_offset.offset_rad": 0.006}
+    car = truth.add("aero_drag", "steer_offset").with_values(hidden)
+    found = improve(start, *drives(car, seed), starts=1)
+    assert found.verdict == "explained"
+    grades = {a.id: a.grade for a in found.added}
+    assert grades.pop("steer_offset") == "confirmed"
+    grades.pop("aero_drag")
+    assert grades == ({"steer_compliance": "plausible"} if seed == 41 else {})
+    errors = [c.error for c in found.test]
+    assert errors == sorted(errors, reverse=True)
+    for name, value in hidden.items():
+        assert abs(found.fit[name].value - value) < 4.0 * found.fit[name].std
