@@ -89,7 +89,7 @@ def _matters(study: Study) -> str:
 
 
 def ahead(study: Study) -> str:
-    """Errors some seconds ahead on validation data, in physical units; empty where too short."""
+    """Lateral errors some seconds ahead on validation data; empty where that is too short."""
     errors = study.horizons
     i = errors.horizons_s.index(AHEAD_S)
     told = []
@@ -101,7 +101,8 @@ def ahead(study: Study) -> str:
             told.append(f"{WORDS[c]} {figures} {UNITS[c]}")
     if not told:
         return ""
-    return f"Median error {AHEAD_S:g} s ahead on validation data: {', '.join(told)}."
+    where = "where the car turns, on validation data"
+    return f"Median error {AHEAD_S:g} s ahead {where}: {', '.join(told)}."
 
 
 def small(study: Study) -> bool:
