@@ -123,7 +123,8 @@ def shown_together(explained: Beyond, fits: Sequence[Fit], test: Driving) -> flo
     """Find the lower end of the share of the error 1 to 5 s ahead that all effects take together.
 
     Where that of the error itself reaches nothing, as disturbances may do most of it: of what any
-    function of the driving could explain of it, if any is seen to.
+    function of the driving could explain of it, if any is seen to. Of an error that does not fall
+    nothing is taken, whatever other blocks of the driving say of what could be.
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ def shown_together(explained: Beyond, fits: Sequence[Fit], test: Driving) -> flo
     test : Driving
         Validation data.
     """
-    if explained.low > 0.0:
+    if explained.low > 0.0 or not explained.share > 0.0:
         return explained.low
     whole = shares(at_its_best(fits[0], test), at_its_best(fits[-1], test), test).whole
     return whole.low if whole.known else explained.low
