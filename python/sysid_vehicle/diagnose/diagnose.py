@@ -141,12 +141,14 @@ def _refitted(
     # What the best one gains tells which of the others cannot come near it.
     first = in_time(lambda c: refitted(fit, driving, c), ends)(few[0])
     best = max(first.statistic, few[0].statistic)
-    others = [
-        c
-        for c in few[1:]
-        if not _too_fast(c)
-        and (c.id in again or c.statistic > _hopeless(c) * best or _rivals(c, few[0]))
-    ]
+    leaders = {c.effect.along_alone: c for c in reversed(few)}
+
+    def hopeful(c: Candidate) -> bool:
+        leader = leaders[c.effect.along_alone]
+        most = best if leader is few[0] else leader.statistic
+        return c.id in again or c.statistic > _hopeless(c) * most or _rivals(c, leader)
+
+    others = [c for c in few[1:] if not _too_fast(c) and hopeful(c)]
     tried = [
         first,
         *with_progress(
@@ -157,8 +159,10 @@ def _refitted(
         ),
     ]
     # Under the noise of the poorer model they differ less than they really do.
-    top = max(c.statistic for c in tried)
-    near = [c for c in tried if c.statistic > 0.4 * top]
+    top = dict.fromkeys(leaders, 0.0)
+    for c in tried:
+        top[c.effect.along_alone] = max(top[c.effect.along_alone], c.statistic)
+    near = [c for c in tried if c.statistic > 0.4 * top[c.effect.along_alone]]
     finished = list(pool.map(in_time(lambda c: finished_of(fit, c), ends), near))
     if any(c is begun and c.fit for c, begun in zip(finished, near, strict=True)):
         finished = near  # with noise of their own only some would seem the likelier ones
@@ -185,9 +189,17 @@ def _with_errors(dx: Diagnosis) -> Diagnosis:
 def _worth_refitting(
     significant: list[Candidate], refits: int, again: Collection[str]
 ) -> list[Candidate]:
-    """The best few, those asked for, and what the catalogue says acts like the very best."""
+    """The best few, those asked for, and what the catalogue says acts like the very best.
+
+    So for either motion: what the lateral model lacks says nothing of a mass, and several lateral
+    effects may lead of which validation data confirm none.
+    """
     few = significant[:refits]
-    more = {*few[0].effect.confounded_with, *again} if few else set()
+    more = {*again}
+    for along in (True, False) if few else ():
+        leader = next((c for c in significant if c.effect.along_alone == along), None)
+        if leader is not None:
+            more |= {leader.id, *leader.effect.confounded_with}
     return few + [c for c in significant[refits:] if c.id in more]
 
 

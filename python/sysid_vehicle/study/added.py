@@ -129,6 +129,7 @@ def added_by(
         for name in (e for e in richer.model.effects if e not in poorer.model.effects):
             finding, because = told[name].finding, told[name].because
             others = [e for e in trail.rivals.get(name, ()) if e not in final.model.effects]
+            others = [*sorted(decision.groups.get(name, ())), *others]
             added.append(
                 AddedEffect(
                     name,

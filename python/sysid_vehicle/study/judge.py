@@ -22,7 +22,14 @@ from .beyond import Beyond
 from .foretold import foretold
 from .limit import Judging
 from .matters import buried, sufficient
-from .own import own_shares, shown_together, sure_of, together_by_motion
+from .own import (
+    alike,
+    own_shares,
+    shares_of_groups,
+    shown_together,
+    sure_of,
+    together_by_motion,
+)
 from .search import Trail
 from .slow import slow_forces
 from .steps import way
@@ -225,6 +232,8 @@ class Judge:
         sure = sure_of(fit, sorted(named), test, self.rules, ends) if below else frozenset()
         facts = replace(facts.with_own(shares, unknown, sure), buried=below)
         self.asks.note(unknown, _ALONE)
+        groups = alike(fit, named)
+        facts = facts.with_groups(shares_of_groups(fit, groups, test, ends))
         if explained is None:
             return facts
         low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.outer, self.test))

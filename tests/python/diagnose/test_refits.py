@@ -93,6 +93,21 @@ def test_a_refit_ends_with_a_round_that_gains_next_to_nothing(
     assert 0.0 <= gains[-1] < 0.05
 
 
+def test_the_best_of_either_motion_is_refitted(truth: Model, start: Model) -> None:
+    """Lateral effects lead by far, and say nothing of what moves the car along."""
+    hidden = {"steer_lag.time_constant_s": 0.1, "aero_drag.drag_area_m2": 0.12}
+    car = truth.add("steer_lag", "aero_drag").with_values(hidden)
+    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1)
+    found = diagnose(fit, refits=1).ranking
+    along = [c for c in found if c.effect.along_alone]
+    lateral = [c for c in found if not c.effect.along_alone]
+    assert along[0].statistic < 0.25 * lateral[0].statistic
+    assert along[0].id == "aero_drag"
+    assert along[0].finished
+    assert along[0].fit is not None
+    assert lateral[0].finished
+
+
 def test_of_two_delays_one_may_not_be_there(truth: Model, start: Model) -> None:
     car = truth.add("sensor_delay").with_values({"sensor_delay.speeds_s": 0.0})
     car = car.with_values({"sensor_delay.inertial_s": 0.03})
