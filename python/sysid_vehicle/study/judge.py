@@ -151,7 +151,15 @@ class Judge:
             test=tuple(on_test[f] for f in fits),
             validation=self.test,
             added=added_by(
-                self.trail, fits, [on_test[f] for f in fits], told, alone, decision, shared, rules
+                self.trail,
+                fits,
+                [on_test[f] for f in fits],
+                told,
+                alone,
+                decision,
+                facts,
+                shared,
+                rules,
             ),
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
