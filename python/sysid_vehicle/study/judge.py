@@ -22,6 +22,7 @@ from .beyond import Beyond
 from .foretold import foretold
 from .limit import Judging
 from .matters import buried, sufficient
+from .next_steps import SHORT_S
 from .own import (
     alike,
     own_shares,
@@ -37,8 +38,6 @@ from .structure import structure
 from .study import Study
 from .validation import at_its_best, beyond_noise_ahead, serving
 from .verdict import facts_of, in_the_light_of
-
-_SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
 
 # What a time limit may leave unknown, in words.
 _RIVALS = "whether something unknown would do in the place of what was added"
@@ -276,9 +275,9 @@ def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:
             "likelihood fits the model, and whatever it leaves open, errors 1 to 5 s ahead grow "
             "with it: taken back"
         )
-    if driving.usable_s < _SHORT_S:
+    if driving.usable_s < SHORT_S:
         found.append(
-            f"{driving}: too short to tell many effects apart; record {_SHORT_S:.0f} s or more, "
+            f"{driving}: too short to tell many effects apart; record {SHORT_S:.0f} s or more, "
             "with steps, sweeps and corners near the limit"
         )
         warn(found[-1])

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .added import AddedEffect
     from .study import Study
 
+SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
 _SHOWN = 4
 _ASKED = 2  # effects that a next drive is to show
 _MEND = (
@@ -61,6 +62,12 @@ def _of_names(study: Study) -> list[str]:
         found.append(
             "to predict, the final model serves better than the baseline, as a whole and in "
             "driving like this"
+        )
+    seconds = study.validation.usable_s
+    if aliases and seconds < SHORT_S:
+        found.append(
+            f"validate with longer driving, {SHORT_S:.0f} s or more: {seconds:.2g} s hardly show "
+            "what an effect takes of errors 1 to 5 s ahead"
         )
     shown_by = {e.id: e.excited_by for e in study.model.parts}
     for a in _worth_a_drive(aliases):

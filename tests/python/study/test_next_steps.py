@@ -189,6 +189,9 @@ def test_what_no_name_stands_for_is_told_with_shares_and_a_drive(unknown: Study)
     # What is no stand-in for sure is to be shown by driving, if it may take a share.
     (drive_it,) = (text for text in said if "to find out whether" in text)
     assert "steer_lag is in the car, drive what shows it (fast sweeps" in drive_it
+    assert not any("validate with longer driving" in text for text in said)
+    short = replace(found, validation=Driving.of(unknown.validation.logs[0].between(0.0, 4.0)))
+    assert any("20 s or more: 4 s hardly show" in text for text in next_steps(short))
     nothing = next_steps(replace(found, explained=Beyond((1.0, 0.9), 0.1, -0.1, 0.3)))
     assert not any("serves better" in text for text in nothing)
 
