@@ -150,7 +150,7 @@ struct LongitudinalLoadTransfer : Effect {
         .excited_by = "braking and accelerating in corners",
         .moves = "yaw_rate_radps, ay_mps2",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "tyre_load_sensitivity, combined_slip, force_split",
+        .confounded_with = "tyre_load_sensitivity, combined_slip, force_split, drive_yaw_moment",
         .parameters = {{.name = "height_error_m",
                         .unit = "m",
                         .typical = 0.12,
