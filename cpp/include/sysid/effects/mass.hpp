@@ -44,8 +44,9 @@ struct YawInertia : Effect {
         .excited_by = "steering sweeps at 2 Hz and faster, steps",
         .moves = "yaw_rate_radps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "mass, tyre_relaxation, front_tyre_relaxation, rear_tyre_relaxation, "
-                           "locked_differential",
+        .confounded_with =
+            "mass, tyre_relaxation, front_tyre_relaxation, rear_tyre_relaxation, "
+            "locked_differential",
         .parameters = {{.name = "relative_error",
                         .unit = "1",
                         .typical = 0.25,
