@@ -111,6 +111,7 @@ def diagnose(
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         known = {c.id for c in finished}
         hidden = [c for c in ranked if is_hidden_by_noise(c.effect) and c.id not in known]
+        hidden += _hidden_by_tyres(ranked, finished)
         asked = refits and hidden and time.perf_counter() < ends
         if asked and _leaves_more(finished[:1], left, driving, rules):
             tried = pool.map(in_time(lambda c: from_typical(fit, c, len(ranked)), ends), hidden)
@@ -169,6 +170,20 @@ def _refitted(
     done = {c.id for c in finished}
     far = sorted((c for c in tried if c.id not in done), key=lambda c: -c.statistic)
     return finished, far
+
+
+def _hidden_by_tyres(ranked: Sequence[Candidate], finished: Sequence[Candidate]) -> list[Candidate]:
+    """What acts like the best along the car, and may have no score beside tyres that are wrong.
+
+    A mass moves the car along and divides its side forces: the score adds what the speed says and
+    what tyres say that are not those of the car.
+    """
+    best = next((c for c in finished if c.effect.along_alone), None)
+    if best is None:
+        return []
+    few = [c for c in ranked if c.id in best.effect.confounded_with and c.effect.along_alone]
+    known = {c.id for c in finished}
+    return [c for c in few if len(c.effect.parameters) == 1 and c.id not in known]
 
 
 def _leaves_more(best: Sequence[Candidate], left: Omnibus, driving: Driving, rules: Rules) -> bool:
