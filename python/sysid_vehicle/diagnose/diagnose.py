@@ -111,6 +111,7 @@ def diagnose(
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         known = {c.id for c in finished}
         hidden = [c for c in ranked if is_hidden_by_noise(c.effect) and c.id not in known]
+        hidden += _hidden_by_tyres(ranked, finished)
         asked = refits and hidden and time.perf_counter() < ends
         if asked and _leaves_more(finished[:1], left, driving, rules):
             tried = pool.map(in_time(lambda c: from_typical(fit, c, len(ranked)), ends), hidden)
@@ -141,12 +142,14 @@ def _refitted(
     # What the best one gains tells which of the others cannot come near it.
     first = in_time(lambda c: refitted(fit, driving, c), ends)(few[0])
     best = max(first.statistic, few[0].statistic)
-    others = [
-        c
-        for c in few[1:]
-        if not _too_fast(c)
-        and (c.id in again or c.statistic > _hopeless(c) * best or _rivals(c, few[0]))
-    ]
+    leaders = {c.effect.along_alone: c for c in reversed(few)}
+
+    def hopeful(c: Candidate) -> bool:
+        leader = leaders[c.effect.along_alone]
+        most = best if leader is few[0] else leader.statistic
+        return c.id in again or c.statistic > _hopeless(c) * most or _rivals(c, leader)
+
+    others = [c for c in few[1:] if not _too_fast(c) and hopeful(c)]
     tried = [
         first,
         *with_progress(
@@ -157,14 +160,30 @@ def _refitted(
         ),
     ]
     # Under the noise of the poorer model they differ less than they really do.
-    top = max(c.statistic for c in tried)
-    near = [c for c in tried if c.statistic > 0.4 * top]
+    top = dict.fromkeys(leaders, 0.0)
+    for c in tried:
+        top[c.effect.along_alone] = max(top[c.effect.along_alone], c.statistic)
+    near = [c for c in tried if c.statistic > 0.4 * top[c.effect.along_alone]]
     finished = list(pool.map(in_time(lambda c: finished_of(fit, c), ends), near))
     if any(c is begun and c.fit for c, begun in zip(finished, near, strict=True)):
         finished = near  # with noise of their own only some would seem the likelier ones
     done = {c.id for c in finished}
     far = sorted((c for c in tried if c.id not in done), key=lambda c: -c.statistic)
     return finished, far
+
+
+def _hidden_by_tyres(ranked: Sequence[Candidate], finished: Sequence[Candidate]) -> list[Candidate]:
+    """What acts like the best along the car, and may have no score beside tyres that are wrong.
+
+    A mass moves the car along and divides its side forces: the score adds what the speed says and
+    what tyres say that are not those of the car.
+    """
+    best = next((c for c in finished if c.effect.along_alone), None)
+    if best is None:
+        return []
+    few = [c for c in ranked if c.id in best.effect.confounded_with and c.effect.along_alone]
+    known = {c.id for c in finished}
+    return [c for c in few if len(c.effect.parameters) == 1 and c.id not in known]
 
 
 def _leaves_more(best: Sequence[Candidate], left: Omnibus, driving: Driving, rules: Rules) -> bool:
@@ -185,9 +204,17 @@ def _with_errors(dx: Diagnosis) -> Diagnosis:
 def _worth_refitting(
     significant: list[Candidate], refits: int, again: Collection[str]
 ) -> list[Candidate]:
-    """The best few, those asked for, and what the catalogue says acts like the very best."""
+    """The best few, those asked for, and what the catalogue says acts like the very best.
+
+    So for either motion: what the lateral model lacks says nothing of a mass, and several lateral
+    effects may lead of which validation data confirm none.
+    """
     few = significant[:refits]
-    more = {*few[0].effect.confounded_with, *again} if few else set()
+    more = {*again}
+    for along in (True, False) if few else ():
+        leader = next((c for c in significant if c.effect.along_alone == along), None)
+        if leader is not None:
+            more |= {leader.id, *leader.effect.confounded_with}
     return few + [c for c in significant[refits:] if c.id in more]
 
 

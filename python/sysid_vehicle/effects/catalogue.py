@@ -220,6 +220,11 @@ class Effect:
         return frozenset(self.moves.split(", "))
 
     @property
+    def along_alone(self) -> bool:
+        """Whether it moves the car along it and no other way, as a drag does."""
+        return self.moved <= {"vx_mps", "ax_mps2"}
+
+    @property
     def scanned(self) -> Parameter | None:
         """Its parameter that means nothing while the effect is null, if there is one."""
         return next((p for p in self.parameters if p.scan), None)

@@ -23,7 +23,9 @@
    comes back of the error 1 to 5 s ahead, of the motion that it moves, where the final model lacks
    it and all else is fitted anew. It is above `taken` and shown not to be chance, on training and
    on validation data; where less than `most` of that error is gone, the whole interval is above
-   `taken`. Nothing that has no such share takes more, and moves a channel that it moves. All that
+   `taken`. Of effects that act alike, and have no such share beside each other, the share of all
+   of them counts, and they are named as a group. Nothing that has no share of either kind takes
+   more, and moves a channel that it moves. All that
    was added together is shown to take a share, of that error or of what could be explained of it.
    Where the final model errs by less than the noise of the sensors (`buried`), no share can be
    shown: an effect without rivals, and without a stand-in beside it, keeps its name if the

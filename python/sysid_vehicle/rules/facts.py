@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
 from .share import UNKNOWN, Share
@@ -56,6 +56,10 @@ class Added:
     sure : bool
         Whether the likelihood of validation data is shown to be higher with it (`Rules.interval`),
         all else fitted anew. Only asked where what is left is `buried`.
+    beside : frozenset of str
+        Others of the final model that act like it, where such a group was asked for its share.
+    shared, shared_in_training : Share
+        As `own`, of it and all of these together.
     """
 
     id: str
@@ -68,6 +72,9 @@ class Added:
     taken_low: float | None = None
     late: bool = False
     sure: bool = False
+    beside: frozenset[str] = frozenset()
+    shared: Share = UNKNOWN
+    shared_in_training: Share = UNKNOWN
 
     @property
     def named(self) -> bool:
@@ -149,6 +156,22 @@ class Facts:
         )
         return replace(self, added=added)
 
+    def with_groups(self, told: Mapping[tuple[str, ...], tuple[Share, Share]]) -> Facts:
+        """The same with the shares that effects which act alike take together, by group."""
+        of = {e: (frozenset(g) - {e}, *shares) for g, shares in told.items() for e in g}
+        added = (
+            replace(
+                a,
+                beside=of[a.id][0],
+                shared=of[a.id][1],
+                shared_in_training=of[a.id][2],
+            )
+            if a.id in of
+            else a
+            for a in self.added
+        )
+        return replace(self, added=tuple(added))
+
     def with_motions(self, told: Mapping[str, tuple[tuple[float, float], float]]) -> Facts:
         """The same with `missing` and `taken_low` of the motion that each effect moves."""
         added = (
@@ -183,8 +206,11 @@ class Decision:
     ----------
     much_left : bool
         Whether names stand beside an error of which they take up less than `Rules.most`.
+    groups : mapping
+        By effect that stands only together with others of the model, those others.
     """
 
     verdict: Verdict
     withdrawn: tuple[Withdrawn, ...] = ()
     much_left: bool = False
+    groups: Mapping[str, frozenset[str]] = field(default_factory=dict)

@@ -7,7 +7,7 @@ from typing import Literal
 
 from .facts import Added, Decision, Facts, Tested, Withdrawn
 from .limits import USUAL, Rules
-from .share import share_of
+from .share import Share, share_of
 
 Grade = Literal["confirmed", "plausible", "alias"]
 _NOT_SHOWN = (
@@ -138,10 +138,12 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
         return Decision("unknown" if left and not facts.small else "adequate")
     stand_ins = frozenset(a.id for a in facts.added if a.finding == "proxy")
     withdrawn = []
+    groups: dict[str, frozenset[str]] = {}
     if left or stand_ins:
         late = frozenset(a.id for a in facts.added if a.late)
         likely = _likely(facts, rules)
-        falling = names - likely - _standing(facts, rules)
+        alone, groups = _standing(facts, rules)
+        falling = names - likely - alone - groups.keys()
         if left:
             nothing = frozenset(a.id for a in facts.added if not _together_low(a, facts) > 0.0)
             withdrawn.append(Withdrawn(nothing - likely - falling, _NOT_TOGETHER, names))
@@ -160,11 +162,15 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
         return Decision("adequate" if facts.small else "unknown", tuple(withdrawn))
     whole = not left and not proxies
     much = left and share_of(*facts.missing) < rules.most
-    return Decision("explained" if whole else "partly_explained", tuple(withdrawn), much)
+    groups = {e: others for e, others in groups.items() if e not in proxies}
+    return Decision("explained" if whole else "partly_explained", tuple(withdrawn), much, groups)
 
 
-def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
+def _standing(facts: Facts, rules: Rules) -> tuple[frozenset[str], dict[str, frozenset[str]]]:
     """Effects whose own share of the error ahead is shown on training and validation data.
+
+    The second are those that have none, with the others of the model that act like them, where
+    the share of all of these together is shown: each does what the others would do in its place.
 
     Evidence grows with the data, whatever small misfit an effect serves; a share does not. It is
     that of the effect beside all others, which were fitted anew without it: what one of them, or
@@ -174,15 +180,32 @@ def _standing(facts: Facts, rules: Rules) -> frozenset[str]:
     moves the same channel, if that is the larger part.
     """
 
-    def worth(a: Added) -> bool:
+    def worth(a: Added, *shares: Share) -> bool:
         much = share_of(*(facts.missing if a.missing is None else a.missing)) < rules.most
         least = rules.taken if much else 0.0
-        return all(s.value > rules.taken and s.low > least for s in (a.own, a.own_in_training))
+        return all(s.value > rules.taken and s.low > least for s in shares)
 
-    shown = [a for a in facts.added if a.named and worth(a)]
-    others = [a for a in facts.added if a not in shown]
-    return frozenset(
-        a.id for a in shown if not any(a.moves & b.moves and _more(b, a) for b in others)
+    named = [a for a in facts.added if a.named]
+    alone = {a.id for a in named if worth(a, a.own, a.own_in_training)}
+    together = {
+        a.id
+        for a in named
+        if a.beside
+        and alone.isdisjoint({a.id, *a.beside})
+        and worth(a, a.shared, a.shared_in_training)
+    }
+    others = [a for a in facts.added if a.id not in alone | together]
+
+    def leads(a: Added, *shares: Share) -> bool:
+        return not any(a.moves & b.moves and _more(b, shares) for b in others)
+
+    return (
+        frozenset(a.id for a in named if a.id in alone and leads(a, a.own, a.own_in_training)),
+        {
+            a.id: a.beside
+            for a in named
+            if a.id in together and leads(a, a.shared, a.shared_in_training)
+        },
     )
 
 
@@ -205,11 +228,10 @@ def _likely(facts: Facts, rules: Rules) -> frozenset[str]:
     return frozenset(a.id for a in facts.added if a.finding == "missing" and a.sure)
 
 
-def _more(one: Added, other: Added) -> bool:
-    """Whether an effect takes more than another on any data."""
-    return (
-        one.own.value > other.own.value or one.own_in_training.value > other.own_in_training.value
-    )
+def _more(one: Added, shares: Sequence[Share]) -> bool:
+    """Whether an effect takes more than others do on validation or on training data."""
+    own = one.own, one.own_in_training
+    return any(a.value > b.value for a, b in zip(own, shares, strict=True))
 
 
 def _together(facts: Facts, rules: Rules) -> bool:

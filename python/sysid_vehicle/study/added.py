@@ -13,7 +13,7 @@ from .._common.text import with_error
 from ..compare import Comparison
 from ..diagnose import Verdicts
 from ..identify import Estimate, Fit
-from ..rules import USUAL, Decision, Grade, Rules, grade, little
+from ..rules import UNKNOWN, USUAL, Decision, Facts, Grade, Rules, Share, grade, little
 from .search import Trail
 
 
@@ -38,6 +38,10 @@ class AddedEffect:
     takes_little : bool
         Of the error on validation data, and of what all that was added takes off it
         (`rules.little`).
+    own, own_in_training : Share
+        Of the error 1 to 5 s ahead that the final model leaves without it, all else fitted anew,
+        what it takes away: on validation and on training data. Unknown where nothing is missing,
+        as nobody asked.
     """
 
     id: str
@@ -49,6 +53,8 @@ class AddedEffect:
     stands_in: str = ""
     grade: Grade = "plausible"
     takes_little: bool = False
+    own: Share = UNKNOWN
+    own_in_training: Share = UNKNOWN
 
     @property
     def name(self) -> str:
@@ -78,7 +84,15 @@ class AddedEffect:
             f"{e.name.split('.')[1]} {with_error(e.value, e.std)} {e.unit}".removesuffix(" 1")
             for e in self.parameters
         )
-        return f"{self.id}: {size}; {self.grade}" + (f"; {self.reserve}" if self.reserve else "")
+        told = (f"{self.id}: {size}", self.grade, self.shared_out, self.reserve)
+        return "; ".join(text for text in told if text)
+
+    @property
+    def shared_out(self) -> str:
+        """Its own shares in words; empty where nobody asked."""
+        pairs = (self.own, "validation"), (self.own_in_training, "training")
+        told = [f"{share} on {data} data" for share, data in pairs if share.known]
+        return f"its own share of the error 1 to 5 s ahead {' and '.join(told)}" if told else ""
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""
@@ -92,6 +106,8 @@ class AddedEffect:
             "stands_in": self.stands_in,
             "grade": self.grade,
             "takes_little": self.takes_little,
+            "own_share": self.own.to_dict(),
+            "own_share_in_training": self.own_in_training.to_dict(),
         }
 
 
@@ -102,6 +118,7 @@ def added_by(
     told: Verdicts,
     alone: Verdicts,
     decision: Decision,
+    facts: Facts,
     shared: Collection[str] = (),
     rules: Rules = USUAL,
 ) -> tuple[AddedEffect, ...]:
@@ -118,17 +135,21 @@ def added_by(
     told, alone : Verdicts
         On each effect, in the light of the whole study, and by itself.
     decision : Decision
+    facts : Facts
+        From which it follows.
     shared : collection of str
         Effects of which nobody knows what each takes of the error: none is sure.
     rules : Rules
     """
     added = []
+    known = {a.id: (a.own, a.own_in_training) for a in facts.added}
     final, ends = fits[-1], (on_test[0].error, on_test[-1].error)
     for (before, after), (poorer, richer) in zip(pairwise(on_test), pairwise(fits), strict=True):
         small = little(ends[0], before.error, after.error, ends[1], rules)
         for name in (e for e in richer.model.effects if e not in poorer.model.effects):
             finding, because = told[name].finding, told[name].because
             others = [e for e in trail.rivals.get(name, ()) if e not in final.model.effects]
+            others = [*sorted(decision.groups.get(name, ())), *others]
             added.append(
                 AddedEffect(
                     name,
@@ -145,6 +166,7 @@ def added_by(
                         takes_little=small or name in shared,
                     ),
                     small,
+                    *known.get(name, (UNKNOWN, UNKNOWN)),
                 )
             )
     return tuple(added)

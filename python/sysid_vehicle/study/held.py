@@ -15,15 +15,14 @@ import numpy as np
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import ErrorChange
-from .horizons import LATERAL, changes, moving_with
+from .horizons import LATERAL, changes
 
 
 def along_alone(one: Fit, other: Fit) -> bool:
     """Whether effects that only one of two models has move the car along it and no other way."""
-    parts = {part.id: part.moved for fit in (one, other) for part in fit.model.parts}
+    parts = {part.id: part for fit in (one, other) for part in fit.model.parts}
     which = set(one.model.effects) ^ set(other.model.effects)
-    moved = {c for e in which for c in moving_with(parts[e])}
-    return bool(moved) and moved.isdisjoint(LATERAL)
+    return bool(which) and all(parts[e].along_alone for e in which)
 
 
 def changes_of(

@@ -22,7 +22,15 @@ from .beyond import Beyond
 from .foretold import foretold
 from .limit import Judging
 from .matters import buried, sufficient
-from .own import own_shares, shown_together, sure_of, together_by_motion
+from .next_steps import SHORT_S
+from .own import (
+    alike,
+    own_shares,
+    shares_of_groups,
+    shown_together,
+    sure_of,
+    together_by_motion,
+)
 from .search import Trail
 from .slow import slow_forces
 from .steps import way
@@ -30,8 +38,6 @@ from .structure import structure
 from .study import Study
 from .validation import at_its_best, beyond_noise_ahead, serving
 from .verdict import facts_of, in_the_light_of
-
-_SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
 
 # What a time limit may leave unknown, in words.
 _RIVALS = "whether something unknown would do in the place of what was added"
@@ -144,7 +150,15 @@ class Judge:
             test=tuple(on_test[f] for f in fits),
             validation=self.test,
             added=added_by(
-                self.trail, fits, [on_test[f] for f in fits], told, alone, decision, shared, rules
+                self.trail,
+                fits,
+                [on_test[f] for f in fits],
+                told,
+                alone,
+                decision,
+                facts,
+                shared,
+                rules,
             ),
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
@@ -225,6 +239,8 @@ class Judge:
         sure = sure_of(fit, sorted(named), test, self.rules, ends) if below else frozenset()
         facts = replace(facts.with_own(shares, unknown, sure), buried=below)
         self.asks.note(unknown, _ALONE)
+        groups = alike(fit, named)
+        facts = facts.with_groups(shares_of_groups(fit, groups, test, ends))
         if explained is None:
             return facts
         low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.outer, self.test))
@@ -259,9 +275,9 @@ def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:
             "likelihood fits the model, and whatever it leaves open, errors 1 to 5 s ahead grow "
             "with it: taken back"
         )
-    if driving.usable_s < _SHORT_S:
+    if driving.usable_s < SHORT_S:
         found.append(
-            f"{driving}: too short to tell many effects apart; record {_SHORT_S:.0f} s or more, "
+            f"{driving}: too short to tell many effects apart; record {SHORT_S:.0f} s or more, "
             "with steps, sweeps and corners near the limit"
         )
         warn(found[-1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from .._common.text import few
@@ -9,9 +10,12 @@ from .matters import USUAL_SIZES
 from .said import disturbance, only_elsewhere, slow, small
 
 if TYPE_CHECKING:
+    from .added import AddedEffect
     from .study import Study
 
+SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
 _SHOWN = 4
+_ASKED = 2  # effects that a next drive is to show
 _MEND = (
     "mend the channels that contradict each other, before anything else: `sysid-vehicle check` "
     "tells delays, scales and places of sensors"
@@ -47,13 +51,37 @@ def _of_names(study: Study) -> list[str]:
                 f"tell {a.id} from {some}: `sysid-vehicle next-drive` designs a drive that "
                 "does, or give what is known of them to the vehicle file"
             )
-    aliases = [a.id for a in study.added if a.stands_in]
+    aliases = [a for a in study.added if a.stands_in]
     if aliases:
         found.append(
-            f"do not take the size of {', '.join(aliases)} for a property of the car: what is "
-            "missing may be something else"
+            f"do not take the size of {', '.join(a.id for a in aliases)} for a property of the "
+            "car: what is missing may be something else"
+        )
+    taken = study.explained
+    if study.verdict == "unknown" and taken is not None and taken.low > 0.0:
+        found.append(
+            "to predict, the final model serves better than the baseline, as a whole and in "
+            "driving like this"
+        )
+    seconds = study.validation.usable_s
+    if aliases and seconds < SHORT_S:
+        found.append(
+            f"validate with longer driving, {SHORT_S:.0f} s or more: {seconds:.2g} s hardly show "
+            "what an effect takes of errors 1 to 5 s ahead"
+        )
+    shown_by = {e.id: e.excited_by for e in study.model.parts}
+    for a in _worth_a_drive(aliases):
+        found.append(
+            f"to find out whether {a.id} is in the car, drive what shows it ({shown_by[a.id]}), or "
+            "give what is known of it to the vehicle file"
         )
     return found
+
+
+def _worth_a_drive(aliases: Sequence[AddedEffect]) -> list[AddedEffect]:
+    """Those that are not shown to be none, the one with the largest own share first."""
+    open_ = [a for a in aliases if a.grade != "alias" and a.own.known and a.own.value > 0.0]
+    return sorted(open_, key=lambda a: -a.own.value)[:_ASKED]
 
 
 def _of_what_is_left(study: Study) -> list[str]:

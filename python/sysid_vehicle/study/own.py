@@ -8,6 +8,7 @@ import numpy as np
 
 from .._common.memo import remembered
 from .._common.threads import before, in_parallel
+from ..effects import Effect
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refit
@@ -52,42 +53,108 @@ def own_shares(
         By effect, on validation and on training data; unknown where a model fails. Effects for
         which there was no time are not in it.
     """
-    late: set[str] = set()
+    each = [(e,) for e in effects]
+    found = _shares(final, each, [(e,) for e in named], test, ends)
+    return {one: both for (one,), both in found.items()}
 
-    def in_time(share: Callable[[str], Share | None], asked: Collection[str]) -> dict[str, Share]:
+
+def shares_of_groups(
+    final: Fit, groups: Sequence[tuple[str, ...]], test: Driving, ends: float = np.inf
+) -> dict[tuple[str, ...], tuple[Share, Share]]:
+    """Find what all effects of a group take off the error 1 to 5 s ahead together.
+
+    As `own_shares`, of the final model without any of them: beside each other neither a drag nor
+    a rolling resistance has a share that is its own.
+
+    Parameters
+    ----------
+    final : Fit
+    groups : sequence of tuple of str
+        As `alike` finds them.
+    test : Driving
+        Validation data.
+    ends : float
+        As for `own_shares`.
+    """
+    return _shares(final, groups, groups, test, ends)
+
+
+def alike(final: Fit, effects: Collection[str]) -> tuple[tuple[str, ...], ...]:
+    """Find groups of effects of a model that act alike, by the catalogue, and move the same motion.
+
+    Parameters
+    ----------
+    final : Fit
+    effects : collection of str
+        Those that may be in a group.
+    """
+    left = [part for part in final.model.parts if part.id in effects]
+    groups = []
+    while left:
+        group, left = left[:1], left[1:]
+        while near := [e for e in left if any(_act_alike(e, one) for one in group)]:
+            group += near
+            left = [e for e in left if e not in near]
+        if len(group) > 1:
+            groups.append(tuple(e.id for e in group))
+    return tuple(groups)
+
+
+def _act_alike(one: Effect, other: Effect) -> bool:
+    named = other.id in one.confounded_with or one.id in other.confounded_with
+    return named and moving_with(one.moved) == moving_with(other.moved)
+
+
+def _shares(
+    final: Fit,
+    asked: Sequence[tuple[str, ...]],
+    named: Collection[tuple[str, ...]],
+    test: Driving,
+    ends: float,
+) -> dict[tuple[str, ...], tuple[Share, Share]]:
+    """Of effects that are taken out together, on validation and on training data."""
+    late: set[tuple[str, ...]] = set()
+
+    def in_time(
+        share: Callable[[tuple[str, ...]], Share | None], asked: Collection[tuple[str, ...]]
+    ) -> dict[tuple[str, ...], Share]:
         told = in_parallel(lambda e: before(ends, lambda: (share(e),), None), asked)
         late.update(e for e, found in zip(asked, told, strict=True) if found is None)
         found = {e: one[0] for e, one in zip(asked, told, strict=True) if one is not None}
         return {e: one for e, one in found.items() if one is not None}
 
-    moved = {part.id: moving_with(part.moved) for part in final.model.parts}
+    parts = {part.id: moving_with(part.moved) for part in final.model.parts}
+    moved = {few: frozenset(c for e in few for c in parts[e]) for few in asked}
 
-    def on_train(effect: str) -> Share | None:
-        fit = _without(final, effect)
+    def on_train(few: tuple[str, ...]) -> Share | None:
+        fit = _without(final, few)
         if fit is None:
             return None
-        return own_share(fit, final, final.driving, AHEAD, channels=moved[effect])
+        return own_share(fit, final, final.driving, AHEAD, channels=moved[few])
 
-    def on_test(effect: str) -> Share:
-        fit = _without(final, effect)
+    def on_test(few: tuple[str, ...]) -> Share:
+        fit = _without(final, few)
         assert fit is not None  # its share of the training data is known
         best, poorer = at_its_best(final, test), at_its_best(fit, test)
-        return own_share(poorer, best, test, AHEAD, channels=moved[effect])
+        return own_share(poorer, best, test, AHEAD, channels=moved[few])
 
-    fitted = in_time(on_train, effects)
-    judged: dict[str, Share] = {}
+    fitted = in_time(on_train, asked)
+    judged: dict[tuple[str, ...], Share] = {}
     if any(fitted[e].low > 0.0 for e in fitted if e in named):
         before(ends, lambda: at_its_best(final, test), None)  # once for all of them
         judged = in_time(on_test, fitted)
-    return {e: (judged.get(e, UNKNOWN), fitted.get(e, UNKNOWN)) for e in effects if e not in late}
+    return {e: (judged.get(e, UNKNOWN), fitted.get(e, UNKNOWN)) for e in asked if e not in late}
 
 
 # Twice the effects of any study so far.
 @remembered(16)
-def _without(final: Fit, effect: str) -> Fit | None:
-    """The final model without an effect, fitted anew under its noise; None where it fails."""
+def _without(final: Fit, effects: tuple[str, ...]) -> Fit | None:
+    """The final model without some effects, fitted anew under its noise; None where it fails."""
+    model = final.model
+    for effect in effects:
+        model = model.drop(effect)
     try:
-        return refit(final.model.drop(effect), final.driving, final.noise)
+        return refit(model, final.driving, final.noise)
     except (NumericalError, np.linalg.LinAlgError):
         return None
 
@@ -110,7 +177,7 @@ def sure_of(
     """
 
     def sure(effect: str) -> bool:
-        poorer = _without(final, effect)
+        poorer = _without(final, (effect,))
         if poorer is None:
             return False
         return gain_in_log_likelihood(poorer, final, test).beyond(rules.interval)
@@ -123,7 +190,8 @@ def shown_together(explained: Beyond, fits: Sequence[Fit], test: Driving) -> flo
     """Find the lower end of the share of the error 1 to 5 s ahead that all effects take together.
 
     Where that of the error itself reaches nothing, as disturbances may do most of it: of what any
-    function of the driving could explain of it, if any is seen to.
+    function of the driving could explain of it, if any is seen to. Of an error that does not fall
+    nothing is taken, whatever other blocks of the driving say of what could be.
 
     Parameters
     ----------
@@ -134,7 +202,7 @@ def shown_together(explained: Beyond, fits: Sequence[Fit], test: Driving) -> flo
     test : Driving
         Validation data.
     """
-    if explained.low > 0.0:
+    if explained.low > 0.0 or not explained.share > 0.0:
         return explained.low
     whole = shares(at_its_best(fits[0], test), at_its_best(fits[-1], test), test).whole
     return whole.low if whole.known else explained.low

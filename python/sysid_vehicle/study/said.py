@@ -37,9 +37,15 @@ def meaning(study: Study) -> str:
     if study.verdict == "unknown" and study.added and study.explained is not None:
         if not study.explained.share > 0.0:
             return f"something is missing; what was added is no sure name: {NONE_GONE}"
+        names = [a.id for a in study.added]
+        if len(names) == 1:
+            return (
+                f"something is missing; {names[0]} takes up {study.explained} of the error 1 to "
+                "5 s ahead, and is no sure name beside what is left"
+            )
         return (
-            f"something is missing; what was added takes up {study.explained} of the error 1 to "
-            "5 s ahead, and is no sure name beside what is left"
+            f"something is missing; {' and '.join(names)} together take up {study.explained} of "
+            "the error 1 to 5 s ahead, and which of them are in the car this driving does not tell"
         )
     if study.verdict == "partly_explained" and study.buried:
         return (

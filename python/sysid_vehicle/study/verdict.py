@@ -69,7 +69,10 @@ def facts_of(
 
 
 def in_the_light_of(decision: Decision, told: Verdicts) -> Verdicts:
-    """Verdicts on every effect, without the names that the decision withdraws."""
+    """Verdicts on every effect, without the names that the decision withdraws.
+
+    Names that stand only together are those of a group.
+    """
     for w in decision.withdrawn:
         told = told.with_reservation(w.effects, w.because, added=w.beside)
-    return told
+    return told.with_groups(decision.groups)

@@ -32,6 +32,20 @@ def test_a_true_effect_keeps_its_value(fits: dict[str, Fit]) -> None:
     assert str(kept).startswith("rolling_resistance keeps its value")
 
 
+def test_what_was_never_felt_has_no_value_that_could_differ(fits: dict[str, Fit]) -> None:
+    """Cut into pieces it would take any, and the others of the effect move against it."""
+    fit = fits["rolling_resistance"]
+
+    def unfelt(*names: str) -> Fit:
+        told = (replace(e, std=np.inf) if e.name in names else e for e in fit.estimates)
+        return replace(fit, estimates=tuple(told))
+
+    found = constancy(unfelt("rolling_resistance.per_speed_spm"))["rolling_resistance"]
+    assert found.degrees == 1
+    assert found.holds
+    assert constancy(unfelt("rolling_resistance.per_speed_spm", ROLLING)) == {}
+
+
 def test_a_proxy_changes_from_drive_to_drive(fits: dict[str, Fit]) -> None:
     fit = fits["head_wind"]
     kept = constancy(fit)["head_wind"]

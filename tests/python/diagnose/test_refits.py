@@ -15,6 +15,7 @@ from sysid_vehicle.diagnose.candidates.refits import (
     is_hidden_by_noise,
     refitted,
 )
+from sysid_vehicle.diagnose.diagnose import _hidden_by_tyres
 from sysid_vehicle.effects import catalogue
 from sysid_vehicle.identify import refit
 from sysid_vehicle.identify.objective import Objective
@@ -91,6 +92,32 @@ def test_a_refit_ends_with_a_round_that_gains_next_to_nothing(
     assert gains[0] > 1.0
     assert (gains[:-1] > 0.05).all()
     assert 0.0 <= gains[-1] < 0.05
+
+
+def test_the_best_of_either_motion_is_refitted(truth: Model, start: Model) -> None:
+    """Lateral effects lead by far, and say nothing of what moves the car along."""
+    hidden = {"steer_lag.time_constant_s": 0.1, "aero_drag.drag_area_m2": 0.12}
+    car = truth.add("steer_lag", "aero_drag").with_values(hidden)
+    fit = identify(start, drive(car, manoeuvres.lap(15.0), seed=3), starts=1)
+    found = diagnose(fit, refits=1).ranking
+    along = [c for c in found if c.effect.along_alone]
+    lateral = [c for c in found if not c.effect.along_alone]
+    assert along[0].statistic < 0.25 * lateral[0].statistic
+    assert along[0].id == "aero_drag"
+    assert along[0].finished
+    assert along[0].fit is not None
+    assert lateral[0].finished
+
+
+def test_what_acts_like_the_best_along_the_car_is_refitted_whatever_it_scores(fit: Fit) -> None:
+    """Beside wrong tyres the score of a mass may be nothing, as it divides side forces too."""
+    ranked = diagnose(fit, refits=0).ranking
+    gain, lag = (next(c for c in ranked if c.id == name) for name in ("force_gain", "steer_lag"))
+    asked = {c.id for c in _hidden_by_tyres(ranked, [lag, gain])}
+    assert asked == {"mass", "aero_drag", "road_grade", "wheel_inertia"}
+    mass = next(c for c in ranked if c.id == "mass")
+    assert "mass" not in {c.id for c in _hidden_by_tyres(ranked, [gain, mass])}
+    assert _hidden_by_tyres(ranked, [lag]) == []
 
 
 def test_of_two_delays_one_may_not_be_there(truth: Model, start: Model) -> None:

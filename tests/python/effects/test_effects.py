@@ -50,6 +50,12 @@ def test_an_effect_says_what_it_is(e: Effect) -> None:
         assert p.one_sided == (p.null_value in (p.lower, p.upper))
 
 
+def test_what_moves_the_car_along_and_no_other_way() -> None:
+    along = {e.id for e in catalogue() if e.along_alone}
+    assert {"aero_drag", "road_grade", "mass"} < along
+    assert {"steer_lag", "imu_lever_arm", "speed_sensor_lever_arm"}.isdisjoint(along)
+
+
 def test_twins_name_each_other_and_needs_are_channels() -> None:
     for e in catalogue():
         assert e.needs

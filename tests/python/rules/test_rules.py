@@ -56,9 +56,8 @@ NUMERICAL = {
     "study/horizons.py": {"AHEAD", "_FEWEST", "_APART", "_LOST"},
     "study/beyond.py": {"_DRAWS"},
     "study/foretold.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
-    "study/judge.py": {"_SHORT_S"},
     "study/limit.py": {"_BASELINE", "_SEARCHED", "_SENSORS", "_STEP"},
-    "study/next_steps.py": {"_SHOWN"},
+    "study/next_steps.py": {"SHORT_S", "_SHOWN", "_ASKED"},
     "study/shares.py": {
         "AHEAD", "_LEAST_APART_S", "_APART", "_DRAWS", "_LONG_S", "_FEW",
         "_VISIBLE", "_LOST", "_LEAST", "_QUANTILES",

@@ -316,3 +316,32 @@ def test_no_name_stands_beside_a_stand_in_that_moves_the_same() -> None:
         assert set(withdrawn(replace(LEFT, added=(MASS, elsewhere)))) == {"aligning_moment"}
     sure = replace(MASS, id="aligning_moment", moves=both, own=larger)
     assert withdrawn(replace(LEFT, added=(MASS, sure))) == {}
+
+
+def test_effects_that_act_alike_stand_together() -> None:
+    """Beside each other neither a drag nor a rolling resistance has a share of its own."""
+    drag = replace(DRAG, own=NONE_OF_IT, own_in_training=NONE_OF_IT)
+    both = (drag, replace(drag, id="rolling_resistance"))
+    groups = {("aero_drag", "rolling_resistance"): (MOST, SOME)}
+    alone = replace(LEFT, added=(MASS, *both))
+    assert set(withdrawn(alone)) == {"aero_drag", "rolling_resistance"}
+    said = verdict(alone.with_groups(groups))
+    assert {e for w in said.withdrawn for e in w.effects} == set()
+    assert said.groups == {
+        "aero_drag": {"rolling_resistance"},
+        "rolling_resistance": {"aero_drag"},
+    }
+    assert said.verdict == "partly_explained"
+    # Their share has to be shown as that of a single one, on all data.
+    for unsure in ((MOST, NONE_OF_IT), (UNKNOWN, MOST)):
+        told = alone.with_groups(dict.fromkeys(groups, unsure))
+        assert verdict(told).groups == {}
+        assert set(withdrawn(told)) == {"aero_drag", "rolling_resistance"}
+    # What has a share of its own stands alone, and what does not beside it is none.
+    one = replace(alone, added=(MASS, DRAG, both[1])).with_groups(groups)
+    assert verdict(one).groups == {}
+    assert set(withdrawn(one)) == {"rolling_resistance"}
+    # Nor do they stand where all that was added is not shown to take anything.
+    nothing = replace(alone, taken_low=-0.1).with_groups(groups)
+    assert verdict(nothing).groups == {}
+    assert verdict(nothing).verdict == "unknown"

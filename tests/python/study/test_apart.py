@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,11 +10,12 @@ import pytest
 from sysid_vehicle import Fit, Log, Model, drive, manoeuvres
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import Share, worse
+from sysid_vehicle.study import own
 from sysid_vehicle.study.apart import apart
-from sysid_vehicle.study.beyond import own_share, taken_of
+from sysid_vehicle.study.beyond import Beyond, own_share, taken_of
 from sysid_vehicle.study.held import along_alone, changes_of
 from sysid_vehicle.study.horizons import LATERAL, changes, moving_with
-from sysid_vehicle.study.own import together_by_motion
+from sysid_vehicle.study.own import shown_together, together_by_motion
 from sysid_vehicle.study.validation import AHEAD, fall_in_error
 
 ALONG = moving_with({"vx_mps"})
@@ -61,8 +63,20 @@ def test_what_one_motion_lacks_says_nothing_of_the_other(
     (before, after), low = told["mass"]
     assert low > 0.0
     assert after < 0.5 * before
-    (before, after), _ = told["steer_lag"]
+    (before, after), low = told["steer_lag"]
     assert after > before
+    assert not low > 0.0
+
+
+def test_of_errors_that_grow_no_share_is_taken(
+    fit: Fit, lanes: Driving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Other blocks of the driving may show a part of what could be explained as explained."""
+    monkeypatch.setattr(own, "shares", lambda *_: SimpleNamespace(whole=Share(1.0, 1.0, 1.0)))
+    grown = Beyond((0.4, 0.5), -0.25, -0.5, 0.1)
+    assert shown_together(grown, [fit, fit], lanes) == grown.low
+    unsure = Beyond((0.4, 0.2), 0.5, -0.1, 0.8)
+    assert shown_together(unsure, [fit, fit], lanes) == 1.0
 
 
 def test_lateral_errors_are_one_figure_beside_an_effect_along_the_car(

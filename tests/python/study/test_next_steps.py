@@ -13,7 +13,16 @@ from sysid_vehicle import Model, Study, drive, identify, improve, manoeuvres
 from sysid_vehicle.diagnose import Omnibus
 from sysid_vehicle.diagnose.unexplained.ceiling import Explainable
 from sysid_vehicle.estimate import Driving
-from sysid_vehicle.rules import Added, ErrorChange, Facts, Share, grade, share_of, verdict
+from sysid_vehicle.rules import (
+    UNKNOWN,
+    Added,
+    ErrorChange,
+    Facts,
+    Share,
+    grade,
+    share_of,
+    verdict,
+)
 from sysid_vehicle.study import AddedEffect
 from sysid_vehicle.study.beyond import Beyond
 from sysid_vehicle.study.disagree import disagreements
@@ -151,6 +160,42 @@ def test_what_is_confounded_is_to_be_told_apart(unknown: Study) -> None:
     assert second.startswith("do not take the size of mass for a property of the car")
 
 
+def test_what_no_name_stands_for_is_told_with_shares_and_a_drive(unknown: Study) -> None:
+    """Together they take most of the error; which of them are in the car nobody knows."""
+    shares = Share(0.3, -0.1, 0.5), Share(0.4, 0.2, 0.6)
+    lag, wind, ratio = (
+        AddedEffect(e, (), 2.0, 1.0, 1e-9, (), "it has no share", grade, own=own)
+        for e, grade, own in (
+            ("steer_lag", "plausible", shares[0]),
+            ("side_wind", "alias", shares[1]),
+            ("steer_ratio", "plausible", UNKNOWN),
+        )
+    )
+    richer = replace(unknown.fit, model=unknown.model.add("steer_lag", "side_wind", "steer_ratio"))
+    found = replace(
+        unknown,
+        added=(lag, wind, ratio),
+        fits=(unknown.fit, richer),
+        explained=Beyond((1.0, 0.2), 0.8, 0.6, 0.9),
+    )
+    names = "steer_lag and side_wind and steer_ratio"
+    assert f"{names} together take up 80 % (60 to 90) of the error 1 to 5 s" in found.meaning
+    assert "steer_lag takes up 80 %" in replace(found, added=(lag,)).meaning
+    assert "its own share of the error 1 to 5 s ahead 30 % (-10 to 50) on validation" in str(lag)
+    assert "own share" not in str(ratio)
+    assert lag.to_dict()["own_share"]["low"] == -0.1
+    said = next_steps(found)
+    assert any("the final model serves better than the baseline" in text for text in said)
+    # What is no stand-in for sure is to be shown by driving, if it may take a share.
+    (drive_it,) = (text for text in said if "to find out whether" in text)
+    assert "steer_lag is in the car, drive what shows it (fast sweeps" in drive_it
+    assert not any("validate with longer driving" in text for text in said)
+    short = replace(found, validation=Driving.of(unknown.validation.logs[0].between(0.0, 4.0)))
+    assert any("20 s or more: 4 s hardly show" in text for text in next_steps(short))
+    nothing = next_steps(replace(found, explained=Beyond((1.0, 0.9), 0.1, -0.1, 0.3)))
+    assert not any("serves better" in text for text in nothing)
+
+
 P = (1e-60, 1e-7, 5e-5, 5e-4, 0.004, 0.02, 0.07, 0.6)
 SQUARES = (0.0, 0.05, 0.5, 1.0, 3.0)
 EFFECTS = ("tyre_load_sensitivity", "steer_lag")
@@ -225,6 +270,8 @@ def said(base: Study, rng: random.Random) -> str:
             a.group,
             because := "it acts alike" if a.finding == "proxy" else gone.get(a.id, ""),
             grade(a.finding, "proxy" if because else a.finding, much_left=decision.much_left),
+            own=a.own,
+            own_in_training=a.own_in_training,
         )
         for a in added
     )

@@ -15,7 +15,7 @@ from sysid_vehicle.identify import refit
 from sysid_vehicle.rules import UNKNOWN, USUAL, Share
 from sysid_vehicle.study import own
 from sysid_vehicle.study.improve import _room
-from sysid_vehicle.study.own import own_shares
+from sysid_vehicle.study.own import alike, own_shares, shares_of_groups
 
 
 def test_what_another_effect_would_do_in_its_place_is_not_its_own(
@@ -33,6 +33,23 @@ def test_what_another_effect_would_do_in_its_place_is_not_its_own(
         assert alone.value > USUAL.taken
         assert alone.low > 0.0
     assert all(shared.value < USUAL.taken for shared in found["head_wind"])
+
+
+def test_effects_that_copy_each_other_have_a_share_together(truth: Model, start: Model) -> None:
+    """At the speeds of one lap a drag and a rolling resistance act alike."""
+    hidden = {"aero_drag.drag_area_m2": 0.5, "rolling_resistance.coefficient": 0.012}
+    car = truth.add("aero_drag", "rolling_resistance").with_values(hidden)
+    train, test = (drive(car, manoeuvres.lap(25.0), seed=seed, rate_hz=50.0) for seed in (3, 13))
+    asked = ("aero_drag", "steer_lag", "rolling_resistance")
+    fit = identify(start.add(*asked), train, starts=1)
+    groups = alike(fit, asked)
+    assert groups == (("aero_drag", "rolling_resistance"),)
+    assert alike(fit, ("aero_drag", "steer_lag")) == ()
+    found = shares_of_groups(fit, groups, Driving.of(test))
+    alone = own_shares(fit, asked, asked, Driving.of(test))
+    for i, together in enumerate(found[groups[0]]):
+        assert together.low > USUAL.taken
+        assert all(together.value > alone[e][i].value + 0.1 for e in groups[0])
 
 
 def test_validation_data_are_asked_only_where_a_name_has_a_share(

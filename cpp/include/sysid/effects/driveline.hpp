@@ -148,7 +148,8 @@ struct DriveYawMoment : Effect {
         .excited_by = "full throttle and braking, straight and in corners",
         .moves = "yaw_rate_radps",
         .needs = "fx_n, vx_mps, yaw_rate_radps",
-        .confounded_with = "limited_slip_differential, locked_differential",
+        .confounded_with =
+            "limited_slip_differential, locked_differential, longitudinal_load_transfer",
         .parameters = {{.name = "arm_m",
                         .unit = "m",
                         .typical = 0.03,

@@ -44,7 +44,9 @@ struct YawInertia : Effect {
         .excited_by = "steering sweeps at 2 Hz and faster, steps",
         .moves = "yaw_rate_radps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "mass, tyre_relaxation, rear_tyre_relaxation, locked_differential",
+        .confounded_with =
+            "mass, tyre_relaxation, front_tyre_relaxation, rear_tyre_relaxation, "
+            "locked_differential",
         .parameters = {{.name = "relative_error",
                         .unit = "1",
                         .typical = 0.25,
@@ -149,7 +151,7 @@ struct LongitudinalLoadTransfer : Effect {
         .excited_by = "braking and accelerating in corners",
         .moves = "yaw_rate_radps, ay_mps2",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "tyre_load_sensitivity, combined_slip, force_split",
+        .confounded_with = "tyre_load_sensitivity, combined_slip, force_split, drive_yaw_moment",
         .parameters = {{.name = "height_error_m",
                         .unit = "m",
                         .typical = 0.12,

@@ -97,7 +97,7 @@ struct OneAxleRelaxation : Effect {
                   .equation = "(sigma_f / v_x) d(alpha_f')/dt + alpha_f' = alpha_f",
                   .moves = "yaw_rate_radps, ay_mps2",
                   .confounded_with =
-                      "tyre_relaxation, rear_tyre_relaxation, steer_lag, steer_delay",
+                      "tyre_relaxation, rear_tyre_relaxation, steer_lag, steer_delay, yaw_inertia",
                   .states = {{"own_slip_front", "rad"}},
                   .breaks = Breaks::kAnswersLate,
               })

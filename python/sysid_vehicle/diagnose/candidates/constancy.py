@@ -8,7 +8,7 @@ the same as Cochran's Q of the pieces' own estimates (Biometrics 1954) with all 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -40,7 +40,7 @@ class Constancy:
         Standard deviation of the value over the pieces, beyond what their noise explains, in sizes
         that matter; the largest of the effect's parameters.
     values : tuple of float
-        Of the first parameter, piece by piece.
+        Of the first parameter that was felt, piece by piece.
     rules : Rules
         By which it holds.
     """
@@ -74,6 +74,9 @@ class Constancy:
 def constancy(fit: Fit, rules: Rules = USUAL) -> dict[str, Constancy]:
     """Test every effect of a fitted model, on what it was fitted to.
 
+    Parameters that are at a bound, or were never felt, have no value that could differ: cut into
+    pieces they would take any, against which the others of the effect move.
+
     Returns
     -------
     dict
@@ -81,7 +84,8 @@ def constancy(fit: Fit, rules: Rules = USUAL) -> dict[str, Constancy]:
         driving that is one short piece tells nothing.
     """
     pieces = _pieces(fit.driving)
-    parts = [e for e in fit.model.parts if e.scanned is None]
+    parts = [_as_felt(e, fit) for e in fit.model.parts if e.scanned is None]
+    parts = [e for e in parts if e.parameters]
     if len(pieces) < 2 or not parts:
         return {}
     evidence = Evidence(fit, fit.driving)
@@ -96,6 +100,12 @@ def constancy(fit: Fit, rules: Rules = USUAL) -> dict[str, Constancy]:
         )
         for part in parts
     }
+
+
+def _as_felt(effect: Effect, fit: Fit) -> Effect:
+    """The effect with those of its parameters that the driving told of."""
+    felt = [p for name, p in effect.named.items() if np.isfinite(fit[name].std)]
+    return replace(effect, parameters=tuple(felt))
 
 
 def _pieces(driving: Driving) -> list[FloatArray]:

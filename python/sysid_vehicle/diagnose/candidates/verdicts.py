@@ -145,6 +145,16 @@ class Verdicts:
         ]
         return Verdicts(tuple(sorted(told, key=lambda v: _ORDER.index(v.finding))))
 
+    def with_groups(self, groups: Mapping[str, Collection[str]]) -> Verdicts:
+        """The same, but these effects are one of a group with others of the model."""
+        told = [
+            replace(v, finding="one of a group", group=(*sorted(groups[v.effect.id]), *v.group))
+            if v.effect.id in groups
+            else v
+            for v in self.all
+        ]
+        return Verdicts(tuple(sorted(told, key=lambda v: _ORDER.index(v.finding))))
+
     def of(self, finding: Finding) -> tuple[EffectVerdict, ...]:
         """All of one kind."""
         return tuple(v for v in self.all if v.finding == finding)
