@@ -20,6 +20,7 @@ _STAMP = re.compile(
     r"(\d{4}-\d\d-\d\d[T ]|\d\d?[./]\d\d?[./]\d{4} )?"
     r"(\d\d?:\d\d:\d\d(?:[.,]\d+)?) ?(Z|[+-]\d\d:?\d\d)?"
 )
+_DAY_S = 86400.0
 _YEAR_LAST = re.compile(r"(\d\d?)[./](\d\d?)[./](\d{4})T(.*)")
 
 
@@ -242,7 +243,7 @@ def seconds_of_stamps(cells: Sequence[str]) -> FloatArray | None:
     """Return ISO 8601 dates with time, or times of day, as seconds since the first; else None.
 
     Of dates with the year last, ``05/03/2026``, the order of day and month is the one in which
-    less time passes.
+    less time passes. Times of day are counted on where the day ends.
 
     Parameters
     ----------
@@ -266,7 +267,18 @@ def seconds_of_stamps(cells: Sequence[str]) -> FloatArray | None:
         return None
     read = [_times(stamps, day_at) for day_at in (0, 1)]
     known = [times for times in read if times is not None]
+    if dated == {True}:
+        known = [_counted_on(times) for times in known]
     return min(known, key=lambda times: float(np.nanmax(times) - np.nanmin(times)), default=None)
+
+
+def _counted_on(seconds: FloatArray) -> FloatArray:
+    """Add a day after each midnight."""
+    result = seconds.copy()
+    there = np.flatnonzero(np.isfinite(seconds))
+    ends = np.diff(seconds[there]) < -0.5 * _DAY_S
+    result[there[1:]] += _DAY_S * np.cumsum(ends)
+    return result
 
 
 def _times(stamps: Sequence[str], day_at: int) -> FloatArray | None:

@@ -90,9 +90,12 @@ def test_dates_with_the_year_last(tmp_path: Path, stamp: str) -> None:
     np.testing.assert_allclose(log["time_s"], np.arange(60) / 100.0)
 
 
-def test_midnight_is_one_day_later_whatever_the_order(tmp_path: Path) -> None:
-    days = [("04/05/2026 23:59:59", k) for k in range(50, 100)]
-    days += [("05/05/2026 00:00:00", k) for k in range(50)]
+@pytest.mark.parametrize(
+    "day", [("04/05/2026 ", "05/05/2026 "), ("5/3/2026 ", "5/4/2026 "), ("", "")]
+)
+def test_midnight_is_one_day_later_whatever_the_order(tmp_path: Path, day: tuple[str, str]) -> None:
+    days = [(day[0] + "23:59:59", k) for k in range(50, 100)]
+    days += [(day[1] + "00:00:00", k) for k in range(50)]
     rows = [f"{day}.{k:02d},20,0.1,2,0.5,0.01" for day, k in days]
     log = read(write(tmp_path, HEADER, *rows))
     np.testing.assert_allclose(log["time_s"], np.arange(100) / 100.0)
