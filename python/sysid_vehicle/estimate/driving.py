@@ -59,11 +59,14 @@ class Driving:
         acceleration stands in for it and is no longer a measurement to predict.
     offsets : tuple of mapping of str to float, optional
         By log, how much parameters of a model differ there from their values, by full name.
+    part : Stretch, optional
+        All that is used of the logs.
     """
 
     logs: tuple[Log, ...]
     force_known: bool
     offsets: tuple[Mapping[str, float], ...] = ()
+    part: Stretch | None = None
 
     @classmethod
     def of(cls, logs: Log | Sequence[Log] | Driving) -> Driving:
@@ -98,14 +101,17 @@ class Driving:
     def each_log(self) -> tuple[Driving, ...]:
         """Its logs one by one, with the offsets that they have."""
         offsets = self.offsets or ({},) * len(self.logs)
+        used = range(len(self.logs)) if self.part is None else (self.part.log,)
+        part = None if self.part is None else Stretch(0, self.part.where)
         return tuple(
-            replace(self, logs=(log,), offsets=(own,))
-            for log, own in zip(self.logs, offsets, strict=True)
+            replace(self, logs=(self.logs[i],), offsets=(offsets[i],), part=part) for i in used
         )
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
         """The usable stretches, in the order in which the core's results come."""
+        if self.part is not None:
+            return (self.part,)
         return tuple(
             Stretch(i, where) for i, log in enumerate(self.logs) for where in log.stretches()
         )
@@ -118,10 +124,10 @@ class Driving:
         return tuple(map(Span, [0, *ends[:-1]], ends, rates))
 
     def only(self, stretch: Stretch) -> Driving:
-        """One stretch, or a part of one, alone."""
-        alone = replace(self)
-        vars(alone)["stretches"] = (stretch,)
-        return alone
+        """One stretch, or a part of one, alone, with the offsets of its log."""
+        own = self.offsets and (self.offsets[stretch.log],)
+        log = self.logs[stretch.log]
+        return replace(self, logs=(log,), offsets=own, part=Stretch(0, stretch.where))
 
     def channel(self, name: str) -> FloatArray:
         """A channel over all stretches; NaN throughout where a log lacks it."""

@@ -25,6 +25,9 @@ _SCATTER_S = 0.15
 _APART_S = 0.3
 _DRIFT_S = 0.6  # over the log, where a constant delay mends too little
 _CLEAR = 6.0  # deviations of single lags
+# Of speed times yaw rate, that the lateral speed changes by beside the path of the rear axle: in a
+# slide the driver steers against the turn, and steering and yaw rate tell no clock.
+_SLIDES = 0.3
 _UNDERSTEER_MPS2 = 1400.0  # square of the speed at which a usual car steers twice as much
 
 
@@ -81,14 +84,15 @@ def _lags_over_time(m: Motion) -> FloatArray:
         return none
     c = m.channels
     asked = c["steer_rad"] * c["vx_mps"] / (1.0 + c["vx_mps"] ** 2 / _UNDERSTEER_MPS2)
-    steer, turn, speed = (
+    steer, turn, speed, felt = (
         v[: count * every].reshape(count, every).mean(axis=1)
-        for v in (asked, c["yaw_rate_radps"], c["vx_mps"])
+        for v in (asked, c["yaw_rate_radps"], c["vx_mps"], c["ay_mps2"])
     )
     found = []
     for start in range(reach, count - width - reach + 1, round(_EVERY_S * rate)):
         rows = slice(start, start + width)
-        if float(np.std(speed[rows] * turn[rows])) < _CORNERS_MPS2:
+        bend = speed[rows] * turn[rows]
+        if float(np.std(bend)) < _CORNERS_MPS2 or _slides(felt[rows], bend, turn[rows]):
             continue
         alike = _correlations(steer[start - reach : start + width + reach], turn[rows])
         best = float(alike.max())
@@ -103,6 +107,14 @@ def _lags_over_time(m: Motion) -> FloatArray:
             continue
         found.append((m.time_s[(start + width // 2) * every], lag))
     return np.array(found) if found else none
+
+
+def _slides(felt: FloatArray, bend: FloatArray, turn: FloatArray) -> bool:
+    """Whether the lateral speed changes by more than the yaw rate makes it, ``vy = l r``."""
+    slip = felt - bend
+    columns = np.column_stack([np.gradient(turn), np.ones_like(turn)])
+    rest = slip - columns @ np.linalg.lstsq(columns, slip, rcond=None)[0]
+    return float(np.std(rest)) > _SLIDES * float(np.std(bend))
 
 
 def _correlations(longer: FloatArray, turn: FloatArray) -> FloatArray:

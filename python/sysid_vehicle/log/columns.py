@@ -16,7 +16,12 @@ from .grid import at
 
 _SHOWN_NAMES = 20
 _LARGEST = 1e12  # in any channel's unit: nothing that a sensor of a car measures
-_STAMP = re.compile(r"(\d{4}-\d\d-\d\d[T ])?(\d\d?:\d\d:\d\d(?:[.,]\d+)?) ?(Z|[+-]\d\d:?\d\d)?")
+_STAMP = re.compile(
+    r"(\d{4}-\d\d-\d\d[T ]|\d\d?[./]\d\d?[./]\d{4} )?"
+    r"(\d\d?:\d\d:\d\d(?:[.,]\d+)?) ?(Z|[+-]\d\d:?\d\d)?"
+)
+_DAY_S = 86400.0
+_YEAR_LAST = re.compile(r"(\d\d?)[./](\d\d?)[./](\d{4})T(.*)")
 
 
 class Columns(Protocol):
@@ -237,6 +242,9 @@ def _seconds(span: np.ndarray) -> FloatArray:
 def seconds_of_stamps(cells: Sequence[str]) -> FloatArray | None:
     """Return ISO 8601 dates with time, or times of day, as seconds since the first; else None.
 
+    Of dates with the year last, ``05/03/2026``, the order of day and month is the one in which
+    less time passes. Times of day are counted on where the day ends.
+
     Parameters
     ----------
     cells : sequence of str
@@ -257,9 +265,35 @@ def seconds_of_stamps(cells: Sequence[str]) -> FloatArray | None:
         stamps.append((day or "1970-01-01T").replace(" ", "T") + clock)
     if len(zones) != 1 or len(dated) != 1:
         return None
+    read = [_times(stamps, day_at) for day_at in (0, 1)]
+    known = [times for times in read if times is not None]
+    if dated == {True}:
+        known = [_counted_on(times) for times in known]
+    return min(known, key=lambda times: float(np.nanmax(times) - np.nanmin(times)), default=None)
+
+
+def _counted_on(seconds: FloatArray) -> FloatArray:
+    """Add a day after each midnight."""
+    result = seconds.copy()
+    there = np.flatnonzero(np.isfinite(seconds))
+    ends = np.diff(seconds[there]) < -0.5 * _DAY_S
+    result[there[1:]] += _DAY_S * np.cumsum(ends)
+    return result
+
+
+def _times(stamps: Sequence[str], day_at: int) -> FloatArray | None:
+    """Seconds since the first stamp, `day_at` the place of the day in dates with the year last."""
+
+    def iso(stamp: str) -> str:
+        parts = _YEAR_LAST.fullmatch(stamp)
+        if parts is None:
+            return stamp
+        day, month = parts[1 + day_at].zfill(2), parts[2 - day_at].zfill(2)
+        return f"{parts[3]}-{month}-{day}T{parts[4]}"
+
     try:
-        times = np.array(stamps, dtype="datetime64[ns]")
+        times = np.array([iso(stamp) for stamp in stamps], dtype="datetime64[ns]")
     except ValueError:
         return None
     known = times[~np.isnat(times)]
-    return _seconds(times - known[0])
+    return _seconds(times - known[0]) if known.size else None

@@ -58,6 +58,9 @@ _SLIDE_STD = 0.35
 _WHEELBASE_M, _WHEELBASE_STD = 2.9, 0.45
 _UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003
 _NOT_A_WHEELBASE = 3.5
+# Change of the lateral speed over a window, and sideslip, that a car has which does not slide; and
+# the share of windows that must be left to tell of the steering.
+_GRIP_MPS2, _GRIP_RAD, _GRIP_SHARE = 2.5, 0.15, 0.2
 _MODEL_CAR_M = 0.1  # the shortest wheelbase of a car on a scale, 1:24
 _LEAST_OFFSET_RAD = 1e-6  # a steering angle that stays at zero has no size
 
@@ -150,10 +153,12 @@ def _check_laws(drive: Drive) -> tuple[list[Contradiction], list[Contradiction]]
     steer = [] if clock else _check_steer(drive)
     if "vy_mps" in channels:
         _check_sliding(drive)
-    if "ax_mps2" in channels:
-        check_longitudinal(drive)
-    if "fx_n" in channels:
-        check_force(drive)
+    # Without the lateral speed nothing tells what a slide takes from the speed.
+    driven = drive if "vy_mps" in channels else _gripping(drive)
+    if driven is not None and "ax_mps2" in channels:
+        check_longitudinal(driven)
+    if driven is not None and "fx_n" in channels:
+        check_force(driven)
     return clock, steer
 
 
@@ -222,14 +227,17 @@ def _check_steer(drive: Drive) -> list[Contradiction]:
     curvature, steer = drive.mean(c["yaw_rate_radps"] / speed), drive.mean(c["steer_rad"])
     if size_of(ay) < EXCITED:
         return []
-    gentle = np.abs(ay) < LINEAR_MPS2
+    grip = _in_grip(drive)
+    if not _enough(grip):
+        return []
+    gentle = grip & (np.abs(ay) < LINEAR_MPS2)
     if (
         np.count_nonzero(gentle) > max(_MIN_WINDOWS, 0.2 * ay.size)
         and size_of(ay[gentle]) > EXCITED
     ):
         rows = gentle
     else:
-        rows = np.ones(ay.size, dtype=bool)
+        rows = grip
     yaw = drive.change(c["yaw_rate_radps"])
     columns = [curvature[rows], yaw[rows], np.ones(np.count_nonzero(rows))]
     # On a circle of one radius only a small offset keeps the slope from being anything.
@@ -277,6 +285,31 @@ def _check_steer(drive: Drive) -> list[Contradiction]:
         f"ratio in the channel map"
     )
     raise Implausible("steer_rad", f"{told}; {what}")
+
+
+def _in_grip(drive: Drive) -> np.ndarray:
+    """Windows in which the car does not slide: there the driver may steer against the turn."""
+    c = drive.motion.channels
+    slides = drive.mean(c["ay_mps2"]) - drive.mean(c["vx_mps"] * c["yaw_rate_radps"])
+    grip: np.ndarray = np.abs(slides) < _GRIP_MPS2
+    if "vy_mps" in c:
+        speed = np.maximum(np.abs(drive.mean(c["vx_mps"])), 1.0)
+        grip &= np.abs(drive.mean(c["vy_mps"])) < _GRIP_RAD * speed
+    return grip
+
+
+def _enough(grip: np.ndarray) -> bool:
+    return bool(np.count_nonzero(grip) >= max(_MIN_WINDOWS, _GRIP_SHARE * grip.size))
+
+
+def _gripping(drive: Drive) -> Drive | None:
+    """The windows without a slide; None where they are too few."""
+    grip = _in_grip(drive)
+    if not _enough(grip):
+        return None
+    rows = drive.rows.copy()
+    rows[drive.rows] = grip
+    return Drive(drive.motion, rows)
 
 
 def _check_sliding(drive: Drive) -> None:

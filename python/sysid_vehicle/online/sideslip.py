@@ -10,12 +10,13 @@ import numpy as np
 from .. import _core
 from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput, warn
+from ..estimate.inputs import white_noise_std
 from ..log import Log
 from ..model import vehicle_data
 from ..tyre import Tyre
 from ..vehicle import Vehicle
 from .sideslip_results import SideslipRun
-from .sideslip_settings import SideslipSettings
+from .sideslip_settings import NOISE_BLOCK, SideslipSettings
 
 #: Kinds of observers, with what each is.
 KINDS: Mapping[str, str] = {
@@ -200,10 +201,15 @@ def run_over(log: Log, observer: SideslipObserver, settings: SideslipSettings) -
     sensors = np.column_stack([log[name] for name in _SENSORS])
     dt = np.full(log.n, 1.0 / log.rate_hz)
     found = SideslipEstimate._make(observer.run(dt, sensors).T)
-    true_beta = np.arctan2(log["vy_mps"], log["vx_mps"]) if log.has("vy_mps") else None
+    true_beta = true_std = None
+    if log.has("vy_mps"):
+        true_beta = np.arctan2(log["vy_mps"], log["vx_mps"])
+        across = white_noise_std(log["vy_mps"], NOISE_BLOCK)
+        true_std = across / np.maximum(np.hypot(log["vx_mps"], log["vy_mps"]), 1.0)
     return SideslipRun(
         observer.kind, observer.vehicle, log.name, settings, log["time_s"], log["ay_mps2"],
         true_beta,
+        true_std,
         **{name: np.ascontiguousarray(column) for name, column in found._asdict().items()},
     )  # fmt: skip
 

@@ -28,6 +28,10 @@ _LEARNT = (
     "friction_time_s", "relaxation_m", "relaxation_std", "error_curve", "error_slip_rad",
     "yaw_rate_radps", "ay_mps2",
 )  # fmt: skip
+_MEAN_S = 1.0
+# Settings lie about those at the start, within a factor e; errors of the tyres last for a corner,
+# so that so many seconds of a drive tell of them once.
+_SPREAD, _LASTS_S = 1.0, 10.0
 _FIRST_STEP, _WIDEN, _NARROW = 0.7, 1.15, 0.96  # of the logarithms
 
 
@@ -42,7 +46,7 @@ class SideslipCalibration(Told):
     before, after : SideslipRun
         The drive with the settings at the start and with these; their error is in-sample.
     score_before, score_after : float
-        Mean log density of the measured sideslip [1 / sample].
+        Mean log density of the measured sideslip, of a sample and of the mean over a second.
     """
 
     settings: SideslipSettings
@@ -52,7 +56,7 @@ class SideslipCalibration(Told):
     score_after: float
 
     def __str__(self) -> str:
-        score = f"{self.score_before:.3f} to {self.score_after:.3f} per sample"
+        score = f"{self.score_before:.3f} to {self.score_after:.3f}"
         lines = [f"{self.after.log_name}: log density of the sideslip {score}"]
         for name, run in (("before", self.before), ("after", self.after)):
             e = run.error()
@@ -80,8 +84,10 @@ def calibrate_sideslip(
 
     The observer runs without ``vy_mps``; its settings are those under which the measured sideslip
     has the highest density, which rewards small errors and an honest band alike (the logarithmic
-    score is proper: Gneiting & Raftery, JASA 2007). The search is an evolution strategy with one
-    parent and one child (Rechenberg, 1973), over the logarithms of the settings.
+    score is proper: Gneiting & Raftery, JASA 2007), by single samples and by means over a second.
+    The white noise of the measured sideslip is part of that density, and settings lie about those
+    at the start. The search is an evolution strategy with one parent and one child (Rechenberg,
+    1973), over the logarithms of the settings.
 
     Parameters
     ----------
@@ -113,12 +119,14 @@ def calibrate_sideslip(
     names = list(learnt)
     rng = generator(seed)
 
+    x = begin = np.log([start[name] for name in names])
+
     def tried(x: FloatArray) -> tuple[float, SideslipRun]:
         changed = dict(zip(names, (float(v) for v in np.exp(x)), strict=True))
         run = estimate_sideslip(vehicle, log, kind=kind, settings=start.replace(**changed))
-        return _score(run), run
+        far = 0.5 * float(np.sum((x - begin) ** 2)) / _SPREAD**2
+        return _score(run) - far * _LASTS_S / max(log.duration_s, _LASTS_S), run
 
-    x = np.log([start[name] for name in names])
     steps = np.full(len(names), _FIRST_STEP)
     score_before, before = tried(x)
     score, after = score_before, before
@@ -136,11 +144,29 @@ def calibrate_sideslip(
 
 
 def _score(run: SideslipRun) -> float:
+    """Log density of the measured sideslip by single samples, and by means over a second.
+
+    An estimate is not to answer for the noise of what it is compared with; where that is larger
+    than its error, the means show the error, which lasts, while the noise does not.
+    """
     assert run.true_beta_rad is not None
+    assert run.true_beta_std_rad is not None
     known = np.isfinite(run.true_beta_rad) & (run.mode != 1)
-    std = run.beta_std_rad[known]
-    off = (run.beta_rad - run.true_beta_rad)[known] / std
-    return float(np.mean(-0.5 * off**2 - np.log(std)) - 0.5 * math.log(2.0 * math.pi))
+    off = (run.beta_rad - run.true_beta_rad)[known]
+    std, noise = run.beta_std_rad[known], run.true_beta_std_rad[known]
+    _, second, count = np.unique(
+        np.floor(run.time_s[known] / _MEAN_S), return_inverse=True, return_counts=True
+    )
+
+    def mean(values: FloatArray) -> FloatArray:
+        return np.asarray(np.bincount(second, values) / count)
+
+    slow = _log_density(mean(off), np.hypot(mean(std), np.sqrt(mean(noise**2) / count)))
+    return _log_density(off, np.hypot(std, noise)) + slow
+
+
+def _log_density(off: FloatArray, std: FloatArray) -> float:
+    return float(np.mean(-0.5 * (off / std) ** 2 - np.log(std)) - 0.5 * math.log(2.0 * math.pi))
 
 
 def fitted_vehicle(fit: Fit) -> Vehicle:

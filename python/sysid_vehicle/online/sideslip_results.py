@@ -31,7 +31,10 @@ class SideslipError:
     rms_deg, max_deg : float
         Size of the error.
     covered : float
-        Share of samples whose true sideslip lies in the band of 2 standard deviations.
+        Share of samples whose true sideslip lies in the band of 2 standard deviations, of the
+        estimate and of the noise of the measured sideslip together.
+    noise_deg : float
+        What the noise of the measured sideslip makes of the rms.
     bands : tuple of (low, high, rms_deg, samples)
         Error by size of the lateral acceleration [m/s2].
     """
@@ -40,11 +43,13 @@ class SideslipError:
     max_deg: float
     covered: float
     bands: tuple[tuple[float, float, float, int], ...]
+    noise_deg: float = 0.0
 
     def __str__(self) -> str:
+        noise = f", {self.noise_deg:.3f} of it noise of the measured one" if self.noise_deg else ""
         rows = [[f"{a:g} .. {b:g}", f"{rms:.3f}", str(n)] for a, b, rms, n in self.bands]
         return (
-            f"error: {self.rms_deg:.3f} deg rms, {self.max_deg:.2f} deg at most; "
+            f"error: {self.rms_deg:.3f} deg rms{noise}, {self.max_deg:.2f} deg at most; "
             f"{100.0 * self.covered:.1f} % of samples inside 2 sigma\n"
             + text_table(["|a_y| [m/s2]", "rms [deg]", "samples"], rows)
         )
@@ -62,6 +67,8 @@ class SideslipRun(Told):
         Of the log.
     true_beta_rad : ndarray or None
         Sideslip from the log's own ``vy_mps``, which the observer did not see.
+    true_beta_std_rad : ndarray or None
+        The white noise of that.
     beta_rad, beta_std_rad : ndarray
         Sideslip and its standard deviation.
     vx_mps, yaw_rate_radps, fyf_n, fyr_n, fx_n : ndarray
@@ -81,6 +88,7 @@ class SideslipRun(Told):
     time_s: FloatArray
     ay_mps2: FloatArray
     true_beta_rad: FloatArray | None
+    true_beta_std_rad: FloatArray | None
     beta_rad: FloatArray
     beta_std_rad: FloatArray
     vx_mps: FloatArray
@@ -105,11 +113,19 @@ class SideslipRun(Told):
         return self.vx_mps * np.tan(self.beta_rad)
 
     def error(self, true_beta_rad: FloatArray | None = None) -> SideslipError | None:
-        """Compare with the truth; with that of the log, or None, if there is none."""
+        """Compare with the truth while the car runs; with that of the log, or None, if none is.
+
+        What is measured has noise, which the band of an estimate does not hold; a truth that is
+        given is taken as exact.
+        """
+        white = self.true_beta_std_rad if true_beta_rad is None else None
         truth = true_beta_rad if true_beta_rad is not None else self.true_beta_rad
         if truth is None:
             return None
-        known = np.isfinite(truth)
+        known = np.isfinite(truth) & (self.mode != 1)
+        if not known.any():
+            return None
+        noise = np.zeros(np.count_nonzero(known)) if white is None else white[known]
         off = (self.beta_rad - truth)[known]
         degrees, size = np.degrees(off), np.abs(self.ay_mps2[known])
         bands = []
@@ -121,8 +137,9 @@ class SideslipRun(Told):
         return SideslipError(
             float(np.sqrt(np.mean(degrees**2))),
             float(np.abs(degrees).max()),
-            float(np.mean(np.abs(off) <= 2.0 * self.beta_std_rad[known])),
+            float(np.mean(np.abs(off) <= 2.0 * np.hypot(self.beta_std_rad[known], noise))),
             tuple(bands),
+            float(np.degrees(np.sqrt(np.mean(noise**2)))),
         )
 
     def __str__(self) -> str:
@@ -169,6 +186,7 @@ class SideslipRun(Told):
             if found is None
             else {
                 "rms_deg": found.rms_deg,
+                "noise_deg": found.noise_deg,
                 "max_deg": found.max_deg,
                 "inside_two_sigma": found.covered,
                 "by_ay_mps2": [

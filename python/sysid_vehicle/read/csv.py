@@ -15,12 +15,17 @@ from .formats import read_text_table
 from .table import BadCell, Table
 from .units import is_unit
 
+_LAST_ROWS = 20  # that tell how many cells a row has
+_FEWEST_CELLS = 3
+_LONGEST_PREAMBLE = 100
+
 
 def read_table(path: str | Path) -> Table:
     """Read a CSV file whose first line names the columns (comma, semicolon or tab between).
 
     Lines that begin with ``#`` are comments; where only they come before the numbers the last of
-    them names the columns. A second line of units is kept with the columns.
+    them names the columns. So are lines of another form before the one with the names. A second
+    line of units is kept with the columns.
 
     Raises
     ------
@@ -73,10 +78,39 @@ def _split(text: str) -> tuple[str, str, int]:
         numbers = all(is_number(cell) for cell in header.split(delimiter) if cell.strip())
         if numbers and header.strip() and named.count(delimiter) == header.count(delimiter):
             header, at = named, at - 1
+    ahead = _preamble(lines[at:])
+    header, at = lines[at + ahead] if ahead else header, at + ahead
     rest = lines[at + 1 :]
     if any(line.startswith("#") for line in rest):
         rest = ["" if line.startswith("#") else line for line in rest]
     return header, "\n".join(rest), at + 2
+
+
+def _preamble(lines: list[str]) -> int:
+    """Lines about the log before the one that names the columns; 0 where that is the first.
+
+    The names have as many cells as the rows at the end of the file, and are no numbers.
+    """
+    last = [line for line in lines[-_LAST_ROWS:] if line.strip()]
+    if len(lines) < 2 * _LAST_ROWS or not last:
+        return 0
+    for delimiter in ";\t,":  # a comma between others is one of decimals
+        widths = {len(_cells(line, delimiter)) for line in last}
+        width = min(widths)
+        if len(widths) > 1 or width < _FEWEST_CELLS:
+            continue
+        for k, line in enumerate(lines[:_LONGEST_PREAMBLE]):
+            named = _cells(line, delimiter)
+            if len(named) == width and not any(map(is_number, named)):
+                return k
+    return 0
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=delimiter), [])
+    except csv.Error:  # is told of where the rows are read
+        return []
 
 
 def _units_row(

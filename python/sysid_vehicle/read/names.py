@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 
-from .units import FACTORS, plain, states_nothing
+from .units import FACTORS, plain, states_nothing, unit_at_end
 
 # Of the car, and not of a tyre.
 _SIDESLIP = (
@@ -17,38 +18,46 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
     "time_s": (
         r"^time( s)?$",
         r"^(t|zeit|(time ?)?stamps?( s| sec\w*)?|times?|tout|utc time)$",
+        r"^(temps|tempo|tiempo|tijd|tid|時間|時刻|时间)$",
         r"\btime\b|^(header )?stamp\b|^(sec(ond)?s|elapsed|epoch)\b",
     ),
     "vx_mps": (
         r"^v ?x( mps)?$",
         r"twist linear x$|(long\w*|forward) (speed|vel\w*)|(speed|vel\w*) (x|long\w*)$",
         r"(vehicle|ground|corr\w*|gps|car|veh) (speed|vel\w*)|^v (veh|car|ego)|v fzg",
-        r"^(speed|velocity|vel|geschwindigkeit|v)( kmh| kph| mps| mph)?$",
+        r"^(speed|velocity|vel|geschwindigkeit|v)$",
         r"\b(speed|velocity|geschwindigkeit)\b",
+        r"^(vitesse|velocita|velocidade?|snelheid|hastighet)\b|車速|车速",
     ),
     "vy_mps": (
         r"^v ?y( mps)?$",
         r"twist linear y$|lat\w* (speed|vel\w*)|(speed|vel\w*) (y|lat\w*)$|quergeschw\w*",
+        r"(vitesse|velocita|velocidade?) (lat\w*|trans\w*)",
         _SIDESLIP,
     ),
     "yaw_rate_radps": (
         r"yaw ?rate|yaw ?vel\w*|gier ?(rate|geschw\w*)",
         r"angular velocity z$|gyro\w* (z|yaw)|twist angular z$|psi ?(p|dot|rate)$",
-        r"^(w|omega|rate|gyro|ang vel) ?z$|\byaw\b.*\b(dps|radps|degps)\b",
+        r"^(w|omega|rate|gyro|ang vel) ?z$|\bgyro z\b|\byaw\b.*\b(dps|radps|degps)\b",
+        r"\b(lacet|imbardata|guinada)\b|^gier|girhastighet|ヨーレート|横摆角速度",
     ),
     "ax_mps2": (
         r"^a ?x( mps2)?$|acc ?x$|x acc\w*$",
         r"long\w* (acc\w*|g\b)|acc\w* (x|long\w*)|g (force )?(long|x)\w*",
-        r"inline acc\w*|laengsbeschl\w*",
+        r"inline acc\w*|laengsbeschl\w*|langsversnelling",
+        r"^ace?l\w* lon\w*|^acc?el\w* lon\w*|前後(加速度|g)|纵向加速度",
     ),
     "ay_mps2": (
         r"^a ?y( mps2)?$|acc ?y$|y acc\w*$",
         r"lat\w* (acc\w*|g\b)|acc\w* (y|lat\w*)|g (force )?(lat|y)\w*|querbeschl\w*",
+        r"^ace?l\w* (lat|trans)\w*|^acc?el\w* trans\w*|dwarsversnelling",
+        r"横(加速度|g)|(侧|横)向加速度",
     ),
     "steer_rad": (
         r"road ?wheel angle|^steer rad$|front wheel angle",
         r"steer\w* ?(wheel )?ang\w*|lenk(rad)?winkel|\bswa\b|str\w* ?whl ?ang\w*|hand ?wheel",
         r"\b(steer|steering|steered|delta)\b",
+        r"\b(volant|volante|sterzo|braquage)\b|stuurhoek|rattvinkel|操舵角|ハンドル角|舵角|方向盘转角",
     ),
     "fx_n": (
         r"^f ?x( n)?$",
@@ -57,7 +66,8 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
 }
 _REFUSED: dict[str, str] = {
     "time_s": r"\b(lap|run|delta|remaining|sector)\b",
-    "vx_mps": r"\b(wheel|whl|engine|rpm|fl|fr|rl|rr|lat\w*|vert\w*|wind|angular|steer\w*|y|z)\b",
+    "vx_mps": r"\b(wheel|whl|engine|rpm|fl|fr|rl|rr|lat\w*|vert\w*|wind|angular|steer\w*|y|z"
+    r"|trans\w*|lacet|imbardata|guinada|moteur|motore?|roues?|ruot[ae]|rueda|roda|vento?|viento)\b",
     "vy_mps": r"\b(angular|wind|acc\w*)\b",
     "yaw_rate_radps": r"\b(acc\w*|target|ref\w*|covariance)\b",
     "ax_mps2": r"\b(yaw|lat\w*|vert\w*|angular|covariance|target)\b",
@@ -77,10 +87,18 @@ _SI = {
 }
 
 
+_UMLAUTS = {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"}
+
+
 def words(name: str) -> str:
-    """Return a name in plain words: ``ESP_YawRate.z`` as ``esp yaw rate z``."""
+    """Return a name in plain words, without accents: ``ESP_YawRate.z`` as ``esp yaw rate z``."""
     apart = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name)
-    return " ".join(re.sub(r"[^A-Za-z0-9]+", " ", apart).lower().split())
+    for letter, plainly in _UMLAUTS.items():
+        apart = apart.replace(letter, plainly)
+    marks = unicodedata.normalize("NFKD", apart)
+    bare = "".join(c for c in marks if not "\u0300" <= c <= "\u036f")
+    bare = unicodedata.normalize("NFC", bare)
+    return " ".join(re.sub(r"[\W_]+", " ", bare).lower().split())
 
 
 def rank(name: str, unit: str, channel: str) -> float:
@@ -91,8 +109,16 @@ def rank(name: str, unit: str, channel: str) -> float:
     if re.search(_REFUSED[channel], text):
         return 0.0
     patterns = _PATTERNS[channel]
-    score = next(
-        (1.0 + len(patterns) - k for k, p in enumerate(patterns) if re.search(p, text)), 0.0
+    # As it is, and without a unit at its end: vx_kmh is one of vx.
+    forms = (text, words(unit_at_end(name, si_unit(channel, name))[0]))
+    score = max(
+        (
+            1.0 + len(patterns) - k
+            for k, p in enumerate(patterns)
+            for form in forms
+            if re.search(p, form)
+        ),
+        default=0.0,
     )
     if score == 0.0 or not unit or states_nothing(unit):
         return score

@@ -16,7 +16,7 @@ import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
 from ..log import times_wheelbase
-from ..log.laws import LINEAR_MPS2, cosine
+from ..log.laws import LINEAR_MPS2, cosine, fit
 from ..log.motion import Windows
 from ..vehicle import GRAVITY_MPS2
 from .sideslip import against_the_rear_axle, usual_sideslip
@@ -112,7 +112,7 @@ def sideways(
     angle : bool
         Whether the column is the angle.
     """
-    drive = _Windows(time_s, columns, _SHORT_S)
+    drive, longer = _Windows(time_s, columns, _SHORT_S), _Windows(time_s, columns)
     moves = drive.has("vx_mps", "yaw_rate_radps")
     column = drive.mean("vy_mps")
     usual, speed, yaw, rows = np.array(_SIDESLIP), column, column, np.ones(len(column), bool)
@@ -125,17 +125,38 @@ def sideways(
     if angle:
         said.append("sideslip angle: the lateral speed is vx_mps tan(angle)")
     if factor is None:
-        factor = abs(factors.get("vx_mps", 1.0))
+        told = None if angle or not moves else _lateral_unit(longer, factors)
+        factor = abs(factors.get("vx_mps", 1.0)) if told is None else told
         if angle:
             ratio = _large(column[rows]) / _large(usual)
             factor = min((1.0, _DEG), key=lambda f: abs(math.log(max(f * ratio, 1e-9))))
         if factor != 1.0:
-            said.append("unit found by its size" if angle else "unit as that of vx_mps")
+            by_law = "unit found by the laws of motion" if told else "unit as that of vx_mps"
+            said.append("unit found by its size" if angle else by_law)
     lateral = factor * column * (speed if angle else 1.0)
     if moves and against_the_rear_axle(lateral[rows], speed[rows], yaw[rows], 0.5 * _SHORT_S):
         factor = -factor
         said.append("turned round: it moves against the path of the rear axle")
     return factor, "; ".join(said)
+
+
+def _lateral_unit(drive: _Windows, factors: Mapping[str, float]) -> float | None:
+    """The factor by which a lateral speed changes as ``a_y - v_x r`` asks; None where few do."""
+    if not drive.has("ay_mps2"):
+        return None
+    turn = factors["vx_mps"] * factors["yaw_rate_radps"] * drive.mean("vx_mps", "yaw_rate_radps")
+    # The small difference of two large readings, each with a scale and a lever arm of its own.
+    asked = factors["ay_mps2"] * drive.mean("ay_mps2") - turn
+    spin = factors["yaw_rate_radps"] * drive.change("yaw_rate_radps")
+    change = drive.change("vy_mps")
+    # In the unit of the column, whatever it is, the terms beside may be as large.
+    unit = _slope(change, asked)
+    columns = [asked, turn, spin, np.ones(turn.size)]
+    found = fit(change, columns, [np.inf, 0.06 * unit, unit, np.inf])
+    if found.coherence < _FOLLOWS or not found.coefficients[0]:
+        return None
+    ratio = abs(float(found.coefficients[0]))
+    return min(_TRIED["vx_mps"], key=lambda f: abs(math.log(f * ratio)))
 
 
 def _large(values: FloatArray) -> float:

@@ -20,7 +20,7 @@ from .physics import scales, sideways
 from .recording import Recording
 from .registry import blamed, recognised
 from .table import Table
-from .units import factor_to, unit_in_name
+from .units import factor_to, unit_at_end, unit_in_name
 
 _RATE_HZ = 50.0  # at which units and signs are looked for
 _FEWEST = 100
@@ -145,6 +145,10 @@ class _View:
             return self._held.entries[name].unit or unit_in_name(name, si_unit)
         return self._held.unit(name, si_unit)
 
+    def said(self, name: str, si_unit: str) -> str:
+        """The unit that the file states, or else the one at the end of the name."""
+        return self.unit(name, si_unit) or unit_at_end(name, si_unit)[1]
+
     @property
     def rising(self) -> list[str]:
         """Columns of a table that rise from each row to the next."""
@@ -183,7 +187,7 @@ def _proposal(view: _View, chosen: dict[str, list[str]], wheelbase_m: float | No
     stated: dict[str, float] = {}
     for channel, name in first.items():
         unit = si_unit(channel, name)
-        factor = factor_to(unit, view.unit(name, unit))
+        factor = factor_to(unit, view.said(name, unit))
         if factor is not None:
             stated[channel] = factor
         elif name == channel:
@@ -215,12 +219,13 @@ def _proposal(view: _View, chosen: dict[str, list[str]], wheelbase_m: float | No
             name,
             factors.get(channel, 1.0),
             unit,
-            "; ".join(filter(None, [_by_name(channel, name, unit), why.get(channel)])),
+            "; ".join(filter(None, [_by_name(channel, name, unit), ended, why.get(channel)])),
             tuple(n for n in chosen[channel] if n != name)[:5],
             channel == "vy_mps" and is_sideslip(name),
         )
         for channel, name in first.items()
         for unit in (view.unit(name, si_unit(channel, name)),)
+        for ended in (_ended(channel, name, unit),)
     }
     needed = [c for c in CHANNELS if CHANNELS[c].required and c not in channels]
     if view.has_times:
@@ -233,6 +238,12 @@ def _by_name(channel: str, name: str, unit: str) -> str:
         return "the only column that always rises"
     text = "by its name" if name != channel else "so called"
     return f"{text}, the file states '{unit}'" if unit else text
+
+
+def _ended(channel: str, name: str, unit: str) -> str:
+    """What a unit at the end of a name is told as, if that is all there is."""
+    found = "" if unit or name == channel else unit_at_end(name, si_unit(channel, name))[1]
+    return f"in '{found}', as its name ends" if found else ""
 
 
 def _time_factor(

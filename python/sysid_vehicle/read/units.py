@@ -98,6 +98,9 @@ WHAT = {
     "Hz": "a frequency",
     "%": "a share",
 }
+_LAST_WORD = re.compile(r"^(.*[^\W_])[\s_.]+([A-Za-z]\w*)$")
+# Units that are words of other meanings in names.
+_WORDS = {"turn", "turns", "rev", "revs", "min", "h", "grad"}
 _AT_END = re.compile(r"[\[({]([^\[\](){}]+)[\])}]\s*$")
 _NONE = {"", "-", "1", "none", "n/a", "na", "[]", "unitless", "no_unit", "nounit"}
 
@@ -134,6 +137,17 @@ def unit_in_name(name: str, si_unit: str) -> str:
     """
     found = _AT_END.search(name)
     return found[1] if found and factor_to(si_unit, found[1]) is not None else ""
+
+
+def unit_at_end(name: str, si_unit: str) -> tuple[str, str]:
+    """Return a name without the unit of that kind that is its last word, and that unit.
+
+    ``steer_deg`` is ``steer`` in ``deg``; both are what they were where there is none.
+    """
+    found = _LAST_WORD.search(name)
+    if found is None or found[2].lower() in _WORDS or factor_to(si_unit, found[2]) is None:
+        return name, ""
+    return found[1], found[2]
 
 
 def measures(text: str) -> str:

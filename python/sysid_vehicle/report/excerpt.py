@@ -9,6 +9,7 @@ import numpy as np
 from .._common.arrays import FloatArray
 from ..estimate import MEASURED
 from ..estimate.driving import Stretch
+from ..identify import driving_of
 from ..study import Study, look_ahead
 from .words import stages
 
@@ -79,12 +80,12 @@ def worst_excerpt(study: Study, *, seconds: float = 6.0, horizon_s: float = 0.5)
     first = max(before, stretch.where.start)
     # Some samples more: noise is taken out of inputs by what comes before and after.
     part = slice(first, min(start + width + round(log.rate_hz), stretch.where.stop))
-    near = driving.only(Stretch(stretch.log, part))
     shown = slice(start - first, start - first + width)
-    errors = {
-        title: look_ahead(study.fits[i], noise, near, horizon_s)[shown, columns]
-        for title, i in stages(study)
-    }
+    errors = {}
+    for title, i in stages(study):
+        # Offsets are those of the whole log: a few seconds would take up every error.
+        near = driving_of(study.fits[i], driving).only(Stretch(stretch.log, part))
+        errors[title] = look_ahead(study.fits[i], noise, near, horizon_s)[shown, columns]
     return Excerpt(
         log.name,
         horizon_s,

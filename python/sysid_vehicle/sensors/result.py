@@ -240,9 +240,13 @@ class SensorCheck:
     def headline(self) -> str:
         """One sentence."""
         names = ", ".join(log.name for log in self.logs)
-        if not self.found:
-            return f"{names}: the sensors agree; no fault was found."
-        return f"{names}: {len(self.found)} sensor faults were found."
+        if len(self.found) == 1:
+            return f"{names}: 1 sensor fault was found."
+        if self.found:
+            return f"{names}: {len(self.found)} sensor faults were found."
+        if not self.estimate.settled:
+            return f"{names}: no fault was found, but the sensors do not agree."
+        return f"{names}: the sensors agree; no fault was found."
 
     def __str__(self) -> str:
         lines = [self.headline, text_table(_HEAD, self._rows()), ""]

@@ -204,7 +204,11 @@ def refuse_mixed_up(logs: Sequence[Log], readings: Sequence[Readings]) -> None:
     turn, felt = _slowly(vx * yaw, base), _slowly(base.values, base)
     if float(np.std(turn)) < 0.3:
         return
-    slope, fit = _slope(felt, turn)
+    # ay = vx r + d(vy)/dt: a car that slides feels far less than its turn.
+    changes = []
+    if "vy_mps" in by:
+        changes = [_slowly(_rate_of(_at(by["vy_mps"], base), base), base)]
+    slope, fit = _slope(*_without(changes, felt, turn))
     if "ax_mps2" in by:
         other = _slowly(_at(by["ax_mps2"], base), base)
         if fit < 0.5 and _slope(other, turn)[1] > 0.9:
@@ -236,6 +240,17 @@ def _slope(y: FloatArray, x: FloatArray) -> tuple[float, float]:
     y, x = y - y.mean(), x - x.mean()
     both, own = float(x @ y), float(x @ x)
     return both / own, both**2 / (own * max(float(y @ y), 1e-300))
+
+
+def _without(columns: list[FloatArray], *values: FloatArray) -> list[FloatArray]:
+    """Values without what these columns and a constant explain of them."""
+    x = np.column_stack([*columns, np.ones_like(values[0])])
+    return [v - x @ np.linalg.lstsq(x, v, rcond=None)[0] for v in values]
+
+
+def _rate_of(values: FloatArray, base: Readings) -> FloatArray:
+    """Derivative of a channel over the times of another."""
+    return np.asarray(np.gradient(values, base.time_s + 1e6 * base.stretch))
 
 
 def _at(readings: Readings, base: Readings) -> FloatArray:

@@ -11,6 +11,7 @@ from sysid_vehicle import Fit, Log, Model, compare, diagnose, drive, identify, i
 from sysid_vehicle import manoeuvres as drives
 from sysid_vehicle.diagnose.evidence.evidence import Evidence
 from sysid_vehicle.estimate import Driving
+from sysid_vehicle.estimate.driving import Stretch
 from sysid_vehicle.estimate.pieces import PiecewiseProblem
 from sysid_vehicle.identify import driving_of, predicting_ahead
 from sysid_vehicle.identify.offsets import marginal_information
@@ -56,6 +57,16 @@ def test_each_log_of_a_fit_has_its_own(found: Fit, several: tuple[Log, ...], tru
         stiffness = load_n * np.prod([truth.value(f"{x}_{axle}") for x in "BCD"])
         e = found[f"cornering stiffness {axle}"]
         assert abs(e.value - stiffness) < 4.0 * e.std
+
+
+def test_a_part_of_driving_keeps_to_itself(found: Fit, several: tuple[Log, ...]) -> None:
+    part = Driving.of(several).only(Stretch(1, slice(100, 400)))
+    assert part.samples == 300
+    assert [log.name for log in part.logs] == [several[1].name]
+    own = driving_of(found, part)
+    assert own.offsets
+    assert own.samples == 300
+    assert own.only(own.stretches[0]).offsets == own.offsets
 
 
 def test_logs_of_the_same_offsets_need_none(start: Model, lap: Log) -> None:

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from smooth_log import drift
 
 from sysid_vehicle import Log, Model, drive, lab, manoeuvres, published, read_log
 from sysid_vehicle.errors import InvalidInput, SysidWarning
@@ -44,6 +45,14 @@ def test_own_drives_are_read_in_silence(truth: Model, name: str, rate_hz: float)
     for start in (0.0, 0.3, 0.6):
         part = slice(int(start * n), int(start * n) + int(12.0 * rate_hz))
         assert heard({c: v[part] for c, v in data.items()}) == ""
+
+
+def test_a_car_that_slides_and_is_steered_against_it() -> None:
+    """Its steering follows neither yaw rate nor a_y, and its speed changes by v_y r."""
+    data = drift(np.arange(0.0, 90.0, 0.01))
+    assert heard(data) == ""
+    wrong = {**data, "yaw_rate_radps": -data["yaw_rate_radps"]}
+    assert "yaw_rate_radps" in heard(wrong) or "ay_mps2" in heard(wrong)
 
 
 def test_a_double_lane_change_keeps_its_speed(truth: Model, tmp_path: Path) -> None:

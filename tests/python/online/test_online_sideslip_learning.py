@@ -57,6 +57,37 @@ def test_a_calibration_drive_teaches_what_to_trust(wrong, log):
     assert dict(again.settings) == dict(found.settings)
 
 
+@pytest.fixture(scope="module")
+def noisy(log):
+    """The same drive, its lateral speed with the noise of an antenna pair."""
+    columns = {name: np.array(log[name]) for name in log.channels}
+    columns["vy_mps"] += 0.1 * np.random.default_rng(2).standard_normal(log.n)
+    return sv.Log.from_arrays(columns, name="noisy", check=False)
+
+
+def test_the_band_does_not_answer_for_noise_of_the_measured_sideslip(vehicle, log, noisy):
+    run = estimate_sideslip(vehicle, noisy)
+    exact, told = estimate_sideslip(vehicle, log).error(), run.error()
+    speed = np.hypot(log["vx_mps"], log["vy_mps"])
+    assert told.noise_deg == pytest.approx(
+        np.degrees(np.sqrt(np.mean((0.1 / speed) ** 2))), rel=0.1
+    )
+    assert told.noise_deg > 1.5 * exact.rms_deg
+    assert told.covered > 0.9
+    assert "of it noise of the measured one" in str(run)
+    truth = np.arctan2(log["vy_mps"], log["vx_mps"])
+    assert run.error(truth) == dataclasses.replace(exact, noise_deg=0.0)
+
+
+def test_a_calibration_does_not_learn_the_noise_of_the_measured_sideslip(vehicle, log, noisy):
+    found = calibrate_sideslip(vehicle, noisy.between(0.0, 20.0), runs=40)
+    rest = log.between(20.0, 40.0)
+    before = estimate_sideslip(vehicle, rest, settings=found.before.settings)
+    after = estimate_sideslip(vehicle, rest, settings=found.settings)
+    assert after.error().rms_deg < 1.2 * before.error().rms_deg
+    assert np.mean(after.beta_std_rad) < 1.2 * np.mean(before.beta_std_rad)
+
+
 def test_a_drive_without_sideslip_teaches_nothing(vehicle, log):
     columns = {name: log[name] for name in log.channels if name != "vy_mps"}
     blind = sv.Log.from_arrays(columns, name="blind", check=False)

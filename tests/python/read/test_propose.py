@@ -56,6 +56,34 @@ LOGGERS: dict[str, dict[str, tuple[str, float]]] = {
         "steer_rad": ("Lenkradwinkel", 15.0 / DEG),
     },
 }
+_NAMES = {
+    "French": "Temps|Vitesse|Vitesse de lacet|Accélération longitudinale|Accélération latérale"
+    "|Angle volant",
+    "Italian": "Tempo|Velocità|Velocità di imbardata|Accelerazione longitudinale"
+    "|Accelerazione laterale|Angolo sterzo",
+    "Spanish": "Tiempo|Velocidad|Velocidad de guiñada|Aceleración longitudinal"
+    "|Aceleración lateral|Ángulo de volante",
+    "Japanese": "時間|車速|ヨーレート|前後加速度|横加速度|操舵角",
+    "umlauts": "Zeit|Geschwindigkeit|Gierrate|Längsbeschleunigung|Querbeschleunigung|Lenkradwinkel",
+}
+LOGGERS |= {
+    language: dict(
+        zip(
+            ("time_s", *CHANNELS),
+            zip(names.split("|"), (1.0, 3.6, 1 / DEG, 1.0, 1.0, 15.0 / DEG), strict=True),
+            strict=True,
+        )
+    )
+    for language, names in _NAMES.items()
+}
+LOGGERS["units at the end"] = {
+    "time_s": ("epoch_ms", 1e3),
+    "vx_mps": ("vx_kmh", 3.6),
+    "yaw_rate_radps": ("imu_gyro_z_dps", 1 / DEG),
+    "ax_mps2": ("ax_g", 1 / G),
+    "ay_mps2": ("ay_g", 1 / G),
+    "steer_rad": ("steer_deg", 1 / DEG),
+}
 OTHERS = ("WheelSpeed_FL", "Engine RPM", "SteeringTorque", "Lap Time", "Oil Temp", "acc_z")
 
 
@@ -103,6 +131,23 @@ def test_names_units_and_signs(right: sv.Log, logger: str) -> None:
         assert 0.6 < ratio < 1.6
         assert "steering ratio of about" in proposal.channels["steer_rad"].why
     sv.read_log(data, proposal.channel_map)  # it passes every check of a log
+
+
+@pytest.mark.parametrize("unit", [1.0, 3.6, 1 / 0.44704])
+@pytest.mark.parametrize("speed", [1.0, 3.6])
+def test_a_lateral_speed_has_a_unit_of_its_own(right: sv.Log, unit: float, speed: float) -> None:
+    names = {**LOGGERS["CAN"], "vx_mps": ("speed", speed), "vy_mps": ("vy", unit)}
+    proposal = sv.propose_channels(renamed(right, names))
+    assert proposal.channels["vy_mps"].factor == pytest.approx(1.0 / unit, rel=1e-6)
+
+
+def test_a_unit_in_the_name_is_no_word_of_it(right: sv.Log) -> None:
+    why = {c: p.why for c, p in sv.propose_channels(
+        renamed(right, LOGGERS["units at the end"])
+    ).channels.items()}  # fmt: skip
+    assert "in 'g', as its name ends" in why["ay_mps2"]
+    assert "in 'deg', as its name ends" in why["steer_rad"]
+    assert "in 'ms', as its name ends" in why["time_s"]
 
 
 def test_swapped_accelerations_are_found(right: sv.Log) -> None:

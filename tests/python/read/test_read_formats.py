@@ -68,6 +68,39 @@ def test_comments(tmp_path: Path, lines: list[str]) -> None:
         read(write(tmp_path, *bad))
 
 
+@pytest.mark.parametrize("about", [["Logger 7"], ["Logger 7", "Car;a;car", "Date;03.05.2026", ""]])
+def test_lines_about_the_log_before_the_names(tmp_path: Path, about: list[str]) -> None:
+    """Whatever separates their cells; the line of an error is that of the file."""
+    header = HEADER.replace(",", ";")
+    rows = [f"{k / 100:.2f};{20 + k};0,1;2,0;0,5;0,01".replace(".", ",") for k in range(60)]
+    lines = [*about, header, *rows]
+    log = read(write(tmp_path, *lines))
+    np.testing.assert_array_equal(log["vx_mps"], 20.0 + np.arange(60.0))
+    with pytest.raises(InvalidInput, match=f"'fast' in line {len(about) + 32} "):
+        read(write(tmp_path, *(line.replace(";50;", ";fast;") for line in lines)))
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    ["05/31/2026 {}", "31.05.2026 {}", "1/2/2026 {}"],
+)
+def test_dates_with_the_year_last(tmp_path: Path, stamp: str) -> None:
+    rows = [f"{stamp.format(f'10:59:59.{k:02d}')},20,0.1,2,0.5,0.01" for k in range(60)]
+    log = read(write(tmp_path, HEADER, *rows))
+    np.testing.assert_allclose(log["time_s"], np.arange(60) / 100.0)
+
+
+@pytest.mark.parametrize(
+    "day", [("04/05/2026 ", "05/05/2026 "), ("5/3/2026 ", "5/4/2026 "), ("", "")]
+)
+def test_midnight_is_one_day_later_whatever_the_order(tmp_path: Path, day: tuple[str, str]) -> None:
+    days = [(day[0] + "23:59:59", k) for k in range(50, 100)]
+    days += [(day[1] + "00:00:00", k) for k in range(50)]
+    rows = [f"{day}.{k:02d},20,0.1,2,0.5,0.01" for day, k in days]
+    log = read(write(tmp_path, HEADER, *rows))
+    np.testing.assert_allclose(log["time_s"], np.arange(100) / 100.0)
+
+
 class TestUnits:
     def test_those_of_the_channels_are_taken_silently(self, tmp_path: Path) -> None:
         log = read(write(tmp_path, HEADER, "[s],[m/s],[rad/s],[m/s^2],[m/s²],[rad]", *ROWS))

@@ -54,7 +54,7 @@ def test_a_mirrored_lateral_speed_is_turned_round(right: sv.Log) -> None:
     data["Speed"] = data.pop("vx_mps")
     proposal = sv.propose_channels(data)
     assert proposal.channels["vy_mps"].factor == pytest.approx(-1.0 / 3.6)
-    assert "unit as that of vx_mps" in proposal.channels["vy_mps"].why
+    assert "unit found by the laws of motion" in proposal.channels["vy_mps"].why
     log = sv.read_log(data, proposal.channel_map)
     np.testing.assert_allclose(log["vy_mps"], right["vy_mps"], atol=1e-12)
 

@@ -9,7 +9,7 @@ import pytest
 from reported import TRUTH, ended_at_once, reported_study
 
 import sysid_vehicle as sv
-from sysid_vehicle.estimate import MEASURED
+from sysid_vehicle.estimate import MEASURED, Driving
 from sysid_vehicle.report import chart, figures
 from sysid_vehicle.report.excerpt import worst_excerpt
 from sysid_vehicle.report.samples import Samples, samples_of
@@ -68,6 +68,27 @@ def test_the_excerpt_is_where_the_baseline_predicts_worst(study: sv.Study) -> No
     columns = [MEASURED.index(c) for c in found.channels]
     np.testing.assert_allclose(
         found.errors["baseline"], whole[found.where][:, columns], rtol=0.02, atol=2e-3
+    )
+
+
+def test_the_excerpt_has_the_offsets_of_its_log(nothing_added: sv.Study) -> None:
+    """Those of all of it: a few seconds by themselves would take up every error."""
+    before = nothing_added.fits[0]
+    log = nothing_added.validation.logs[0]
+    columns = {c: np.array(log[c]) for c in log.channels}
+    columns["yaw_rate_radps"] += 0.01
+    moved = sv.Log.from_arrays(columns, check=False)
+    model = before.model.with_nuisances(("steer_offset", "gyro_bias"))
+    fit = sv.identify(model, before.driving.logs, starts=1)
+    study = replace(nothing_added, fits=(fit,), validation=Driving.of(moved))
+    found = worst_excerpt(study)
+    assert found is not None
+    whole = look_ahead(fit, fit.noise.floor(), study.validation, found.horizon_s)
+    np.testing.assert_allclose(
+        found.errors["baseline"],
+        whole[found.where][:, [MEASURED.index(c) for c in found.channels]],
+        rtol=0.02,
+        atol=2e-3,
     )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from smooth_log import drift
 
 import sysid_vehicle as sv
 from sysid_vehicle.cli.main import main
@@ -62,6 +63,24 @@ TRUTH = {
 @pytest.fixture(scope="module")
 def faulty(perfect: Channels) -> sv.SensorCheck:
     return sv.check(as_log(with_faults(perfect)))
+
+
+def test_sensors_that_were_not_reconciled_are_not_said_to_agree(faulty: sv.SensorCheck) -> None:
+    open_ = replace(
+        faulty,
+        faults=tuple(replace(fault, found=False) for fault in faulty.faults),
+        estimate=replace(faulty.estimate, settled=False),
+    )
+    assert open_.headline == "drive: no fault was found, but the sensors do not agree."
+    assert "none of these faults describes" in str(open_)
+
+
+def test_a_car_that_slides_has_no_speed_in_another_unit() -> None:
+    """Of its turn it feels what the lateral speed does not take up."""
+    channels = noisy(drift(np.arange(0.0, 60.0, 0.01)))
+    assert sv.check(as_log(channels)).found == ()
+    with pytest.raises(sv.errors.InvalidInput, match="vx_mps is in mph"):
+        sv.check(as_log({**channels, "vx_mps": channels["vx_mps"] / 0.44704}))
 
 
 def test_good_sensors_are_called_good(perfect: Channels) -> None:
