@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from .._common.memo import remembered
 from .._common.threads import before, in_parallel
 from ..diagnose import Candidate, Diagnosis, possible
 from ..effects import Parameter
@@ -269,6 +270,8 @@ def real(fit: Fit, name: str, rules: Rules) -> bool:
     return possible(found, [e.value for e in estimates], [e.std for e in estimates], rules)
 
 
+# A candidate is asked when it is chosen, and when it is tried in place of another one.
+@remembered(32)
 def without_insignificant(fit: Fit, rules: Rules = USUAL) -> Fit:
     """The fit without effects that have become indistinguishable from nothing, and unnecessary.
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 
 import numpy as np
 
-from .._common.threads import before
+from .._common.threads import before, in_parallel
 from ..diagnose import Diagnosis
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refine_while, refit
+from ..model import Model
 from .steps import better, merit, real, speaks_for, strength, without_insignificant
 
 _SUBSETS = 2  # that are refitted
@@ -37,9 +39,12 @@ def first_together(
     end at `ends`, by `time.perf_counter`; validation data have answered at `judged_by`.
     """
     rules, fit = dx.rules, dx.fit
+    known = [f for f in (single, *(c.fit for c in dx.ranking if c.finished)) if f is not None]
     for names in _leading_subsets(dx, most_effects - len(fit.model.effects)):
         # One after the other: those that are not added mostly end soon, and one is all it takes.
-        found = before(ends, partial(_with_subset, dx, names), None)
+        found = before(ends, partial(_with_subset, dx, names, known), None)
+        if found is not None:
+            known.append(found)
         if found is None or not set(names) <= set(found.model.effects):
             continue
         if not all(real(found, name, rules) for name in names):
@@ -63,27 +68,71 @@ def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:
     return [s.effects for s in several[:_SUBSETS]]
 
 
-def _with_subset(dx: Diagnosis, names: Sequence[str]) -> Fit | None:
+def _with_subset(dx: Diagnosis, names: Sequence[str], known: Sequence[Fit] = ()) -> Fit | None:
     """The model with several effects, refitted; None where that fails, or no car has the values.
 
-    Parameters come first, under the noise of the model without them: that shows where they lead
-    at a fraction of the time. Where an effect comes to nothing on the way the refit does not go on.
+    Parameters come first, under the noise of the model that they begin at: that shows where they
+    lead at a fraction of the time. Where an effect comes to nothing on the way the refit does not
+    go on. It never ends below the likeliest of the models `known` that it contains.
     """
     effects = {c.id: c.effect for c in dx.ranking}
     values: dict[str, float] = {}
     for name in (n for n in names if n in dx.proposed.sizes):
         for p, v in zip(effects[name].parameters, dx.proposed.sizes[name][0], strict=True):
             values[f"{name}.{p.name}"] = float(np.clip(v, p.lower, p.upper))
-    model = dx.fit.model.add(*(effects[n] for n in names)).with_values(values)
+    bare = dx.fit.model.add(*(effects[n] for n in names))
+    contained = _likeliest_within(dx.fit, names, known)
+    begins = dict.fromkeys((dx.fit, contained))
     try:
-        near = refit(model, dx.fit.driving, dx.fit.noise)
-        if not all(real(near, name, dx.rules) for name in names):
+        ends = in_parallel(partial(_from_within, bare, values), begins)
+        real_ones = [f for f in ends if f is not None and _all_real(f, names, dx)]
+        if not real_ones:
             return None
+        near = max(real_ones, key=_height)
         some = partial(_none_at_nothing, names)
         found = refine_while(near.model, near.driving, near.noise, some)
-        return found and without_insignificant(found, dx.rules)
+        if found is None or found.log_likelihood < contained.log_likelihood:
+            return None
+        return without_insignificant(found, dx.rules)
     except (NumericalError, np.linalg.LinAlgError):
         return None
+
+
+def _likeliest_within(fit: Fit, names: Sequence[str], known: Sequence[Fit]) -> Fit:
+    """The likeliest of some fits, and of one more, that lack only effects `names`."""
+    base = set(fit.model.effects)
+    inside = [
+        f
+        for f in known
+        if base <= set(f.model.effects) <= base | set(names) and f.driving is fit.driving
+    ]
+    return max([fit, *inside], key=_height)
+
+
+def _from_within(bare: Model, foretold: Mapping[str, float], contained: Fit) -> Fit | None:
+    """Parameters of a model refitted from one that it contains; None where that fails.
+
+    Its other effects begin at sizes that were foretold. These come from a poorer model and may lead
+    below the contained one: then they begin at nothing.
+    """
+    there = {e.name: e.value for e in contained.estimates}
+    ends: list[Fit] = []
+    for sizes in (foretold, {}):
+        with suppress(NumericalError, np.linalg.LinAlgError):
+            model = bare.with_values({**sizes, **there})
+            ends.append(refit(model, contained.driving, contained.noise))
+            if ends[-1].log_likelihood >= contained.log_likelihood:
+                break
+    return max(ends, key=_height, default=None)
+
+
+def _height(fit: Fit) -> float:
+    return fit.log_likelihood
+
+
+def _all_real(fit: Fit, names: Sequence[str], dx: Diagnosis) -> bool:
+    """Whether effects have values that a car can have."""
+    return all(real(fit, name, dx.rules) for name in names)
 
 
 def _none_at_nothing(names: Sequence[str], fit: Fit) -> bool:

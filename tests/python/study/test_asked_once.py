@@ -22,6 +22,7 @@ from sysid_vehicle.identify import (
     refine_while,
 )
 from sysid_vehicle.identify.ahead import _Ahead
+from sysid_vehicle.rules import USUAL
 from sysid_vehicle.sensors.low_pass import _Problem
 from sysid_vehicle.sensors.spectrum import _bias, _of_windows, spectrum_of
 from sysid_vehicle.study import steps
@@ -136,6 +137,21 @@ def test_effects_that_are_fitted_together_are_left_where_one_comes_to_nothing(
     monkeypatch.setattr(maximum, "likelier_noise", pytest.fail)
     together = partial(_none_at_nothing, both.effects)
     assert refine_while(both, fit.driving, fit.noise, together) is None
+
+
+def test_what_is_insignificant_is_dropped_once(fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
+    richer = refine(fit.model.add("gyro_scale"), fit.driving, fit.noise)
+    calls: list[int] = []
+
+    def counted(*args: Any) -> Fit:
+        calls.append(1)
+        return refine(*args)
+
+    monkeypatch.setattr(steps, "refine", counted)
+    lean = without_insignificant(richer, USUAL)
+    assert lean.model.effects == fit.model.effects
+    assert without_insignificant(richer, USUAL) is lean
+    assert len(calls) == 1
 
 
 def test_where_a_search_begins_is_looked_at_once(fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,7 +24,6 @@ from sysid_vehicle.study.steps import (
     way,
     without_insignificant,
 )
-from sysid_vehicle.study.together import _leading_subsets, _with_subset, first_together
 from sysid_vehicle.study.validation import (
     error_falls,
     fall_in_error,
@@ -330,45 +329,6 @@ def test_two_that_may_hold_only_together_are_sought_together(
     silent = replace(alone, ranking=tuple(replace(c, p_value=1.0) for c in alone.ranking))
     assert likeliest(silent) is None
     assert replace(looking, say=told.append)._beside_another(silent, trail) is None
-
-
-def test_two_are_added_together_where_the_posterior_names_both(truth: Model, start: Model) -> None:
-    sizes = {"gyro_bias.bias_radps": 0.006, "steer_ratio.ratio_error": 0.1}
-    both = ("gyro_bias", "steer_ratio")
-    car = truth.add(*both).with_values(sizes)
-    train, test = (
-        drive(car, manoeuvre, seed=seed, rate_hz=RATE_HZ)
-        for manoeuvre, seed in ((manoeuvres.ramp_steer(), 81), (manoeuvres.lap(25.0), 82))
-    )
-    fit, test = identify(start, train, starts=1), Driving.of(test)
-    dx = diagnose(fit, candidates=[*both, "mass"], refits=0)
-    found = first_together(dx, test, None, 2)
-    assert found is not None
-    assert found[0] == both
-    for name, size in sizes.items():
-        assert abs(found[1][name].value - size) < 4.0 * found[1][name].std
-    trail = Trail([fit])
-    trail.note_several(dx, found[0])
-    assert set(trail.p_values) == set(both)
-    assert max(trail.p_values.values()) < 1e-6
-    assert first_together(dx, test, None, 1) is None  # there has to be room for two
-
-
-@pytest.mark.manual
-def test_a_group_with_a_value_that_no_car_has_is_not_added(truth: Model, start: Model) -> None:
-    both = ("gyro_bias", "steer_ratio")
-    sizes = {"gyro_bias.bias_radps": 0.006, "steer_ratio.ratio_error": -0.36}
-    car = truth.add(*both).with_values(sizes)
-    fit = identify(start, drive(car, manoeuvres.ramp_steer(), seed=81), starts=1)
-    test = Driving.of(drive(car, manoeuvres.lap(25.0), seed=82))
-    dx = diagnose(fit, candidates=[*both, "mass"], refits=0)
-    assert both in _leading_subsets(dx, 2)
-    assert _with_subset(dx, both) is None
-    tolerant = replace(dx, rules=replace(USUAL, implausible=9.0))
-    found = _with_subset(tolerant, both)
-    assert found is not None
-    assert found.model.effects == both
-    assert first_together(dx, test, None, 2) is None
 
 
 def test_what_came_with_a_step_is_told(dx: Diagnosis) -> None:

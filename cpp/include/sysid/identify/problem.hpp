@@ -87,6 +87,10 @@ struct Problem {
 /// guess, decide.
 constexpr std::array<double, kMotionStates> kFirstVariances{1.0, 1.0, 0.04};
 
+/// Below this speed [m/s], or in bends that make more sideslip [rad] than this, a car that rolls is
+/// nearer to one that turns than no sideslip is.
+constexpr double kSlow = 3.0, kTightBend = 0.2;
+
 /// Where a run starts: the measured motion where there is one, settled auxiliary states. The same
 /// from sample `begin` on is a guess of the state there.
 template <class S = double, class T>
@@ -99,8 +103,13 @@ ModelState<S> initial_state(const SingleTrack& model, const Run& run, const T* p
     };
     ModelState<S> x{};
     x[0] = S(first(kVx, 10.0));
-    x[1] = S(first(kVy, 0.0));
-    x[2] = S(first(kYawRate, 0.0));
+    const double r = first(kYawRate, 0.0);
+    // The rear axle rolls without slip. Where tyres answer within a sample or two the filter, which
+    // is linear in slip, does not come back for half a second from the wrong side of their peak.
+    const double rolling = model.car.lr_m * r, speed = std::max(value_of(x[0]), kLowestSpeed);
+    const bool rolls = speed < kSlow || std::abs(rolling) > kTightBend * speed;
+    x[1] = S(first(kVy, rolls ? rolling : 0.0));
+    x[2] = S(r);
     const std::array<S, kExternals> calm{};
     const Input& u = run.inputs[begin];
     InputFor<S> input{u.steer_rad, u.longitudinal, u.time_s, u.steer_rate_radps};

@@ -1,0 +1,95 @@
+"""Several effects that are added in one step."""
+
+from dataclasses import replace
+
+import pytest
+
+from sysid_vehicle import Model, diagnose, drive, identify, manoeuvres
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.identify import refine
+from sysid_vehicle.rules import USUAL
+from sysid_vehicle.study import together
+from sysid_vehicle.study.search import Trail
+from sysid_vehicle.study.together import (
+    _from_within,
+    _leading_subsets,
+    _likeliest_within,
+    _with_subset,
+    first_together,
+)
+
+RATE_HZ = 50.0  # tells as much of these effects as 100 Hz, in half the time
+
+
+def test_two_are_added_together_where_the_posterior_names_both(truth: Model, start: Model) -> None:
+    sizes = {"gyro_bias.bias_radps": 0.006, "steer_ratio.ratio_error": 0.1}
+    both = ("gyro_bias", "steer_ratio")
+    car = truth.add(*both).with_values(sizes)
+    train, test = (
+        drive(car, manoeuvre, seed=seed, rate_hz=RATE_HZ)
+        for manoeuvre, seed in ((manoeuvres.ramp_steer(), 81), (manoeuvres.lap(25.0), 82))
+    )
+    fit, test = identify(start, train, starts=1), Driving.of(test)
+    dx = diagnose(fit, candidates=[*both, "mass"], refits=0)
+    found = first_together(dx, test, None, 2)
+    assert found is not None
+    assert found[0] == both
+    for name, size in sizes.items():
+        assert abs(found[1][name].value - size) < 4.0 * found[1][name].std
+    trail = Trail([fit])
+    trail.note_several(dx, found[0])
+    assert set(trail.p_values) == set(both)
+    assert max(trail.p_values.values()) < 1e-6
+    assert first_together(dx, test, None, 1) is None  # there has to be room for two
+
+
+@pytest.mark.manual
+def test_a_group_with_a_value_that_no_car_has_is_not_added(truth: Model, start: Model) -> None:
+    both = ("gyro_bias", "steer_ratio")
+    sizes = {"gyro_bias.bias_radps": 0.006, "steer_ratio.ratio_error": -0.36}
+    car = truth.add(*both).with_values(sizes)
+    fit = identify(start, drive(car, manoeuvres.ramp_steer(), seed=81), starts=1)
+    test = Driving.of(drive(car, manoeuvres.lap(25.0), seed=82))
+    dx = diagnose(fit, candidates=[*both, "mass"], refits=0)
+    assert both in _leading_subsets(dx, 2)
+    assert _with_subset(dx, both) is None
+    tolerant = replace(dx, rules=replace(USUAL, implausible=9.0))
+    found = _with_subset(tolerant, both)
+    assert found is not None
+    assert found.model.effects == both
+    assert first_together(dx, test, None, 2) is None
+
+
+def test_several_effects_never_end_below_a_model_that_they_contain(
+    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sizes = {"steer_lag.time_constant_s": 0.08, "gyro_bias.bias_radps": 0.004}
+    both = ("steer_lag", "gyro_bias")
+    car = truth.add(*both).with_values(sizes)
+    fit = identify(start, drive(car, manoeuvres.lap(20.0), seed=5), starts=1)
+    lag = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.05})
+    single = refine(lag, fit.driving, fit.noise)
+    bare, none = fit.model.add(*both), {"steer_lag.time_constant_s": 0.0005}
+    # Under the noise that was learned without the lag the search does not find it.
+    hidden = _from_within(bare, none, fit)
+    assert hidden is not None
+    assert hidden.log_likelihood < single.log_likelihood - 20.0
+    end = _from_within(bare, none, single)
+    assert end is not None
+    assert end.model.effects == both
+    assert end.log_likelihood >= single.log_likelihood
+    # Sizes that lead below the contained model are left for none.
+    far = _from_within(bare, {"gyro_bias.bias_radps": 5.0}, single)
+    assert far is not None
+    assert far.log_likelihood >= single.log_likelihood
+
+    dx = diagnose(fit, candidates=both, refits=0)
+    foretold = {"steer_lag": ((0.0005,), (0.1,)), "gyro_bias": ((0.0,), (0.1,))}
+    dx = replace(dx, proposed=replace(dx.proposed, sizes=foretold))
+    monkeypatch.setattr(together, "_none_at_nothing", lambda *_: True)
+    assert _likeliest_within(fit, both, [single]) is single
+    assert _likeliest_within(fit, both[1:], [single]) is fit
+    found = _with_subset(dx, both, [single])
+    assert found is not None
+    assert found.model.effects == both
+    assert found.log_likelihood >= single.log_likelihood
