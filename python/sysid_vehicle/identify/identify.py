@@ -21,6 +21,7 @@ from .estimates import BETTER_FOUND, INTERVALS, profiled_estimates
 from .fit import Fit
 from .maximum import (
     THINNED,
+    another_top,
     log_likelihood_of,
     objectives,
     on_its_road,
@@ -214,8 +215,9 @@ def _from_ends(
     known = fit.model.vector(), fit.noise.vector()
     usual = from_usual_tyres(objective, known, noise.vector(), box, thinned)
     if usual is not None:
-        rival = top(model, driving, objective, usual, table, thinned)
-        fit = rival if rival.log_likelihood > fit.log_likelihood else fit
+        rival = another_top(fit, objective, usual, thinned)
+        if rival is not None and rival.log_likelihood > fit.log_likelihood:
+            fit = rival
     best = at_top = fit.model.vector(), fit.noise.vector(), fit.converged
     for elsewhere in at_typical_sizes(model, at_top[0]):
         best = rivalled(objective, best, elsewhere, box, thinned)

@@ -28,6 +28,8 @@ THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
 _FAR_BELOW_BY_FEW = 50.0  # nats on few samples, chosen as `FAR_BELOW`
 _ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
+# Nats, and standard errors, between maxima that are one: climbs end so far from each other.
+_SAME, _NEAR = 0.5, 0.5
 
 
 def refine(
@@ -161,6 +163,37 @@ def top(
     """
     at_top = to_the_top(objective, *settled[:2], free_box(model))
     return _likeliest(model, driving, objective, at_top, starts, thinned, settled[2])
+
+
+def another_top(
+    known: Fit,
+    objective: Objective,
+    settled: tuple[FloatArray, FloatArray, bool],
+    thinned: Sequence[Objective] = (),
+) -> Fit | None:
+    """As `top` where a search has settled elsewhere; None where it leads far below.
+
+    Noise of other time scales is not tried there, from where nothing comes up, nor where the climb
+    ends at the known maximum, of which it was tried.
+    """
+    model, driving, box = known.model, known.driving, free_box(known.model)
+    at_top = to_the_top(objective, *settled[:2], box)
+    above = log_likelihood_of(objective, *at_top) - known.log_likelihood
+    if above < -FAR_BELOW:
+        return None
+    p, noise = at_top
+    if abs(above) < _SAME and _near(known, p[box.columns], _NEAR):
+        told = NoiseModel.from_vector(noise)
+        return summary(model, driving, objective, p, told, known.starts, settled[2])
+    return _likeliest(model, driving, objective, at_top, known.starts, thinned, settled[2])
+
+
+def _near(fit: Fit, x: FloatArray, share: float) -> bool:
+    """Whether free parameters are those of a fit, to a share of their standard errors."""
+    return all(
+        abs(e.value - v) <= share * e.std or e.value == v
+        for e, v in zip(fit.estimates, x, strict=True)
+    )
 
 
 def _likeliest(

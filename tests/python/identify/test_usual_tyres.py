@@ -1,10 +1,13 @@
 """A maximum with tyres that no car has is left for one with usual tyres, where that is better."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle.estimate import Driving, first_guess
+from sysid_vehicle.identify import maximum
 from sysid_vehicle.identify.box import free_box
 from sysid_vehicle.identify.maximum import objectives
 from sysid_vehicle.identify.objective import Objective
@@ -50,3 +53,26 @@ def test_a_complete_model_is_asked_nothing(
     known = fit.model.vector(), fit.noise.vector()
     monkeypatch.setattr(Objective, "learn_noise", None)
     assert from_usual_tyres(objective, known, first, free_box(start), thin) is None
+
+
+def test_a_search_that_leads_back_to_the_known_maximum_ends_there(
+    place: Place, fit: sv.Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    objective, thin, _ = place
+    monkeypatch.setattr(maximum, "likelier_noise", pytest.fail)
+    p, noise = fit.model.vector(), fit.noise.vector()
+    end = maximum.another_top(fit, objective, (p, noise, True), thin)
+    assert end is not None
+    assert end.log_likelihood >= fit.log_likelihood - 0.01
+    # Far below nothing more is tried either, and what is likelier is searched to its end.
+    above = replace(fit, log_likelihood=fit.log_likelihood + 2.0 * maximum.FAR_BELOW)
+    assert maximum.another_top(above, objective, (p, noise, True), thin) is None
+    tried: list[int] = []
+    monkeypatch.setattr(maximum, "likelier_noise", lambda _, at, *__: tried.append(1) or at)
+    below = replace(fit, log_likelihood=fit.log_likelihood - 2.0)
+    assert maximum.another_top(below, objective, (p, noise, True), thin) is not None
+    first, *others = fit.estimates
+    elsewhere = replace(first, value=first.value + 2.0 * first.std)
+    moved = replace(fit, estimates=(elsewhere, *others))
+    assert maximum.another_top(moved, objective, (p, noise, True), thin) is not None
+    assert len(tried) == 2
