@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from sysid_vehicle.estimate.inputs import quiet, white_noise_std
+from sysid_vehicle import Log, Model, drive, example_vehicle, identify, manoeuvres
+from sysid_vehicle.estimate import inputs
+from sysid_vehicle.estimate.inputs import quiet, white_noise_std, without_stairs
 
 T = np.arange(3000) / 100.0
 NOISE = 1e-3
@@ -71,3 +73,30 @@ def test_the_signal_given_is_not_changed(rng: np.random.Generator) -> None:
     before = y.copy()
     quiet(y)
     assert np.array_equal(y, before)
+
+
+def test_a_coarse_count_is_hardly_a_lag(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stairs are smoothed by a lag that the car does not have."""
+    truth = Model(example_vehicle())
+    log = drive(truth, manoeuvres.lap(25.0), seed=102449)
+    columns = {name: np.array(log[name]) for name in log.channels}
+    columns["steer_rad"] = 0.004 * np.round(columns["steer_rad"] / 0.004)
+
+    def lag() -> float:
+        coarse = Log.from_arrays(columns, check=False)
+        fit = identify(truth.add("steer_lag"), coarse, starts=1)
+        return fit["steer_lag.time_constant_s"].value
+
+    found = lag()
+    monkeypatch.setattr(inputs, "without_stairs", lambda y: y)
+    assert 0.0 <= found < 0.5 * lag()
+
+
+def test_stairs_become_slopes_within_half_a_count() -> None:
+    t = np.arange(0.0, 20.0, 0.01)
+    truth = 0.05 * np.sin(0.9 * t) + 0.02 * np.sin(2.3 * t)
+    stairs = 0.004 * np.round(truth / 0.004)
+    found = without_stairs(stairs)
+    assert np.abs(found - stairs).max() <= 0.002 + 1e-12
+    assert np.std(found - truth) < 0.75 * np.std(stairs - truth)
+    np.testing.assert_array_equal(without_stairs(truth), truth)
