@@ -228,8 +228,7 @@ def _rivals(c: Candidate, best: Candidate) -> bool:
     Score is held against score: at the fit a refit starts from, such effects lead it astray alike,
     and what the first one gains when it is refitted the others may gain too.
     """
-    alike = c.id in best.effect.confounded_with or best.id in c.effect.confounded_with
-    return alike and c.statistic > _RIVALS * best.statistic
+    return c.effect.is_like(best.effect) and c.statistic > _RIVALS * best.statistic
 
 
 def _too_fast(c: Candidate) -> bool:

@@ -219,6 +219,10 @@ class Effect:
         """The measured channels that it moves first, one by one."""
         return frozenset(self.moves.split(", "))
 
+    def is_like(self, other: Effect) -> bool:
+        """Whether the catalogue says of either that it acts like the other."""
+        return other.id in self.confounded_with or self.id in other.confounded_with
+
     @property
     def along_alone(self) -> bool:
         """Whether it moves the car along it and no other way, as a drag does."""

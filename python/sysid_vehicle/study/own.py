@@ -101,8 +101,7 @@ def alike(final: Fit, effects: Collection[str]) -> tuple[tuple[str, ...], ...]:
 
 
 def _act_alike(one: Effect, other: Effect) -> bool:
-    named = other.id in one.confounded_with or one.id in other.confounded_with
-    return named and moving_with(one.moved) == moving_with(other.moved)
+    return one.is_like(other) and moving_with(one.moved) == moving_with(other.moved)
 
 
 def _shares(
@@ -127,13 +126,13 @@ def _shares(
     moved = {few: frozenset(c for e in few for c in parts[e]) for few in asked}
 
     def on_train(few: tuple[str, ...]) -> Share | None:
-        fit = _without(final, few)
+        fit = without(final, few)
         if fit is None:
             return None
         return own_share(fit, final, final.driving, AHEAD, channels=moved[few])
 
     def on_test(few: tuple[str, ...]) -> Share:
-        fit = _without(final, few)
+        fit = without(final, few)
         assert fit is not None  # its share of the training data is known
         best, poorer = at_its_best(final, test), at_its_best(fit, test)
         return own_share(poorer, best, test, AHEAD, channels=moved[few])
@@ -148,8 +147,14 @@ def _shares(
 
 # Twice the effects of any study so far.
 @remembered(16)
-def _without(final: Fit, effects: tuple[str, ...]) -> Fit | None:
-    """The final model without some effects, fitted anew under its noise; None where it fails."""
+def without(final: Fit, effects: tuple[str, ...]) -> Fit | None:
+    """Fit a model anew without some of its effects, under its noise; None where that fails.
+
+    Parameters
+    ----------
+    final : Fit
+    effects : tuple of str
+    """
     model = final.model
     for effect in effects:
         model = model.drop(effect)
@@ -177,7 +182,7 @@ def sure_of(
     """
 
     def sure(effect: str) -> bool:
-        poorer = _without(final, (effect,))
+        poorer = without(final, (effect,))
         if poorer is None:
             return False
         return gain_in_log_likelihood(poorer, final, test).beyond(rules.interval)

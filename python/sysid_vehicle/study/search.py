@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -25,7 +25,7 @@ from .steps import (
     in_common,
     likeliest,
 )
-from .together import first_together
+from .together import first_together, in_place_of
 from .validation import AHEAD, serving
 
 
@@ -100,14 +100,20 @@ class Trail:
             self.diagnoses.pop()
         self.taken_back = tuple(e for e in last if e not in self.fit.model.effects)
 
-    def note_several(self, dx: Diagnosis, chosen: Sequence[str]) -> None:
-        """Remember what was chosen together, and what is confounded with each of it."""
+    def note_several(
+        self, dx: Diagnosis, chosen: Sequence[str], rivals: Mapping[str, Sequence[str]]
+    ) -> None:
+        """Remember what was chosen together, and what is confounded with each of it.
+
+        So by the posterior, and as `in_place_of` finds.
+        """
         for name in chosen:
             self.p_values[name] = dx.family[name]
             shared = dx.proposed.of(name)
             others = () if shared is None else shared.effects
             known = set(dx.family) - set(chosen)
-            self.rivals[name] = tuple(e for e in others if e in known)
+            alike = dict.fromkeys((*others, *rivals.get(name, ())))
+            self.rivals[name] = tuple(e for e in alike if e in known)
 
     def note(self, dx: Diagnosis, chosen: Candidate) -> None:
         """Remember what was chosen, and what nearly was."""
@@ -184,7 +190,7 @@ class Search:
                 step = before(self.ends, partial(self._beside_another, dx, trail), None)
             if several is not None:
                 chosen, lean = several
-                trail.note_several(dx, chosen)
+                trail.note_several(dx, chosen, in_place_of(lean, chosen, dx, self.ends))
             elif step is not None:
                 chosen, lean = (step[0].id,), step[1]
                 trail.note(dx, step[0])

@@ -112,11 +112,7 @@ def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
         and c.id != chosen.id
         and c.statistic > dx.rules.near * chosen.statistic
         and abs(c.statistic - chosen.statistic) >= same
-        and (
-            c.id in chosen.effect.confounded_with
-            or chosen.id in c.effect.confounded_with
-            or c.id in chosen.indistinguishable_from
-        )
+        and (c.effect.is_like(chosen.effect) or c.id in chosen.indistinguishable_from)
     ]
     return tuple(alike[:_ALTERNATIVES])
 

@@ -9,14 +9,18 @@ from functools import partial
 import numpy as np
 
 from .._common.threads import before, in_parallel
-from ..diagnose import Diagnosis
+from ..diagnose import Candidate, Diagnosis, possible
+from ..diagnose.candidates.refits import refitted
+from ..diagnose.candidates.reservation import beside
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refine_while, refit
 from ..model import Model
+from .own import without
 from .steps import better, merit, real, speaks_for, strength, without_insignificant
 
 _SUBSETS = 2  # that are refitted
+_RIVALS = 2  # of one effect, that are refitted in its place
 _LEAST = 1.0  # standard errors from nothing, below which the refit of a subset does not go on
 
 
@@ -57,6 +61,54 @@ def first_together(
         ):
             return names, found
     return None
+
+
+def in_place_of(
+    fit: Fit, chosen: Sequence[str], dx: Diagnosis, ends: float = np.inf
+) -> dict[str, tuple[str, ...]]:
+    """Find what fits as well in the place of each of several effects that were added together.
+
+    The posterior is that of scores, linearised at a fit that lacks all of them: of two effects that
+    only the others show to be alike it may know one. Here each is taken out of the model with the
+    others, and what acts like it, by the catalogue, is refitted in its place.
+
+    Parameters
+    ----------
+    fit : Fit
+        With the effects.
+    chosen : sequence of str
+    dx : Diagnosis
+        That they were chosen in.
+    ends : float
+        When to end, by `time.perf_counter`; effects for which there was no time are left out.
+    """
+    found = {}
+    for name in (e for e in chosen if e in fit.model.effects):
+        rivals = before(ends, partial(_in_place, fit, name, dx), None)
+        if rivals is not None:
+            found[name] = rivals
+    return found
+
+
+def _in_place(fit: Fit, name: str, dx: Diagnosis) -> tuple[str, ...]:
+    poorer, rules = without(fit, (name,)), dx.rules
+    if poorer is None:
+        return ()
+    parts = {e.id: e for e in fit.model.parts}
+    alike = {e.id for e in poorer.model.candidates if e.id in dx.family and e.is_like(parts[name])}
+    if not alike:
+        return ()
+    scores = beside(poorer, poorer.driving, {name, *alike}, rules).board.scores
+    by = {s.effect.id: s.statistic * max(s.variance_ratio, 1.0) for s in scores}
+    near = [s for s in scores if s.effect.id in alike and by[s.effect.id] > rules.near * by[name]]
+    gained, rivals = 2.0 * (fit.log_likelihood - poorer.log_likelihood), []
+    for s in sorted(near, key=lambda s: -by[s.effect.id])[:_RIVALS]:
+        told = s.statistic, s.p_value, s.value, s.std, s.retained, s.variance_ratio
+        c = refitted(poorer, poorer.driving, Candidate(s.effect, *told))
+        as_well = c.statistic > gained - 2.0 * rules.apart
+        if as_well and possible(c.effect, c.value, c.std, rules):
+            rivals.append(c.id)
+    return tuple(rivals)
 
 
 def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:

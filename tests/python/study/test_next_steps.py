@@ -76,7 +76,9 @@ def test_what_predicts_better_some_seconds_ahead_is_to_be_used(unknown: Study) -
 
 
 def test_errors_are_told_in_units_and_small_ones_as_such(adequate: Study, unknown: Study) -> None:
-    assert "Median error 2 s ahead where the car turns, on validation data: v_y 0.0" in str(adequate)
+    assert "Median error 2 s ahead where the car turns, on validation data: v_y 0.0" in str(
+        adequate
+    )
     assert "rad/s, a_y 0.0" in adequate._repr_html_()
     # With two models both are told, and a car that is lost is called so.
     errors = unknown.horizons

@@ -16,6 +16,7 @@ from sysid_vehicle.study.together import (
     _likeliest_within,
     _with_subset,
     first_together,
+    in_place_of,
 )
 
 RATE_HZ = 50.0  # tells as much of these effects as 100 Hz, in half the time
@@ -36,8 +37,10 @@ def test_two_are_added_together_where_the_posterior_names_both(truth: Model, sta
     assert found[0] == both
     for name, size in sizes.items():
         assert abs(found[1][name].value - size) < 4.0 * found[1][name].std
+    alike = in_place_of(found[1], both, dx)
+    assert alike == {"gyro_bias": (), "steer_ratio": ()}
     trail = Trail([fit])
-    trail.note_several(dx, found[0])
+    trail.note_several(dx, found[0], alike)
     assert set(trail.p_values) == set(both)
     assert max(trail.p_values.values()) < 1e-6
     assert first_together(dx, test, None, 1) is None  # there has to be room for two
@@ -93,3 +96,23 @@ def test_several_effects_never_end_below_a_model_that_they_contain(
     assert found is not None
     assert found.model.effects == both
     assert found.log_likelihood >= single.log_likelihood
+
+
+def test_what_fits_as_well_in_the_place_of_one_of_several_is_told(
+    truth: Model, start: Model
+) -> None:
+    hidden = {"rolling_resistance.coefficient": 0.02, "gyro_bias.bias_radps": 0.006}
+    car = truth.add("rolling_resistance", "gyro_bias").with_values(hidden)
+    train = drive(car, manoeuvres.lap(25.0), seed=5, rate_hz=RATE_HZ)
+    bare = start.add("accelerometer_bias")
+    fit = identify(bare, train, starts=1)
+    both = ("road_grade", "gyro_bias")
+    dx = diagnose(fit, candidates=[*both, "rolling_resistance", "mass"], refits=0)
+    # A slope whose gravity the accelerometer does not feel is a rolling resistance.
+    found = identify(bare.add(*both), train, starts=1)
+    alike = in_place_of(found, both, dx)
+    assert alike == {"road_grade": ("rolling_resistance",), "gyro_bias": ()}
+    trail = Trail([fit])
+    trail.note_several(dx, both, alike)
+    assert trail.rivals["road_grade"] == ("rolling_resistance",)
+    assert in_place_of(found, both, dx, ends=0.0) == {}  # no time
