@@ -6,6 +6,8 @@ import time
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from .._common.arguments import duration
 from .._common.progress import with_progress
 from .._common.threads import Workers
@@ -18,11 +20,13 @@ from ..log import Log
 from ..rules import USUAL, Rules, bic
 from .candidates.candidate import Candidate
 from .candidates.clocks import shifts
+from .candidates.confirm import hopeless
 from .candidates.diagnosis import Diagnosis
 from .candidates.possible import considered
 from .candidates.posterior import causes_of
 from .candidates.refits import finished as finished_of
 from .candidates.refits import from_typical, in_time, is_hidden_by_noise, refitted
+from .candidates.reservation import beside
 from .candidates.score import Score, ScoreBoard, score_board_of
 from .evidence.evidence import Evidence
 from .unexplained.omnibus import Omnibus, Unknown, omnibus, omnibus_of
@@ -106,8 +110,10 @@ def diagnose(
         for s in board.scores
     ]
     with Workers(workers) as pool:
-        few = _worth_refitting([c for c in ranked if c.p_value < rules.alpha], refits, again)
-        finished, far = _refitted(fit, driving, few, again, pool, ends, progress)
+        significant = [c for c in ranked if c.p_value < rules.alpha]
+        few = _worth_refitting(significant, refits, again)
+        more = _of_the_other_motion(significant, few)
+        finished, far = _refitted(fit, driving, few, more, again, pool, ends, progress, rules)
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         known = {c.id for c in finished}
         hidden = [c for c in ranked if is_hidden_by_noise(c.effect) and c.id not in known]
@@ -131,16 +137,28 @@ def _refitted(
     fit: Fit,
     driving: Driving,
     few: Sequence[Candidate],
+    more: Sequence[Candidate],
     again: Collection[str],
     pool: Workers,
     ends: float,
     progress: bool | None,
+    rules: Rules,
 ) -> tuple[list[Candidate], list[Candidate]]:
-    """Those near the best with noise of their own, and the others under that of the fit."""
+    """Those near the best with noise of their own, and the others under that of the fit.
+
+    `more` are of another motion than the best one: those are left of which nothing remains beside
+    that.
+    """
     if not few:
         return [], []
     # What the best one gains tells which of the others cannot come near it.
     first = in_time(lambda c: refitted(fit, driving, c), ends)(few[0])
+    if more and first.fit is not None:
+        price = rules.price * float(np.log(driving.samples))
+        left = beside(first.fit, driving, set(), rules)
+        none = hopeless(left, more, price)
+        more = [c for c in more if c.id not in none]
+    few = [*few, *more]
     best = max(first.statistic, few[0].statistic)
     leaders = {c.effect.along_alone: c for c in reversed(few)}
 
@@ -204,18 +222,29 @@ def _with_errors(dx: Diagnosis) -> Diagnosis:
 def _worth_refitting(
     significant: list[Candidate], refits: int, again: Collection[str]
 ) -> list[Candidate]:
-    """The best few, those asked for, and what the catalogue says acts like the very best.
-
-    So for either motion: what the lateral model lacks says nothing of a mass, and several lateral
-    effects may lead of which validation data confirm none.
-    """
+    """The best few, those asked for, and what the catalogue says acts like the very best."""
     few = significant[:refits]
-    more = {*again}
-    for along in (True, False) if few else ():
-        leader = next((c for c in significant if c.effect.along_alone == along), None)
-        if leader is not None:
-            more |= {leader.id, *leader.effect.confounded_with}
+    more = {*few[0].effect.confounded_with, *again} if few else set()
     return few + [c for c in significant[refits:] if c.id in more]
+
+
+def _of_the_other_motion(
+    significant: Sequence[Candidate], few: Sequence[Candidate]
+) -> list[Candidate]:
+    """The best that moves the car otherwise than the very best, and what acts like it.
+
+    What the lateral model lacks says nothing of a mass, and several lateral effects may lead of
+    which validation data confirm none.
+    """
+    if not few:
+        return []
+    along = not few[0].effect.along_alone
+    leader = next((c for c in significant if c.effect.along_alone == along), None)
+    if leader is None:
+        return []
+    known = {c.id for c in few}
+    alike = {leader.id, *leader.effect.confounded_with}
+    return [c for c in significant if c.id in alike and c.id not in known]
 
 
 def _hopeless(c: Candidate) -> float:

@@ -91,13 +91,20 @@ def refine_while(
     return _likeliest(model, driving, objective, at_top, starts, thinned, settled[2])
 
 
-def refit(model: Model, driving: Driving, noise: NoiseModel, *, rounds: int = 3) -> Fit:
+def refit(
+    model: Model,
+    driving: Driving,
+    noise: NoiseModel,
+    *,
+    rounds: int = 3,
+    inputs: FloatArray | None = None,
+) -> Fit:
     """Parameters alone, from a model's values, under a noise model that stays as it is.
 
-    The likelihood is never lower than that of the values it starts from.
+    The likelihood is never lower than that of the values it starts from. `inputs` as for `refine`.
     """
     box = free_box(model)
-    objective = objective_of(model, driving.problem(model), driving)
+    objective = objective_of(model, driving.problem(model, other_inputs=inputs), driving)
     p = box.inside(model.vector())
     gains, value = None, -np.inf
     for _ in range(rounds):

@@ -9,6 +9,7 @@ Scores beside those before it are asked first: what gains next to nothing there 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -48,11 +49,11 @@ def confirmed(dx: Diagnosis) -> Causes:
     waiting = {s: effect for s, effect in told.items() if effect}
     # The one that gains most comes first: beside what is still missing any effect gains something.
     while waiting:
-        hopeless = _hopeless(left, [known[e] for e in waiting.values()], price)
+        none = hopeless(left, [known[e] for e in waiting.values()], price)
         tried = {
             s: _refitted(left, known[e], dx)
             for s, e in waiting.items()
-            if e not in left.fit.model.effects and e not in hopeless
+            if e not in left.fit.model.effects and e not in none
         }
         waiting = {s: waiting[s] for s, c in tried.items() if c.statistic >= price}
         if not waiting:
@@ -71,8 +72,16 @@ def _left(dx: Diagnosis, c: Candidate) -> Beside:
     return beside(c.fit, dx.driving, {e.id for e in dx.fit.model.candidates}, dx.rules)
 
 
-def _hopeless(left: Beside, candidates: list[Candidate], price: float) -> set[str]:
-    """Effects that gain far less than the price by their scores beside what is in the model."""
+def hopeless(left: Beside, candidates: Sequence[Candidate], price: float) -> set[str]:
+    """Effects that gain far less than the price by their scores beside what is in the model.
+
+    Parameters
+    ----------
+    left : Beside
+    candidates : sequence of Candidate
+    price : float
+        In twice the log-likelihood.
+    """
     few = tuple(c.effect for c in candidates if c.id not in left.fit.model.effects)
     return {
         s.effect.id

@@ -29,7 +29,7 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import HALF_95
 from ...estimate.driving import Span
 from ...estimate.inputs import quiet, white_noise_std
-from ...identify import refine
+from ...identify import refine, refit
 from ..evidence.evidence import Evidence, solve
 from .omnibus import omnibus_of
 
@@ -120,27 +120,31 @@ def delay(
     """
     if float(np.std(inputs[:, which])) <= 0.0:
         return None
-    total, late, first = 0.0, inputs, evidence
+    put_in, late, first = 0.0, inputs, evidence
     for _ in range(_ROUNDS):
         direction, step, std = _later(evidence, late, which)
-        total += step
         tiny = 2.0 * np.pi * HIGHEST_HZ * abs(step) < _TINY_RAD and abs(step) < _NOTABLE * std
         if abs(step) < std or tiny:
             break  # the second order of so small a step is next to nothing
-        late = later(inputs, which, evidence.driving.spans, total)
+        put_in += step
+        late = later(inputs, which, evidence.driving.spans, put_in)
+        fit = refit(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
+        evidence = Evidence(fit, evidence.driving, late)
+    if evidence is not first:
+        # Noise is learned once, where the input is in its place.
         fit = refine(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
         evidence = Evidence(fit, evidence.driving, late)
-    else:
         direction, step, std = _later(evidence, late, which)
-        total += step
+    total = put_in + step
     std = float(np.hypot(std, std**2 * _by_input_noise(evidence, late, direction, rng)))
     found = _phases(evidence, late, which)
     if found is None:
         return None
     f, phase, phase_std, linear = found
-    put_in = 2.0 * np.pi * f * (total - step)
     alone = complete() if evidence is first else not omnibus_of(evidence).rejects
-    return Delay(total, std, f, as_float64(phase + put_in), phase_std, linear, alone)
+    return Delay(
+        total, std, f, as_float64(phase + 2.0 * np.pi * f * put_in), phase_std, linear, alone
+    )
 
 
 def _later(evidence: Evidence, inputs: FloatArray, which: int) -> tuple[FloatArray, float, float]:
