@@ -101,10 +101,11 @@ def _of_what_is_left(study: Study) -> list[str]:
             "and in the other direction; bank and slope of the road stay with the place, wind with "
             "the course, what belongs to the car with the driving"
         )
-    if not study.added and only_elsewhere(study):
+    if only_elsewhere(study):
+        what = "what is left" if study.added else "what is missing"
         found.append(
             "give the fit driving like the validation data too, and validate with other driving "
-            "of that kind: what is missing hardly shows in the training data, and no effect can be "
+            f"of that kind: {what} hardly shows in the training data, and no effect can be "
             "named that they do not excite"
         )
     if not study.sensors and not study.checked:
