@@ -10,7 +10,7 @@ import numpy as np
 
 from .._common.arrays import FloatArray
 from .._common.tables import frame
-from .._common.text import brief, html_list, html_paragraph, html_table, number, text_table
+from .._common.text import HALF_95, brief, html_list, html_paragraph, html_table, number, text_table
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
@@ -99,17 +99,21 @@ class Fit(Estimated):
         """What the tyre coefficients of an axle mean together.
 
         Cornering stiffness [N/rad], highest friction [1] and slip angle of that peak [rad], which
-        is infinite where the curve has none. Driving that never reaches the peak determines the
-        stiffness long before it determines B, C, D and E one by one. Each is found by the name it
-        is printed with, and by that name with underscores.
+        is infinite where the curve has none; `not determined` where the 95 % interval reaches
+        nothing. Driving that never reaches the peak determines the stiffness long before it
+        determines B, C, D and E one by one. Each is found by the name it is printed with, and by
+        that name with underscores.
         """
         p, columns = self.model.vector(), self.columns
-        found = []
+        found, exactly = [], {f.name for f in self.profiles}
         for what in tuple(self.quantities.values())[len(self.estimates) :]:
             std = std_of(what, p, columns, self.covariance)
             unit = _UNITS[what.name.rsplit(" ", 1)[0]]
-            note = "" if np.isfinite(std) else "no peak"
-            found.append(Estimate(what.name, what.of(p), std, unit, note))
+            value = what.of(p)
+            # None of them is negative: an interval that reaches nothing tells nothing.
+            wide = value < HALF_95 * std and what.name not in exactly
+            note = "no peak" if not np.isfinite(std) else "not determined" if wide else ""
+            found.append(Estimate(what.name, value, std, unit, note))
         return tuple(profiled(e, self.profiles) for e in found)
 
     def values_of(self, model: Model) -> dict[str, float]:

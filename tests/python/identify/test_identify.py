@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -62,6 +62,13 @@ def test_derived_quantities_are_found_by_name(fit: Fit) -> None:
     }
     with pytest.raises(KeyError, match="there are"):
         fit["cornering stiffness middle"]
+
+
+def test_a_meaning_whose_interval_reaches_nothing_is_not_determined(fit: Fit) -> None:
+    assert fit["cornering stiffness front"].note == ""
+    vague = replace(fit, covariance=1e6 * fit.covariance)
+    assert vague["cornering stiffness front"].note == "not determined"
+    assert vague["cornering stiffness front"].value == fit["cornering stiffness front"].value
 
 
 def test_what_a_fit_means_is_worked_out_for_a_car_without_its_effects(
