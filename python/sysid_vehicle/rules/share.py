@@ -54,12 +54,17 @@ class Share:
     def __str__(self) -> str:
         if not self.known:
             return ""
-        return f"{100 * self.value:.0f} % ({100 * self.low:.0f} to {100 * self.high:.0f})"
+        return f"{_percent(self.value)} % ({_percent(self.low)} to {_percent(self.high)})"
 
     def to_dict(self) -> dict[str, float | None]:
         """Share and interval, ready for JSON."""
         names = ("value", "low", "high")
         return {n: getattr(self, n) if self.known else None for n in names}
+
+
+def _percent(share: float) -> str:
+    text = f"{100 * share:.0f}"
+    return "0" if text == "-0" else text
 
 
 UNKNOWN = Share(np.nan, np.nan, np.nan)

@@ -345,3 +345,8 @@ def test_effects_that_act_alike_stand_together() -> None:
     nothing = replace(alone, taken_low=-0.1).with_groups(groups)
     assert verdict(nothing).groups == {}
     assert verdict(nothing).verdict == "unknown"
+
+
+def test_a_share_is_told_without_a_negative_zero() -> None:
+    assert str(Share(-0.001, -0.09, 0.004)) == "0 % (-9 to 0)"
+    assert str(Share(0.5, float("-inf"), 1.0)) == "50 % (-inf to 100)"
