@@ -139,6 +139,8 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
         "gains",
         "grade",
         "id",
+        "own_share",
+        "own_share_in_training",
         "p_value",
         "parameters",
         "stands_in",
