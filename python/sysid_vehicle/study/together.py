@@ -20,7 +20,6 @@ from .own import without
 from .steps import better, merit, real, speaks_for, strength, without_insignificant
 
 _SUBSETS = 2  # that are refitted
-_RIVALS = 2  # of one effect, that are refitted in its place
 _LEAST = 1.0  # standard errors from nothing, below which the refit of a subset does not go on
 
 
@@ -100,9 +99,11 @@ def _in_place(fit: Fit, name: str, dx: Diagnosis) -> tuple[str, ...]:
         return ()
     scores = beside(poorer, poorer.driving, {name, *alike}, rules).board.scores
     by = {s.effect.id: s.statistic * max(s.variance_ratio, 1.0) for s in scores}
-    near = [s for s in scores if s.effect.id in alike and by[s.effect.id] > rules.near * by[name]]
+    # An effect that parameters of the poorer model can copy has no score there.
+    least = rules.near * by.get(name, 0.0)
+    near = [s for s in scores if s.effect.id in alike and by[s.effect.id] > least]
     gained, rivals = 2.0 * (fit.log_likelihood - poorer.log_likelihood), []
-    for s in sorted(near, key=lambda s: -by[s.effect.id])[:_RIVALS]:
+    for s in sorted(near, key=lambda s: -by[s.effect.id]):
         told = s.statistic, s.p_value, s.value, s.std, s.retained, s.variance_ratio
         c = refitted(poorer, poorer.driving, Candidate(s.effect, *told))
         as_well = c.statistic > gained - 2.0 * rules.apart

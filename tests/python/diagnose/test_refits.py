@@ -109,6 +109,23 @@ def test_the_best_of_either_motion_is_refitted(truth: Model, start: Model) -> No
     assert lateral[0].finished
 
 
+def test_of_the_other_motion_what_the_best_explains_is_not_refitted(
+    truth: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    car = truth.add("tyre_load_sensitivity")
+    car = car.with_values({"tyre_load_sensitivity.sensitivity": 0.25})
+    fit = identify(truth, drive(car, manoeuvres.lap(), seed=1), starts=1)
+
+    def along() -> set[str]:
+        ranking = diagnose(fit, refits=1).ranking
+        assert ranking[0].id == "tyre_load_sensitivity"
+        return {c.id for c in ranking if c.effect.along_alone and c.fit is not None}
+
+    found = along()
+    monkeypatch.setattr(sys.modules["sysid_vehicle.diagnose.diagnose"], "hopeless", lambda *_: ())
+    assert found < along()
+
+
 def test_what_acts_like_the_best_along_the_car_is_refitted_whatever_it_scores(fit: Fit) -> None:
     """Beside wrong tyres the score of a mass may be nothing, as it divides side forces too."""
     ranked = diagnose(fit, refits=0).ranking

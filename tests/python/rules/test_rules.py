@@ -65,7 +65,7 @@ NUMERICAL = {
     "study/slow.py": {"_AT_LONGEST"},
     "study/steps.py": {"_ALTERNATIVES"},
     "study/structure.py": {"_AHEAD_S", "_APART", "_FEW"},
-    "study/together.py": {"_LEAST", "_RIVALS", "_SUBSETS"},
+    "study/together.py": {"_LEAST", "_SUBSETS"},
     # Descriptions of the unknown, of biases, and of the next drive.
     "diagnose/unexplained/ceiling.py": {
         "_RATE_HZ", "_LAGS_S", "_FOLDS", "_DRAWS", "_UNDERSTEER_MPS", "_REACH",

@@ -1,10 +1,13 @@
 """Several effects that are added in one step."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from sysid_vehicle import Model, diagnose, drive, identify, manoeuvres
+from sysid_vehicle.diagnose.candidates.reservation import beside
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import refine
 from sysid_vehicle.rules import USUAL
@@ -99,7 +102,7 @@ def test_several_effects_never_end_below_a_model_that_they_contain(
 
 
 def test_what_fits_as_well_in_the_place_of_one_of_several_is_told(
-    truth: Model, start: Model
+    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hidden = {"rolling_resistance.coefficient": 0.02, "gyro_bias.bias_radps": 0.006}
     car = truth.add("rolling_resistance", "gyro_bias").with_values(hidden)
@@ -116,3 +119,11 @@ def test_what_fits_as_well_in_the_place_of_one_of_several_is_told(
     trail.note_several(dx, both, alike)
     assert trail.rivals["road_grade"] == ("rolling_resistance",)
     assert in_place_of(found, both, dx, ends=0.0) == {}  # no time
+
+    def unscored(*args: Any) -> SimpleNamespace:
+        scores = [s for s in beside(*args).board.scores if s.effect.id != "road_grade"]
+        return SimpleNamespace(board=SimpleNamespace(scores=scores))
+
+    # What parameters of the poorer model can copy has no score: the refits alone tell.
+    monkeypatch.setattr(together, "beside", unscored)
+    assert in_place_of(found, ("road_grade",), dx) == {"road_grade": ("rolling_resistance",)}
