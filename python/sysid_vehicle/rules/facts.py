@@ -208,7 +208,8 @@ class Decision:
     Attributes
     ----------
     much_left : bool
-        Whether names stand beside an error of which they take up less than `Rules.most`.
+        Whether names stand beside an error of which all that was added takes up less than
+        `Rules.most`, or beside added effects that do not stand: none is confirmed.
     groups : mapping
         By effect that stands only together with others of the model, those others.
     """

@@ -162,7 +162,8 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     if proxies == names or (left and proxies | negligible == names):
         return Decision("adequate" if facts.small else "unknown", tuple(withdrawn))
     whole = not left and not proxies
-    much = left and share_of(*facts.missing) < rules.most
+    # What fell took a part of the error, and what it took may belong to what stands beside it.
+    much = left and (bool(proxies) or share_of(*facts.missing) < rules.most)
     groups = {e: others for e, others in groups.items() if e not in proxies}
     return Decision("explained" if whole else "partly_explained", tuple(withdrawn), much, groups)
 

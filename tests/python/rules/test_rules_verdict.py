@@ -154,6 +154,7 @@ def test_names_beside_something_that_is_left() -> None:
     assert set(withdrawn(little)) == {"aero_drag"}
     assert "not shown to take a share of the error" in withdrawn(little)["aero_drag"]
     assert verdict(little).verdict == "partly_explained"
+    assert verdict(little).much_left  # a part of what is gone went with what does not stand
     only = replace(LEFT, added=(replace(MASS, finding="negligible"),))
     assert verdict(only).verdict == "unknown"
 
