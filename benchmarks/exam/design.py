@@ -11,7 +11,16 @@ import numpy as np
 
 import sysid_vehicle as sv
 
-Kind = Literal["null", "effect", "pair", "outside", "itself removed", "group removed", "rivals"]
+Kind = Literal[
+    "null",
+    "effect",
+    "pair",
+    "outside",
+    "itself removed",
+    "group removed",
+    "one removed",
+    "rivals",
+]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 SEVERITIES = (0.5, 1.0, 2.0)
@@ -123,6 +132,9 @@ class Trial:
             return self.truth
         if self.kind == "group removed":
             return (*self.truth, *(t for e in self.truth for t in sv.effect(e).confounded_with))
+        if self.kind == "one removed":
+            stays, goes = self.truth
+            return (goes, *(e for e in sv.effect(goes).confounded_with if e != stays))
         return ()
 
     def to_dict(self) -> dict[str, Any]:
@@ -138,6 +150,8 @@ def _truths() -> Iterator[tuple[Kind, tuple[str, ...], tuple[float, ...]]]:
         yield "group removed", (e.id,), SEVERITIES
     for pair in PAIRS:
         yield "pair", pair, SEVERITIES
+        yield "one removed", pair, SEVERITIES
+        yield "one removed", (pair[1], pair[0]), SEVERITIES
     for rivals in RIVALS:
         yield "rivals", rivals, SEVERITIES
     for name in OUTSIDE:

@@ -220,6 +220,34 @@ def _both_in_groups(o: Outcome) -> bool:
     return len(named) == len(truth) and all(any(t in g for g in named) for t in truth)
 
 
+def _partly(outcomes: Sequence[Outcome]) -> list[Row]:
+    every = _of(outcomes, "one removed")
+    found = [o for o in every if detected(o) or o["omnibus_first"] < 0.01]
+    partly = Rate.over(o["verdict"] == "partly_explained" for o in found)
+    unknown = Rate.over(o["verdict"] == "unknown" for o in found)
+    return [
+        ("seen at all", f"{len(found)}/{len(every)}", ""),
+        ("the candidate named, or in the group", str(_rate(_candidate_named, found)), ""),
+        ("any other effect named beside it or alone", str(_rate(_another_named, found)), "<= 2 %"),
+        ("verdict partly explained", str(partly), ""),
+        ("verdict unknown", str(unknown), ""),
+    ]
+
+
+def _named(o: Outcome) -> list[set[str]]:
+    """What was added and is named, each with its rivals."""
+    told = [e for e in o["added"] if o["findings"].get(e) in _TOLD]
+    return [{e, *o["groups"].get(e, [])} for e in told]
+
+
+def _candidate_named(o: Outcome) -> bool:
+    return any(o["trial"]["truth"][0] in group for group in _named(o))
+
+
+def _another_named(o: Outcome) -> bool:
+    return any(o["trial"]["truth"][0] not in group for group in _named(o))
+
+
 def _steps(outcomes: Sequence[Outcome]) -> list[Row]:
     found = _of(outcomes, "null")
     steps = [o for o in found if o["trial"]["driving"] in ("ramp", "step")]
@@ -252,6 +280,7 @@ _MAKERS: dict[str, tuple[str, Callable[[Sequence[Outcome]], list[Row]]]] = {
     "timing": ("Lag and relaxation", _timing),
     "kinematic": ("Kinematic and sensor effects, not among the candidates", _kinematic),
     "pairs": ("Two effects hidden", _pairs),
+    "partly": ("Two effects hidden, the second one and its like no candidates", _partly),
     "steps": ("Step-like driving beside laps", _steps),
     "rivals": ("After the drive that was suggested", _rivals),
 }
@@ -266,6 +295,7 @@ KINDS_OF = {
     "timing": ("effect",),
     "kinematic": ("itself removed", "group removed"),
     "pairs": ("pair",),
+    "partly": ("one removed",),
     "steps": ("null",),
     "rivals": ("rivals",),
 }

@@ -82,6 +82,7 @@ def _told(study: sv.Study) -> Outcome:
     return {
         "verdict": study.verdict,
         "added": [a.id for a in study.added],
+        "own": {a.id: [a.own.to_dict(), a.own_in_training.to_dict()] for a in study.added},
         "groups": {a.id: list(study.verdicts[a.id].group) for a in study.added},
         "evidence": [c.id for c in first.significant],
         "leader": leader,

@@ -22,11 +22,12 @@
 8. Something left, or taken up by what only stands in for it: a name stands by its own share, what
    comes back of the error 1 to 5 s ahead, of the motion that it moves, where the final model lacks
    it and all else is fitted anew. It is above `taken` and shown not to be chance, on training and
-   on validation data; where less than `most` of that error is gone, the whole interval is above
-   `taken`. Of effects that act alike, and have no such share beside each other, the share of all
-   of them counts, and they are named as a group. Nothing that has no share of either kind takes
-   more, and moves a channel that it moves. All that
-   was added together is shown to take a share, of that error or of what could be explained of it.
+   on validation data; where less than `most` of that error is gone, the whole interval of the mean
+   of both is above `taken`. Of effects that act alike, and have no such share beside each other, or
+   are not shown to be off nothing (`insignificant`), the share of all of them counts, and they are
+   named as a group. Nothing that has no share of either kind takes more, and moves a channel that
+   it moves. All that was added together is shown to take a share, of that error or of what could
+   be explained of it.
    Where the final model errs by less than the noise of the sensors (`buried`), no share can be
    shown: an effect without rivals, and without a stand-in beside it, keeps its name if the
    likelihood of validation data needs it (`interval`), unless training data show more (`strict`).
@@ -39,7 +40,15 @@ Nothing here sees a fit or a log: others measure, this decides.
 from .accept import ErrorChange, Gain, Measures, accept, bic, worse
 from .facts import Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
-from .share import NONE_GONE, UNKNOWN, Share, share_between, share_explained, share_of
+from .share import (
+    NONE_GONE,
+    UNKNOWN,
+    Share,
+    low_of_mean,
+    share_between,
+    share_explained,
+    share_of,
+)
 from .verdict import (
     Grade,
     excess,
@@ -73,6 +82,7 @@ __all__ = [
     "grade",
     "incomplete",
     "little",
+    "low_of_mean",
     "share_between",
     "share_explained",
     "share_of",

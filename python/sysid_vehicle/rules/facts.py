@@ -41,6 +41,8 @@ class Added:
         What is said of it by itself: `missing`, `one of a group`, `negligible` or `proxy`.
     group : tuple of str
         Its rivals, where it is one of a group.
+    felt : bool
+        Whether a parameter of it is shown to be off nothing (`Rules.insignificant`).
     moves : frozenset of str
         Channels that it moves.
     own, own_in_training : Share
@@ -75,6 +77,7 @@ class Added:
     beside: frozenset[str] = frozenset()
     shared: Share = UNKNOWN
     shared_in_training: Share = UNKNOWN
+    felt: bool = True
 
     @property
     def named(self) -> bool:
@@ -205,7 +208,8 @@ class Decision:
     Attributes
     ----------
     much_left : bool
-        Whether names stand beside an error of which they take up less than `Rules.most`.
+        Whether names stand beside an error of which all that was added takes up less than
+        `Rules.most`, or beside added effects that do not stand: none is confirmed.
     groups : mapping
         By effect that stands only together with others of the model, those others.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,6 +66,15 @@ class Share:
 def _percent(share: float) -> str:
     text = f"{100 * share:.0f}"
     return "0" if text == "-0" else text
+
+
+def low_of_mean(shares: Sequence[Share]) -> float:
+    """Lower end of the interval of the mean of shares, each of other data.
+
+    Half intervals of independent figures add up as their squares do; NaN where one is unknown.
+    """
+    values, lows = (np.array([getattr(s, end) for s in shares]) for end in ("value", "low"))
+    return float(values.mean() - np.linalg.norm(values - lows) / len(shares))
 
 
 UNKNOWN = Share(np.nan, np.nan, np.nan)

@@ -7,7 +7,7 @@ from typing import Literal
 
 from .facts import Added, Decision, Facts, Tested, Withdrawn
 from .limits import USUAL, Rules
-from .share import Share, share_of
+from .share import Share, low_of_mean, share_of
 
 Grade = Literal["confirmed", "plausible", "alias"]
 _NOT_SHOWN = (
@@ -127,7 +127,8 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     """
     names = frozenset(a.id for a in facts.added)
     if facts.contradictions:
-        # Readings that contradict each other leave no name safe.
+        # Readings that contradict each other leave no name safe. Nor along the car: a lateral
+        # speed that is led astray acts on the speed, as a drag does in corners.
         because = "; ".join(facts.contradictions)
         return Decision("unknown", (Withdrawn(names, because, names),))
     left = something_left(facts, rules)
@@ -161,7 +162,8 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     if proxies == names or (left and proxies | negligible == names):
         return Decision("adequate" if facts.small else "unknown", tuple(withdrawn))
     whole = not left and not proxies
-    much = left and share_of(*facts.missing) < rules.most
+    # What fell took a part of the error, and what it took may belong to what stands beside it.
+    much = left and (bool(proxies) or share_of(*facts.missing) < rules.most)
     groups = {e: others for e, others in groups.items() if e not in proxies}
     return Decision("explained" if whole else "partly_explained", tuple(withdrawn), much, groups)
 
@@ -176,17 +178,19 @@ def _standing(facts: Facts, rules: Rules) -> tuple[frozenset[str], dict[str, fro
     that of the effect beside all others, which were fitted anew without it: what one of them, or
     the tyres, would do in its place is not its own. A stand-in serves one manoeuvre, and the next
     one at a price. Where much is left of the motion that it moves, what it stands in for may be
-    that: the share must be shown to be one worth a name. So may it be what a stand-in takes that
-    moves the same channel, if that is the larger part.
+    that: the share must be shown to be one worth a name, of all data. So may it be what a stand-in
+    takes that moves the same channel, if that is the larger part. What is not shown to be off
+    nothing has no name of its own, whatever the model lacks without it: it is there for others.
     """
 
     def worth(a: Added, *shares: Share) -> bool:
         much = share_of(*(facts.missing if a.missing is None else a.missing)) < rules.most
         least = rules.taken if much else 0.0
-        return all(s.value > rules.taken and s.low > least for s in shares)
+        each = all(s.value > rules.taken and s.low > 0.0 for s in shares)
+        return each and low_of_mean(shares) > least
 
     named = [a for a in facts.added if a.named]
-    alone = {a.id for a in named if worth(a, a.own, a.own_in_training)}
+    alone = {a.id for a in named if a.felt and worth(a, a.own, a.own_in_training)}
     together = {
         a.id
         for a in named

@@ -42,6 +42,9 @@ class AddedEffect:
         Of the error 1 to 5 s ahead that the final model leaves without it, all else fitted anew,
         what it takes away: on validation and on training data. Unknown where nothing is missing,
         as nobody asked.
+    together, together_in_training : Share
+        The same of it and the effects of the model that it is named with, as a group; unknown where
+        it stands alone or not at all.
     """
 
     id: str
@@ -55,6 +58,8 @@ class AddedEffect:
     takes_little: bool = False
     own: Share = UNKNOWN
     own_in_training: Share = UNKNOWN
+    together: Share = UNKNOWN
+    together_in_training: Share = UNKNOWN
 
     @property
     def name(self) -> str:
@@ -89,10 +94,13 @@ class AddedEffect:
 
     @property
     def shared_out(self) -> str:
-        """Its own shares in words; empty where nobody asked."""
-        pairs = (self.own, "validation"), (self.own_in_training, "training")
-        told = [f"{share} on {data} data" for share, data in pairs if share.known]
-        return f"its own share of the error 1 to 5 s ahead {' and '.join(told)}" if told else ""
+        """Its own shares, and those of its group, in words; empty where nobody asked."""
+        own = _both(self.own, self.own_in_training)
+        if not own:
+            return ""
+        group = _both(self.together, self.together_in_training)
+        others = f", that of the group {group}" if group else ""
+        return f"its own share of the error 1 to 5 s ahead {own}{others}"
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""
@@ -108,7 +116,14 @@ class AddedEffect:
             "takes_little": self.takes_little,
             "own_share": self.own.to_dict(),
             "own_share_in_training": self.own_in_training.to_dict(),
+            "share_together": self.together.to_dict(),
+            "share_together_in_training": self.together_in_training.to_dict(),
         }
+
+
+def _both(validation: Share, training: Share) -> str:
+    pairs = (validation, "validation"), (training, "training")
+    return " and ".join(f"{share} on {data} data" for share, data in pairs if share.known)
 
 
 def added_by(
@@ -142,7 +157,12 @@ def added_by(
     rules : Rules
     """
     added = []
-    known = {a.id: (a.own, a.own_in_training) for a in facts.added}
+    known = {
+        a.id: (a.own, a.own_in_training, a.shared, a.shared_in_training)[
+            : 4 if a.id in decision.groups else 2
+        ]
+        for a in facts.added
+    }
     final, ends = fits[-1], (on_test[0].error, on_test[-1].error)
     for (before, after), (poorer, richer) in zip(pairwise(on_test), pairwise(fits), strict=True):
         small = little(ends[0], before.error, after.error, ends[1], rules)

@@ -30,10 +30,11 @@ from .own import (
     shown_together,
     sure_of,
     together_by_motion,
+    without_idle,
 )
 from .search import Trail
 from .slow import slow_forces
-from .steps import way
+from .steps import insignificant, way
 from .structure import structure
 from .study import Study
 from .validation import at_its_best, beyond_noise_ahead, serving
@@ -134,6 +135,7 @@ class Judge:
             unopposed=bool(self.added) and rivals is None,
             unforeseen=expected is not None and expected.unforeseen,
             slow=slow,
+            unfelt=insignificant(fit, rules),
         )
         if self.added and incomplete(facts, rules):
             facts = self._with_shares(facts, explained)
@@ -239,7 +241,7 @@ class Judge:
         sure = sure_of(fit, sorted(named), test, self.rules, ends) if below else frozenset()
         facts = replace(facts.with_own(shares, unknown, sure), buried=below)
         self.asks.note(unknown, _ALONE)
-        groups = alike(fit, named)
+        groups = without_idle(alike(fit, named), shares, self.rules)
         facts = facts.with_groups(shares_of_groups(fit, groups, test, ends))
         if explained is None:
             return facts

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ..effects import Effect
 from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refit
-from ..rules import UNKNOWN, Rules, Share
+from ..rules import UNKNOWN, USUAL, Rules, Share
 from .beyond import Beyond, own_share, taken_of
 from .horizons import LATERAL, moving_with
 from .shares import shares
@@ -98,6 +98,29 @@ def alike(final: Fit, effects: Collection[str]) -> tuple[tuple[str, ...], ...]:
         if len(group) > 1:
             groups.append(tuple(e.id for e in group))
     return tuple(groups)
+
+
+def without_idle(
+    groups: Sequence[tuple[str, ...]],
+    own: Mapping[str, tuple[Share, Share]],
+    rules: Rules = USUAL,
+) -> tuple[tuple[str, ...], ...]:
+    """Groups without what takes nothing beside the others, where several of them take a part each.
+
+    What takes a part each, and cannot be told from the others, needs these: what has none beside
+    them is no part of that.
+
+    Parameters
+    ----------
+    groups : sequence of tuple of str
+        As `alike` finds them.
+    own : mapping
+        By effect, its own shares on validation and on training data.
+    rules : Rules
+    """
+    busy = {e for e, both in own.items() if all(s.value > rules.taken for s in both)}
+    few = (tuple(e for e in group if e in busy) for group in groups)
+    return tuple(some if len(some) > 1 else group for group, some in zip(groups, few, strict=True))
 
 
 def _act_alike(one: Effect, other: Effect) -> bool:
@@ -220,7 +243,8 @@ def together_by_motion(
 
     What the lateral model lacks says nothing of a mass, nor the other way round. The share is that
     of `own_share`, block against block. Where its interval reaches nothing for lateral errors, that
-    of what could be explained counts.
+    of what could be explained counts. Of a median error that does not fall nothing is taken, though
+    more blocks may gain than lose.
 
     Parameters
     ----------
@@ -243,7 +267,9 @@ def together_by_motion(
     for channels in {parts[e] for e in added}:
         taken = taken_of(first, last, test, AHEAD, channels)
         low = own_share(first, last, test, AHEAD, channels=channels).low
-        if not low > 0.0 and not channels.isdisjoint(LATERAL):
+        if not taken.share > 0.0:
+            low = min(low, taken.share)
+        elif not low > 0.0 and not channels.isdisjoint(LATERAL):
             low = shown_together(taken, (first, last), test)
         found[channels] = (taken.squares[0], taken.squares[-1]), low
     return {e: found[parts[e]] for e in added}

@@ -60,9 +60,10 @@ def meaning(study: Study) -> str:
                 f"{study.shares.whole} of what any function of the driving could explain of the "
                 "error 1 to 5 s ahead"
             )
+        named = _named(study)
         return (
-            f"what was added takes up {part}; the rest is disturbance, and something else that is "
-            "missing"
+            f"{named}what was added takes up {part}; the rest is disturbance, and something else "
+            "that is missing"
         )
     seen = study.omnibus.rejects or study.diagnoses[-1].significant or structured(study)
     seen = seen or elsewhere(study) or slow(study)
@@ -88,6 +89,16 @@ def meaning(study: Study) -> str:
             "floors, by disturbances like those of the training data"
         )
     return _MEANING[study.verdict]
+
+
+def _named(study: Study) -> str:
+    """The names that stand, in words; rivals of one group are told once."""
+    told = {v.effect.id for v in study.verdicts.all if v.finding in ("missing", "one of a group")}
+    names: dict[frozenset[str], str] = {}
+    for a in study.added:
+        if a.id in told:
+            names.setdefault(frozenset((a.id, *a.confounded_with)), a.name)
+    return f"named: {', '.join(names.values())}; " if names else ""
 
 
 def _matters(study: Study) -> str:

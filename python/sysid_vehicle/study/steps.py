@@ -44,7 +44,7 @@ def first_that_holds(
         if c.fit is None or not _sound(c, rules):
             continue
         lean: Fit | None = c.fit
-        if _insignificant(c.fit, rules):
+        if insignificant(c.fit, rules):
             lean = before(ends, partial(without_insignificant, c.fit, rules), None)
         if lean is None or c.id not in lean.model.effects:
             continue
@@ -276,10 +276,10 @@ def without_insignificant(fit: Fit, rules: Rules = USUAL) -> Fit:
     """
     kept: set[str] = set()
     while True:
-        insignificant = _insignificant(fit, rules) - kept
-        if not insignificant:
+        weak = insignificant(fit, rules) - kept
+        if not weak:
             return fit
-        weakest = min(sorted(insignificant), key=lambda name: strength(fit, name))
+        weakest = min(sorted(weak), key=lambda name: strength(fit, name))
         without = refine(fit.model.drop(weakest), fit.driving, fit.noise)
         if merit(without) + rules.apart < merit(fit):
             kept.add(weakest)
@@ -309,8 +309,8 @@ def way(fits: Sequence[Fit], ends: float = np.inf) -> list[Fit]:
     return story if story[0] is baseline else [baseline, *story]
 
 
-def _insignificant(fit: Fit, rules: Rules) -> set[str]:
-    """Effects of the model that cannot be told from nothing."""
+def insignificant(fit: Fit, rules: Rules = USUAL) -> set[str]:
+    """Effects of the model that cannot be told from nothing, by the parameters of each."""
     sought = (e.id for e in fit.model.parts if e.id not in fit.model.nuisances)
     return {name for name in sought if strength(fit, name) < rules.insignificant}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from ..compare import Comparison
 from ..diagnose import Omnibus, Verdicts
@@ -26,6 +26,7 @@ def facts_of(
     unopposed: bool = False,
     unforeseen: bool = False,
     slow: tuple[str, ...] = (),
+    unfelt: Collection[str] = (),
 ) -> Facts:
     """Collect what is known of a final model.
 
@@ -42,6 +43,8 @@ def facts_of(
         then all of them may be left.
     fitted, together, candidate, excited, small, structure, unopposed, unforeseen, slow
         As in `Facts`.
+    unfelt : collection of str
+        Effects of which no parameter is shown to be off nothing.
     """
     added = set(fits[-1].model.effects) - set(fits[0].model.effects)
     missing: tuple[float, ...] = (1.0,) if added else (0.0,)
@@ -54,7 +57,7 @@ def facts_of(
         (missing[0], missing[-1]),
         1.0 if explained is None else explained.low,
         tuple(
-            Added(v.effect.id, v.finding, v.group, v.effect.moved)
+            Added(v.effect.id, v.finding, v.group, v.effect.moved, felt=v.effect.id not in unfelt)
             for v in told.all
             if v.effect.id in added
         ),

@@ -63,6 +63,10 @@ def test_the_grid_has_every_point_once(exam: SimpleNamespace) -> None:
     removed = next(t for t in trials if t.kind == "group removed" and t.truth == ("steer_lag",))
     assert set(removed.removed) == {"steer_lag", *sv.effect("steer_lag").confounded_with}
     assert {"steer_delay", "tyre_relaxation", "front_tyre_relaxation"} < set(removed.removed)
+    halves = {t.truth: t.removed for t in trials if t.kind == "one removed"}
+    assert len(halves) == 20
+    assert all(goes in out and stays not in out for (stays, goes), out in halves.items())
+    assert "tyre_relaxation" in halves["aero_downforce", "steer_lag"]
 
 
 def test_a_sample_is_drawn_by_its_seed_from_every_kind(exam: SimpleNamespace) -> None:
@@ -107,6 +111,21 @@ def test_rates_are_counted_against_what_was_hidden(exam: SimpleNamespace) -> Non
         ),
         outcome(exam, "outside", ("crowned road",), leader="road_bank", verdict="unknown"),
         outcome(exam, "outside", ("torque vectoring",)) | {"state": "lost"},
+        outcome(
+            exam,
+            "one removed",
+            ("mass", "steer_lag"),
+            leader="yaw_inertia",
+            added=["yaw_inertia", "road_grade", "gyro_scale"],
+            groups={"road_grade": ["mass"]},
+            findings={
+                "yaw_inertia": "proxy",
+                "road_grade": "one of a group",
+                "gyro_scale": "missing",
+            },
+            verdict="partly_explained",
+        ),
+        outcome(exam, "one removed", ("steer_lag", "mass"), leader="mass", verdict="unknown"),
     ]
     rows = {r[0]: r[1] for t in exam.tables.tables(found) for r in t.rows}
     assert rows["any effect claimed, lap"].startswith("1/2 ")
@@ -117,6 +136,9 @@ def test_rates_are_counted_against_what_was_hidden(exam: SimpleNamespace) -> Non
     assert rows["95 % intervals that hold the true parameter"].startswith("1/2 ")
     assert rows["lag or relaxation named first"].startswith("1/1 ")
     assert rows["something else left or added"].startswith("0/1 ")
+    assert rows["the candidate named, or in the group"].startswith("1/2 ")
+    assert rows["any other effect named beside it or alone"].startswith("1/2 ")
+    assert rows["verdict partly explained"].startswith("1/2 ")
     by_title = {t.name: str(t) for t in exam.tables.tables(found)}
     assert "outside, severity 2: seen at all" in by_title["unknown"]
     assert "1/1 = 100.0 % (21-100)" in by_title["unknown"]

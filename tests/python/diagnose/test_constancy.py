@@ -105,6 +105,7 @@ def test_two_parameters_of_one_sign_have_the_level_they_claim(name: str, alike: 
 def test_differences_that_matter_to_nobody_are_none(fits: dict[str, Fit]) -> None:
     kept = constancy(fits["head_wind"])["head_wind"]
     size = kept.effect.parameters[0].matters
-    assert kept.spread * size == pytest.approx(np.std(kept.values), rel=0.5)
+    # A slow drive tells less of a wind, and of the difference as much as the fast one does.
+    assert kept.spread * size == pytest.approx(np.std(kept.values), rel=0.05)
     assert not kept.holds
     assert replace(kept, spread=0.99).holds

@@ -15,6 +15,7 @@ from sysid_vehicle.rules import (
     grade,
     incomplete,
     little,
+    low_of_mean,
     share_explained,
     something_left,
     unforeseen,
@@ -153,6 +154,7 @@ def test_names_beside_something_that_is_left() -> None:
     assert set(withdrawn(little)) == {"aero_drag"}
     assert "not shown to take a share of the error" in withdrawn(little)["aero_drag"]
     assert verdict(little).verdict == "partly_explained"
+    assert verdict(little).much_left  # a part of what is gone went with what does not stand
     only = replace(LEFT, added=(replace(MASS, finding="negligible"),))
     assert verdict(only).verdict == "unknown"
 
@@ -217,14 +219,20 @@ def test_beside_much_that_is_left_a_share_is_shown_to_be_worth_a_name() -> None:
     assert withdrawn(much) == {}
     assert verdict(much).verdict == "partly_explained"
     assert verdict(much).much_left
-    unsure = replace(MASS, own=Share(0.3, 0.05, 0.5))
+    little = Share(0.2, 0.02, 0.4)
+    unsure = replace(MASS, own=little, own_in_training=little)
     assert withdrawn(replace(LEFT, added=(unsure,))) == {}
     assert set(withdrawn(replace(much, added=(unsure,)))) == {"mass"}
     assert verdict(replace(much, added=(unsure,))).verdict == "unknown"
+    # All data show it together; neither may show none.
+    for where in ("own", "own_in_training"):
+        assert withdrawn(replace(much, added=(replace(unsure, **{where: MOST}),))) == {}
+        none = replace(unsure, **{where: Share(0.2, -0.02, 0.4)})
+        assert set(withdrawn(replace(much, added=(none,)))) == {"mass"}
 
 
 def test_what_is_left_of_one_motion_spoils_no_name_of_the_other() -> None:
-    unsure = replace(DRAG, own=Share(0.3, 0.05, 0.5))
+    unsure = replace(DRAG, own=Share(0.2, 0.02, 0.4), own_in_training=Share(0.2, 0.02, 0.4))
     much = replace(LEFT, missing=(8.0, 5.0), added=(unsure,))
     assert set(withdrawn(much)) == {"aero_drag"}
     told = much.with_motions({"aero_drag": ((2.0, 0.1), 0.9)})
@@ -332,6 +340,11 @@ def test_effects_that_act_alike_stand_together() -> None:
         "rolling_resistance": {"aero_drag"},
     }
     assert said.verdict == "partly_explained"
+    # So do those of which the model needs each, while none is shown to be off nothing.
+    needed = [replace(a, own=MOST, own_in_training=MOST, felt=False) for a in both]
+    some = replace(LEFT, added=(MASS, *needed))
+    assert set(withdrawn(some)) == {"aero_drag", "rolling_resistance"}
+    assert verdict(some.with_groups(groups)).groups == said.groups
     # Their share has to be shown as that of a single one, on all data.
     for unsure in ((MOST, NONE_OF_IT), (UNKNOWN, MOST)):
         told = alone.with_groups(dict.fromkeys(groups, unsure))
@@ -345,6 +358,13 @@ def test_effects_that_act_alike_stand_together() -> None:
     nothing = replace(alone, taken_low=-0.1).with_groups(groups)
     assert verdict(nothing).groups == {}
     assert verdict(nothing).verdict == "unknown"
+
+
+def test_the_mean_of_shares_is_known_better_than_each() -> None:
+    assert low_of_mean([Share(0.3, 0.1, 0.5)]) == pytest.approx(0.1)
+    assert low_of_mean([Share(0.3, 0.1, 0.5)] * 4) == pytest.approx(0.2)
+    assert low_of_mean([Share(0.5, 0.2, 0.6), Share(0.3, -0.1, 0.9)]) == pytest.approx(0.15)
+    assert np.isnan(low_of_mean([MOST, UNKNOWN]))
 
 
 def test_a_share_is_told_without_a_negative_zero() -> None:

@@ -77,6 +77,12 @@ def test_of_errors_that_grow_no_share_is_taken(
     assert shown_together(grown, [fit, fit], lanes) == grown.low
     unsure = Beyond((0.4, 0.2), 0.5, -0.1, 0.8)
     assert shown_together(unsure, [fit, fit], lanes) == 1.0
+    # Nor where more blocks gain than lose, while the median error of the motion grows.
+    monkeypatch.setattr(own, "own_share", lambda *_, **__: Share(0.3, 0.2, 0.5))
+    heavier = replace(fit, model=fit.model.add("mass"))
+    for told, least in ((grown, -0.25), (unsure, 0.2)):
+        monkeypatch.setattr(own, "taken_of", lambda *_, told=told: told)
+        assert together_by_motion([fit, heavier], ["mass"], lanes)["mass"][1] == least
 
 
 def test_lateral_errors_are_one_figure_beside_an_effect_along_the_car(

@@ -225,7 +225,7 @@ def said(base: Study, rng: random.Random) -> str:
             e,
             finding := rng.choice(FINDINGS),
             ("mass",) if finding == "one of a group" else (),
-            rng.choice((frozenset({"yaw_rate_radps"}), frozenset({"ay_mps2"}))),
+            frozenset({rng.choice(("yaw_rate_radps", "ay_mps2", "vx_mps"))}),
             own_share(rng),
             own_share(rng),
             sure=rng.random() < 0.5,

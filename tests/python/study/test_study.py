@@ -22,6 +22,7 @@ from sysid_vehicle import (
     improve,
     manoeuvres,
 )
+from sysid_vehicle.diagnose import Verdicts
 from sysid_vehicle.rules import Gain
 from sysid_vehicle.study.beyond import Beyond
 from sysid_vehicle.study.shares import shares
@@ -233,7 +234,17 @@ def test_infinite_figures_become_null(study: Study, tmp_path: Path) -> None:
 def test_a_part_is_told_with_its_share(study: Study) -> None:
     part = replace(study, verdict="partly_explained", explained=Beyond((1.0, 0.7), 0.3, 0.2, 0.4))
     assert "takes up 30 % (20 to 40) of the error 1 to 5 s ahead; the rest is" in part.meaning
+    assert part.meaning.startswith(f"named: {study.added[0].name}; what was added takes up 30 %")
     assert "takes up" not in replace(part, explained=study.explained).meaning
+    # What cannot be told from another is one name.
+    one, other = (
+        replace(study.added[0], id=e, confounded_with=(f,))
+        for e, f in (("mass", "force_gain"), ("force_gain", "mass"))
+    )
+    (known,) = (v for v in study.verdicts.all if v.effect.id == study.added[0].id)
+    told = Verdicts(tuple(replace(known, effect=effect(e.id)) for e in (one, other)))
+    both = replace(part, added=(one, other), verdicts=told)
+    assert both.meaning.startswith("named: mass or force_gain; what was added")
 
 
 def test_undetermined_parameters_are_among_the_warnings(study: Study) -> None:

@@ -15,7 +15,7 @@ from sysid_vehicle.identify import refit
 from sysid_vehicle.rules import UNKNOWN, USUAL, Share
 from sysid_vehicle.study import own
 from sysid_vehicle.study.improve import _room
-from sysid_vehicle.study.own import alike, own_shares, shares_of_groups
+from sysid_vehicle.study.own import alike, own_shares, shares_of_groups, without_idle
 
 
 def test_what_another_effect_would_do_in_its_place_is_not_its_own(
@@ -50,6 +50,17 @@ def test_effects_that_copy_each_other_have_a_share_together(truth: Model, start:
     for i, together in enumerate(found[groups[0]]):
         assert together.low > USUAL.taken
         assert all(together.value > alone[e][i].value + 0.1 for e in groups[0])
+
+
+def test_a_group_is_of_those_that_take_a_part_each_where_several_do() -> None:
+    some, none = (Share(0.5, 0.2, 0.7),) * 2, (Share(-0.2, -0.4, 0.1),) * 2
+    group = ("front_tyre_relaxation", "steer_delay", "tyre_relaxation")
+    own = dict(zip(group, (some, none, some), strict=True))
+    assert without_idle([group], own) == (("front_tyre_relaxation", "tyre_relaxation"),)
+    # What takes a part on some data alone takes none; one alone is no group.
+    own["tyre_relaxation"] = (some[0], none[0])
+    assert without_idle([group], own) == (group,)
+    assert without_idle([group], {}) == (group,)
 
 
 def test_validation_data_are_asked_only_where_a_name_has_a_share(

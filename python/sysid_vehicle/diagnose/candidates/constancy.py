@@ -129,7 +129,8 @@ def _of_effect(
     # The pieces add up to the whole, which is fitted: the last one says nothing of its own.
     cut = np.hstack([own * piece[:, None] for piece in pieces])
     R = evidence.project(cut)
-    inverse, rank = pseudo_inverse(R.T @ R)
+    information = R.T @ R
+    inverse, rank = pseudo_inverse(information)
     S = R.T @ e
     off = inverse @ S
     along = R @ off
@@ -137,7 +138,9 @@ def _of_effect(
     statistic = float(S @ off) / ratio
     width = own.shape[1]
     by_piece = off.reshape(len(pieces), width)
-    precision = np.array([(own[piece] ** 2).sum(axis=0) for piece in pieces])
+    # What each piece tells beside all else. Of two pieces either tells their difference as well,
+    # though one may hold nearly all that the effect does.
+    precision = information.diagonal().reshape(by_piece.shape)
     weights = precision / np.maximum(precision.sum(axis=0), 1e-300)
     centred = by_piece - (weights * by_piece).sum(axis=0)
     # What noise alone would scatter, taken off (DerSimonian & Laird, Controlled Trials 1986).
