@@ -23,6 +23,8 @@ _LATE = (
     "validation data"
 )
 
+_TAKES_MORE = "takes more, which has no name itself: what it stands in for may be this, too"
+
 _UNOPPOSED = (
     "the time limit left unknown whether something unknown would do in its place on training and "
     "validation data"
@@ -143,12 +145,17 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     if left or stand_ins:
         late = frozenset(a.id for a in facts.added if a.late)
         likely = _likely(facts, rules)
-        alone, groups = _standing(facts, rules)
-        falling = names - likely - alone - groups.keys()
+        alone, groups, led = _standing(facts, rules)
+        falling = names - likely - alone - groups.keys() - led.keys()
         if left:
             nothing = frozenset(a.id for a in facts.added if not _together_low(a, facts) > 0.0)
             withdrawn.append(Withdrawn(nothing - likely - falling, _NOT_TOGETHER, names))
         withdrawn.append(Withdrawn(falling - late, _NOT_SHOWN, names))
+        for name, leaders in led.items():
+            if name in likely:
+                continue
+            because = f"of the same errors {' and '.join(sorted(leaders))} {_TAKES_MORE}"
+            withdrawn.append(Withdrawn(frozenset({name}), because, names))
         if falling & late:
             withdrawn.append(Withdrawn(falling & late, _LATE, names))
     if facts.unopposed:
@@ -168,11 +175,14 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     return Decision("explained" if whole else "partly_explained", tuple(withdrawn), much, groups)
 
 
-def _standing(facts: Facts, rules: Rules) -> tuple[frozenset[str], dict[str, frozenset[str]]]:
+def _standing(
+    facts: Facts, rules: Rules
+) -> tuple[frozenset[str], dict[str, frozenset[str]], dict[str, frozenset[str]]]:
     """Effects whose own share of the error ahead is shown on training and validation data.
 
     The second are those that have none, with the others of the model that act like them, where
     the share of all of these together is shown: each does what the others would do in its place.
+    The third are those of either kind that lead none of what they move, with what takes more.
 
     Evidence grows with the data, whatever small misfit an effect serves; a share does not. It is
     that of the effect beside all others, which were fitted anew without it: what one of them, or
@@ -198,18 +208,19 @@ def _standing(facts: Facts, rules: Rules) -> tuple[frozenset[str], dict[str, fro
         and alone.isdisjoint({a.id, *a.beside})
         and worth(a, a.shared, a.shared_in_training)
     }
-    others = [a for a in facts.added if a.id not in alone | together]
-
-    def leads(a: Added, *shares: Share) -> bool:
-        return not any(a.moves & b.moves and _more(b, shares) for b in others)
-
+    shares = {a.id: (a.own, a.own_in_training) for a in facts.added if a.id in alone}
+    shares |= {a.id: (a.shared, a.shared_in_training) for a in facts.added if a.id in together}
+    others = [a for a in facts.added if a.id not in shares]
+    led = {}
+    for a in named:
+        if a.id in shares:
+            more = [b.id for b in others if a.moves & b.moves and _more(b, shares[a.id])]
+            led[a.id] = frozenset(more)
+    leading = {e for e, more in led.items() if not more}
     return (
-        frozenset(a.id for a in named if a.id in alone and leads(a, a.own, a.own_in_training)),
-        {
-            a.id: a.beside
-            for a in named
-            if a.id in together and leads(a, a.shared, a.shared_in_training)
-        },
+        frozenset(alone & leading),
+        {a.id: a.beside for a in named if a.id in together & leading},
+        {e: more for e, more in led.items() if more},
     )
 
 
@@ -233,9 +244,13 @@ def _likely(facts: Facts, rules: Rules) -> frozenset[str]:
 
 
 def _more(one: Added, shares: Sequence[Share]) -> bool:
-    """Whether an effect takes more than others do on validation or on training data."""
+    """Whether an effect takes more than others do, of validation and training data together.
+
+    On one of them it may do so by chance. What it takes at a price it does not take.
+    """
     own = one.own, one.own_in_training
-    return any(a.value > b.value for a, b in zip(own, shares, strict=True))
+    pairs = [(a.value, b.value) for a, b in zip(own, shares, strict=True) if a.known and b.known]
+    return sum(max(a, 0.0) - b for a, b in pairs) > 0.0
 
 
 def _together(facts: Facts, rules: Rules) -> bool:
