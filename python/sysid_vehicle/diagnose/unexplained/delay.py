@@ -29,7 +29,7 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import HALF_95
 from ...estimate.driving import Span
 from ...estimate.inputs import quiet, white_noise_std
-from ...identify import refine, refit
+from ...identify import refit, relearn
 from ..evidence.evidence import Evidence, solve
 from .omnibus import omnibus_of
 
@@ -132,7 +132,7 @@ def delay(
         evidence = Evidence(fit, evidence.driving, late)
     if evidence is not first:
         # Noise is learned once, where the input is in its place.
-        fit = refine(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
+        fit = relearn(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
         evidence = Evidence(fit, evidence.driving, late)
         direction, step, std = _later(evidence, late, which)
     total = put_in + step
