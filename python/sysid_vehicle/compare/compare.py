@@ -176,9 +176,7 @@ def _running_rms(e: FloatArray, log_number: FloatArray, width: int) -> FloatArra
     return out
 
 
-def one_step_error(
-    fit: Fit, driving: Driving, noise: NoiseModel, near: Fit | None = None
-) -> float:
+def one_step_error(fit: Fit, driving: Driving, noise: NoiseModel, near: Fit | None = None) -> float:
     """The `error` of a comparison alone; the arguments are those of `compare`.
 
     Offsets of the driving's logs are found from those under a fit that is `near`, if there is one.

@@ -3,11 +3,13 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from sysid_vehicle import Driving, Fit, Model, drive, identify, manoeuvres, where
+from sysid_vehicle._common.arrays import FloatArray
 from sysid_vehicle.diagnose import Where
 from sysid_vehicle.diagnose.evidence.evidence import Evidence
 from sysid_vehicle.diagnose.unexplained import delay as delay_module
@@ -150,6 +152,38 @@ def test_noise_learned_with_the_delay_put_in_needs_no_climb(
     assert near.delay_s == pytest.approx(best.delay_s, abs=0.2 * best.std_s)
     assert near.std_s == pytest.approx(best.std_s, rel=0.05)
     assert (near.linear, near.alone) == (best.linear, best.alone)
+
+
+def test_where_first_order_is_not_enough_it_is_climbed(
+    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def far(evidence: Evidence, inputs: FloatArray, which: int) -> tuple[FloatArray, float, float]:
+        direction, step, std = later(evidence, inputs, which)
+        return direction, step + (3.0 * std if asked else 0.0), std
+
+    def noted(name: str) -> Callable[..., Fit]:
+        def learned(*args: Any, **options: Any) -> Fit:
+            asked.append(name)
+            return refine(*args, **options)
+
+        return learned
+
+    later = delay_module._later
+    fit = hidden_fit("steer_delay.delay_s", 0.04)
+    for name in ("relearn", "refine"):
+        monkeypatch.setattr(delay_module, name, noted(name))
+
+    def sought() -> list[str]:
+        asked.clear()
+        evidence, rng = Evidence(fit, fit.driving), np.random.default_rng(0)
+        delay_module.delay(evidence, fit.driving.inputs(), 0, rng, lambda: True)
+        return list(asked)
+
+    assert sought() == ["relearn"]
+    monkeypatch.setattr(delay_module, "_later", far)
+    assert sought() == ["relearn", "refine"]
 
 
 def test_a_steady_force_is_seen(dragged: Where, truth: Model) -> None:
