@@ -120,23 +120,24 @@ def delay(
     """
     if float(np.std(inputs[:, which])) <= 0.0:
         return None
-    put_in, late, first = 0.0, inputs, evidence
+    put_in, late, first, ended = 0.0, inputs, evidence, False
     for _ in range(_ROUNDS):
         direction, step, std = _later(evidence, late, which)
-        if abs(step) < std or (_turns_little(step) and abs(step) < _NOTABLE * std):
+        tiny = 2.0 * np.pi * HIGHEST_HZ * abs(step) < _TINY_RAD and abs(step) < _NOTABLE * std
+        ended = abs(step) < std or tiny
+        if ended:
             break  # the second order of so small a step is next to nothing
         put_in += step
         late = later(inputs, which, evidence.driving.spans, put_in)
         fit = refit(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
         evidence = Evidence(fit, evidence.driving, late)
-    for learn in (relearn, refine) if evidence is not first else ():
+    if evidence is not first:
         # Noise is learned once, where the input is in its place. What a climb to the maximum would
-        # move as well the parameters do to first order, where that is all there is to do.
+        # move as well the parameters do to first order, where no more than that is left to do.
+        learn = relearn if ended else refine
         fit = learn(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
         evidence = Evidence(fit, evidence.driving, late)
         direction, step, std = _later(evidence, late, which)
-        if abs(step) < std or _turns_little(step):
-            break
     total = put_in + step
     std = float(np.hypot(std, std**2 * _by_input_noise(evidence, late, direction, rng)))
     found = _phases(evidence, late, which)
@@ -147,11 +148,6 @@ def delay(
     return Delay(
         total, std, f, as_float64(phase + 2.0 * np.pi * f * put_in), phase_std, linear, alone
     )
-
-
-def _turns_little(step: float) -> bool:
-    """Whether a delay turns even the fastest of an input by next to nothing."""
-    return 2.0 * np.pi * HIGHEST_HZ * abs(step) < _TINY_RAD
 
 
 def _later(evidence: Evidence, inputs: FloatArray, which: int) -> tuple[FloatArray, float, float]:
