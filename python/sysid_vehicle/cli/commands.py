@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
@@ -17,13 +18,16 @@ from ..errors import warn
 from ..identify import Fit, identify
 from ..model import Model
 from ..report import RANKING_HEAD, ranking_rows, ranking_title, summary, write_report
-from ..study import Study, improve
+from ..study import Study, improve, left_out
 from ..vehicle import Vehicle
 from . import changed, fleet, forces, lab, mu_slip, next_drive, sensors, sideslip, twin
 from .log_arguments import read_logs, say_it_runs, written_map
 from .outputs import write_figures
 
 Warnings = list[str]
+
+# Of a time limit, when the study ends, and when what takes long to tell of it does.
+_STUDIED, _TOLD = 0.75, 0.95
 
 
 def _demo(args: argparse.Namespace, heard: Warnings) -> None:
@@ -84,7 +88,8 @@ def _improve(args: argparse.Namespace, heard: Warnings) -> None:
     study = _study(args, heard)
     # The warnings have gone to the error stream.
     print(study.with_warnings(()))
-    print(study.shares)
+    if "shares" not in study.left_out:
+        print(study.shares)
     print(f"Of what the final model lacks, {study.ceiling}.")
     _print_where(study)
     if study.unknown is not None:
@@ -147,6 +152,7 @@ def _define(args: argparse.Namespace) -> None:
 
 
 def _study(args: argparse.Namespace, heard: Warnings) -> Study:
+    began, limit = time.perf_counter(), args.time_limit
     model = Model(Vehicle.from_toml(args.vehicle))
     if args.nuisances:
         model = model.with_nuisances()
@@ -162,11 +168,22 @@ def _study(args: argparse.Namespace, heard: Warnings) -> Study:
         test,
         most_effects=args.max_effects,
         exclude=args.exclude,
-        time_limit_s=args.time_limit,
+        time_limit_s=None if limit is None else _STUDIED * limit,
         matters=args.matters,
         tell=note,
     )
+    if limit is not None:
+        left = began + _TOLD * limit - time.perf_counter()
+        study = study.in_time(max(left, 1e-9), reported=_reported(args))
+        for text in left_out(study):
+            warn(text)
     return _with_warnings(study, heard)
+
+
+def _reported(args: argparse.Namespace) -> bool:
+    """Whether something is asked for that needs all that a study tells."""
+    printed = args.command == "diagnose"
+    return printed or args.json is not None or getattr(args, "report", None) is not None
 
 
 def _with_warnings(study: Study, heard: Warnings) -> Study:

@@ -138,8 +138,8 @@ def _search(parser: argparse.ArgumentParser) -> None:
         "--time-limit",
         type=_seconds,
         metavar="S",
-        help="end the study after S seconds: every stage has a share of them, and what was left "
-        "out is said; what is printed of it and the report come after",
+        help="end after S seconds, with what is printed and the report: every stage has a share of "
+        "them, and what was left out is said",
     )
     parser.add_argument(
         "--matters",

@@ -14,7 +14,7 @@ from .._common.tables import dataset, frame
 from .._common.text import brief, html_list, html_paragraph, html_table, number, text_table
 from ..estimate import MEASURED, UNITS, Driving, NoiseModel
 from ..estimate.pieces import traces
-from ..identify import Fit, driving_of, explaining
+from ..identify import Fit, driving_beside, driving_of, explaining
 from ..log import Log
 from .failure_map import FailureMap, Region
 from .unrelated import incoherent, unrelated
@@ -176,10 +176,14 @@ def _running_rms(e: FloatArray, log_number: FloatArray, width: int) -> FloatArra
     return out
 
 
-def one_step_error(fit: Fit, driving: Driving, noise: NoiseModel) -> float:
-    """The `error` of a comparison alone; the arguments are those of `compare`."""
+def one_step_error(fit: Fit, driving: Driving, noise: NoiseModel, near: Fit | None = None) -> float:
+    """The `error` of a comparison alone; the arguments are those of `compare`.
+
+    Offsets of the driving's logs are found from those under a fit that is `near`, if there is one.
+    """
     total, number = 0.0, 0
-    for _, squares, count, _ in _told(fit, driving_of(fit, driving), noise.floor()):
+    own = driving_of(fit, driving) if near is None else driving_beside(fit, near, driving)
+    for _, squares, count, _ in _told(fit, own, noise.floor()):
         total, number = total + float(squares.sum()), number + int(count.sum())
     return float(np.sqrt(total / number))
 

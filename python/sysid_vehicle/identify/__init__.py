@@ -5,8 +5,8 @@ from .box import free_box, objective_of
 from .estimates import Estimate
 from .fit import Fit
 from .identify import identify, profile_fit
-from .maximum import refine, refine_above, refine_while, refit, unmoved
-from .offsets import driving_of
+from .maximum import refine, refine_above, refine_while, refit, relearn, unmoved
+from .offsets import driving_beside, driving_of
 from .posterior import Posterior
 from .predictive import Prediction, predict
 from .profile import Profile
@@ -27,6 +27,7 @@ __all__ = [
     "RunsFit",
     "Start",
     "Starts",
+    "driving_beside",
     "driving_of",
     "explaining",
     "free_box",
@@ -40,6 +41,7 @@ __all__ = [
     "refine_above",
     "refine_while",
     "refit",
+    "relearn",
     "settle",
     "unmoved",
 ]

@@ -116,6 +116,19 @@ def refit(
     return summary(model, driving, objective, p, noise, Starts.none(model.free_names), True, gains)
 
 
+def relearn(model: Model, driving: Driving, noise: NoiseModel, *, inputs: FloatArray) -> Fit:
+    """Noise and parameters in turn until they stand, from values that are near; nothing is climbed.
+
+    For those who ask for what the parameters can do besides, to first order: what `refine` gains
+    beyond this is a way along them. `inputs` as for `refine`.
+    """
+    objective = objective_of(model, driving.problem(model, other_inputs=inputs), driving)
+    box, starts = free_box(model), Starts.none(model.free_names)
+    p, learned, converged = settle(objective, model.vector(), noise.vector(), box)
+    told = NoiseModel.from_vector(learned)
+    return summary(model, driving, objective, p, told, starts, converged)
+
+
 def unmoved(model: Model, driving: Driving, noise: NoiseModel) -> Fit:
     """A model's values as they stand, with their standard errors: nothing is searched."""
     objective = objective_of(model, driving.problem(model), driving)

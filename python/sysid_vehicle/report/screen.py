@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._common.text import number, unit_after
-from ..study import AddedEffect, Study
+from ..study import AddedEffect, Study, left_out
 from . import figures
 from .page import bars, bullets, panel, paragraph, table
 from .samples import Samples
@@ -26,6 +26,7 @@ def first_screen(study: Study, samples: Samples | None) -> list[str]:
     ]
     return [
         paragraph(verdict, "lead"),
+        *(paragraph(f"{text[0].upper()}{text[1:]}.") for text in left_out(study)),
         '<section class="screen">',
         *panels,
         "</section>",
@@ -60,6 +61,8 @@ def _which(study: Study) -> str:
     before = study.test[0].error
     beyond = before - 1.0
     tried = {e: both[1] for e, both in study.errors_with[0].items()}
+    if "errors_with" in study.left_out:
+        return panel("3 Which", [paragraph("Left out: there was no time.")], 4)
     if not tried:
         none = "No effect of the catalogue has evidence that called for a refit."
         return panel("3 Which", [paragraph(none)], 4)
@@ -69,7 +72,7 @@ def _which(study: Study) -> str:
     gone = {e: (before - after) / beyond for e, after in tried.items() if np.isfinite(after)}
     order = sorted(gone, key=lambda e: -gone[e])[:_CANDIDATES]
     own = {a.id for a in study.added}
-    probable = study.diagnoses[0].causes.inclusion
+    probable = study.causes[0].inclusion
     rows = []
     for e in order:
         text = f"{100.0 * max(gone[e], 0.0):.0f} %"
@@ -90,7 +93,7 @@ def _which(study: Study) -> str:
 def _added(study: Study) -> str:
     told = [_effect(study, a) for a in study.added]
     parts = [bullets(told)] if told else [paragraph(summary(study)[1])]
-    sets = study.diagnoses[0].causes.sets
+    sets = study.causes[0].sets
     if sets:
         parts.append(paragraph(f"Credible sets: {'; '.join(map(str, sets))}."))
     return panel("4 Added", [*parts, paragraph(study.in_the_end)], 4)

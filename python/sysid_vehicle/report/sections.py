@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from .._common.text import html_table, number, unit_after
-from ..diagnose import EffectVerdict, bias_report
 from ..estimate import UNITS
 from ..model import Model
-from ..study import LATERAL, Study
+from ..study import LATERAL, Study, open_effects
 from . import figures
 from .failure import unknown, where_and_when
 from .page import bullets, fold, heading, paragraph, table
@@ -69,7 +66,7 @@ def _which(study: Study, samples: Samples | None, truth: Model | None) -> list[s
         grades = {a.id: a.grade for a in study.added}
         n = len(dx.significant)
         parts += [
-            figures.causes(dx.causes, grades),
+            figures.causes(study.causes[i], grades),
             paragraph(
                 "Probability that each effect is missing, by credible set: effects of one set are "
                 "confounded, and one of them acts. Beside a bar stands the grade of what the study "
@@ -116,28 +113,17 @@ def _verdicts(study: Study, samples: Samples | None, truth: Model | None) -> lis
     return parts + _hidden(study)
 
 
-# Each effect takes two refits: the page is not to wait for all of them.
-_MOST_HIDDEN = 6
-_HIDDEN_SAMPLES = 1500
-
-
 def _hidden(study: Study) -> list[str]:
     """What the effects that this driving tells least of would do to the parameters."""
-    known = {e.id for e in study.fit.model.candidates}
-    open_ = [v for v in study.verdicts.of("not testable") if v.effect.id in known]
+    found, open_ = study.hidden, open_effects(study)
     title = heading("What the identified parameters would hide", 3)
     if not open_:
         text = (
             "Each effect that was tested would have been seen. bias_report tells what it would do"
         )
         return [title, paragraph(f"{text} unseen.")]
-
-    def looseness(v: EffectVerdict) -> float:
-        sizes = zip(v.bound, v.effect.parameters, strict=False)
-        return max((b / abs(p.typical) for b, p in sizes if p.typical != 0.0), default=np.inf)
-
-    least = sorted(open_, key=looseness, reverse=True)[:_MOST_HIDDEN]
-    report = bias_report(study.fit, [v.effect for v in least], most_samples=_HIDDEN_SAMPLES)
+    if found is None:
+        return [title, paragraph("Left out: there was no time. bias_report tells it.")]
     return [
         title,
         paragraph(
@@ -145,7 +131,7 @@ def _hidden(study: Study) -> list[str]:
             "least. Each was simulated at a typical size on the same driving, and the model fitted "
             "without it. bias_report tells the same of all effects."
         ),
-        bullets(f"{b}." for b in report.biases),
+        bullets(f"{b}." for b in found.biases),
     ]
 
 
@@ -153,8 +139,14 @@ def _ahead(study: Study, samples: Samples | None, truth: Model | None) -> list[s
     channels = [c for c in study.horizons.channels if c in LATERAL] or study.horizons.channels[:1]
     shares = study.shares
     return [
-        paragraph(f"{shares.sentence} {shares.CAPTION}"),
-        html_table(shares.HEAD, shares.rows()),
+        *(
+            []
+            if "shares" in study.left_out
+            else [
+                paragraph(f"{shares.sentence} {shares.CAPTION}"),
+                html_table(shares.HEAD, shares.rows()),
+            ]
+        ),
         figures.ahead(
             study,
             channels,

@@ -50,9 +50,10 @@ def _work_out(study: Study) -> None:
     asked: tuple[Callable[[], object], ...] = (
         lambda: (study.where, study.where_baseline),
         lambda: study.shares,
-        lambda: [dx.causes for dx in study.diagnoses],
+        lambda: study.causes,
         lambda: study.horizons,
         lambda: (study.errors_with, study.late),
         lambda: study.unknown,
+        lambda: study.hidden,
     )
     in_parallel(lambda ask: ask(), asked)

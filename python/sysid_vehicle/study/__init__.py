@@ -2,8 +2,10 @@
 
 from ..rules import Verdict
 from .added import AddedEffect
+from .hidden import open_effects
 from .horizons import LATERAL, PREDICTED, Horizons, horizons
 from .improve import improve
+from .said import left_out
 from .study import Study
 from .waterfall import Waterfall, look_ahead
 
@@ -17,5 +19,7 @@ __all__ = [
     "Waterfall",
     "horizons",
     "improve",
+    "left_out",
     "look_ahead",
+    "open_effects",
 ]

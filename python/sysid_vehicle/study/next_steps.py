@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from .._common.text import few
 from .matters import USUAL_SIZES
-from .said import disturbance, only_elsewhere, slow, small
+from .said import disturbance, only_elsewhere, slow
 
 if TYPE_CHECKING:
     from .added import AddedEffect
@@ -88,7 +88,7 @@ def _of_what_is_left(study: Study) -> list[str]:
     found = []
     if study.stopped:
         found.append(f"give the search more time: {few(study.stopped)} were still to be tried")
-    if study.verdict == "unknown" and small(study):
+    if study.verdict == "unknown" and study.small:
         usual = ", ".join(f"{name} {size}" for name, size in USUAL_SIZES.items())
         found.append(
             f"if errors 0.5 to 5 s ahead of less than {usual} do not matter to you, use the "

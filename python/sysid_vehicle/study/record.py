@@ -32,7 +32,7 @@ def record(study: Study) -> dict[str, Any]:
             _candidate(c, study.verdicts[c.id], *errors.get(c.id, (None, None)))
             for c in study.diagnoses[0].ranking
         ],
-        "causes": study.diagnoses[0].causes.to_dict(),
+        "causes": study.causes[0].to_dict(),
         "verdicts": study.verdicts.to_dict(),
         "channels": {
             "before": {"train": _channels(study.train[0]), "test": _channels(study.test[0])},
@@ -66,6 +66,7 @@ def record(study: Study) -> dict[str, Any]:
         "predicting": None if study.predicting is None else study.predicting.to_dict(),
         "disagreements": [d.to_dict() for d in study.disagreements],
         "warnings": list(study.warnings),
+        "left_out": list(study.left_out.values()),
         "next_steps": list(study.next_steps),
     }
 

@@ -105,6 +105,12 @@ def _matters(study: Study) -> str:
     return "the noise of the sensors" if study.matters is None else "the errors that matter"
 
 
+def left_out(study: Study) -> tuple[str, ...]:
+    """What `Study.in_time` had no time for, in one sentence; none where it had."""
+    some = "; ".join(study.left_out.values())
+    return (f"no time was left to tell {some}",) if some else ()
+
+
 def ahead(study: Study) -> str:
     """Lateral errors some seconds ahead on validation data; empty where that is too short."""
     errors = study.horizons

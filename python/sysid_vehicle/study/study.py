@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,39 +11,42 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from .._common.arguments import duration
 from .._common.files import write_json
 from .._common.tables import frame
 from .._common.text import brief, html_list, html_paragraph, html_table, text_table
 from ..compare import Comparison
 from ..diagnose import (
-    INPUTS,
+    BiasReport,
+    Causes,
     Ceiling,
     Delay,
     Diagnosis,
-    Evidence,
     Omnibus,
     Unknown,
     Verdicts,
     Where,
     ceiling,
-    coherence,
     unknown,
     where,
 )
 from ..estimate import Driving
-from ..identify import Fit, refine
+from ..identify import Fit
 from ..model import Model
 from ..rules import USUAL, Rules, Verdict
 from ..saved import save
 from .added import AddedEffect
 from .beyond import Beyond
 from .disagree import Disagreement, disagreements
+from .failing import errors_with, late, where_lines
 from .foretold import Foretold
+from .hidden import hidden
 from .horizons import Horizons, horizons
+from .in_time import in_time
 from .next_steps import next_steps
 from .predicting import Predicting, predicting
 from .record import record
-from .said import ahead, in_the_end, meaning, nuisances
+from .said import ahead, in_the_end, left_out, meaning, nuisances, small
 from .shares import Shares, shares
 from .structure import Structure
 from .validation import at_its_best
@@ -162,7 +166,7 @@ class Study:
     @cached_property
     def where(self) -> Where:
         """Where, when and at which frequencies the final model fails; some seconds at first."""
-        return where(self.fit, name=self._named(self.fit), omnibus=self.omnibus)
+        return where(self.fit, name=self.name_of(self.fit), omnibus=self.omnibus)
 
     @cached_property
     def where_baseline(self) -> Where:
@@ -173,7 +177,7 @@ class Study:
         """
         if len(self.fits) == 1:
             return self.where
-        return where(self.fits[0], causes=False, name=self._named(self.fits[0]))
+        return where(self.fits[0], causes=False, name=self.name_of(self.fits[0]))
 
     @cached_property
     def errors_with(self) -> tuple[dict[str, tuple[float, float]], ...]:
@@ -182,13 +186,7 @@ class Study:
         One step ahead, against the noise floor of the final model, as `train` and `test` are. A
         dictionary by effect for each diagnosis; some seconds at first.
         """
-        floor = self.fit.noise
-        found = []
-        for dx in self.diagnoses:
-            train = dx.errors_on(self.fit.driving, floor)
-            test = dx.errors_on(self.validation, floor)
-            found.append({e: (train[e], test[e]) for e in train})
-        return tuple(found)
+        return errors_with(self)
 
     @cached_property
     def late(self) -> dict[str, Delay]:
@@ -197,32 +195,15 @@ class Study:
         Compared with the final model without them, all else fitted anew. By input, `steer` and
         `force`; empty where no effect that was added delays anything.
         """
-        lags = {e.id for e in self.model.parts if e.scored_at_typical}
-        lags &= {a.id for a in self.added}
-        if not lags:
-            return {}
-        model = self.model
-        for name in lags:
-            model = model.drop(name)
-        prompt = refine(model, self.fit.driving, self.fit.noise)
-        found = coherence(Evidence(prompt, prompt.driving))
-        return {c.input: c.delay for c in found if c.delay is not None and c.delay.significant}
+        return late(self)
 
     @property
     def where_lines(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
         """Where the baseline and the final model fail: a title and sentences of each."""
-        final = self.where.lines
-        lags = ", ".join(e.id for e in self.model.parts if e.scored_at_typical)
-        final += tuple(
-            d.answers(f"the model without {lags}", f"the {INPUTS[name]}")
-            for name, d in self.late.items()
-        )
-        told = ((self.where.title, final),)
-        if len(self.fits) == 1:
-            return told
-        return ((self.where_baseline.title, self.where_baseline.lines), *told)
+        return where_lines(self)
 
-    def _named(self, fit: Fit) -> str:
+    def name_of(self, fit: Fit) -> str:
+        """The model of one of its fits, in words."""
         if len(self.fits) == 1:
             return "the baseline"
         added = [e for e in fit.model.effects if e not in self.fits[0].model.effects]
@@ -237,6 +218,24 @@ class Study:
         if self.verdict not in ("unknown", "partly_explained"):
             return None
         return unknown(self.fit, self.validation)
+
+    @cached_property
+    def causes(self) -> tuple[Causes, ...]:
+        """What each diagnosis finds missing (`Diagnosis.causes`); a second or two each at first."""
+        return tuple(dx.causes for dx in self.diagnoses)
+
+    @cached_property
+    def hidden(self) -> BiasReport | None:
+        """What the effects would do that this driving tells least of; some seconds at first.
+
+        None where it could tell each of them.
+        """
+        return hidden(self)
+
+    @cached_property
+    def left_out(self) -> Mapping[str, str]:
+        """What `in_time` had no time for: attributes of the study, and what they tell."""
+        return {}
 
     @cached_property
     def ceiling(self) -> Ceiling:
@@ -262,12 +261,45 @@ class Study:
         return disagreements(self.fit, self.validation, self.rules)
 
     @cached_property
+    def small(self) -> bool:
+        """Whether something is missing of which no error 0.5 to 5 s ahead exceeds the usual sizes.
+
+        Some seconds at first.
+        """
+        return self.verdict == "unknown" and small(self)
+
+    @cached_property
     def predicting(self) -> Predicting | None:
         """First and last model fitted to predictions of 2 s, seconds at first.
 
         None where the driving is too short.
         """
         return predicting(self)
+
+    def in_time(self, seconds: float, *, reported: bool = True) -> Study:
+        """The same study with what takes long to tell worked out, as far as that is done in time.
+
+        Then printing, drawing and writing it take little.
+
+        Parameters
+        ----------
+        seconds : float
+            From now on. Some passes over the data come after.
+        reported : bool
+            Whether also what only reports and files tell.
+
+        Returns
+        -------
+        Study
+            What is not done in time is left out, and `left_out` says so.
+
+        Raises
+        ------
+        InvalidInput
+            No time above zero.
+        """
+        ends = time.perf_counter() + duration(seconds, "seconds")
+        return in_time(self, ends, reported=reported)
 
     def with_warnings(self, warnings: Sequence[str]) -> Study:
         """The same study with these warnings; what it has worked out so far it keeps."""
@@ -315,7 +347,7 @@ class Study:
         lines.append(text_table(self._HEAD, self._rows()))
         lines += [text for text in (ahead(self), self.in_the_end) if text]
         lines += [f"Next: {text}." for text in self.next_steps]
-        lines += [f"Warning: {w}" for w in self.warnings]
+        lines += [f"Warning: {w}" for w in dict.fromkeys((*self.warnings, *left_out(self)))]
         return "\n".join(lines)
 
     @property

@@ -3,15 +3,19 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from sysid_vehicle import Driving, Fit, Model, drive, identify, manoeuvres, where
+from sysid_vehicle._common.arrays import FloatArray
 from sysid_vehicle.diagnose import Where
 from sysid_vehicle.diagnose.evidence.evidence import Evidence
+from sysid_vehicle.diagnose.unexplained import delay as delay_module
 from sysid_vehicle.diagnose.unexplained.change_points import change_points
 from sysid_vehicle.diagnose.unexplained.coherence import coherence
+from sysid_vehicle.identify import refine
 
 
 @pytest.fixture(scope="module")
@@ -132,6 +136,54 @@ def test_a_late_steering_is_told(delayed: Where) -> None:
     assert force.delay is not None
     assert not force.delay.significant
     assert delayed.change_points == ()
+
+
+def test_noise_learned_with_the_delay_put_in_needs_no_climb(
+    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a climb to the maximum would move, the free parameters do to first order."""
+    fit = hidden_fit("steer_delay.delay_s", 0.04)
+    found = [coherence(Evidence(fit, fit.driving))[0].delay]
+    monkeypatch.setattr(delay_module, "relearn", refine)
+    found.append(coherence(Evidence(fit, fit.driving))[0].delay)
+    near, best = found
+    assert near is not None
+    assert best is not None
+    assert near.delay_s == pytest.approx(best.delay_s, abs=0.2 * best.std_s)
+    assert near.std_s == pytest.approx(best.std_s, rel=0.05)
+    assert (near.linear, near.alone) == (best.linear, best.alone)
+
+
+def test_where_a_delay_is_not_found_to_its_end_it_is_climbed(
+    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def far(evidence: Evidence, inputs: FloatArray, which: int) -> tuple[FloatArray, float, float]:
+        direction, _, std = later(evidence, inputs, which)
+        return direction, 3.0 * std, std
+
+    def noted(name: str) -> Callable[..., Fit]:
+        def learned(*args: Any, **options: Any) -> Fit:
+            asked.append(name)
+            return refine(*args, **options)
+
+        return learned
+
+    later = delay_module._later
+    fit = hidden_fit("steer_delay.delay_s", 0.04)
+    for name in ("relearn", "refine"):
+        monkeypatch.setattr(delay_module, name, noted(name))
+
+    def sought() -> list[str]:
+        asked.clear()
+        evidence, rng = Evidence(fit, fit.driving), np.random.default_rng(0)
+        delay_module.delay(evidence, fit.driving.inputs(), 0, rng, lambda: True)
+        return list(asked)
+
+    assert sought() == ["relearn"]
+    monkeypatch.setattr(delay_module, "_later", far)
+    assert sought() == ["refine"]
 
 
 def test_a_steady_force_is_seen(dragged: Where, truth: Model) -> None:

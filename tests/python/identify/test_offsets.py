@@ -9,11 +9,12 @@ import pytest
 
 from sysid_vehicle import Fit, Log, Model, compare, diagnose, drive, identify, identify_runs, load
 from sysid_vehicle import manoeuvres as drives
+from sysid_vehicle.compare import one_step_error
 from sysid_vehicle.diagnose.evidence.evidence import Evidence
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.estimate.driving import Stretch
 from sysid_vehicle.estimate.pieces import PiecewiseProblem
-from sysid_vehicle.identify import driving_of, predicting_ahead
+from sysid_vehicle.identify import driving_beside, driving_of, offsets, predicting_ahead, refine
 from sysid_vehicle.identify.offsets import marginal_information
 
 STEER, GYRO = "steer_offset.offset_rad", "gyro_bias.bias_radps"
@@ -92,6 +93,36 @@ def test_other_logs_have_their_own_too(found: Fit, several: tuple[Log, ...]) -> 
     assert compare(found, rigid).error > 1.3
     assert driving_of(found, found.driving) is found.driving
     assert driving_of(found, rigid) is rigid
+
+
+def test_offsets_beside_a_known_fit_are_those_found_anew(
+    found: Fit, several: tuple[Log, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a model with an effect more they stand within the standard error that they have."""
+    driving = Driving.of(several[2])
+    richer = refine(found.model.add("steer_lag", "mass"), found.driving, found.noise)
+    anew = driving_of(richer, driving)
+    driving_of(found, driving)
+
+    def learned(*_: object, **__: object) -> None:
+        pytest.fail("noise is learned once")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(offsets.Objective, "learn_noise", learned)
+        near = driving_beside(richer, found, driving)
+    moved = False
+    for name in (STEER, GYRO):
+        one, other = (d.offsets[0][name] for d in (anew, near))
+        assert one == pytest.approx(other, abs=0.5 * richer[name].std)
+        moved |= other + richer.model.value(name) != found.model.value(name)
+    assert moved
+    errors = [one_step_error(richer, d, found.noise) for d in (anew, near)]
+    assert errors[1] == pytest.approx(errors[0], rel=2e-3)
+    assert one_step_error(richer, driving, found.noise, near=found) == errors[1]
+    # Where the other fit has other nuisances, or the driving its own offsets, nothing is saved.
+    plain = refine(found.model.drop("gyro_bias"), found.driving, found.noise)
+    assert driving_beside(richer, plain, driving) is driving_of(richer, driving)
+    assert driving_beside(richer, found, richer.driving) is richer.driving
 
 
 def test_a_prior_holds_what_a_log_does_not_tell(found: Fit, several: tuple[Log, ...]) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +29,9 @@ KERNELS = (
 
 # Once the time is over: one scoring of all effects, and errors of two models on two data sets.
 PASSES = 25
+
+# What is told once the time is over: errors ahead, maps, residuals.
+TOLD = 40
 
 SEARCHED = 0.1  # nats: searches go on while a round gains more than half of this
 
@@ -93,6 +98,21 @@ def test_no_stage_of_a_study_outlasts_the_time_limit(
     if unknown is not None:
         assert any(unknown in fact for fact in study.late_facts)
         assert unknown in told
+
+
+@pytest.mark.filterwarnings("ignore::sysid_vehicle.SysidWarning")
+def test_what_is_told_of_a_study_takes_no_longer_than_it_may(
+    start: Model, logs: tuple[Log, Log], clock: Clock, tmp_path: Path
+) -> None:
+    study = improve(start, *logs, candidates=CANDIDATES, starts=3, time_limit_s=300.0)
+    for seconds in (1.0, 60.0):
+        began = clock.now
+        told = replace(study).in_time(seconds)
+        assert told.left_out
+        str(told)
+        told.to_json(tmp_path / "told.json")
+        told.report(tmp_path / "told.html")
+        assert clock.now <= began + seconds + TOLD
 
 
 def test_a_baseline_that_had_too_little_time_is_the_likeliest_seen(

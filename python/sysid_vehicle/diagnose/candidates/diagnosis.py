@@ -17,7 +17,7 @@ from ...compare import one_step_error
 from ...effects import Effect
 from ...errors import InvalidInput, NumericalError
 from ...estimate import Driving, NoiseModel
-from ...identify import Fit
+from ...identify import Fit, driving_of
 from ...rules import Rules
 from ..unexplained.omnibus import Omnibus
 from .candidate import Candidate
@@ -90,6 +90,8 @@ class Diagnosis(Printed):
     def errors_on(self, driving: Driving, floor: NoiseModel) -> dict[str, float]:
         """Errors with each effect that was refitted, one step ahead.
 
+        Offsets of the driving's logs are those of each refit, from those of the fit as it is on.
+
         Parameters
         ----------
         driving : Driving
@@ -102,10 +104,12 @@ class Diagnosis(Printed):
             By effect. Infinite where the model fails.
         """
         refitted = {c.id: c.fit for c in self.ranking if c.fit is not None}
+        if refitted:
+            driving_of(self.fit, driving)  # once, and not in each thread
 
         def error(fit: Fit) -> float:
             try:
-                return one_step_error(fit, driving, floor)
+                return one_step_error(fit, driving, floor, near=self.fit)
             except NumericalError:
                 return float("inf")
 

@@ -84,6 +84,12 @@ class Evidence:
         return self.problem.residuals(self.fit.model.vector(), self.frozen).ravel()
 
     @cached_property
+    def filtered(self) -> FloatArray:
+        """States of the filter, shape (n, states)."""
+        p, noise = self.fit.model.vector(), self.fit.noise.vector()
+        return as_float64(self.problem.trace(p, noise, False)["state"])
+
+    @cached_property
     def fitted(self) -> FloatArray:
         """Sensitivities to the free parameters, shape (5 n, parameters)."""
         return self.of_parameters(*self.fit.model.free_names)

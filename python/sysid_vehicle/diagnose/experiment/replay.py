@@ -15,6 +15,7 @@ import numpy as np
 
 from ... import _core
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.threads import check_time
 from ...errors import NumericalError
 from ...estimate import MEASURED, generous
 from ...identify import Fit, free_box, objective_of, settle
@@ -170,6 +171,7 @@ class Replay:
         """Where searches from some starts end: half the sum of squares, and parameters."""
         ends = []
         for start in starts:
+            check_time()
             begin = box.inside(start)
             found = minimise(problem, begin, frozen, box, tolerance=0.1)
             ends.append((found.cost, box.put(begin, found.x)))

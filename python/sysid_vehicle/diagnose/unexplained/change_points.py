@@ -29,6 +29,7 @@ import scipy
 
 from ..._common.arguments import generator
 from ..._common.arrays import FloatArray, as_float64
+from ..._common.threads import check_time
 from ...effects import effect
 from ...estimate import Driving
 from ..evidence.coordinates import running_time
@@ -130,6 +131,7 @@ def _search(
     rng: np.random.Generator,
 ) -> tuple[int, Kind, float] | None:
     """The change that stands out most in samples of a segment, if any does."""
+    check_time()
     begin, end = segment
     channels = len(residual) // driving.samples
     rate = driving.mean_rate_hz

@@ -29,7 +29,7 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import HALF_95
 from ...estimate.driving import Span
 from ...estimate.inputs import quiet, white_noise_std
-from ...identify import refine, refit
+from ...identify import refine, refit, relearn
 from ..evidence.evidence import Evidence, solve
 from .omnibus import omnibus_of
 
@@ -120,19 +120,22 @@ def delay(
     """
     if float(np.std(inputs[:, which])) <= 0.0:
         return None
-    put_in, late, first = 0.0, inputs, evidence
+    put_in, late, first, ended = 0.0, inputs, evidence, False
     for _ in range(_ROUNDS):
         direction, step, std = _later(evidence, late, which)
         tiny = 2.0 * np.pi * HIGHEST_HZ * abs(step) < _TINY_RAD and abs(step) < _NOTABLE * std
-        if abs(step) < std or tiny:
+        ended = abs(step) < std or tiny
+        if ended:
             break  # the second order of so small a step is next to nothing
         put_in += step
         late = later(inputs, which, evidence.driving.spans, put_in)
         fit = refit(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
         evidence = Evidence(fit, evidence.driving, late)
     if evidence is not first:
-        # Noise is learned once, where the input is in its place.
-        fit = refine(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
+        # Noise is learned once, where the input is in its place. What a climb to the maximum would
+        # move as well the parameters do to first order, where no more than that is left to do.
+        learn = relearn if ended else refine
+        fit = learn(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
         evidence = Evidence(fit, evidence.driving, late)
         direction, step, std = _later(evidence, late, which)
     total = put_in + step

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..._common.arrays import FloatArray, as_float64, usual_range
+from ..._common.memo import remembered
 from ..._common.style import axes_or_new, tidy
 from ..._common.text import HALF_95, brief, html_text
 from ...estimate import Driving
@@ -197,6 +198,8 @@ def missing_forces(fit: Fit, driving: Driving) -> MissingForces:
     return MissingForces(targets, state[:, columns], std[:, columns], state)
 
 
+# What fails and of which shape it is are two questions about the same maps.
+@remembered(8)
 def force_maps(
     fit: Fit, driving: Driving
 ) -> tuple[tuple[ForceMap, ...], dict[str, tuple[float, float]]]:

@@ -191,8 +191,7 @@ def surface(evidence: Evidence, pair: tuple[str, str], seed: int = 0) -> Surface
 def known(evidence: Evidence) -> dict[str, FloatArray]:
     """Coordinates of every sample as they were known one sample earlier."""
     fit, driving = evidence.fit, evidence.driving
-    trace = evidence.problem.trace(fit.model.vector(), fit.noise.vector(), False)
-    now, first = coordinates(fit, driving, trace["state"]), begins(driving)
+    now, first = coordinates(fit, driving, evidence.filtered), begins(driving)
     return {
         name: late(x, first, float(np.median(x))) for name, x in now.items() if name != "time_s"
     }
