@@ -36,7 +36,7 @@ from .omnibus import omnibus_of
 _BANDS = 6
 _LOWEST_HZ, HIGHEST_HZ = 0.15, 5.0
 _SMALL = 1e-3  # of an input, to differentiate by
-_ROUNDS = 4
+_ROUNDS, _LONGER = 8, 4.0  # steps, and how much longer than to first order one may be
 _TINY_RAD, _NOTABLE = 0.1, 2.0  # phase, standard errors; a delay is claimed beyond three
 _DRAWS = 16  # of noise of the inputs
 
@@ -120,16 +120,19 @@ def delay(
     """
     if float(np.std(inputs[:, which])) <= 0.0:
         return None
-    put_in, late, first, ended = 0.0, inputs, evidence, False
+    put_in, late, first, ended, before, beyond = 0.0, inputs, evidence, False, 0.0, 0.0
     for _ in range(_ROUNDS):
         direction, step, std = _later(evidence, late, which)
-        tiny = 2.0 * np.pi * HIGHEST_HZ * abs(step) < _TINY_RAD and abs(step) < _NOTABLE * std
-        ended = abs(step) < std or tiny
+        ended = _arrived(step, std)
         if ended:
             break  # the second order of so small a step is next to nothing
-        put_in += step
-        late = later(inputs, which, evidence.driving.spans, put_in)
-        fit = refit(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=late)
+        by, before = _stretched(step, before), step
+        there = later(inputs, which, evidence.driving.spans, put_in + by)
+        fit = refit(evidence.fit.model, evidence.driving, evidence.fit.noise, inputs=there)
+        if fit.log_likelihood < evidence.fit.log_likelihood and evidence is not first:
+            beyond = by  # gains that are held lead on past the likeliest delay
+            break
+        put_in, late = put_in + by, there
         evidence = Evidence(fit, evidence.driving, late)
     if evidence is not first:
         # Noise is learned once, where the input is in its place. What a climb to the maximum would
@@ -139,7 +142,11 @@ def delay(
         evidence = Evidence(fit, evidence.driving, late)
         direction, step, std = _later(evidence, late, which)
     total = put_in + step
+    arrived = evidence is first or (not beyond and _arrived(step, std))
     std = float(np.hypot(std, std**2 * _by_input_noise(evidence, late, direction, rng)))
+    if not arrived:
+        # Where the search would end is not known any closer.
+        std = float(np.linalg.norm([std, step, beyond]))
     found = _phases(evidence, late, which)
     if found is None:
         return None
@@ -148,6 +155,22 @@ def delay(
     return Delay(
         total, std, f, as_float64(phase + 2.0 * np.pi * f * put_in), phase_std, linear, alone
     )
+
+
+def _arrived(step: float, std: float) -> bool:
+    tiny = 2.0 * np.pi * HIGHEST_HZ * abs(step) < _TINY_RAD and abs(step) < _NOTABLE * std
+    return abs(step) < std or tiny
+
+
+def _stretched(step: float, before: float) -> float:
+    """A step as long as it takes where the one before was too short by as much again.
+
+    Disturbances take up a part of what a delay does, and steps to first order fall short.
+    """
+    if step * before <= 0.0:
+        return step
+    falls = 1.0 - step / before
+    return step * (min(1.0 / falls, _LONGER) if falls > 0.0 else _LONGER)
 
 
 def _later(evidence: Evidence, inputs: FloatArray, which: int) -> tuple[FloatArray, float, float]:
