@@ -190,7 +190,8 @@ def _standing(
     one at a price. Where much is left of the motion that it moves, what it stands in for may be
     that: the share must be shown to be one worth a name, of all data. So may it be what a stand-in
     takes that moves the same channel, if that is the larger part. What is not shown to be off
-    nothing has no name of its own, whatever the model lacks without it: it is there for others.
+    nothing, while another of the model acts like it, has no name of its own: either may be there
+    for the other.
     """
 
     def worth(a: Added, *shares: Share) -> bool:
@@ -200,7 +201,8 @@ def _standing(
         return each and low_of_mean(shares) > least
 
     named = [a for a in facts.added if a.named]
-    alone = {a.id for a in named if a.felt and worth(a, a.own, a.own_in_training)}
+    own = [a for a in named if a.felt or not a.beside]
+    alone = {a.id for a in own if worth(a, a.own, a.own_in_training)}
     together = {
         a.id
         for a in named

@@ -355,8 +355,11 @@ def test_effects_that_act_alike_stand_together() -> None:
     # So do those of which the model needs each, while none is shown to be off nothing.
     needed = [replace(a, own=MOST, own_in_training=MOST, felt=False) for a in both]
     some = replace(LEFT, added=(MASS, *needed))
-    assert set(withdrawn(some)) == {"aero_drag", "rolling_resistance"}
     assert verdict(some.with_groups(groups)).groups == said.groups
+    nothing = dict.fromkeys(groups, (NONE_OF_IT, NONE_OF_IT))
+    assert set(withdrawn(some.with_groups(nothing))) == {"aero_drag", "rolling_resistance"}
+    # Where nothing else acts like it what the model loses without it is its own.
+    assert withdrawn(replace(some, added=(MASS, needed[0]))) == {}
     # Their share has to be shown as that of a single one, on all data.
     for unsure in ((MOST, NONE_OF_IT), (UNKNOWN, MOST)):
         told = alone.with_groups(dict.fromkeys(groups, unsure))

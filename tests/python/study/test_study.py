@@ -153,6 +153,8 @@ def test_the_figures_are_json(study: Study, tmp_path: Path) -> None:
         "own_share_in_training",
         "p_value",
         "parameters",
+        "share_together",
+        "share_together_in_training",
         "stands_in",
         "takes_little",
     ]
