@@ -1,6 +1,7 @@
 #include "sysid/online/sideslip_dual.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace sysid {
 
@@ -8,18 +9,43 @@ namespace {
 
 constexpr double kSteerUnknown = 0.15;  // random walk of its angle [rad/sqrt(s)]
 constexpr double kAtOrigin = 1.5;  // error of the curve's slope there over that at larger slips
-constexpr std::array<double, 3> kDepartures = {0.12, 0.45, 2.0};  // from the model, over the usual
-constexpr double kWeightTimeS = 5.0;    // of readings that decide between them
+/// What a tyre filter expects, each over the settings: errors of the tyre model, bank of the road,
+/// change of the friction, and errors of what is told of the car. `doubt` is the logarithm by which
+/// it is less likely before any reading.
+struct Departures {
+    double model, road, grip, car, doubt;
+};
+constexpr std::array<Departures, 5> kDepartures = {{
+    {0.12, 0.12, 1.0, 0.05, 0.0},
+    {0.45, 0.45, 1.0, 0.05, 0.0},
+    {2.0, 2.0, 1.0, 0.05, 0.0},
+    {0.45, 30.0, 5.0, 0.05, 4.0},  // banks, and biases of sensors, which act alike
+    {0.45, 0.45, 5.0, 1.0, 0.0},   // other tyres, inertia or sensors than was told
+}};
+constexpr double kWeightTimeS = 5.0;  // of readings that decide between them
+// Errors of the model make innovations that follow each other: one tells less than its likelihood.
+constexpr double kCounts = 0.2;
 constexpr double kGivesUpAfterS = 3.0;  // longer than most faults of a sensor
 constexpr double kAgainstAfterwards = 5.0;
 constexpr double kMostAgainst = 10.0;  // of the log weights, so that none is lost for good
 
-/// The same, with `factor` times the errors of model and road.
-ObserverSettings expecting(ObserverSettings s, double factor) {
-    for (double* error : {&s.road_mps2, &s.error_load, &s.error_lateral, &s.error_drive,
-                          &s.error_slip_rad, &s.yaw_walk_radps, &s.sideslip_walk_rad})
-        *error *= factor;
+/// The same, with other errors of model and road.
+ObserverSettings expecting(ObserverSettings s, const Departures& d) {
+    for (double* error : {&s.error_load, &s.error_lateral, &s.error_drive, &s.error_slip_rad,
+                          &s.yaw_walk_radps, &s.sideslip_walk_rad})
+        *error *= d.model;
+    s.road_mps2 *= d.road;
+    s.friction_prior *= d.grip;
+    for (double* told : {&s.inertia_prior, &s.ahead_m, &s.steer_late_s}) *told *= d.car;
     return s;
+}
+
+template <std::size_t... i>
+std::array<TyreObserver, sizeof...(i)> observers(const ObservedCar& car,
+                                                 const ObserverSettings& settings,
+                                                 std::index_sequence<i...>) {
+    static_assert(sizeof...(i) == kDepartures.size());
+    return {TyreObserver(car, expecting(settings, kDepartures[i]))...};
 }
 
 }  // namespace
@@ -74,9 +100,7 @@ SideslipDual::SideslipDual(const ObservedCar& car, const ObserverSettings& setti
       settings_(settings),
       watch_(settings),
       forces_(ForceModel{car, settings}, Vec<5>::Zero(), Mat<5, 5>::Identity()),
-      tyres_{TyreObserver(car, expecting(settings, kDepartures[0])),
-             TyreObserver(car, expecting(settings, kDepartures[1])),
-             TyreObserver(car, expecting(settings, kDepartures[2]))} {
+      tyres_{observers(car, settings, std::make_index_sequence<kMembers>())} {
     log_weights_.fill(0.0);
     weigh();
 }
@@ -135,7 +159,7 @@ void SideslipDual::start(double dt, const SensorSample& s) {
     forces_.restart(a, deviation.cwiseAbs2().asDiagonal());
     input_ = {};
     input_.loads = axle_forces(car_, ax, speed);
-    input_.steer = s.steer_rad;
+    input_.steer = input_.steer_slow = s.steer_rad;
     input_.vx = speed;
     input_.ax = ax;
     for (TyreObserver& one : tyres_) one.start(dt, s, input_);
@@ -150,6 +174,8 @@ void SideslipDual::run_tyres(double dt, const SensorSample& s) {
     u.vx_before = u.vx;
     u.ax_before = u.ax;
     u.steer = s.steer_rad;
+    u.steer_slow_before = u.steer_slow;
+    u.steer_slow = u.steer + std::exp(-dt / TyreModel::kSteerLagS) * (u.steer_slow - u.steer);
     // Not the raw reading: its vibration would take grip, and always take it.
     u.ax = (a[ForceModel::kFx] - std::sin(u.steer) * a[ForceModel::kFyf]) / car_.data.mass_kg;
     u.vx = std::max(std::isnan(s.vx_mps) ? u.vx_before + dt * u.ax : s.vx_mps, kSlowestMps);
@@ -158,7 +184,7 @@ void SideslipDual::run_tyres(double dt, const SensorSample& s) {
     const double keep = std::exp(-dt / kWeightTimeS);
     for (std::size_t i = 0; i < kMembers; ++i) {
         tyres_[i].step(u, s);
-        log_weights_[i] = keep * log_weights_[i] + tyres_[i].log_likelihood();
+        log_weights_[i] = keep * log_weights_[i] + kCounts * tyres_[i].log_likelihood();
     }
     weigh();
     // One that trusts the model and was refuted goes on from where a more cautious one stands, as
@@ -179,7 +205,7 @@ void SideslipDual::weigh() {
     double sum = 0.0;
     for (std::size_t i = 0; i < kMembers; ++i) {
         log_weights_[i] = std::max(log_weights_[i] - most, -kMostAgainst);
-        weights_[i] = std::exp(log_weights_[i]);
+        weights_[i] = std::exp(log_weights_[i] - kDepartures[i].doubt);
         sum += weights_[i];
     }
     for (double& w : weights_) w /= sum;

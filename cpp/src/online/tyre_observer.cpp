@@ -4,6 +4,7 @@ namespace sysid {
 
 namespace {
 
+constexpr int kN = TyreModel::kStates;
 constexpr double kFullUse = 0.3;  // lateral force over load at which tyres tell all they can
 constexpr double kMostStiffness = 1.6, kMostFriction = 0.8, kMostRelaxation = 3.0;  // logarithms
 constexpr double kRelaxationWalk = 0.01;                                            // [1/sqrt(s)]
@@ -40,7 +41,11 @@ void TyreModel::predict(const Input& u, const S* x, S* next) const {
     const VehicleData& c = car.data;
     const double vx = 0.5 * (u.vx + u.vx_before), ax = 0.5 * (u.ax + u.ax_before);
     const double steer = 0.5 * (u.steer + u.steer_before);
+    // Late wheels stand where the angle was; what is taken off is linear in the time.
+    const double gone = steer - 0.5 * (u.steer_slow + u.steer_slow_before);
+    const S turned = steer - (gone / kSteerLagS) * x[kLate];
     const double cosine = std::cos(steer), side = u.loads.fx_f * std::sin(steer);
+    const S inverse_inertia = exp(-1.0 * x[kInertia]) / car.yaw_inertia_kgm2;
     S felt;
     const auto rates = [&](const S* at, S& beta_rate, S& yaw_acceleration) {
         S front, rear;
@@ -50,14 +55,14 @@ void TyreModel::predict(const Input& u, const S* x, S* next) const {
         const S ay = felt + at[kRoad];
         const S along = cos(at[kBeta]);
         beta_rate = (ay * along - ax * sin(at[kBeta])) * along / vx - at[kYawRate];
-        yaw_acceleration = (c.lf_m * front_across - c.lr_m * rear + u.drive_nm * at[kDrive]) /
-                           car.yaw_inertia_kgm2;
+        yaw_acceleration =
+            (c.lf_m * front_across - c.lr_m * rear + u.drive_nm * at[kDrive]) * inverse_inertia;
     };
     const S keep = exp((-vx * u.dt / settings.relaxation_m) * exp(-1.0 * x[kRelax]));
     const auto relax = [&](const S& beta, const S& r, S* to) {
         const S tangent = sin(beta) / cos(beta);
         const Axles<S> slip =
-            slip_angles(S(1.0), tangent, S((1.0 / vx) * r), c.lf_m, c.lr_m, steer);
+            slip_angles(S(1.0), tangent, S((1.0 / vx) * r), c.lf_m, c.lr_m, turned);
         to[kSlipF] = slip.front + keep * (x[kSlipF] - slip.front);
         to[kSlipR] = slip.rear + keep * (x[kSlipR] - slip.rear);
     };
@@ -83,18 +88,21 @@ void TyreModel::predict(const Input& u, const S* x, S* next) const {
 
 template <class S>
 void TyreModel::observe(const Input& u, const S* x, S* y) const {
+    using std::exp;
     S front, rear;
     forces(u, x, front, rear);
     y[0] = x[kYawRate];
-    y[1] =
-        (std::cos(u.steer) * front + std::sin(u.steer) * u.loads.fx_f + rear) / car.data.mass_kg +
-        x[kRoll] * x[kLean];
+    const VehicleData& c = car.data;
+    const S across = std::cos(u.steer) * front + std::sin(u.steer) * u.loads.fx_f;
+    const S turn = (c.lf_m * across - c.lr_m * rear + u.drive_nm * x[kDrive]) *
+                   exp(-1.0 * x[kInertia]) / car.yaw_inertia_kgm2;
+    y[1] = (across + rear) / c.mass_kg + x[kAhead] * turn + x[kRoll] * x[kLean];
 }
 
-Mat<15, 15> TyreModel::process_noise(const Input& u) const {
+Mat<TyreModel::kStates, TyreModel::kStates> TyreModel::process_noise(const Input& u) const {
     const ObserverSettings& s = settings;
     const auto fresh = [&](double time_s) { return 1.0 - squared(share_of(u.dt, time_s)); };
-    Vec<15> q;
+    Vec<kN> q;
     q[kBeta] = u.dt * squared(s.sideslip_walk_rad);
     q[kYawRate] = u.dt * squared(s.yaw_walk_radps);
     q[kSlipF] = u.dt * squared(u.slip_f_walk) + 1e-12;
@@ -104,7 +112,7 @@ Mat<15, 15> TyreModel::process_noise(const Input& u) const {
     q[kRelax] = u.dt * squared(kRelaxationWalk);
     q[kGripF] = q[kGripR] = squared(s.friction_prior) * fresh(s.friction_time_s);
     q[kRoad] = squared(s.road_mps2) * fresh(s.road_time_s);
-    q[kRoll] = 1e-16;  // a property of the car
+    q[kLate] = q[kAhead] = q[kInertia] = q[kRoll] = 1e-16;  // properties of the car and its sensors
     q[kErrorF] = q[kErrorR] = q[kDrive] = fresh(s.error_time_s);
     q[kLean] = 1e-10;  // it follows from the forces
     return q.asDiagonal();
@@ -117,7 +125,7 @@ Mat<2, 2> TyreModel::measurement_noise(const Input&) const {
 TyreObserver::TyreObserver(const ObservedCar& car, const ObserverSettings& settings)
     : car_(car),
       settings_(settings),
-      filter_(TyreModel{car, settings}, Vec<15>::Zero(), Mat<15, 15>::Identity(), Gate<2>(),
+      filter_(TyreModel{car, settings}, Vec<kN>::Zero(), Mat<kN, kN>::Identity(), Gate<2>(),
               NoiseAdaptation(), SigmaWeights::near(TyreModel::kStates)),
       refusal_(0.5 * squared(gaussian_bound(settings.gate_probability))) {}
 
@@ -142,7 +150,7 @@ void TyreObserver::start(double dt, const SensorSample& s, const TyreModel::Inpu
     const double slip_f = share * c.mass_kg * ay / (car_.front.slope() * input_.loads.fz_f);
     const double slip_r = (1.0 - share) * c.mass_kg * ay / (car_.rear.slope() * input_.loads.fz_r);
     const bool first = filter_.samples() == 0 || refuted();
-    Vec<15> b = filter_.state().mean, deviation;
+    Vec<kN> b = filter_.state().mean, deviation;
     if (first) b.setZero();
     constexpr int at = TyreModel::kLearnt, learnt = TyreModel::kLearntStates;
     const Mat<learnt, learnt> known = filter_.state().covariance.block<learnt, learnt>(at, at);
@@ -160,8 +168,9 @@ void TyreObserver::start(double dt, const SensorSample& s, const TyreModel::Inpu
     const double unseen = blind ? kBlindSideslip : 0.0;
     deviation << 0.01 + std::abs(slip_r) + unseen, blind ? kBlindYawRate : 0.1,
         0.005 + std::abs(slip_f), 0.005 + std::abs(slip_r), stiff, stiff, grip, grip,
-        settings_.relaxation_std, settings_.roll_share, settings_.road_mps2, 1.0, 1.0, 1.0, 0.5;
-    Mat<15, 15> P = deviation.cwiseAbs2().asDiagonal();
+        settings_.relaxation_std, settings_.steer_late_s, settings_.ahead_m,
+        settings_.inertia_prior, settings_.roll_share, settings_.road_mps2, 1.0, 1.0, 1.0, 0.5;
+    Mat<kN, kN> P = deviation.cwiseAbs2().asDiagonal();
     if (!first) P.block<learnt, learnt>(at, at) = known;
     // An error of beta is one of both slip angles, which have errors of their own as well.
     const double shared = squared(deviation[TyreModel::kBeta]);
@@ -177,7 +186,7 @@ void TyreObserver::start(double dt, const SensorSample& s, const TyreModel::Inpu
 }
 
 void TyreObserver::adopt(const TyreObserver& other) {
-    filter_.restart(other.filter_.state().mean, Mat<15, 15>(other.filter_.state().covariance));
+    filter_.restart(other.filter_.state().mean, Mat<kN, kN>(other.filter_.state().covariance));
     contradiction_ = 1.0;
 }
 
@@ -220,11 +229,11 @@ void TyreObserver::step(const TyreModel::Input& common, const SensorSample& s) {
 
 void TyreObserver::learn_less(double use_f, double use_r) {
     const auto& now = filter_.state();
-    Vec<15> mean = now.mean;
-    Mat<15, 15> P = now.covariance;
+    Vec<kN> mean = now.mean;
+    Mat<kN, kN> P = now.covariance;
     // Partial update (Brink, J. Guid. Control Dyn. 40, 2017): little slip is as much one of
     // compliance and body motion, and the stiffness takes in only a share of what it says.
-    Vec<15> left = Vec<15>::Zero();
+    Vec<kN> left = Vec<kN>::Zero();
     left[TyreModel::kStiffF] = std::max(1.0 - use_f / settings_.learning_use, 0.0);
     left[TyreModel::kStiffR] = std::max(1.0 - use_r / settings_.learning_use, 0.0);
     for (const int i : {TyreModel::kStiffF, TyreModel::kStiffR}) {

@@ -41,7 +41,7 @@ from .laws import (
 from .longitudinal import check_force, check_longitudinal, held_speed_note
 from .motion import Motion
 from .ranges import WHITE, blank, check_lost, check_ranges, dropouts
-from .regression import size_of
+from .regression import in_most, size_of
 
 _MOVING = 3.0  # in whatever unit vx has; only windows above are compared
 _MIN_WINDOWS = 8
@@ -185,7 +185,11 @@ def _check_lateral(drive: Drive) -> None:
         other = "yaw_rate_radps * vx_mps" if odd == "ay_mps2" else "ay_mps2"
         text = f"moves against both {other} and steer_rad"
         raise wrong_sign(odd, text, drive.mean(c[odd]), drive)
-    if both.coherence > 0.6 and ratio > 0.0:
+    if (
+        both.coherence > 0.6
+        and ratio > 0.0
+        and ("vy_mps" in c or in_most(ratio, turn, ay, 2.0 * EXCITED))
+    ):
         formula = "ay_mps2 / (vx_mps * yaw_rate_radps)"
         slips = _LATERAL_SLIPS
         check_scale(ratio, deviation, SCALE_STD, slips, "ay_mps2", formula, turn, drive)

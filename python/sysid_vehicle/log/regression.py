@@ -9,6 +9,8 @@ import numpy as np
 
 from .._common.arrays import NORMAL_MAD, FloatArray
 
+# Of a ratio; a wrong unit leaves 70 % of corners and more within it, spins 20 to 40 %.
+_ALIKE = 0.2
 _PASSES = 5
 _HUBER = 2.5  # residuals beyond so many robust deviations lose weight
 _BLOCK = 6  # windows that are taken as dependent when deviations are estimated
@@ -214,3 +216,13 @@ def _alone(y: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, fl
 def size_of(values: FloatArray) -> float:
     """A size that few values exceed."""
     return float(np.percentile(np.abs(values), 95))
+
+
+def in_most(ratio: float, x: FloatArray, y: FloatArray, least: float) -> bool:
+    """Whether ``y = ratio x`` holds in most places, where either is at least so large.
+
+    A wrong unit has one ratio; a car that spins has any.
+    """
+    large = np.maximum(np.abs(x), np.abs(y)) > least
+    alike = np.abs(y[large] - ratio * x[large]) < _ALIKE * ratio * np.abs(x[large])
+    return 2 * int(np.count_nonzero(alike)) > alike.size

@@ -19,6 +19,7 @@ from .._common.style import AFTER, MEASURED, axes_or_new, tidy
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..log import Log
+from ..tyre import Tyre
 from ..vehicle import Vehicle, slip_angles
 from .sideslip import static_stiffness, yaw_inertia
 from .sideslip_settings import NOISE_BLOCK
@@ -138,7 +139,9 @@ class CorneringRun(Told):
     Attributes
     ----------
     time_s, cf_npr, cr_npr, cf_std_npr, cr_std_npr : ndarray
-        Time, stiffness of the axles [N/rad] and their standard deviations.
+        Time, stiffness of the axles [N/rad] and their standard deviations. The stiffness is the
+        secant of the tyre curve at the slips that were used; the standard deviation covers that of
+        the regression and what the tyres of the vehicle file bend away by up to there.
     used : ndarray of bool
         Whether the sample held enough slip, and not too much.
     """
@@ -242,6 +245,8 @@ def cornering_stiffness(
     )
     found = CorneringRls(vehicle, forgetting=forgetting, **settings).run(readings).T
     cf, cr, cf_std, cr_std, used = found
+    cf_std = np.hypot(cf_std, cf * _bent(vehicle.tyre_front, readings[:, 0], used))
+    cr_std = np.hypot(cr_std, cr * _bent(vehicle.tyre_rear, readings[:, 1], used))
     run = CorneringRun(log.name, log["time_s"], cf, cr, cf_std, cr_std, used > 0.5)
     if not run.excited:
         warn(
@@ -250,6 +255,14 @@ def cornering_stiffness(
             f"in which no channel is missing for long"
         )
     return run
+
+
+def _bent(tyre: Tyre, slip_rad: FloatArray, used: FloatArray) -> FloatArray:
+    """Share of the stiffness by which a secant at the slips used so far falls short of it."""
+    weight = np.where((used > 0.5) & np.isfinite(slip_rad), slip_rad**2, 0.0)
+    straight = tyre.cornering_stiffness_per_load * np.where(weight > 0.0, slip_rad, 1.0)
+    short = 1.0 - tyre.friction(np.where(weight > 0.0, slip_rad, 0.0)) / straight
+    return np.asarray(np.abs(np.cumsum(weight * short)) / np.maximum(np.cumsum(weight), 1e-12))
 
 
 def _parabolas(y: FloatArray, width: int, derivative: int, step_s: float) -> FloatArray:

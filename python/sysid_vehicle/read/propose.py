@@ -117,7 +117,12 @@ def propose_channels(
     is_path = isinstance(source, (str, Path))
     entry = recognised(as_path(source)) if is_path else None
     with blamed(entry, source if is_path else "log"):
-        held = contents(source, dbc, entry)
+        try:
+            held = contents(source, dbc, entry)
+        except InvalidInput as error:
+            if not is_path or as_path(source).name in str(error):
+                raise
+            raise InvalidInput(f"{source}: {error}") from error
         view = _View(held)
         chosen = {
             channel: found

@@ -23,6 +23,7 @@ VIRIDIS = ("#440154", "#443983", "#31688e", "#21918c", "#35b779", "#90d743", "#f
 DIVERGING = ("#053061", "#2f79b5", "#8ac0db", "#f7f7f7", "#f5a886", "#c13639", "#67001f")
 
 _SHADES = 16
+_LETTER = 6.6  # width of a figure [px]; page.js has the same
 
 
 def ticks(low: float, high: float, most: int = 6) -> list[Tick]:
@@ -203,6 +204,11 @@ class Chart:
             f'height="{bottom - top:.1f}"/>'
         )
 
+    def _inside(self, x: float, word: str) -> float:
+        """Where the middle of a word stands that is not cut off at the chart's edge."""
+        half = 0.5 * _LETTER * len(word)
+        return float(np.clip(x, half, self._size[0] - half))
+
     def svg(self, told: str = "") -> str:
         """The element; `told`, or else its labels, stand for it where it is not seen."""
         left, top, width, height = self._frame
@@ -219,7 +225,7 @@ class Chart:
                 f' data-bare="{"x" if self._ticks[0] is not None else ""}"'
             )
         marks = "".join(
-            f'<path d="M{a:.1f} {top:.1f}v{height:.1f}"/><text x="{a:.1f}" '
+            f'<path d="M{a:.1f} {top:.1f}v{height:.1f}"/><text x="{self._inside(a, word):.1f}" '
             f'y="{top + height + 13:.1f}" text-anchor="middle">{word}</text>'
             for value, word in xt
             for a in self._at(value, y0)[0]

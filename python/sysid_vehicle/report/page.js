@@ -156,8 +156,9 @@
       if (!this.svg.dataset.bare)
         grid(".xt", ticks(from, until, Math.max(Math.floor(w / 50), 2)), (g, v, word) => {
           make("path", { d: `M${this.across(v)} ${t}v${h}` }, g);
-          make("text", { x: this.across(v), y: t + h + 13, "text-anchor": "middle" }, g)
-            .textContent = word;
+          const half = 3.3 * word.length, wide = this.svg.viewBox.baseVal.width;
+          const x = Math.min(Math.max(this.across(v), half), wide - half);
+          make("text", { x, y: t + h + 13, "text-anchor": "middle" }, g).textContent = word;
         });
       grid(".yt", ticks(this.view[2], this.view[3], Math.max(Math.floor(h / 20), 2)), (g, v, word) => {
         make("path", { d: `M${l} ${this.down(v)}h${w}` }, g);

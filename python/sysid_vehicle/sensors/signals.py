@@ -12,6 +12,7 @@ import numpy.typing as npt
 from .._common.arrays import FloatArray, filled
 from ..errors import InvalidInput
 from ..log import CHANNELS, MEASURED, Log, held_rows
+from ..log.regression import in_most
 from ..log.signals import runs
 from ..vehicle import GRAVITY_MPS2
 from .colour import neighbours
@@ -229,7 +230,8 @@ def refuse_mixed_up(logs: Sequence[Log], readings: Sequence[Readings]) -> None:
         (1 / 3.6, "vx_mps is in km/h: put factor = 0.2777778 for vx_mps"),
         (1 / 2.236936, "vx_mps is in mph: put factor = 0.44704 for vx_mps"),
     ):
-        if 0.87 < slope / factor < 1.15:
+        alike = changes or in_most(slope, turn, felt, 0.3)
+        if 0.87 < slope / factor < 1.15 and alike:
             raise InvalidInput(
                 f"{name}: ay_mps2 is {slope:.3g} times vx_mps * yaw_rate_radps: probably {words} "
                 f"in the channel map"

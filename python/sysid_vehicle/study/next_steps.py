@@ -87,7 +87,8 @@ def _worth_a_drive(aliases: Sequence[AddedEffect]) -> list[AddedEffect]:
 def _of_what_is_left(study: Study) -> list[str]:
     found = []
     if study.stopped:
-        found.append(f"give the search more time: {few(study.stopped)} were still to be tried")
+        was = "was" if len(study.stopped) == 1 else "were"
+        found.append(f"give the search more time: {few(study.stopped)} {was} still to be tried")
     if study.verdict == "unknown" and study.small:
         usual = ", ".join(f"{name} {size}" for name, size in USUAL_SIZES.items())
         found.append(

@@ -12,7 +12,7 @@ from smooth_log import drift
 
 from sysid_vehicle import Log, Model, drive, lab, manoeuvres, published, read_log
 from sysid_vehicle.errors import InvalidInput, SysidWarning
-from sysid_vehicle.log.regression import find_lag, regress
+from sysid_vehicle.log.regression import find_lag, in_most, regress
 
 Columns = dict[str, np.ndarray]
 
@@ -244,3 +244,14 @@ def test_a_regression_is_not_bent_by_outliers(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(found.coefficients, [2.0, 1.0], atol=0.05)
     assert 0.003 < found.deviations[0] < 0.01
     assert found.coherence > 0.7
+
+
+def test_a_car_that_spins_is_no_wrong_unit() -> None:
+    """Without the lateral speed: of a spin the ratio of a_y to v_x r is below one, and any."""
+    rng = np.random.default_rng(5)
+    yaw = np.repeat(rng.uniform(-0.8, 0.8, 40), 200)
+    yaw = np.convolve(yaw, np.full(60, 1.0 / 60.0), "same")
+    share = np.interp(np.arange(yaw.size), np.arange(0, yaw.size, 150), rng.uniform(0.1, 1.0, 54))
+    turn = 12.0 * yaw
+    assert in_most(0.45, turn, 0.45 * turn, 1.0)
+    assert not in_most(0.55, turn, share * turn, 1.0)

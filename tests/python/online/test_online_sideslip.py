@@ -18,6 +18,7 @@ from sysid_vehicle.online import (
     cornering_stiffness,
     estimate_sideslip,
 )
+from sysid_vehicle.online.sideslip import static_stiffness
 from sysid_vehicle.published import PublishedSideslipObserver
 
 SENSORS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
@@ -166,6 +167,16 @@ def test_least_squares_over_a_log(vehicle, log):
     assert run.cr_npr[-1] == pytest.approx(true.cr_npr[0], rel=0.1)
     with pytest.warns(SysidWarning, match="hold slip angles"):
         cornering_stiffness(vehicle, log, beta_rad=np.full(log.n, 0.5))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_interval_of_least_squares_covers_the_bend_of_the_tyres(vehicle, seed):
+    """The secant at the slips used lies 4 to 5 % below the slope at the origin."""
+    drive = sv.drive(sv.Model(vehicle), sv.manoeuvres.handling_course(60.0), seed=seed)
+    run = cornering_stiffness(vehicle, drive)
+    true = static_stiffness(vehicle)
+    assert abs(run.cf_npr[-1] - true[0]) < 2.0 * run.cf_std_npr[-1] < 0.2 * true[0]
+    assert abs(run.cr_npr[-1] - true[1]) < 2.0 * run.cr_std_npr[-1] < 0.2 * true[1]
 
 
 def test_noise_of_the_yaw_rate_does_not_make_the_stiffness_too_small(vehicle, log):

@@ -271,3 +271,9 @@ def test_names_that_toml_cannot_hold() -> None:
     assert text == 'speed "x" \\'
     with pytest.raises(InvalidInput, match="control character"):
         sv.propose_channels(data).to_toml()
+
+
+def test_what_is_wrong_with_a_file_is_said_with_its_name(tmp_path: Path) -> None:
+    (tmp_path / "nothing.csv").write_text("")
+    with pytest.raises(InvalidInput, match=r"nothing\.csv: the first line is empty"):
+        sv.propose_channels(tmp_path / "nothing.csv")

@@ -240,3 +240,12 @@ def test_the_worst_excerpt_is_where_the_baseline_is_worst(study: sv.Study) -> No
 
 def test_a_horizon_longer_than_the_driving_gives_no_excerpt(study: sv.Study) -> None:
     assert worst_excerpt(study, horizon_s=60.0) is None
+
+
+def test_the_last_label_of_an_axis_is_not_cut_off() -> None:
+    drawn = chart.Chart(200, 100, (0.0, 1000.0), (-1.0, 1.0), left=40.0, bottom=24.0).svg()
+    labels = re.findall(
+        r'<text x="([0-9.]+)" y="[0-9.]+" text-anchor="middle">([0-9]+)</text>', drawn
+    )
+    assert labels[-1][1] == "1000"
+    assert all(float(x) + 3.0 * len(word) <= 200.0 for x, word in labels)

@@ -101,6 +101,8 @@ def test_a_search_that_was_cut_short_is_to_go_on(unknown: Study) -> None:
     cut = replace(unknown, stopped=("mass", "steer_lag"), checked=True)
     said = next_steps(cut)
     assert said[0] == "give the search more time: mass, steer_lag were still to be tried"
+    one = next_steps(replace(cut, stopped=("mass",)))
+    assert one[0] == "give the search more time: mass was still to be tried"
     assert not any("check the sensors" in text for text in said)
 
 

@@ -87,6 +87,7 @@ struct ObserverSettings {
     double stiffness_prior = 0.4, stiffness_walk = 0.0003;
     double friction_prior = 0.1, friction_time_s = 50.0;
     double relaxation_m = 0.3, relaxation_std = 0.6;
+    double steer_late_s = 0.03, ahead_m = 0.3, inertia_prior = 0.1;
     double error_curve = 0.06, error_slip_rad = 0.0004, learning_use = 0.2;
     double gate_probability = 1e-6, gate_patience_s = 3.0, frozen_after_s = 0.2;
     double stop_below_mps = 3.0, go_above_mps = 4.0;
@@ -137,6 +138,12 @@ inline constexpr ObserverSetting kObserverSettings[] = {
     {"relaxation_m", &ObserverSettings::relaxation_m, "relaxation length of the tyres [m]"},
     {"relaxation_std", &ObserverSettings::relaxation_std,
      "standard deviation of that length (of its logarithm)"},
+    {"steer_late_s", &ObserverSettings::steer_late_s,
+     "standard deviation of the time by which the wheels turn late [s]"},
+    {"ahead_m", &ObserverSettings::ahead_m,
+     "standard deviation of the accelerometer's place ahead of the centre of gravity [m]"},
+    {"inertia_prior", &ObserverSettings::inertia_prior,
+     "standard deviation of the yaw inertia (of its logarithm)"},
     {"learning_use", &ObserverSettings::learning_use,
      "lateral force over load up to which slip tells less of the stiffness"},
     {"error_slip_rad", &ObserverSettings::error_slip_rad,

@@ -10,9 +10,12 @@
 // forces be what the sensors say, so that beta follows the measured acceleration at once (which is
 // true of any tyre, but drifts) and the tyre model in the long run.
 //
-// How far a car and its road depart from the model differs by more than ten times from car to car.
-// There are three B, which expect small, middling and large departures; each counts by the
-// likelihood of its last readings (Raftery, Karny & Ettler, Technometrics 52, 2010).
+// How far a car and its road depart from the model differs by more than ten times from car to car,
+// and so does in what. There are five B, which expect small, middling and large departures, banked
+// roads, and a car or tyres that are not as told; each counts by the likelihood of its
+// last readings (Raftery, Karny & Ettler, Technometrics 52, 2010), tempered, as a wrong model makes
+// errors that last (Grunwald & van Ommen, Bayesian Analysis 12, 2017): those that explain the
+// readings about as well stay, and where they disagree the band is wide.
 #pragma once
 
 #include <array>
@@ -59,7 +62,7 @@ class SideslipDual {
     }
 
   private:
-    static constexpr std::size_t kMembers = 3;
+    static constexpr std::size_t kMembers = 5;
 
     void start(double dt, const SensorSample& s);
     void run(double dt, const SensorSample& s);

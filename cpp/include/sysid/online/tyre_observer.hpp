@@ -1,9 +1,10 @@
 // Observer B of the dual sideslip observer: the car on tyres that are known only roughly.
 //
 // State: beta, r, both slip angles behind their relaxation length, and what is uncertain of the
-// tyres: stiffness, grip, an error of the force for each axle, and the relaxation length; of the
-// road, of body roll, and of the yaw moment by drive and brakes (a locking differential makes one
-// as large as a tenth of the tyres'). It reads r and a_y.
+// tyres: stiffness, grip, an error of the force for each axle, and the relaxation length; of what
+// was told of the car: how late the wheels turn, where the accelerometer sits, the yaw inertia; of
+// the road, of body roll, and of the yaw moment by drive and brakes (a locking differential makes
+// one as large as a tenth of the tyres'). It reads r and a_y.
 #pragma once
 
 #include "sysid/estimate/filter.hpp"
@@ -13,6 +14,7 @@
 namespace sysid {
 
 struct TyreModel {  // observer B
+    static constexpr double kSteerLagS = 0.1;
     // Stiffness and grip are logarithms of what the tyre of the vehicle file is multiplied by;
     // errors are in units of their standard deviation.
     enum State {
@@ -24,21 +26,25 @@ struct TyreModel {  // observer B
         kStiffR,
         kGripF,
         kGripR,
-        kRelax,  // logarithm of what the relaxation length is multiplied by
-        kRoll,   // share of `kLean` that the accelerometer feels too much, by gravity in body roll
-        kRoad,   // lateral acceleration that moves the car and that no accelerometer feels
+        kRelax,    // logarithm of what the relaxation length is multiplied by
+        kLate,     // time by which the wheels turn after the steering angle that is read [s]
+        kAhead,    // how far ahead of the centre of gravity the accelerometer sits [m]
+        kInertia,  // logarithm of what the yaw inertia is multiplied by
+        kRoll,  // share of `kLean` that the accelerometer feels too much, by gravity in body roll
+        kRoad,  // lateral acceleration that moves the car and that no accelerometer feels
         kErrorF,
         kErrorR,
         kDrive,  // yaw moment of wheels that drive or brake unlike left and right
         kLean,   // lateral acceleration that the body has rolled with by now
     };
-    static constexpr int kStates = 15;
+    static constexpr int kStates = 18;
     // What is learnt of the car and outlives a stop.
     static constexpr int kLearnt = kStiffF, kLearntStates = kRoll - kStiffF + 1;
     static constexpr int kMeasured = 2;  // r, a_y
     struct Input {
         double dt = 0.0;
-        double steer = 0.0, steer_before = 0.0;  // now and at the sample before
+        double steer = 0.0, steer_before = 0.0;            // now and at the sample before
+        double steer_slow = 0.0, steer_slow_before = 0.0;  // behind a lag of `kSteerLagS`
         double vx = 1.0, vx_before = 1.0;
         double ax = 0.0, ax_before = 0.0;
         AxleForces loads{};
@@ -57,7 +63,7 @@ struct TyreModel {  // observer B
     void predict(const Input& u, const S* x, S* next) const;
     template <class S>
     void observe(const Input& u, const S* x, S* y) const;
-    Mat<15, 15> process_noise(const Input& u) const;
+    Mat<kStates, kStates> process_noise(const Input& u) const;
     Mat<2, 2> measurement_noise(const Input& u) const;
 };
 
