@@ -57,6 +57,7 @@ NUMERICAL = {
     "study/beyond.py": {"_DRAWS"},
     "study/foretold.py": {"_BLOCK_S", "_FEWEST_BLOCKS"},
     "study/limit.py": {"_BASELINE", "_SEARCHED", "_SENSORS", "_STEP"},
+    "study/hidden.py": {"_MOST", "_SAMPLES"},
     "study/next_steps.py": {"SHORT_S", "_SHOWN", "_ASKED"},
     "study/shares.py": {
         "AHEAD", "_LEAST_APART_S", "_APART", "_DRAWS", "_LONG_S", "_FEW",
@@ -79,8 +80,8 @@ NUMERICAL = {
     "diagnose/unexplained/coherence.py": {"_WINDOW_S", "_LEVEL"},
     "diagnose/candidates/confirm.py": {"_HOPELESS"},
     "diagnose/unexplained/delay.py": {
-        "HIGHEST_HZ", "_BANDS", "_LOWEST_HZ", "_SMALL", "_ROUNDS", "_DRAWS", "_NOTABLE",
-        "_TINY_RAD",
+        "HIGHEST_HZ", "_BANDS", "_LOWEST_HZ", "_SMALL", "_ROUNDS", "_LONGER", "_DRAWS",
+        "_NOTABLE", "_TINY_RAD",
     },
     "diagnose/unexplained/force_map.py": {
         "_CELLS", "_CELLS_ALONE", "_FEWEST", "_FOLDS", "_LONGEST_S",
