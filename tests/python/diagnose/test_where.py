@@ -186,6 +186,21 @@ def test_where_a_delay_is_not_found_to_its_end_it_is_climbed(
     assert sought() == ["refine"]
 
 
+def test_the_interval_of_a_delay_holds_how_far_the_search_would_still_go(
+    truth: Model, start: Model
+) -> None:
+    """Beside a misfit disturbances take up a part of what a delay does, and steps fall short."""
+    late = truth.add("force_lag", "tyre_load_sensitivity").with_values(
+        {"force_lag.time_constant_s": 0.1, "tyre_load_sensitivity.sensitivity": 0.3}
+    )
+    fit = identify(start, drive(late, manoeuvres.lap(40.0), seed=2), starts=1)
+    evidence, rng = Evidence(fit, fit.driving), np.random.default_rng(0)
+    found = delay_module.delay(evidence, fit.driving.inputs(), 1, rng, lambda: True)
+    assert found is not None
+    assert abs(found.delay_s - 0.1) < 2.5 * found.std_s
+    assert found.std_s < 0.04
+
+
 def test_a_steady_force_is_seen(dragged: Where, truth: Model) -> None:
     mean, std = dragged.steady["F_x"]
     drag = -0.5 * truth.vehicle.air_density_kgpm3 * 0.45 * 26.0**2  # at the mean speed of the lap
