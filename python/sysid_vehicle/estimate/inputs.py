@@ -8,10 +8,6 @@ confidence intervals; Goldenshluger & Nemirovski, Mathematical Methods of Statis
 Katkovnik, IEEE Transactions on Signal Processing 1999). At a corner the window shrinks to the
 sample itself.
 
-The windows go on to 0.8 s at 100 Hz: on a motorway the noise of a steering sensor is a third of
-what the driver steers, and what shorter ones leave of it is found as a lag of 40 ms that no car
-has.
-
 The polynomial is of sixth degree: one of second degree flattens the crests of a fast sweep by less
 than it can notice in one place, but everywhere alike, and a test over the whole drive notices.
 
@@ -28,7 +24,7 @@ import numpy as np
 from .._common.arrays import NORMAL_MAD, FloatArray, as_float64
 from ..sensors import quantum
 
-_HALF_WIDTHS = (4, 6, 9, 12, 18, 27, 40)
+_HALF_WIDTHS = (4, 6, 9, 12)
 _DEGREE = 6
 _AGREES = 1.8  # standard deviations
 

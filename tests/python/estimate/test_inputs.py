@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from sysid_vehicle import Log, Model, SensorNoise, drive, example_vehicle, identify, manoeuvres
+from sysid_vehicle import Log, Model, drive, example_vehicle, identify, manoeuvres
 from sysid_vehicle.estimate import inputs
 from sysid_vehicle.estimate.inputs import quiet, white_noise_std, without_stairs
 
 T = np.arange(3000) / 100.0
 NOISE = 1e-3
-LAGGING = Model(example_vehicle()).add("steer_lag")
 
 
 def smooth() -> np.ndarray:
@@ -41,21 +40,6 @@ def test_too_few_samples_tell_no_noise(rng: np.random.Generator) -> None:
 def test_noise_falls_to_less_than_half(true: np.ndarray, rng: np.random.Generator) -> None:
     y = true + NOISE * rng.standard_normal(T.size)
     assert np.sqrt(np.mean((quiet(y) - true) ** 2)) < 0.5 * NOISE
-
-
-def test_of_noise_beside_slow_steering_little_is_left(rng: np.random.Generator) -> None:
-    """On a motorway; more of it is found as a lag of the steering."""
-    true = 0.05 * smooth()
-    y = true + NOISE * rng.standard_normal(T.size)
-    assert np.sqrt(np.mean((quiet(y) - true) ** 2)) < 0.33 * NOISE
-
-
-def test_noise_of_the_steering_is_no_lag_on_a_motorway() -> None:
-    """The driver steers hardly more than the noise; a lag that smooths it would predict better."""
-    manoeuvre = manoeuvres.handling_course(60.0, lateral_mps2=0.8, top_speed_mps=33.0)
-    log = drive(Model(example_vehicle()), manoeuvre, seed=51, noise=SensorNoise(steer_rad=6e-4))
-    fits = [identify(m, log, starts=1) for m in (Model(example_vehicle()), LAGGING)]
-    assert fits[1].log_likelihood - fits[0].log_likelihood < 12.0
 
 
 # However steep the corner: a window is taken only if it agrees within 1.8 deviations.
