@@ -36,19 +36,32 @@ def excess(test: Tested) -> float:
     return max(test.statistic - test.degrees, 0.0)
 
 
-def little(first: float, before: float, after: float, last: float, rules: Rules = USUAL) -> bool:
+def little(
+    first: float,
+    before: float,
+    after: float,
+    last: float,
+    own: Sequence[Share] = (),
+    rules: Rules = USUAL,
+) -> bool:
     """Whether an effect takes little of the validation error, and of what all that was added takes.
 
     A small misfit is explained by whatever effect fits it best, and its evidence grows with the
     data: what takes little may be any of them. Beside a large effect that came first a share of the
     whole fall is small for any other: what takes a tenth of the error that it found is not little.
+    Nor is what takes a tenth of the errors ahead: beside large lateral errors a drag takes little
+    of those one step ahead.
 
     Parameters
     ----------
     first, before, after, last : float
         Errors of the baseline, without and with the effect, and of the final model.
+    own : sequence of Share
+        Its own shares of the errors ahead, on validation and on training data.
     rules : Rules
     """
+    if own and all(s.low > rules.taken for s in own):
+        return False
     of_the_fall = before**2 - after**2 < rules.taken * (first**2 - last**2)
     return of_the_fall and before - after < rules.taken * before
 

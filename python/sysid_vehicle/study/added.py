@@ -165,9 +165,11 @@ def added_by(
     }
     final, ends = fits[-1], (on_test[0].error, on_test[-1].error)
     for (before, after), (poorer, richer) in zip(pairwise(on_test), pairwise(fits), strict=True):
-        small = little(ends[0], before.error, after.error, ends[1], rules)
+        errors = ends[0], before.error, after.error, ends[1]
         for name in (e for e in richer.model.effects if e not in poorer.model.effects):
             finding, because = told[name].finding, told[name].because
+            own = known.get(name, (UNKNOWN, UNKNOWN))
+            small = little(*errors, own[:2], rules)
             others = [e for e in trail.rivals.get(name, ()) if e not in final.model.effects]
             others = [*sorted(decision.groups.get(name, ())), *others]
             added.append(
@@ -186,7 +188,7 @@ def added_by(
                         takes_little=small or name in shared,
                     ),
                     small,
-                    *known.get(name, (UNKNOWN, UNKNOWN)),
+                    *own,
                 )
             )
     return tuple(added)

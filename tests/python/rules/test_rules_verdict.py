@@ -290,7 +290,11 @@ def test_what_takes_little_of_the_fall_in_error_is_no_confirmed_name() -> None:
     assert little(10.6, 1.05, 1.0, 1.0)
     assert little(2.0, 1.0, 1.1, 1.1)
     assert not little(1.0, 1.0, 1.0, 1.0)  # nothing falls: it is not told
-    assert not little(2.0, 1.1, 1.0, 1.0, replace(USUAL, most=0.95))
+    assert not little(2.0, 1.1, 1.0, 1.0, rules=replace(USUAL, most=0.95))
+    # Beside large lateral errors a drag takes little of one step, and most of those ahead.
+    assert little(27.0, 26.8, 26.5, 1.7, (MOST, NONE_OF_IT))
+    assert not little(27.0, 26.8, 26.5, 1.7, (MOST, MOST))
+    assert little(27.0, 26.8, 26.5, 1.7, (MOST, UNKNOWN))
 
 
 def test_the_share_explained_is_of_what_is_beyond_the_noise_floor() -> None:
