@@ -323,30 +323,33 @@ def _steer(
         return own[0]
     sign = math.copysign(1.0, alike)
     usual = (wheelbase_m or _WHEELBASE_M) + _UNDERSTEER * float(np.median(speed)) ** 2
-    times, std = _slope(steer, curvature) / usual, _WHEELBASE_STD
+    times, std, off = _slope(steer, curvature) / usual, _WHEELBASE_STD, 1.0
     if wheelbase_m is not None:
         about = {**factors, "steer_rad": sign / times}
         asked = times_wheelbase(*drive.in_units(about), wheelbase_m)
         if asked is None:
             wheelbase_m = None
         else:
-            times, std = times * asked, _LAW_STD
+            times, std, off = times * asked[0], _LAW_STD, asked[1]
     ways = [(f, 1.0, std) for f in own]
     ways += [(f, _RATIO, math.hypot(std, _RATIO_STD)) for f in own]
     factor, ratio, _ = min(ways, key=lambda way: abs(math.log(times * way[0] / way[1])) / way[2])
     found = times * factor
     said = [] if sign > 0.0 else ["turned round: it moves against yaw rate and a_y"]
+    within = f"({found / off:.3g} to {found * off:.3g})"
     if ratio != 1.0:
-        size = f"{found:.3g}" if wheelbase_m is not None else f"{found:.2g}"
-        by = "put in the car's" if wheelbase_m is None else f"by a wheelbase of {wheelbase_m:.3g} m"
+        told = f"{found:.2g} was found"
+        if wheelbase_m is not None:
+            told = f"{found:.3g} {within} was found by a wheelbase of {wheelbase_m:.3g} m"
         said.append(
-            f"angle of the steering wheel; a steering ratio of about {size} was found: {by}"
+            f"angle of the steering wheel; a steering ratio of about {told}: put in the car's own"
         )
         factor /= float(f"{found:.3g}")
     elif wheelbase_m is not None:
         check = ": check both" if abs(math.log(found)) > 2.0 * _LAW_STD else ""
         said.append(
-            f"about {found:.2g} times what a wheelbase of {wheelbase_m:.3g} m asks for{check}"
+            f"about {found:.2g} {within} times what a wheelbase of {wheelbase_m:.3g} m asks for"
+            f"{check}"
         )
     notes["steer_rad"] = "; ".join(said)
     return sign * factor
