@@ -56,6 +56,10 @@ def test_the_first_screen_tells_the_story(
     assert lengths == pytest.approx([100.0, 100.0 * after / before, 100.0 / before], abs=0.06)
     bare = "".join(first_screen(nothing_added, samples_of(nothing_added)))
     assert "none of them holds on validation data" in bare
+    untried = replace(nothing_added, stopped=(nothing_added.diagnoses[0].significant[0].id,))
+    late = "".join(first_screen(untried, samples_of(nothing_added)))
+    assert "none of them holds" not in late
+    assert "the time limit came before all were tried" in late
     assert "final" not in bare
     assert "5 Error<" in bare
 
