@@ -233,6 +233,20 @@ def test_the_wheelbase_of_the_car_tells_its_steering_gear(
     assert "turned round" in proposed.why
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_lateral_speed_changes_as_the_others_ask(side: float) -> None:
+    """At speed the body turns in as much as out: the path of the rear axle tells no sign."""
+    model = sv.Model(sv.example_vehicle())
+    drive = sv.drive(model, sv.manoeuvres.sine_sweep(), seed=62, rate_hz=50.0)
+    data = {name: drive[name] for name in ("time_s", "vx_mps", "ax_mps2", "ay_mps2")}
+    data["GyroZ_radps"] = side * drive["yaw_rate_radps"]
+    data["SteeringAngle_rad"] = side * drive["steer_rad"]
+    data["GpsLateralVelocity_mps"] = drive["vy_mps"]
+    proposed = sv.propose_channels(data).channels
+    assert proposed["ay_mps2"].factor == side
+    assert proposed["vy_mps"].factor == side
+
+
 def test_the_steering_gear_is_told_with_what_it_may_be_off_by(minute: sv.Log) -> None:
     """At one speed understeer looks like another wheelbase."""
     car = sv.example_vehicle()
