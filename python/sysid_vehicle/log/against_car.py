@@ -122,8 +122,11 @@ def check_car(log: Log, *, mass_kg: float, wheelbase_m: float) -> None:
 
 def times_wheelbase(
     columns: Mapping[str, FloatArray], rate_hz: float, wheelbase_m: float
-) -> float | None:
+) -> tuple[float, float] | None:
     """Steering angle over the one that a wheelbase asks for at low a_y; None where nothing tells.
+
+    Beside it stands the factor, either way, that it may be off by: where the speed hardly changes
+    understeer looks like another wheelbase.
 
     Parameters
     ----------
@@ -135,7 +138,7 @@ def times_wheelbase(
     """
     drive = _driven(columns, rate_hz, wheelbase_m)
     told = None if drive is None else _steer(drive, wheelbase_m)
-    return None if told is None else told.ratio
+    return None if told is None else (told.ratio, math.exp(told.deviation))
 
 
 def _driven(columns: Mapping[str, FloatArray], rate_hz: float, wheelbase_m: float) -> Drive | None:

@@ -55,7 +55,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
     ),
     "steer_rad": (
         r"road ?wheel angle|^steer rad$|front wheel angle",
-        r"steer\w* ?(wheel )?ang\w*|lenk(rad)?winkel|\bswa\b|str\w* ?whl ?ang\w*|hand ?wheel",
+        r"steer\w* ?(wheel )?ang\w*|lenk(rad)?winkel|\bswa\b|str\w* ?wheel ?ang\w*|hand ?wheel",
         r"\b(steer|steering|steered|delta)\b",
         r"\b(volant|volante|sterzo|braquage)\b|stuurhoek|rattvinkel|操舵角|ハンドル角|舵角|方向盘转角",
     ),
@@ -66,7 +66,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
 }
 _REFUSED: dict[str, str] = {
     "time_s": r"\b(lap|run|delta|remaining|sector)\b",
-    "vx_mps": r"\b(wheel|whl|engine|rpm|fl|fr|rl|rr|lat\w*|vert\w*|wind|angular|steer\w*|y|z"
+    "vx_mps": r"\b(wheel|eng|engine|rpm|fl|fr|rl|rr|lat\w*|vert\w*|wind|angular|steer\w*|y|z"
     r"|trans\w*|lacet|imbardata|guinada|moteur|motore?|roues?|ruot[ae]|rueda|roda|vento?|viento)\b",
     "vy_mps": r"\b(angular|wind|acc\w*)\b",
     "yaw_rate_radps": r"\b(acc\w*|target|ref\w*|covariance)\b",
@@ -87,18 +87,21 @@ _SI = {
 }
 
 
+# As the databases of cars shorten words, whose names may have 32 letters.
+_SHORT = {"spd": "speed", "whl": "wheel", "lgt": "long", "lng": "long"}
 _UMLAUTS = {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"}
 
 
 def words(name: str) -> str:
-    """Return a name in plain words, without accents: ``ESP_YawRate.z`` as ``esp yaw rate z``."""
+    """Return a name in plain words, without accents: ``ESP_VehSpd.x`` as ``esp veh speed x``."""
     apart = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name)
     for letter, plainly in _UMLAUTS.items():
         apart = apart.replace(letter, plainly)
     marks = unicodedata.normalize("NFKD", apart)
     bare = "".join(c for c in marks if not "\u0300" <= c <= "\u036f")
     bare = unicodedata.normalize("NFC", bare)
-    return " ".join(re.sub(r"[\W_]+", " ", bare).lower().split())
+    there = re.sub(r"[\W_]+", " ", bare).lower().split()
+    return " ".join(_SHORT.get(word, word) for word in there)
 
 
 def rank(name: str, unit: str, channel: str) -> float:

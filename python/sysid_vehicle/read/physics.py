@@ -44,6 +44,7 @@ _UNDERSTEER = 0.002  # that lengthens a wheelbase by K v^2 [s^2/m]
 _WHEELBASE_M, _WHEELBASE_STD = 2.9, 0.35
 _RATIO, _RATIO_STD = 15.0, 0.25  # of steering gears
 _FORCES, _MASS_KG = (1.0, 1e3), 1300.0
+_SURE = 3.0  # deviations
 _FOLLOWS = 0.5  # cosine from which two channels are taken to go together
 
 
@@ -134,7 +135,15 @@ def sideways(
             by_law = "unit found by the laws of motion" if told else "unit as that of vx_mps"
             said.append("unit found by its size" if angle else by_law)
     lateral = factor * column * (speed if angle else 1.0)
-    if moves and against_the_rear_axle(lateral[rows], speed[rows], yaw[rows], 0.5 * _SHORT_S):
+    if not moves:
+        return factor, "; ".join(said)
+    own = columns["vy_mps"] * (factors["vx_mps"] * columns["vx_mps"] if angle else 1.0)
+    law = _lateral_law(_Windows(time_s, {**columns, "vy_mps": own}), factors)
+    told = law is not None and abs(law[0]) > _SURE * law[1]
+    if told and law is not None and law[0] * factor < 0.0:
+        factor = -factor
+        said.append("turned round: it changes against what a_y - v_x r asks for")
+    elif not told and against_the_rear_axle(lateral[rows], speed[rows], yaw[rows], 0.5 * _SHORT_S):
         factor = -factor
         said.append("turned round: it moves against the path of the rear axle")
     return factor, "; ".join(said)
@@ -142,6 +151,17 @@ def sideways(
 
 def _lateral_unit(drive: _Windows, factors: Mapping[str, float]) -> float | None:
     """The factor by which a lateral speed changes as ``a_y - v_x r`` asks; None where few do."""
+    law = _lateral_law(drive, factors)
+    if law is None:
+        return None
+    return min(_TRIED["vx_mps"], key=lambda f: abs(math.log(f * abs(law[0]))))
+
+
+def _lateral_law(drive: _Windows, factors: Mapping[str, float]) -> tuple[float, float] | None:
+    """The change of a lateral speed over the one that ``a_y - v_x r`` asks for, +- what.
+
+    None where they do not go together.
+    """
     if not drive.has("ay_mps2"):
         return None
     turn = factors["vx_mps"] * factors["yaw_rate_radps"] * drive.mean("vx_mps", "yaw_rate_radps")
@@ -155,8 +175,7 @@ def _lateral_unit(drive: _Windows, factors: Mapping[str, float]) -> float | None
     found = fit(change, columns, [np.inf, 0.06 * unit, unit, np.inf])
     if found.coherence < _FOLLOWS or not found.coefficients[0]:
         return None
-    ratio = abs(float(found.coefficients[0]))
-    return min(_TRIED["vx_mps"], key=lambda f: abs(math.log(f * ratio)))
+    return float(found.coefficients[0]), float(found.deviations[0])
 
 
 def _large(values: FloatArray) -> float:
@@ -323,30 +342,33 @@ def _steer(
         return own[0]
     sign = math.copysign(1.0, alike)
     usual = (wheelbase_m or _WHEELBASE_M) + _UNDERSTEER * float(np.median(speed)) ** 2
-    times, std = _slope(steer, curvature) / usual, _WHEELBASE_STD
+    times, std, off = _slope(steer, curvature) / usual, _WHEELBASE_STD, 1.0
     if wheelbase_m is not None:
         about = {**factors, "steer_rad": sign / times}
         asked = times_wheelbase(*drive.in_units(about), wheelbase_m)
         if asked is None:
             wheelbase_m = None
         else:
-            times, std = times * asked, _LAW_STD
+            times, std, off = times * asked[0], _LAW_STD, asked[1]
     ways = [(f, 1.0, std) for f in own]
     ways += [(f, _RATIO, math.hypot(std, _RATIO_STD)) for f in own]
     factor, ratio, _ = min(ways, key=lambda way: abs(math.log(times * way[0] / way[1])) / way[2])
     found = times * factor
     said = [] if sign > 0.0 else ["turned round: it moves against yaw rate and a_y"]
+    within = f"({found / off:.3g} to {found * off:.3g})"
     if ratio != 1.0:
-        size = f"{found:.3g}" if wheelbase_m is not None else f"{found:.2g}"
-        by = "put in the car's" if wheelbase_m is None else f"by a wheelbase of {wheelbase_m:.3g} m"
+        told = f"{found:.2g} was found"
+        if wheelbase_m is not None:
+            told = f"{found:.3g} {within} was found by a wheelbase of {wheelbase_m:.3g} m"
         said.append(
-            f"angle of the steering wheel; a steering ratio of about {size} was found: {by}"
+            f"angle of the steering wheel; a steering ratio of about {told}: put in the car's own"
         )
         factor /= float(f"{found:.3g}")
     elif wheelbase_m is not None:
         check = ": check both" if abs(math.log(found)) > 2.0 * _LAW_STD else ""
         said.append(
-            f"about {found:.2g} times what a wheelbase of {wheelbase_m:.3g} m asks for{check}"
+            f"about {found:.2g} {within} times what a wheelbase of {wheelbase_m:.3g} m asks for"
+            f"{check}"
         )
     notes["steer_rad"] = "; ".join(said)
     return sign * factor

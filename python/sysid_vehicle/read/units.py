@@ -99,6 +99,7 @@ WHAT = {
     "%": "a share",
 }
 _LAST_WORD = re.compile(r"^(.*[^\W_])[\s_.]+([A-Za-z]\w*)$")
+_QUOTIENT = re.compile(r"^(.*[^\W_])[\s_.]+([A-Za-z]+)[\s_]([A-Za-z]+2?)$")
 # Units that are words of other meanings in names.
 _WORDS = {"turn", "turns", "rev", "revs", "min", "h", "grad"}
 _AT_END = re.compile(r"[\[({]([^\[\](){}]+)[\])}]\s*$")
@@ -142,8 +143,12 @@ def unit_in_name(name: str, si_unit: str) -> str:
 def unit_at_end(name: str, si_unit: str) -> tuple[str, str]:
     """Return a name without the unit of that kind that is its last word, and that unit.
 
-    ``steer_deg`` is ``steer`` in ``deg``; both are what they were where there is none.
+    ``steer_deg`` is ``steer`` in ``deg``, ``yaw_deg_s`` is ``yaw`` in ``deg/s``; both are what they
+    were where there is none.
     """
+    found = _QUOTIENT.search(name)
+    if found is not None and factor_to(si_unit, f"{found[2]}/{found[3]}") is not None:
+        return found[1], f"{found[2]}/{found[3]}"
     found = _LAST_WORD.search(name)
     if found is None or found[2].lower() in _WORDS or factor_to(si_unit, found[2]) is None:
         return name, ""

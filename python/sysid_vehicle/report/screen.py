@@ -105,12 +105,15 @@ def _effect(study: Study, added: AddedEffect) -> str:
         for e in added.parameters
     )
     at = study.horizons.horizons_s.index(_AHEAD_S)
-    gains = []
-    for channel, by_horizon in study.horizons.gains(study.step_of(added.id)).items():
+    gains, step = [], study.step_of(added.id)
+    others = [a.id for a in study.added if a.id != added.id and study.step_of(a.id) == step]
+    for channel, by_horizon in study.horizons.gains(step).items():
         gain, shown = by_horizon[at], shown_in(channel)
         if gain is not None and channel in _SHOWN:
             gains.append(f"{number(shown.factor * gain, 2)} {shown.unit} of {shown.name}")
-    takes = f"; takes off the error {_AHEAD_S:g} s ahead {', '.join(gains)}" if gains else ""
+    takes = f"takes off the error {_AHEAD_S:g} s ahead {', '.join(gains)}" if gains else ""
+    beside = f"together with {' and '.join(others)} " if others else ""
+    takes = takes and f"; {beside}{takes}"
     reserve = f"; {added.reserve}" if added.reserve else ""
     return f"{added.id} ({added.grade}): {sizes}{takes}{reserve}"
 

@@ -70,8 +70,11 @@ def summary(study: Study) -> tuple[str, str, str]:
         names = "; ".join(effect_found(a) for a in study.added)
         what = f"The model got {names}."
     elif study.diagnoses[0].significant:
-        names = ", ".join(c.id for c in study.diagnoses[0].significant[:3])
-        what = f"There is evidence for {names}, but none of them holds on validation data."
+        leading = [c.id for c in study.diagnoses[0].significant[:3]]
+        but = "but none of them holds on validation data"
+        if set(leading) & set(study.stopped):
+            but = "and the time limit came before all were tried on validation data"
+        what = f"There is evidence for {', '.join(leading)}, {but}."
     else:
         what = "No effect was added: there is evidence for none of the catalogue."
     error = f"On validation data, the one-step-ahead error {errors(study)}."

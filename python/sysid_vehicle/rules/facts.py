@@ -101,9 +101,10 @@ class Facts:
     missing : (float, float)
         Squares of errors 1 to 5 s ahead on validation data, beyond the noise of sensors, without
         and with what was added; in one unit.
-    taken_low : float
+    taken_low : float or None
         Lower end of the interval of the share of these that what was added takes away, or of what
-        any function of the driving could explain of them.
+        any function of the driving could explain of them; None where the time limit left it
+        unknown.
     contradictions : tuple of str
         Channels that contradict the others, in words.
     excited : bool
@@ -130,7 +131,7 @@ class Facts:
     together: Tested | None = None
     candidate: float = 1.0
     missing: tuple[float, float] = (0.0, 0.0)
-    taken_low: float = 1.0
+    taken_low: float | None = 1.0
     added: tuple[Added, ...] = ()
     contradictions: tuple[str, ...] = ()
     excited: bool = True

@@ -18,6 +18,9 @@ _NOT_TOGETHER = (
     "together, what was added is not shown to take anything off the error 1 to 5 s ahead of this "
     "motion on validation data: the interval of its share reaches nothing"
 )
+_LATE_TOGETHER = (
+    "the time limit left unknown what share of the error 1 to 5 s ahead all that was added takes"
+)
 _LATE = (
     "the time limit left unknown what share of the error 1 to 5 s ahead is its own on training and "
     "validation data"
@@ -161,8 +164,11 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
         alone, groups, led = _standing(facts, rules)
         falling = names - likely - alone - groups.keys() - led.keys()
         if left:
-            nothing = frozenset(a.id for a in facts.added if not _together_low(a, facts) > 0.0)
+            lows = {a.id: _together_low(a, facts) for a in facts.added}
+            nothing = frozenset(e for e, low in lows.items() if low is not None and not low > 0.0)
+            unknown = frozenset(e for e, low in lows.items() if low is None)
             withdrawn.append(Withdrawn(nothing - likely - falling, _NOT_TOGETHER, names))
+            withdrawn.append(Withdrawn(unknown - likely - falling, _LATE_TOGETHER, names))
         withdrawn.append(Withdrawn(falling - late, _NOT_SHOWN, names))
         for name, leaders in led.items():
             if name in likely:
@@ -239,7 +245,7 @@ def _standing(
     )
 
 
-def _together_low(effect: Added, facts: Facts) -> float:
+def _together_low(effect: Added, facts: Facts) -> float | None:
     """Lower end of the share that all effects take together of the motion that one moves."""
     return facts.taken_low if effect.taken_low is None else effect.taken_low
 

@@ -246,7 +246,7 @@ class Judge:
         if explained is None:
             return facts
         low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.outer, self.test))
-        facts = replace(facts, taken_low=0.0 if low is None else low)
+        facts = replace(facts, taken_low=low)
         motions = self.asks.asked(
             _TOGETHER, lambda: together_by_motion(self.outer, self.added, self.test)
         )

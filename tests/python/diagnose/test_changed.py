@@ -245,7 +245,26 @@ def test_tyres_of_an_axle_may_change(truth: Model, before: Fit) -> None:
     worn = later(truth, D_front=0.9 * truth.value("D_front"))
     change = changed(before, worn, candidates=("steer_ratio",))
     assert [e.id for e in change.named] == ["tyre_front"]
-    assert change["tyre_front"].names == ("B_front", "C_front", "D_front", "E_front")
+    front = change["tyre_front"]
+    assert front.names == ("B_front", "C_front", "D_front", "E_front")
+    assert front.stiffness is not None
+    share, std = front.stiffness
+    assert abs(share + 0.1) < 3.0 * std
+    assert std < 0.04  # driving tells it before B, C and D one by one
+    assert front.size.startswith("cornering stiffness -")
+    assert change["tyre_rear"].stiffness is not None
+    assert change["steer_ratio"].stiffness is None
+
+
+def test_what_is_likely_and_not_shown_is_no_calm(offset: Change) -> None:
+    """Two changes that act alike may both be likelier than not, and neither be shown."""
+    few = (replace(e, said="not testable", probability=0.1) for e in offset.effects[1:])
+    likely = replace(offset.effects[0], said="not testable", probability=0.8)
+    assert "something changed, likeliest steer_offset (80 % sure)" in str(
+        replace(offset, effects=(likely, *few))
+    )
+    calm = replace(likely, probability=0.3)
+    assert str(replace(offset, effects=(calm,))).startswith("no change is shown\n")
 
 
 def test_a_change_prints_and_is_kept(offset: Change, tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """Channel maps that are proposed: names, units, signs and swaps are found."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +86,24 @@ LOGGERS["units at the end"] = {
     "ay_mps2": ("ay_g", 1 / G),
     "steer_rad": ("steer_deg", 1 / DEG),
 }
-OTHERS = ("WheelSpeed_FL", "Engine RPM", "SteeringTorque", "Lap Time", "Oil Temp", "acc_z")
+LOGGERS["shortened"] = {
+    "time_s": ("t", 1.0),
+    "vx_mps": ("ABS.VehSpd", 3.6),
+    "yaw_rate_radps": ("IMU.YawRate_deg_s", 1 / DEG),
+    "ax_mps2": ("IMU.LgtAcc_m_s2", 1.0),
+    "ay_mps2": ("IMU.LatAcc_m_s2", 1.0),
+    "steer_rad": ("EPS.StrWhlAng", 15.0 / DEG),
+}
+OTHERS = (
+    "WheelSpeed_FL",
+    "ABS.WhlSpdFR",
+    "ECM.EngSpd",
+    "Engine RPM",
+    "SteeringTorque",
+    "Lap Time",
+    "Oil Temp",
+    "acc_z",
+)
 
 
 @pytest.fixture(scope="module")
@@ -148,6 +167,9 @@ def test_a_unit_in_the_name_is_no_word_of_it(right: sv.Log) -> None:
     assert "in 'g', as its name ends" in why["ay_mps2"]
     assert "in 'deg', as its name ends" in why["steer_rad"]
     assert "in 'ms', as its name ends" in why["time_s"]
+    shortened = sv.propose_channels(renamed(right, LOGGERS["shortened"]))
+    assert "in 'deg/s', as its name ends" in shortened.channels["yaw_rate_radps"].why
+    assert "in 'm/s2', as its name ends" in shortened.channels["ax_mps2"].why
 
 
 def test_swapped_accelerations_are_found(right: sv.Log) -> None:
@@ -209,6 +231,38 @@ def test_the_wheelbase_of_the_car_tells_its_steering_gear(
     assert proposed.factor == pytest.approx(-DEG / gear, rel=0.08)
     assert f"wheelbase of {truth.vehicle.wheelbase_m:.3g} m" in proposed.why
     assert "turned round" in proposed.why
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_lateral_speed_changes_as_the_others_ask(side: float) -> None:
+    """At speed the body turns in as much as out: the path of the rear axle tells no sign."""
+    model = sv.Model(sv.example_vehicle())
+    drive = sv.drive(model, sv.manoeuvres.sine_sweep(), seed=62, rate_hz=50.0)
+    data = {name: drive[name] for name in ("time_s", "vx_mps", "ax_mps2", "ay_mps2")}
+    data["GyroZ_radps"] = side * drive["yaw_rate_radps"]
+    data["SteeringAngle_rad"] = side * drive["steer_rad"]
+    data["GpsLateralVelocity_mps"] = drive["vy_mps"]
+    proposed = sv.propose_channels(data).channels
+    assert proposed["ay_mps2"].factor == side
+    assert proposed["vy_mps"].factor == side
+
+
+def test_the_steering_gear_is_told_with_what_it_may_be_off_by(minute: sv.Log) -> None:
+    """At one speed understeer looks like another wheelbase."""
+    car = sv.example_vehicle()
+    stable = car.replace(tyre_rear=replace(car.tyre_rear, B=1.8 * car.tyre_rear.B))
+    fast = sv.manoeuvres.slalom(60.0, 30.0, 4.0, 60.0)
+    wide = {}
+    for drive in (minute, sv.drive(sv.Model(stable), fast, seed=61, rate_hz=50.0)):
+        data = {name: drive[name] for name in drive.channels if name != "steer_rad"}
+        data["Steering Wheel Angle"] = 15.0 * drive["steer_rad"] / DEG
+        why = sv.propose_channels(data, vehicle=car).channels["steer_rad"].why
+        found = re.search(r"about [\d.]+ \(([\d.]+) to ([\d.]+)\) was found", why)
+        assert found is not None, why
+        low, high = float(found[1]), float(found[2])
+        assert low < 15.0 < high
+        wide[drive.name] = high / low
+    assert min(wide.values()) < 2.0 < 4.0 < max(wide.values())
 
 
 def test_steering_that_is_not_of_this_car_is_told(minute: sv.Log, truth: sv.Model) -> None:

@@ -13,7 +13,7 @@ from sysid_vehicle.estimate import MEASURED, Driving
 from sysid_vehicle.report import chart, figures
 from sysid_vehicle.report.excerpt import worst_excerpt
 from sysid_vehicle.report.samples import Samples, samples_of
-from sysid_vehicle.report.screen import first_screen
+from sysid_vehicle.report.screen import _effect, first_screen
 from sysid_vehicle.report.tyres import driven_slip, identified_curves, model_curves
 from sysid_vehicle.study import look_ahead
 
@@ -56,8 +56,25 @@ def test_the_first_screen_tells_the_story(
     assert lengths == pytest.approx([100.0, 100.0 * after / before, 100.0 / before], abs=0.06)
     bare = "".join(first_screen(nothing_added, samples_of(nothing_added)))
     assert "none of them holds on validation data" in bare
+    untried = replace(nothing_added, stopped=(nothing_added.diagnoses[0].significant[0].id,))
+    late = "".join(first_screen(untried, samples_of(nothing_added)))
+    assert "none of them holds" not in late
+    assert "the time limit came before all were tried" in late
     assert "final" not in bare
     assert "5 Error<" in bare
+
+
+def test_what_one_step_takes_off_is_no_single_effects(study: sv.Study) -> None:
+    """Of effects that were added together nobody knows which takes what."""
+    first, last = study.added[0], study.fits[-1]
+    richer = replace(last, model=last.model.add("steer_lag"))
+    both = replace(
+        study,
+        fits=(*study.fits[:-1], richer),
+        added=(first, replace(first, id="steer_lag")),
+    )
+    assert "together with" not in _effect(study, first)
+    assert "together with steer_lag takes off the error" in _effect(both, first)
 
 
 def test_the_excerpt_is_where_the_baseline_predicts_worst(study: sv.Study) -> None:

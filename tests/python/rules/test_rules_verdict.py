@@ -379,6 +379,17 @@ def test_effects_that_act_alike_stand_together() -> None:
     assert verdict(nothing).verdict == "unknown"
 
 
+def test_what_there_was_no_time_for_is_not_told_as_nothing() -> None:
+    """A share that nobody asked for does not reach nothing: the name falls for want of time."""
+    own = replace(MASS, own=MOST, own_in_training=MOST)
+    assert withdrawn(replace(LEFT, added=(own,))) == {}
+    for low, because in ((-0.1, "reaches nothing"), (None, "the time limit left unknown")):
+        told = verdict(replace(LEFT, added=(own,), taken_low=low))
+        (fallen,) = (w for w in told.withdrawn if own.id in w.effects)
+        assert because in fallen.because
+        assert told.verdict == "unknown"
+
+
 def test_the_mean_of_shares_is_known_better_than_each() -> None:
     assert low_of_mean([Share(0.3, 0.1, 0.5)]) == pytest.approx(0.1)
     assert low_of_mean([Share(0.3, 0.1, 0.5)] * 4) == pytest.approx(0.2)

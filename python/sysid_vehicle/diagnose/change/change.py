@@ -27,6 +27,11 @@ Said = Literal[
 _NAMED: tuple[Said, ...] = ("changed", "one of a group")
 
 
+def _signed(value: float, std: float) -> str:
+    told = with_error(value, std)
+    return told if told.startswith("-") else f"+{told}"
+
+
 @dataclass(frozen=True)
 class EffectChange:
     """By how much an effect, or the tyres of an axle, differ from the reference.
@@ -52,6 +57,9 @@ class EffectChange:
         what matters; or `not testable` with this driving.
     group : tuple of str
         The others of the group.
+    stiffness : tuple of float, optional
+        Of tyres, by which share of the reference their cornering stiffness at the same load
+        differs, and its standard error: driving tells it long before B, C, D and E one by one.
     """
 
     id: str
@@ -64,6 +72,7 @@ class EffectChange:
     said: Said
     group: tuple[str, ...] = ()
     least: tuple[float, ...] = ()
+    stiffness: tuple[float, float] | None = None
 
     @property
     def named(self) -> bool:
@@ -73,8 +82,11 @@ class EffectChange:
     @property
     def size(self) -> str:
         """The differences with standard errors, in words."""
-        told = [with_error(v, s) for v, s in zip(self.value, self.std, strict=True)]
-        return self._listed([t if t.startswith("-") else f"+{t}" for t in told])
+        told = [_signed(v, s) for v, s in zip(self.value, self.std, strict=True)]
+        if self.stiffness is None:
+            return self._listed(told)
+        value, std = (100.0 * x for x in self.stiffness)
+        return f"cornering stiffness {_signed(value, std)} %, {self._listed(told)}"
 
     @property
     def sure(self) -> str:
@@ -154,7 +166,12 @@ class Change(Printed):
             kinds = ", ".join(s.effects[0].removeprefix(UNKNOWN) for s in self.unknown)
             more = f"something changed that no effect explains, in {kinds}"
             return f"{what}; beside it {more}" if what else more
-        return what or "no change is shown"
+        if what:
+            return what
+        likely = [f"{e.id} ({e.sure})" for e in self.effects if e.probability > 0.5]
+        if likely:
+            return f"no change is shown by itself; something changed, likeliest {', '.join(likely)}"
+        return "no change is shown"
 
     def _before(self, effect: str, e: EffectChange) -> bool:
         order = [one.id for one in self.named]
@@ -169,8 +186,12 @@ class Change(Printed):
     __repr__ = brief
 
     def _parts(self) -> list[Part]:
-        other = [f"{self.alike}: intervals allow for what the model lacks there"]
-        told = other if self.alike.beyond > self.rules.taken else []
+        other = (
+            f"{self.alike}: intervals hold what estimates differ by between pieces of the "
+            "reference, and what the model lacks beyond them may look like a change; drive the "
+            "same again to be sure"
+        )
+        told = [other] if self.alike.beyond > self.rules.taken else []
         return [self._headline(), *told, Table(self._HEAD, self._rows())]
 
     def to_pandas(self) -> Any:
@@ -197,6 +218,7 @@ class Change(Printed):
                     "said": e.said,
                     "probability": e.probability,
                     "group": list(e.group),
+                    "stiffness": None if e.stiffness is None else list(e.stiffness),
                     "change": {
                         n: {
                             "value": v,

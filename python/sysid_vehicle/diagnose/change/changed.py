@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
+from ..._common.arrays import as_float64
 from ...effects import Effect
 from ...errors import InvalidInput
 from ...estimate import Driving
@@ -221,4 +222,21 @@ class _Said:
             said = "unchanged"
         names, units = zip(*((p.name, p.unit) for p in m.parameters), strict=True)
         probability = causes.inclusion.get(m.id, 0.0)
-        return EffectChange(m.id, names, units, value, std, bound, probability, said, group, least)
+        stiffness = self._stiffness(m, value)
+        return EffectChange(
+            m.id, names, units, value, std, bound, probability, said, group, least, stiffness
+        )
+
+    def _stiffness(self, m: May, sizes: Sequence[float]) -> tuple[float, float] | None:
+        """By which share the cornering stiffness of an axle's tyres differs, per load, +- what."""
+        if m not in self.search.tyres:
+            return None
+        own = self.search.before.model
+        before = np.array([own.value(n) for n in m.names[:3]])  # B, C, D
+        put = m.id in self.state.put
+        after = before + np.array(sizes[:3]) if put else before
+        whole = float(np.prod(before))
+        slope = float(np.prod(after)) / whole / after
+        value = float(np.prod(after)) / whole - 1.0 if put else float(slope @ np.array(sizes[:3]))
+        known = {**dict(zip(m.names, sizes, strict=True)), **self.state.changes}
+        return value, self.told.std_along(m.id, as_float64([*slope, 0.0]), known)

@@ -175,6 +175,32 @@ class Competition:
             ratio[own] = (ratios[:n] if name.startswith(UNKNOWN) else ratio)[own].max()
         return self._shared(ratio) if self._put else ratio
 
+    def std_along(self, effect: str, slope: FloatArray, changes: Mapping[str, float]) -> float:
+        """Standard error of what follows from an effect's changes, beside what was put in.
+
+        Parameters
+        ----------
+        effect : str
+        slope : array, shape (k,)
+            Derivatives by its parameters.
+        changes : mapping of str to float
+            What is taken off before the colour of residuals is asked for.
+        """
+        beside = [p for p in self._put if p != effect and self._alike[effect, p] < self._rules.near]
+        both, inverse = self._solved([*beside, effect])
+        own = [both.index(c) for c in self._whole[effect].columns]
+        variance = float(slope @ inverse[np.ix_(own, own)] @ slope)
+        if variance <= 0.0:
+            return np.inf
+        along, of, off = np.zeros((3, len(self._score), 1))
+        along[both, 0] = inverse[:, own] @ slope
+        of[list(self._whole[effect].columns), 0] = inverse[np.ix_(own, own)] @ slope / variance
+        for name in {*self._put, effect}:
+            columns = self._whole[name].columns
+            off[list(columns), 0] = [changes.get(n, 0.0) for n in self._of(name).names]
+        turned = (self._turns @ x for x in (along, off, of))
+        return float(np.sqrt(variance * self._differences.ratios(*turned)[0]))
+
     def off_nothing(self, effect: str, changes: Mapping[str, float]) -> float:
         """Of a change that was put in, the p-value of nothing by lines, beside the others.
 

@@ -47,6 +47,8 @@ class Search:
     ----------
     may : list of May
         What may have changed.
+    tyres : tuple of May
+        Those of it that are the tyres of an axle.
     can : dict of str to May
         What of it can be fitted.
     reference : Reference
@@ -70,7 +72,8 @@ class Search:
             if e.scanned is None and e.id in lacked and all(d.shows(e) for d in both)
         )
         own = (e for e in model.parts if e.scanned is None and free.issuperset(e.named))
-        several = [*map(of_effect, (*own, *effects)), *(of_tyre(model, a) for a in AXLES)]
+        self.tyres = tuple(of_tyre(model, a) for a in AXLES)
+        several = [*map(of_effect, (*own, *effects)), *self.tyres]
         if YAW_INERTIA in free:
             several.append(of_inertia(model))
         clocks = [c for c in CLOCKS if c.channel != "fx_n" or start.driving.force_known]
