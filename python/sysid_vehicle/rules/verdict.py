@@ -265,13 +265,13 @@ def _likely(facts: Facts, rules: Rules) -> frozenset[str]:
 
 
 def _more(one: Added, shares: Sequence[Share]) -> bool:
-    """Whether an effect takes more than others do, of validation and training data together.
+    """Whether an effect takes more than others do, on validation and on training data.
 
-    On one of them it may do so by chance. What it takes at a price it does not take.
+    What it stands in for acts on both: what takes more on one of them is not the larger part.
     """
     own = one.own, one.own_in_training
     pairs = [(a.value, b.value) for a, b in zip(own, shares, strict=True) if a.known and b.known]
-    return sum(max(a, 0.0) - b for a, b in pairs) > 0.0
+    return bool(pairs) and all(a > b for a, b in pairs)
 
 
 def _together(facts: Facts, rules: Rules) -> bool:
