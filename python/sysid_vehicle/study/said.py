@@ -227,7 +227,7 @@ def _on_train(study: Study) -> str:
             f"a test for anything left finds p = {test.p_value:.2g}, but no function of the "
             "driving predicts what is left: it is disturbance."
         )
-    if not test.rejects and (structured(study) or slow(study)):
+    if not test.rejects and structured(study):
         return f"the test of unknown forces sees nothing (p = {test.p_value:.2g})."
     if only_elsewhere(study):
         return f"training data by themselves show nothing that is left (p = {test.p_value:.2g})."
@@ -257,11 +257,8 @@ def elsewhere(study: Study) -> bool:
 
 
 def only_elsewhere(study: Study) -> bool:
-    """Whether what is left shows with validation data alone.
-
-    Slow forces are those of the training data, and so show there.
-    """
-    return elsewhere(study) and not study.omnibus.rejects and not slow(study)
+    """Whether what is left shows with validation data alone."""
+    return elsewhere(study) and not study.omnibus.rejects
 
 
 def slow(study: Study) -> bool:

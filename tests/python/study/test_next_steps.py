@@ -199,11 +199,6 @@ def test_what_no_name_stands_for_is_told_with_shares_and_a_drive(unknown: Study)
     seen, unseen = (Omnibus(t, 9, p, "M_z") for t, p in ((900.0, 1e-60), (9.0, 0.4)))
     elsewhere = next_steps(replace(found, omnibus=unseen, omnibus_together=seen))
     assert any("what is left hardly shows in the training data" in text for text in elsewhere)
-    # Slow forces are of the training data: what they take for disturbances shows there.
-    slow = replace(unknown, omnibus=unseen, omnibus_together=seen, added=(), slow=("force of 9 N",))
-    assert any("brings about the force of 9 N" in text for text in next_steps(slow))
-    assert not any("hardly shows in the training data" in text for text in next_steps(slow))
-    assert "hardly in training data" not in slow.meaning
     nothing = next_steps(replace(found, explained=Beyond((1.0, 0.9), 0.1, -0.1, 0.3)))
     assert not any("serves better" in text for text in nothing)
 
