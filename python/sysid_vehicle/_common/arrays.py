@@ -53,3 +53,21 @@ def median_of_known(values: FloatArray, axis: int) -> FloatArray:
         for at in ((known - 1) // 2, known // 2)
     )
     return as_float64(np.squeeze(0.5 * (low + high), axis))
+
+
+def mean_of_known(values: FloatArray, axis: int) -> FloatArray:
+    """Mean of what is known, and NaN where nothing is.
+
+    As `numpy.nanmean` without its warning: filters of warnings belong to the whole process, and
+    must not be changed in a thread.
+    """
+    known = ~np.isnan(values)
+    number = np.sum(known, axis=axis)
+    total = np.sum(values, axis=axis, where=known)
+    return as_float64(np.where(number > 0, total / np.maximum(number, 1), np.nan))
+
+
+def spread_of_known(values: FloatArray, axis: int) -> FloatArray:
+    """Standard deviation of what is known, and NaN where nothing is; never with a warning."""
+    middle = np.expand_dims(mean_of_known(values, axis), axis)
+    return as_float64(np.sqrt(mean_of_known(as_float64((values - middle) ** 2), axis)))

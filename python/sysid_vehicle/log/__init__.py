@@ -6,7 +6,7 @@ from .columns import Columns, as_floats, as_seconds, listed, named_columns, seco
 from .held import held_rows
 from .laws import Contradiction
 from .log import Log
-from .together import check_excitation, several_logs
+from .together import check_excitation, several_logs, unexcited
 
 __all__ = [
     "CHANNELS",
@@ -25,4 +25,5 @@ __all__ = [
     "seconds_of_stamps",
     "several_logs",
     "times_wheelbase",
+    "unexcited",
 ]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .._common.arrays import FloatArray, as_float64
+from .._common.arrays import FloatArray, as_float64, spread_of_known
 from ..estimate import MEASURED, Driving, equal_blocks, moving
 from ..identify import Fit
 from .horizons import PREDICTED, errors_ahead, explainable, lost_as_large
@@ -79,7 +79,7 @@ def apart(
 def _differ(errors: FloatArray, channels: Sequence[str], driving: Driving) -> npt.NDArray[np.bool_]:
     """Where predictions of one horizon, (2, samples, channels), differ, by their typical errors."""
     known = ~np.any(np.isnan(errors), axis=0)
-    spread = np.array([np.nanstd(driving.channel(c)) for c in channels])
+    spread = spread_of_known(np.column_stack([driving.channel(c) for c in channels]), axis=0)
     with np.errstate(invalid="ignore"):
         # What differs by more than the channel varies at all is lost, wherever it goes.
         by = np.minimum(np.nan_to_num(np.abs(errors[0] - errors[1]), nan=np.inf), spread)

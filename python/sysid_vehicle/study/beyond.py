@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
 from .._common.arguments import generator
-from .._common.arrays import FloatArray, as_float64, in_turn, median_of_known
+from .._common.arrays import FloatArray, as_float64, in_turn, mean_of_known, median_of_known
 from ..estimate import Driving
 from ..identify import Fit
 from ..rules import UNKNOWN, Share, share_of
@@ -107,9 +106,7 @@ def own_share(
         each = (beyond[0] - beyond[1]) / np.max(squares, axis=0)
 
     def mean(rows: FloatArray) -> FloatArray:  # (draws, blocks, errors)
-        with catch_warnings():
-            simplefilter("ignore", RuntimeWarning)  # blocks without a prediction this far ahead
-            return as_float64(np.nanmean(median_of_known(rows, axis=-2), axis=-1))
+        return mean_of_known(median_of_known(rows, axis=-2), axis=-1)
 
     draws = generator(seed).integers(0, len(each), (_DRAWS, len(each)))
     # A draw in which the models differ nowhere tells nothing for the effect.

@@ -6,16 +6,15 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from warnings import catch_warnings, simplefilter
 
 from .._common.text import few
 from .._common.threads import before, in_parallel
 from ..compare import Comparison, compare
 from ..diagnose import Instead, Omnibus, Verdicts, instead, judge, omnibus
-from ..errors import SysidWarning, warn
+from ..errors import warn
 from ..estimate import Driving
 from ..identify import Fit, driving_of
-from ..log import check_excitation
+from ..log import unexcited
 from ..rules import Facts, Rules, incomplete, verdict
 from .added import added_by, of_one_step
 from .beyond import Beyond
@@ -129,7 +128,7 @@ class Judge:
             fitted=self.fitted,
             together=None if rivals is None else rivals.omnibus,
             candidate=min((c.p_value for c in self.trail.diagnoses[-1].ranking), default=1.0),
-            excited=_excited(fit.driving),
+            excited=not unexcited(fit.driving.logs),
             structure=(1.0, 0.0) if pattern is None else (pattern.anywhere, pattern.everywhere),
             small=bool(small),
             unopposed=bool(self.added) and rivals is None,
@@ -257,12 +256,6 @@ def _together(train: Driving, test: Driving) -> Driving:
     """All driving; the training data where one of the two lacks the wheel force."""
     same = train.force_known == test.force_known
     return Driving.joined((train, test)) if same else train
-
-
-def _excited(driving: Driving) -> bool:
-    with catch_warnings():
-        simplefilter("ignore", SysidWarning)  # reading the logs has warned of it
-        return check_excitation(driving.logs)
 
 
 def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:

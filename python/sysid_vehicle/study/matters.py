@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
 from .._common.arguments import real
+from .._common.arrays import mean_of_known
 from ..errors import InvalidInput, near_names
 from ..estimate import UNITS, Driving, NoiseModel
 from ..identify import Fit
@@ -112,7 +112,5 @@ def buried(fit: Fit, test: Driving, noise: NoiseModel) -> bool:
         return False
     usual = sizes_that_matter({})
     most = np.minimum(sensor, [usual[c] for c in PREDICTED])
-    with catch_warnings():
-        simplefilter("ignore", RuntimeWarning)  # horizons that no block reaches
-        beyond = np.nanmean(squares[0], axis=0) - sensor**2
+    beyond = mean_of_known(squares[0], axis=0) - sensor**2
     return bool(np.all((beyond < most**2)[seen]))

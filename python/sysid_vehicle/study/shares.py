@@ -13,13 +13,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
 import numpy.typing as npt
 
 from .._common.arguments import generator
-from .._common.arrays import FloatArray, as_float64, in_turn, median_of_known
+from .._common.arrays import FloatArray, as_float64, in_turn, median_of_known, spread_of_known
 from .._common.text import html_paragraph, html_table, number, text_table
 from .._common.threads import in_parallel
 from ..diagnose.evidence.coordinates import begins
@@ -298,9 +297,7 @@ def _errors(
     problem = driving_of(fit, driving).problem(fit.model)
     p, w = fit.model.vector(), noise.vector()
     lateral = [MEASURED.index(c) for c in CHANNELS[:-1]]
-    with catch_warnings():
-        simplefilter("ignore", RuntimeWarning)  # channels that were not measured
-        spread = np.nanstd(driving.measured[:, lateral], axis=0)
+    spread = spread_of_known(driving.measured[:, lateral], axis=0)
     parts: list[list[_Errors]] = [[] for _ in horizons_s]
     for rate in np.unique(driving.sample_rate_hz):
         ahead = [max(round(h * rate), 1) for h in horizons_s]

@@ -381,3 +381,14 @@ def test_no_file_is_too_long_to_read() -> None:
     }
     assert lines, "no source file was found"
     assert {path: count for path, count in lines.items() if count > MAX_LINES} == {}
+
+
+def test_nothing_that_runs_in_threads_changes_the_filters_of_warnings() -> None:
+    """They belong to the process: a thread that restores them sets others' filters anew."""
+    on_the_main_thread = {"cli/main.py", "fleet/work.py", "twin/calibrate.py", "_common/tables.py"}
+    found = {
+        str(path.relative_to(PACKAGE))
+        for path in PACKAGE.rglob("*.py")
+        if "catch_warnings" in path.read_text(encoding="utf-8")
+    }
+    assert found == on_the_main_thread

@@ -10,6 +10,7 @@ import pytest
 from scipy import signal
 
 from sysid_vehicle import Fit, Model, NumericalError, diagnose, drive, identify, manoeuvres
+from sysid_vehicle._common.arrays import mean_of_known, median_of_known, spread_of_known
 from sysid_vehicle._common.threads import at_most
 from sysid_vehicle.diagnose.unexplained.ceiling import left_out
 from sysid_vehicle.estimate import Driving
@@ -26,7 +27,6 @@ from sysid_vehicle.rules import USUAL
 from sysid_vehicle.sensors.low_pass import _Problem
 from sysid_vehicle.sensors.spectrum import _bias, _of_windows, spectrum_of
 from sysid_vehicle.study import steps
-from sysid_vehicle.study.beyond import median_of_known
 from sysid_vehicle.study.steps import alternatives, exchanged, without_insignificant
 from sysid_vehicle.study.together import _none_at_nothing
 
@@ -56,6 +56,16 @@ def test_medians_that_are_taken_together_are_those_of_each_column(
     squares[:, :, 0] = 1.0
     np.testing.assert_array_equal(median_of_known(squares, -3), np.nanmedian(squares, axis=-3))
     assert np.isnan(median_of_known(np.full((4, 1), np.nan), 0)).all()
+
+
+def test_means_and_spreads_of_what_is_known_warn_of_nothing(rng: np.random.Generator) -> None:
+    rows = rng.normal(size=(6, 50, 3))
+    rows[rng.random(rows.shape) < 0.3] = np.nan
+    np.testing.assert_allclose(mean_of_known(rows, 1), np.nanmean(rows, axis=1), rtol=1e-12)
+    np.testing.assert_allclose(spread_of_known(rows, 1), np.nanstd(rows, axis=1), rtol=1e-12)
+    rows[:, :, 1] = np.nan
+    for known in (mean_of_known(rows, 1), spread_of_known(rows, 1)):
+        assert np.isnan(known).all(axis=0).tolist() == [False, True, False]
 
 
 @pytest.mark.parametrize("width", [200, 201])
