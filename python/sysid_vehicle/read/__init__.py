@@ -9,15 +9,26 @@ from typing import Any
 from .._common.files import as_path
 from ..errors import InvalidInput, warn
 from ..log import Columns, Log
-from .channel_map import ChannelMap, Source
+from .channel_map import ChannelMap
 from .csv import read_table
+from .ground import Ground
 from .objects import contents_of_object
 from .propose import Proposal, propose_channels
 from .recording import Recording
 from .registry import FORMATS, Format, blamed, read_with, recognised
+from .source import Source
 from .table import Table
 
-__all__ = ["FORMATS", "ChannelMap", "Format", "Proposal", "Source", "propose_channels", "read_log"]
+__all__ = [
+    "FORMATS",
+    "ChannelMap",
+    "Format",
+    "Ground",
+    "Proposal",
+    "Source",
+    "propose_channels",
+    "read_log",
+]
 
 
 def read_log(

@@ -14,11 +14,12 @@ from .._common.files import as_path
 from ..errors import InvalidInput
 from ..log import CHANNELS, Columns, Log, listed
 from ..vehicle import Vehicle
-from .channel_map import ChannelMap, Source
+from .channel_map import ChannelMap
 from .names import is_sideslip, rank, si_unit
 from .physics import scales, sideways
 from .recording import Recording
 from .registry import blamed, recognised
+from .source import Source
 from .table import Table
 from .units import factor_to, unit_at_end, unit_in_name
 
