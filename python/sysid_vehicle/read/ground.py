@@ -18,7 +18,7 @@ PARTS = {"east": "m/s", "north": "m/s", "speed": "m/s", "course": "rad", "headin
 """What navigation knows, with SI units; an angle counts from north or from east."""
 
 _VELOCITIES = (("east", "north"), ("speed", "course"))
-_FROM = ("north", "east")
+FROM = ("north", "east")
 
 _WINDOW_S = 0.5  # over which the heading's turn is compared with the yaw rate's
 _TURNS_RAD = 0.03  # root mean square of these turns, below which nothing is compared
@@ -76,7 +76,7 @@ class Ground:
             rest = dict(entry)
             if PARTS[part] == "rad" and "from" in rest:
                 counted[part] = rest.pop("from")
-                if counted[part] not in _FROM:
+                if counted[part] not in FROM:
                     raise InvalidInput(
                         f'{at}: from = {counted[part]!r}; give "north" (clockwise, as a compass) '
                         'or "east" (anticlockwise)'
@@ -97,7 +97,7 @@ class Ground:
             values = source.read(table, part, PARTS[part], notes)
             if PARTS[part] == "rad":
                 clockwise = self.counted_from.get(part, "north") == "north"
-                values = _unwrapped(0.5 * np.pi - values if clockwise else values)
+                values = unwrapped(0.5 * np.pi - values if clockwise else values)
             found[part] = (
                 source.on_time(columns["time_s"], values) if "time_s" in columns else values
             )
@@ -120,13 +120,13 @@ class Ground:
         time_s = columns.get("time_s")
         if time_s is None or not (np.diff(time_s) > 0.0).all():
             return {name: np.full(len(parts["heading"]), np.nan) for name in ("vx_mps", "vy_mps")}
-        speed, course = _polar(time_s, parts)
+        speed, course = polar(time_s, parts)
         angle = course - _between(time_s, parts["heading"])
         # As it would be if the heading counted the other way.
         other = 2.0 * course - 0.5 * np.pi - angle
-        ahead, else_ahead = (_Direction.of(speed, x) for x in (angle, other))
+        ahead, else_ahead = (Direction.of(speed, x) for x in (angle, other))
         if "yaw_rate_radps" in columns:
-            ratio = _turns(time_s, parts["heading"], columns["yaw_rate_radps"], speed)
+            ratio = turns_of(time_s, parts["heading"], columns["yaw_rate_radps"], speed)
             self._refuse_another_turn(ratio, ahead, else_ahead)
             _refuse_the_course(angle, ratio)
         if not ahead.forward and else_ahead.forward:
@@ -151,10 +151,10 @@ class Ground:
 
     def _counted_otherwise(self) -> str:
         now = self.counted_from.get("heading", "north")
-        other = next(name for name in _FROM if name != now)
+        other = next(name for name in FROM if name != now)
         return f'put from = "{other}" for it, as it counts from there'
 
-    def _refuse_another_turn(self, ratio: float, ahead: _Direction, other: _Direction) -> None:
+    def _refuse_another_turn(self, ratio: float, ahead: Direction, other: Direction) -> None:
         """Refuse a heading that does not turn by about what the yaw rate says."""
         if np.isnan(ratio) or _FOLLOWS[0] < ratio < _FOLLOWS[1]:
             return
@@ -176,14 +176,15 @@ class Ground:
 
 
 @dataclass(frozen=True)
-class _Direction:
+class Direction:
     """Where the car moves as seen from its nose: mean angle, and how far that is one direction."""
 
     mean_rad: float
     length: float
 
     @classmethod
-    def of(cls, speed: FloatArray, angle: FloatArray) -> _Direction:
+    def of(cls, speed: FloatArray, angle: FloatArray) -> Direction:
+        """Of the samples at which the car moves."""
         known = np.isfinite(speed) & np.isfinite(angle)
         if not known.any():
             return cls(0.0, 1.0)  # the log is refused for it
@@ -192,10 +193,12 @@ class _Direction:
 
     @property
     def together(self) -> bool:
+        """Whether it is one direction."""
         return self.length > _TOGETHER
 
     @property
     def forward(self) -> bool:
+        """Whether that is about where the car points."""
         return self.together and abs(self.mean_rad) < _AHEAD_RAD
 
     def __str__(self) -> str:
@@ -215,7 +218,7 @@ def _refuse_the_course(angle: FloatArray, ratio: float) -> None:
         )
 
 
-def _unwrapped(angle: FloatArray) -> FloatArray:
+def unwrapped(angle: FloatArray) -> FloatArray:
     """Return an angle [rad] without jumps of a turn, NaN where it is unknown."""
     out = np.full(angle.shape, np.nan)
     known = np.isfinite(angle)
@@ -223,7 +226,7 @@ def _unwrapped(angle: FloatArray) -> FloatArray:
     return out
 
 
-def _polar(time_s: FloatArray, parts: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+def polar(time_s: FloatArray, parts: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Return speed and course, anticlockwise from east, at the samples of the speed."""
     if "course" in parts:
         return parts["speed"], _between(time_s, parts["course"])
@@ -244,7 +247,7 @@ def _between(time_s: FloatArray, angle: FloatArray) -> FloatArray:
     return as_float64(np.where(near, found, np.nan))
 
 
-def _turns(
+def turns_of(
     time_s: FloatArray, heading: FloatArray, yaw_rate: FloatArray, speed: FloatArray
 ) -> float:
     """Return how far the heading turns for each turn by the yaw rate; NaN on a straight road."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import unicodedata
 
-from .units import FACTORS, plain, states_nothing, unit_at_end
+from .ground import PARTS
+from .units import FACTORS, plain, states_nothing, unit_at_end, without_unit
 
 # Of the car, and not of a tyre.
 _SIDESLIP = (
@@ -63,6 +64,17 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"^f ?x( n)?$",
         r"(wheel|drive|traction|long\w*|total) force( total| x)?$|force x$|antriebskraft",
     ),
+    # Of navigation, which gives the speeds of the body as velocity over ground and heading.
+    "east": (r"^v ?e$|(speed|vel\w*) ?e(ast\w*)?$|^east\w* (speed|vel\w*)$", r"^v(el)? east$"),
+    "north": (
+        r"^v ?n$|(speed|vel\w*) ?n(orth\w*)?$|^north\w* (speed|vel\w*)$",
+        r"^v(el)? north$",
+    ),
+    "heading": (
+        r"^true head(ing)?$|^(ins )?heading$|\bheading (true|angle)$",
+        r"^(azimuth|yaw|psi|yaw angle|gierwinkel|kurswinkel)$|\bheading$|\b(ins|imu) yaw$",
+    ),
+    "course": (r"\bcourse\b|\bcog\b|ground ?track|track (angle|over ground|made good)|^track$",),
 }
 _REFUSED: dict[str, str] = {
     "time_s": r"\b(lap|run|delta|remaining|sector)\b",
@@ -74,6 +86,10 @@ _REFUSED: dict[str, str] = {
     "ay_mps2": r"\b(yaw|long\w*|vert\w*|angular|covariance|target)\b",
     "steer_rad": r"\b(torque|rate|speed|vel\w*|moment|target|force|motor|current|rear)\b",
     "fx_n": r"\b(fl|fr|rl|rr|brake|steer\w*)\b",
+    **dict.fromkeys(
+        ("east", "north", "heading", "course"),
+        r"\b(std\w*|accuracy|cov\w*|error|sigma|rate|acc\w*|target|ref\w*|wind|valid|status)\b",
+    ),
 }
 _SI = {
     "time_s": "s",
@@ -84,6 +100,7 @@ _SI = {
     "ay_mps2": "m/s2",
     "steer_rad": "rad",
     "fx_n": "N",
+    **PARTS,
 }
 
 
@@ -105,7 +122,10 @@ def words(name: str) -> str:
 
 
 def rank(name: str, unit: str, channel: str) -> float:
-    """Return how well a name and its unit suit a channel: 0 not at all, 1 and more well."""
+    """Return how well a name and its unit suit a channel: 0 not at all, 1 and more well.
+
+    Channels are the canonical ones and the parts of what navigation knows, as ``heading``.
+    """
     text = words(name)
     if name == channel:
         return 10.0
@@ -113,7 +133,9 @@ def rank(name: str, unit: str, channel: str) -> float:
         return 0.0
     patterns = _PATTERNS[channel]
     # As it is, and without a unit at its end: vx_kmh is one of vx.
-    forms = (text, words(unit_at_end(name, si_unit(channel, name))[0]))
+    own = si_unit(channel, name)
+    bare = without_unit(name, own)
+    forms = (text, words(unit_at_end(name, own)[0]), words(bare))
     score = max(
         (
             1.0 + len(patterns) - k

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,9 @@ from ..errors import InvalidInput
 from ..log import CHANNELS, Columns, Log, listed
 from ..vehicle import Vehicle
 from .channel_map import ChannelMap
+from .ground import PARTS, Ground
 from .names import is_sideslip, rank, si_unit
+from .navigation import NAMED, Navigation, combination, ground_speed, told
 from .physics import scales, sideways
 from .recording import Recording
 from .registry import blamed, recognised
@@ -25,6 +27,7 @@ from .units import factor_to, unit_at_end, unit_in_name
 
 _RATE_HZ = 50.0  # at which units and signs are looked for
 _FEWEST = 100
+_TURNED = ("yaw_rate_radps", "ay_mps2", "steer_rad")  # together, where the axes have z down
 _FINER = ((0.5, 1.0), (500.0, 1e-3), (5e5, 1e-6), (np.inf, 1e-9))  # steps below, factor of time
 
 
@@ -55,15 +58,26 @@ class Proposal:
         By canonical channel.
     missing : tuple of str
         Needed channels for which nothing was found.
+    ground : mapping of Proposed
+        Velocity over ground and heading, by part, where they make the speeds of the body.
+    counted_from : str
+        Where its angles begin.
     """
 
     channels: Mapping[str, Proposed]
     missing: tuple[str, ...]
+    ground: Mapping[str, Proposed] = field(default_factory=dict)
+    counted_from: str = "north"
 
     @property
     def channel_map(self) -> ChannelMap:
         """The map, ready for `read_log`."""
-        return ChannelMap({c: p.source for c, p in self.channels.items()})
+        angles = dict.fromkeys((p for p in self.ground if PARTS[p] == "rad"), self.counted_from)
+        parts = {part: p.source for part, p in self.ground.items()}
+        return ChannelMap(
+            {c: p.source for c, p in self.channels.items()},
+            ground=Ground(parts, angles) if parts else None,
+        )
 
     def to_toml(self) -> str:
         """The map as a file to look through and to edit."""
@@ -78,6 +92,17 @@ class Proposal:
         for name in self.missing:
             lines.append(f"# {CHANNELS[name].meaning} [{CHANNELS[name].unit}]: nothing was found")
             lines.append(f'# {name} = {{ column = "", factor = 1.0 }}')
+        if self.ground:
+            lines += [
+                "",
+                "# Velocity over ground and heading make vx_mps and vy_mps.",
+                "[ground]",
+            ]
+        for part, p in self.ground.items():
+            lines.append(f"# {part} [{PARTS[part]}]: {p.why}")
+            entry = f"column = {_quoted(p.column)}, factor = {p.factor!r}"
+            entry += f', from = "{self.counted_from}"' if PARTS[part] == "rad" else ""
+            lines.append(f"{part} = {{ {entry} }}")
         return "\n".join(lines) + "\n"
 
     def __str__(self) -> str:
@@ -190,23 +215,23 @@ def _proposal(view: _View, chosen: dict[str, list[str]], wheelbase_m: float | No
         free = [name for name in names if name not in first.values()]
         if free:
             first[channel] = free[0]
-    stated: dict[str, float] = {}
-    for channel, name in first.items():
-        unit = si_unit(channel, name)
-        factor = factor_to(unit, view.said(name, unit))
-        if factor is not None:
-            stated[channel] = factor
-        elif name == channel:
-            stated[channel] = 1.0
+    stated = _stated(view, first)
     time = first.get("time_s")
-    driven = {c: n for c, n in first.items() if c not in ("time_s", "vy_mps")}
-    held = view.values([n for c, n in first.items() if c != "time_s"], time)
+    parts = _navigated(view, first)
+    held = view.values([*(n for c, n in first.items() if c != "time_s"), *parts.values()], time)
+    signals = {c: held[n] for c, n in first.items() if n in held}
+    said = _stated(view, parts)
+    if "east" in parts and held:
+        signals["vx_mps"] = ground_speed(held[parts["east"]], held[parts["north"]])
+        stated.pop("vx_mps", None)
+        stated.update({"vx_mps": said["east"]} if "east" in said else {})
+    driven = {c: x for c, x in signals.items() if c != "vy_mps"}
     factors = dict(stated)
     why: dict[str, str] = {}
     if time is not None:
         factors["time_s"], why["time_s"] = _time_factor(view, time, held, stated.get("time_s"))
     clock = factors.get("time_s", 1.0)
-    even = _even({c: held[n] for c, n in driven.items() if n in held}, clock)
+    even = _even(driven, clock)
     if even is not None:
         # The sign and the gear of the steering are no matter of its unit: they are always sought.
         known = {c: f for c, f in stated.items() if c in even[1]}
@@ -216,10 +241,22 @@ def _proposal(view: _View, chosen: dict[str, list[str]], wheelbase_m: float | No
         factors.update(found.factors)
         why.update(found.notes)
         # By itself: a sensor of sideslip often knows less of the drive than the others.
-        every = _even({c: held[n] for c, n in first.items() if n in held}, clock)
+        every = _even(signals, clock)
         if every is not None and "vy_mps" in every[1]:
             angle = is_sideslip(first["vy_mps"])
             factors["vy_mps"], why["vy_mps"] = sideways(*every, factors, stated, angle=angle)
+    nav = None
+    if parts and even is not None and {"vx_mps", "yaw_rate_radps"} <= {*even[1], *factors}:
+        motion = {c: (even[0], factors[c] * even[1][c]) for c in ("vx_mps", "yaw_rate_radps")}
+        own = {part: (clock * held[n][0], held[n][1]) for part, n in parts.items()}
+        nav = told(own, said, motion["yaw_rate_radps"], motion["vx_mps"], factors["vx_mps"])
+    ground = {} if nav is None else _ground(view, nav, parts, first, factors)
+    if nav is not None and nav.to_the_right:
+        for channel in [c for c in _TURNED if c in first]:
+            factors[channel] = -factors.get(channel, 1.0)
+            why[channel] = "; ".join(
+                filter(None, [why.get(channel), "positive to the right, as the heading tells"])
+            )
     channels = {
         channel: Proposed(
             name,
@@ -236,7 +273,54 @@ def _proposal(view: _View, chosen: dict[str, list[str]], wheelbase_m: float | No
     needed = [c for c in CHANNELS if CHANNELS[c].required and c not in channels]
     if view.has_times:
         needed = [c for c in needed if c != "time_s"]
-    return Proposal(channels, tuple(needed))
+    if nav is None:
+        return Proposal(channels, tuple(needed))
+    return Proposal(channels, tuple(c for c in needed if c != "vx_mps"), ground, nav.counted_from)
+
+
+def _stated(view: _View, columns: Mapping[str, str]) -> dict[str, float]:
+    """Factors of what has a unit that is stated, or the name of the channel itself."""
+    found: dict[str, float] = {}
+    for channel, name in columns.items():
+        unit = si_unit(channel, name)
+        factor = factor_to(unit, view.said(name, unit))
+        if factor is not None:
+            found[channel] = factor
+        elif name == channel and channel in CHANNELS:
+            found[channel] = 1.0
+    return found
+
+
+def _navigated(view: _View, first: Mapping[str, str]) -> dict[str, str]:
+    """Columns of what navigation knows, where no lateral speed is logged and they make one."""
+    if "vy_mps" in first:
+        return {}
+    kept = set(first.values())
+    found = combination({p: [n for n in _ranked(view, p) if n not in kept] for p in NAMED})
+    return found if "east" in found or "vx_mps" in first else {}
+
+
+def _ground(
+    view: _View,
+    nav: Navigation,
+    parts: Mapping[str, str],
+    first: dict[str, str],
+    factors: Mapping[str, float],
+) -> dict[str, Proposed]:
+    """Proposals of what navigation knows; the speed is no channel of its own beside them."""
+    columns = dict(parts)
+    speed = first.pop("vx_mps", "")
+    if "east" not in columns:
+        columns["speed"] = speed
+    found = {}
+    for part, name in columns.items():
+        unit = view.unit(name, PARTS[part])
+        factor = nav.factors[part] if part in nav.factors else factors["vx_mps"]
+        text = f"by its name, the file states '{unit}'" if unit else "by its name"
+        if PARTS[part] == "rad":
+            text += f", counted from {nav.counted_from}, as the car moves the way it points"
+        found[part] = Proposed(name, factor, unit, text, ())
+    return found
 
 
 def _by_name(channel: str, name: str, unit: str) -> str:

@@ -140,6 +140,11 @@ def unit_in_name(name: str, si_unit: str) -> str:
     return found[1] if found and factor_to(si_unit, found[1]) is not None else ""
 
 
+def without_unit(name: str, si_unit: str) -> str:
+    """Return a name without the unit of that kind in brackets at its end."""
+    return _AT_END.sub("", name) if unit_in_name(name, si_unit) else name
+
+
 def unit_at_end(name: str, si_unit: str) -> tuple[str, str]:
     """Return a name without the unit of that kind that is its last word, and that unit.
 

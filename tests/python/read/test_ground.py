@@ -30,7 +30,7 @@ def driven(right: sv.Log) -> dict[str, np.ndarray]:
         "VelNorth": v_x * np.sin(psi) + v_y * np.cos(psi),
         "Heading": (np.degrees(0.5 * np.pi - psi)) % 360.0,
         "Yaw": np.mod(psi + np.pi, 2.0 * np.pi) - np.pi,
-        "Speed2D": np.hypot(v_x, v_y),
+        "Speed 2D": np.hypot(v_x, v_y),
         "Track": np.degrees(0.5 * np.pi - psi - np.arctan2(v_y, v_x)) % 360.0,
     }
 
@@ -47,7 +47,7 @@ UNITS = {
     "VelNorth": "km/h",
     "Heading": "deg",
     "Yaw": "rad",
-    "Speed2D": "m/s",
+    "Speed 2D": "m/s",
     "Track": "deg",
 }
 VELOCITIES = {"east": "VelEast", "north": "VelNorth"}
@@ -55,7 +55,7 @@ MAPS: dict[str, dict[str, Any]] = {
     "compass": {**VELOCITIES, "heading": COMPASS},
     "from east": {**VELOCITIES, "heading": {"column": "Yaw", "from": "east"}},
     "course": {
-        "speed": "Speed2D",
+        "speed": "Speed 2D",
         "course": {"column": "Track", "factor": DEG},
         "heading": COMPASS,
     },
@@ -191,6 +191,65 @@ def test_a_map_that_says_too_little_is_refused(ground: dict[str, Any], message: 
 
 
 def test_one_speed_comes_from_one_place() -> None:
-    channels = {"vx_mps": "Speed2D"}
+    channels = {"vx_mps": "Speed 2D"}
     with pytest.raises(InvalidInput, match=r"vx_mps is mapped, and \[ground\] gives it too"):
         sv.ChannelMap.from_dict({"channels": channels, "ground": MAPS["compass"]})
+
+
+PROPOSED = {
+    "compass": (("VelEast", "VelNorth", "Heading"), "north", DEG),
+    "yaw from east": (("VelEast", "VelNorth", "Yaw"), "east", 1.0),
+    "course": (("Speed 2D", "Track", "Heading"), "north", DEG),
+}
+
+
+@pytest.mark.parametrize(("columns", "start", "factor"), PROPOSED.values(), ids=PROPOSED)
+@pytest.mark.parametrize("to_the_right", [False, True])
+def test_it_is_proposed_with_units_and_beginning(
+    right: sv.Log,
+    driven: dict[str, np.ndarray],
+    columns: tuple[str, ...],
+    start: str,
+    factor: float,
+    to_the_right: bool,
+) -> None:
+    channels = ("time_s", "yaw_rate_radps", "ax_mps2", "ay_mps2", "steer_rad", "fx_n")
+    data = {c: driven[c] for c in (*channels, *columns)}
+    names = {"yaw_rate_radps": "gyro_z", "ay_mps2": "acc_y", "steer_rad": "steer"}
+    sign = -1.0 if to_the_right else 1.0
+    data = {names.get(c, c): (sign if c in names else 1.0) * x for c, x in data.items()}
+    if "VelEast" in columns:
+        data |= {c: 3.6 * data[c] for c in ("VelEast", "VelNorth")}
+    proposal = sv.propose_channels(data)
+    heading = proposal.ground["heading"]
+    assert proposal.counted_from == start
+    assert heading.factor == pytest.approx(factor)
+    assert proposal.missing == ()
+    assert "vx_mps" not in proposal.channels
+    log = sv.read_log(data, proposal.channel_map)
+    np.testing.assert_allclose(log["vy_mps"], right["vy_mps"], atol=1e-9)
+    np.testing.assert_allclose(log["yaw_rate_radps"], right["yaw_rate_radps"], atol=1e-9)
+
+
+def test_the_proposed_file_reads_the_log(
+    tmp_path: Path, right: sv.Log, driven: dict[str, np.ndarray]
+) -> None:
+    channels = ("time_s", "yaw_rate_radps", "ax_mps2", "ay_mps2", "steer_rad")
+    data = {c: driven[c] for c in (*channels, "VelEast", "VelNorth", "Heading")}
+    path = tmp_path / "map.toml"
+    path.write_text(sv.propose_channels(data).to_toml())
+    log = sv.read_log(data, path)
+    np.testing.assert_allclose(log["vy_mps"], right["vy_mps"], atol=1e-9)
+
+
+def test_a_lateral_speed_is_taken_before_it(right: sv.Log, driven: dict[str, np.ndarray]) -> None:
+    data = driven | {"vx_mps": right["vx_mps"], "vy_mps": right["vy_mps"]}
+    assert sv.propose_channels(data).ground == {}
+
+
+def test_a_course_alone_makes_none(driven: dict[str, np.ndarray]) -> None:
+    """Of one aerial the heading is the course: no lateral speed comes of it."""
+    channels = ("time_s", "yaw_rate_radps", "ax_mps2", "ay_mps2", "steer_rad")
+    proposal = sv.propose_channels({c: driven[c] for c in (*channels, "Speed 2D", "Track")})
+    assert proposal.ground == {}
+    assert proposal.channels["vx_mps"].column == "Speed 2D"
