@@ -168,15 +168,16 @@ def refuse_unknown(
 ) -> None:
     """Raise :class:`InvalidInput` naming the first of `keys` that is not in `known`.
 
-    Near names are sought among `likely` first, then among all of `known`.
+    Near names are sought among `likely`, which are missing, first, then among all of `known`.
     """
-    known = tuple(known)
+    known, likely = tuple(known), tuple(likely)
+    lacks = f"; the file lacks {', '.join(likely)}" if likely else ""
     for key in keys:
         if key not in known:
             hint = near_names(key, likely) or near_names(key, known)
             if not hint:
                 hint = f" (known are {', '.join(known)})"
-            raise InvalidInput(f"{where}: unknown key '{key}'{hint}; correct or remove it")
+            raise InvalidInput(f"{where}: unknown key '{key}'{hint}; correct or remove it{lacks}")
 
 
 def _plain(x: Any) -> Any:
