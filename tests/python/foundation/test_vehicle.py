@@ -107,7 +107,11 @@ def test_all_missing_keys_are_named_at_once(car_file: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("mass_kg = 1500", "mass = 1500", ["unknown key 'mass'", "did you mean 'mass_kg'", "the file lacks mass_kg"]),
+        (
+            "mass_kg = 1500",
+            "mass = 1500",
+            ["unknown key 'mass'", "did you mean 'mass_kg'", "the file lacks mass_kg"],
+        ),
         ("[tyre.front]", "[tyre.fornt]", ["[tyre]", "'fornt'", "did you mean 'front'"]),
         ("E = 0.0", "E = 0.0\nF = 1.0", ["[tyre.front]", "'F'", "remove it"]),
         ("mass_kg = 1500", "mass_kg = 0.5", ["mass_kg = 0.5", "kilograms"]),
