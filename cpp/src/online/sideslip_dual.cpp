@@ -9,18 +9,19 @@ namespace {
 
 constexpr double kSteerUnknown = 0.15;  // random walk of its angle [rad/sqrt(s)]
 constexpr double kAtOrigin = 1.5;  // error of the curve's slope there over that at larger slips
-/// What a tyre filter expects, each over the settings: errors of the tyre model, bank of the road,
-/// change of the friction, and errors of what is told of the car. `doubt` is the logarithm by which
-/// it is less likely before any reading.
+/// What a tyre filter expects, each over the settings: errors of the tyre model, bank of the road
+/// and how long it lasts, change of the friction, and errors of what is told of the car. `doubt` is
+/// the logarithm by which it is less likely before any reading.
 struct Departures {
-    double model, road, grip, car, doubt;
+    double model, road, road_lasts, grip, car, doubt;
 };
 constexpr std::array<Departures, 5> kDepartures = {{
-    {0.12, 0.12, 1.0, 0.05, 0.0},
-    {0.45, 0.45, 1.0, 0.05, 0.0},
-    {2.0, 2.0, 1.0, 0.05, 0.0},
-    {0.45, 30.0, 5.0, 0.05, 4.0},  // banks, and biases of sensors, which act alike
-    {0.45, 0.45, 5.0, 1.0, 0.0},   // other tyres, inertia or sensors than was told
+    {0.12, 0.12, 1.0, 1.0, 0.02, 0.0},
+    {0.45, 0.45, 1.0, 1.0, 0.02, 0.0},
+    {2.0, 2.0, 1.0, 1.0, 0.02, 0.0},
+    // Banks, and biases of sensors, which act alike. Quicker ones would be the body that rolls.
+    {0.45, 30.0, 30.0, 5.0, 0.05, 4.0},
+    {0.45, 0.45, 1.0, 5.0, 1.0, 0.0},  // other tyres, inertia or sensors than was told
 }};
 constexpr double kWeightTimeS = 5.0;  // of readings that decide between them
 // Errors of the model make innovations that follow each other: one tells less than its likelihood.
@@ -35,6 +36,7 @@ ObserverSettings expecting(ObserverSettings s, const Departures& d) {
                           &s.yaw_walk_radps, &s.sideslip_walk_rad})
         *error *= d.model;
     s.road_mps2 *= d.road;
+    s.road_time_s *= d.road_lasts;
     s.friction_prior *= d.grip;
     for (double* told : {&s.inertia_prior, &s.ahead_m, &s.steer_late_s}) *told *= d.car;
     return s;
