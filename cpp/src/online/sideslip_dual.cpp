@@ -19,8 +19,8 @@ constexpr std::array<Departures, 5> kDepartures = {{
     {0.12, 0.12, 1.0, 1.0, 0.02, 0.0},
     {0.45, 0.45, 1.0, 1.0, 0.02, 0.0},
     {2.0, 2.0, 1.0, 1.0, 0.02, 0.0},
-    // Banks, and biases of sensors, which act alike. Quicker ones would be the body that rolls.
-    {0.45, 30.0, 30.0, 5.0, 0.05, 4.0},
+    // Banks, and biases of sensors, which act alike: slow, as quick ones are the body that rolls.
+    {0.2, 40.0, 10.0, 5.0, 0.05, 5.0},
     {0.45, 0.45, 1.0, 5.0, 1.0, 0.0},  // other tyres, inertia or sensors than was told
 }};
 constexpr double kWeightTimeS = 5.0;  // of readings that decide between them
