@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from .. import _core
 from .._common.arrays import FloatArray, as_float64
 from .._common.threads import check_time
 from ..errors import NumericalError
@@ -67,6 +68,16 @@ class Together(Protocol):
 
     def log_likelihoods(self, sets: FloatArray, noise: FloatArray, /) -> FloatArray:
         """Log-likelihoods of sets of parameters, a row each; minus infinity where one fails."""
+
+
+@runtime_checkable
+class Filtered(Protocol):
+    """A problem that scores the noise along a filter that has run."""
+
+    def filtered_noise_score(
+        self, p: FloatArray, gains: Any, /
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """What `noise_score` gives under the noise with which the gains were made."""
 
 
 @dataclass(frozen=True)
@@ -277,7 +288,7 @@ class Objective(Penalised):
     ) -> Learned:
         """Noise of maximum likelihood at fixed parameters, and the log-likelihood of the data."""
         return maximise_noise(
-            self.problem,
+            self,
             p,
             noise,
             self.lowest,
@@ -289,4 +300,14 @@ class Objective(Penalised):
 
     def noise_promises(self, p: FloatArray, noise: FloatArray) -> float:
         """What a step of the noise promises to gain at fixed parameters [nats]."""
-        return promised_by_noise(self.problem, p, noise, self.lowest, self.highest)
+        return promised_by_noise(self, p, noise, self.lowest, self.highest)
+
+    def noise_score(self, p: FloatArray, noise: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Log-likelihood of the data, its derivatives by the noise's logarithms, their information.
+
+        Where the filter has run it does not run again, and where it has not its gains are kept.
+        """
+        check_time()
+        if isinstance(self.problem, Filtered) and self.samples <= _core.TOLD_SAMPLES:
+            return self.problem.filtered_noise_score(p, self.freeze(p, noise))
+        return self.problem.noise_score(p, noise)
