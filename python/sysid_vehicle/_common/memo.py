@@ -36,12 +36,10 @@ class Memory(Generic[R]):
                 return self._answers[asked]
         answer = self._function(*asked)
         with self._lock:
-            return self._put(asked, answer)
-
-    def tell(self, answer: R, *asked: Hashable) -> None:
-        """Remember an answer that somebody else has worked out."""
-        with self._lock:
-            self._put(asked, answer)
+            answer = self._answers.setdefault(asked, answer)
+            while len(self._answers) > self._most:
+                self._answers.popitem(last=False)
+        return answer
 
     def known(self) -> dict[tuple[Hashable, ...], R]:
         """What is remembered, by what was asked."""
@@ -56,12 +54,6 @@ class Memory(Generic[R]):
         """Let go of all answers."""
         with self._lock:
             self._answers.clear()
-
-    def _put(self, asked: tuple[Hashable, ...], answer: R) -> R:
-        kept = self._answers.setdefault(asked, answer)
-        while len(self._answers) > self._most:
-            self._answers.popitem(last=False)
-        return kept
 
 
 _memories: list[Memory[object]] = []

@@ -247,7 +247,8 @@ class Objective(Penalised):
                 return last.found
         found = super().normal_equations(p, gains, columns)
         if self.samples <= _LONG:
-            self._linear[:] = [_Linear(p.copy(), gains, list(columns), found)]
+            last = _Linear(p.copy(), gains, list(columns), found)
+            self._linear[:] = [last, *self._linear[: _KEPT - 1]]
         return found
 
     def log_likelihood(self, p: FloatArray, noise: FloatArray) -> float:
