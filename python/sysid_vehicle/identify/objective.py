@@ -12,7 +12,6 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from .. import _core
 from .._common.arrays import FloatArray, as_float64
 from .._common.threads import check_time
 from ..errors import NumericalError
@@ -223,9 +222,9 @@ class Objective(Penalised):
         they were.
         """
         check_time()
-        for at, under, gains in tuple(self._last):
-            if np.array_equal(at, p) and np.array_equal(under, noise):
-                return gains
+        gains = self._known(p, noise)
+        if gains is not None:
+            return gains
         gains = self.problem.freeze(p, noise)
         value = self.reached(p, gains)
         if not self._seen or value > self._seen[0].log_likelihood:
@@ -306,9 +305,17 @@ class Objective(Penalised):
     def noise_score(self, p: FloatArray, noise: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Log-likelihood of the data, its derivatives by the noise's logarithms, their information.
 
-        Where the filter has run it does not run again, and where it has not its gains are kept.
+        Where the filter ran a moment ago it does not run again.
         """
         check_time()
-        if isinstance(self.problem, Filtered) and self.samples <= _core.TOLD_SAMPLES:
-            return self.problem.filtered_noise_score(p, self.freeze(p, noise))
+        gains = self._known(p, noise)
+        if gains is not None and isinstance(self.problem, Filtered):
+            return self.problem.filtered_noise_score(p, gains)
         return self.problem.noise_score(p, noise)
+
+    def _known(self, p: FloatArray, noise: FloatArray) -> Any:
+        """Gains that were asked for last, or None."""
+        for at, under, gains in tuple(self._last):
+            if np.array_equal(at, p) and np.array_equal(under, noise):
+                return gains
+        return None
