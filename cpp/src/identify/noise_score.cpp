@@ -145,9 +145,8 @@ Sum<L> along(const Problem& problem, const double* p, const FrozenFilter& filter
     Sum<L> sum;
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         const Run& run = problem.runs[i];
-        auto score =
-            score_of<L>(filter.noise, run, static_cast<int>(n), static_cast<int>(moving),
-                        [&](std::size_t d) { return static_cast<int>(moving + d); });
+        auto score = score_of<L>(filter.noise, run, static_cast<int>(n), static_cast<int>(moving),
+                                 [&](std::size_t d) { return static_cast<int>(moving + d); });
         for (std::size_t first = 0; first < run.size(); first += kTogether) {
             poll_interrupt();
             const std::size_t count = std::min(kTogether, run.size() - first);

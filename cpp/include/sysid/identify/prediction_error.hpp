@@ -48,9 +48,9 @@ struct FrozenFilter {
     double* whitener(std::size_t run, std::size_t k) {
         return gain(run, k) + rows.size() * kChannels;
     }
-    /// Numbers that tell how a sample was filtered: innovations, zero where a measurement is missing,
-    /// means of the states after them, the lower triangle of their covariance. Of a problem with
-    /// more than `kToldSamples` they are not kept.
+    /// Numbers that tell how a sample was filtered: innovations, zero where a measurement is
+    /// missing, means of the states after them, the lower triangle of their covariance. Of a
+    /// problem with more than `kToldSamples` they are not kept.
     std::size_t told_size() const {
         return kChannels + rows.size() + rows.size() * (rows.size() + 1) / 2;
     }
