@@ -33,7 +33,8 @@ def microseconds(work: Callable[[], object], samples: int, times: int = 7) -> fl
 
 def likelihood(model: sv.Model, driving: Driving) -> None:
     """Prints a row for each kernel of the grey-box model."""
-    problem = driving.problem(model)
+    # As a problem of so many samples at most it shares no filters with others.
+    problem = driving.problem(model, most_samples=driving.samples)
     p = model.vector()
     noise = first_guess(driving, model.vehicle).vector()
     filtered = problem.freeze(p, noise)
@@ -58,6 +59,7 @@ def likelihood(model: sv.Model, driving: Driving) -> None:
         ),
         ("freeze", lambda: problem.freeze(p, noise)),
         ("noise score", lambda: problem.noise_score(p, noise)),
+        ("the same, the filter known", lambda: problem.filtered_noise_score(p, filtered)),
         ("1, 2 and 5 s ahead", lambda: problem.look_ahead(p, noise, ahead)),
         ("trace, smoothed", lambda: problem.trace(p, noise, True)),
     ):

@@ -70,6 +70,7 @@ const double* values_of(const Array& p) { return vector(p, kParameterCount, "par
 void register_identify(py::module_& m) {
     m.attr("NOISE_PARAMETERS") = kNoiseParameters;
     m.attr("PARAMETERS") = kParameterCount;
+    m.attr("TOLD_SAMPLES") = kToldSamples;
     m.attr("LANES") = kLanes;
     m.attr("SHIFT_REACH") = kShiftReach;
     m.attr("CHANNELS") = static_cast<int>(kChannels);
@@ -107,6 +108,16 @@ void register_identify(py::module_& m) {
                 });
             },
             py::arg("parameters"), py::arg("noise"))
+        .def(
+            "filtered_noise_score",
+            [](const LogwiseProblem& self, const Array& p, const LogwiseFilter& filter) {
+                check_runs(self, filter);
+                const double* values = values_of(p);
+                return with_derivatives(kNoiseParameters, [&](double* g, double* h) {
+                    return noise_score(self, values, filter, g, h);
+                });
+            },
+            py::arg("parameters"), py::arg("filter"))
         .def(
             "log_likelihoods",
             [](const LogwiseProblem& self, const Array& sets, const Array& noise) {

@@ -46,6 +46,7 @@ LANES: int
 CHANNELS: int
 GRAVITY_MPS2: float
 NOISE_PARAMETERS: int
+TOLD_SAMPLES: int
 PARAMETERS: int
 SHIFT_REACH: int
 USER_EFFECTS: int
@@ -165,6 +166,9 @@ class Problem(metaclass=_Bound):
         self, parameters: _Array, filter: FrozenFilter, signals: _Array, targets: Sequence[int]
     ) -> _Array: ...
     def noise_score(self, parameters: _Array, noise: _Array) -> tuple[float, _Array, _Array]: ...
+    def filtered_noise_score(
+        self, parameters: _Array, filter: FrozenFilter
+    ) -> tuple[float, _Array, _Array]: ...
     def trace(self, parameters: _Array, noise: _Array, smoothed: bool) -> _Trace: ...
     def smoothed_means(self, parameters: _Array, noise: _Array) -> _Array: ...
     def look_ahead(

@@ -36,6 +36,14 @@ void freeze_run(const Problem& problem, std::size_t number, const double* p, Fro
             const auto whitener = whitener_of<kChannels>(s.update, run.measurements[k]);
             for (int i = 0; i < kChannels; ++i)
                 for (int j = 0; j <= i; ++j) *to++ = whitener(i, j);
+            if (filter.tells()) {
+                to = filter.told(number, k);
+                for (int c = 0; c < kChannels; ++c)
+                    *to++ = std::isnan(run.measurements[k][c]) ? 0.0 : s.update.innovation[c];
+                for (const int row : from) *to++ = s.mean[row];
+                for (std::size_t i = 0; i < n; ++i)
+                    for (std::size_t j = 0; j <= i; ++j) *to++ = s.covariance(from[i], from[j]);
+            }
             if (k + 1 < run.size()) {
                 substeps[k + 1] = substeps_for(problem.model, p, s.mean[0], run.dt);
                 return;
@@ -53,10 +61,12 @@ FrozenFilter empty(const Problem& problem, const Noise& noise) {
     filter.rows = filter_rows(problem.model.effects, noise.disturbances());
     filter.deviations.assign(filter.rows.size(), 0.0);
     filter.runs.resize(problem.runs.size());
+    const bool tells = problem.samples() <= kToldSamples;
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         for (const Vec<kChannels>& y : problem.runs[i].measurements)
             for (const double v : y) filter.observed += std::isnan(v) ? 0 : 1;
         filter.runs[i].numbers.resize(problem.runs[i].size() * filter.size());
+        if (tells) filter.runs[i].told.resize(problem.runs[i].size() * filter.told_size());
         filter.runs[i].substeps.assign(problem.runs[i].size(), 1);
     }
     return filter;
@@ -97,6 +107,11 @@ FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise) 
             const std::size_t run = pieces[sample.piece].run;
             LaneFilter::write(walk.gain(), lane, filter.gain(run, sample.at));
             LaneFilter::write(walk.whitener(), lane, filter.whitener(run, sample.at));
+            if (filter.tells()) {
+                double* to = filter.told(run, sample.at);
+                to = LaneFilter::write(walk.innovation(), lane, to);
+                LaneFilter::write(walk.state(), lane, to);
+            }
             if (sample.at > 0) filter.runs[run].substeps[sample.at] = parts;
             if (sample.at + 1 < sample.run->size()) return;
             for (std::size_t i = 0; i < filter.rows.size(); ++i)

@@ -166,6 +166,13 @@ double noise_score(const LogwiseProblem& logged, const double* p, const Noise& n
                      double* h) { return noise_score(part, own, noise, g, h); });
 }
 
+double noise_score(const LogwiseProblem& logged, const double* p, const LogwiseFilter& filter,
+                   double* gradient, double* information) {
+    return added(logged, p, kNoiseParameters, gradient, information,
+                 [&](const Problem& part, const double* own, std::size_t number, double* g,
+                     double* h) { return noise_score(part, own, filter.parts[number], g, h); });
+}
+
 Trace trace(const LogwiseProblem& logged, const double* p, const Noise& noise, bool smoothed) {
     Trace all;
     each(logged, p, [&](const Problem& part, const double* own, std::size_t number, std::size_t) {

@@ -6,8 +6,10 @@
 
 #include "sysid/identify/in_time.hpp"
 #include "sysid/identify/lane_filter.hpp"
+#include "sysid/identify/local_model.hpp"
 #include "sysid/identify/prediction_error.hpp"
 #include "sysid/identify/run_system.hpp"
+#include "sysid/math/interrupt.hpp"
 
 namespace sysid {
 
@@ -131,11 +133,62 @@ bool in_pieces(const Problem& problem, const double* p, const Noise& noise, Sum<
     return true;
 }
 
+/// The same along a path that a filter has told. How single samples answer to states is worked out
+/// for many of them side by side, as for `normal_equations`.
 template <int L>
-double score_all(const Problem& problem, const double* p, const Noise& noise, double* gradient,
-                 double* information) {
+Sum<L> along(const Problem& problem, const double* p, const FrozenFilter& filter) {
+    constexpr std::size_t kTogether = std::size_t{8} * kLanes;
+    LocalModel local(problem.model, p, {}, 0, filter.noise.disturbances());
+    const std::size_t n = filter.rows.size(), moving = local.states();
+    std::vector<PathSample> samples(kTogether);
+    std::vector<double> predicted(kTogether * n), derivatives(kTogether * local.size());
     Sum<L> sum;
-    if (!in_pieces(problem, p, noise, sum)) sum = one_after_the_other<L>(problem, p, noise);
+    for (std::size_t i = 0; i < problem.runs.size(); ++i) {
+        const Run& run = problem.runs[i];
+        auto score = score_of<L>(filter.noise, run, static_cast<int>(n), static_cast<int>(moving),
+                                 [&](std::size_t d) { return static_cast<int>(moving + d); });
+        for (std::size_t first = 0; first < run.size(); first += kTogether) {
+            poll_interrupt();
+            const std::size_t count = std::min(kTogether, run.size() - first);
+            for (std::size_t j = 0; j < count; ++j) {
+                const std::size_t k = first + j;
+                const double *gain = filter.gain(i, k), *told = filter.told(i, k);
+                double* here = predicted.data() + j * n;
+                for (std::size_t a = 0; a < n; ++a) {
+                    here[a] = told[kChannels + a];
+                    for (std::size_t c = 0; c < kChannels; ++c)
+                        here[a] -= gain[a * kChannels + c] * told[c];
+                }
+                PathSample& s = samples[j];
+                s = {&run, k, 0, nullptr, nullptr, here, here + moving};
+                if (k == 0) continue;
+                s.substeps = filter.runs[i].substeps[k];
+                s.before = filter.told(i, k - 1) + kChannels;
+                s.pushed = s.before + moving;
+            }
+            local.differentiate(samples.data(), count, derivatives.data());
+            for (std::size_t j = 0; j < count; ++j) {
+                const std::size_t k = first + j;
+                const double* by = derivatives.data() + j * local.size();
+                ScoreSample s;
+                s.transition = k > 0 ? by : nullptr;
+                s.observation = by + local.read();
+                s.gain = filter.gain(i, k);
+                s.whitener = filter.whitener(i, k);
+                s.innovation = filter.told(i, k);
+                s.mean = s.innovation + kChannels;
+                s.covariance = s.mean + n;
+                score.add(s, run.measurements[k]);
+            }
+        }
+        sum.add(score);
+    }
+    sum.log_likelihood = filter.log_likelihood;
+    return sum;
+}
+
+template <int L>
+double handed_on(Sum<L> sum, double* gradient, double* information) {
     symmetrise(sum.information);
     using All = Mat<kNoiseParameters, kNoiseParameters>;
     Eigen::Map<Vec<kNoiseParameters>> to{gradient};
@@ -147,18 +200,38 @@ double score_all(const Problem& problem, const double* p, const Noise& noise, do
     return sum.log_likelihood;
 }
 
+/// Calls `score` with the number of noise parameters that there are.
+template <class Score>
+double with_parameters(const Noise& noise, Score&& score) {
+    if (noise.white()) return score(std::integral_constant<int, kChannels + kMotionStates>{});
+    if (noise.sloping()) return score(std::integral_constant<int, kNoiseParameters>{});
+    return score(std::integral_constant<int, kPlainNoiseParameters>{});
+}
+
 }  // namespace
 
 double noise_score(const Problem& logged, const double* p, const Noise& noise, double* gradient,
                    double* information) {
     const InTime in_time(logged, p);
     const Problem& problem = *in_time;
-    const auto score = [&](auto parameters) {
-        return score_all<decltype(parameters)::value>(problem, p, noise, gradient, information);
-    };
-    if (noise.white()) return score(std::integral_constant<int, kChannels + kMotionStates>{});
-    if (noise.sloping()) return score(std::integral_constant<int, kNoiseParameters>{});
-    return score(std::integral_constant<int, kPlainNoiseParameters>{});
+    return with_parameters(noise, [&](auto parameters) {
+        constexpr int L = decltype(parameters)::value;
+        Sum<L> sum;
+        if (!in_pieces(problem, p, noise, sum)) sum = one_after_the_other<L>(problem, p, noise);
+        return handed_on(sum, gradient, information);
+    });
+}
+
+double noise_score(const Problem& logged, const double* p, const FrozenFilter& filter,
+                   double* gradient, double* information) {
+    const std::vector<int> rows = filter_rows(logged.model.effects, filter.noise.disturbances());
+    if (!filter.tells() || rows != filter.rows)
+        return noise_score(logged, p, filter.noise, gradient, information);
+    const InTime in_time(logged, p);
+    return with_parameters(filter.noise, [&](auto parameters) {
+        constexpr int L = decltype(parameters)::value;
+        return handed_on(along<L>(*in_time, p, filter), gradient, information);
+    });
 }
 
 }  // namespace sysid

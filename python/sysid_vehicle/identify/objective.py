@@ -69,6 +69,16 @@ class Together(Protocol):
         """Log-likelihoods of sets of parameters, a row each; minus infinity where one fails."""
 
 
+@runtime_checkable
+class Filtered(Protocol):
+    """A problem that scores the noise along a filter that has run."""
+
+    def filtered_noise_score(
+        self, p: FloatArray, gains: Any, /
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """What `noise_score` gives under the noise with which the gains were made."""
+
+
 @dataclass(frozen=True)
 class LinearRows:
     """Further residuals that are linear in the parameters: `target - rows @ p`."""
@@ -212,9 +222,9 @@ class Objective(Penalised):
         they were.
         """
         check_time()
-        for at, under, gains in tuple(self._last):
-            if np.array_equal(at, p) and np.array_equal(under, noise):
-                return gains
+        gains = self._known(p, noise)
+        if gains is not None:
+            return gains
         gains = self.problem.freeze(p, noise)
         value = self.reached(p, gains)
         if not self._seen or value > self._seen[0].log_likelihood:
@@ -236,7 +246,8 @@ class Objective(Penalised):
                 return last.found
         found = super().normal_equations(p, gains, columns)
         if self.samples <= _LONG:
-            self._linear[:] = [_Linear(p.copy(), gains, list(columns), found)]
+            last = _Linear(p.copy(), gains, list(columns), found)
+            self._linear[:] = [last, *self._linear[: _KEPT - 1]]
         return found
 
     def log_likelihood(self, p: FloatArray, noise: FloatArray) -> float:
@@ -277,7 +288,7 @@ class Objective(Penalised):
     ) -> Learned:
         """Noise of maximum likelihood at fixed parameters, and the log-likelihood of the data."""
         return maximise_noise(
-            self.problem,
+            self,
             p,
             noise,
             self.lowest,
@@ -289,4 +300,22 @@ class Objective(Penalised):
 
     def noise_promises(self, p: FloatArray, noise: FloatArray) -> float:
         """What a step of the noise promises to gain at fixed parameters [nats]."""
-        return promised_by_noise(self.problem, p, noise, self.lowest, self.highest)
+        return promised_by_noise(self, p, noise, self.lowest, self.highest)
+
+    def noise_score(self, p: FloatArray, noise: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Log-likelihood of the data, its derivatives by the noise's logarithms, their information.
+
+        Where the filter ran a moment ago it does not run again.
+        """
+        check_time()
+        gains = self._known(p, noise)
+        if gains is not None and isinstance(self.problem, Filtered):
+            return self.problem.filtered_noise_score(p, gains)
+        return self.problem.noise_score(p, noise)
+
+    def _known(self, p: FloatArray, noise: FloatArray) -> Any:
+        """Gains that were asked for last, or None."""
+        for at, under, gains in tuple(self._last):
+            if np.array_equal(at, p) and np.array_equal(under, noise):
+                return gains
+        return None

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import scipy
@@ -26,6 +26,8 @@ from .fit import Fit
 from .objective import Objective
 from .settle import moved
 
+OFFSETS = "offsets"
+"""With a fit the question that `Driving.told` may answer, by `Settled`."""
 _ROUNDS = 3
 _STANDS = 0.1  # nats
 
@@ -49,7 +51,7 @@ def driving_of(fit: Fit, logs: Log | Sequence[Log] | Driving) -> Driving:
     driving = Driving.of(logs)
     if driving is fit.driving or driving.offsets or not fit.model.offset_names:
         return driving
-    return _settled(fit, driving).driving
+    return settled_offsets(fit, driving).driving
 
 
 def driving_beside(fit: Fit, near: Fit, logs: Log | Sequence[Log] | Driving) -> Driving:
@@ -74,7 +76,7 @@ def driving_beside(fit: Fit, near: Fit, logs: Log | Sequence[Log] | Driving) -> 
     names = fit.model.offset_names
     if driving is fit.driving or driving.offsets or not names:
         return driving
-    known = _settled(near, driving)
+    known = settled_offsets(near, driving)
     if fit.horizon_s or not known.noise or near.model.offset_names != names:
         return driving_of(fit, driving)
     at = {n: near.model.value(n) for n in names}
@@ -94,7 +96,7 @@ def driving_beside(fit: Fit, near: Fit, logs: Log | Sequence[Log] | Driving) -> 
     return _with_offsets(fit, driving, own)
 
 
-class _Settled(NamedTuple):
+class Settled(NamedTuple):
     """Driving with its offsets, and the noise of each log; none where it was not learned."""
 
     driving: Driving
@@ -103,14 +105,17 @@ class _Settled(NamedTuple):
 
 # Several measures ask for the same fit on the same validation data.
 @remembered(64)
-def _settled(fit: Fit, driving: Driving) -> _Settled:
+def settled_offsets(fit: Fit, driving: Driving) -> Settled:
+    """Offsets that are best under a fit, on driving that has none yet."""
+    if (OFFSETS, fit) in driving.told:
+        return cast(Settled, driving.told[OFFSETS, fit])
     try:
         found = [_best(fit, log) for log in driving.each_log()]
     except (NumericalError, np.linalg.LinAlgError):
-        return _Settled(driving, ())
+        return Settled(driving, ())
     noise = tuple(noise for _, noise in found if noise is not None)
     settled = _with_offsets(fit, driving, [values for values, _ in found])
-    return _Settled(settled, noise if len(noise) == len(found) else ())
+    return Settled(settled, noise if len(noise) == len(found) else ())
 
 
 def _with_offsets(fit: Fit, driving: Driving, own: Sequence[dict[str, float]]) -> Driving:
@@ -181,7 +186,7 @@ def _likeliest(alone: Model, driving: Driving, noise: NoiseModel) -> tuple[Float
 def centred(fit: Fit) -> tuple[Model, Driving]:
     """The model with the mean of what its nuisances are in each log, and these by their offsets."""
     plain = replace(fit.driving, offsets=())
-    driving = _settled(fit, plain).driving
+    driving = settled_offsets(fit, plain).driving
     names = fit.model.offset_names
     if not driving.offsets:
         return fit.model, plain

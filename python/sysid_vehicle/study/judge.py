@@ -17,6 +17,7 @@ from ..identify import Fit, driving_of
 from ..log import unexcited
 from ..rules import Facts, Rules, incomplete, verdict
 from .added import added_by, of_one_step
+from .answers import answers_of
 from .beyond import Beyond
 from .foretold import foretold
 from .limit import Judging
@@ -176,6 +177,7 @@ class Judge:
             checked=checked,
             matters=self.sizes,
             buried=facts.buried,
+            answers=answers_of(fits, self.test),
         )
 
     def _compared(

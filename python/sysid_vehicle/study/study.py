@@ -36,6 +36,7 @@ from ..model import Model
 from ..rules import USUAL, Rules, Verdict
 from ..saved import save
 from .added import AddedEffect
+from .answers import Answers
 from .beyond import Beyond
 from .disagree import Disagreement, disagreements
 from .failing import errors_with, late, where_lines
@@ -72,8 +73,7 @@ class Study:
     added : tuple of AddedEffect
     omnibus, omnibus_together : Omnibus
         Whether the final model leaves anything that depends on the driving it was fitted to, and
-        whether anything unknown is left beside what was added on training and validation data
-        together; None where the time limit came first.
+        whether anything unknown is left beside what was added on all data; None: time had run out.
     verdicts : Verdicts
         What is to be said of every effect that the baseline lacks.
     seconds : float
@@ -82,8 +82,7 @@ class Study:
         By which effects were claimed.
     explained : Beyond or None
         Of the errors 1 to 5 s ahead on validation data, beyond the noise of the sensors, what the
-        added effects take away together; None where nothing was added, or the time limit came
-        first.
+        added effects take away together; None where nothing was added, or time had run out.
     structure : Structure, optional
         What of that which the final model leaves depends on the driving.
     foretold : Foretold, optional
@@ -101,6 +100,8 @@ class Study:
     buried : bool
         Whether something is left beside what was added, and errs by less, 0.5 to 5 s ahead, than
         the noise of the sensors.
+    answers : Answers, optional
+        About its validation data, for those who ask again.
     """
 
     verdict: Verdict
@@ -125,6 +126,7 @@ class Study:
     checked: bool = False
     matters: Mapping[str, float] | None = None
     buried: bool = False
+    answers: Answers | None = None
 
     @property
     def fit(self) -> Fit:

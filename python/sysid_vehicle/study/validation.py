@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -26,6 +27,9 @@ _PIECE_S, _FEWEST_PIECES = 5.0, 6
 _TRIMMED = 0.1  # of the pieces, at either end
 AHEAD = (1.0, 2.0, 5.0)
 AHEAD_S = 2.0
+BEST, FITTED_AHEAD = "best", "fitted ahead"
+"""With a fit questions that `Driving.told` may answer: `at_its_best` by validation data, and
+`fitted_ahead` by the driving of the fit."""
 """What parameters are fitted to predict, beside one step [s]."""
 _NONE = Gain(-np.inf, 0.0, -np.inf, 0.0)
 
@@ -179,6 +183,8 @@ def at_its_best(fit: Fit, test: Driving) -> Fit:
     disturbances share, at the price of those some seconds ahead. What an effect takes away is then
     nothing that other parameters would have taken away.
     """
+    if (BEST, fit) in test.told:
+        return cast(Fit, test.told[BEST, fit])
     found = [fit]
     with suppress(NumericalError, np.linalg.LinAlgError):
         found.append(replace(fit, model=_prediction(fit, test, fit).model))
@@ -192,6 +198,8 @@ def at_its_best(fit: Fit, test: Driving) -> Fit:
 @remembered(16)
 def fitted_ahead(fit: Fit) -> Fit | None:
     """The same model fitted to predictions of `AHEAD_S`; None where its driving is too short."""
+    if (FITTED_AHEAD, fit) in fit.driving.told:
+        return cast(Fit | None, fit.driving.told[FITTED_AHEAD, fit])
     if longest_s(fit.driving) < 2.0 * AHEAD_S:
         return None
     try:

@@ -42,6 +42,42 @@ TEST(Smoother, StandsStatesWithoutNoise) {
     expect_batch_posterior(s, kSmallMean, P);
 }
 
+TEST(Smoother, RoomForMoreStatesChangesNothing) {
+    const auto steps = filtered(small_system(25), kSmallMean, small_covariance());
+    const auto place = [](int i) { return i == 0 ? 0 : i + 1; };
+    std::vector<StateStep<5>> wide(steps.size());
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+        StateStep<5>& to = wide[k];
+        to.predicted_mean.setZero();
+        to.mean.setZero();
+        to.predicted_covariance.setZero();
+        to.covariance.setZero();
+        to.transition.setIdentity();
+        for (int i = 0; i < 3; ++i) {
+            to.predicted_mean[place(i)] = steps[k].predicted_mean[i];
+            to.mean[place(i)] = steps[k].mean[i];
+            for (int j = 0; j < 3; ++j) {
+                to.predicted_covariance(place(i), place(j)) = steps[k].predicted_covariance(i, j);
+                to.covariance(place(i), place(j)) = steps[k].covariance(i, j);
+                to.transition(place(i), place(j)) = steps[k].transition(i, j);
+            }
+        }
+    }
+    const auto narrow = smooth(steps);
+    const auto smoothed = smooth(wide);
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+        Mat<5, 5> rest = smoothed[k].covariance;
+        for (int i = 0; i < 3; ++i) {
+            EXPECT_NEAR(smoothed[k].mean[place(i)], narrow[k].mean[i], 1e-13) << k;
+            for (int j = 0; j < 3; ++j) {
+                EXPECT_NEAR(rest(place(i), place(j)), narrow[k].covariance(i, j), 1e-13) << k;
+                rest(place(i), place(j)) = 0.0;
+            }
+        }
+        EXPECT_EQ(rest.norm(), 0.0) << k;
+    }
+}
+
 TEST(Smoother, NeverLessCertainThanTheFilter) {
     const Small s = small_system(25);
     const auto steps = filtered(s, kSmallMean, small_covariance());

@@ -145,5 +145,45 @@ TEST_P(NoiseScore, HasMeanZeroAndTheInformationAsVariance) {
     }
 }
 
+TEST_P(NoiseScore, AlongAFilterThatHasRunIsTheSame) {
+    const Problem problem = mild(effects(), 43);
+    const Parameters p = typical_parameters();
+    Noise white = ordinary_noise();
+    white.disturbance.fill(0.0);
+    for (const Noise& noise : {ordinary_noise(), sloping_noise(), white}) {
+        const Score whole = score(problem, p, noise);
+        FrozenFilter filter = freeze(problem, p.data(), noise);
+        ASSERT_TRUE(filter.tells());
+        const auto along = [&] {
+            Score s;
+            s.value =
+                noise_score(problem, p.data(), filter, s.gradient.data(), s.information.data());
+            return s;
+        };
+        const Score s = along();
+        EXPECT_NEAR(s.value, whole.value, 1e-12 * std::abs(whole.value));
+        EXPECT_LT((s.gradient - whole.gradient).norm(), 1e-9 * whole.gradient.norm());
+        EXPECT_LT((s.information - whole.information).norm(), 1e-9 * whole.information.norm());
+        // A filter of so many samples that it keeps no states runs again.
+        for (FrozenRun& run : filter.runs) run.told.clear();
+        const Score again = along();
+        EXPECT_EQ((again.gradient - whole.gradient).norm(), 0.0);
+        EXPECT_EQ((again.information - whole.information).norm(), 0.0);
+    }
+}
+
+TEST(NoiseScoreAlongAFilter, IsOfAnotherModelsStatesWorkedOutAnew) {
+    const Problem lagging = mild(mask_of({"steer_lag", "tyre_relaxation"}), 45);
+    Problem plain = lagging;
+    plain.model = SingleTrack{saloon(), EffectMask{0}};
+    const Parameters p = typical_parameters();
+    const FrozenFilter filter = freeze(plain, p.data(), ordinary_noise());
+    const Score whole = score(lagging, p, ordinary_noise());
+    Score s;
+    s.value = noise_score(lagging, p.data(), filter, s.gradient.data(), s.information.data());
+    EXPECT_EQ(s.value, whole.value);
+    EXPECT_EQ((s.gradient - whole.gradient).norm(), 0.0);
+}
+
 }  // namespace
 }  // namespace sysid::test

@@ -195,7 +195,7 @@ def test_logs_in_memory_and_a_car_for_each(garage: Path, tmp_path: Path) -> None
     assert found.rows[1].validation_s == pytest.approx(3.0, abs=0.2)
     # A worker that does many studies holds none of their logs.
     assert _memo._memories
-    assert not any(memory.cache_info().currsize for memory in _memo._memories)
+    assert not any(len(memory) for memory in _memo._memories)
 
 
 def effect(name: str, before: float, after: float, grade: str = "confirmed") -> Effect:

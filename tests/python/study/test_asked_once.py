@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import signal
 
-from sysid_vehicle import Fit, Model, NumericalError, diagnose, drive, identify, manoeuvres
+from sysid_vehicle import (
+    Fit,
+    Model,
+    NumericalError,
+    diagnose,
+    drive,
+    example_vehicle,
+    identify,
+    load,
+    manoeuvres,
+    saved,
+)
 from sysid_vehicle._common.arrays import mean_of_known, median_of_known, spread_of_known
+from sysid_vehicle._common.memo import forget
 from sysid_vehicle._common.threads import at_most
 from sysid_vehicle.diagnose.unexplained.ceiling import left_out
-from sysid_vehicle.estimate import Driving
+from sysid_vehicle.estimate import Driving, first_guess
 from sysid_vehicle.identify import (
     ahead,
+    driving_of,
     maximum,
+    offsets,
     predicting_ahead,
     refine,
     refine_above,
@@ -26,7 +41,8 @@ from sysid_vehicle.identify.ahead import _Ahead
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.sensors.low_pass import _Problem
 from sysid_vehicle.sensors.spectrum import _bias, _of_windows, spectrum_of
-from sysid_vehicle.study import steps
+from sysid_vehicle.study import steps, validation
+from sysid_vehicle.study.answers import answers_of
 from sysid_vehicle.study.steps import alternatives, exchanged, without_insignificant
 from sysid_vehicle.study.together import _none_at_nothing
 
@@ -228,3 +244,57 @@ def test_exchanges_are_the_same_for_any_number_of_threads(
     assert set(one.model.effects) == {"aero_drag", "rolling_resistance"}
     assert one.model.effects == other.model.effects
     assert one.log_likelihood == other.log_likelihood
+
+
+def test_what_a_study_found_out_about_validation_data_comes_with_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = Model(example_vehicle()).with_nuisances()
+    logs = [drive(model, manoeuvres.lap(15.0), seed=i, rate_hz=25.0) for i in (1, 2)]
+    fit, test = identify(model, logs[0], starts=1), Driving.of(logs[1])
+    best, apart = validation.at_its_best(fit, test), driving_of(fit, test)
+    assert apart.offsets
+    saved.save([fit, answers_of([fit], test)], tmp_path / "answers.npz")
+    forget()
+
+    def asked(*_: Any) -> Any:
+        raise AssertionError("asked again")
+
+    monkeypatch.setattr(offsets, "_best", asked)
+    monkeypatch.setattr(validation, "predicting_ahead", asked)
+    monkeypatch.setattr(validation, "predict", asked)
+    again, answers = load(tmp_path / "answers.npz")
+    found = validation.at_its_best(again, answers.validation)
+    assert found.model == best.model
+    assert driving_of(again, answers.validation).offsets == apart.offsets
+    ahead = validation.fitted_ahead(again)
+    assert ahead is not None
+    assert ahead.horizon_s > 0.0
+    with pytest.raises(AssertionError, match="asked again"):
+        validation.at_its_best(again, again.driving)
+
+
+def test_a_filter_that_has_run_is_not_run_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = Model(example_vehicle())
+    driving = Driving.of(drive(model, manoeuvres.lap(10.0), seed=1, rate_hz=25.0))
+    p, noise = model.vector(), first_guess(driving, model.vehicle).vector()
+    gains = driving.problem(model).freeze(p, noise)
+    assert driving.problem(model).freeze(p.copy(), noise.copy()) is gains
+    inputs = driving.inputs()
+    others = (
+        driving.problem(model).freeze(1.01 * p, noise),
+        driving.problem(model).freeze(p, 1.01 * noise),
+        driving.problem(model.add("steer_lag")).freeze(p, noise),
+        driving.problem(Model(example_vehicle().replace(mass_kg=900.0))).freeze(p, noise),
+        driving.problem(model, other_inputs=0.9 * inputs).freeze(p, noise),
+        Driving.of(driving.logs).problem(model).freeze(p, noise),
+    )
+    assert all(other is not gains for other in others)
+    assert driving.problem(model, other_inputs=inputs.copy()).freeze(p, noise) is not gains
+    # A lag of nothing and the same logs once more are another question with the same answer.
+    assert len({other.log_likelihood for other in (gains, *others)}) == len(others) - 1
+    for _ in range(3):  # of so many filters the first ones are let go
+        for step in np.linspace(1.0, 1.1, 300):
+            driving.problem(model).freeze(step * p, noise)
+    kept = driving._filters
+    assert kept._samples == driving.samples * len(kept._kept) <= 1 << 16

@@ -22,7 +22,8 @@ from sysid_vehicle.study.search import Search, Trail
 CANDIDATES = ["steer_lag", "aero_drag", "rolling_resistance", "yaw_inertia", "gyro_bias"]
 
 KERNELS = (
-    *("freeze", "half_sum_of_squares", "log_likelihoods", "look_ahead", "noise_score"),
+    *("filtered_noise_score", "freeze", "half_sum_of_squares", "log_likelihoods", "look_ahead"),
+    "noise_score",
     *("normal_equations", "residuals", "sensitivities", "signal_sensitivities", "smoothed_means"),
     "trace",
 )

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -33,6 +34,20 @@ Mat<NX, NX> rescaled(const Mat<NX, NX>& C, const Vec<NX>& by) {
     return out;
 }
 
+/// A covariance with ones in place of the variances of states that are no states: their rows are
+/// zeros, as where there is room for more states than a model has. `unused` says which these are.
+template <int NX>
+Mat<NX, NX> without_gaps(const Mat<NX, NX>& C, std::array<bool, NX>& unused) {
+    Mat<NX, NX> out = C;
+    for (int i = 0; i < NX; ++i) {
+        bool zeros = true;
+        for (int j = 0; j < NX; ++j) zeros = zeros && C(i, j) == 0.0 && C(j, i) == 0.0;
+        unused[static_cast<std::size_t>(i)] = zeros;
+        if (zeros) out(i, i) = 1.0;
+    }
+    return out;
+}
+
 /// S^-1 X, by the inverse of a Cholesky factor, which is quick. States without noise make a
 /// predicted covariance singular: it is then scaled to correlations, and the pseudo-inverse of
 /// these stands for the inverse. Directions surer than `kSurest` get no gain: an inverse would
@@ -40,8 +55,12 @@ Mat<NX, NX> rescaled(const Mat<NX, NX>& C, const Vec<NX>& by) {
 template <int NX>
 Mat<NX, NX> solved_by_covariance(const Mat<NX, NX>& S, const Mat<NX, NX>& X) {
     Mat<NX, NX> lower, whitening;
-    bool regular = cholesky<NX>(S, lower, whitening);
-    for (int i = 0; i < NX; ++i) regular = regular && lower(i, i) * lower(i, i) > 1e-9 * S(i, i);
+    std::array<bool, NX> unused;
+    bool regular = cholesky<NX>(without_gaps<NX>(S, unused), lower, whitening);
+    for (int i = 0; i < NX; ++i) {
+        regular = regular && lower(i, i) * lower(i, i) > 1e-9 * S(i, i);
+        if (unused[static_cast<std::size_t>(i)]) whitening(i, i) = 0.0;
+    }
     if (regular) return transposed_times<NX, NX, NX>(whitening, times<NX, NX, NX>(whitening, X));
     const Vec<NX> per_size = inverse_sizes<NX>(S);
     const auto e = spectrum<NX>(rescaled<NX>(S, per_size));
@@ -62,7 +81,12 @@ Mat<NX, NX> solved_by_covariance(const Mat<NX, NX>& S, const Mat<NX, NX>& X) {
 template <int NX>
 Mat<NX, NX> covariance_root(const Mat<NX, NX>& C, const Mat<NX, NX>& predicted) {
     Mat<NX, NX> lower, inverse;
-    if (cholesky<NX>(C, lower, inverse)) return lower;
+    std::array<bool, NX> unused;
+    if (cholesky<NX>(without_gaps<NX>(C, unused), lower, inverse)) {
+        for (int i = 0; i < NX; ++i)
+            if (unused[static_cast<std::size_t>(i)]) lower(i, i) = 0.0;
+        return lower;
+    }
     const auto e = spectrum<NX>(rescaled<NX>(C, inverse_sizes<NX>(predicted)));
     Mat<NX, NX> root;
     for (int j = 0; j < NX; ++j)
@@ -76,7 +100,8 @@ Mat<NX, NX> covariance_root(const Mat<NX, NX>& C, const Mat<NX, NX>& predicted) 
 template <int NX>
 Mat<NX, NX> as_covariance(const Mat<NX, NX>& C, const Mat<NX, NX>& predicted) {
     Mat<NX, NX> lower, inverse;
-    if (cholesky<NX>(C, lower, inverse)) return C;
+    std::array<bool, NX> unused;
+    if (cholesky<NX>(without_gaps<NX>(C, unused), lower, inverse)) return C;
     const Mat<NX, NX> root = covariance_root<NX>(C, predicted);
     return times_transposed<NX, NX, NX>(root, root);
 }

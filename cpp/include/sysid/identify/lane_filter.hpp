@@ -30,6 +30,7 @@ class LaneFilter {
     // Of the sample that `keep` was called for.
     const Rows& gain() const { return gain_; }          // states x readings
     const Rows& whitener() const { return whitener_; }  // lower triangle
+    const Rows& innovation() const { return innovation_; }
     /// The whole sample, one after the other: transition (moving x states; of a first
     /// sample none), observation, gain, whitener, innovation, mean and the lower triangle of the
     /// covariance.

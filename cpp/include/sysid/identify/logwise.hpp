@@ -49,6 +49,8 @@ void signal_sensitivities(const LogwiseProblem& problem, const double* p,
                           const std::vector<int>& targets, double* out);
 double noise_score(const LogwiseProblem& logged, const double* p, const Noise& noise,
                    double* gradient, double* information);
+double noise_score(const LogwiseProblem& logged, const double* p, const LogwiseFilter& filter,
+                   double* gradient, double* information);
 Trace trace(const LogwiseProblem& logged, const double* p, const Noise& noise, bool smoothed);
 void smoothed_means(const LogwiseProblem& logged, const double* p, const Noise& noise, double* out);
 void look_ahead(const LogwiseProblem& logged, const double* p, const Noise& noise,

@@ -18,10 +18,14 @@ namespace sysid {
 /// kept as well: were they counted anew, residuals would jump where a parameter makes it one more.
 struct FrozenRun {
     std::vector<double> numbers;
+    std::vector<double> told;  // see `FrozenFilter::told`
     std::vector<int> substeps;
     std::size_t size() const { return substeps.size(); }
 };
 constexpr std::size_t kWhitener = kChannels * (kChannels + 1) / 2;
+
+/// Samples of a problem up to which a filter keeps what it told of the states.
+constexpr std::size_t kToldSamples = std::size_t{1} << 15;
 
 /// Belongs to problems with the runs it was made from, whatever their model.
 struct FrozenFilter {
@@ -44,6 +48,17 @@ struct FrozenFilter {
     double* whitener(std::size_t run, std::size_t k) {
         return gain(run, k) + rows.size() * kChannels;
     }
+    /// Numbers that tell how a sample was filtered: innovations, zero where a measurement is
+    /// missing, means of the states after them, the lower triangle of their covariance. Of a
+    /// problem with more than `kToldSamples` they are not kept.
+    std::size_t told_size() const {
+        return kChannels + rows.size() + rows.size() * (rows.size() + 1) / 2;
+    }
+    const double* told(std::size_t run, std::size_t k) const {
+        return runs[run].told.data() + k * told_size();
+    }
+    double* told(std::size_t run, std::size_t k) { return runs[run].told.data() + k * told_size(); }
+    bool tells() const { return !runs.empty() && !runs[0].told.empty(); }
     /// Where among the gains of a sample those of such rows stand; -1 for those that have none.
     std::vector<int> places(const std::vector<int>& of) const;
 };
@@ -87,6 +102,10 @@ void signal_sensitivities(const Problem& problem, const double* p, const FrozenF
 /// three are zero), and their expected information (row-major).
 double noise_score(const Problem& logged, const double* p, const Noise& noise, double* gradient,
                    double* information);
+
+/// The same where the filter has run with these parameters, under its noise.
+double noise_score(const Problem& logged, const double* p, const FrozenFilter& filter,
+                   double* gradient, double* information);
 
 /// Everything the filter, or the smoother, says of each sample.
 struct Trace {

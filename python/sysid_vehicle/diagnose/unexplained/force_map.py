@@ -177,6 +177,8 @@ class MissingForces:
     state: FloatArray
 
 
+# Maps, ceilings and the structure of what is missing ask for the same forces.
+@remembered(4)
 def missing_forces(fit: Fit, driving: Driving) -> MissingForces:
     """Smooth the forces that a model lacks.
 
