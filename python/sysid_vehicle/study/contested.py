@@ -16,11 +16,13 @@ from ..estimate import Driving
 from ..identify import Fit
 from ..rules import USUAL, Rules
 from .disagree import Disagreement, disagreements
+from .horizons import errors_grow
 from .together import InPlace
 from .validation import gain_in_log_likelihood
 
 
 def spoken_against(
+    first: Fit,
     final: Fit,
     asked: Collection[str],
     alone: Collection[str],
@@ -31,12 +33,14 @@ def spoken_against(
     """Find what speaks against names of added effects: by effect, in words.
 
     Its value itself, not an end of its interval, is one that no car has, or too small to matter.
-    Validation data by themselves tell another one. Or an effect that acts like it is likelier in
-    its place, on training and on validation data.
+    The errors ahead of what it moves grow with all that was added. Validation data by themselves
+    tell another value. Or an effect that acts like it is likelier in its place, on training and on
+    validation data.
 
     Parameters
     ----------
-    final : Fit
+    first, final : Fit
+        The baseline, and the model with the effects.
     asked : collection of str
         Effects whose names would stand.
     alone : collection of str
@@ -49,6 +53,9 @@ def spoken_against(
     """
     parts = {part.id: part for part in final.model.parts}
     found = {e: of_no_use(parts[e], final, rules, small=e in alone) for e in asked}
+    for effect in asked:
+        if not found[effect] and errors_grow(first, final, test, parts[effect].moved):
+            found[effect] = "as fitted, the errors 0.5 to 5 s ahead of what it moves grow"
     for effect, others in other_values(disagreements(final, test, rules), final, rules).items():
         if not found.get(effect, "told"):
             found[effect] = f"validation data by themselves tell otherwise ({others})"

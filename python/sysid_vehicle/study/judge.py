@@ -240,7 +240,7 @@ class Judge:
         own = asked - first.groups.keys()
         told = self.asks.asked(
             _CONTESTED,
-            lambda: spoken_against(fit, asked, own, in_place, self.test, self.rules),
+            lambda: spoken_against(self.outer[0], fit, asked, own, in_place, self.test, self.rules),
         )
         facts = facts.with_against(told or {})
         known = self.trail.rivals

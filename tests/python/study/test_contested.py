@@ -8,11 +8,12 @@ from sysid_vehicle import Fit, Model, drive, identify, manoeuvres
 from sysid_vehicle.diagnose import Candidate
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
-from sysid_vehicle.identify import Estimate
+from sysid_vehicle.identify import Estimate, refit
 from sysid_vehicle.rules import Gain
 from sysid_vehicle.study import contested
 from sysid_vehicle.study.contested import of_no_use, other_values, spoken_against
 from sysid_vehicle.study.disagree import Disagreement
+from sysid_vehicle.study.horizons import errors_grow
 from sysid_vehicle.study.together import InPlace
 
 NAME = "aero_downforce.cl_a_rear_m2"
@@ -66,6 +67,7 @@ def test_a_value_that_no_car_has_or_does_not_matter_is_no_name(fit: Fit) -> None
 def test_names_are_asked_of_values_and_of_what_is_likelier_in_their_place(
     fit: Fit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    bare = refit(fit.model.drop("aero_downforce"), fit.driving, fit.noise)
     test = Driving.of(drive(fit.model, manoeuvres.lap(20.0), seed=4, rate_hz=50.0))
     rival = Candidate(effect("tyre_temperature"), 9.0, 1e-9, (0.1, 20.0), (0.01, 1.0), 1.0, 1.0)
     rival = replace(rival, fit=fit)
@@ -75,7 +77,7 @@ def test_names_are_asked_of_values_and_of_what_is_likelier_in_their_place(
         monkeypatch.setattr(
             contested, "gain_in_log_likelihood", lambda *_: Gain(gain, 0.1, gain, 0.1)
         )
-        return spoken_against(fit, ["aero_downforce"], ["aero_downforce"], known, test)
+        return spoken_against(bare, fit, ["aero_downforce"], ["aero_downforce"], known, test)
 
     assert against(4.0) == {}
     assert against(5.0, gain=-1.0) == {}
@@ -85,3 +87,16 @@ def test_names_are_asked_of_values_and_of_what_is_likelier_in_their_place(
     }
     monkeypatch.setattr(contested, "other_values", lambda *_: other)
     assert "validation data by themselves tell otherwise" in against(0.0)["aero_downforce"]
+
+
+def test_no_name_stands_for_what_makes_errors_grow(fit: Fit) -> None:
+    """The motion that an effect moves counts; what is lost is as wrong as anything."""
+    name = ["aero_downforce"]
+    test = Driving.of(drive(fit.model, manoeuvres.lap(20.0), seed=4, rate_hz=50.0))
+    bare = refit(fit.model.drop("aero_downforce"), fit.driving, fit.noise)
+    assert not errors_grow(bare, fit, test, fit.model.parts[0].moved)
+    wrong = replace(fit, model=fit.model.with_values({NAME: 6.0}))
+    assert errors_grow(fit, wrong, test, fit.model.parts[0].moved)
+    found = spoken_against(fit, wrong, name, name, {}, test)
+    assert found[name[0]] == "as fitted, the errors 0.5 to 5 s ahead of what it moves grow"
+    assert not errors_grow(fit, fit, test, ["vx_mps"])
