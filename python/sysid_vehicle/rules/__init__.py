@@ -27,7 +27,11 @@
    are not shown to be off nothing (`insignificant`), the share of all of them counts, and they are
    named as a group. Nothing that has no share of either kind takes more, and moves a channel that
    it moves. All that was added together is shown to take a share, of that error or of what could
-   be explained of it.
+   be explained of it. Nothing else speaks against it: a value, not only an end of its interval,
+   that no car has or that does not matter; errors ahead of its motion that grow with all that was
+   added, as the models are fitted; validation data that by themselves tell another one, so
+   that both do not show it to be off nothing (`insignificant`); an effect like it that is likelier
+   in its place (`apart`).
    Where the final model errs by less than the noise of the sensors (`buried`), no share can be
    shown: an effect without rivals, and without a stand-in beside it, keeps its name if the
    likelihood of validation data needs it (`interval`), unless training data show more (`strict`).
@@ -56,6 +60,7 @@ from .verdict import (
     incomplete,
     little,
     something_left,
+    standing,
     unforeseen,
     verdict,
 )
@@ -87,6 +92,7 @@ __all__ = [
     "share_explained",
     "share_of",
     "something_left",
+    "standing",
     "unforeseen",
     "verdict",
     "worse",

@@ -62,6 +62,9 @@ class Added:
         Others of the final model that act like it, where such a group was asked for its share.
     shared, shared_in_training : Share
         As `own`, of it and all of these together.
+    against : str
+        What else speaks against its name, in words. Only asked of names that would stand beside
+        something that is missing.
     """
 
     id: str
@@ -78,6 +81,7 @@ class Added:
     shared: Share = UNKNOWN
     shared_in_training: Share = UNKNOWN
     felt: bool = True
+    against: str = ""
 
     @property
     def named(self) -> bool:
@@ -174,6 +178,11 @@ class Facts:
             else a
             for a in self.added
         )
+        return replace(self, added=tuple(added))
+
+    def with_against(self, told: Mapping[str, str]) -> Facts:
+        """The same with what else speaks against the names of some effects."""
+        added = (replace(a, against=told.get(a.id, "")) for a in self.added)
         return replace(self, added=tuple(added))
 
     def with_motions(self, told: Mapping[str, tuple[tuple[float, float], float]]) -> Facts:

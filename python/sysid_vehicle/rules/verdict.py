@@ -162,7 +162,8 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
         late = frozenset(a.id for a in facts.added if a.late)
         likely = _likely(facts, rules)
         alone, groups, led = _standing(facts, rules)
-        falling = names - likely - alone - groups.keys() - led.keys()
+        spoken = {a.id: a.against for a in facts.added if a.named and a.against}
+        falling = names - likely - alone - groups.keys() - led.keys() - spoken.keys()
         if left:
             lows = {a.id: _together_low(a, facts) for a in facts.added}
             nothing = frozenset(e for e, low in lows.items() if low is not None and not low > 0.0)
@@ -170,6 +171,7 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
             withdrawn.append(Withdrawn(nothing - likely - falling, _NOT_TOGETHER, names))
             withdrawn.append(Withdrawn(unknown - likely - falling, _LATE_TOGETHER, names))
         withdrawn.append(Withdrawn(falling - late, _NOT_SHOWN, names))
+        withdrawn += [Withdrawn(frozenset({e}), because, names) for e, because in spoken.items()]
         for name, leaders in led.items():
             if name in likely:
                 continue
@@ -194,6 +196,21 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     return Decision("explained" if whole else "partly_explained", tuple(withdrawn), much, groups)
 
 
+def standing(facts: Facts, decision: Decision) -> frozenset[str]:
+    """Added effects that keep their names.
+
+    Parameters
+    ----------
+    facts : Facts
+    decision : Decision
+        That follows from these.
+    """
+    if decision.verdict not in ("explained", "partly_explained"):
+        return frozenset()
+    named = (a for a in facts.added if a.named)
+    return frozenset(a.id for a in named if not _falls(a, decision.withdrawn))
+
+
 def _standing(
     facts: Facts, rules: Rules
 ) -> tuple[frozenset[str], dict[str, frozenset[str]], dict[str, frozenset[str]]]:
@@ -210,7 +227,7 @@ def _standing(
     that: the share must be shown to be one worth a name, of all data. So may it be what a stand-in
     takes that moves the same channel, if that is the larger part. What is not shown to be off
     nothing, while another of the model acts like it, has no name of its own: either may be there
-    for the other.
+    for the other. Nor has what something else speaks against.
     """
 
     def worth(a: Added, *shares: Share) -> bool:
@@ -219,7 +236,7 @@ def _standing(
         each = all(s.value > rules.taken and s.low > 0.0 for s in shares)
         return each and low_of_mean(shares) > least
 
-    named = [a for a in facts.added if a.named]
+    named = [a for a in facts.added if a.named and not a.against]
     own = [a for a in named if a.felt or not a.beside]
     alone = {a.id for a in own if worth(a, a.own, a.own_in_training)}
     together = {
@@ -231,7 +248,8 @@ def _standing(
     }
     shares = {a.id: (a.own, a.own_in_training) for a in facts.added if a.id in alone}
     shares |= {a.id: (a.shared, a.shared_in_training) for a in facts.added if a.id in together}
-    others = [a for a in facts.added if a.id not in shares]
+    # What something else speaks against was asked beside the others, and they beside it.
+    others = [a for a in facts.added if a.id not in shares and not a.against]
     led = {}
     for a in named:
         if a.id in shares:
@@ -261,7 +279,8 @@ def _likely(facts: Facts, rules: Rules) -> frozenset[str]:
     shown = min(facts.fitted.p_value, facts.candidate) <= rules.strict
     if not facts.buried or shown or any(a.finding == "proxy" for a in facts.added):
         return frozenset()
-    return frozenset(a.id for a in facts.added if a.finding == "missing" and a.sure)
+    likely = (a for a in facts.added if a.finding == "missing" and a.sure and not a.against)
+    return frozenset(a.id for a in likely)
 
 
 def _more(one: Added, shares: Sequence[Share]) -> bool:

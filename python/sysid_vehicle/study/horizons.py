@@ -308,3 +308,27 @@ def changes(
                 )
             )
     return tuple(found)
+
+
+def errors_grow(first: Fit, final: Fit, test: Driving, channels: Collection[str]) -> bool:
+    """Whether the errors ahead of a motion grow, in the mean over its channels and horizons.
+
+    Shares are asked of parameters that predict best (`at_its_best`). What a study prints, and its
+    user gets, is the model as it was fitted.
+
+    Parameters
+    ----------
+    first, final : Fit
+    test : Driving
+        Validation data.
+    channels : collection of str
+        Of the motion.
+    """
+    found = horizons((first, final), ("first", "final"), test)
+    moved = [c in moving_with(channels) for c in found.channels]
+    before, after = (error[:, moved] for error in found.error)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grown = np.log(after) - np.log(before)
+    # Of what both models lose, or neither predicts, there is nothing to be learnt.
+    grown = np.clip(grown[~np.isnan(grown)], -_LOST, _LOST)
+    return bool(grown.size and grown.mean() > 0.0)

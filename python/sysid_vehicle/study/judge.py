@@ -15,10 +15,11 @@ from ..errors import warn
 from ..estimate import Driving
 from ..identify import Fit, driving_of
 from ..log import unexcited
-from ..rules import Facts, Rules, incomplete, verdict
+from ..rules import Facts, Rules, incomplete, standing, verdict
 from .added import added_by, of_one_step
 from .answers import answers_of
 from .beyond import Beyond
+from .contested import spoken_against
 from .foretold import foretold
 from .limit import Judging
 from .matters import buried, sufficient
@@ -37,6 +38,7 @@ from .slow import slow_forces
 from .steps import insignificant, way
 from .structure import structure
 from .study import Study
+from .together import in_place_of
 from .validation import at_its_best, beyond_noise_ahead, serving
 from .verdict import facts_of, in_the_light_of
 
@@ -46,6 +48,7 @@ _UNSHOWN = "whether training and validation data together show anything that is 
 _FORETOLD = "whether validation data err by more than training data foretell"
 _TOGETHER = "the share of the error 1 to 5 s ahead that the effects take together"
 _ALONE = "the share of the error 1 to 5 s ahead that is due to {} alone"
+_CONTESTED = "whether validation data, or what acts like them, speak against names"
 _STRUCTURE = "how much of what is left depends on the driving"
 _SMALL = "whether the errors of the baseline are as large as matters"
 _STEPS = "what each of {} takes of the validation error in its turn"
@@ -139,6 +142,7 @@ class Judge:
         )
         if self.added and incomplete(facts, rules):
             facts = self._with_shares(facts, explained)
+            alone, facts = self._contested(rivals, alone, facts)
         decision = verdict(facts, rules)
         fits, shared = self._way()
         on_train |= self._compared([f for f in fits if f not in on_train])
@@ -221,6 +225,39 @@ class Judge:
             untried=trail.stopped,
             away={} if rivals is None else rivals.away,
         )
+
+    def _contested(
+        self, rivals: Instead | None, alone: Verdicts, facts: Facts
+    ) -> tuple[Verdicts, Facts]:
+        """What is said of each effect, and known of all, where names that stand are asked more.
+
+        Rivals are those beside all else of the final model.
+        """
+        first = verdict(facts, self.rules)
+        asked = standing(facts, first)
+        if not asked:
+            return alone, facts
+        last, fit, ends = self.trail.diagnoses[-1], self.fit, self.asks.ends
+        in_place = in_place_of(fit, sorted(asked), last, ends)
+        own = asked - first.groups.keys()
+        told = self.asks.asked(
+            _CONTESTED,
+            lambda: spoken_against(self.outer[0], fit, asked, own, in_place, self.test, self.rules),
+        )
+        facts = facts.with_against(told or {})
+        known = self.trail.rivals
+        more = {e: [n for n in r.names if n not in known.get(e, ())] for e, r in in_place.items()}
+        more = {e: names for e, names in more.items() if names and not (told or {}).get(e)}
+        if not more:
+            return alone, facts
+        known |= {e: (*known.get(e, ()), *names) for e, names in more.items()}
+        alone = self._alone(rivals)
+        told_again = {v.effect.id: v for v in alone.all}
+        added = (
+            replace(a, finding=told_again[a.id].finding, group=told_again[a.id].group)
+            for a in facts.added
+        )
+        return alone, replace(facts, added=tuple(added))
 
     def _small(self, slow: tuple[str, ...]) -> bool:
         """Whether no error of the baseline matters; slow forces err by more the further ahead."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from .._common.text import few
 from .matters import USUAL_SIZES
-from .said import disturbance, only_elsewhere, slow
+from .said import disturbance, in_training, only_elsewhere, slow
 
 if TYPE_CHECKING:
     from .added import AddedEffect
@@ -106,8 +106,8 @@ def _of_what_is_left(study: Study) -> list[str]:
         what = "what is left" if study.added else "what is missing"
         found.append(
             "give the fit driving like the validation data too, and validate with other driving "
-            f"of that kind: {what} hardly shows in the training data, and no effect can be "
-            "named that they do not excite"
+            f"of that kind: {what} {in_training(study)}, and no effect can be named that they do "
+            "not excite"
         )
     if not study.sensors and not study.checked:
         found.append(

@@ -82,7 +82,7 @@ def meaning(study: Study) -> str:
             f"{how if helps else ''}"
         )
     if study.verdict == "unknown" and not study.added and only_elsewhere(study):
-        return "something is missing that shows in validation data, and hardly in training data"
+        return f"something is missing that shows in validation data, and {in_training(study)}"
     if study.verdict == "adequate" and _disturbed(study):
         return (
             f"{_MEANING['adequate']}; validation data err by {study.test[-1].error:.2g} noise "
@@ -270,12 +270,28 @@ def _unforeseen(study: Study) -> bool:
     return not study.added and study.foretold is not None and study.foretold.unforeseen
 
 
+def in_training(study: Study) -> str:
+    """What training data show of that which shows with validation data alone, in words.
+
+    Where most of their error is disturbance, what is missing may be a part of it.
+    """
+    error = study.train[-1].error
+    if _beyond_noise(error) > study.rules.most:
+        floors = f"{number(error, 2)} noise floors"
+        return f"is not told from disturbance in the training data, which err by {floors}"
+    return "hardly shows in the training data"
+
+
+def _beyond_noise(error: float) -> float:
+    """Share of the square of an error one step ahead that is no noise of the sensors."""
+    return share_of(error**2, 1.0)
+
+
 def _disturbed(study: Study) -> bool:
     """Whether validation data err by more than noise of the sensors, as is foretold."""
     if study.foretold is None:
         return False
-    left = share_of(study.test[-1].error ** 2, 1.0)
-    return left > study.rules.explainable
+    return _beyond_noise(study.test[-1].error) > study.rules.explainable
 
 
 def _more(study: Study) -> bool:

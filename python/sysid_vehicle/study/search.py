@@ -190,7 +190,8 @@ class Search:
                 step = before(self.ends, partial(self._beside_another, dx, trail), None)
             if several is not None:
                 chosen, lean = several
-                trail.note_several(dx, chosen, in_place_of(lean, chosen, dx, self.ends))
+                rivals = in_place_of(lean, chosen, dx, self.ends)
+                trail.note_several(dx, chosen, {e: r.names for e, r in rivals.items()})
             elif step is not None:
                 chosen, lean = (step[0].id,), step[1]
                 trail.note(dx, step[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..errors import NumericalError
 from ..estimate import Driving
 from ..identify import Fit, refine_while, refit
 from ..model import Model
+from ..rules import USUAL, Rules, bic
 from .own import without
 from .steps import better, merit, real, speaks_for, strength, without_insignificant
 
@@ -62,14 +64,42 @@ def first_together(
     return None
 
 
+@dataclass(frozen=True)
+class InPlace:
+    """What would do in the place of an effect of a model.
+
+    Attributes
+    ----------
+    rivals : tuple of Candidate
+        Refitted, no less likely than the effect by more than `Rules.apart`; of values that a car
+        can have.
+    leads : tuple of float
+        How much more likely each is, less the BIC penalty of its parameters [nats].
+    """
+
+    rivals: tuple[Candidate, ...] = ()
+    leads: tuple[float, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Ids of the rivals."""
+        return tuple(c.id for c in self.rivals)
+
+    def better(self, rules: Rules = USUAL) -> tuple[Candidate, ...]:
+        """Rivals that are more likely by `Rules.apart`."""
+        led = zip(self.rivals, self.leads, strict=True)
+        return tuple(c for c, lead in led if lead > rules.apart)
+
+
 def in_place_of(
     fit: Fit, chosen: Sequence[str], dx: Diagnosis, ends: float = np.inf
-) -> dict[str, tuple[str, ...]]:
-    """Find what fits as well in the place of each of several effects that were added together.
+) -> dict[str, InPlace]:
+    """Find what fits as well in the place of each of several effects of a model.
 
-    The posterior is that of scores, linearised at a fit that lacks all of them: of two effects that
-    only the others show to be alike it may know one. Here each is taken out of the model with the
-    others, and what acts like it, by the catalogue, is refitted in its place.
+    What was found step by step, or by the posterior, is known beside what the model had then: of
+    two effects that only the others show to be alike, or to be apart, either may know one. Here
+    each is taken out of the model with the others, and what acts like it, by the catalogue, is
+    refitted in its place.
 
     Parameters
     ----------
@@ -89,27 +119,30 @@ def in_place_of(
     return found
 
 
-def _in_place(fit: Fit, name: str, dx: Diagnosis) -> tuple[str, ...]:
+def _in_place(fit: Fit, name: str, dx: Diagnosis) -> InPlace:
     poorer, rules = without(fit, (name,)), dx.rules
     if poorer is None:
-        return ()
+        return InPlace()
     parts = {e.id: e for e in fit.model.parts}
     alike = {e.id for e in poorer.model.candidates if e.id in dx.family and e.is_like(parts[name])}
     if not alike:
-        return ()
+        return InPlace()
     scores = beside(poorer, poorer.driving, {name, *alike}, rules).board.scores
     by = {s.effect.id: s.statistic * max(s.variance_ratio, 1.0) for s in scores}
     # An effect that parameters of the poorer model can copy has no score there.
     least = rules.near * by.get(name, 0.0)
     near = [s for s in scores if s.effect.id in alike and by[s.effect.id] > least]
-    gained, rivals = 2.0 * (fit.log_likelihood - poorer.log_likelihood), []
+    gained = 2.0 * (fit.log_likelihood - poorer.log_likelihood)
+    rivals, leads = [], []
     for s in sorted(near, key=lambda s: -by[s.effect.id]):
         told = s.statistic, s.p_value, s.value, s.std, s.retained, s.variance_ratio
         c = refitted(poorer, poorer.driving, Candidate(s.effect, *told))
         as_well = c.statistic > gained - 2.0 * rules.apart
         if as_well and possible(c.effect, c.value, c.std, rules):
-            rivals.append(c.id)
-    return tuple(rivals)
+            more = len(c.effect.parameters) - len(parts[name].parameters)
+            rivals.append(c)
+            leads.append(bic(0.5 * (c.statistic - gained), more, fit.driving.samples))
+    return InPlace(tuple(rivals), tuple(leads))
 
 
 def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:

@@ -1,6 +1,7 @@
 """A verdict that training data by themselves cannot give: validation data show what they do not."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -67,12 +68,17 @@ def test_what_shows_in_validation_data_alone_is_not_adequate(hidden: Study) -> N
     assert hidden.verdict == "unknown"
     assert hidden.added == ()
     text = str(hidden)
-    assert "shows in validation data, and hardly in training data" in text
+    assert "shows in validation data, and hardly shows in the training data" in text
     assert "training data by themselves show nothing that is left" in text
     assert "On all data together: something is left" in text
     assert "mostly in M_z" in text
     assert any("driving like the validation data too" in step for step in hidden.next_steps)
     assert contradictions(text) == []
+    # Where disturbances make up much of the training error, nobody knows what is in them.
+    noisy = replace(hidden, train=tuple(replace(c, error=7.0) for c in hidden.train))
+    disturbed = "not told from disturbance in the training data, which err by 7 noise floors"
+    assert disturbed in noisy.meaning
+    assert any(disturbed in step for step in noisy.next_steps)
     told = hidden.to_dict()["unknown"]
     assert told["together"]["p_value"] < USUAL.strict
     assert told["foretold"]["p_value"] < USUAL.strict

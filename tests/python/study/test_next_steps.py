@@ -231,6 +231,7 @@ def said(base: Study, rng: random.Random) -> str:
             own_share(rng),
             own_share(rng),
             sure=rng.random() < 0.5,
+            against=rng.choice(("", "", "it is too small to matter")),
         )
         for e in EFFECTS[: rng.randrange(3)]
     )

@@ -1,5 +1,6 @@
 """Several effects that are added in one step."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -40,7 +41,7 @@ def test_two_are_added_together_where_the_posterior_names_both(truth: Model, sta
     assert found[0] == both
     for name, size in sizes.items():
         assert abs(found[1][name].value - size) < 4.0 * found[1][name].std
-    alike = in_place_of(found[1], both, dx)
+    alike = {e: r.names for e, r in in_place_of(found[1], both, dx).items()}
     assert alike == {"gyro_bias": (), "steer_ratio": ()}
     trail = Trail([fit])
     trail.note_several(dx, found[0], alike)
@@ -113,8 +114,13 @@ def test_what_fits_as_well_in_the_place_of_one_of_several_is_told(
     dx = diagnose(fit, candidates=[*both, "rolling_resistance", "mass"], refits=0)
     # A slope whose gravity the accelerometer does not feel is a rolling resistance.
     found = identify(bare.add(*both), train, starts=1)
-    alike = in_place_of(found, both, dx)
+    in_place = in_place_of(found, both, dx)
+    alike = {e: r.names for e, r in in_place.items()}
     assert alike == {"road_grade": ("rolling_resistance",), "gyro_bias": ()}
+    # It is the same by another name, of a parameter more.
+    (lead,) = in_place["road_grade"].leads
+    assert -USUAL.apart < lead + 0.5 * math.log(found.driving.samples) < USUAL.apart
+    assert in_place["road_grade"].better() == ()
     trail = Trail([fit])
     trail.note_several(dx, both, alike)
     assert trail.rivals["road_grade"] == ("rolling_resistance",)
@@ -126,4 +132,5 @@ def test_what_fits_as_well_in_the_place_of_one_of_several_is_told(
 
     # What parameters of the poorer model can copy has no score: the refits alone tell.
     monkeypatch.setattr(together, "beside", unscored)
-    assert in_place_of(found, ("road_grade",), dx) == {"road_grade": ("rolling_resistance",)}
+    alone = in_place_of(found, ("road_grade",), dx)
+    assert alone["road_grade"].names == ("rolling_resistance",)

@@ -15,7 +15,8 @@ struct AeroDownforce : Effect {
         .excited_by = "the same lateral acceleration at three or more speeds",
         .moves = "ay_mps2, yaw_rate_radps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "friction_change, tyre_temperature, tyre_load_sensitivity",
+        .confounded_with =
+            "friction_change, tyre_temperature, tyre_load_sensitivity, locked_differential",
         .parameters = {{.name = "cl_a_front_m2",
                         .unit = "m2",
                         .typical = 0.9,
@@ -74,7 +75,7 @@ struct HeadWind : Effect {
         .excited_by = "the same road out and back, at several speeds",
         .moves = "vx_mps, ax_mps2",
         .needs = "fx_n, vx_mps",
-        .confounded_with = "aero_drag, rolling_resistance, road_grade",
+        .confounded_with = "aero_drag, rolling_resistance, road_grade, force_gain",
         .parameters = {{.name = "speed_mps",
                         .unit = "m/s",
                         .typical = 6.0,

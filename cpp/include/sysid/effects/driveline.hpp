@@ -17,7 +17,8 @@ struct ForceGain : Effect {
         .excited_by = "accelerating and braking on a straight",
         .moves = "vx_mps, ax_mps2",
         .needs = "fx_n, vx_mps",
-        .confounded_with = "aero_drag, rolling_resistance, road_grade, mass, wheel_inertia",
+        .confounded_with =
+            "aero_drag, rolling_resistance, head_wind, road_grade, mass, wheel_inertia",
         .parameters = {{.name = "drive_error",
                         .unit = "1",
                         .typical = 0.08,
@@ -114,7 +115,7 @@ struct ForceSplit : Effect {
         .excited_by = "braking and full throttle in corners",
         .moves = "yaw_rate_radps, ay_mps2",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "combined_slip, longitudinal_load_transfer",
+        .confounded_with = "combined_slip, longitudinal_load_transfer, drive_yaw_moment",
         .parameters = {{.name = "brake_front_error",
                         .unit = "1",
                         .typical = 0.1,
@@ -149,7 +150,8 @@ struct DriveYawMoment : Effect {
         .moves = "yaw_rate_radps",
         .needs = "fx_n, vx_mps, yaw_rate_radps",
         .confounded_with =
-            "limited_slip_differential, locked_differential, longitudinal_load_transfer",
+            "limited_slip_differential, locked_differential, longitudinal_load_transfer, "
+            "tyre_load_sensitivity, force_split",
         .parameters = {{.name = "arm_m",
                         .unit = "m",
                         .typical = 0.03,
@@ -184,7 +186,8 @@ struct LockedDifferential : Effect {
         .moves = "yaw_rate_radps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
         .confounded_with =
-            "yaw_inertia, limited_slip_differential, aligning_moment, drive_yaw_moment",
+            "yaw_inertia, limited_slip_differential, aligning_moment, drive_yaw_moment, "
+            "aero_downforce",
         .parameters = {{.name = "slip_stiffness_nm2",
                         .unit = "N m2",
                         .typical = 120000.0,

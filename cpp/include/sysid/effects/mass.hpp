@@ -46,7 +46,7 @@ struct YawInertia : Effect {
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
         .confounded_with =
             "mass, tyre_relaxation, front_tyre_relaxation, rear_tyre_relaxation, "
-            "locked_differential",
+            "steer_lag, steer_delay, locked_differential",
         .parameters = {{.name = "relative_error",
                         .unit = "1",
                         .typical = 0.25,

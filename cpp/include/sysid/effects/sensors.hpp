@@ -40,7 +40,7 @@ struct SensorDelay : Effect {
         .excited_by = "sweeps of the steering, steps of the drive torque",
         .moves = "yaw_rate_radps, ay_mps2, vy_mps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "steer_lag, steer_delay, force_lag",
+        .confounded_with = "steer_lag, steer_delay, front_tyre_relaxation, force_lag",
         .parameters = {{.name = "speeds_s",
                         .unit = "s",
                         .typical = 0.06,

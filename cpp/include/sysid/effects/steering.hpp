@@ -20,7 +20,8 @@ struct SteerDelay : Effect {
         .excited_by = "fast sweeps and steps of the steering",
         .moves = "yaw_rate_radps, ay_mps2",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "tyre_relaxation, front_tyre_relaxation, steer_lag, sensor_delay",
+        .confounded_with =
+            "tyre_relaxation, front_tyre_relaxation, steer_lag, yaw_inertia, sensor_delay",
         .parameters = {{.name = "delay_s",
                         .unit = "s",
                         .typical = 0.04,
@@ -122,7 +123,8 @@ struct SteerLag : Effect {
         .excited_by = "fast sweeps and steps of the steering",
         .moves = "yaw_rate_radps, ay_mps2",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "tyre_relaxation, front_tyre_relaxation, steer_delay, sensor_delay",
+        .confounded_with =
+            "tyre_relaxation, front_tyre_relaxation, steer_delay, yaw_inertia, sensor_delay",
         .parameters = {{.name = "time_constant_s",
                         .unit = "s",
                         .typical = 0.06,

@@ -16,7 +16,9 @@ struct TyreLoadSensitivity : Effect {
         .excited_by = "braking and driving while cornering, downforce at several speeds",
         .moves = "ay_mps2, yaw_rate_radps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "lateral_load_transfer, longitudinal_load_transfer, aero_downforce",
+        .confounded_with =
+            "lateral_load_transfer, longitudinal_load_transfer, aero_downforce, combined_slip, "
+            "drive_yaw_moment",
         .parameters = {{.name = "sensitivity",
                         .unit = "1",
                         .typical = 0.25,
@@ -97,7 +99,8 @@ struct OneAxleRelaxation : Effect {
                   .equation = "(sigma_f / v_x) d(alpha_f')/dt + alpha_f' = alpha_f",
                   .moves = "yaw_rate_radps, ay_mps2",
                   .confounded_with =
-                      "tyre_relaxation, rear_tyre_relaxation, steer_lag, steer_delay, yaw_inertia",
+                      "tyre_relaxation, rear_tyre_relaxation, steer_lag, steer_delay, yaw_inertia, "
+                      "sensor_delay",
                   .states = {{"own_slip_front", "rad"}},
                   .breaks = Breaks::kAnswersLate,
               })
@@ -185,7 +188,7 @@ struct CombinedSlip : Effect {
         .excited_by = "braking and accelerating while cornering",
         .moves = "ay_mps2, yaw_rate_radps",
         .needs = "steer_rad, vx_mps, yaw_rate_radps",
-        .confounded_with = "longitudinal_load_transfer, force_split",
+        .confounded_with = "tyre_load_sensitivity, longitudinal_load_transfer, force_split",
         .parameters = {{.name = "ellipse",
                         .unit = "1",
                         .typical = 1.0,
