@@ -62,8 +62,9 @@ class Search:
         self, before: Fit, start: Fit, candidates: Sequence[str | Effect] | None, rules: Rules
     ) -> None:
         self.before, self.start, self.rules = before, start, rules
-        self._pieces = Pieces(before.driving)
-        self.alike = self._pieces.alike(start.driving)
+        known = Pieces(before.driving)
+        self._pieces = (known, Pieces(start.driving, known))
+        self.alike = known.alike(start.driving)
         model, both = start.model, (before.driving, start.driving)
         free, lacked = set(model.free_names), {e.id for e in before.model.candidates}
         effects = tuple(
