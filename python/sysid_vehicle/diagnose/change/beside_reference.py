@@ -198,12 +198,15 @@ class Differences:
         """Of both drivings."""
         return self._reference.driving.samples + self._later.driving.samples
 
-    def ratios(self, along: FloatArray, sizes: FloatArray, of: FloatArray) -> FloatArray:
+    def ratios(
+        self, along: FloatArray, sizes: FloatArray, of: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Variance of scores over what white noise would give them, at least 1.
 
         That of their long-run sums or of blocks that are taken as independent, whichever is
         larger: what a model lacks acts for as long as a manoeuvre does. And what it acts otherwise
-        in driving of another kind, as pieces of the reference tell.
+        in driving of another kind, as pieces of the reference tell; and in the second array, as
+        pieces of the later driving tell too: a change is there all the time.
 
         Parameters
         ----------
@@ -244,11 +247,14 @@ class Differences:
         chance = 1.0 + 2.0 * np.sqrt(2.0 / max(len(every), 1))
         by_block = (every**2).sum(axis=0) / naive / chance
         long_run = np.maximum(found.ratios(naive), 1.0)
-        variance = self._unlike * np.max(pieces, axis=0)
         many = along.shape[1] // few
         told = np.einsum("ij,ij->j", along, np.tile(self.information @ of, many))
-        unlike = np.tile(variance, many) * told**2 / naive
-        return as_float64(np.maximum(long_run, by_block) + unlike)
+        least = np.maximum(long_run, by_block)
+        few_cuts, every_cut = (
+            as_float64(least + self._unlike * np.tile(np.max(cuts, axis=0), many) * told**2 / naive)
+            for cuts in (pieces[:1], pieces)
+        )
+        return few_cuts, every_cut
 
 
 def _block_of(first: npt.NDArray[np.intp], where: slice) -> npt.NDArray[np.intp]:
