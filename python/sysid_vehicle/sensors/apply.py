@@ -13,6 +13,13 @@ from ..log import Log
 _SMOOTH_S = 0.2  # yaw acceleration is that of a parabola over this time
 _HALF_TAPS = 8  # of the interpolation, on either side
 _KAISER = 6.0  # its window's shape
+# What makes a channel late.
+LATE = {
+    "vx_mps": ("delay_vx_s",),
+    "vy_mps": ("delay_vy_s",),
+    "ax_mps2": ("lean_ax_s",),
+    "ay_mps2": ("delay_ay_s", "lean_ay_s"),
+}
 
 
 def corrected(log: Log, found: Mapping[str, float]) -> tuple[dict[str, FloatArray], list[str]]:
@@ -23,7 +30,8 @@ def corrected(log: Log, found: Mapping[str, float]) -> tuple[dict[str, FloatArra
     log : Log
         As read.
     found : mapping of float
-        Faults by the names of `SensorFault`.
+        Faults by the names of `SensorFault`; `lean_ax_s` and `lean_ay_s` are how late an axis is
+        because gravity by pitch and roll is a part of it.
     """
     now: dict[str, FloatArray] = {}
     what: list[str] = []
@@ -31,15 +39,12 @@ def corrected(log: Log, found: Mapping[str, float]) -> tuple[dict[str, FloatArra
     def values(channel: str) -> FloatArray:
         return now.get(channel, log[channel])
 
-    for channel, name in (
-        ("vx_mps", "delay_vx_s"),
-        ("vy_mps", "delay_vy_s"),
-        ("ay_mps2", "delay_ay_s"),
-    ):
-        if name in found and log.has(channel):
-            now[channel] = shifted(log["time_s"], values(channel), found[name])
-            when = "later" if found[name] > 0.0 else "earlier"
-            what.append(f"{channel}: taken {1000.0 * abs(found[name]):.3g} ms {when} in the file")
+    for channel, names in LATE.items():
+        late_s = sum(found.get(name, 0.0) for name in names)
+        if late_s and log.has(channel):
+            now[channel] = shifted(log["time_s"], values(channel), late_s)
+            when = "later" if late_s > 0.0 else "earlier"
+            what.append(f"{channel}: taken {1000.0 * abs(late_s):.3g} ms {when} in the file")
     for channel, bias, gain in (
         ("yaw_rate_radps", "bias_yaw_rate_radps", "gain_yaw_rate"),
         ("vy_mps", "bias_vy_mps", ""),

@@ -145,7 +145,7 @@ def _names(have: set[str]) -> list[str]:
     names = [name for name, kind in FAULTS.items() if kind.channel in have]
     if "vy_mps" not in have:
         # The lateral equation has an unknown of its own then; only its slow part is left.
-        for name in ("delay.speeds", "arm_x", "arm_y", "turn", "delay.ay_mps2"):
+        for name in ("delay.speeds", "arm_x", "arm_y", "turn", "delay.ay_mps2", "lean.ay_mps2"):
             names.remove(name)
         names.remove("gain.yaw_rate_radps")
     if "ax_mps2" not in have:

@@ -48,6 +48,9 @@ class FaultKind:
         return float(np.log1p((value / scale) ** 2) + 0.5 * (value / self.most) ** 2)
 
 
+# How late gravity by roll and pitch comes after the acceleration: 2 D/w and more towards the body's
+# natural frequency, 1 to 2 Hz with a damping of 0.2 to 0.4.
+LEAN_S, LEAN_STD_S = 0.1, 0.06
 FAULTS = {
     kind.name: kind
     for kind in (
@@ -63,6 +66,9 @@ FAULTS = {
         FaultKind("arm_x", "ay_mps2", 0.4),
         FaultKind("arm_y", "ax_mps2", 0.15),
         FaultKind("turn", "ay_mps2", 0.01),
+        # A body leans later than its wheels are pushed, more or less than is usual.
+        FaultKind("lean.ax_mps2", "ax_mps2", 1e3, LEAN_STD_S),
+        FaultKind("lean.ay_mps2", "ay_mps2", 1e3, LEAN_STD_S),
     )
 }
 _SPEEDS = ("vx_mps", "vy_mps")  # of one device as a rule
@@ -113,6 +119,8 @@ def predict(
     late_s = faults.get(f"delay.{name}", 0.0)
     if name in _SPEEDS:
         late_s += faults.get("delay.speeds", 0.0)
+    share, lean_s = lean(name, faults)
+    late_s += share * lean_s
     time_s = readings.time_s - late_s
     quick = grid.quick(readings.stretch, time_s)
     if name in ("ax_mps2", "ay_mps2"):
@@ -126,6 +134,9 @@ def predict(
         blocks = [(columns, gain * quick.weights[0])]
         by_fault = {f"gain.{name}": value, f"bias.{name}": np.ones_like(value)}
     by_fault[f"delay.{name}"] = -rate
+    if share:
+        by_fault[f"lean.{name}"] = -share * rate
+        by_fault[f"gain.{name}"] -= (1.0 - share) ** 2 * lean_s * rate
     if name in _SPEEDS:
         by_fault["delay.speeds"] = -rate
     columns = np.concatenate([c for c, _ in blocks], axis=1)
@@ -135,6 +146,17 @@ def predict(
         (weights.ravel(), columns.ravel(), np.arange(0, n * k + 1, k)), shape=(n, grid.size)
     )
     return expected, by_motion, {key: d for key, d in by_fault.items() if key in faults}
+
+
+def lean(channel: str, faults: dict[str, float]) -> tuple[float, float]:
+    """Share of gravity by roll or pitch in what an axis feels, and how late that share is [s].
+
+    Both are 0 where the axis feels too little: gravity only adds.
+    """
+    gain = faults.get(f"gain.{channel}", 0.0)
+    if gain <= 0.0 or f"lean.{channel}" not in faults:
+        return 0.0, 0.0
+    return gain / (1.0 + gain), LEAN_S + faults[f"lean.{channel}"]
 
 
 def _evaluate(

@@ -1,7 +1,11 @@
 """Maximum likelihood of sensor faults, with the motion, the road and the noise unknown beside.
 
 Gauss-Newton over the splines of the motion and the faults at once; the faults' information is the
-Schur complement, so that their intervals hold whatever the motion was. Noise is learned from
+Schur complement, so that their intervals hold whatever the motion was. What a fault does to the
+readings is taken from a smoothed motion, as an instrument: the estimated one follows the noise of
+all sensors, and noise times the derivative of noise moves delays and places by more than the rest
+together. Smoothed or not, the motion is independent of the errors that it leaves, so that nothing
+is biased (W. A. Fuller, Measurement Error Models, Wiley 1987, sec. 2.4). Noise is learned from
 errors of motions drawn from the posterior (Monte Carlo EM: Wei & Tanner, JASA 85 (1990), 699-704),
 because the errors of the best motion alone are too small where it follows the noise. The splines
 are those of P. Furgale, T. D. Barfoot, G. Sibley, Continuous-time batch estimation using temporal
@@ -159,6 +163,9 @@ def estimate(
     for count in range(1, _ROUNDS + 1):
         check_time()
         system = linearise(readings, grid, x, faults, colours, runs)
+        system = system.with_faults_at(
+            linearise(readings, grid, grid.smoothed(x), faults, colours, runs)
+        )
         rows = _rows(readings, grid, road)
         now = np.array([faults[name] for name in names])
         # Cauchy's prior at its present curvature.
@@ -185,10 +192,9 @@ def estimate(
             if count % _ROAD_ROUNDS == 0:
                 for signal in SLOW:
                     road[signal] = _road(steps[signal], x, normal.band, road[signal])
-    # The motion has followed the noise, whose derivatives are large: on a smooth one delays are not
-    # told from places by what is noise. Faults that act alike where there are none look told apart
-    # where the estimate has left zero: a delay at constant speed is the place of the IMU, up to
-    # the square of the delay.
+    # On a smooth motion delays are not told from places by what is noise. Faults that act alike
+    # where there are none look told apart where the estimate has left zero: a delay at constant
+    # speed is the place of the IMU, up to the square of the delay.
     calm = grid.smoothed(x)
 
     def smooth(at: FloatArray) -> FloatArray:

@@ -13,8 +13,6 @@ from .estimate import Estimate
 from .faults import SensorFault, to_put_right
 
 _DELAYS = ("delay_vx_s", "delay_vy_s", "delay_ay_s")
-# Of the part of a_y that is gravity by roll, how late: 2 D/w of a body that rolls at 1 Hz, D = 0.3.
-_ROLL_LATE_S = 0.1
 _LEVEL_MPS2 = 0.05  # change of gravity within a second, on a road that counts as level
 
 
@@ -47,10 +45,6 @@ def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], l
     if max(found.estimate.road_mps2.values()) > _LEVEL_MPS2:
         return own, rest, False
     late = to_put_right([found[name] for name in _DELAYS])
-    gain = found["gain_ay"]
-    # What the body's roll makes late is no delay of the sensor.
-    if gain.found and 0.0 < late.get("delay_ay_s", 0.0) < _ROLL_LATE_S * gain.value:
-        del late["delay_ay_s"]
     if not late:
         return own, rest, False
     done = [log.corrected(*corrected(log, late)) for log in ready]

@@ -16,9 +16,9 @@ from .._common.text import html_list, html_paragraph, html_table, number, text_t
 from ..errors import InvalidInput, near_names
 from ..log import Log
 from ..vehicle import Vehicle
-from .apply import corrected
+from .apply import LATE, corrected
 from .colour import Colour
-from .equations import Readings
+from .equations import Readings, lean
 from .estimate import Estimate
 from .faults import SensorFault, to_put_right
 from .motion import Stretch
@@ -42,11 +42,7 @@ _SETTLED = {
     "accelerometer_scale": ("gain_ax", "gain_ay"),
 }
 _GAINS = {"ax_mps2": "gain_ax", "ay_mps2": "gain_ay", "yaw_rate_radps": "gain_yaw_rate"}
-_DELAYS = {
-    "vx_mps": "delay_vx_s",
-    "vy_mps": "delay_vy_s",
-    "ay_mps2": "delay_ay_s",
-}
+_LEANING = {"ax_mps2": "gain_ax", "ay_mps2": "gain_ay"}
 _BIASES = {"yaw_rate_radps": "bias_yaw_rate_radps", "vy_mps": "bias_vy_mps"}
 
 
@@ -130,14 +126,23 @@ class SensorCheck:
     @property
     def map_lines(self) -> tuple[str, ...]:
         """Lines for the table ``[channels]`` of a channel map that put right what was found."""
-        values, lines = to_put_right(self.faults), []
+        values, lines = self._taken_out, []
         for channel in MOVING:
-            delay, gain, bias = (
-                values.get(table.get(channel, ""), 0.0) for table in (_DELAYS, _GAINS, _BIASES)
-            )
+            gain, bias = (values.get(table.get(channel, ""), 0.0) for table in (_GAINS, _BIASES))
+            delay = sum(values.get(name, 0.0) for name in LATE.get(channel, ()))
             if delay or gain or bias:
                 lines.append(map_line(channel, delay, gain, bias))
         return tuple(lines)
+
+    @cached_property
+    def _taken_out(self) -> dict[str, float]:
+        """What a log is freed of: with gravity by roll and pitch goes what it makes late."""
+        values = to_put_right(self.faults)
+        for channel, gain in _LEANING.items():
+            if gain in values:
+                share, late_s = lean(channel, self.estimate.faults)
+                values[f"lean_{channel[:2]}_s"] = share * max(late_s, 0.0)
+        return values
 
     def apply(self, log: Log) -> Log:
         """Return the log with what was found put right, and with what was done recorded.
@@ -149,7 +154,7 @@ class SensorCheck:
         a_x is what drives the car, and its mean beyond the motion is taken out: bias of the sensor
         and slope of the road are one there. That of a_y is left to the tyres, which can tell them.
         """
-        channels, what = corrected(log, to_put_right(self.faults))
+        channels, what = corrected(log, self._taken_out)
         bias, std = self.offsets["ax_mps2"]
         if log.has("ax_mps2") and not log.has("fx_n") and abs(bias) > _SURE * std:
             channels["ax_mps2"] = channels.get("ax_mps2", log["ax_mps2"]) - bias
@@ -170,7 +175,7 @@ class SensorCheck:
                 said.append(
                     f"{channel}: the scale is that of an accelerometer on a body with a {axis} "
                     f"gradient of {gradient(fault.value):.3g} deg/g ({low:.3g} to {high:.3g}); "
-                    f"kinematics cannot tell it from a scale error"
+                    f"kinematics cannot tell it from a scale error{self._leaning(channel)}"
                 )
         for signal in self.signals:
             if signal.held_rows:
@@ -190,6 +195,13 @@ class SensorCheck:
                 "none of these faults describes; take the intervals with care"
             )
         return tuple(said)
+
+    def _leaning(self, channel: str) -> str:
+        share, late_s = lean(channel, self.estimate.faults)
+        if not share:
+            return ""
+        about = 1000.0 * share * late_s
+        return f"; delays stand beside the {about:.2g} ms by which such a body makes it late"
 
     def _rows(self) -> list[tuple[str, ...]]:
         rows: list[tuple[str, ...]] = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -63,6 +63,10 @@ class Linearised:
     by_faults: dict[str, FloatArray]
     white: dict[str, FloatArray]
     weights: dict[str, FloatArray]
+
+    def with_faults_at(self, other: Linearised) -> Linearised:
+        """The same errors, with what faults do to the readings taken from another motion."""
+        return replace(self, raw_faults=other.raw_faults, by_faults=other.by_faults)
 
 
 def linearise(

@@ -33,6 +33,8 @@ _OTHER = {
     "arm_x": "an IMU ahead of the speed sensor",
     "arm_y": "an IMU left of the speed sensor",
     "turn": "a turned IMU",
+    "lean.ax_mps2": "a body that pitches late",
+    "lean.ay_mps2": "a body that rolls late",
 }
 ON_CORRECTION = (
     "delay of steer_rad: kinematics does not know the steering",

@@ -173,15 +173,15 @@ def test_driving_is_as_unlike_as_its_kinds_differ(truth: Model, before: Fit) -> 
 def test_variance_between_pieces_is_found(before: Fit, rng: np.random.Generator) -> None:
     """That of estimates which differ from piece to piece, and none of white noise."""
     pieces = Pieces(before.driving)
-    count, many = len(pieces.first), 4000
+    count, many = int(pieces.cuts[0].max()) + 1, 4000
     information = rng.uniform(50.0, 200.0, size=(count, many))
     noise = np.sqrt(information) * rng.normal(size=(count, many))
     off = 0.5 * rng.normal(size=(count, many))
-    few = pieces.variance(noise, information)
-    more = pieces.variance(information * off + noise, information)
+    few = pieces.variance(0, noise, information)
+    more = pieces.variance(0, information * off + noise, information)
     # What white noise feigns goes down with the information; what differs does not.
     assert few.mean() < 0.05 * more.mean()
-    scale = pieces.variance(information * 2.0 * off, information).mean()
+    scale = pieces.variance(0, information * 2.0 * off, information).mean()
     assert scale == pytest.approx(4.0 * more.mean(), rel=0.1)
 
 
@@ -313,7 +313,8 @@ class Told:
     def __init__(self, put: tuple[str, ...], p_values: dict[str, float]) -> None:
         self.put, self._p_values = put, p_values
 
-    def off_nothing(self, effect: str, _: object) -> float:
+    def off_nothing(self, effects: tuple[str, ...], _: object) -> float:
+        (effect,) = effects
         return self._p_values[effect]
 
 
@@ -358,7 +359,7 @@ def test_differences_are_those_of_all_unknowns_together(fit: Fit, rng: np.random
     precision, centre = np.array([0.0, 5.0, 50.0, 0.0]), np.array([0.0, 0.2, 0.0, 0.0])
     shift = np.array([0.0, 0.1, 0.0, -0.2])
     before, after = Drawn(G_before, e_before, fit.driving), Drawn(G_after, e_after, fit.driving)
-    pieces = Pieces(fit.driving)
+    pieces = (Pieces(fit.driving),) * 2
     found = Differences(before, after, shift, Shared(precision, centre), pieces, 0.0)
     # Unknowns: what both share, then what changed; residuals of the later one begin at the shift.
     zero = np.zeros((rows, n))
@@ -375,7 +376,7 @@ def test_differences_are_those_of_all_unknowns_together(fit: Fit, rng: np.random
     covariance = np.linalg.inv(whole.T @ whole)[n:, n:]
     assert np.linalg.inv(found.information) == pytest.approx(covariance, rel=1e-6)
     one, none = np.eye(n), np.zeros((n, n))
-    ratios = found.ratios(one, none, one)
+    ratios, _ = found.ratios(one, none, one)
     assert np.all((ratios >= 1.0) & (ratios < 2.5))  # the noise is white
     # Driving of another kind: an estimate may be off by what pieces of the reference differ by.
     G_before[: rows // 2] *= 3.0
@@ -385,4 +386,13 @@ def test_differences_are_those_of_all_unknowns_together(fit: Fit, rng: np.random
         Differences(moved, after, shift, Shared(precision, centre), pieces, unlike)
         for unlike in (0.0, 1.0)
     )
-    assert other.ratios(one, none, one)[0] > 10.0 * same.ratios(one, none, one)[0]
+    assert other.ratios(one, none, one)[0][0] > 10.0 * same.ratios(one, none, one)[0][0]
+    # So it may be by what pieces of the later driving do, or its kinds: a change is there always.
+    G_after[::2] *= 3.0
+    off = 0.2 * np.sign(fit.driving.channel("yaw_rate_radps"))
+    turned = Drawn(G_after, e_after + G_after[:, 0] * np.repeat(off, 5), fit.driving)
+    same, other = (
+        Differences(before, turned, shift, Shared(precision, centre), pieces, unlike)
+        for unlike in (0.0, 1.0)
+    )
+    assert other.ratios(one, none, one)[1][0] > 10.0 * same.ratios(one, none, one)[1][0]

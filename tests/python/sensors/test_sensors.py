@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from smooth_log import drift
 
 import sysid_vehicle as sv
@@ -144,7 +145,7 @@ def test_faults_are_named_with_their_size(faulty: sv.SensorCheck) -> None:
     for name, true in TRUTH.items():
         fault = faulty[name]
         assert abs(fault.value - true) < 3.0 * fault.std, fault
-        assert fault.std < 0.1 * true, fault
+        assert fault.std < 0.2 * true, fault  # other noise moves the place by a sixth
     low, high = faulty["gain_ay"].interval
     assert low < np.radians(5.0) < high
     assert any("roll gradient" in text for text in faulty.remarks)
@@ -168,7 +169,7 @@ def test_a_turned_speed_sensor_is_no_bias_of_the_lateral_speed(perfect: Channels
 
 def test_a_log_put_right_holds_no_fault_any_more(faulty: sv.SensorCheck, perfect: Channels) -> None:
     right = faulty.apply(faulty.logs[0])
-    assert len(right.corrections) == 3
+    assert len(right.corrections) == 4  # a_y is late too: a body that leans takes its time
     assert right.corrections[0] in str(right)
     assert right.between(5.0, 10.0).corrections == right.corrections
     for name, most in (("ay_mps2", 0.1), ("vy_mps", 0.04), ("yaw_rate_radps", 3e-3)):
@@ -207,6 +208,21 @@ def test_a_slow_channel_enters_at_its_own_times(perfect: Channels) -> None:
     for name in ("gain_ay", "delay_vy_s"):
         assert abs(found[name].value - TRUTH[name]) < 3.5 * found[name].std
         assert found[name].found
+
+
+def test_estimates_scatter_no_more_than_they_say(perfect: Channels) -> None:
+    """Noise times the derivative of noise would move delays and places by several times that."""
+    rng, names = np.random.default_rng(40), ("delay_ay_s", "delay_vy_s", "imu_forward_m")
+    off = []
+    for seed in range(6):
+        c = noisy(perfect, 50 + seed)
+        for name in ("ax_mps2", "ay_mps2"):
+            fresh = rng.standard_normal(c[name].size) * 0.03 * np.sqrt(1.0 - np.exp(-0.02 / 0.3))
+            c[name] = c[name] + lfilter([1.0], [1.0, -np.exp(-0.01 / 0.3)], fresh)
+        found = sv.check(as_log(c))
+        assert found.found == ()
+        off.append([found[name].value / found[name].std for name in names])
+    assert float(np.max(np.sqrt(np.mean(np.square(off), axis=0)))) < 1.3
 
 
 def test_what_is_not_logged_cannot_be_told(perfect: Channels) -> None:

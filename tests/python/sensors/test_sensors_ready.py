@@ -257,13 +257,15 @@ def test_a_body_that_rolls_makes_no_sensor_late(truth: sv.Model) -> None:
     roll = {"body_roll.roll_per_g_rad": 0.09, "body_roll.frequency_hz": 1.5}
     rolling = truth.add("body_roll").with_values(roll)
     log = sv.drive(rolling, sv.manoeuvres.lap(60.0), seed=3)
-    late = sv.check(log)["delay_ay_s"]
-    assert late.found  # by kinematics, which know no roll
-    assert 0.002 < late.value < 0.01
+    check = sv.check(log)
+    assert check["gain_ay"].found
+    assert not check["delay_ay_s"].found
+    # What the roll made late goes with it: put right, the log holds neither.
+    assert not sv.check(check.apply(log)).found
     assert not made_ready([log], [])[2]
     # A sensor that is later than that is told on the same car.
     ay = np.interp(log["time_s"] - 0.03, log["time_s"], log["ay_mps2"])
     own, _, delayed = made_ready([_with(log, ay_mps2=ay)], [])
     assert delayed
     (moved,) = (text for text in own[0].corrections if text.startswith("ay_mps2: taken"))
-    assert float(moved.split()[2]) == pytest.approx(35.0, abs=4.0)
+    assert float(moved.split()[2]) == pytest.approx(30.0, abs=4.0)

@@ -159,8 +159,8 @@ class Differences:
     shift : array, shape (n,)
         By which parameters of the model of `later` differ already.
     known : Shared
-    pieces : Pieces
-        Of the reference.
+    pieces : tuple of Pieces
+        Of the reference and of the later driving.
     unlike : float
         How far the later driving is from it (`Alike`).
 
@@ -176,7 +176,7 @@ class Differences:
         later: Side,
         shift: FloatArray,
         known: Shared,
-        pieces: Pieces,
+        pieces: tuple[Pieces, Pieces],
         unlike: float,
     ) -> None:
         self._reference, self._later, self._shift = reference, later, shift
@@ -198,12 +198,15 @@ class Differences:
         """Of both drivings."""
         return self._reference.driving.samples + self._later.driving.samples
 
-    def ratios(self, along: FloatArray, sizes: FloatArray, of: FloatArray) -> FloatArray:
+    def ratios(
+        self, along: FloatArray, sizes: FloatArray, of: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Variance of scores over what white noise would give them, at least 1.
 
         That of their long-run sums or of blocks that are taken as independent, whichever is
         larger: what a model lacks acts for as long as a manoeuvre does. And what it acts otherwise
-        in driving of another kind, as pieces of the reference tell.
+        in driving of another kind, as pieces of the reference tell; and in the second array, as
+        pieces of the later driving tell too: a change is there all the time.
 
         Parameters
         ----------
@@ -215,11 +218,13 @@ class Differences:
         mean = np.einsum("ij,ij->j", along, self.score[:, None] - self.information @ sizes)
         found = LongRun(self.samples, along.shape[1])
         sums = []
-        cuts, few = self._pieces.first, of.shape[1]
-        own_score, own_information = np.zeros((2, len(cuts), few))
-        for side, shared in ((self._reference, 0.0), (self._later, 1.0)):
+        few = of.shape[1]
+        pieces: list[FloatArray] = []
+        sides = ((self._reference, 0.0), (self._later, 1.0))
+        for (side, shared), cut_up in zip(sides, self._pieces, strict=True):
             first = blocks(side.driving, BLOCK_S)
             own = np.zeros((len(first), along.shape[1]))
+            told_by = [np.zeros((2, cut.max(initial=0) + 1, few)) for cut in cut_up.cuts]
             known = self._common - shared * self._shift
             turned = shared * np.eye(len(known)) - self._response
             for where, G, e in side.rows():
@@ -229,25 +234,27 @@ class Differences:
                 terms -= mean / self.samples
                 found.add(terms)
                 np.add.at(own, _block_of(first, where), terms)
-                if side is self._reference:
-                    at = np.repeat(_block_of(cuts, where), _core.CHANNELS)
+                S = G @ of
+                several = np.stack([S * (left[:, None] - G @ off[:, :few]), S**2])
+                for cut, own_sums in zip(cut_up.cuts, told_by, strict=True):
+                    at = np.repeat(cut[where], _core.CHANNELS)
                     for k in np.unique(at):
-                        rows = slice(*np.searchsorted(at, [k, k + 1]))
-                        S = G[rows] @ of
-                        R = left[rows, None] - G[rows] @ off[:, :few]
-                        own_score[k] += np.einsum("ij,ij->j", S, R)
-                        own_information[k] += np.einsum("ij,ij->j", S, S)
+                        own_sums[:, k] += several[:, at == k].sum(axis=1)
             sums.append(own)
+            pieces += [cut_up.variance(k, *own_sums) for k, own_sums in enumerate(told_by)]
         naive = np.maximum(np.einsum("ij,ij->j", along, self.information @ along), 1e-300)
         every = np.vstack(sums)
         chance = 1.0 + 2.0 * np.sqrt(2.0 / max(len(every), 1))
         by_block = (every**2).sum(axis=0) / naive / chance
         long_run = np.maximum(found.ratios(naive), 1.0)
-        variance = self._unlike * self._pieces.variance(own_score, own_information)
         many = along.shape[1] // few
         told = np.einsum("ij,ij->j", along, np.tile(self.information @ of, many))
-        unlike = np.tile(variance, many) * told**2 / naive
-        return as_float64(np.maximum(long_run, by_block) + unlike)
+        least = np.maximum(long_run, by_block)
+        few_cuts, every_cut = (
+            as_float64(least + self._unlike * np.tile(np.max(cuts, axis=0), many) * told**2 / naive)
+            for cuts in (pieces[:1], pieces)
+        )
+        return few_cuts, every_cut
 
 
 def _block_of(first: npt.NDArray[np.intp], where: slice) -> npt.NDArray[np.intp]:

@@ -113,6 +113,31 @@ class EffectChange:
         return f"{self.id}: {self.size}"
 
 
+@dataclass(frozen=True)
+class Load:
+    """A load that was put into the car, or taken out of it.
+
+    Attributes
+    ----------
+    mass_kg, mass_std_kg : float
+        Negative where it was taken out.
+    rearward_m, rearward_std_m : float
+        How far behind the centre of gravity of the car without the change, and standard error.
+    """
+
+    mass_kg: float
+    mass_std_kg: float
+    rearward_m: float
+    rearward_std_m: float
+
+    def __str__(self) -> str:
+        what = "a load of" if self.mass_kg > 0.0 else "taking out"
+        where = "behind" if self.rearward_m > 0.0 else "ahead of"
+        mass = with_error(abs(self.mass_kg), self.mass_std_kg)
+        place = with_error(abs(self.rearward_m), self.rearward_std_m)
+        return f"{what} {mass} kg, {place} m {where} the centre of gravity,"
+
+
 @dataclass(frozen=True, eq=False)
 class Change(Printed):
     """What changed since the reference.
@@ -158,6 +183,23 @@ class Change(Printed):
         """Changes that are there and that no effect of the catalogue explains."""
         return tuple(s for s in self.causes.sets if s.effects[0].startswith(UNKNOWN))
 
+    @property
+    def load(self) -> Load | None:
+        """The load that changes mass and centre of gravity as they are named; None without both."""
+        named = {e.id: e for e in self.named}
+        if not {"mass", "cg_position"} <= set(named):
+            return None
+        before = self.before.model
+        own = "mass.relative_error"
+        mass = before.vehicle.mass_kg
+        mass *= 1.0 + (before.value(own) if own in before.parameters else 0.0)
+        (more,), (more_std,) = named["mass"].value, named["mass"].std
+        (back,), (back_std,) = named["cg_position"].value, named["cg_position"].std
+        # The whole is in balance: (m + load) shift = load place.
+        place = back * (1.0 + more) / more
+        std = np.hypot(back_std * (1.0 + more) / more, back * more_std / more**2)
+        return Load(mass * more, mass * more_std, place, float(std))
+
     def _headline(self) -> str:
         leading = [e for e in self.named if not any(self._before(g, e) for g in e.group)]
         told = [f"{e} ({', or else '.join((e.sure, *e.group))})" for e in leading]
@@ -192,6 +234,8 @@ class Change(Printed):
             "same again to be sure"
         )
         told = [other] if self.alike.beyond > self.rules.taken else []
+        if self.load is not None:
+            told.insert(0, f"mass and centre of gravity: as {self.load} would change them")
         return [self._headline(), *told, Table(self._HEAD, self._rows())]
 
     def to_pandas(self) -> Any:

@@ -29,7 +29,7 @@ from ..candidates.causes import Causes, CredibleSet
 from ..candidates.possible import possible
 from .change import Change, EffectChange, Said
 from .changes_compete import Competition
-from .may_change import YAW_INERTIA, May
+from .may_change import YAW_INERTIA, May, as_one
 from .reference import Exact
 from .search import Search
 
@@ -167,6 +167,25 @@ class _Said:
         own = self.search.reference.factors(state)
         return {n: x / own.get(n, 1.0) for n, x in told_by.items()}
 
+    def _off_nothing(self, effect: str, state: Exact, told: Competition) -> bool:
+        """Whether a size is beyond what pieces of the drivings differ by, as far as a name asks.
+
+        What stands in for a lack of the model gains likelihood as a change does. Tyres are told
+        along their stiffness, not by one parameter.
+        """
+        m = self.search.can[effect]
+        if m in self.search.tyres:
+            return True
+        stds, bound = [told.stds[n] for n in m.names], self.search.rules.bound
+        return any(
+            abs(state.changes[n]) > told.least(s, usual) - bound * s
+            for n, s, usual in zip(m.names, stds, m.scale, strict=True)
+        )
+
+    def _one(self, effect: str, state: Exact) -> tuple[str, ...]:
+        """What was put in as one change with an effect."""
+        return next(several for several in as_one(state.put) if effect in several)
+
     def _in_place(self, effect: str, of: CredibleSet, state: Exact) -> Exact | None:
         """The state with an effect in place of another one of its set, where it was visited."""
         others = frozenset(state.put) - set(of.effects)
@@ -176,7 +195,9 @@ class _Said:
         self, effect: str, state: Exact, told: Competition, ratio: float
     ) -> CredibleSet | None:
         """What may have changed in place of an effect that was put in; None where nothing need."""
-        others = frozenset(state.put) - {effect}
+        if not self._off_nothing(effect, state, told):
+            return None
+        others = frozenset(state.put) - set(self._one(effect, state))
         here = self.search.evidence(state, told, ratio)
         log_odds = self.search.odds(effect, state, told)
         linear = told.causes.of(effect)

@@ -16,7 +16,7 @@ from ..candidates.single_effects import Hypothesis, ScoreModel
 from ..evidence.projection import pseudo_inverse
 from ..unexplained.omnibus import LEAST_LEFT
 from .beside_reference import Differences
-from .may_change import May
+from .may_change import May, as_one
 
 _MOST = 6  # effects of the sum
 _SINGULAR = 1e-6  # of the eigenvalues of what an unknown force does
@@ -164,11 +164,12 @@ class Competition:
                 told[np.ix_(own, own)] = along[np.ix_(own, own)]
         turned = self._turns @ np.hstack([along, np.eye(n)])
         off = self._turns @ np.hstack([sizes, sizes])
-        ratios = self._differences.ratios(turned, off, self._turns @ told)
+        ratios, wide = self._differences.ratios(turned, off, self._turns @ told)
         for m in self._may:
-            for name, c in zip(m.names, self._whole[m.id].columns, strict=True):
+            own = list(self._whole[m.id].columns)
+            for name, c in zip(m.names, own, strict=True):
                 self.sizes[name] = float(mine[c, 0])
-                self.stds[name] = float(mine[c, 1] * np.sqrt(ratios[c]))
+                self.stds[name] = float(mine[c, 1] * np.sqrt(wide[c]))
         ratio = ratios[n:]
         for name, h in self._whole.items():
             own = list(h.columns)
@@ -199,19 +200,23 @@ class Competition:
             columns = self._whole[name].columns
             off[list(columns), 0] = [changes.get(n, 0.0) for n in self._of(name).names]
         turned = (self._turns @ x for x in (along, off, of))
-        return float(np.sqrt(variance * self._differences.ratios(*turned)[0]))
+        return float(np.sqrt(variance * self._differences.ratios(*turned)[1][0]))
 
-    def off_nothing(self, effect: str, changes: Mapping[str, float]) -> float:
-        """Of a change that was put in, the p-value of nothing by lines, beside the others.
+    def off_nothing(self, effects: Sequence[str], changes: Mapping[str, float]) -> float:
+        """Of what was put in as one change, the p-value of nothing by lines, beside the others.
 
         Lines know unknown forces that both drivings share, which no likelihood of named effects
         does: that gains from what the model lacks by whatever is fitted.
         """
-        beside = [p for p in self._put if p != effect and self._alike[effect, p] < self._rules.near]
-        both, inverse = self._solved([*beside, effect])
-        columns = list(self._whole[effect].columns)
+        beside = [
+            p
+            for p in self._put
+            if p not in effects and all(self._alike[e, p] < self._rules.near for e in effects)
+        ]
+        both, inverse = self._solved([*beside, *effects])
+        columns = [c for e in effects for c in self._whole[e].columns]
         own = [both.index(c) for c in columns]
-        size = np.array([changes[n] for n in self._of(effect).names])
+        size = np.array([changes[n] for e in effects for n in self._of(e).names])
         known, rank = pseudo_inverse(inverse[np.ix_(own, own)])
         wald = float(size @ known @ size) / float(self._ratio[columns].max())
         return float(scipy.stats.chi2.sf(wald, rank))
@@ -282,7 +287,7 @@ class Competition:
         known = np.eye(len(columns)) + block / self.ratio_of(put)
         sizes = (self._turns.T @ shift)[columns] / scale
         occam = 0.5 * float(np.linalg.slogdet(known)[1]) + 0.5 * float(sizes @ sizes)
-        return occam + len(put) * self._of_one
+        return occam + len(as_one(put)) * self._of_one
 
     @property
     def _of_one(self) -> float:

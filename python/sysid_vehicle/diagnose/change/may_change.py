@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from ...effects import Effect, Parameter
@@ -13,6 +14,8 @@ from ..candidates.posterior import forms
 YAW_INERTIA = "yaw_inertia_kgm2"
 # Priors of changed tyres, as shares of their values; E is itself a share.
 _TYRES = {"B": 0.2, "C": 0.1, "D": 0.15, "E": 0.5}
+# A load changes these together, and counts as one change.
+PAYLOAD = ("mass", "cg_position", "yaw_inertia")
 _INERTIA = 0.25  # the same of a yaw inertia that nobody knows
 
 
@@ -42,6 +45,14 @@ class May:
     def scale(self) -> tuple[float, ...]:
         """Prior standard deviations."""
         return tuple(p.typical for p in self.parameters)
+
+
+def as_one(put: Iterable[str]) -> list[tuple[str, ...]]:
+    """What was put in, one by one; with a payload as one change."""
+    several = tuple(put)
+    if not set(PAYLOAD) <= set(several):
+        return [(e,) for e in several]
+    return [PAYLOAD, *((e,) for e in several if e not in PAYLOAD)]
 
 
 def difference(p: Parameter, usual: float) -> Parameter:

@@ -56,25 +56,31 @@ class Pieces:
         First samples.
     """
 
-    def __init__(self, before: Driving) -> None:
-        self.first = blocks(before, min(BLOCK_S, before.usable_s / _PIECES))
-        self._known = known = _Kind(before)
-        self._width = np.maximum(known.spread, 1e-9)
+    def __init__(self, driving: Driving, like: Pieces | None = None) -> None:
+        first = blocks(driving, min(BLOCK_S, driving.usable_s / _PIECES))
+        self._known = known = _Kind(driving)
+        own = np.maximum(known.spread, 1e-9)
+        self._width: FloatArray = own if like is None else like._width
         self._among = self._kernel(known.points, known.points)
-        of = np.searchsorted(self.first, known.at, "right") - 1
+        every = np.searchsorted(first, np.arange(driving.samples), "right") - 1
+        self.cuts = (every, _by_kind(driving))
+        self._apart = [self._between(cut[known.at]) for cut in self.cuts]
+
+    def _between(self, of: npt.NDArray[np.intp]) -> float:
+        """Mean squared distance of pieces from the whole."""
         apart = []
         for k in np.unique(of):
-            own = np.where(of == k, known.weights, 0.0)
-            off = own / own.sum() - known.weights
+            own = np.where(of == k, self._known.weights, 0.0)
+            off = own / own.sum() - self._known.weights
             apart.append(float(off @ self._among @ off))
-        self._apart = max(float(np.mean(apart)), 1e-9) if apart else 1.0
+        return max(float(np.mean(apart)), 1e-9) if apart else 1.0
 
     def _kernel(self, a: FloatArray, b: FloatArray) -> FloatArray:
         off = (a[:, None] - b[None]) / self._width
         return as_float64(np.exp(-0.5 * (off**2).sum(axis=2)))
 
-    def variance(self, score: FloatArray, information: FloatArray) -> FloatArray:
-        """Of what estimates are off by from one kind of driving to the other.
+    def variance(self, cut: int, score: FloatArray, information: FloatArray) -> FloatArray:
+        """Of what estimates are off by from one kind of driving to the other, as one cut tells.
 
         Parameters
         ----------
@@ -92,7 +98,7 @@ class Pieces:
         Q = (information * (own - mean) ** 2).sum(axis=0)
         excess = np.maximum(Q - np.maximum(told.sum(axis=0) - 1.0, 0.0), 0.0)
         spread = whole - (information**2).sum(axis=0) / whole
-        return as_float64(excess / np.maximum(spread, 1e-12 * whole) / self._apart)
+        return as_float64(excess / np.maximum(spread, 1e-12 * whole) / self._apart[cut])
 
     def alike(self, later: Driving) -> Alike:
         """Compare later driving.
@@ -109,6 +115,18 @@ class Pieces:
         apart = other @ self._kernel(new.points, new.points) @ other - 2.0 * other @ cross @ own
         unlike = float(apart + own @ self._among @ own)
         return Alike(float(other[beyond].sum()), max(unlike, 0.0))
+
+
+def _by_kind(driving: Driving) -> npt.NDArray[np.intp]:
+    """Of each sample the kind: slow to fast by left to right, three of each."""
+    speed = driving.channel("vx_mps")
+    of = np.zeros(driving.samples, dtype=np.intp)
+    for values in (speed, speed * driving.channel("yaw_rate_radps")):
+        told = np.isfinite(values)
+        if told.any():
+            edges = np.quantile(values[told], [1.0 / 3.0, 2.0 / 3.0])
+            of = 3 * of + np.searchsorted(edges, np.where(told, values, edges[0]))
+    return of
 
 
 class _Kind:

@@ -17,7 +17,7 @@ from ..candidates.clocks import CLOCKS
 from ..candidates.possible import considered
 from .beside_reference import Differences, Side
 from .changes_compete import Competition
-from .may_change import YAW_INERTIA, of_clock, of_effect, of_inertia, of_tyre
+from .may_change import PAYLOAD, YAW_INERTIA, as_one, of_clock, of_effect, of_inertia, of_tyre
 from .pieces import Pieces
 from .reference import Exact, Reference
 
@@ -62,8 +62,9 @@ class Search:
         self, before: Fit, start: Fit, candidates: Sequence[str | Effect] | None, rules: Rules
     ) -> None:
         self.before, self.start, self.rules = before, start, rules
-        self._pieces = Pieces(before.driving)
-        self.alike = self._pieces.alike(start.driving)
+        known = Pieces(before.driving)
+        self._pieces = (known, Pieces(start.driving, known))
+        self.alike = known.alike(start.driving)
         model, both = start.model, (before.driving, start.driving)
         free, lacked = set(model.free_names), {e.id for e in before.model.candidates}
         effects = tuple(
@@ -90,7 +91,8 @@ class Search:
         # Lines are drawn from the reference: where nothing may change it goes far from any car.
         told = self.told(replace(begin, fit=self.start, shift=np.zeros_like(begin.shift)))
         alone = [(e,) for e in told.alone if e in self.can][:_TRIED]
-        for few in (self._leading(told, begin), *alone):
+        load = [PAYLOAD] if self.can.keys() >= set(PAYLOAD) else []
+        for few in (self._leading(told, begin), *alone, *load):
             self._visit(few, told)
         state = max(self.visited.values(), key=lambda s: self.evidence(s, told, 1.0))
         seen: set[tuple[str, ...]] = set()
@@ -127,9 +129,9 @@ class Search:
         """
         for _ in range(_ROUNDS):
             while state.put:
-                p_values = {e: told.off_nothing(e, state.changes) for e in state.put}
+                p_values = {e: told.off_nothing(e, state.changes) for e in as_one(state.put)}
                 least = max(p_values, key=lambda e: p_values[e])
-                rest = tuple(e for e in state.put if e != least)
+                rest = tuple(e for e in state.put if e not in least)
                 if p_values[least] <= 1.0 - self.rules.credible:
                     break
                 self._visit(rest, told)
