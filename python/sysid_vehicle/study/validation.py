@@ -27,10 +27,10 @@ _PIECE_S, _FEWEST_PIECES = 5.0, 6
 _TRIMMED = 0.1  # of the pieces, at either end
 AHEAD = (1.0, 2.0, 5.0)
 AHEAD_S = 2.0
+"""What parameters are fitted to predict, beside one step [s]."""
 BEST, FITTED_AHEAD = "best", "fitted ahead"
 """With a fit questions that `Driving.told` may answer: `at_its_best` by validation data, and
 `fitted_ahead` by the driving of the fit."""
-"""What parameters are fitted to predict, beside one step [s]."""
 _NONE = Gain(-np.inf, 0.0, -np.inf, 0.0)
 
 
