@@ -25,6 +25,10 @@ class KnownFilters:
         self._kept: OrderedDict[Hashable, tuple[int, _core.FrozenFilter]] = OrderedDict()
         self._samples = 0
 
+    def __reduce__(self) -> tuple[type[KnownFilters], tuple[()]]:
+        """Copies begin without any: filters are quicker to run again than to hand over."""
+        return KnownFilters, ()
+
     def get(self, asked: Hashable) -> _core.FrozenFilter | None:
         """A filter, if it is known."""
         with self._lock:

@@ -131,7 +131,7 @@ def test_what_acts_like_the_best_along_the_car_is_refitted_whatever_it_scores(fi
     ranked = diagnose(fit, refits=0).ranking
     gain, lag = (next(c for c in ranked if c.id == name) for name in ("force_gain", "steer_lag"))
     asked = {c.id for c in _hidden_by_tyres(ranked, [lag, gain])}
-    assert asked == {"mass", "aero_drag", "road_grade", "wheel_inertia"}
+    assert asked == {"mass", "aero_drag", "head_wind", "road_grade", "wheel_inertia"}
     mass = next(c for c in ranked if c.id == "mass")
     assert "mass" not in {c.id for c in _hidden_by_tyres(ranked, [gain, mass])}
     assert _hidden_by_tyres(ranked, [lag]) == []
