@@ -1,6 +1,7 @@
 """What a study says, and what is to be done next."""
 
 import random
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +29,7 @@ from sysid_vehicle.study.beyond import Beyond
 from sysid_vehicle.study.disagree import disagreements
 from sysid_vehicle.study.foretold import Foretold
 from sysid_vehicle.study.next_steps import next_steps
-from sysid_vehicle.study.said import ahead, small
+from sysid_vehicle.study.said import ahead, in_the_end, small
 from sysid_vehicle.study.structure import Structure
 
 
@@ -201,6 +202,18 @@ def test_what_no_name_stands_for_is_told_with_shares_and_a_drive(unknown: Study)
     assert any("what is left hardly shows in the training data" in text for text in elsewhere)
     nothing = next_steps(replace(found, explained=Beyond((1.0, 0.9), 0.1, -0.1, 0.3)))
     assert not any("serves better" in text for text in nothing)
+
+
+def test_a_fall_that_other_parameters_of_the_baseline_take_is_told_so(unknown: Study) -> None:
+    """Printed errors are those of models as fitted, shares those of parameters that fit best."""
+    bent = unknown.model.with_values({"B_front": 0.5 * unknown.model.value("B_front")})
+    lag = AddedEffect("steer_lag", (), 2.0, 1.0, 1e-9)
+    two = replace(unknown, added=(lag,), fits=(replace(unknown.fit, model=bent), unknown.fit))
+    little = in_the_end(replace(two, explained=Beyond((1.0, 0.9), 0.1, -0.1, 0.3)))
+    assert re.search(r"lateral errors fall by \d\d %, which other parameters of the", little)
+    assert "as the two were fitted" not in in_the_end(
+        replace(two, explained=Beyond((1.0, 0.1), 0.9, 0.8, 1.0))
+    )
 
 
 P = (1e-60, 1e-7, 5e-5, 5e-4, 0.004, 0.02, 0.07, 0.6)
