@@ -106,6 +106,7 @@ def reference(name: str, args: argparse.Namespace) -> tuple[sv.Fit, tuple[str, .
     begun = sv.identify(first, check.apply(log), starts=_STARTS)
     fit, settled = put_right(begun, check.settles).fit, tuple(check.settles)
     if kept is not None:
+        kept.parent.mkdir(parents=True, exist_ok=True)
         fit.save(kept)
         kept.with_suffix(".settled").write_text(" ".join(settled), encoding="utf-8")
     return fit, settled
