@@ -7,7 +7,7 @@ from .candidates.diagnosis import Diagnosis
 from .candidates.instead import Instead, instead
 from .candidates.possible import Size, considered, possible
 from .candidates.verdicts import EffectVerdict, Verdicts, judge, verdicts
-from .change.change import Change, EffectChange
+from .change.change import Change, EffectChange, LoadChange
 from .change.changed import changed
 from .diagnose import diagnose
 from .evidence.coordinates import blocks
@@ -48,6 +48,7 @@ __all__ = [
     "Explainable",
     "ForceMap",
     "Instead",
+    "LoadChange",
     "NextDrive",
     "Omnibus",
     "Proposal",

@@ -114,7 +114,7 @@ class EffectChange:
 
 
 @dataclass(frozen=True)
-class Load:
+class LoadChange:
     """A load that was put into the car, or taken out of it.
 
     Attributes
@@ -184,7 +184,7 @@ class Change(Printed):
         return tuple(s for s in self.causes.sets if s.effects[0].startswith(UNKNOWN))
 
     @property
-    def load(self) -> Load | None:
+    def load(self) -> LoadChange | None:
         """The load that changes mass and centre of gravity as they are named; None without both."""
         named = {e.id: e for e in self.named}
         if not {"mass", "cg_position"} <= set(named):
@@ -198,7 +198,7 @@ class Change(Printed):
         # The whole is in balance: (m + load) shift = load place.
         place = back * (1.0 + more) / more
         std = np.hypot(back_std * (1.0 + more) / more, back * more_std / more**2)
-        return Load(mass * more, mass * more_std, place, float(std))
+        return LoadChange(mass * more, mass * more_std, place, float(std))
 
     def _headline(self) -> str:
         leading = [e for e in self.named if not any(self._before(g, e) for g in e.group)]
