@@ -25,7 +25,7 @@ struct FrozenRun {
 constexpr std::size_t kWhitener = kChannels * (kChannels + 1) / 2;
 
 /// Samples of a problem up to which a filter keeps what it told of the states.
-constexpr std::size_t kToldSamples = std::size_t{1} << 15;
+constexpr std::size_t kToldSamples = 32768;
 
 /// Belongs to problems with the runs it was made from, whatever their model.
 struct FrozenFilter {
