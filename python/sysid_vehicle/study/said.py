@@ -208,8 +208,8 @@ def _explained(study: Study) -> list[str]:
     if fall > study.explained.high:
         said.append(
             "That counts each model with the parameters that predict best: as the two were fitted, "
-            f"lateral errors fall by {100 * fall:.0f} %, which other parameters of the baseline do "
-            "as well."
+            f"squares of lateral errors fall by {100 * fall:.0f} %, which other parameters of the "
+            "baseline take as well."
         )
     whole = study.shares.whole
     if whole.known and whole.value > 0.0:
