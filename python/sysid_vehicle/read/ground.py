@@ -96,8 +96,7 @@ class Ground:
         for part, source in self.sources.items():
             values = source.read(table, part, PARTS[part], notes)
             if PARTS[part] == "rad":
-                clockwise = self.counted_from.get(part, "north") == "north"
-                values = unwrapped(0.5 * np.pi - values if clockwise else values)
+                values = from_east(values, self.counted_from.get(part, "north"))
             found[part] = (
                 source.on_time(columns["time_s"], values) if "time_s" in columns else values
             )
@@ -218,11 +217,11 @@ def _refuse_the_course(angle: FloatArray, ratio: float) -> None:
         )
 
 
-def unwrapped(angle: FloatArray) -> FloatArray:
-    """Return an angle [rad] without jumps of a turn, NaN where it is unknown."""
+def from_east(angle: FloatArray, counted_from: str) -> FloatArray:
+    """Return an angle [rad] anticlockwise from east, without jumps; NaN where it is unknown."""
     out = np.full(angle.shape, np.nan)
     known = np.isfinite(angle)
-    out[known] = np.unwrap(angle[known])
+    out[known] = np.unwrap(angle[known] if counted_from == "east" else 0.5 * np.pi - angle[known])
     return out
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
-from .ground import FROM, Direction, polar, turns_of, unwrapped
+from .ground import FROM, Direction, from_east, polar, turns_of
 
 NAMED = ("east", "north", "course", "heading")
 """Parts that are known by their own names."""
@@ -95,7 +95,7 @@ def told(
         for part, (own_s, values) in held.items():
             x = factors[part] * values
             if part in angles:
-                x = unwrapped(0.5 * np.pi - x if start == "north" else x)
+                x = from_east(x, start)
             known = np.isfinite(x)
             parts[part] = np.interp(time_s, own_s[known], x[known])
         v, course = polar(time_s, parts)
