@@ -36,7 +36,8 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Fit the earlier drives, compare the later ones with them, print, write."""
     model = Model(Vehicle.from_toml(args.vehicle), args.effects)
     later = None if args.vehicle_after is None else Vehicle.from_toml(args.vehicle_after)
-    before, after = (read_logs(logs, args) for logs in (args.logs, args.after))
+    before = read_logs(args.logs, args, model.vehicle)
+    after = read_logs(args.after, args, later or model.vehicle)
     found = changed(identify(model, before), after, vehicle=later)
     print(found)
     write_figures(args.json, found.to_dict(), heard)

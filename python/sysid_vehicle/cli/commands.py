@@ -51,7 +51,7 @@ def _demo(args: argparse.Namespace, heard: Warnings) -> None:
 def _compare(args: argparse.Namespace, heard: Warnings) -> None:
     _define(args)
     model = Model(Vehicle.from_toml(args.vehicle), args.effects)
-    logs = read_logs(args.logs, args)
+    logs = read_logs(args.logs, args, model.vehicle)
     fit = identify(model, logs)
     comparison = compare(fit, logs)
     failing = where(fit)
@@ -156,8 +156,8 @@ def _study(args: argparse.Namespace, heard: Warnings) -> Study:
     model = Model(Vehicle.from_toml(args.vehicle))
     if args.nuisances:
         model = model.with_nuisances()
-    train = read_logs(args.logs, args)
-    test = read_logs(args.test, args) if args.test else None
+    train = read_logs(args.logs, args, model.vehicle)
+    test = read_logs(args.test, args, model.vehicle) if args.test else None
     for path in {p.resolve() for p in args.logs} & {p.resolve() for p in args.test}:
         warn(
             f"{path.name} is training and validation data; the validation error then proves nothing"

@@ -33,8 +33,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Find the forces, print, draw, write."""
-    logs = read_logs(args.logs, args)
-    found = axle_forces(logs, Vehicle.from_toml(args.vehicle), cg_ahead_m=args.cg_ahead)
+    vehicle = Vehicle.from_toml(args.vehicle)
+    logs = read_logs(args.logs, args, vehicle)
+    found = axle_forces(logs, vehicle, cg_ahead_m=args.cg_ahead)
     print(found)
     write_figures(args.json, found.to_dict(), heard)
     if args.plot is not None:

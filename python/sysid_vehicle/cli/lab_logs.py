@@ -70,9 +70,8 @@ def em(args: argparse.Namespace, heard: list[str]) -> None:
     car = ObserverCar.of(vehicle, drag_nspm=args.drag)
     tyres = (vehicle.tyre_front, vehicle.tyre_rear)
     front, rear = args.stiffness or [tyre.cornering_stiffness_per_load for tyre in tyres]
-    records = [
-        ObserverRecord.from_log(log, car, (front, rear)) for log in read_logs(args.logs, args)
-    ]
+    logs = read_logs(args.logs, args, vehicle)
+    records = [ObserverRecord.from_log(log, car, (front, rear)) for log in logs]
     pair = (("yaw_rate_radps", "ay_mps2"),) if args.correlated else ()
     result = learn_observer_noise(
         Observer(car, ObserverNoise.first_guess(records[0], car)),
@@ -136,8 +135,10 @@ def identify_arguments(parser: argparse.ArgumentParser) -> None:
 
 def identify(args: argparse.Namespace, heard: list[str]) -> None:
     """Identify, print, and write what was asked for."""
-    car = GreyBoxVehicle.of(vehicle_of(args), mass_tolerance=args.mass_tolerance)
-    logs = [part for log in read_logs(args.logs, args) for part in TyreLog.from_log(log, car)]
+    vehicle = vehicle_of(args)
+    car = GreyBoxVehicle.of(vehicle, mass_tolerance=args.mass_tolerance)
+    read = read_logs(args.logs, args, vehicle)
+    logs = [part for log in read for part in TyreLog.from_log(log, car)]
     if args.no_sideslip:
         logs = [log.without_sideslip() for log in logs]
     fit = identify_tyres(
@@ -183,9 +184,8 @@ def validate_arguments(parser: argparse.ArgumentParser) -> None:
 def validate(args: argparse.Namespace, heard: list[str]) -> None:
     """Predict, print, and write what was asked for."""
     car = IdentifiedCar.from_json(args.tyres)
-    logs = [
-        part for log in read_logs(args.logs, args) for part in TyreLog.from_log(log, car.vehicle)
-    ]
+    read = read_logs(args.logs, args, None)
+    logs = [part for log in read for part in TyreLog.from_log(log, car.vehicle)]
     found = validate_tyres(car, logs, horizon_s=args.horizon)
     print("\n\n".join(map(str, found)))
     if args.plot is not None:

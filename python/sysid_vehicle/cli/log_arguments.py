@@ -56,13 +56,16 @@ def add_effects(parser: argparse.ArgumentParser) -> None:
 
 
 def read_logs(
-    paths: Sequence[Path], args: argparse.Namespace, mapping: ChannelMap | None = None
+    paths: Sequence[Path],
+    args: argparse.Namespace,
+    vehicle: Vehicle | None,
+    mapping: ChannelMap | None = None,
 ) -> list[Log]:
-    """Read logs as `add_reading` was told, or by a channel map that is known already."""
+    """Read logs of a car as `add_reading` was told, or by a channel map that is known already."""
     if mapping is None and args.channels is not None:
         mapping = ChannelMap.from_toml(args.channels)
     check = not getattr(args, "unchecked", False)
-    return [read_log(path, mapping, dbc=args.dbc, check=check) for path in paths]
+    return [read_log(p, mapping, dbc=args.dbc, check=check, vehicle=vehicle) for p in paths]
 
 
 def written_map(log: Path, to: Path | None, dbc: Path | None, vehicle: Vehicle | None) -> Proposal:

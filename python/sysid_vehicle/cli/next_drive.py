@@ -45,10 +45,11 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     pair = [name.strip() for name in args.between.split(",")]
     if len(pair) != 2:
         raise InvalidInput(f"--between {args.between}: give two effects, as in steer_lag,mass")
-    logs = read_logs(args.logs, args)
+    model = Model(Vehicle.from_toml(args.vehicle))
+    logs = read_logs(args.logs, args, model.vehicle)
     area = None if args.area is None else (args.area[0], args.area[1])
     limits = DriveLimits(args.top_speed, args.lateral, area, args.duration)
-    fit = identify(Model(Vehicle.from_toml(args.vehicle)), logs)
+    fit = identify(model, logs)
     found = suggest_manoeuvre(fit, *pair, limits=limits)
     print(found)
     write_figures(args.json, found.to_dict(), heard)

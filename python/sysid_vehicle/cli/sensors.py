@@ -40,7 +40,7 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     vehicle = None if args.vehicle is None else Vehicle.from_toml(args.vehicle)
     if args.map is not None:
         mapping = written_map(args.logs[0], args.map, args.dbc, vehicle).channel_map
-    found = check(read_logs(args.logs, args, mapping), vehicle)
+    found = check(read_logs(args.logs, args, vehicle, mapping), vehicle)
     print(found)
     write_figures(args.json, found.to_dict(), heard)
     if args.report is not None:

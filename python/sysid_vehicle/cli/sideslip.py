@@ -42,7 +42,7 @@ def add_parser(commands: Any) -> None:
 def run(args: argparse.Namespace, heard: list[str]) -> None:
     """Estimate, print, and write what was asked for."""
     vehicle = Vehicle.from_toml(args.vehicle)
-    (log,) = read_logs([args.log], args)
+    (log,) = read_logs([args.log], args, vehicle)
     if args.kind == "published":
         found = published.estimate_sideslip(vehicle, log)
     else:

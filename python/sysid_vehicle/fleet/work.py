@@ -77,7 +77,10 @@ def _define(files: tuple[Path, ...]) -> None:
 
 
 def _logs(job: Job, drives: tuple[Log | Path, ...]) -> list[Log]:
-    return [x if isinstance(x, Log) else read_log(x, job.channels, dbc=job.dbc) for x in drives]
+    def read(path: Path) -> Log:
+        return read_log(path, job.channels, dbc=job.dbc, vehicle=job.model.vehicle)
+
+    return [x if isinstance(x, Log) else read(x) for x in drives]
 
 
 def _row(job: Job, study: Study, seconds: float) -> Row:

@@ -24,9 +24,10 @@ _HEAD = ("axle", "slip angle", "side force", "of the load", "slope", "95 % band"
 _SMALL = 0.3  # of the load, below which a side force is nearly proportional to slip
 _FEWEST = 50
 _DRAWN = 4000  # points of a picture
-# Figure, label and factor by the word that asks for it.
+_MODEL_CAR_KG = 100.0  # below, forces are told in newtons
+# Figure, label and factor by the word that asks for it; loads in the unit of the forces.
 _COLOURS = {
-    "load": ("load_n", "axle load [kN]", 1e-3),
+    "load": ("load_n", "axle load [{unit}]", 1.0),
     "a_x": ("ax_mps2", "longitudinal acceleration [m/s2]", 1.0),
     "steer rate": ("steer_rate_radps", "steering rate [deg/s]", float(np.degrees(1.0))),
     "time": ("time_s", "time [s]", 1.0),
@@ -109,10 +110,16 @@ class AxleForces(Printed):
         slope, at_zero = np.polyfit(x[few], y[few], 1)
         return float(slope), float(at_zero)
 
+    @property
+    def _forces_in(self) -> tuple[float, str]:
+        """Factor and unit in which forces of this car read well."""
+        return (1e-3, "kN") if self.vehicle.mass_kg > _MODEL_CAR_KG else (1.0, "N")
+
     def _rows(self) -> list[list[str]]:
         rows = []
+        factor, unit = self._forces_in
         for i, axle in enumerate(AXLES):
-            slip, force = np.degrees(self.slip_rad[:, i]), 1e-3 * self.lateral_n[:, i]
+            slip, force = np.degrees(self.slip_rad[:, i]), factor * self.lateral_n[:, i]
             use = float(np.percentile(np.abs(self.lateral_n[:, i]) / self.load_n[:, i], 99.5))
             slope = self.slope_npr[i]
             wide = (_band(self.lateral_std_n[:, i]), _band(np.degrees(self.slip_std_rad[:, i])))
@@ -120,9 +127,9 @@ class AxleForces(Printed):
                 [
                     axle,
                     f"{slip.min():.2g} to {slip.max():.2g} deg",
-                    f"{force.min():.3g} to {force.max():.3g} kN",
+                    f"{force.min():.3g} to {force.max():.3g} {unit}",
                     f"up to {use:.2f}",
-                    f"{number(1e-3 * slope, 3)} kN/rad" if np.isfinite(slope) else "",
+                    f"{number(factor * slope, 3)} {unit}/rad" if np.isfinite(slope) else "",
                     f"{wide[0]} N, {wide[1]} deg",
                 ]
             )
@@ -131,12 +138,13 @@ class AxleForces(Printed):
     def _said(self) -> list[str]:
         turn = float(np.percentile(np.abs(self.yaw_acceleration_radps2), 99.5))
         tilt = 0.1 * self.yaw_inertia_kgm2 * turn / self.vehicle.wheelbase_m
-        push, moment = 1e-3 * self.longitudinal_n, 1e-3 * self.moment_nm
+        factor, unit = self._forces_in
+        push, moment = factor * self.longitudinal_n, factor * self.moment_nm
         said: list[str] = []
         said.append(
-            f"wheel force {push.min():.3g} to {push.max():.3g} kN, band "
+            f"wheel force {push.min():.3g} to {push.max():.3g} {unit}, band "
             f"{_band(self.longitudinal_std_n)} N; yaw moment {moment.min():.3g} to "
-            f"{moment.max():.3g} kN m, band {_band(self.moment_std_nm)} N m"
+            f"{moment.max():.3g} {unit} m, band {_band(self.moment_std_nm)} N m"
         )
         said.append(
             "were the yaw inertia 10 % larger, the front force would change by up to "
@@ -198,17 +206,18 @@ class AxleForces(Printed):
             figure = pyplot.figure(figsize=(8.5, 3.6), layout="constrained")
             ax = figure.subplots(1, 2, sharey=True)
         front, rear = _two(ax)
-        name, label, factor = _COLOURS[colour]
-        values = factor * getattr(self, name)
+        name, label, scale = _COLOURS[colour]
+        factor, unit = self._forces_in
+        values = (factor if colour == "load" else scale) * getattr(self, name)
         values = np.stack([values, values], axis=1) if values.ndim == 1 else values
         low, high = np.percentile(values, [0.5, 99.5])
         some = slice(None, None, max(len(self.time_s) // _DRAWN, 1))
         for i, (axes, axle) in enumerate(zip((front, rear), AXLES, strict=True)):
-            slip, force = np.degrees(self.slip_rad[some, i]), 1e-3 * self.lateral_n[some, i]
+            slip, force = np.degrees(self.slip_rad[some, i]), factor * self.lateral_n[some, i]
             axes.errorbar(
                 slip,
                 force,
-                1e-3 * HALF_95 * self.lateral_std_n[some, i],
+                factor * HALF_95 * self.lateral_std_n[some, i],
                 np.degrees(HALF_95 * self.slip_std_rad[some, i]),
                 fmt="none",
                 ecolor=MEASURED,
@@ -227,8 +236,8 @@ class AxleForces(Printed):
                 rasterized=True,
                 zorder=3,
             )
-            tidy(axes, title=axle, xlabel="slip angle [deg]", ylabel="side force [kN]")
-        rear.figure.colorbar(points, ax=[front, rear], label=label)
+            tidy(axes, title=axle, xlabel="slip angle [deg]", ylabel=f"side force [{unit}]")
+        rear.figure.colorbar(points, ax=[front, rear], label=label.format(unit=unit))
         return front, rear
 
     def to_dict(self) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput, warn
+from ..vehicle import Vehicle
 from . import checks
 from .channels import CHANNELS
 from .columns import Columns, collect
@@ -33,11 +34,13 @@ class Built:
     uniform: bool
 
 
-def build(data: Columns, name: str, despike: Iterable[str], check: bool) -> Built:
+def build(
+    data: Columns, name: str, despike: Iterable[str], check: bool, vehicle: Vehicle | None = None
+) -> Built:
     """Make the channels of a log; every error and warning begins with the log's `name`."""
     notes: list[str] = []
     try:
-        built = _build(data, tuple(despike), check, notes)
+        built = _build(data, tuple(despike), check, vehicle, notes)
     except InvalidInput as error:
         raise InvalidInput(f"{name}: {error}") from error
     for note in notes:
@@ -45,7 +48,13 @@ def build(data: Columns, name: str, despike: Iterable[str], check: bool) -> Buil
     return built
 
 
-def _build(data: Columns, despike: tuple[str, ...], check: bool, notes: list[str]) -> Built:
+def _build(
+    data: Columns,
+    despike: tuple[str, ...],
+    check: bool,
+    vehicle: Vehicle | None,
+    notes: list[str],
+) -> Built:
     columns = collect(data, notes)
     time_s = columns.pop("time_s")
     if time_s.size < 2:
@@ -71,7 +80,7 @@ def _build(data: Columns, despike: tuple[str, ...], check: bool, notes: list[str
     channels.update((key, columns.pop(key)) for key in CHANNELS if key in columns)
     channels.update(columns)
     if check:
-        _check(channels, rate_hz, notes)
+        _check(channels, rate_hz, vehicle, notes)
     for values in channels.values():
         values.flags.writeable = False
     return Built(channels, rate_hz, uniform=not note)
@@ -143,7 +152,9 @@ def _fill_inputs(
             )
 
 
-def _check(channels: dict[str, FloatArray], rate_hz: float, notes: list[str]) -> None:
+def _check(
+    channels: dict[str, FloatArray], rate_hz: float, vehicle: Vehicle | None, notes: list[str]
+) -> None:
     time_s = channels["time_s"]
     usable = checks.usable_seconds(channels, rate_hz)
     if usable < _MIN_USABLE_S:
@@ -153,7 +164,9 @@ def _check(channels: dict[str, FloatArray], rate_hz: float, notes: list[str]) ->
             f"known); at least {_MIN_USABLE_S:g} s are needed, 30 s with corners are good"
         )
     with np.errstate(over="ignore"):
-        notes += [doubtful.text for doubtful in check_coherence(channels, rate_hz)]
+        found = check_coherence(channels, rate_hz)
+    # What is doubted for cars of usual size is compared with the car itself where it is fitted.
+    notes += [doubtful.text for doubtful in found if vehicle is None or not doubtful.by_the_car]
     dull = checks.excitation_note(channels, rate_hz)
     notes += checks.low_rate_note(rate_hz)
     notes += checks.frozen_notes(channels, rate_hz, excited=not dull)

@@ -15,6 +15,7 @@ from .._common.files import write_text
 from .._common.tables import dataset, frame
 from .._common.text import html_paragraph, html_table
 from ..errors import InvalidInput, near_names
+from ..vehicle import Vehicle
 from .build import build
 from .channels import CHANNELS
 from .columns import Columns
@@ -69,6 +70,7 @@ class Log:
         name: str = "log",
         despike: Iterable[str] = (),
         check: bool = True,
+        vehicle: Vehicle | None = None,
     ) -> Log:
         """Build a log from a mapping of arrays; a DataFrame works as it is.
 
@@ -86,6 +88,8 @@ class Log:
             Whether to look for wrong units, wrong signs, frozen sensors, a log that is too short,
             too slow or without corners. False suits simulated pieces. The order of time, the
             presence of channels and holes are looked at in any case.
+        vehicle : Vehicle, optional
+            The car. A steering angle that only a car of unusual size has is then not warned of.
 
         Raises
         ------
@@ -97,7 +101,7 @@ class Log:
         SysidWarning
             If the data can be used but something was corrected or looks implausible.
         """
-        built = build(data, name, despike, check)
+        built = build(data, name, despike, check, vehicle)
         return cls(name, built.rate_hz, built.uniform, built.channels)
 
     @property

@@ -9,11 +9,13 @@ from typing import Any
 from .._common.files import as_path
 from ..errors import InvalidInput, warn
 from ..log import Columns, Log
+from ..vehicle import Vehicle
 from .channel_map import ChannelMap
 from .csv import read_table
 from .ground import Ground
 from .objects import contents_of_object
-from .propose import Proposal, propose_channels
+from .proposal import Proposal
+from .propose import propose_channels
 from .recording import Recording
 from .registry import FORMATS, Format, blamed, read_with, recognised
 from .source import Source
@@ -38,6 +40,7 @@ def read_log(
     dbc: str | Path | None = None,
     name: str | None = None,
     check: bool = True,
+    vehicle: Vehicle | None = None,
 ) -> Log:
     """Read a driving log from a file of any known format, or from what is in memory.
 
@@ -61,7 +64,7 @@ def read_log(
         Database of the CAN frames that the file holds.
     name : str, optional
         Name of the run; the file name without its suffix otherwise, ``log`` for a table.
-    check : bool
+    check, vehicle
         As in :meth:`Log.from_arrays`.
 
     Raises
@@ -97,7 +100,8 @@ def read_log(
         raise InvalidInput(f"{run}: {error}") from error
     for note in notes:
         warn(f"{run}: {note}")
-    return Log.from_arrays(columns, name=run, despike=mapping.despiked, check=check)
+    despike = mapping.despiked
+    return Log.from_arrays(columns, name=run, despike=despike, check=check, vehicle=vehicle)
 
 
 def contents(

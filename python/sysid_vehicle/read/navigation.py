@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._common.arrays import FloatArray, as_float64
+from .._common.arrays import as_float64
 from .ground import FROM, Direction, from_east, polar, turns_of
+from .look import Signal
 
 NAMED = ("east", "north", "course", "heading")
 """Parts that are known by their own names."""
@@ -18,8 +19,6 @@ _IN_DEGREES = 7.0  # an angle that goes beyond is no radian of one turn
 
 # What makes a lateral speed; the second beside a speed.
 _COMBINATIONS = (("east", "north", "heading"), ("course", "heading"))
-
-Signal = tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)

@@ -130,6 +130,15 @@ def test_it_prints_and_draws(found: sv.AxleForces) -> None:
         found.plot(ax=front)  # type: ignore[arg-type]
 
 
+def test_forces_of_a_model_car_are_told_in_newtons(found: sv.AxleForces) -> None:
+    small = replace(found.vehicle, mass_kg=3.7, yaw_inertia_kgm2=None)
+    model_car = replace(found, vehicle=small, lateral_n=1e-3 * found.lateral_n)
+    assert " N/rad" in str(model_car)
+    assert "kN" not in str(model_car)
+    front, _ = model_car.plot()
+    assert front.get_ylabel() == "side force [N]"
+
+
 def test_wrong_arguments_are_refused(truth: Drive, found: sv.AxleForces) -> None:
     with pytest.raises(sv.InvalidInput, match="check of other logs"):
         sv.axle_forces(truth.log, found.vehicle, sensors=found.sensors)

@@ -1,5 +1,9 @@
 """A car on a scale has a short wheelbase: the car's own numbers tell it from a wrong unit."""
 
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -30,6 +34,19 @@ def test_a_model_car_is_read_with_a_note() -> None:
         log = Log.from_arrays(columns(0.33))
     assert not [c for c in contradictions(columns(0.33), log.rate_hz) if c.channel == "steer_rad"]
     check_car(log, mass_kg=3.7, wheelbase_m=0.33)
+
+
+def test_no_note_is_needed_where_the_car_is_known(tmp_path: Path) -> None:
+    vehicle = replace(
+        sv.example_vehicle(), mass_kg=3.7, lf_m=0.16, lr_m=0.17, yaw_inertia_kgm2=None
+    )
+    log = tmp_path / "log.csv"
+    table = columns(0.33)
+    rows = np.column_stack(list(table.values()))
+    np.savetxt(log, rows, delimiter=",", header=",".join(table), comments="")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sv.read_log(log, vehicle=vehicle)
 
 
 def test_its_numbers_must_be_those_of_the_log() -> None:
