@@ -67,9 +67,8 @@ def _ranking(study: Study) -> str:
     )
     best = first.ranking[0]
     if first.significant and best.indistinguishable_from:
-        text += (
-            f"\n  This driving cannot tell {best.id} from {', '.join(best.indistinguishable_from)}."
-        )
+        others = ", ".join(best.indistinguishable_from)
+        text += f"\n  {best.id} is confounded with {others} in this driving."
     return text
 
 
@@ -120,7 +119,7 @@ def _why_not(study: Study, hidden: str) -> str:
     confounded = set(study.model.effects) & set(own.indistinguishable_from if own else ())
     if confounded:
         others = ", ".join(sorted(confounded))
-        return f"this driving cannot tell it from {others}, which the model got."
+        return f"it is confounded with {others}, which was added to the model."
     if study.added:
         return f"the model got {', '.join(study.model.effects)} instead."
     if study.verdict in ("adequate", "not_testable"):

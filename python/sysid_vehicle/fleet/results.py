@@ -251,7 +251,7 @@ class Fleet:
                 str(c.cars),
                 f"{100.0 * c.share:.0f} %",
                 f"{c.gain:.3f}" if np.isfinite(c.gain) else "-",
-                c.sizes or f"only stands in for something else, in {c.aliases}",
+                c.sizes or f"compensates for something else, in {c.aliases}",
                 ", ".join(c.confounded_with) or "-",
             ]
             for c in self.causes

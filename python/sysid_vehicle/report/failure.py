@@ -34,7 +34,7 @@ def where_and_when(study: Study, samples: Samples | None, truth: Model | None) -
         figure(
             [grid, _coherence(follows)],
             "Of the baseline: the force that it lacks, over the pair of coordinates that "
-            "predicts most of it on driving it was not made from (grey: hardly any driving; dots: "
+            "predicts most of it on other pieces of the driving (grey: hardly any driving; dots: "
             "beyond two standard errors), and how far its residuals follow the "
             f"{INPUTS[follows.input]}, by frequency.",
             told + key,
@@ -186,7 +186,7 @@ def unknown(study: Study, samples: Samples | None, truth: Model | None) -> list[
         figure(
             [*map(_curve, found.curves[:2]), grid],
             "The missing force beyond all that the fitted parameters can do, over the coordinates "
-            "that tell most of it. A band holds its whole curve with 95 %. On the map dots mark "
+            "that predict most of it. A band holds its whole curve with 95 %. On the map dots mark "
             "where the band excludes zero; grey: hardly any driving.",
             told,
             "row",
@@ -201,5 +201,5 @@ def unknown(study: Study, samples: Samples | None, truth: Model | None) -> list[
             bullets(f"{p}." for p in found.proposals),
         ]
     else:
-        parts.append(paragraph("No formula that was tried holds on validation data."))
+        parts.append(paragraph("No formula that was tried also holds on validation data."))
     return parts

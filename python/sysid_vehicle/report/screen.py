@@ -64,10 +64,10 @@ def _which(study: Study) -> str:
     if "errors_with" in study.left_out:
         return panel("3 Which", [paragraph("Left out: there was no time.")], 4)
     if not tried:
-        none = "No effect of the catalogue has evidence that called for a refit."
+        none = "No effect of the catalogue was significant enough for a refit."
         return panel("3 Which", [paragraph(none)], 4)
     if beyond <= 0.0:
-        none = "On validation data the baseline leaves nothing beyond the noise floor."
+        none = "On validation data the error of the baseline is at the noise floor."
         return panel("3 Which", [paragraph(none)], 4)
     gone = {e: (before - after) / beyond for e, after in tried.items() if np.isfinite(after)}
     order = sorted(gone, key=lambda e: -gone[e])[:_CANDIDATES]
@@ -81,12 +81,12 @@ def _which(study: Study) -> str:
         rows.append((e, gone[e], text, "" if e in own else "mute"))
     text = (
         "Share of the baseline's one-step error beyond the noise floor on validation data that "
-        "each effect takes away if it alone is added. "
+        "each effect removes if it alone is added. "
         f"{len(study.diagnoses[0].ranking)} were scored, {len(tried)} refitted."
         + (" Probability: that it is missing, by the training data." if probable else "")
     )
     if own:
-        text += " Grey: acts alike, and was not added."
+        text += " Grey: not added."
     return panel("3 Which", [bars(rows), paragraph(text)], 4)
 
 
@@ -111,7 +111,7 @@ def _effect(study: Study, added: AddedEffect) -> str:
         gain, shown = by_horizon[at], shown_in(channel)
         if gain is not None and channel in _SHOWN:
             gains.append(f"{number(shown.factor * gain, 2)} {shown.unit} of {shown.name}")
-    takes = f"takes off the error {_AHEAD_S:g} s ahead {', '.join(gains)}" if gains else ""
+    takes = f"reduces the error {_AHEAD_S:g} s ahead by {', '.join(gains)}" if gains else ""
     beside = f"together with {' and '.join(others)} " if others else ""
     takes = takes and f"; {beside}{takes}"
     reserve = f"; {added.reserve}" if added.reserve else ""

@@ -77,12 +77,12 @@ def _which(study: Study, samples: Samples | None, truth: Model | None) -> list[s
         ]
     parts.append(
         paragraph(
-            "Each candidate was refitted or scored as if it alone were missing, so sizes of rivals "
-            "are not to be added up. 'validation error with it' is the one-step-ahead error on the "
-            "validation data of the model with that effect, refitted to the driving of the fit, "
-            f"in units of the noise floor of the {whose} model; where there is none nothing was "
-            "refitted. 'cannot tell from' names effects that would explain the driving of the fit "
-            "as well."
+            "Each candidate was refitted or scored as if it alone were missing, so sizes of "
+            "confounded effects are not to be added up. 'validation error with it' is the "
+            "one-step-ahead error on the validation data of the model with that effect, refitted "
+            f"to the training data, in units of the noise floor of the {whose} model; where there "
+            "is none nothing was refitted. 'confounded with' names effects that would explain the "
+            "training data as well."
         )
     )
     return parts
@@ -103,11 +103,10 @@ def _verdicts(study: Study, samples: Samples | None, truth: Model | None) -> lis
         )
     parts.append(
         paragraph(
-            "Each is judged beside the effects that were added. 'one of a group': it or another of "
-            "the group is missing, and this driving cannot tell which. 'proxy': it acts like "
-            "something that is missing, but is not that itself, for the reason stated. 'absent': "
-            "it can be no larger than stated. 'not testable': this driving could hide one large "
-            "enough to matter."
+            "Each is judged beside the effects that were added. 'one of a group': it or a "
+            "confounded effect of the group is missing. 'proxy': it is significant, but not itself "
+            "what is missing, for the reason stated. 'absent': it can be no larger than stated. "
+            "'not testable': this driving could hide one large enough to matter."
         )
     )
     return parts + _hidden(study)
@@ -119,17 +118,17 @@ def _hidden(study: Study) -> list[str]:
     title = heading("What the identified parameters would hide", 3)
     if not open_:
         text = (
-            "Each effect that was tested would have been seen. bias_report tells what it would do"
+            "Each effect that was tested would have been seen. bias_report computes what one does"
         )
         return [title, paragraph(f"{text} unseen.")]
     if found is None:
-        return [title, paragraph("Left out: there was no time. bias_report tells it.")]
+        return [title, paragraph("Left out: there was no time. bias_report computes it.")]
     return [
         title,
         paragraph(
-            f"Of the {len(open_)} effects that are not testable, those of which this driving tells "
+            f"Of the {len(open_)} effects that are not testable, those that this driving shows "
             "least. Each was simulated at a typical size on the same driving, and the model fitted "
-            "without it. bias_report tells the same of all effects."
+            "without it. bias_report computes the same for all effects."
         ),
         bullets(f"{b}." for b in found.biases),
     ]

@@ -10,7 +10,7 @@ from .._common.text import few, number, unit_after
 from ..identify import Estimate
 from ..study import AddedEffect, Study
 
-RANKING_HEAD = ("effect", "statistic", "p", "validation error with it", "size", "cannot tell from")
+RANKING_HEAD = ("effect", "statistic", "p", "validation error with it", "size", "confounded with")
 
 
 @dataclass(frozen=True)
@@ -71,12 +71,12 @@ def summary(study: Study) -> tuple[str, str, str]:
         what = f"The model got {names}."
     elif study.diagnoses[0].significant:
         leading = [c.id for c in study.diagnoses[0].significant[:3]]
-        but = "but none of them holds on validation data"
+        but = "but none of them improves the prediction of validation data"
         if set(leading) & set(study.stopped):
-            but = "and the time limit came before all were tried on validation data"
+            but = "but the time limit ended before all were tried on validation data"
         what = f"There is evidence for {', '.join(leading)}, {but}."
     else:
-        what = "No effect was added: there is evidence for none of the catalogue."
+        what = "No effect was added: none of the catalogue is significant."
     error = f"On validation data, the one-step-ahead error {errors(study)}."
     return verdict, what, error
 
@@ -96,17 +96,17 @@ def ranking_title(study: Study) -> str:
     """Say what leads the ranking of the baseline, no surer of it than the verdict is."""
     dx = study.diagnoses[0]
     if not dx.significant:
-        return f"There is evidence for no effect of the catalogue; {dx.omnibus}."
+        return f"No effect of the catalogue is significant; {dx.omnibus}."
     named = [
         a for a in study.added if not a.stands_in and study.verdicts[a.id].finding != "negligible"
     ]
     leading = next((a for c in dx.significant for a in named if a.id == c.id), None)
     if leading is None:
         best = dx.significant[0].effect
-        return f"What fits best, but is not named as missing: {best.title} ({best.id})."
+        return f"Best fit, but not named as missing: {best.title} ({best.id})."
     title = study.verdicts[leading.id].effect.title
     others = ", ".join(leading.confounded_with)
-    beside = f", or else {others}, which this driving cannot tell from it" if others else ""
+    beside = f", confounded with {others} in this driving" if others else ""
     return f"most likely missing: {title} ({leading.id}){beside}"
 
 

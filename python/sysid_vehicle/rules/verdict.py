@@ -11,26 +11,26 @@ from .share import Share, low_of_mean, share_of
 
 Grade = Literal["confirmed", "plausible", "alias"]
 _NOT_SHOWN = (
-    "beside all else it is not shown to take a share of the error 1 to 5 s ahead on training and "
-    "validation data"
+    "beside the other effects its share of the error 1 to 5 s ahead is not significant on training "
+    "and validation data"
 )
 _NOT_TOGETHER = (
-    "together, what was added is not shown to take anything off the error 1 to 5 s ahead of this "
-    "motion on validation data: the interval of its share reaches nothing"
+    "together, the effects added do not significantly reduce the error 1 to 5 s ahead of this "
+    "motion on validation data: the interval of their share includes zero"
 )
 _LATE_TOGETHER = (
-    "the time limit left unknown what share of the error 1 to 5 s ahead all that was added takes"
+    "the time limit left open which share of the error 1 to 5 s ahead the effects added remove"
 )
 _LATE = (
-    "the time limit left unknown what share of the error 1 to 5 s ahead is its own on training and "
-    "validation data"
+    "the time limit left open its own share of the error 1 to 5 s ahead on training and validation "
+    "data"
 )
 
-_TAKES_MORE = "takes more, which has no name itself: what it stands in for may be this, too"
+_TAKES_MORE = "explains more and is not confirmed itself: both may compensate for the same cause"
 
 _UNOPPOSED = (
-    "the time limit left unknown whether something unknown would do in its place on training and "
-    "validation data"
+    "the time limit left open whether an unknown force would explain training and validation data "
+    "as well"
 )
 
 
@@ -183,7 +183,7 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
         withdrawn.append(Withdrawn(names, _UNOPPOSED, names))
     # What only stands in for something else explains nothing, however well it fits, and what cannot
     # be told from that is no better.
-    because = f"it acts like {', '.join(sorted(stand_ins))}, which is none either"
+    because = f"it acts like {', '.join(sorted(stand_ins))}, which is not confirmed either"
     withdrawn.append(Withdrawn(stand_ins, because))
     proxies = {a.id for a in facts.added if a.finding == "proxy" or _falls(a, withdrawn)}
     negligible = {a.id for a in facts.added if a.finding == "negligible"}

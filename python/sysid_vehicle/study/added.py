@@ -71,17 +71,14 @@ class AddedEffect:
         """What is to be said against it, in words; empty where there is nothing."""
         said = []
         if self.confounded_with:
-            others = ", ".join(self.confounded_with)
-            said.append(f"or else {others}, which this driving cannot tell from it")
+            said.append(f"confounded with {', '.join(self.confounded_with)} in this driving")
         if self.stands_in:
             # By itself it is wrong, or it is not sure beside what is left.
             sure = self.grade == "alias"
-            what = (
-                "only stands in for something else" if sure else "may stand in for something else"
-            )
+            what = "compensates for something else" if sure else "may compensate for something else"
             said.append(f"it {what}: {self.stands_in}")
         elif self.takes_little:
-            said.append("the error hardly falls with it: something else may explain so little")
+            said.append("the error hardly falls with it: another effect may explain as much")
         return "; ".join(said)
 
     def __str__(self) -> str:

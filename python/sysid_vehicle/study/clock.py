@@ -83,7 +83,7 @@ def _log_shifted(log: Log, late: dict[str, float]) -> Log:
     now = {c: _later(log[c], log.rate_hz, by_s) for c, by_s in late.items()}
     what = [
         f"{c}: the car feels it {1000.0 * abs(by_s):.2g} ms "
-        f"{'later' if by_s > 0.0 else 'sooner'} than the log says; put right"
+        f"{'later' if by_s > 0.0 else 'sooner'} than the log says; corrected"
         for c, by_s in late.items()
     ]
     return log.corrected(now, what)

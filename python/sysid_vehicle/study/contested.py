@@ -55,10 +55,10 @@ def spoken_against(
     found = {e: of_no_use(parts[e], final, rules, small=e in alone) for e in asked}
     for effect in asked:
         if not found[effect] and errors_grow(first, final, test, parts[effect].moved):
-            found[effect] = "as fitted, the errors 0.5 to 5 s ahead of what it moves grow"
+            found[effect] = "as fitted, the errors 0.5 to 5 s ahead of the channels it moves grow"
     for effect, others in other_values(disagreements(final, test, rules), final, rules).items():
         if not found.get(effect, "told"):
-            found[effect] = f"validation data by themselves tell otherwise ({others})"
+            found[effect] = f"validation data alone give another value ({others})"
     for effect, rivals in in_place.items():
         if not found.get(effect, "told"):
             better = [

@@ -43,7 +43,10 @@ class Disagreement:
 
     def __str__(self) -> str:
         here, there = (with_error(e.value, e.std) for e in (self.train, self.validation))
-        return f"{self.train.name} {here} {self.train.unit} from training data, {there} from others"
+        return (
+            f"{self.train.name} {here} {self.train.unit} from training data, {there} from "
+            "validation data"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """All figures, ready for JSON."""

@@ -48,8 +48,11 @@ class Foretold:
         return unforeseen(self.ratio, self.p_value, self.rules)
 
     def __str__(self) -> str:
-        times = f"{np.sqrt(self.ratio):.2g} times what" if np.isfinite(self.ratio) else "beyond all"
-        return f"validation data err {times} the training data foretell (p = {self.p_value:.2g})"
+        ratio = f"{np.sqrt(self.ratio):.2g}" if np.isfinite(self.ratio) else "infinitely many"
+        return (
+            f"the validation error is {ratio} times the one that the training data predict "
+            f"(p = {self.p_value:.2g})"
+        )
 
     def to_dict(self) -> dict[str, float | None]:
         """Both figures, ready for JSON."""

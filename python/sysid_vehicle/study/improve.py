@@ -27,9 +27,9 @@ from .study import Study
 from .validation import set_aside
 
 # What a time limit may leave unknown, in words.
-_CHANNELS = "whether the channels were read at the same moments, with noise that is white"
+_CHANNELS = "whether all channels have the same clock, and white noise"
 _BASELINE = "the likeliest parameters of the baseline"
-_CLOCK = "what follows with the wheel force at the time at which the car feels it"
+_CLOCK = "the results with the delay of the wheel force corrected"
 
 
 @explaining
@@ -165,7 +165,7 @@ def improve(
     again = schedule.again(time.perf_counter() - begun)
     if clocked is not None and again is not None:
         train_driving, test_driving = clocked
-        say("The wheel force has a clock of its own: with it put right everything is done again.")
+        say("The wheel force has a delay of its own: it is corrected, and the study starts again.")
         found = searched(again)
     elif clocked is not None:
         judging.left_out.append(_CLOCK)

@@ -45,12 +45,12 @@ def _without_causes(study: Study) -> Any:
 
 _PARTS = {
     "shares": _Part("how much of the errors ahead could be explained", _nothing),
-    "predicting": _Part("what fits to predictions gain", lambda _: None),
-    "disagreements": _Part("what validation data tell differently", lambda _: ()),
+    "predicting": _Part("what a fit to predictions gains", lambda _: None),
+    "disagreements": _Part("which parameters validation data give differently", lambda _: ()),
     "small": _Part("whether the errors of the baseline matter", lambda _: False),
     "where": _Part("moments at which the car changed, and delays", _without_causes),
     "unknown": _Part("the shape of what is missing", lambda _: None),
-    "late": _Part("how late the car answers without the lags of the model", lambda _: {}),
+    "late": _Part("the delay of the car without the lags of the model", lambda _: {}),
 }
 """In the order in which they are asked for."""
 _REPORTED = {
@@ -61,7 +61,7 @@ _REPORTED = {
     "errors_with": _Part(
         "the errors with each effect alone", lambda study: tuple({} for _ in study.diagnoses)
     ),
-    "hidden": _Part("what the identified parameters would hide", lambda _: None),
+    "hidden": _Part("which effects the identified parameters would hide", lambda _: None),
 }
 """What reports and files tell besides."""
 

@@ -43,15 +43,15 @@ from .validation import at_its_best, beyond_noise_ahead, serving
 from .verdict import facts_of, in_the_light_of
 
 # What a time limit may leave unknown, in words.
-_RIVALS = "whether something unknown would do in the place of what was added"
-_UNSHOWN = "whether training and validation data together show anything that is left"
-_FORETOLD = "whether validation data err by more than training data foretell"
-_TOGETHER = "the share of the error 1 to 5 s ahead that the effects take together"
+_RIVALS = "whether an unknown force would explain as much as the effects added"
+_UNSHOWN = "whether training and validation data together show a remaining error"
+_FORETOLD = "whether the validation error is larger than the training data predict"
+_TOGETHER = "the share of the error 1 to 5 s ahead that the effects remove together"
 _ALONE = "the share of the error 1 to 5 s ahead that is due to {} alone"
-_CONTESTED = "whether validation data, or what acts like them, speak against names"
-_STRUCTURE = "how much of what is left depends on the driving"
-_SMALL = "whether the errors of the baseline are as large as matters"
-_STEPS = "what each of {} takes of the validation error in its turn"
+_CONTESTED = "whether validation data or confounded effects contradict the effects named"
+_STRUCTURE = "how much of the remaining error depends on the driving"
+_SMALL = "whether the errors of the baseline are large enough to matter"
+_STEPS = "how much of the validation error each of {} removes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,9 +305,9 @@ def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:
         warn(found[-1])
     if trail.taken_back:
         found.append(
-            f"{' and '.join(trail.taken_back)} gained with parameters that predict best; as the "
-            "likelihood fits the model, and whatever it leaves open, errors 1 to 5 s ahead grow "
-            "with it: taken back"
+            f"{' and '.join(trail.taken_back)} removed again: errors 1 to 5 s ahead fall with the "
+            "parameters that predict best, but grow with those of the likelihood, whatever the "
+            "driving leaves open"
         )
     if driving.usable_s < SHORT_S:
         found.append(
@@ -330,6 +330,6 @@ def _cut_short(stopped: Sequence[str], late: Sequence[str]) -> str:
     if stopped:
         cut.append(f"ended the search with {few(stopped)} still to be tried")
     if late:
-        cut.append(f"left unknown {'; '.join(late)}")
-    unsure = "; without that neither the verdict nor a name is sure" if late else ""
+        cut.append(f"left open {'; '.join(late)}")
+    unsure = "; without that neither the verdict nor the effects named are certain" if late else ""
     return f"the time limit {', and '.join(cut)}{unsure}"

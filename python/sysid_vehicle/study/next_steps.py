@@ -17,8 +17,8 @@ SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
 _SHOWN = 4
 _ASKED = 2  # effects that a next drive is to show
 _MEND = (
-    "mend the channels that contradict each other, before anything else: `sysid-vehicle check` "
-    "tells delays, scales and places of sensors"
+    "first correct the channels that contradict each other: `sysid-vehicle check` finds delays, "
+    "scales and positions of sensors"
 )
 
 
@@ -48,32 +48,32 @@ def _of_names(study: Study) -> list[str]:
         if a.confounded_with and a.grade != "alias":
             some = few(a.confounded_with)
             found.append(
-                f"tell {a.id} from {some}: `sysid-vehicle next-drive` designs a drive that "
-                "does, or give what is known of them to the vehicle file"
+                f"separate {a.id} from {some}: `sysid-vehicle next-drive` designs a drive that "
+                "does, or state what is known of them in the vehicle file"
             )
     aliases = [a for a in study.added if a.stands_in]
     if aliases:
         found.append(
-            f"do not take the size of {', '.join(a.id for a in aliases)} for a property of the "
-            "car: what is missing may be something else"
+            f"do not take the size of {', '.join(a.id for a in aliases)} as a property of the "
+            "car: another effect may be missing instead"
         )
     taken = study.explained
     if study.verdict == "unknown" and taken is not None and taken.low > 0.0:
         found.append(
-            "to predict, the final model serves better than the baseline, as a whole and in "
-            "driving like this"
+            "for prediction use the final model, as a whole and in similar driving: it is better "
+            "than the baseline"
         )
     seconds = study.validation.usable_s
     if aliases and seconds < SHORT_S:
         found.append(
             f"validate with longer driving, {SHORT_S:.0f} s or more: {seconds:.2g} s hardly show "
-            "what an effect takes of errors 1 to 5 s ahead"
+            "how far an effect reduces the errors 1 to 5 s ahead"
         )
     shown_by = {e.id: e.excited_by for e in study.model.parts}
     for a in _worth_a_drive(aliases):
         found.append(
-            f"to find out whether {a.id} is in the car, drive what shows it ({shown_by[a.id]}), or "
-            "give what is known of it to the vehicle file"
+            f"to find out whether the car has {a.id}, record driving that excites it "
+            f"({shown_by[a.id]}), or state what is known of it in the vehicle file"
         )
     return found
 
@@ -88,31 +88,31 @@ def _of_what_is_left(study: Study) -> list[str]:
     found = []
     if study.stopped:
         was = "was" if len(study.stopped) == 1 else "were"
-        found.append(f"give the search more time: {few(study.stopped)} {was} still to be tried")
+        found.append(f"raise the time limit: {few(study.stopped)} {was} not tried")
     if study.verdict == "unknown" and study.small:
         usual = ", ".join(f"{name} {size}" for name, size in USUAL_SIZES.items())
         found.append(
             f"if errors 0.5 to 5 s ahead of less than {usual} do not matter to you, use the "
-            "baseline as it is: with `matters`, or `--matters`, the verdict counts larger ones "
-            "alone"
+            "baseline as it is: with `matters`, or `--matters`, the verdict counts only larger "
+            "ones"
         )
     if slow(study):
         found.append(
-            f"find what brings about the {' and the '.join(study.slow)}: drive the same way again, "
-            "and in the other direction; bank and slope of the road stay with the place, wind with "
-            "the course, what belongs to the car with the driving"
+            f"find the cause of the {' and the '.join(study.slow)}: repeat the drive in both "
+            "directions; bank and slope of the road repeat at the same place, wind with the same "
+            "heading, an effect of the car with the same manoeuvre"
         )
     if only_elsewhere(study):
-        what = "what is left" if study.added else "what is missing"
+        what = "the remaining error" if study.added else "what is missing"
         found.append(
-            "give the fit driving like the validation data too, and validate with other driving "
-            f"of that kind: {what} {in_training(study)}, and no effect can be named that they do "
-            "not excite"
+            "add driving like the validation data to the training data, and validate with other "
+            f"driving of that kind: {what} {in_training(study)}, and no effect can be named that "
+            "they do not excite"
         )
     if not study.sensors and not study.checked:
         found.append(
             "check the sensors, and give the result to the study: `sv.check`, or "
-            "`sysid-vehicle check`; scales, biases and places of sensors act like "
+            "`sysid-vehicle check`; scales, biases and positions of sensors act like "
             "effects of the car"
         )
     if not study.fit.model.nuisances:
@@ -130,13 +130,13 @@ def _of_what_is_left(study: Study) -> list[str]:
     ]
     if open_:
         found.append(
-            f"drive nearer the limit of the tyres: not determined: {few(open_)}; tyres that are "
-            "open hide what is missing"
+            f"drive nearer the limit of the tyres: {few(open_)} not determined, and undetermined "
+            "tyre parameters hide what is missing"
         )
     if not study.fit.driving.force_known:
         found.append(
-            "log the wheel force `fx_n`, if it can be had: without it drag, slopes and the "
-            "split of forces cannot be told"
+            "log the wheel force `fx_n` if possible: without it drag, slopes and the split of "
+            "forces cannot be determined"
         )
     if study.predicting is not None and study.predicting.helps:
         which = "final" if study.predicting.explains else "baseline"
@@ -153,7 +153,7 @@ def _of_what_is_left(study: Study) -> list[str]:
     )
     if where:
         found.append(
-            f"look at the shape of what is left of {where} (`study.unknown`), and define an effect "
+            f"look at the shape of the remaining {where} (`study.unknown`), and define an effect "
             "that has it: `sv.define_effect`"
         )
     return found

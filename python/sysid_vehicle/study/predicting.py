@@ -86,13 +86,13 @@ class Predicting:
             )
             said.append(
                 f"Fitted to predictions {self.horizon_s:g} s ahead (`study.predicting.final`), the "
-                f"final model errs less there on validation data than as fitted one step ahead: "
-                f"{told}."
+                f"final model has smaller errors there on validation data than as fitted one step "
+                f"ahead: {told}."
             )
         if not self.explains and self._falls(self.better):
             said.append(
-                f"The baseline so fitted errs no more: {self.horizon_s:g} s ahead what was added "
-                "is not needed."
+                f"The baseline so fitted has no larger error: {self.horizon_s:g} s ahead the "
+                "effects added are not needed."
             )
         return " ".join(said)
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .study import Study
 
 _MEANING = {
-    "adequate": "nothing is missing that this driving can show",
+    "adequate": "no effect is missing that this driving can show",
     "explained": "the effects found explain all that depends on the driving",
     "partly_explained": "the effects found explain part of it; something else is missing",
     "unknown": "something is missing and no effect of the catalogue explains it",
@@ -36,21 +36,21 @@ def meaning(study: Study) -> str:
         return "something is missing; the time limit ended the search for what explains it"
     if study.verdict == "unknown" and study.added and study.explained is not None:
         if not study.explained.share > 0.0:
-            return f"something is missing; what was added is no sure name: {NONE_GONE}"
+            return f"something is missing; the effects added are not confirmed: {NONE_GONE}"
         names = [a.id for a in study.added]
         if len(names) == 1:
             return (
-                f"something is missing; {names[0]} takes up {study.explained} of the error 1 to "
-                "5 s ahead, and is no sure name beside what is left"
+                f"something is missing; {names[0]} explains {study.explained} of the error 1 to "
+                "5 s ahead, but beside the remaining error it is not confirmed as the cause"
             )
         return (
-            f"something is missing; {' and '.join(names)} together take up {study.explained} of "
-            "the error 1 to 5 s ahead, and which of them are in the car this driving does not tell"
+            f"something is missing; {' and '.join(names)} together explain {study.explained} of "
+            "the error 1 to 5 s ahead; this driving does not show which of them the car has"
         )
     if study.verdict == "partly_explained" and study.buried:
         return (
-            "effects were found that are a part of it; what is left errs by less, 0.5 to 5 s "
-            "ahead, than the noise of the sensors"
+            "the effects found explain part of it; the errors that remain 0.5 to 5 s ahead are "
+            "below the noise of the sensors"
         )
     beyond = study.explained
     if study.verdict == "partly_explained" and beyond and beyond.share < study.rules.most:
@@ -62,31 +62,31 @@ def meaning(study: Study) -> str:
             )
         named = _named(study)
         return (
-            f"{named}what was added takes up {part}; the rest is disturbance, and something else "
+            f"{named}the effects added explain {part}; the rest is disturbance, and something else "
             "that is missing"
         )
     seen = study.omnibus.rejects or study.diagnoses[-1].significant or structured(study)
     seen = seen or elsewhere(study) or slow(study)
     if study.verdict == "adequate" and study.added:
         return (
-            "what was added is no sure name; what the baseline (`study.fits[0]`) leaves can be "
-            f"smaller, 0.5 to 5 s ahead, than {_matters(study)}"
+            "the effects added are not confirmed; the baseline (`study.fits[0]`) can be fitted so "
+            f"that its errors 0.5 to 5 s ahead are below {_matters(study)}"
         )
     if study.verdict == "adequate" and seen:
         if disturbance(study):
-            return "what is left is disturbance: no function of the driving predicts it"
+            return "the remaining error is disturbance: no function of the driving predicts it"
         helps = study.predicting is not None and study.predicting.helps
         how = " with parameters fitted to predictions (`study.predicting.final`)"
         return (
-            f"something is left, and its errors 0.5 to 5 s ahead are smaller than {_matters(study)}"
+            f"an error remains, but 0.5 to 5 s ahead it is below {_matters(study)}"
             f"{how if helps else ''}"
         )
     if study.verdict == "unknown" and not study.added and only_elsewhere(study):
-        return f"something is missing that shows in validation data, and {in_training(study)}"
+        return f"something is missing that shows in the validation data; it {in_training(study)}"
     if study.verdict == "adequate" and _disturbed(study):
         return (
-            f"{_MEANING['adequate']}; validation data err by {study.test[-1].error:.2g} noise "
-            "floors, by disturbances like those of the training data"
+            f"{_MEANING['adequate']}; the validation error is {study.test[-1].error:.2g} "
+            "noise floors, from disturbances like those of the training data"
         )
     return _MEANING[study.verdict]
 
@@ -108,7 +108,7 @@ def _matters(study: Study) -> str:
 def left_out(study: Study) -> tuple[str, ...]:
     """What `Study.in_time` had no time for, in one sentence; none where it had."""
     some = "; ".join(study.left_out.values())
-    return (f"no time was left to tell {some}",) if some else ()
+    return (f"no time was left to find out {some}",) if some else ()
 
 
 def ahead(study: Study) -> str:
@@ -179,7 +179,7 @@ def _left(study: Study) -> str:
     left = _on_train(study)
     if study.structure is not None and structured(study):
         left += f" A function of the driving still predicts {study.structure.strongest}."
-    said = " ".join([*_explained(study), f"In the end: {left}", *_on_all(study)])
+    said = " ".join([*_explained(study), f"Final model: {left}", *_on_all(study)])
     if study.train[-1].unrelated:
         wrong = "; ".join(study.train[-1].unrelated.values())
         return f"{said} Something else is wrong: {wrong}."
@@ -190,10 +190,12 @@ def _left(study: Study) -> str:
     # Nothing is left, yet something is missing: what took it up is not what is missing.
     stand_ins = [a.id for a in study.added if a.stands_in]
     if stand_ins:
-        said += f" What is missing was taken up by stand-ins: {', '.join(stand_ins)}."
+        said += f" Other effects have absorbed what is missing: {', '.join(stand_ins)}."
     elif study.diagnoses[-1].significant:
         some = ", ".join(c.id for c in study.diagnoses[-1].significant[:3])
-        said += f" There is evidence for {some}, which predict validation data no better."
+        said += (
+            f" There is evidence for {some}; they do not improve the prediction of validation data."
+        )
     return said
 
 
@@ -202,22 +204,20 @@ def _explained(study: Study) -> list[str]:
     if study.explained is None:
         return []
     if not study.explained.share > 0.0:
-        return [f"{NONE_GONE.capitalize()}: what was added takes nothing off that error."]
-    said = [f"Of the error 1 to 5 s ahead, {study.explained} is gone."]
+        return [f"{NONE_GONE.capitalize()}: the effects added do not reduce it."]
+    said = [f"The effects added remove {study.explained} of the error 1 to 5 s ahead."]
     fall = _fall_as_fitted(study)
     if fall > study.explained.high:
         said.append(
-            "That counts each model with the parameters that predict best: as the two were fitted, "
-            f"squares of lateral errors fall by {100 * fall:.0f} %, which other parameters of the "
-            "baseline take as well."
+            "This share compares both models with the parameters that predict best. As fitted one "
+            f"step ahead, the squared lateral errors fall by {100 * fall:.0f} %; the baseline with "
+            "other parameters achieves that too."
         )
     whole = study.shares.whole
     if whole.known and whole.value > 0.0:
         sure = study.verdict in ("explained", "partly_explained")
-        who = "Named physics" if sure else "What was added"
-        said.append(
-            f"{who} explains {whole} of what any function of the driving could explain of it."
-        )
+        who = "The effects named explain" if sure else "The effects added explain"
+        said.append(f"{who} {whole} of what any function of the driving could explain of it.")
     return said
 
 
@@ -241,13 +241,13 @@ def _on_train(study: Study) -> str:
     test = study.omnibus
     if test.rejects and disturbance(study):
         return (
-            f"a test for anything left finds p = {test.p_value:.2g}, but no function of the "
-            "driving predicts what is left: it is disturbance."
+            f"the test for a remaining error gives p = {test.p_value:.2g}, but no function of the "
+            "driving predicts that error: it is disturbance."
         )
     if not test.rejects and structured(study):
-        return f"the test of unknown forces sees nothing (p = {test.p_value:.2g})."
+        return f"the test for unknown forces is not significant (p = {test.p_value:.2g})."
     if only_elsewhere(study):
-        return f"training data by themselves show nothing that is left (p = {test.p_value:.2g})."
+        return f"the training data alone show no remaining error (p = {test.p_value:.2g})."
     return f"{test}."
 
 
@@ -258,13 +258,13 @@ def _on_all(study: Study) -> list[str]:
     if beyond is not None and told:
         found = str(beyond)
         if not _more(study):
-            found = f"no more than a disturbance may leave (p = {beyond.p_value:.2g})"
+            found = f"no more than a disturbance can cause (p = {beyond.p_value:.2g})"
         said.append(f"On all data together: {found if beyond.rejects else beyond}.")
     if _unforeseen(study):
         said.append(f"{str(study.foretold).capitalize()}.")
     if slow(study):
         some = " and a ".join(study.slow)
-        said.append(f"Slower than any disturbance, and so with a cause: a {some}.")
+        said.append(f"Too slow for a disturbance, so it has a cause: a {some}.")
     return said
 
 
@@ -295,7 +295,7 @@ def in_training(study: Study) -> str:
     error = study.train[-1].error
     if _beyond_noise(error) > study.rules.most:
         floors = f"{number(error, 2)} noise floors"
-        return f"is not told from disturbance in the training data, which err by {floors}"
+        return f"cannot be separated from disturbance in the training data (error {floors})"
     return "hardly shows in the training data"
 
 

@@ -266,5 +266,5 @@ def _sizes(fit: Fit, effects: Sequence[str]) -> str:
 def _more(fit: Fit, gone: set[str], beside: set[str]) -> str:
     """What else a step took out of the model or put into it, in words."""
     if gone:
-        return f" Without {', '.join(sorted(gone))} the model is {', '.join(fit.model.effects)}."
-    return f" It holds together with {', '.join(sorted(beside))}." if beside else ""
+        return f" {', '.join(sorted(gone))} removed; the model has {', '.join(fit.model.effects)}."
+    return f" It is significant only together with {', '.join(sorted(beside))}." if beside else ""

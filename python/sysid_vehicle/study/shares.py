@@ -115,8 +115,8 @@ class Shares:
         ]
         if not some:
             return (
-                "No function of the driving is found that predicts the errors ahead better than "
-                "the baseline: as far as it tells they are disturbance and noise."
+                "No function of the driving predicts the errors ahead better than the baseline: "
+                "as far as this shows they are disturbance and noise."
             )
         if not self.named:
             return (
@@ -126,11 +126,11 @@ class Shares:
         if not self.whole.known:
             return (
                 f"A function of the driving predicts a part of the errors ahead of "
-                f"{', '.join(some)}; of those 1 to 5 s ahead together no share is certain."
+                f"{', '.join(some)}; the share over 1 to 5 s is not significant."
             )
         return (
-            f"The effects added explain {self.whole} of what is seen to be explainable of the "
-            "errors 1 to 5 s ahead."
+            f"The effects added explain {self.whole} of the explainable part of the errors 1 to "
+            "5 s ahead."
         )
 
     def __str__(self) -> str:

@@ -42,7 +42,7 @@ def test_it_says_how_an_effect_was_lost(lost: SimpleNamespace) -> None:
     assert lost.fate(study((drag,), "proxy"), drag) == "added, proxy: so"
     assert "dropped" in lost.fate(study((), seen=((), (drag,))), drag)
     assert lost.fate(study((), seen=((),)), drag) == "no evidence for it"
-    back = "mass and aero_drag gained with parameters that predict best; errors grow: taken back"
+    back = "mass and aero_drag removed again: errors 1 to 5 s ahead grow"
     assert "taken back" in lost.fate(study((), seen=((),), warnings=(back,)), drag)
 
 

@@ -58,7 +58,7 @@ def test_a_proxy_changes_from_drive_to_drive(fits: dict[str, Fit]) -> None:
     assert "head_wind does not keep its value: speed_mps from" in str(kept)
     judged = judge(fit, lacked={"head_wind"}, groups={}, acted=set())["head_wind"]
     assert judged.finding == "proxy"
-    assert "not with one value (speed_mps from " in judged.sentence
+    assert "its value is not constant (speed_mps from " in judged.sentence
     assert judged.sentence.endswith("m/s)")
 
 
@@ -73,9 +73,7 @@ def test_with_an_effect_its_rivals_are_doubted() -> None:
     )
     reserved = told.with_reservation({"aero_drag"}, "it explains little", added={"aero_drag"})
     assert [v.finding for v in reserved.all] == ["missing", "proxy", "proxy"]
-    assert reserved["rolling_resistance"].sentence == (
-        "something acts like it, but it explains little"
-    )
+    assert reserved["rolling_resistance"].sentence == ("significant, but it explains little")
     # What was added does not fall with a rival.
     both = {"aero_drag", "rolling_resistance"}
     kept = told.with_reservation({"rolling_resistance"}, "it explains little", added=both)

@@ -53,7 +53,7 @@ def test_a_shuffled_channel_is_named_and_no_effect_is(of_shuffled: Diagnosis) ->
     assert dx.named is None
     with pytest.raises(InvalidInput, match=r"no effect can be named: .*ay_mps2"):
         _ = dx.best
-    assert str(dx).startswith("something is wrong that no effect can be named for")
+    assert str(dx).startswith("something is missing, but no effect can be named")
     assert "ay_mps2" in str(dx).splitlines()[0]
     told = verdicts(dx)
     assert not [v for v in told.all if v.finding in NAMED]
@@ -152,15 +152,16 @@ def test_without_evidence_what_is_wrong_is_told_all_the_same(
 ) -> None:
     dx = diagnose(fit, candidates=["mass"])
     assert not dx.significant
-    assert str(dx).startswith("no effect of the catalogue is missing; no sign of anything left")
+    assert str(dx).startswith("no effect of the catalogue is missing; no remaining error")
     incomplete = replace(dx, omnibus=Omnibus(450.0, 50, 1e-60, "F_y"))
     assert str(incomplete).startswith(
-        "no effect of the catalogue explains what is missing: something is left"
+        "no effect of the catalogue explains what is missing: an error that depends on the "
+        "driving remains"
     )
     time_s = course["time_s"]
     late = altered(course, ay_mps2=np.interp(time_s - 0.1, time_s, course["ay_mps2"]))
     wrong = replace(dx, driving=Driving.of(late))
-    with pytest.raises(InvalidInput, match="readings are wrong: ay_mps2: lags behind"):
+    with pytest.raises(InvalidInput, match="channels are wrong: ay_mps2: lags behind"):
         _ = wrong.best
 
 
@@ -191,7 +192,7 @@ def test_a_missing_effect_is_named_and_others_stay_open(
     assert dx.named is not None
     assert dx.named.id == dx.best.id == "steer_offset"
     assert str(dx).startswith("most likely missing: ")
-    assert "with it no sign of anything left" in str(dx)
+    assert "with it no remaining error" in str(dx)
     two = truth.add("mass", "gyro_scale").with_values(
         {"mass.relative_error": 0.1, "gyro_scale.scale_error": 0.05}
     )

@@ -88,9 +88,9 @@ def test_what_time_did_not_suffice_for_is_open(found: Diagnosis) -> None:
         )  # fmt: skip
         return told["steer_offset"]
 
-    assert "predicted no better" in of(()).because
+    assert "does not improve the prediction" in of(()).because
     assert of(("steer_offset",)).finding == "open"
-    assert of(("steer_offset",)).sentence.startswith("evidence for it, and not tried yet; offset")
+    assert of(("steer_offset",)).sentence.startswith("significant, not tried yet; offset")
 
 
 def test_what_is_absent_is_bounded_below_what_matters(judged: Verdicts) -> None:
@@ -158,9 +158,9 @@ def test_verdicts_show_themselves(judged: Verdicts) -> None:
 
 def test_one_that_only_acted_like_others_names_them() -> None:
     of = EffectVerdict(effect("mass"), "proxy", group=("steer_lag",))
-    assert of.sentence == "only acted like what steer_lag explains"
+    assert of.sentence == "its evidence is explained by steer_lag"
     both = EffectVerdict(effect("mass"), "proxy", group=("steer_lag", "aero_drag"))
-    assert both.sentence == "only acted like what steer_lag, aero_drag explain"
+    assert both.sentence == "its evidence is explained by steer_lag, aero_drag"
 
 
 def test_a_factor_is_as_many_times_smaller_as_it_may_be_larger() -> None:

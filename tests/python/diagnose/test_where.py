@@ -121,7 +121,7 @@ def test_a_delay_that_something_else_feigns_is_not_claimed(
     assert not steer.delay.alone, "with any delay the load sensitivity is left"
     told = str(replace(steer, delay=replace(steer.delay, delay_s=0.1)))
     assert "the car answers it 100" in told
-    assert "leaves something that depends on the driving" in told
+    assert "an error that depends on the driving remains" in told
     assert "later than the model" not in told
 
 

@@ -225,7 +225,7 @@ def test_causes_are_ranked_by_share_of_cars_and_gain() -> None:
     assert low < middle < high
     assert (steer.cars, steer.aliases) == (0, 1)
     assert np.isnan(steer.gain)
-    assert "stands in for something else, in 1" in str(fleet)
+    assert "compensates for something else, in 1" in str(fleet)
     back = [Row.from_dict(json.loads(json.dumps(r.to_dict()))) for r in rows]
     assert tuple(back) == rows
 

@@ -97,18 +97,14 @@ def test_a_study_is_copied_whole(start: Model, lap: Log, course: Log) -> None:
         assert again.to_dict() == study.to_dict()
 
 
-def _identified(model: Model, log: Log) -> Fit:
-    return sv.identify(model, log, starts=2)
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no fork")
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
 @pytest.mark.parametrize("way", ["fork", "spawn"])
 def test_another_process_finds_the_same(way: str, start: Model, lap: Log) -> None:
     short = lap.between(0.0, 8.0)
-    here = _identified(start, short)
+    here = sv.identify(start, short, starts=2)
     with multiprocessing.get_context(way).Pool(1) as pool:
-        there = pool.apply(_identified, (start, short))
+        there = pool.apply(sv.identify, (start, short), {"starts": 2})
     same(here.estimates, there.estimates)
     same(here.covariance, there.covariance)
     assert here.log_likelihood == there.log_likelihood

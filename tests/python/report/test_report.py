@@ -200,7 +200,7 @@ def test_a_study_that_added_nothing_has_one_column_and_no_equations(
     path = tmp_path / "report.html"
     nothing_added.report(path)
     text = " ".join(read(path).text)
-    assert "none of them holds on validation data" in text
+    assert "none of them improves the prediction of validation data" in text
     assert "final model" not in re.sub(
         "Parameters of the final model|the final model still", "", text
     )
@@ -263,7 +263,7 @@ def test_an_error_that_rose_did_not_fall(study: sv.Study) -> None:
 def test_what_cannot_be_told_apart_is_named_together(study: sv.Study, tmp_path: Path) -> None:
     group = replace(study.added[0], confounded_with=("longitudinal_load_transfer",))
     either = replace(study, added=(group,))
-    together = "or else longitudinal_load_transfer, which this driving cannot tell from it"
+    together = "confounded with longitudinal_load_transfer in this driving"
     assert together in str(either)
     assert together in either._repr_html_()
     assert together in summary(either)[1]
@@ -283,11 +283,11 @@ def test_a_stand_in_is_not_said_to_be_missing(study: sv.Study) -> None:
     """Nothing is left, and still something is missing: the text says how both can be."""
     stand_in = replace(study.added[0], stands_in="no car has such a value", grade="alias")
     unknown = replace(study, verdict="unknown", added=(stand_in,))
-    assert "no sign of anything left" in unknown.in_the_end
-    assert "taken up by stand-ins: tyre_load_sensitivity" in unknown.in_the_end
-    assert "it only stands in for something else: no car has such a value" in str(unknown)
+    assert "no remaining error" in unknown.in_the_end
+    assert "absorbed what is missing: tyre_load_sensitivity" in unknown.in_the_end
+    assert "it compensates for something else: no car has such a value" in str(unknown)
     unsure = replace(unknown, added=(replace(stand_in, grade="plausible"),))
-    assert "it may stand in for something else: no car" in str(unsure)
+    assert "it may compensate for something else: no car" in str(unsure)
     assert "most likely missing" not in ranking_title(unknown)
     assert "most likely missing" in ranking_title(study)
 

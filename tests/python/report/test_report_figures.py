@@ -55,11 +55,11 @@ def test_the_first_screen_tells_the_story(
     lengths = [float(x) for x in re.findall(r"width: ([\d.]+)%", panels["5 Error falls"])]
     assert lengths == pytest.approx([100.0, 100.0 * after / before, 100.0 / before], abs=0.06)
     bare = "".join(first_screen(nothing_added, samples_of(nothing_added)))
-    assert "none of them holds on validation data" in bare
+    assert "none of them improves the prediction of validation data" in bare
     untried = replace(nothing_added, stopped=(nothing_added.diagnoses[0].significant[0].id,))
     late = "".join(first_screen(untried, samples_of(nothing_added)))
     assert "none of them holds" not in late
-    assert "the time limit came before all were tried" in late
+    assert "the time limit ended before all were tried" in late
     assert "final" not in bare
     assert "5 Error<" in bare
 
@@ -74,7 +74,7 @@ def test_what_one_step_takes_off_is_no_single_effects(study: sv.Study) -> None:
         added=(first, replace(first, id="steer_lag")),
     )
     assert "together with" not in _effect(study, first)
-    assert "together with steer_lag takes off the error" in _effect(both, first)
+    assert "together with steer_lag reduces the error" in _effect(both, first)
 
 
 def test_the_excerpt_is_where_the_baseline_predicts_worst(study: sv.Study) -> None:

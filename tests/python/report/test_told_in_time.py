@@ -30,7 +30,7 @@ def test_what_no_time_was_left_for_is_said(
         *("shares", "predicting", "disagreements", "small", "where", "unknown", "late"),
         *("causes", "errors_with", "hidden"),
     }
-    said = "o time was left to tell how much of the errors ahead could be explained; what fits"
+    said = "o time was left to find out how much of the errors ahead could be explained; what a fit"
     assert f"Warning: n{said}" in str(cut)
     assert cut.where.change_points is None
     assert all(c.delay is None for c in cut.where.coherence)
@@ -73,7 +73,7 @@ def test_the_time_limit_counts_what_is_printed(
     assert f"Verdict: {study.verdict}" in told.out
     assert Shares.CAPTION not in told.out
     for text in (told.out, told.err):
-        assert text.count("no time was left to tell how much of the errors ahead could be") == 1
+        assert text.count("no time was left to find out how much of the errors ahead could be") == 1
     assert "which causes" not in told.out
     assert main([*command, "--time-limit", "1e4"]) == 0
     told = capsys.readouterr()

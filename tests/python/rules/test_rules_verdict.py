@@ -152,7 +152,7 @@ def test_names_beside_something_that_is_left() -> None:
     assert withdrawn(LEFT) == {}
     little = replace(LEFT, added=(MASS, replace(DRAG, own=NONE_OF_IT)))
     assert set(withdrawn(little)) == {"aero_drag"}
-    assert "not shown to take a share of the error" in withdrawn(little)["aero_drag"]
+    assert "share of the error 1 to 5 s ahead is not significant" in withdrawn(little)["aero_drag"]
     assert verdict(little).verdict == "partly_explained"
     assert verdict(little).much_left  # a part of what is gone went with what does not stand
     only = replace(LEFT, added=(replace(MASS, finding="negligible"),))
@@ -164,7 +164,7 @@ def test_no_name_stands_where_all_together_may_take_nothing() -> None:
     facts = replace(LEFT, taken_low=0.0)
     assert verdict(facts).verdict == "unknown"
     assert set(withdrawn(facts)) == {"mass", "aero_drag"}
-    assert "its share reaches nothing" in withdrawn(facts)["mass"]
+    assert "their share includes zero" in withdrawn(facts)["mass"]
     assert verdict(replace(LEFT, taken_low=0.05)).verdict == "partly_explained"
     # Where nothing is left no share is asked for.
     assert verdict(replace(WHOLE, taken_low=-0.1)).verdict == "explained"
@@ -200,9 +200,9 @@ def test_a_share_for_which_there_was_no_time_is_said_to_be_unknown() -> None:
     facts = LEFT.with_own(shares, late=["aero_drag"])
     assert [a.late for a in facts.added] == [False, True]
     assert set(withdrawn(facts)) == {"aero_drag"}
-    assert "the time limit left unknown" in withdrawn(facts)["aero_drag"]
+    assert "the time limit left open" in withdrawn(facts)["aero_drag"]
     neither = LEFT.with_own({}, late=["aero_drag"])
-    assert "not shown to take a share" in withdrawn(neither)["mass"]
+    assert "is not significant" in withdrawn(neither)["mass"]
     assert verdict(neither).verdict == "unknown"
 
 
@@ -210,7 +210,7 @@ def test_what_competed_with_nothing_unknown_in_time_has_no_sure_name() -> None:
     assert verdict(WHOLE).verdict == "explained"
     late = replace(WHOLE, together=None, unopposed=True)
     assert verdict(late).verdict == "unknown"
-    assert "something unknown would do in its place" in withdrawn(late)["mass"]
+    assert "an unknown force would explain" in withdrawn(late)["mass"]
 
 
 def test_beside_much_that_is_left_a_share_is_shown_to_be_worth_a_name() -> None:
@@ -245,7 +245,7 @@ def test_what_is_left_of_one_motion_spoils_no_name_of_the_other() -> None:
     assert set(withdrawn(nothing)) == {"mass"}
     one = LEFT.with_motions({"aero_drag": ((2.0, 2.1), -0.2), "mass": ((2.0, 0.1), 0.9)})
     assert set(withdrawn(one)) == {"aero_drag"}
-    assert "its share reaches nothing" in withdrawn(one)["aero_drag"]
+    assert "their share includes zero" in withdrawn(one)["aero_drag"]
 
 
 @pytest.mark.parametrize(
@@ -325,7 +325,7 @@ def test_no_name_stands_beside_a_stand_in_that_moves_the_same() -> None:
         told = verdict(replace(LEFT, added=(MASS, other)))
         assert told.verdict == "unknown"
         because = {e: w.because for w in told.withdrawn for e in w.effects}
-        assert because["mass"].startswith("of the same errors aligning_moment takes more")
+        assert because["mass"].startswith("of the same errors aligning_moment explains more")
     elsewhere = replace(large, moves=frozenset({"vx_mps"}))
     assert set(withdrawn(replace(LEFT, added=(MASS, elsewhere)))) == {"aligning_moment"}
     # What it stands in for acts on both data sets.
@@ -381,7 +381,7 @@ def test_what_there_was_no_time_for_is_not_told_as_nothing() -> None:
     """A share that nobody asked for does not reach nothing: the name falls for want of time."""
     own = replace(MASS, own=MOST, own_in_training=MOST)
     assert withdrawn(replace(LEFT, added=(own,))) == {}
-    for low, because in ((-0.1, "reaches nothing"), (None, "the time limit left unknown")):
+    for low, because in ((-0.1, "includes zero"), (None, "the time limit left open")):
         told = verdict(replace(LEFT, added=(own,), taken_low=low))
         (fallen,) = (w for w in told.withdrawn if own.id in w.effects)
         assert because in fallen.because

@@ -46,8 +46,8 @@ def test_a_name_stands_by_its_likelihood_where_no_error_shows() -> None:
     assert abs(length.value - LENGTH_M) < 3.0 * length.std
     assert study.verdict == "partly_explained"
     assert study.buried
-    assert "effects were found that are a part of it" in study.meaning
-    assert "than the noise of the sensors" in study.meaning
+    assert "the effects found explain part of it" in study.meaning
+    assert "below the noise of the sensors" in study.meaning
     assert contradictions(str(study)) == []
 
 
@@ -57,8 +57,8 @@ def test_a_baseline_whose_errors_drown_is_adequate() -> None:
     assert study.omnibus_together is not None
     assert study.omnibus_together.p_value < study.rules.strict
     assert study.verdict == "adequate"
-    assert "something is left" in study.meaning
-    assert "smaller than the noise of the sensors" in study.meaning
+    assert "an error remains" in study.meaning
+    assert "below the noise of the sensors" in study.meaning
     assert contradictions(str(study)) == []
 
 

@@ -41,7 +41,7 @@ def test_two_values_tell_one_effect_only_if_both_are_off_nothing(fit: Fit) -> No
     assert set(told(fit, 0.28, 1.42)) == {"aero_downforce"}
     assert set(told(fit, 1.0, -1.0)) == {"aero_downforce"}
     assert (
-        "1.42 +- 0.1 m2 from training data, 0.28 +- 0.1 from others"
+        "1.42 +- 0.1 m2 from training data, 0.28 +- 0.1 from validation data"
         in told(fit, 1.42, 0.28)["aero_downforce"]
     )
     # What training data do not feel is not what the name stands by.
@@ -86,7 +86,7 @@ def test_names_are_asked_of_values_and_of_what_is_likelier_in_their_place(
         "aero_downforce": "aero_downforce.cl_a_rear_m2 1.4 from training data, 0.2 from others"
     }
     monkeypatch.setattr(contested, "other_values", lambda *_: other)
-    assert "validation data by themselves tell otherwise" in against(0.0)["aero_downforce"]
+    assert "validation data alone give another value" in against(0.0)["aero_downforce"]
 
 
 def test_no_name_stands_for_what_makes_errors_grow(fit: Fit) -> None:
@@ -98,5 +98,5 @@ def test_no_name_stands_for_what_makes_errors_grow(fit: Fit) -> None:
     wrong = replace(fit, model=fit.model.with_values({NAME: 6.0}))
     assert errors_grow(fit, wrong, test, fit.model.parts[0].moved)
     found = spoken_against(fit, wrong, name, name, {}, test)
-    assert found[name[0]] == "as fitted, the errors 0.5 to 5 s ahead of what it moves grow"
+    assert found[name[0]] == "as fitted, the errors 0.5 to 5 s ahead of the channels it moves grow"
     assert not errors_grow(fit, fit, test, ["vx_mps"])

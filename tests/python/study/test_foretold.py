@@ -68,15 +68,15 @@ def test_what_shows_in_validation_data_alone_is_not_adequate(hidden: Study) -> N
     assert hidden.verdict == "unknown"
     assert hidden.added == ()
     text = str(hidden)
-    assert "shows in validation data, and hardly shows in the training data" in text
-    assert "training data by themselves show nothing that is left" in text
-    assert "On all data together: something is left" in text
+    assert "shows in the validation data; it hardly shows in the training data" in text
+    assert "the training data alone show no remaining error" in text
+    assert "On all data together: an error that depends on the driving remains" in text
     assert "mostly in M_z" in text
-    assert any("driving like the validation data too" in step for step in hidden.next_steps)
+    assert any("add driving like the validation data" in step for step in hidden.next_steps)
     assert contradictions(text) == []
     # Where disturbances make up much of the training error, nobody knows what is in them.
     noisy = replace(hidden, train=tuple(replace(c, error=7.0) for c in hidden.train))
-    disturbed = "not told from disturbance in the training data, which err by 7 noise floors"
+    disturbed = "cannot be separated from disturbance in the training data (error 7 noise floors)"
     assert disturbed in noisy.meaning
     assert any(disturbed in step for step in noisy.next_steps)
     told = hidden.to_dict()["unknown"]
@@ -87,9 +87,9 @@ def test_what_shows_in_validation_data_alone_is_not_adequate(hidden: Study) -> N
 def test_where_its_size_does_not_matter_that_is_said(start: Model, truth: Model) -> None:
     found = studied(start, pulling_aside(truth), matters=True)
     assert found.verdict == "adequate"
-    assert "something is left" in found.meaning
-    assert "smaller than the errors that matter" in found.meaning
-    assert "On all data together: something is left" in str(found)
+    assert "an error remains" in found.meaning
+    assert "below the errors that matter" in found.meaning
+    assert "On all data together: an error that depends on the driving remains" in str(found)
     assert contradictions(str(found)) == []
 
 
@@ -99,7 +99,7 @@ def test_an_uneven_road_is_no_reason_to_look_for_more(start: Model, truth: Model
     found = studied(start, truth, road)
     assert found.test[-1].error > 1.5
     assert found.verdict == "adequate"
-    assert "by disturbances like those of the training data" in found.meaning
+    assert "from disturbances like those of the training data" in found.meaning
     assert contradictions(str(found)) == []
     smooth = studied(start, truth)
     assert smooth.verdict == "adequate"
@@ -114,8 +114,8 @@ def test_a_slow_force_is_no_disturbance(start: Model, truth: Model) -> None:
     assert told.endswith("N sideways")
     assert 40.0 < float(told.split()[2]) < 250.0  # of 225 N, by how fast it changes
     assert found.verdict == "unknown"
-    assert f"Slower than any disturbance, and so with a cause: a {told}." in str(found)
-    assert any(told in step and "other direction" in step for step in found.next_steps)
+    assert f"Too slow for a disturbance, so it has a cause: a {told}." in str(found)
+    assert any(told in step and "both directions" in step for step in found.next_steps)
     assert contradictions(str(found)) == []
     assert found.to_dict()["unknown"]["slow"] == [told]
 
@@ -140,8 +140,8 @@ def test_errors_that_no_training_data_showed_are_not_foretold(fit: Fit, course: 
 
 
 def test_what_is_foretold_in_words_and_figures() -> None:
-    assert "err 1.5 times what the training data foretell" in str(Foretold(2.25, 1e-9))
+    assert "error is 1.5 times the one that the training data predict" in str(Foretold(2.25, 1e-9))
     lost = Foretold(np.inf, 0.0)
     assert lost.unforeseen
     assert lost.to_dict() == {"ratio": None, "p_value": 0.0}
-    assert "err beyond all the training data foretell" in str(lost)
+    assert "infinitely many times the one that the training data predict" in str(lost)

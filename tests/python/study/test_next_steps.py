@@ -101,9 +101,9 @@ def test_errors_are_told_in_units_and_small_ones_as_such(adequate: Study, unknow
 def test_a_search_that_was_cut_short_is_to_go_on(unknown: Study) -> None:
     cut = replace(unknown, stopped=("mass", "steer_lag"), checked=True)
     said = next_steps(cut)
-    assert said[0] == "give the search more time: mass, steer_lag were still to be tried"
+    assert said[0] == "raise the time limit: mass, steer_lag were not tried"
     one = next_steps(replace(cut, stopped=("mass",)))
-    assert one[0] == "give the search more time: mass was still to be tried"
+    assert one[0] == "raise the time limit: mass was not tried"
     assert not any("check the sensors" in text for text in said)
 
 
@@ -153,16 +153,16 @@ def test_which_of_two_stand_ins_it_is_is_no_question(unknown: Study) -> None:
     alike = AddedEffect("aero_drag", (), 2.0, 1.0, 1e-9, ("head_wind",), "not with one value")
     unsure = next_steps(replace(unknown, added=(replace(alike, grade="plausible"),)))
     sure = next_steps(replace(unknown, added=(replace(alike, grade="alias"),)))
-    assert any("tell aero_drag from head_wind" in step for step in unsure)
-    assert not any("tell aero_drag from head_wind" in step for step in sure)
+    assert any("separate aero_drag from head_wind" in step for step in unsure)
+    assert not any("separate aero_drag from head_wind" in step for step in sure)
 
 
 def test_what_is_confounded_is_to_be_told_apart(unknown: Study) -> None:
     drag = AddedEffect("aero_drag", (), 2.0, 1.0, 1e-9, confounded_with=("head_wind",))
     proxy = AddedEffect("mass", (), 2.0, 1.0, 1e-9, stands_in="it is not constant")
     first, second, *_ = next_steps(replace(unknown, added=(drag, proxy)))
-    assert first.startswith("tell aero_drag from head_wind: `sysid-vehicle next-drive`")
-    assert second.startswith("do not take the size of mass for a property of the car")
+    assert first.startswith("separate aero_drag from head_wind: `sysid-vehicle next-drive`")
+    assert second.startswith("do not take the size of mass as a property of the car")
 
 
 def test_what_no_name_stands_for_is_told_with_shares_and_a_drive(unknown: Study) -> None:
@@ -184,24 +184,26 @@ def test_what_no_name_stands_for_is_told_with_shares_and_a_drive(unknown: Study)
         explained=Beyond((1.0, 0.2), 0.8, 0.6, 0.9),
     )
     names = "steer_lag and side_wind and steer_ratio"
-    assert f"{names} together take up 80 % (60 to 90) of the error 1 to 5 s" in found.meaning
-    assert "steer_lag takes up 80 %" in replace(found, added=(lag,)).meaning
+    assert f"{names} together explain 80 % (60 to 90) of the error 1 to 5 s" in found.meaning
+    assert "steer_lag explains 80 %" in replace(found, added=(lag,)).meaning
     assert "its own share of the error 1 to 5 s ahead 30 % (-10 to 50) on validation" in str(lag)
     assert "own share" not in str(ratio)
     assert lag.to_dict()["own_share"]["low"] == -0.1
     said = next_steps(found)
-    assert any("the final model serves better than the baseline" in text for text in said)
+    assert any("for prediction use the final model" in text for text in said)
     # What is no stand-in for sure is to be shown by driving, if it may take a share.
     (drive_it,) = (text for text in said if "to find out whether" in text)
-    assert "steer_lag is in the car, drive what shows it (fast sweeps" in drive_it
+    assert "the car has steer_lag, record driving that excites it (fast sweeps" in drive_it
     assert not any("validate with longer driving" in text for text in said)
     short = replace(found, validation=Driving.of(unknown.validation.logs[0].between(0.0, 4.0)))
     assert any("20 s or more: 4 s hardly show" in text for text in next_steps(short))
     seen, unseen = (Omnibus(t, 9, p, "M_z") for t, p in ((900.0, 1e-60), (9.0, 0.4)))
     elsewhere = next_steps(replace(found, omnibus=unseen, omnibus_together=seen))
-    assert any("what is left hardly shows in the training data" in text for text in elsewhere)
+    assert any(
+        "the remaining error hardly shows in the training data" in text for text in elsewhere
+    )
     nothing = next_steps(replace(found, explained=Beyond((1.0, 0.9), 0.1, -0.1, 0.3)))
-    assert not any("serves better" in text for text in nothing)
+    assert not any("for prediction use" in text for text in nothing)
 
 
 def test_a_fall_that_other_parameters_of_the_baseline_take_is_told_so(unknown: Study) -> None:
@@ -210,7 +212,7 @@ def test_a_fall_that_other_parameters_of_the_baseline_take_is_told_so(unknown: S
     lag = AddedEffect("steer_lag", (), 2.0, 1.0, 1e-9)
     two = replace(unknown, added=(lag,), fits=(replace(unknown.fit, model=bent), unknown.fit))
     little = in_the_end(replace(two, explained=Beyond((1.0, 0.9), 0.1, -0.1, 0.3)))
-    assert re.search(r"squares of lateral errors fall by \d\d %, which other", little)
+    assert re.search(r"squared lateral errors fall by \d\d %; the baseline with other", little)
     assert "as the two were fitted" not in in_the_end(
         replace(two, explained=Beyond((1.0, 0.1), 0.9, 0.8, 1.0))
     )

@@ -64,7 +64,7 @@ def test_what_no_effect_explains_is_told(found: Shares) -> None:
     assert "no effect was added" in alone.sentence
     assert "yaw rate" in alone.sentence
     unsure = replace(found, whole=share_between(np.ones((9, 3))))
-    assert "no share is certain" in unsure.sentence
+    assert "is not significant" in unsure.sentence
 
 
 def test_pieces_of_several_logs_count_alike(fit: Fit, course: Log) -> None:

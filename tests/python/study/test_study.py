@@ -236,9 +236,9 @@ def test_infinite_figures_become_null(study: Study, tmp_path: Path) -> None:
 
 def test_a_part_is_told_with_its_share(study: Study) -> None:
     part = replace(study, verdict="partly_explained", explained=Beyond((1.0, 0.7), 0.3, 0.2, 0.4))
-    assert "takes up 30 % (20 to 40) of the error 1 to 5 s ahead; the rest is" in part.meaning
-    assert part.meaning.startswith(f"named: {study.added[0].name}; what was added takes up 30 %")
-    assert "takes up" not in replace(part, explained=study.explained).meaning
+    assert "30 % (20 to 40) of the error 1 to 5 s ahead; the rest is" in part.meaning
+    assert part.meaning.startswith(f"named: {study.added[0].name}; the effects added explain 30 %")
+    assert "the effects added explain" not in replace(part, explained=study.explained).meaning
     # What cannot be told from another is one name.
     one, other = (
         replace(study.added[0], id=e, confounded_with=(f,))
@@ -247,7 +247,7 @@ def test_a_part_is_told_with_its_share(study: Study) -> None:
     (known,) = (v for v in study.verdicts.all if v.effect.id == study.added[0].id)
     told = Verdicts(tuple(replace(known, effect=effect(e.id)) for e in (one, other)))
     both = replace(part, added=(one, other), verdicts=told)
-    assert both.meaning.startswith("named: mass or force_gain; what was added")
+    assert both.meaning.startswith("named: mass or force_gain; the effects added")
 
 
 def test_undetermined_parameters_are_among_the_warnings(study: Study) -> None:
@@ -262,7 +262,7 @@ def test_a_complete_model_is_adequate(start: Model, truth: Model, drives: Drives
     assert found.to_dict()["effects"] == []
     assert len(found.fits) == 1
     assert found.test[0].error == pytest.approx(1.0, abs=0.04)
-    assert "no sign of anything left" in str(found)
+    assert "no remaining error" in str(found)
     assert contradictions(str(found)) == []
 
 

@@ -36,19 +36,28 @@ def test_driving_without_corners_tests_nothing_lateral(start: Model, truth: Mode
     [
         ("the one-step-ahead error fell from 1.22 to 1.32", "fell from 1.22 to 1.32"),
         (
-            "Verdict: unknown - it is.\nIn the end: no sign of anything left",
+            (
+                "Verdict: unknown - it is.\nFinal model: "
+                "no remaining error that depends on the driving"
+            ),
             "no word of what is left",
         ),
         (
-            "Verdict: explained - all.\nIn the end: something is left that depends on the driving",
+            "Verdict: explained - all.\nFinal model: an error that depends on the driving remains",
             "explained, and something is left",
         ),
         (
-            "takes up only 36 % of it; of the error 1 to 5 s ahead, 96 % (93 to 99) is gone",
-            "takes up only 36 %",
+            (
+                "the effects added explain 36 % (30 to 40) of the error 1 to 5 s ahead. The "
+                "effects added remove 96 % (93 to 99) of the error 1 to 5 s ahead."
+            ),
+            "explains 36 %",
         ),
         (
-            "s ahead on validation data: v_y 0.25 -> 0.15 m/s. What was added takes nothing off it",
+            (
+                "s ahead on validation data: v_y 0.25 -> 0.15 m/s. The error: the effects added do "
+                "not reduce it"
+            ),
             "takes nothing off errors that fell",
         ),
     ],

@@ -334,8 +334,8 @@ def test_two_that_may_hold_only_together_are_sought_together(
 def test_what_came_with_a_step_is_told(dx: Diagnosis) -> None:
     fit = by_id(dx, "aero_drag")
     assert _more(fit, set(), set()) == ""
-    assert _more(fit, set(), {"steer_lag"}) == " It holds together with steer_lag."
-    assert _more(fit, {"head_wind"}, set()) == " Without head_wind the model is aero_drag."
+    assert _more(fit, set(), {"steer_lag"}) == " It is significant only together with steer_lag."
+    assert _more(fit, {"head_wind"}, set()) == " head_wind removed; the model has aero_drag."
 
 
 def test_the_fall_in_error_is_by_the_richer_models_floor(

@@ -199,7 +199,7 @@ def test_what_the_time_limit_leaves_unknown_is_said(
         finally:
             monkeypatch.setattr("time.perf_counter", clock[0])
 
-    with pytest.warns(SysidWarning, match="time limit left unknown"):
+    with pytest.warns(SysidWarning, match="time limit left open"):
         study = improve(
             start, *logs, candidates=["steer_lag"], most_effects=1, starts=1, time_limit_s=1e5
         )
@@ -208,7 +208,7 @@ def test_what_the_time_limit_leaves_unknown_is_said(
     together, alone = study.late_facts
     assert "together" in together
     assert "steer_lag alone" in alone
-    said = f"Warning: the time limit left unknown {together}; {alone}; without that neither"
+    said = f"Warning: the time limit left open {together}; {alone}; without that neither"
     assert [said in line for line in str(study).splitlines() if "time limit left" in line] == [True]
 
 

@@ -80,7 +80,7 @@ def logs(truth: Model) -> tuple[Log, Log]:
 @pytest.mark.parametrize(
     ("limit", "unknown"),
     [
-        (1.0, "read at the same moments"),
+        (1.0, "have the same clock"),
         (60.0, "parameters of the baseline"),
         (300.0, None),
         (700.0, None),
@@ -156,10 +156,13 @@ def test_what_was_added_is_judged_whatever_the_search_takes(
     assert study.explained is not None
     assert not study.stopped
     (late,) = study.late_facts
-    assert late == "what each of aero_drag, steer_lag takes of the validation error in its turn"
+    assert late == "how much of the validation error each of aero_drag, steer_lag removes"
     told = [text for text in study.warnings if "time limit" in text]
     assert told == [
-        f"the time limit left unknown {late}; without that neither the verdict nor a name is sure"
+        (
+            f"the time limit left open {late}; without that neither the verdict nor the effects "
+            "named are certain"
+        )
     ]
     # Which of the two takes little nobody knows.
     assert {a.id: a.grade for a in study.added} == dict.fromkeys(CANDIDATES[:2], "plausible")

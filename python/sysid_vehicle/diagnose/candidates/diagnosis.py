@@ -203,7 +203,7 @@ class Diagnosis(Printed):
         if c.fit is None:
             told = f"{c.id} is likeliest by its score alone: no refit confirms it"
         elif not confirmed(c.statistic, c.effect, self.rules):
-            told = f"{c.id} is likeliest by its score, but refitted the model predicts no better"
+            told = f"{c.id} is likeliest by its score, but a refit with it predicts no better"
         else:
             told = f"{c.id} fits best, but its value is physically implausible ({c.size})"
         worst = "; ".join(self.beside.unrelated.values())
@@ -213,14 +213,12 @@ class Diagnosis(Printed):
         """What may be said where no effect is significant."""
         wrong = "; ".join(self.beside.unrelated.values())
         if wrong:
-            return (
-                f"there is evidence for no effect of the catalogue, but readings are wrong: {wrong}"
-            )
+            return f"no effect of the catalogue is significant, but channels are wrong: {wrong}"
         if self.omnibus.rejects:
             return f"no effect of the catalogue explains what is missing: {self.omnibus}"
         return f"no effect of the catalogue is missing; {self.omnibus}"
 
-    _HEAD = ("effect", "statistic", "p", "training error with it", "size", "cannot tell from")
+    _HEAD = ("effect", "statistic", "p", "training error with it", "size", "confounded with")
 
     def _rows(self, most: int = 12) -> list[list[str]]:
         return [
@@ -239,11 +237,11 @@ class Diagnosis(Printed):
         if not self.significant:
             return self._without_evidence()
         if self.named is None:
-            return f"something is wrong that no effect can be named for: {self.reservation}"
+            return f"something is missing, but no effect can be named: {self.reservation}"
         what = f"most likely missing: {self.named.effect.title}"
         if self.named.indistinguishable_from:
             others = few(self.named.indistinguishable_from)
-            what += f" (this driving cannot tell it from {others})"
+            what += f" (confounded with {others} in this driving)"
         # The test against unknown forces is blunter than that of one effect: its silence is none.
         return f"{what}; with it {self.beside.omnibus}" if self.omnibus.rejects else what
 

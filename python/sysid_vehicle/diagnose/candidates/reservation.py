@@ -109,12 +109,12 @@ def reservation(
     share = excess(left.omnibus) / max(excess(before), 1.0)
     if share > rules.most and share_explained(error_before, error_after) < rules.taken:
         return (
-            f"with the effect that fits best {100 * min(share, 1.0):.0f} % of the evidence that "
-            f"something is missing stays, and the error does not fall; {left.worst}"
+            f"with the best-fitting effect {100 * min(share, 1.0):.0f} % of the evidence that "
+            f"something is missing remains, and the error does not fall; {left.worst}"
         )
     if not any(p < rules.alpha for p in left.board.family_p_values().values()):
         return (
-            f"with the effect that fits best {left.omnibus}, and no other effect of the catalogue "
+            f"with the best-fitting effect {left.omnibus}, and no other effect of the catalogue "
             f"explains that; {left.worst}"
         )
     return ""

@@ -80,22 +80,23 @@ class EffectVerdict:
         if self.finding == "missing":
             return f"missing; {size}"
         if self.finding == "one of a group":
-            return f"missing, or else {rivals}, which this driving cannot tell from it; {size}"
+            return f"missing; confounded with {rivals} in this driving; {size}"
         if self.finding == "open" and not rivals:
-            return f"evidence for it, and not tried yet; {size}"
+            return f"significant, not tried yet; {size}"
         if self.finding == "open":
-            return f"evidence for it beside {rivals}; {size}; add {rivals} and diagnose again"
+            return f"significant beside {rivals}; {size}; add {rivals} and diagnose again"
         if self.finding == "proxy" and rivals:
-            return f"only acted like what {rivals} explain{'s' if len(self.group) == 1 else ''}"
+            return f"its evidence is explained by {rivals}"
         if self.finding == "proxy":
-            return f"something acts like it, but {self.because}"
+            return f"significant, but {self.because}"
         if self.finding == "negligible":
             return f"present but negligible; {size}; it would matter from {matters}"
         if self.finding == "absent":
             return f"absent; {below} at 95 %"
-        takes = f"it takes {self.effect.excited_by}"
+        takes = f"excited by {self.effect.excited_by}"
         if not self.bound:
-            return f"not testable: the fitted parameters copy it, or a channel is missing; {takes}"
+            why = "the fitted parameters reproduce it, or a channel is missing"
+            return f"not testable: {why}; {takes}"
         return f"not testable; {below} at 95 %, and it would matter from {matters}; {takes}"
 
     def _pairs(self) -> list[tuple[float, float]]:
@@ -279,10 +280,10 @@ def judge(
     kept = constancy(final, rules)
     for i, v in enumerate(found):
         if v.effect.id in kept and not kept[v.effect.id].holds:
-            because = f"not with one value ({kept[v.effect.id].span})"
+            because = f"its value is not constant ({kept[v.effect.id].span})"
             found[i] = replace(v, finding="proxy", group=(), because=because)
         elif v.effect.id in away and v.finding in _NAMED:
-            because = f"an unknown {away[v.effect.id]} explains what it does, and more"
+            because = f"an unknown {away[v.effect.id]} explains the same and more"
             found[i] = replace(v, finding="proxy", group=(), because=because)
     missing = [v.effect.id for v in found if v.finding in _NAMED]
     for effect in final.model.candidates:
@@ -302,7 +303,7 @@ def judge(
         elif effect.id in untried and verdict.finding == "missing":
             verdict = replace(verdict, finding="open")
         elif settled and verdict.finding == "missing":
-            because = "with it, driving that no fit saw is predicted no better"
+            because = "it does not improve the prediction of validation data"
             verdict = replace(verdict, finding="proxy", because=because)
         elif names and verdict.finding == "missing":
             # Several may act like the same one that is missing too: only a refit tells.

@@ -97,9 +97,9 @@ class EffectChange:
     def sentence(self) -> str:
         """What is said of it, in words."""
         if self.said == "one of a group":
-            return f"changed, or else {', '.join(self.group)}"
+            return f"changed; confounded with {', '.join(self.group)}"
         if self.said == "implausible":
-            return "acts like what changed, but no car changes so much"
+            return "significant, but the change is physically implausible"
         if self.said in ("unchanged", "not testable"):
             below = self._listed([f"below {number(b, 2)}" for b in self.bound])
             return f"{self.said}: {below} at 95 %"
@@ -202,7 +202,10 @@ class Change(Printed):
 
     def _headline(self) -> str:
         leading = [e for e in self.named if not any(self._before(g, e) for g in e.group)]
-        told = [f"{e} ({', or else '.join((e.sure, *e.group))})" for e in leading]
+        told = [
+            f"{e} ({'; confounded with '.join(filter(None, (e.sure, ', '.join(e.group))))})"
+            for e in leading
+        ]
         what = f"changed: {'; '.join(told)}" if told else ""
         if self.unknown:
             kinds = ", ".join(s.effects[0].removeprefix(UNKNOWN) for s in self.unknown)
@@ -212,7 +215,9 @@ class Change(Printed):
             return what
         likely = [f"{e.id} ({e.sure})" for e in self.effects if e.probability > 0.5]
         if likely:
-            return f"no change is shown by itself; something changed, likeliest {', '.join(likely)}"
+            return (
+                f"no single change is significant; something changed, likeliest {', '.join(likely)}"
+            )
         return "no change is shown"
 
     def _before(self, effect: str, e: EffectChange) -> bool:

@@ -90,8 +90,8 @@ class Ceiling:
             return f"a function of steering, speed and acceleration history explains {told}"
         most = max(self.forces, key=lambda f: f.share)
         return (
-            "no function of steering, speed and acceleration history is found that explains what "
-            f"is missing (at best {most}): as far as they tell it is disturbance"
+            "no function of steering, speed and acceleration history explains what is missing (at "
+            f"best {most}): as far as this shows it is disturbance"
         )
 
     _repr_html_ = html_text

@@ -101,8 +101,8 @@ class Delay:
         if self.alone:
             return f"the car answers {what} {size} than {behind}"
         return (
-            f"{behind} fits best where the car answers {what} {size}, but that leaves something "
-            "that depends on the driving: what the model lacks may look like a delay"
+            f"{behind} fits best where the car answers {what} {size}, but an error that depends on "
+            "the driving remains: a missing effect may look like a delay"
         )
 
 

@@ -72,9 +72,9 @@ class Omnibus:
 
     def __str__(self) -> str:
         if not self.rejects:
-            return f"no sign of anything left that depends on the driving (p = {self.p_value:.2g})"
+            return f"no remaining error that depends on the driving (p = {self.p_value:.2g})"
         return (
-            f"something is left that depends on the driving, mostly in {self.strongest} "
+            f"an error that depends on the driving remains, mostly in {self.strongest} "
             f"(p = {self.p_value:.2g})"
         )
 

@@ -45,7 +45,7 @@ class Unknown:
     def lines(self) -> tuple[str, ...]:
         """The findings, a sentence each."""
         shown = [str(c) for c in self.curves if c.shown]
-        told = shown or ["no band excludes that there is no such force"]
+        told = shown or ["no band excludes zero force"]
         told += [f"proposal {i}: {p}" for i, p in enumerate(self.proposals, 1)]
         if not self.proposals:
             told.append("no formula explains it and also holds on validation data")
