@@ -12,7 +12,7 @@ from sysid_vehicle.errors import NumericalError
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Fit, refine
 from sysid_vehicle.rules import Measures, accept, worse
-from sysid_vehicle.study.own import own_shares
+from sysid_vehicle.study.ahead.own_share import own_shares
 from sysid_vehicle.study.validation import (
     as_sure,
     changes_ahead,

@@ -52,6 +52,15 @@ _MOVED: dict[str, str] = {
         }.items()
         for module in modules.split()
     },
+    **{
+        f"study.{module}": f"study.{folder}.{module}"
+        for folder, modules in {
+            "ahead": "beyond horizons shares waterfall",
+            "judge": "answers disagree foretold structure",
+            "results": "added predicting",
+        }.items()
+        for module in modules.split()
+    },
 }
 # Classes that have another name or module since, by their place.
 _CALLED: dict[str, str] = {

@@ -10,15 +10,15 @@ from .._common.files import as_path
 from ..errors import InvalidInput, warn
 from ..log import Columns, Log
 from ..vehicle import Vehicle
-from .channel_map import ChannelMap
-from .csv import read_table
-from .ground import Ground
-from .objects import contents_of_object
-from .proposal import Proposal
-from .propose import propose_channels
+from .formats.csv import read_table
+from .formats.objects import contents_of_object
+from .mapping.channel_map import ChannelMap
+from .mapping.ground import Ground
+from .mapping.proposal import Proposal
+from .mapping.propose import propose_channels
+from .mapping.source import Source
 from .recording import Recording
 from .registry import FORMATS, Format, blamed, read_with, recognised
-from .source import Source
 from .table import Table
 
 __all__ = [

@@ -171,7 +171,7 @@ def read_with(entry: Format, path: Path, dbc: Path | None) -> Table | Recording:
         If a library is absent; the message names the extra.
     """
     require(entry, str(path))
-    home: Reader = importlib.import_module(f".{entry.module}", __package__)
+    home: Reader = importlib.import_module(f".formats.{entry.module}", __package__)
     return home.read(path, dbc)
 
 

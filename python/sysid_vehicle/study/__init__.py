@@ -1,13 +1,13 @@
 """Studies: the whole loop from a log to a better model."""
 
 from ..rules import Verdict
-from .added import AddedEffect
-from .hidden import open_effects
-from .horizons import LATERAL, PREDICTED, Horizons, horizons
+from .ahead.horizons import LATERAL, PREDICTED, Horizons, horizons
+from .ahead.waterfall import Waterfall, look_ahead
 from .improve import improve
-from .said import left_out
+from .results.added import AddedEffect
+from .results.hidden import open_effects
+from .results.sentences import left_out
 from .study import Study
-from .waterfall import Waterfall, look_ahead
 
 __all__ = [
     "LATERAL",

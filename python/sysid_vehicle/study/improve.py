@@ -18,11 +18,11 @@ from ..log import Log, several_logs
 from ..model import Model
 from ..rules import USUAL, Rules
 from ..sensors import SensorCheck, made_ready, put_right
-from .clock import in_time
-from .judge import Judge
+from .judge.judge import Judge
+from .judge.matters import sizes_that_matter
 from .limit import Judging, Schedule
-from .matters import sizes_that_matter
-from .search import Search, Trail, kept
+from .search.clock import in_time
+from .search.search import Search, Trail, kept
 from .study import Study
 from .validation import set_aside
 

@@ -35,23 +35,23 @@ from ..identify import Fit
 from ..model import Model
 from ..rules import USUAL, Rules, Verdict
 from ..saved import save
-from .added import AddedEffect
-from .answers import Answers
-from .beyond import Beyond
-from .disagree import Disagreement, disagreements
-from .failing import errors_with, late, where_lines
-from .foretold import Foretold
-from .hidden import hidden
-from .horizons import Horizons, horizons
-from .in_time import in_time
-from .next_steps import next_steps
-from .predicting import Predicting, predicting
-from .record import record
-from .said import ahead, in_the_end, left_out, meaning, nuisances, small
-from .shares import Shares, shares
-from .structure import Structure
+from .ahead.beyond import Beyond
+from .ahead.horizons import Horizons, horizons
+from .ahead.shares import Shares, shares
+from .ahead.waterfall import Waterfall, waterfall
+from .judge.answers import Answers
+from .judge.disagree import Disagreement, disagreements
+from .judge.foretold import Foretold
+from .judge.structure import Structure
+from .results.added import AddedEffect
+from .results.failing import errors_with, late, where_lines
+from .results.hidden import hidden
+from .results.in_time import in_time
+from .results.next_steps import next_steps
+from .results.predicting import Predicting, predicting
+from .results.record import record
+from .results.sentences import ahead, in_the_end, left_out, meaning, nuisances, small
 from .validation import at_its_best
-from .waterfall import Waterfall, waterfall
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,9 +18,9 @@ from ..estimate import MEASURED, Driving
 from ..identify import Fit, Prediction, driving_of, predict, predicting_ahead
 from ..log import Log, several_logs
 from ..rules import ErrorChange, Gain
-from .beyond import Beyond, beyond_noise
-from .held import along_alone, changes_of
-from .horizons import ALONG, typical_error
+from .ahead.along_the_car import along_alone, changes_of
+from .ahead.beyond import Beyond, beyond_noise
+from .ahead.horizons import ALONG, typical_error
 
 _SHARE = 0.3
 _PIECE_S, _FEWEST_PIECES = 5.0, 6

@@ -10,7 +10,7 @@ from sysid_vehicle.diagnose import Ceiling, Explainable
 from sysid_vehicle.diagnose.unexplained.ceiling import _ago, _features, _share, ridge
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import USUAL
-from sysid_vehicle.study.structure import structure
+from sysid_vehicle.study.judge.structure import structure
 
 
 def test_a_wrong_answer_to_the_steering_can_be_explained(fit: Fit, course: Log) -> None:

@@ -23,9 +23,9 @@ from sysid_vehicle import (
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import predicting_ahead
 from sysid_vehicle.rules import USUAL, ErrorChange
-from sysid_vehicle.study.horizons import changes, typical_error
-from sysid_vehicle.study.predicting import Predicting
-from sysid_vehicle.study.waterfall import look_ahead
+from sysid_vehicle.study.ahead.horizons import changes, typical_error
+from sysid_vehicle.study.ahead.waterfall import look_ahead
+from sysid_vehicle.study.results.predicting import Predicting
 
 STIFFNESS = ("cornering stiffness front", "cornering stiffness rear")
 
@@ -150,7 +150,7 @@ def _said(better: float, needed: float | None, fit: Fit) -> Predicting:
     def change(log_ratio: float) -> tuple[ErrorChange, ...]:
         return (ErrorChange("vy_mps", 2.0, log_ratio, 0.05),)
 
-    from sysid_vehicle.study.horizons import horizons
+    from sysid_vehicle.study.ahead.horizons import horizons
 
     errors = horizons([fit, fit], ["one step", "2 s ahead"], fit.driving, (2.0,))
     more = () if needed is None else change(needed)

@@ -281,7 +281,7 @@ class TestRegistry:
     def test_every_format_has_its_home_and_its_extra(self, repo: Path) -> None:
         extras = (repo / "pyproject.toml").read_text("utf-8")
         for entry in FORMATS:
-            assert (repo / "python/sysid_vehicle/read" / f"{entry.module}.py").is_file()
+            assert (repo / "python/sysid_vehicle/read/formats" / f"{entry.module}.py").is_file()
             assert bool(entry.extra) == bool(entry.libraries)
             if entry.extra:
                 assert f"\n{entry.extra} = [" in extras

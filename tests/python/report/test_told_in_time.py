@@ -11,7 +11,7 @@ from reported import ended_at_once, reported_study
 import sysid_vehicle as sv
 from sysid_vehicle.cli import commands, main
 from sysid_vehicle.study import study as study_module
-from sysid_vehicle.study.shares import Shares
+from sysid_vehicle.study.ahead.shares import Shares
 
 
 @pytest.fixture(scope="module")

@@ -10,12 +10,12 @@ import pytest
 from sysid_vehicle import Fit, Log, Model, drive, manoeuvres
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import Share, worse
-from sysid_vehicle.study import own
-from sysid_vehicle.study.apart import apart
-from sysid_vehicle.study.beyond import Beyond, own_share, taken_of
-from sysid_vehicle.study.held import along_alone, changes_of
-from sysid_vehicle.study.horizons import LATERAL, changes, moving_with
-from sysid_vehicle.study.own import shown_together, together_by_motion
+from sysid_vehicle.study.ahead import own_share as own
+from sysid_vehicle.study.ahead.along_the_car import along_alone, changes_of
+from sysid_vehicle.study.ahead.beyond import Beyond, own_share, taken_of
+from sysid_vehicle.study.ahead.horizons import LATERAL, changes, moving_with
+from sysid_vehicle.study.ahead.own_share import shown_together, together_by_motion
+from sysid_vehicle.study.ahead.where_models_differ import apart
 from sysid_vehicle.study.validation import AHEAD, fall_in_error
 
 ALONG = moving_with({"vx_mps"})

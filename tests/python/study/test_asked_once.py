@@ -41,10 +41,11 @@ from sysid_vehicle.identify.ahead import _Ahead
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.sensors.low_pass import _Problem
 from sysid_vehicle.sensors.spectrum import _bias, _of_windows, spectrum_of
-from sysid_vehicle.study import steps, validation
-from sysid_vehicle.study.answers import answers_of
-from sysid_vehicle.study.steps import alternatives, exchanged, without_insignificant
-from sysid_vehicle.study.together import _none_at_nothing
+from sysid_vehicle.study import validation
+from sysid_vehicle.study.judge.answers import answers_of
+from sysid_vehicle.study.search import steps
+from sysid_vehicle.study.search.steps import alternatives, exchanged, without_insignificant
+from sysid_vehicle.study.search.together import _none_at_nothing
 
 
 def test_signals_that_are_regressed_together_have_the_shares_of_each_alone(

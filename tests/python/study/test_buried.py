@@ -9,9 +9,9 @@ from contradictions import contradictions
 from sysid_vehicle import Model, NoiseModel, drive, example_vehicle, improve, manoeuvres
 from sysid_vehicle.identify import Fit
 from sysid_vehicle.log import Log
-from sysid_vehicle.study import matters
-from sysid_vehicle.study.horizons import AHEAD, PREDICTED, squares_ahead
-from sysid_vehicle.study.matters import buried
+from sysid_vehicle.study.ahead.horizons import AHEAD, PREDICTED, squares_ahead
+from sysid_vehicle.study.judge import matters
+from sysid_vehicle.study.judge.matters import buried
 from sysid_vehicle.study.study import Study
 
 LENGTH_M = 0.5

@@ -10,11 +10,11 @@ from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refit
 from sysid_vehicle.rules import Gain
-from sysid_vehicle.study import contested
-from sysid_vehicle.study.contested import of_no_use, other_values, spoken_against
-from sysid_vehicle.study.disagree import Disagreement
-from sysid_vehicle.study.horizons import errors_grow
-from sysid_vehicle.study.together import InPlace
+from sysid_vehicle.study.ahead.horizons import errors_grow
+from sysid_vehicle.study.judge import contested
+from sysid_vehicle.study.judge.contested import of_no_use, other_values, spoken_against
+from sysid_vehicle.study.judge.disagree import Disagreement
+from sysid_vehicle.study.search.together import InPlace
 
 NAME = "aero_downforce.cl_a_rear_m2"
 

@@ -11,7 +11,7 @@ from contradictions import contradictions
 from sysid_vehicle import Fit, Log, Model, RoadDisturbance, Study, drive, improve, manoeuvres
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import USUAL
-from sysid_vehicle.study.foretold import Foretold, foretold
+from sysid_vehicle.study.judge.foretold import Foretold, foretold
 
 CANDIDATES = ("steer_lag", "aero_drag")
 

@@ -12,8 +12,8 @@ from sysid_vehicle.estimate import Driving, turning, turning_blocks
 from sysid_vehicle.identify.ahead import of_few
 from sysid_vehicle.rules import Share, worse
 from sysid_vehicle.study import validation
-from sysid_vehicle.study.beyond import Beyond, beyond_noise, own_share
-from sysid_vehicle.study.horizons import (
+from sysid_vehicle.study.ahead.beyond import Beyond, beyond_noise, own_share
+from sysid_vehicle.study.ahead.horizons import (
     LATERAL,
     PREDICTED,
     block_errors,
@@ -21,9 +21,9 @@ from sysid_vehicle.study.horizons import (
     horizons,
     moving_with,
 )
-from sysid_vehicle.study.matters import sizes_that_matter, sufficient, within
+from sysid_vehicle.study.ahead.waterfall import look_ahead
+from sysid_vehicle.study.judge.matters import sizes_that_matter, sufficient, within
 from sysid_vehicle.study.validation import AHEAD, at_its_best
-from sysid_vehicle.study.waterfall import look_ahead
 
 
 @pytest.fixture(scope="module")

@@ -25,12 +25,12 @@ from sysid_vehicle.rules import (
     verdict,
 )
 from sysid_vehicle.study import AddedEffect
-from sysid_vehicle.study.beyond import Beyond
-from sysid_vehicle.study.disagree import disagreements
-from sysid_vehicle.study.foretold import Foretold
-from sysid_vehicle.study.next_steps import next_steps
-from sysid_vehicle.study.said import ahead, in_the_end, small
-from sysid_vehicle.study.structure import Structure
+from sysid_vehicle.study.ahead.beyond import Beyond
+from sysid_vehicle.study.judge.disagree import disagreements
+from sysid_vehicle.study.judge.foretold import Foretold
+from sysid_vehicle.study.judge.structure import Structure
+from sysid_vehicle.study.results.next_steps import next_steps
+from sysid_vehicle.study.results.sentences import ahead, in_the_end, small
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from sysid_vehicle import Fit, Log
 from sysid_vehicle.diagnose.evidence.coordinates import begins
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import share_between
-from sysid_vehicle.study.shares import CHANNELS, Shares, _errors, _path, shares
+from sysid_vehicle.study.ahead.shares import CHANNELS, Shares, _errors, _path, shares
 
 
 @pytest.fixture(scope="module")

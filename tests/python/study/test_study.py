@@ -24,8 +24,8 @@ from sysid_vehicle import (
 )
 from sysid_vehicle.diagnose import Verdicts
 from sysid_vehicle.rules import Gain
-from sysid_vehicle.study.beyond import Beyond
-from sysid_vehicle.study.shares import shares
+from sysid_vehicle.study.ahead.beyond import Beyond
+from sysid_vehicle.study.ahead.shares import shares
 from sysid_vehicle.study.validation import error_falls, gain_in_log_likelihood, set_aside
 
 LAG = "steer_lag.time_constant_s", 0.06

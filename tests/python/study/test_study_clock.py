@@ -8,7 +8,7 @@ from sysid_vehicle import Driving, Fit, Log, diagnose
 from sysid_vehicle.diagnose import Diagnosis
 from sysid_vehicle.diagnose.unexplained.delay import delayed
 from sysid_vehicle.identify import refine
-from sysid_vehicle.study.clock import in_time
+from sysid_vehicle.study.search.clock import in_time
 
 
 def written(log: Log, early_samples: int) -> Log:

@@ -12,7 +12,7 @@ from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import refine
 from sysid_vehicle.rules import USUAL
-from sysid_vehicle.study.steps import _with_others, exchanged, in_common
+from sysid_vehicle.study.search.steps import _with_others, exchanged, in_common
 
 
 def test_an_effect_that_was_tried_against_the_same_ones_is_not_refitted(

@@ -8,7 +8,7 @@ import pytest
 
 from sysid_vehicle import Diagnosis, Fit, diagnose
 from sysid_vehicle.rules import USUAL
-from sysid_vehicle.study.search import Search, Trail
+from sysid_vehicle.study.search.search import Search, Trail
 
 AGAINST = ["aero_drag", "rolling_resistance", "head_wind"]
 
@@ -25,7 +25,7 @@ def test_what_was_near_the_best_is_refitted_in_the_next_step_too(
         few = dx.ranking if len(asked) == 1 else ()
         return replace(dx, ranking=few, proposed=replace(dx.proposed, known=()))
 
-    monkeypatch.setattr("sysid_vehicle.study.search.diagnose", noted)
+    monkeypatch.setattr("sysid_vehicle.study.search.search.diagnose", noted)
     trail = Trail([fit])
     Search(
         fit.driving,
@@ -75,7 +75,7 @@ def test_what_a_fit_left_open_does_not_speak_against_a_step(
     trail = Trail([baseline, lost], [replace(dx, fit=f) for f in (baseline, lost)])
     served = {id(lost): good}
     monkeypatch.setattr(
-        "sysid_vehicle.study.search.serving", lambda fit, _: served.get(id(fit), fit)
+        "sysid_vehicle.study.search.search.serving", lambda fit, _: served.get(id(fit), fit)
     )
     trail.without_harm(baseline.driving, USUAL)
     assert trail.fit is lost

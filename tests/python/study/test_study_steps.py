@@ -11,8 +11,8 @@ from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refine
 from sysid_vehicle.rules import USUAL, share_explained
-from sysid_vehicle.study.search import Search, Trail, _more
-from sysid_vehicle.study.steps import (
+from sysid_vehicle.study.search.search import Search, Trail, _more
+from sysid_vehicle.study.search.steps import (
     _distance,
     _mattering,
     alternatives,
@@ -210,7 +210,7 @@ def test_what_was_refitted_when_the_time_is_over_is_added(
     monkeypatch.setattr("time.perf_counter", lambda: next(clock, 2.0))
     monkeypatch.setattr(Search, "_diagnosis", lambda _, fit, *__: replace(dx, fit=fit))
     for refits in ("together._with_subset", "steps._with_others"):
-        monkeypatch.setattr(f"sysid_vehicle.study.{refits}", pytest.fail)
+        monkeypatch.setattr(f"sysid_vehicle.study.search.{refits}", pytest.fail)
     trail = Trail([baseline])
     replace(search(driving[1], 4, []), ends=1.0).follow(trail)
     held = first_that_holds(dx, baseline, driving[1])

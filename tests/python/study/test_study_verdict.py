@@ -13,9 +13,9 @@ from sysid_vehicle.errors import SysidWarning
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import refit
 from sysid_vehicle.rules import UNKNOWN, USUAL, Share
-from sysid_vehicle.study import own
+from sysid_vehicle.study.ahead import own_share as own
+from sysid_vehicle.study.ahead.own_share import alike, own_shares, shares_of_groups, without_idle
 from sysid_vehicle.study.improve import _room
-from sysid_vehicle.study.own import alike, own_shares, shares_of_groups, without_idle
 
 
 def test_what_another_effect_would_do_in_its_place_is_not_its_own(
@@ -94,7 +94,7 @@ def test_the_baseline_is_asked_whether_its_errors_matter(
     car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
     logs = [drive(car, manoeuvres.lap(20.0), seed=seed, rate_hz=50.0) for seed in (71, 72)]
     asked: list[Fit] = []
-    module = sys.modules["sysid_vehicle.study.judge"]
+    module = sys.modules["sysid_vehicle.study.judge.judge"]
     monkeypatch.setattr(module, "sufficient", lambda fit, *_: asked.append(fit))
     study = improve(start, *logs, candidates=["steer_lag"], most_effects=1, starts=1, matters={})
     assert [a.id for a in study.added] == ["steer_lag"]
@@ -185,7 +185,7 @@ def test_what_the_time_limit_leaves_unknown_is_said(
     """Something is left beside what was added; there is no time to ask what it takes."""
     car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
     logs = [drive(car, manoeuvres.lap(20.0), seed=seed, rate_hz=50.0) for seed in (71, 72)]
-    module = sys.modules["sysid_vehicle.study.judge"]
+    module = sys.modules["sysid_vehicle.study.judge.judge"]
     monkeypatch.setattr(module, "incomplete", lambda *_: True)
     monkeypatch.setattr(module, "own_shares", lambda *_: {})
     monkeypatch.setattr(module, "beyond_noise_ahead", lambda *_: never_done())

@@ -16,8 +16,8 @@ from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify.identify import maximised
 from sysid_vehicle.sensors import estimate as _estimate
 from sysid_vehicle.sensors import low_pass as _low_pass
-from sysid_vehicle.study import judge
-from sysid_vehicle.study.search import Search, Trail
+from sysid_vehicle.study.judge import judge
+from sysid_vehicle.study.search.search import Search, Trail
 
 CANDIDATES = ["steer_lag", "aero_drag", "rolling_resistance", "yaw_inertia", "gyro_bias"]
 

@@ -12,9 +12,9 @@ from sysid_vehicle.diagnose.candidates.reservation import beside
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import refine
 from sysid_vehicle.rules import USUAL
-from sysid_vehicle.study import together
-from sysid_vehicle.study.search import Trail
-from sysid_vehicle.study.together import (
+from sysid_vehicle.study.search import together
+from sysid_vehicle.study.search.search import Trail
+from sysid_vehicle.study.search.together import (
     _from_within,
     _leading_subsets,
     _likeliest_within,

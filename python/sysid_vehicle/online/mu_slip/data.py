@@ -13,7 +13,7 @@ from ..._common.arguments import generator
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import brief
 from ...errors import InvalidInput, near_names
-from ...read.csv import read_table
+from ...read.formats.csv import read_table
 from .curve import TWO_PARAMETER, MuSlipCurve
 
 _COLUMNS = ("slip", "mu")

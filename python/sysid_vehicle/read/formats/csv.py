@@ -1,0 +1,203 @@
+"""Reading a CSV file into columns, with the line number of whatever is not a number."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InvalidInput
+from ...log import seconds_of_stamps
+from ..table import BadCell, Table
+from ..units import is_unit
+from .text import read_text_table
+
+_LAST_ROWS = 20  # that tell how many cells a row has
+_FEWEST_CELLS = 3
+_LONGEST_PREAMBLE = 100
+
+
+def read_table(path: str | Path) -> Table:
+    """Read a CSV file whose first line names the columns (comma, semicolon or tab between).
+
+    Lines that begin with ``#`` are comments; where only they come before the numbers the last of
+    them names the columns. So are lines of another form before the one with the names. A second
+    line of units is kept with the columns.
+
+    Raises
+    ------
+    InvalidInput
+        If the file cannot be read, has no header or no rows, or a row has the wrong length.
+    """
+    return table_of_text(read_text_table(path))
+
+
+def table_of_text(text: str, *, units_row: bool | None = None) -> Table:
+    """Read the text of a CSV file; `units_row` tells whether the second line states units.
+
+    Raises
+    ------
+    InvalidInput
+        As :func:`read_table`.
+    """
+    header, body, first_line = _split(text.replace("\r\n", "\n").replace("\r", "\n"))
+    delimiter = max(",;\t", key=header.count)
+    _, cells = next(_rows(header, delimiter, 1), (1, []))
+    names = tuple(name.strip() for name in cells)
+    if not any(names):
+        raise InvalidInput("the first line is empty; it must hold the column names")
+    if all(is_number(name) for name in names):
+        raise InvalidInput(
+            f"the first line holds numbers ({', '.join(names[:3])}, ...); put a line with the "
+            f"column names before it"
+        )
+    units, body, first_line = _units_row(body, delimiter, names, first_line, units_row)
+    if not body.strip():
+        raise InvalidInput("there are no rows below the column names; record the log again")
+    # With semicolons or tabs between cells a comma inside a cell is a decimal comma.
+    if delimiter != "," and "," in body:
+        body = body.replace(",", ".")
+    table = _read_fast(body, delimiter, names, units)
+    return table if table is not None else _read_slow(body, delimiter, names, units, first_line)
+
+
+def _split(text: str) -> tuple[str, str, int]:
+    """Return header, body and the number of the body's first line; comments become empty lines."""
+    lines = text.split("\n")
+    header, at = "", 0
+    while at < len(lines) and lines[at].startswith("#"):
+        at += 1
+    if at < len(lines):
+        header = lines[at]
+    if 0 < at < len(lines):
+        named = lines[at - 1].lstrip("# ")
+        delimiter = max(",;\t", key=header.count)
+        numbers = all(is_number(cell) for cell in header.split(delimiter) if cell.strip())
+        if numbers and header.strip() and named.count(delimiter) == header.count(delimiter):
+            header, at = named, at - 1
+    ahead = _preamble(lines[at:])
+    header, at = lines[at + ahead] if ahead else header, at + ahead
+    rest = lines[at + 1 :]
+    if any(line.startswith("#") for line in rest):
+        rest = ["" if line.startswith("#") else line for line in rest]
+    return header, "\n".join(rest), at + 2
+
+
+def _preamble(lines: list[str]) -> int:
+    """Lines about the log before the one that names the columns; 0 where that is the first.
+
+    The names have as many cells as the rows at the end of the file, and are no numbers.
+    """
+    last = [line for line in lines[-_LAST_ROWS:] if line.strip()]
+    if len(lines) < 2 * _LAST_ROWS or not last:
+        return 0
+    for delimiter in ";\t,":  # a comma between others is one of decimals
+        widths = {len(_cells(line, delimiter)) for line in last}
+        width = min(widths)
+        if len(widths) > 1 or width < _FEWEST_CELLS:
+            continue
+        for k, line in enumerate(lines[:_LONGEST_PREAMBLE]):
+            named = _cells(line, delimiter)
+            if len(named) == width and not any(map(is_number, named)):
+                return k
+    return 0
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=delimiter), [])
+    except csv.Error:  # is told of where the rows are read
+        return []
+
+
+def _units_row(
+    body: str, delimiter: str, names: tuple[str, ...], first_line: int, told_so: bool | None
+) -> tuple[dict[str, str], str, int]:
+    """Take a row of units off the body: no numbers in it, and mostly units that are known."""
+    row, _, rest = body.partition("\n")
+    try:
+        _, cells = next(_rows(row, delimiter, first_line), (first_line, []))
+    except InvalidInput:  # is told of where the rows are read
+        return {}, body, first_line
+    told = [cell.strip() for cell in cells if cell.strip()]
+    known = 2 * sum(is_unit(cell) for cell in told) > len(told) if told_so is None else told_so
+    if len(cells) != len(names) or any(map(is_number, told)) or not known:
+        return {}, body, first_line
+    units = {name: cell.strip() for name, cell in zip(names, cells, strict=True) if cell.strip()}
+    return units, rest, first_line + 1
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell holds a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _read_fast(
+    body: str, delimiter: str, names: tuple[str, ...], units: dict[str, str]
+) -> Table | None:
+    """Read a body of numbers only; None if anything else is in it."""
+    try:
+        values = np.loadtxt(
+            io.StringIO(body), delimiter=delimiter, comments=None, quotechar='"', ndmin=2
+        )
+    except ValueError:
+        return None
+    if values.shape[1] != len(names):
+        return None
+    first = {name: k for k, name in reversed(list(enumerate(names)))}
+    columns = {name: np.ascontiguousarray(values[:, first[name]]) for name in dict.fromkeys(names)}
+    return Table(names, columns, {}, values.shape[0], units)
+
+
+def _rows(text: str, delimiter: str, first_line: int) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of each row; `first_line` is the number of the first line in a file."""
+    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
+    try:
+        for row in reader:
+            yield reader.line_num + first_line - 1, row
+    except csv.Error as error:
+        raise InvalidInput(
+            f"line {reader.line_num + first_line - 1}: not a CSV row ({error}); close its quotes, "
+            f"or export the file as text"
+        ) from error
+
+
+def _read_slow(
+    body: str, delimiter: str, names: tuple[str, ...], units: dict[str, str], first_line: int
+) -> Table:
+    rows: list[list[str]] = []
+    lines: list[int] = []
+    for line, row in _rows(body, delimiter, first_line):
+        if not row or not any(cell.strip() for cell in row):
+            continue
+        if len(row) != len(names):
+            raise InvalidInput(
+                f"line {line} has {len(row)} cells, the header has {len(names)}; "
+                f"complete or delete the line"
+            )
+        rows.append(row)
+        lines.append(line)
+    if not rows:
+        raise InvalidInput(
+            "there are only empty cells below the column names; record the log again"
+        )
+    columns, not_numbers, seconds = {}, {}, {}
+    for name, cells in zip(names, zip(*rows, strict=True), strict=True):
+        try:
+            values = np.array([float(cell) if cell.strip() else np.nan for cell in cells])
+        except ValueError:
+            first = next(k for k, c in enumerate(cells) if c.strip() and not is_number(c))
+            not_numbers[name] = BadCell(cells[first].strip(), first, lines[first])
+            stamps = seconds_of_stamps(cells)
+            if stamps is not None:
+                seconds[name] = stamps
+        else:
+            columns[name] = values
+    return Table(names, columns, not_numbers, len(rows), units, seconds)

@@ -1,0 +1,84 @@
+"""MATLAB files up to version 7, by SciPy.
+
+Read are arrays, in structs of any depth; Simulink's structures with time; what dSPACE records
+(``X.Data``, ``Y.Name``, ``Y.Data``, ``Y.Unit``); structs of a time and a value.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import InvalidInput
+from ..recording import Recording
+from ..table import Table
+from .tree import Leaf, contents_of
+
+
+def read(path: Path, dbc: Path | None) -> Table | Recording:
+    """Read a file; a table where all arrays are of one length."""
+    from scipy.io import loadmat
+
+    held = loadmat(path, squeeze_me=True, struct_as_record=False)
+    leaves: list[Leaf] = []
+    hidden = [name for name, value in held.items() if _is_opaque(value)]
+    for name, value in held.items():
+        if not name.startswith("__") and name not in hidden:
+            _walk(value, (name,), leaves)
+    if hidden and not leaves:
+        raise InvalidInput(
+            f"{path}: {hidden[0]} is an object of MATLAB (timeseries, table), which only MATLAB "
+            f"can unpack; save structs of arrays: s.t = x.Time; s.vx = x.Data; save('log.mat', "
+            f"'-struct', 's')"
+        )
+    return contents_of(leaves, str(path))
+
+
+def _is_opaque(value: Any) -> bool:
+    return type(value).__name__ in ("MatlabOpaque", "MatlabFunction") or (
+        isinstance(value, np.ndarray)
+        and value.dtype.names is not None
+        and "s2" in value.dtype.names
+    )
+
+
+def _walk(value: Any, path: tuple[str, ...], leaves: list[Leaf]) -> None:
+    if hasattr(value, "_fieldnames"):
+        fields = {name: getattr(value, name) for name in value._fieldnames}
+        if _recorded(fields, path, leaves):
+            return
+        for name, inner in fields.items():
+            _walk(inner, (*path, name), leaves)
+    elif isinstance(value, np.ndarray):
+        if value.dtype.kind in "biuf":
+            leaves.append(Leaf(path, value))
+        elif value.dtype.kind == "O":
+            for k, inner in enumerate(value.flat, 1):
+                _walk(inner, (*path[:-1], f"{path[-1]}({k})"), leaves)
+
+
+def _recorded(fields: dict[str, Any], path: tuple[str, ...], leaves: list[Leaf]) -> bool:
+    """Take the layouts of Simulink and dSPACE, in which names of channels are values."""
+    if {"time", "signals"} <= set(fields):
+        time = np.atleast_1d(np.asarray(fields["time"], dtype=np.float64))
+        for k, signal in enumerate(np.atleast_1d(fields["signals"]), 1):
+            name = _text(getattr(signal, "label", "")) or f"signals({k})"
+            leaves.append(Leaf((*path, name), np.asarray(signal.values), time_s=time))
+        return True
+    if {"X", "Y"} <= set(fields):
+        axes = np.atleast_1d(fields["X"])
+        for k, signal in enumerate(np.atleast_1d(fields["Y"]), 1):
+            which = np.atleast_1d(getattr(signal, "XIndex", 1)).astype(int)
+            axis = axes[min(max(int(which[0]) if which.size else 1, 1), axes.size) - 1]
+            time = np.atleast_1d(np.asarray(axis.Data, dtype=np.float64))
+            name = _text(getattr(signal, "Name", "")) or f"Y({k})"
+            unit = _text(getattr(signal, "Unit", ""))
+            leaves.append(Leaf((*path, name), np.asarray(signal.Data), unit, time))
+        return True
+    return False
+
+
+def _text(value: Any) -> str:
+    return str(value) if isinstance(value, str) else ""

@@ -1,0 +1,150 @@
+"""Messages of ROS and their like: numbers by the path of their fields, times by their stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from operator import attrgetter, itemgetter
+from typing import Any
+
+import numpy as np
+
+from ...errors import InvalidInput
+from ..recording import Entry, Recording, Signal
+
+_MOST_ELEMENTS = 64  # of an array that are listed one by one: more are an image or a scan
+_DEPTH = 8
+_SAME_CLOCK_S = 1.0  # stamps that are farther from the recorder's time are of another clock
+
+Getter = Callable[[Any], Any]
+Taken = tuple[str, Any, int]  # topic, message, time of the recorder [ns]
+
+
+def numbers(message: Any, depth: int = _DEPTH) -> Iterator[tuple[str, Getter]]:
+    """Yield path and getter of each number in a message, such as ``angular_velocity/z``."""
+    for name, get in _fields(message):
+        value = get(message)
+        if isinstance(value, (bool, int, float, np.number, np.bool_)):
+            yield name, get
+        elif not isinstance(value, (str, bytes, type(None))) and depth > 0:
+            for path, inner in numbers(value, depth - 1):
+                joint = "" if path.startswith("[") else "/"
+                yield f"{name}{joint}{path}", _then(get, inner)
+
+
+def _then(first: Getter, second: Getter) -> Getter:
+    return lambda message: second(first(message))
+
+
+def _fields(message: Any) -> Iterator[tuple[str, Getter]]:
+    if isinstance(message, dict):
+        for key in message:
+            if key != "header":
+                yield str(key), itemgetter(key)
+    elif isinstance(message, (list, tuple, np.ndarray)):
+        if len(message) <= _MOST_ELEMENTS:
+            for k in range(len(message)):
+                yield f"[{k}]", itemgetter(k)
+    else:
+        fields = getattr(message, "__dataclass_fields__", None)
+        for name in fields if fields is not None else getattr(message, "__slots__", ()):
+            if not name.startswith("_") and name != "header":
+                yield name, attrgetter(name)
+
+
+def stamp_ns(message: Any) -> int:
+    """Return the time in a message's header [ns]; 0 if it has none."""
+    stamp = _part(_part(message, "header"), "stamp")
+    if stamp is None:
+        return 0
+    fraction = next((f for n in ("nanosec", "nsec") if (f := _part(stamp, n)) is not None), 0)
+    return int(_part(stamp, "sec") or 0) * 10**9 + int(fraction)
+
+
+def _part(message: Any, name: str) -> Any:
+    return message.get(name) if isinstance(message, dict) else getattr(message, name, None)
+
+
+@dataclass
+class Topic:
+    """What is collected of one topic: times [ns] and the values of some paths."""
+
+    getters: dict[str, Getter]
+    stamps: list[int] = field(default_factory=list)
+    recorded: list[int] = field(default_factory=list)
+    values: dict[str, list[float]] = field(default_factory=dict)
+
+    def take(self, message: Any, recorded_ns: int) -> None:
+        """Take one message."""
+        self.stamps.append(stamp_ns(message))
+        self.recorded.append(recorded_ns)
+        for path, get in self.getters.items():
+            try:
+                value = float(get(message))
+            except (IndexError, KeyError, TypeError):  # an array may be shorter now
+                value = np.nan
+            self.values.setdefault(path, []).append(value)
+
+
+def recording_of(
+    firsts: Iterable[tuple[str, Any]], messages: Callable[[list[str]], Iterator[Taken]]
+) -> Recording:
+    """Return the numbers in the first message of each topic as channels.
+
+    Parameters
+    ----------
+    firsts : iterable of tuple
+        Topic and first message.
+    messages : callable
+        Yields all messages of some topics, with the times at which they were recorded.
+    """
+    places = {
+        f"{topic}/{path}": (topic, path, get)
+        for topic, message in firsts
+        for path, get in numbers(message)
+    }
+
+    def fetch(names: list[str], notes: list[str]) -> dict[str, Signal]:
+        topics: dict[str, Topic] = {}
+        for name in names:
+            topic, path, get = places[name]
+            topics.setdefault(topic, Topic({})).getters[path] = get
+        for topic, message, recorded_ns in messages(list(topics)):
+            topics[topic].take(message, recorded_ns)
+        return _signals_of(topics, notes)
+
+    return Recording({name: Entry("", topic) for name, (topic, _, _) in places.items()}, fetch)
+
+
+def _signals_of(topics: dict[str, Topic], notes: list[str]) -> dict[str, Signal]:
+    """Return the collected signals by ``topic/path``, times from the first stamp of all on.
+
+    Raises
+    ------
+    InvalidInput
+        If topics have stamps of different clocks.
+    """
+    times, offsets = {}, {}
+    for name, topic in topics.items():
+        recorded, stamps = np.array(topic.recorded), np.array(topic.stamps)
+        stamped = bool(stamps.size) and bool((stamps > 0).all())
+        times[name] = stamps if stamped else recorded
+        if not stamped and stamps.size:
+            notes.append(
+                f"{name}: its messages have no stamps, so the times are those of the recorder, "
+                f"which come late; stamp the messages where they are measured"
+            )
+        offsets[name] = float(np.median(times[name] - recorded)) * 1e-9 if stamps.size else 0.0
+    apart = sorted(offsets, key=lambda name: offsets[name])
+    if apart and offsets[apart[-1]] - offsets[apart[0]] > _SAME_CLOCK_S:
+        raise InvalidInput(
+            f"{apart[0]} and {apart[-1]}: their stamps are of different clocks "
+            f"({offsets[apart[0]]:.4g} and {offsets[apart[-1]]:.4g} s from the recorder's); stamp "
+            f"both with one clock"
+        )
+    begin = min((int(t[0]) for t in times.values() if t.size), default=0)
+    return {
+        f"{name}/{path}": Signal((times[name] - begin) * 1e-9, np.array(values))
+        for name, topic in topics.items()
+        for path, values in topic.values.items()
+    }

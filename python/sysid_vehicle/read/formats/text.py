@@ -1,0 +1,72 @@
+"""Files of text in any encoding, and what files without a reader are by their first bytes."""
+
+from __future__ import annotations
+
+import codecs
+from pathlib import Path
+
+from ..._common.files import read_bytes
+from ...errors import InvalidInput
+
+_ARRAYS = "and give a dict of its one-dimensional arrays to read_log in place of the path"
+_EXPORT = "export it as CSV"
+
+# First bytes, what has them, what to do.
+_SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
+    (b"\x93NUMPY", "a NumPy file", f"load it with numpy.load {_ARRAYS}"),
+    (b"PK\x03\x04", "a ZIP archive (Excel, .npz, zipped CSV)", f"unpack or load it {_ARRAYS}"),
+    (b"\xd0\xcf\x11\xe0", "an old Excel or Office file", _EXPORT),
+    (b"\x1f\x8b", "a gzip archive", "unpack it with gunzip"),
+    (b"BZh", "a bzip2 archive", "unpack it with bunzip2"),
+    (b"\xfd7zXZ", "an xz archive", "unpack it with unxz"),
+    (b"\x28\xb5\x2f\xfd", "a Zstandard archive", "unpack it with unzstd"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", "unpack it"),
+    (b"TDSm", "a TDMS file", f"read it with nptdms {_ARRAYS}"),
+    (b"\x80\x04\x95", "a pickle", f"load it in Python {_ARRAYS}"),
+    (b"%PDF", "a PDF document", _EXPORT),
+    (b"<!DOCTYPE", "a web page", "download the file itself"),
+    (b"<html", "a web page", "download the file itself"),
+    (b"version https://git-lfs", "a pointer of Git LFS", "fetch the file with git lfs pull"),
+)
+_UTF_32 = ((codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"))
+_UTF_16 = ((codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+
+
+def read_text_table(path: str | Path) -> str:
+    """Return the text of a CSV file: UTF-8, UTF-16 or UTF-32, else Latin-1.
+
+    Raises
+    ------
+    InvalidInput
+        If the file cannot be read, or is none of text; the message says what it is.
+    """
+    raw = read_bytes(path)
+    for signature, what, remedy in _SIGNATURES:
+        if raw.startswith(signature):
+            raise InvalidInput(f"{path}: is {what}, not CSV; {remedy}")
+    for mark, encoding in (*_UTF_32, *_UTF_16):
+        if raw.startswith(mark):
+            return _decoded(raw, encoding, path)
+    if b"\0" in raw[:4096]:
+        sample = raw[:4096]
+        for encoding, zeros in (("utf-16-le", sample[1::2]), ("utf-16-be", sample[::2])):
+            if zeros.count(0) > 0.9 * len(zeros):
+                return _decoded(raw, encoding, path)
+        raise InvalidInput(
+            f"{path}: holds bytes that are no text (first at byte {raw.index(0)}); export the log "
+            f"as CSV"
+        )
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
+def _decoded(raw: bytes, encoding: str, path: str | Path) -> str:
+    try:
+        return raw.decode(encoding)
+    except UnicodeDecodeError as error:
+        raise InvalidInput(
+            f"{path}: begins as {encoding.upper()} text but is not at byte {error.start}; save it "
+            f"as UTF-8"
+        ) from error

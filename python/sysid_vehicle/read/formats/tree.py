@@ -1,0 +1,128 @@
+"""Arrays in nested structs or groups, with a time beside them or one for all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ...errors import InvalidInput
+from ..recording import Entry, Recording, Signal
+from ..table import Table
+
+T = TypeVar("T")
+
+_TIMES = ("time_s", "time", "t", "times", "timestamp", "timestamps", "seconds", "tout")
+_VALUES = ("data", "values", "value", "signal")
+_MOST_COLUMNS = 64  # of a matrix that are channels
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """An array with its place in the file; `time_s` where the file says which belongs to it."""
+
+    path: tuple[str, ...]
+    values: npt.NDArray[np.generic]
+    unit: str = ""
+    time_s: npt.NDArray[np.float64] | None = None
+
+
+def contents_of(leaves: list[Leaf], where: str) -> Table | Recording:
+    """Return a table where all arrays have one length and time, else channels with their own.
+
+    A channel's time is the array called ``time``, ``t``, ... of its length beside it, or else in a
+    struct around it. A struct of a time and ``data`` is one channel, called like the struct.
+
+    Raises
+    ------
+    InvalidInput
+        If there are no arrays.
+    """
+    columns = [column for leaf in leaves for column in _columns(leaf)]
+    columns = [leaf for leaf in columns if leaf.values.size > 1]
+    if not columns:
+        raise InvalidInput(f"{where}: holds no arrays of numbers; save the channels as arrays")
+    times = {c.path: c for c in columns if c.path[-1].lower() in _TIMES and c.time_s is None}
+    own_times = any(leaf.time_s is not None for leaf in columns) or len(times) > 1
+    if not own_times and len({leaf.values.size for leaf in columns}) == 1:
+        named = _short({leaf.path: leaf for leaf in columns})
+        arrays = {name: np.asarray(leaf.values, dtype=np.float64) for name, leaf in named.items()}
+        units = {name: leaf.unit for name, leaf in named.items() if leaf.unit}
+        return Table(tuple(arrays), arrays, {}, columns[0].values.size, units)
+    found: dict[tuple[str, ...], tuple[Leaf, npt.NDArray[np.float64] | None]] = {}
+    for leaf in columns:
+        if leaf.path in times:
+            continue
+        time_s = leaf.time_s if leaf.time_s is not None else _time_of(leaf, times)
+        path = leaf.path
+        if path[-1].lower() in _VALUES and len(path) > 1 and path[:-1] not in found:
+            path = path[:-1]
+        found[path] = leaf, time_s
+    named_pairs = _short(found)
+    entries = {
+        name: Entry(leaf.unit, str(id(time_s)) if time_s is not None else name)
+        for name, (leaf, time_s) in named_pairs.items()
+    }
+
+    def fetch(names: list[str], notes: list[str]) -> dict[str, Signal]:
+        result = {}
+        for name in names:
+            leaf, time_s = named_pairs[name]
+            if time_s is None or time_s.size != leaf.values.size:
+                raise InvalidInput(
+                    f"{name}: has {leaf.values.size} samples and no time of that length beside it; "
+                    f"save its time in the same struct, called 'time'"
+                )
+            result[name] = Signal(time_s, np.asarray(leaf.values, dtype=np.float64))
+        return result
+
+    return Recording(entries, fetch)
+
+
+def _columns(leaf: Leaf) -> list[Leaf]:
+    """One leaf for each column of a matrix, named as MATLAB would."""
+    values = np.atleast_1d(leaf.values)
+    if values.ndim == 1:
+        return [Leaf(leaf.path, values, leaf.unit, leaf.time_s)]
+    if values.ndim != 2:
+        return []
+    long = leaf.time_s.size if leaf.time_s is not None else max(values.shape)
+    if values.shape[0] != long:
+        values = values.T
+    if values.shape[1] > _MOST_COLUMNS:
+        return []
+    return [
+        Leaf((*leaf.path[:-1], f"{leaf.path[-1]}(:,{k})"), column, leaf.unit, leaf.time_s)
+        for k, column in enumerate(values.T, 1)
+    ]
+
+
+def _time_of(leaf: Leaf, times: Mapping[tuple[str, ...], Leaf]) -> npt.NDArray[np.float64] | None:
+    for depth in range(len(leaf.path) - 1, -1, -1):
+        scope = leaf.path[:depth]
+        for path, time in times.items():
+            if path[:-1] == scope and time.values.size == leaf.values.size:
+                return _kept(time)
+    return None
+
+
+def _kept(time: Leaf) -> npt.NDArray[np.float64]:
+    """The same array for all channels of a time, which makes them a group."""
+    values = time.values
+    if values.dtype != np.float64:
+        values = values.astype(np.float64)
+        object.__setattr__(time, "values", values)
+    result: npt.NDArray[np.float64] = values  # type: ignore[assignment]
+    return result
+
+
+def _short(found: dict[tuple[str, ...], T]) -> dict[str, T]:
+    """Join the paths by points, without a struct that is around everything."""
+    paths = list(found)
+    while len(paths) > 1 and all(len(p) > 1 for p in paths) and len({p[0] for p in paths}) == 1:
+        found = {path[1:]: value for path, value in found.items()}
+        paths = list(found)
+    return {".".join(path): value for path, value in found.items()}

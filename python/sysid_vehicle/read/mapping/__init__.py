@@ -1,0 +1,1 @@
+"""Which column is which channel: maps, and proposals of maps by names, units and motion."""

@@ -1,0 +1,115 @@
+"""What a log shows before it is mapped: names, stated units, values on a common clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..._common.arrays import FloatArray
+from ...log import CHANNELS
+from ..recording import Recording
+from ..table import Table
+from ..units import factor_to, unit_at_end, unit_in_name
+from .names import rank, si_unit
+
+_RATE_HZ = 50.0  # at which units and signs are looked for
+_FEWEST = 100
+
+Signal = tuple[FloatArray, FloatArray]
+"""Times and values."""
+
+
+class View:
+    """A table or a recording, alike: names, units, values with times."""
+
+    def __init__(self, held: Table | Recording) -> None:
+        self._held = held
+        self.has_times = isinstance(held, Recording)
+        self.names = list(held.entries) if isinstance(held, Recording) else list(held.columns)
+        if isinstance(held, Table):
+            self.names += [n for n in held.seconds if n not in self.names]
+
+    def unit(self, name: str, si_unit: str) -> str:
+        """Return the unit that the file states, or the one in brackets behind the name."""
+        if isinstance(self._held, Recording):
+            return self._held.entries[name].unit or unit_in_name(name, si_unit)
+        return self._held.unit(name, si_unit)
+
+    def said(self, name: str, si_unit: str) -> str:
+        """The unit that the file states, or else the one at the end of the name."""
+        return self.unit(name, si_unit) or unit_at_end(name, si_unit)[1]
+
+    @property
+    def rising(self) -> list[str]:
+        """Columns of a table that rise from each row to the next."""
+        columns = self._held.columns if isinstance(self._held, Table) else {}
+        return [n for n, x in columns.items() if x.size >= _FEWEST and (np.diff(x) > 0.0).all()]
+
+    def is_stamps(self, name: str) -> bool:
+        """Whether a column of a table holds dates and times of day."""
+        return isinstance(self._held, Table) and name in self._held.seconds
+
+    def values(self, names: list[str], time: str | None) -> dict[str, Signal]:
+        """Return times and values by name; a table's column ``time`` tells its times."""
+        if isinstance(self._held, Recording):
+            signals = self._held.signals(names, [])
+            return {name: (s.time_s, s.values) for name, s in signals.items()}
+        if time is None:
+            return {}
+        clock = self._held.seconds.get(time, self._held.columns.get(time))
+        assert clock is not None
+        return {name: (clock, self._held.columns[name]) for name in names}
+
+
+def ranked(view: View, channel: str) -> list[str]:
+    """Columns that may be a channel by name and unit, likeliest first."""
+    scored = [(rank(n, view.unit(n, si_unit(channel, n)), channel), n) for n in view.names]
+    kept = [(score, name) for score, name in scored if score > 0.0]
+    return [name for _, name in sorted(kept, key=lambda pair: -pair[0])]
+
+
+def stated(view: View, columns: Mapping[str, str]) -> dict[str, float]:
+    """Factors of what has a unit that is stated, or the name of the channel itself."""
+    found: dict[str, float] = {}
+    for channel, name in columns.items():
+        unit = si_unit(channel, name)
+        factor = factor_to(unit, view.said(name, unit))
+        if factor is not None:
+            found[channel] = factor
+        elif name == channel and channel in CHANNELS:
+            found[channel] = 1.0
+    return found
+
+
+def by_name(channel: str, name: str, unit: str) -> str:
+    """Why a column is taken for a channel."""
+    if channel == "time_s" and not rank(name, unit, channel):
+        return "the only column that always rises"
+    text = "by its name" if name != channel else "so called"
+    return f"{text}, the file states '{unit}'" if unit else text
+
+
+def ended(channel: str, name: str, unit: str) -> str:
+    """What a unit at the end of a name is told as, if that is all there is."""
+    found = "" if unit or name == channel else unit_at_end(name, si_unit(channel, name))[1]
+    return f"in '{found}', as its name ends" if found else ""
+
+
+def even(
+    held: Mapping[str, Signal], factor: float
+) -> tuple[FloatArray, dict[str, FloatArray]] | None:
+    """The channels on common even times, to look at: interpolated, for nothing else."""
+    known = {}
+    for channel, (clock, values) in held.items():
+        there = np.isfinite(clock) & np.isfinite(values)
+        if np.count_nonzero(there) >= _FEWEST and (np.diff(clock[there]) > 0.0).all():
+            known[channel] = factor * clock[there], values[there]
+    if not known:
+        return None
+    begin = max(float(t[0]) for t, _ in known.values())
+    end = min(float(t[-1]) for t, _ in known.values())
+    if (end - begin) * _RATE_HZ < _FEWEST:
+        return None
+    time_s = np.arange(begin, end, 1.0 / _RATE_HZ)
+    return time_s, {c: np.interp(time_s, t, values) for c, (t, values) in known.items()}

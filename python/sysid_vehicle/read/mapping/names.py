@@ -1,0 +1,162 @@
+"""What channels of cars are called, by loggers, tools and people."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+from ..units import FACTORS, plain, states_nothing, unit_at_end, without_unit
+from .ground import PARTS
+
+# Of the car, and not of a tyre.
+_SIDESLIP = (
+    r"^(?!.*\b(fl|fr|rl|rr|front|rear|axle|tyres?|tires?|wheels?|ratio|rate|dot)\b)"
+    r".*(\bslip ?ang\w*|\bside ?slip|\bschwimmwinkel|^beta\b)"
+)
+
+# By channel: patterns of a name in plain words, the surest first.
+_PATTERNS: dict[str, tuple[str, ...]] = {
+    "time_s": (
+        r"^time( s)?$",
+        r"^(t|zeit|(time ?)?stamps?( s| sec\w*)?|times?|tout|utc time)$",
+        r"^(temps|tempo|tiempo|tijd|tid|時間|時刻|时间)$",
+        r"\btime\b|^(header )?stamp\b|^(sec(ond)?s|elapsed|epoch)\b",
+    ),
+    "vx_mps": (
+        r"^v ?x( mps)?$",
+        r"twist linear x$|(long\w*|forward) (speed|vel\w*)|(speed|vel\w*) (x|long\w*)$",
+        r"(vehicle|ground|corr\w*|gps|car|veh) (speed|vel\w*)|^v (veh|car|ego)|v fzg",
+        r"^(speed|velocity|vel|geschwindigkeit|v)$",
+        r"\b(speed|velocity|geschwindigkeit)\b",
+        r"^(vitesse|velocita|velocidade?|snelheid|hastighet)\b|車速|车速",
+    ),
+    "vy_mps": (
+        r"^v ?y( mps)?$",
+        r"twist linear y$|lat\w* (speed|vel\w*)|(speed|vel\w*) (y|lat\w*)$|quergeschw\w*",
+        r"(vitesse|velocita|velocidade?) (lat\w*|trans\w*)",
+        _SIDESLIP,
+    ),
+    "yaw_rate_radps": (
+        r"yaw ?rate|yaw ?vel\w*|gier ?(rate|geschw\w*)",
+        r"angular velocity z$|gyro\w* (z|yaw)|twist angular z$|psi ?(p|dot|rate)$",
+        r"^(w|omega|rate|gyro|ang vel) ?z$|\bgyro z\b|\byaw\b.*\b(dps|radps|degps)\b",
+        r"\b(lacet|imbardata|guinada)\b|^gier|girhastighet|ヨーレート|横摆角速度",
+    ),
+    "ax_mps2": (
+        r"^a ?x( mps2)?$|acc ?x$|x acc\w*$",
+        r"long\w* (acc\w*|g\b)|acc\w* (x|long\w*)|g (force )?(long|x)\w*",
+        r"inline acc\w*|laengsbeschl\w*|langsversnelling",
+        r"^ace?l\w* lon\w*|^acc?el\w* lon\w*|前後(加速度|g)|纵向加速度",
+    ),
+    "ay_mps2": (
+        r"^a ?y( mps2)?$|acc ?y$|y acc\w*$",
+        r"lat\w* (acc\w*|g\b)|acc\w* (y|lat\w*)|g (force )?(lat|y)\w*|querbeschl\w*",
+        r"^ace?l\w* (lat|trans)\w*|^acc?el\w* trans\w*|dwarsversnelling",
+        r"横(加速度|g)|(侧|横)向加速度",
+    ),
+    "steer_rad": (
+        r"road ?wheel angle|^steer rad$|front wheel angle",
+        r"steer\w* ?(wheel )?ang\w*|lenk(rad)?winkel|\bswa\b|str\w* ?wheel ?ang\w*|hand ?wheel",
+        r"\b(steer|steering|steered|delta)\b",
+        r"\b(volant|volante|sterzo|braquage)\b|stuurhoek|rattvinkel|操舵角|ハンドル角|舵角|方向盘转角",
+    ),
+    "fx_n": (
+        r"^f ?x( n)?$",
+        r"(wheel|drive|traction|long\w*|total) force( total| x)?$|force x$|antriebskraft",
+    ),
+    # Of navigation, which gives the speeds of the body as velocity over ground and heading.
+    "east": (r"^v ?e$|(speed|vel\w*) ?e(ast\w*)?$|^east\w* (speed|vel\w*)$", r"^v(el)? east$"),
+    "north": (
+        r"^v ?n$|(speed|vel\w*) ?n(orth\w*)?$|^north\w* (speed|vel\w*)$",
+        r"^v(el)? north$",
+    ),
+    "heading": (
+        r"^true head(ing)?$|^(ins )?heading$|\bheading (true|angle)$",
+        r"^(azimuth|yaw|psi|yaw angle|gierwinkel|kurswinkel)$|\bheading$|\b(ins|imu) yaw$",
+    ),
+    "course": (r"\bcourse\b|\bcog\b|ground ?track|track (angle|over ground|made good)|^track$",),
+}
+_REFUSED: dict[str, str] = {
+    "time_s": r"\b(lap|run|delta|remaining|sector)\b",
+    "vx_mps": r"\b(wheel|eng|engine|rpm|fl|fr|rl|rr|lat\w*|vert\w*|wind|angular|steer\w*|y|z"
+    r"|trans\w*|lacet|imbardata|guinada|moteur|motore?|roues?|ruot[ae]|rueda|roda|vento?|viento)\b",
+    "vy_mps": r"\b(angular|wind|acc\w*)\b",
+    "yaw_rate_radps": r"\b(acc\w*|target|ref\w*|covariance)\b",
+    "ax_mps2": r"\b(yaw|lat\w*|vert\w*|angular|covariance|target)\b",
+    "ay_mps2": r"\b(yaw|long\w*|vert\w*|angular|covariance|target)\b",
+    "steer_rad": r"\b(torque|rate|speed|vel\w*|moment|target|force|motor|current|rear)\b",
+    "fx_n": r"\b(fl|fr|rl|rr|brake|steer\w*)\b",
+    **dict.fromkeys(
+        ("east", "north", "heading", "course"),
+        r"\b(std\w*|accuracy|cov\w*|error|sigma|rate|acc\w*|target|ref\w*|wind|valid|status)\b",
+    ),
+}
+_SI = {
+    "time_s": "s",
+    "vx_mps": "m/s",
+    "vy_mps": "m/s",
+    "yaw_rate_radps": "rad/s",
+    "ax_mps2": "m/s2",
+    "ay_mps2": "m/s2",
+    "steer_rad": "rad",
+    "fx_n": "N",
+    **PARTS,
+}
+
+
+# As the databases of cars shorten words, whose names may have 32 letters.
+_SHORT = {"spd": "speed", "whl": "wheel", "lgt": "long", "lng": "long"}
+_UMLAUTS = {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"}
+
+
+def words(name: str) -> str:
+    """Return a name in plain words, without accents: ``ESP_VehSpd.x`` as ``esp veh speed x``."""
+    apart = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name)
+    for letter, plainly in _UMLAUTS.items():
+        apart = apart.replace(letter, plainly)
+    marks = unicodedata.normalize("NFKD", apart)
+    bare = "".join(c for c in marks if not "\u0300" <= c <= "\u036f")
+    bare = unicodedata.normalize("NFC", bare)
+    there = re.sub(r"[\W_]+", " ", bare).lower().split()
+    return " ".join(_SHORT.get(word, word) for word in there)
+
+
+def rank(name: str, unit: str, channel: str) -> float:
+    """Return how well a name and its unit suit a channel: 0 not at all, 1 and more well.
+
+    Channels are the canonical ones and the parts of what navigation knows, as ``heading``.
+    """
+    text = words(name)
+    if name == channel:
+        return 10.0
+    if re.search(_REFUSED[channel], text):
+        return 0.0
+    patterns = _PATTERNS[channel]
+    # As it is, and without a unit at its end: vx_kmh is one of vx.
+    own = si_unit(channel, name)
+    bare = without_unit(name, own)
+    forms = (text, words(unit_at_end(name, own)[0]), words(bare))
+    score = max(
+        (
+            1.0 + len(patterns) - k
+            for k, p in enumerate(patterns)
+            for form in forms
+            if re.search(p, form)
+        ),
+        default=0.0,
+    )
+    if score == 0.0 or not unit or states_nothing(unit):
+        return score
+    fits = plain(unit) in FACTORS[si_unit(channel, name)]
+    known = any(plain(unit) in factors for factors in FACTORS.values())
+    return score + 2.0 if fits else 0.0 if known else score
+
+
+def si_unit(channel: str, name: str) -> str:
+    """Return the SI unit of what a column of this name measures, if it is that channel's."""
+    return "rad" if channel == "vy_mps" and is_sideslip(name) else _SI[channel]
+
+
+def is_sideslip(name: str) -> bool:
+    """Tell whether a name is that of the sideslip angle."""
+    return re.search(_SIDESLIP, words(name)) is not None

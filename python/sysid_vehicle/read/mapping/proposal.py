@@ -1,0 +1,97 @@
+"""A proposed channel map: which column is which channel, told why, as a file to be edited."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ...errors import InvalidInput
+from ...log import CHANNELS, listed
+from .channel_map import ChannelMap
+from .ground import PARTS, Ground
+from .source import Source
+
+
+@dataclass(frozen=True)
+class Proposed:
+    """Where a channel is to come from, and why."""
+
+    column: str
+    factor: float
+    unit: str
+    why: str
+    others: tuple[str, ...]
+    sideslip: bool = False
+
+    @property
+    def source(self) -> Source:
+        """As a channel map has it."""
+        return Source(self.column, self.factor, sideslip=self.sideslip)
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A proposed channel map.
+
+    Attributes
+    ----------
+    channels : mapping of Proposed
+        By canonical channel.
+    missing : tuple of str
+        Needed channels for which nothing was found.
+    ground : mapping of Proposed
+        Velocity over ground and heading, by part, where they make the speeds of the body.
+    counted_from : str
+        Where its angles begin.
+    """
+
+    channels: Mapping[str, Proposed]
+    missing: tuple[str, ...]
+    ground: Mapping[str, Proposed] = field(default_factory=dict)
+    counted_from: str = "north"
+
+    @property
+    def channel_map(self) -> ChannelMap:
+        """The map, ready for `read_log`."""
+        angles = dict.fromkeys((p for p in self.ground if PARTS[p] == "rad"), self.counted_from)
+        parts = {part: p.source for part, p in self.ground.items()}
+        return ChannelMap(
+            {c: p.source for c, p in self.channels.items()},
+            ground=Ground(parts, angles) if parts else None,
+        )
+
+    def to_toml(self) -> str:
+        """The map as a file to look through and to edit."""
+        lines = ["# Proposed channel map: look at every line, mend what is wrong.", "[channels]"]
+        for channel, p in self.channels.items():
+            lines.append(f"# {CHANNELS[channel].meaning} [{CHANNELS[channel].unit}]: {p.why}")
+            if p.others:
+                lines.append(f"#   or one of: {listed(map(_quoted, p.others))}")
+            entry = f"column = {_quoted(p.column)}, factor = {p.factor!r}"
+            entry += ", sideslip = true" if p.sideslip else ""
+            lines.append(f"{channel} = {{ {entry} }}")
+        for name in self.missing:
+            lines.append(f"# {CHANNELS[name].meaning} [{CHANNELS[name].unit}]: nothing was found")
+            lines.append(f'# {name} = {{ column = "", factor = 1.0 }}')
+        if self.ground:
+            lines += [
+                "",
+                "# Velocity over ground and heading make vx_mps and vy_mps.",
+                "[ground]",
+            ]
+        for part, p in self.ground.items():
+            lines.append(f"# {part} [{PARTS[part]}]: {p.why}")
+            entry = f"column = {_quoted(p.column)}, factor = {p.factor!r}"
+            entry += f', from = "{self.counted_from}"' if PARTS[part] == "rad" else ""
+            lines.append(f"{part} = {{ {entry} }}")
+        return "\n".join(lines) + "\n"
+
+    def __str__(self) -> str:
+        return self.to_toml()
+
+
+def _quoted(name: str) -> str:
+    text = name.replace("\\", "\\\\").replace('"', '\\"')
+    if any(ord(c) < 32 for c in text):
+        raise InvalidInput(f"column {name!r}: its name holds a control character; rename it")
+    return f'"{text}"'

@@ -1,0 +1,223 @@
+"""A channel map for a log that nobody has mapped yet: by names, stated units and laws of motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..._common.arrays import FloatArray
+from ..._common.files import as_path
+from ...errors import InvalidInput
+from ...log import CHANNELS, Columns, Log
+from ...vehicle import Vehicle
+from ..registry import blamed, recognised
+from .ground import PARTS
+from .look import Signal, View, by_name, ended, even, ranked, stated
+from .names import is_sideslip, si_unit
+from .navigation import NAMED, Navigation, combination, ground_speed, told
+from .physics import scales, sideways
+from .proposal import Proposal, Proposed
+
+_TURNED = ("yaw_rate_radps", "ay_mps2", "steer_rad")  # together, where the axes have z down
+_FINER = ((0.5, 1.0), (500.0, 1e-3), (5e5, 1e-6), (np.inf, 1e-9))  # steps below, factor of time
+
+
+def propose_channels(
+    source: str | Path | Columns | Log,
+    *,
+    dbc: str | Path | None = None,
+    vehicle: Vehicle | None = None,
+) -> Proposal:
+    """Propose which column of a log is which channel, in which unit and with which sign.
+
+    Columns are found by their names and by the units that the file states. Units that it does not
+    state, signs, swapped accelerations and the angle of the steering wheel in place of the road
+    wheels' are found by the laws of motion. The steering ratio follows from the wheelbase; without
+    a vehicle it is only as good as a usual one.
+
+    Parameters
+    ----------
+    source : str, Path, table or Log
+        As for `read_log`.
+    dbc : str or Path, optional
+        Database of the CAN frames that the file holds.
+    vehicle : Vehicle, optional
+        The car, for its wheelbase.
+
+    Raises
+    ------
+    InvalidInput
+        If the log cannot be read.
+    """
+    from .. import contents
+
+    if isinstance(source, Log):
+        source = {name: source[name] for name in source.channels}
+    is_path = isinstance(source, (str, Path))
+    entry = recognised(as_path(source)) if is_path else None
+    with blamed(entry, source if is_path else "log"):
+        try:
+            held = contents(source, dbc, entry)
+        except InvalidInput as error:
+            if not is_path or as_path(source).name in str(error):
+                raise
+            raise InvalidInput(f"{source}: {error}") from error
+        view = View(held)
+        chosen = {
+            channel: found
+            for channel in CHANNELS
+            if not (channel == "time_s" and view.has_times) and (found := ranked(view, channel))
+        }
+        if "time_s" not in chosen and not view.has_times:
+            rising = [name for name in view.rising if not any(name in c for c in chosen.values())]
+            chosen = {"time_s": rising, **chosen} if len(rising) == 1 else chosen
+        return _Guess(view, chosen).proposal(None if vehicle is None else vehicle.wheelbase_m)
+
+
+class _Guess:
+    """What the columns are taken for, step by step."""
+
+    def __init__(self, view: View, chosen: Mapping[str, list[str]]) -> None:
+        self.view, self.chosen = view, chosen
+        # A column is one channel: the one that is first in the list of channels.
+        self.first: dict[str, str] = {}
+        for channel, names in chosen.items():
+            free = [name for name in names if name not in self.first.values()]
+            if free:
+                self.first[channel] = free[0]
+        self.stated = stated(view, self.first)
+        self.parts = self._navigated()
+        self.factors: dict[str, float] = {}
+        self.why: dict[str, list[str]] = {}
+
+    def proposal(self, wheelbase_m: float | None) -> Proposal:
+        """Ask the laws of motion for what names and units leave open."""
+        time = self.first.get("time_s")
+        columns = [*(n for c, n in self.first.items() if c != "time_s"), *self.parts.values()]
+        held = self.view.values(columns, time)
+        signals = {c: held[n] for c, n in self.first.items() if n in held}
+        units = stated(self.view, self.parts)
+        if "east" in self.parts and held:
+            signals["vx_mps"] = ground_speed(held[self.parts["east"]], held[self.parts["north"]])
+            self.stated.pop("vx_mps", None)
+            self.stated.update({"vx_mps": units["east"]} if "east" in units else {})
+        self.factors.update(self.stated)
+        if time is not None:
+            self._time(time, held)
+        drive = self._by_motion(signals, wheelbase_m)
+        own = {part: held[name] for part, name in self.parts.items() if name in held}
+        nav = None if drive is None else self._by_navigation(own, units, *drive)
+        return self._told(nav)
+
+    def _navigated(self) -> dict[str, str]:
+        """Columns of what navigation knows, where they make a lateral speed that is not logged."""
+        if "vy_mps" in self.first:
+            return {}
+        kept = set(self.first.values())
+        there = {p: [n for n in ranked(self.view, p) if n not in kept] for p in NAMED}
+        found = combination(there)
+        return found if "east" in found or "vx_mps" in self.first else {}
+
+    def _note(self, channel: str, text: str) -> None:
+        if text:
+            self.why.setdefault(channel, []).append(text)
+
+    def _time(self, time: str, held: Mapping[str, Signal]) -> None:
+        """Take the unit of time for the one that is stated, or for one that its steps ask for."""
+        if self.view.is_stamps(time):
+            self.factors["time_s"] = 1.0
+            self._note("time_s", "time stamps")
+        elif "time_s" in self.stated or not held:
+            self.factors["time_s"] = self.stated.get("time_s", 1.0)
+        else:
+            clock = next(iter(held.values()))[0]
+            step = float(np.median(np.diff(clock))) if clock.size > 1 else 0.0
+            self.factors["time_s"] = next(f for below, f in _FINER if step < below)
+            self._note("time_s", f"steps of {step:.4g}")
+
+    def _by_motion(
+        self, signals: Mapping[str, Signal], wheelbase_m: float | None
+    ) -> tuple[FloatArray, dict[str, FloatArray]] | None:
+        """Find units and signs by the motion of the car; return it, on common times."""
+        clock = self.factors.get("time_s", 1.0)
+        drive = even({c: x for c, x in signals.items() if c != "vy_mps"}, clock)
+        if drive is None:
+            return None
+        # The sign and the gear of the steering are no matter of its unit: they are always sought.
+        known = {c: f for c, f in self.stated.items() if c in drive[1]}
+        found = scales(*drive, known, wheelbase_m)
+        if found.swapped:
+            first = self.first
+            first["ax_mps2"], first["ay_mps2"] = first["ay_mps2"], first["ax_mps2"]
+        self.factors.update(found.factors)
+        for channel, text in found.notes.items():
+            self._note(channel, text)
+        # By itself: a sensor of sideslip often knows less of the drive than the others.
+        every = even(signals, clock)
+        if every is not None and "vy_mps" in every[1]:
+            angle = is_sideslip(self.first["vy_mps"])
+            factor, text = sideways(*every, self.factors, self.stated, angle=angle)
+            self.factors["vy_mps"] = factor
+            self._note("vy_mps", text)
+        return drive
+
+    def _by_navigation(
+        self,
+        held: Mapping[str, Signal],
+        units: Mapping[str, float],
+        time_s: FloatArray,
+        drive: Mapping[str, FloatArray],
+    ) -> Navigation | None:
+        """Tell velocity over ground and heading by the motion that the other channels show."""
+        needed = {"vx_mps", "yaw_rate_radps"}
+        if not (held and needed <= {*drive, *self.factors}):
+            return None
+        clock = self.factors.get("time_s", 1.0)
+        yaw_rate, speed = (
+            (time_s, self.factors[c] * drive[c]) for c in ("yaw_rate_radps", "vx_mps")
+        )
+        own = {part: (clock * t, x) for part, (t, x) in held.items()}
+        nav = told(own, units, yaw_rate, speed, self.factors["vx_mps"])
+        if nav is not None and nav.to_the_right:
+            for channel in [c for c in _TURNED if c in self.first]:
+                self.factors[channel] = -self.factors.get(channel, 1.0)
+                self._note(channel, "positive to the right, as the heading tells")
+        return nav
+
+    def _told(self, nav: Navigation | None) -> Proposal:
+        # The speed is no channel of its own beside a velocity over ground.
+        ground = {} if nav is None else self._ground(nav)
+        made = {"vx_mps"} if ground else set()
+        channels = {c: self._channel(c, n) for c, n in self.first.items() if c not in made}
+        made |= {"time_s"} if self.view.has_times else set()
+        missing = [c for c in CHANNELS if CHANNELS[c].required and c not in {*channels, *made}]
+        counted_from = "north" if nav is None else nav.counted_from
+        return Proposal(channels, tuple(missing), ground, counted_from)
+
+    def _channel(self, channel: str, name: str) -> Proposed:
+        unit = self.view.unit(name, si_unit(channel, name))
+        reasons = [by_name(channel, name, unit), ended(channel, name, unit)]
+        return Proposed(
+            name,
+            self.factors.get(channel, 1.0),
+            unit,
+            "; ".join(filter(None, [*reasons, *self.why.get(channel, [])])),
+            tuple(n for n in self.chosen[channel] if n != name)[:5],
+            channel == "vy_mps" and is_sideslip(name),
+        )
+
+    def _ground(self, nav: Navigation) -> dict[str, Proposed]:
+        columns = dict(self.parts)
+        if "east" not in columns:
+            columns["speed"] = self.first["vx_mps"]
+        found = {}
+        for part, name in columns.items():
+            unit = self.view.unit(name, PARTS[part])
+            factor = nav.factors[part] if part in nav.factors else self.factors["vx_mps"]
+            text = f"by its name, the file states '{unit}'" if unit else "by its name"
+            if PARTS[part] == "rad":
+                text += f", counted from {nav.counted_from}, as the car moves the way it points"
+            found[part] = Proposed(name, factor, unit, text, ())
+        return found

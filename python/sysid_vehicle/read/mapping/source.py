@@ -1,0 +1,162 @@
+"""One column of a foreign log: how it becomes numbers in SI units, on the clock of the log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.files import refuse_unknown
+from ...errors import InvalidInput, near_names
+from ...log import CHANNELS, listed
+from ..table import Table
+from ..units import WHAT, factor_to, measures, states_nothing
+
+_SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s", "sideslip")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a canonical channel comes from: ``value = factor * column + offset``.
+
+    `delay_s` is how late the column is [s]: its values are taken from so much later in the file.
+    `sideslip`, for `vy_mps` alone: the column is the sideslip angle, which `factor` makes radians;
+    the lateral speed is ``vx_mps tan(angle)``.
+    """
+
+    column: str
+    factor: float = 1.0
+    offset: float = 0.0
+    despike: bool = False
+    delay_s: float = 0.0
+    sideslip: bool = False
+
+    def unit_of(self, channel: str) -> str:
+        """The unit to which `factor` brings the column."""
+        return "rad" if self.sideslip else CHANNELS[channel].unit
+
+    def read(self, table: Table, channel: str, si_unit: str, notes: list[str]) -> FloatArray:
+        """Return the values in SI units, shape (n,), as the rows of the file have them.
+
+        Where the map gives neither factor nor offset, a unit that the file states is converted,
+        which `notes` tells.
+
+        Raises
+        ------
+        InvalidInput
+            If the column is not in the table (near names are given) or not numeric.
+        """
+        if not table.counts[self.column]:
+            hint = near_names(self.column, table.names)
+            raise InvalidInput(
+                f"{channel}: the channel map names column '{self.column}', which is not in "
+                f"the file{hint}; columns are {listed(table.names)}"
+            )
+        values = values_of(table, self.column, channel)
+        if (self.factor, self.offset) == (1.0, 0.0):
+            values = values * stated_factor(table, self.column, channel, si_unit, notes)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is endless is refused later
+            return as_float64(self.factor * values + self.offset)
+
+    def on_time(self, time_s: FloatArray, values: FloatArray) -> FloatArray:
+        """Return values that were read, earlier by `delay_s`; beyond the ends none is known."""
+        return _earlier(time_s, values, self.delay_s) if self.delay_s else values
+
+
+def values_of(table: Table, column: str, channel: str) -> FloatArray:
+    """Return the values of a column; of time stamps the seconds."""
+    if channel == "time_s" and column in table.seconds and table.counts[column] == 1:
+        return table.seconds[column]
+    return table.column(column)
+
+
+def _earlier(time_s: FloatArray, values: FloatArray, delay_s: float) -> FloatArray:
+    """Return the values that were written `delay_s` later; beyond the ends nothing is known."""
+    known = np.isfinite(values) & np.isfinite(time_s)
+    if np.count_nonzero(known) < 2 or not (np.diff(time_s) > 0.0).all():
+        return values  # the log is refused for it
+    shifted = np.interp(time_s + delay_s, time_s[known], values[known], np.nan, np.nan)
+    # A hole stays one, and a slow channel keeps as many samples as it has.
+    nearest = np.clip(np.searchsorted(time_s, time_s + delay_s - 1e-9), 0, time_s.size - 1)
+    result: FloatArray = np.where(known[nearest], shifted, np.nan)
+    return result
+
+
+def stated_factor(table: Table, column: str, channel: str, si_unit: str, notes: list[str]) -> float:
+    """Return the factor for the unit that the file states for a column; 1 if it states none.
+
+    Raises
+    ------
+    InvalidInput
+        If the unit is one of another quantity.
+    """
+    unit = table.unit(column, si_unit)
+    if not unit or column in table.seconds:
+        return 1.0
+    factor = factor_to(si_unit, unit)
+    if factor is None and states_nothing(unit):
+        return 1.0
+    if factor is None and (what := measures(unit)):
+        raise InvalidInput(
+            f"{channel}: the file states '{unit}' for column '{column}', {what}, but the channel "
+            f"is {WHAT[si_unit]} [{si_unit}]; name another column in the channel map, or a factor "
+            f"that makes {si_unit} of it"
+        )
+    if factor is None:
+        notes.append(
+            f"{channel}: the file states '{unit}', which is no known unit for it; it was taken as "
+            f"{si_unit}: put its factor in the channel map"
+        )
+        return 1.0
+    if factor != 1.0:
+        notes.append(
+            f"{channel}: the file states '{unit}' and it was converted; put factor = "
+            f"{factor:.7g} for {channel} in the channel map to confirm it"
+        )
+    return factor
+
+
+def source_of(entry: Mapping[str, Any], channel: str, where: str) -> Source:
+    """Return what the table of a channel in a channel map says.
+
+    Raises
+    ------
+    InvalidInput
+        If it holds an unknown key or a value of the wrong kind; the message begins with `where`.
+    """
+    refuse_unknown(
+        entry, (*_SOURCE_KEYS, "rate_hz") if channel == "time_s" else _SOURCE_KEYS, where
+    )
+    column = entry.get("column", channel)
+    if not isinstance(column, str):
+        raise InvalidInput(f"{where}: column = {column!r}; give the name of the source column")
+    despike, sideslip = (_flag(entry, key, where) for key in ("despike", "sideslip"))
+    if sideslip and channel != "vy_mps":
+        raise InvalidInput(f"{where}: sideslip = true makes a lateral speed; give it for vy_mps")
+    factor = number(entry, "factor", 1.0, where)
+    if factor == 0.0:
+        raise InvalidInput(f"{where}: factor = 0 would erase the channel; give its unit factor")
+    delay_s = number(entry, "delay_s", 0.0, where)
+    if delay_s and channel == "time_s":
+        raise InvalidInput(f"{where}: delay_s has no meaning for the time; give it for a channel")
+    offset = number(entry, "offset", 0.0, where)
+    return Source(column, factor, offset, despike, delay_s, sideslip)
+
+
+def _flag(entry: Mapping[str, Any], key: str, where: str) -> bool:
+    value = entry.get(key, False)
+    if not isinstance(value, bool):
+        raise InvalidInput(f"{where}: {key} = {value!r}; give true or false")
+    return value
+
+
+def number(entry: Mapping[str, Any], key: str, default: float, where: str) -> float:
+    """Return the number of a key, or `default` where there is none."""
+    value = entry.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise InvalidInput(f"{where}: {key} = {value!r} is not a number; give a plain number")
+    return float(value)

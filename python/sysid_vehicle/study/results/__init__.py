@@ -1,0 +1,1 @@
+"""What a study holds and says: effects, figures, sentences, next steps."""

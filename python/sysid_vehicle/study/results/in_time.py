@@ -1,0 +1,98 @@
+"""What of a finished study takes long to tell: worked out in time, or left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._common.threads import before, in_parallel
+from ...diagnose import Causes, where
+from ...rules import UNKNOWN
+from ..ahead.shares import Shares
+
+if TYPE_CHECKING:
+    from ..study import Study
+
+
+@dataclass(frozen=True)
+class _Part:
+    """An attribute of a study that takes long.
+
+    Attributes
+    ----------
+    words : str
+        What it tells.
+    otherwise : callable
+        What stands for it where it is left out, from the study.
+    """
+
+    words: str
+    otherwise: Callable[[Study], Any]
+
+
+def _nothing(study: Study) -> Shares:
+    none = np.empty((3, 0, 0))
+    return Shares((), (), none, none, none, np.empty(0), (), UNKNOWN, ())
+
+
+def _without_causes(study: Study) -> Any:
+    """Maps and coherence alone, which take a pass or two."""
+    return where(study.fit, causes=False, name=study.name_of(study.fit))
+
+
+_PARTS = {
+    "shares": _Part("how much of the errors ahead could be explained", _nothing),
+    "predicting": _Part("what a fit to predictions gains", lambda _: None),
+    "disagreements": _Part("which parameters validation data give differently", lambda _: ()),
+    "small": _Part("whether the errors of the baseline matter", lambda _: False),
+    "where": _Part("moments at which the car changed, and delays", _without_causes),
+    "unknown": _Part("the shape of what is missing", lambda _: None),
+    "late": _Part("the delay of the car without the lags of the model", lambda _: {}),
+}
+"""In the order in which they are asked for."""
+_REPORTED = {
+    "causes": _Part(
+        "which causes exact refits confirm",
+        lambda study: tuple(Causes({}, (), {}) for _ in study.diagnoses),
+    ),
+    "errors_with": _Part(
+        "the errors with each effect alone", lambda study: tuple({} for _ in study.diagnoses)
+    ),
+    "hidden": _Part("which effects the identified parameters would hide", lambda _: None),
+}
+"""What reports and files tell besides."""
+
+
+def in_time(study: Study, ends: float, *, reported: bool = True) -> Study:
+    """Work out side by side what takes long, and leave out what is not done in time.
+
+    Parameters
+    ----------
+    study : Study
+    ends : float
+        By `time.perf_counter`. What stands for the parts left out takes a pass or two more.
+    reported : bool
+        Whether also what only reports and files tell.
+
+    Returns
+    -------
+    Study
+        The same study, whose `left_out` says what is missing.
+    """
+    parts = _PARTS | _REPORTED if reported else _PARTS
+    told = study.with_warnings(study.warnings)
+    for name in study.left_out:
+        del told.__dict__[name]  # it may be told now
+
+    def asked(name: str) -> bool:
+        return before(ends, lambda: (getattr(told, name),), None) is not None
+
+    done = in_parallel(asked, parts)
+    late = {name: parts[name] for name, there in zip(parts, done, strict=True) if not there}
+    for name, part in late.items():
+        told.__dict__[name] = part.otherwise(told)
+    told.__dict__["left_out"] = {name: part.words for name, part in late.items()}
+    return told

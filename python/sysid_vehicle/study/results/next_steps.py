@@ -1,0 +1,159 @@
+"""What to do after a study, in the order in which it helps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ..._common.text import few
+from ..judge.matters import USUAL_SIZES
+from .sentences import disturbance, in_training, only_elsewhere, slow
+
+if TYPE_CHECKING:
+    from ..study import Study
+    from .added import AddedEffect
+
+SHORT_S = 20.0  # of usable driving: every manoeuvre of the library takes longer
+_SHOWN = 4
+_ASKED = 2  # effects that a next drive is to show
+_MEND = (
+    "first correct the channels that contradict each other: `sysid-vehicle check` finds delays, "
+    "scales and positions of sensors"
+)
+
+
+def next_steps(study: Study) -> tuple[str, ...]:
+    """Sentences that say what to mend, record or look at; none where the model may be used.
+
+    Parameters
+    ----------
+    study : Study
+    """
+    if study.train[-1].unrelated:
+        return (_MEND,)
+    if study.verdict == "adequate":
+        return ()
+    found = [*_of_names(study)]
+    if study.verdict in ("unknown", "partly_explained"):
+        found += _of_what_is_left(study)
+    if study.verdict == "not_testable":
+        found.append("record corners, steps and sweeps of the steering, and study them")
+    return tuple(found)
+
+
+def _of_names(study: Study) -> list[str]:
+    found = []
+    for a in study.added:
+        # Which of two it is that only stands in for something else is no question.
+        if a.confounded_with and a.grade != "alias":
+            some = few(a.confounded_with)
+            found.append(
+                f"separate {a.id} from {some}: `sysid-vehicle next-drive` designs a drive that "
+                "does, or state what is known of them in the vehicle file"
+            )
+    aliases = [a for a in study.added if a.stands_in]
+    if aliases:
+        found.append(
+            f"do not take the size of {', '.join(a.id for a in aliases)} as a property of the "
+            "car: another effect may be missing instead"
+        )
+    taken = study.explained
+    if study.verdict == "unknown" and taken is not None and taken.low > 0.0:
+        found.append(
+            "for prediction use the final model, as a whole and in similar driving: it is better "
+            "than the baseline"
+        )
+    seconds = study.validation.usable_s
+    if aliases and seconds < SHORT_S:
+        found.append(
+            f"validate with longer driving, {SHORT_S:.0f} s or more: {seconds:.2g} s hardly show "
+            "how far an effect reduces the errors 1 to 5 s ahead"
+        )
+    shown_by = {e.id: e.excited_by for e in study.model.parts}
+    for a in _worth_a_drive(aliases):
+        found.append(
+            f"to find out whether the car has {a.id}, record driving that excites it "
+            f"({shown_by[a.id]}), or state what is known of it in the vehicle file"
+        )
+    return found
+
+
+def _worth_a_drive(aliases: Sequence[AddedEffect]) -> list[AddedEffect]:
+    """Those that are not shown to be none, the one with the largest own share first."""
+    open_ = [a for a in aliases if a.grade != "alias" and a.own.known and a.own.value > 0.0]
+    return sorted(open_, key=lambda a: -a.own.value)[:_ASKED]
+
+
+def _of_what_is_left(study: Study) -> list[str]:
+    found = []
+    if study.stopped:
+        was = "was" if len(study.stopped) == 1 else "were"
+        found.append(f"raise the time limit: {few(study.stopped)} {was} not tried")
+    if study.verdict == "unknown" and study.small:
+        usual = ", ".join(f"{name} {size}" for name, size in USUAL_SIZES.items())
+        found.append(
+            f"if errors 0.5 to 5 s ahead of less than {usual} do not matter to you, use the "
+            "baseline as it is: with `matters`, or `--matters`, the verdict counts only larger "
+            "ones"
+        )
+    if slow(study):
+        found.append(
+            f"find the cause of the {' and the '.join(study.slow)}: repeat the drive in both "
+            "directions; bank and slope of the road repeat at the same place, wind with the same "
+            "heading, an effect of the car with the same manoeuvre"
+        )
+    if only_elsewhere(study):
+        what = "the remaining error" if study.added else "what is missing"
+        found.append(
+            "add driving like the validation data to the training data, and validate with other "
+            f"driving of that kind: {what} {in_training(study)}, and no effect can be named that "
+            "they do not excite"
+        )
+    if not study.sensors and not study.checked:
+        found.append(
+            "check the sensors, and give the result to the study: `sv.check`, or "
+            "`sysid-vehicle check`; scales, biases and positions of sensors act like "
+            "effects of the car"
+        )
+    if not study.fit.model.nuisances:
+        found.append(
+            "give the model the offsets that every measured log has (biases, a turned speed "
+            "sensor, crossfall): `model.with_nuisances()`, or `--nuisances`"
+        )
+    apart = "; ".join(str(d) for d in study.disagreements[:_SHOWN])
+    if apart:
+        found.append(
+            f"find out what differs between the drives (speed, load, tyres, road, sensors): {apart}"
+        )
+    open_ = [
+        e.name for e in study.fit.estimates if e.note == "not determined" and "." not in e.name
+    ]
+    if open_:
+        found.append(
+            f"drive nearer the limit of the tyres: {few(open_)} not determined, and undetermined "
+            "tyre parameters hide what is missing"
+        )
+    if not study.fit.driving.force_known:
+        found.append(
+            "log the wheel force `fx_n` if possible: without it drag, slopes and the split of "
+            "forces cannot be determined"
+        )
+    if study.predicting is not None and study.predicting.helps:
+        which = "final" if study.predicting.explains else "baseline"
+        found.append(
+            f"where errors some seconds ahead matter, use `study.predicting.{which}`: its "
+            "parameters are fitted to them"
+        )
+    where = " and ".join(
+        dict.fromkeys(
+            o.strongest
+            for o in (study.omnibus, study.omnibus_together)
+            if o is not None and o.rejects and not disturbance(study)
+        )
+    )
+    if where:
+        found.append(
+            f"look at the shape of the remaining {where} (`study.unknown`), and define an effect "
+            "that has it: `sv.define_effect`"
+        )
+    return found

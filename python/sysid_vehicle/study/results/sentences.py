@@ -1,0 +1,317 @@
+"""What a study leaves unexplained, in words that agree with its verdict."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._common.text import number, with_error
+from ...estimate import UNITS
+from ...estimate.driving import WORDS
+from ...rules import NONE_GONE, share_of
+from ..ahead.horizons import LATERAL
+from ..judge.matters import sizes_that_matter, sufficient
+from ..validation import AHEAD_S
+
+if TYPE_CHECKING:
+    from ..study import Study
+
+_MEANING = {
+    "adequate": "no effect is missing that this driving can show",
+    "explained": "the effects found explain all that depends on the driving",
+    "partly_explained": "the effects found explain part of it; something else is missing",
+    "unknown": "something is missing and no effect of the catalogue explains it",
+    "not_testable": (
+        "this driving does not excite the lateral motion, and shows next to nothing of tyres, "
+        "steering and load transfer; drive corners, steps and sweeps of the steering"
+    ),
+}
+
+
+def meaning(study: Study) -> str:
+    """The verdict of a study in words."""
+    judged = study.added and study.explained is not None
+    if study.verdict == "unknown" and study.stopped and not judged:
+        return "something is missing; the time limit ended the search for what explains it"
+    if study.verdict == "unknown" and study.added and study.explained is not None:
+        if not study.explained.share > 0.0:
+            return f"something is missing; the effects added are not confirmed: {NONE_GONE}"
+        names = [a.id for a in study.added]
+        if len(names) == 1:
+            return (
+                f"something is missing; {names[0]} explains {study.explained} of the error 1 to "
+                "5 s ahead, but beside the remaining error it is not confirmed as the cause"
+            )
+        return (
+            f"something is missing; {' and '.join(names)} together explain {study.explained} of "
+            "the error 1 to 5 s ahead; this driving does not show which of them the car has"
+        )
+    if study.verdict == "partly_explained" and study.buried:
+        return (
+            "the effects found explain part of it; the errors that remain 0.5 to 5 s ahead are "
+            "below the noise of the sensors"
+        )
+    beyond = study.explained
+    if study.verdict == "partly_explained" and beyond and beyond.share < study.rules.most:
+        part = f"{beyond} of the error 1 to 5 s ahead"
+        if not beyond.low > 0.0 and study.shares.whole.known:
+            part = (
+                f"{study.shares.whole} of what any function of the driving could explain of the "
+                "error 1 to 5 s ahead"
+            )
+        named = _named(study)
+        return (
+            f"{named}the effects added explain {part}; the rest is disturbance, and something else "
+            "that is missing"
+        )
+    seen = study.omnibus.rejects or study.diagnoses[-1].significant or structured(study)
+    seen = seen or elsewhere(study) or slow(study)
+    if study.verdict == "adequate" and study.added:
+        return (
+            "the effects added are not confirmed; the baseline (`study.fits[0]`) can be fitted so "
+            f"that its errors 0.5 to 5 s ahead are below {_matters(study)}"
+        )
+    if study.verdict == "adequate" and seen:
+        if disturbance(study):
+            return "the remaining error is disturbance: no function of the driving predicts it"
+        helps = study.predicting is not None and study.predicting.helps
+        how = " with parameters fitted to predictions (`study.predicting.final`)"
+        return (
+            f"an error remains, but 0.5 to 5 s ahead it is below {_matters(study)}"
+            f"{how if helps else ''}"
+        )
+    if study.verdict == "unknown" and not study.added and only_elsewhere(study):
+        return f"something is missing that shows in the validation data; it {in_training(study)}"
+    if study.verdict == "adequate" and _disturbed(study):
+        return (
+            f"{_MEANING['adequate']}; the validation error is {study.test[-1].error:.2g} "
+            "noise floors, from disturbances like those of the training data"
+        )
+    return _MEANING[study.verdict]
+
+
+def _named(study: Study) -> str:
+    """The names that stand, in words; rivals of one group are told once."""
+    told = {v.effect.id for v in study.verdicts.all if v.finding in ("missing", "one of a group")}
+    names: dict[frozenset[str], str] = {}
+    for a in study.added:
+        if a.id in told:
+            names.setdefault(frozenset((a.id, *a.confounded_with)), a.name)
+    return f"named: {', '.join(names.values())}; " if names else ""
+
+
+def _matters(study: Study) -> str:
+    return "the noise of the sensors" if study.matters is None else "the errors that matter"
+
+
+def left_out(study: Study) -> tuple[str, ...]:
+    """What `Study.in_time` had no time for, in one sentence; none where it had."""
+    some = "; ".join(study.left_out.values())
+    return (f"no time was left to find out {some}",) if some else ()
+
+
+def ahead(study: Study) -> str:
+    """Lateral errors some seconds ahead on validation data; empty where that is too short."""
+    errors = study.horizons
+    i = errors.horizons_s.index(AHEAD_S)
+    told = []
+    for j, c in enumerate(errors.channels):
+        first, last = (float(errors.error[k, i, j]) for k in (0, -1))
+        if c in LATERAL and not np.isnan(last):
+            both = (first, last) if len(study.fits) > 1 else (last,)
+            figures = " -> ".join(number(x, 2) if np.isfinite(x) else "lost" for x in both)
+            told.append(f"{WORDS[c]} {figures} {UNITS[c]}")
+    if not told:
+        return ""
+    where = "where the car turns, on validation data"
+    return f"Median error {AHEAD_S:g} s ahead {where}: {', '.join(told)}."
+
+
+def small(study: Study) -> bool:
+    """Whether the baseline's errors 0.5 to 5 s ahead can all be within the usual sizes."""
+    return sufficient(study.fits[0], study.validation, sizes_that_matter({})) is not None
+
+
+def nuisances(study: Study) -> list[str]:
+    """Those that are clearly there and of a size that matters, in words; none is a finding."""
+    fit, found = study.fit, []
+    for part in fit.model.parts:
+        if part.id not in fit.model.nuisances:
+            continue
+        own = [(p, fit[f"{part.id}.{p.name}"]) for p in part.parameters]
+        off = [(abs(e.value - p.null_value), e.std, p.matters) for p, e in own]
+        if any(by >= matters and by > study.rules.interval * std for by, std, matters in off):
+            sizes = ", ".join(f"{p.name} {with_error(e.value, e.std)} {p.unit}" for p, e in own)
+            found.append(f"Nuisance {part.id} ({part.title}): {sizes}")
+    return found
+
+
+def disturbance(study: Study) -> bool:
+    """Whether lesser evidence that something is left counts for nothing (`rules.something_left`).
+
+    No function of the driving predicts what is left.
+    """
+    found = study.structure
+    strict, candidates = study.rules.strict, study.diagnoses[-1].ranking
+    return (
+        found is not None
+        and found.anywhere <= study.rules.explainable
+        and study.omnibus.p_value > strict
+        and not elsewhere(study)
+        and not slow(study)
+        and all(c.p_value > strict for c in candidates)
+    )
+
+
+def in_the_end(study: Study) -> str:
+    """What is explained, what is left, and what a fit to predictions gains.
+
+    Parameters
+    ----------
+    study : Study
+    """
+    ahead = "" if study.verdict == "not_testable" else str(study.predicting or "")
+    return f"{_left(study)} {ahead}".rstrip()
+
+
+def _left(study: Study) -> str:
+    left = _on_train(study)
+    if study.structure is not None and structured(study):
+        left += f" A function of the driving still predicts {study.structure.strongest}."
+    said = " ".join([*_explained(study), f"Final model: {left}", *_on_all(study)])
+    if study.train[-1].unrelated:
+        wrong = "; ".join(study.train[-1].unrelated.values())
+        return f"{said} Something else is wrong: {wrong}."
+    seen = study.omnibus.rejects and not disturbance(study)
+    told = seen or structured(study) or elsewhere(study) or slow(study)
+    if study.verdict not in ("unknown", "partly_explained") or told:
+        return said
+    # Nothing is left, yet something is missing: what took it up is not what is missing.
+    stand_ins = [a.id for a in study.added if a.stands_in]
+    if stand_ins:
+        said += f" Other effects have absorbed what is missing: {', '.join(stand_ins)}."
+    elif study.diagnoses[-1].significant:
+        some = ", ".join(c.id for c in study.diagnoses[-1].significant[:3])
+        said += (
+            f" There is evidence for {some}; they do not improve the prediction of validation data."
+        )
+    return said
+
+
+def _explained(study: Study) -> list[str]:
+    """The share of the errors ahead, and of what any function of the driving could explain."""
+    if study.explained is None:
+        return []
+    if not study.explained.share > 0.0:
+        return [f"{NONE_GONE.capitalize()}: the effects added do not reduce it."]
+    said = [f"The effects added remove {study.explained} of the error 1 to 5 s ahead."]
+    fall = _fall_as_fitted(study)
+    if fall > study.explained.high:
+        said.append(
+            "This share compares both models with the parameters that predict best. As fitted one "
+            f"step ahead, the squared lateral errors fall by {100 * fall:.0f} %; the baseline with "
+            "other parameters achieves that too."
+        )
+    whole = study.shares.whole
+    if whole.known and whole.value > 0.0:
+        sure = study.verdict in ("explained", "partly_explained")
+        who = "The effects named explain" if sure else "The effects added explain"
+        said.append(f"{who} {whole} of what any function of the driving could explain of it.")
+    return said
+
+
+def _fall_as_fitted(study: Study) -> float:
+    """Fall of the squares of the median lateral errors 1 to 5 s ahead, in the mean."""
+    errors = study.horizons
+    ahead = [h >= 1.0 for h in errors.horizons_s]
+    lateral = [c in LATERAL for c in errors.channels]
+    first, last = (errors.error[k][ahead][:, lateral] for k in (0, -1))
+    known = np.isfinite(first) & np.isfinite(last) & (first > 0.0)
+    return float(1.0 - np.mean((last[known] / first[known]) ** 2)) if known.any() else 0.0
+
+
+def structured(study: Study) -> bool:
+    """Whether a function of the driving is shown to predict a part of what is left."""
+    found = study.structure
+    return found is not None and found.everywhere > study.rules.explainable
+
+
+def _on_train(study: Study) -> str:
+    test = study.omnibus
+    if test.rejects and disturbance(study):
+        return (
+            f"the test for a remaining error gives p = {test.p_value:.2g}, but no function of the "
+            "driving predicts that error: it is disturbance."
+        )
+    if not test.rejects and structured(study):
+        return f"the test for unknown forces is not significant (p = {test.p_value:.2g})."
+    if only_elsewhere(study):
+        return f"the training data alone show no remaining error (p = {test.p_value:.2g})."
+    return f"{test}."
+
+
+def _on_all(study: Study) -> list[str]:
+    beyond, said = study.omnibus_together, []
+    # A baseline alone is told of what it leaves once.
+    told = beyond is not None and (beyond.rejects or (study.added and not structured(study)))
+    if beyond is not None and told:
+        found = str(beyond)
+        if not _more(study):
+            found = f"no more than a disturbance can cause (p = {beyond.p_value:.2g})"
+        said.append(f"On all data together: {found if beyond.rejects else beyond}.")
+    if _unforeseen(study):
+        said.append(f"{str(study.foretold).capitalize()}.")
+    if slow(study):
+        some = " and a ".join(study.slow)
+        said.append(f"Too slow for a disturbance, so it has a cause: a {some}.")
+    return said
+
+
+def elsewhere(study: Study) -> bool:
+    """Whether more is left on all data than the training data show or foretell."""
+    return _more(study) or _unforeseen(study)
+
+
+def only_elsewhere(study: Study) -> bool:
+    """Whether what is left shows with validation data alone."""
+    return elsewhere(study) and not study.omnibus.rejects
+
+
+def slow(study: Study) -> bool:
+    """Whether a baseline takes slow forces for disturbances."""
+    return bool(study.slow) and not study.added
+
+
+def _unforeseen(study: Study) -> bool:
+    return not study.added and study.foretold is not None and study.foretold.unforeseen
+
+
+def in_training(study: Study) -> str:
+    """What training data show of that which shows with validation data alone, in words.
+
+    Where most of their error is disturbance, what is missing may be a part of it.
+    """
+    error = study.train[-1].error
+    if _beyond_noise(error) > study.rules.most:
+        floors = f"{number(error, 2)} noise floors"
+        return f"cannot be separated from disturbance in the training data (error {floors})"
+    return "hardly shows in the training data"
+
+
+def _beyond_noise(error: float) -> float:
+    """Share of the square of an error one step ahead that is no noise of the sensors."""
+    return share_of(error**2, 1.0)
+
+
+def _disturbed(study: Study) -> bool:
+    """Whether validation data err by more than noise of the sensors, as is foretold."""
+    if study.foretold is None:
+        return False
+    return _beyond_noise(study.test[-1].error) > study.rules.explainable
+
+
+def _more(study: Study) -> bool:
+    """Whether more is left on all data together than a disturbance may leave."""
+    beyond = study.omnibus_together
+    return beyond is not None and beyond.p_value < study.rules.strict

@@ -1,0 +1,1 @@
+"""The way to a better model: what is added, exchanged, or dropped again."""

@@ -1,0 +1,270 @@
+"""The way to a better model: effects are added one by one, and earlier ones exchanged."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+
+from ..._common.text import with_error
+from ..._common.threads import before
+from ...diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
+from ...diagnose.diagnose import REFITS
+from ...errors import Interrupted
+from ...estimate import Driving
+from ...identify import Fit
+from ...rules import Rules, worse
+from ..ahead.along_the_car import changes_of
+from ..validation import AHEAD, serving
+from .steps import (
+    alternatives,
+    exchanged,
+    first_that_holds,
+    in_common,
+    likeliest,
+)
+from .together import first_together, in_place_of
+
+
+@dataclass(eq=False)
+class Trail:
+    """How a model came about.
+
+    Attributes
+    ----------
+    fits : list of Fit
+        After each step; the first is the baseline.
+    diagnoses : list of Diagnosis
+        Before each step, and the last one, which found nothing more to add.
+    p_values : dict
+        By effect, when it was chosen or nearly chosen.
+    rivals : dict
+        By effect that was chosen or nearly chosen, what the driving could not tell from it.
+    nearly : dict
+        By effect, what was nearly chosen in its place.
+    sizes : dict
+        Parameters of rivals and their standard errors, each refitted in place of what was chosen.
+    stopped : tuple of str
+        Effects with evidence that the time limit left untried.
+    taken_back : tuple of str
+        Effects of last steps without which the model predicts better (`without_harm`).
+    """
+
+    fits: list[Fit]
+    diagnoses: list[Diagnosis] = field(default_factory=list)
+    p_values: dict[str, float] = field(default_factory=dict)
+    rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    nearly: dict[str, tuple[Candidate, ...]] = field(default_factory=dict)
+    sizes: dict[str, Size] = field(default_factory=dict)
+    stopped: tuple[str, ...] = ()
+    taken_back: tuple[str, ...] = ()
+
+    @property
+    def fit(self) -> Fit:
+        """Where it leads."""
+        return self.fits[-1]
+
+    @property
+    def refitted(self) -> tuple[str, ...]:
+        """Effects near the best of the last diagnosis, by refits with noise of their own."""
+        return tuple(c.id for dx in self.diagnoses[-1:] for c in dx.significant if c.finished)
+
+    @property
+    def told(self) -> str:
+        """The effects so far with their sizes, in words."""
+        effects = [e for e in self.fit.model.effects if e not in self.fits[0].model.effects]
+        if not effects:
+            found = ", ".join(c.id for dx in self.diagnoses[:1] for c in dx.significant[:3])
+            return f"no effect was added yet; there is evidence for {found or 'none'}"
+        return "; ".join(f"{e}: {_sizes(self.fit, [e])}" for e in effects)
+
+    def without_harm(self, test: Driving, rules: Rules) -> None:
+        """Take back last steps while the model errs more ahead than the baseline, as it is fitted.
+
+        Each step was judged by the parameters that predict best: what they show an effect to take
+        away, those of the likelihood may lose where the effects that belong to it are not found.
+        What the fit left open does not speak against it: tyres that never met a slip angle take
+        any value, with an effect and without.
+        """
+        last = self.fit.model.effects
+
+        def harms() -> bool:
+            one, other = (serving(fit, test) for fit in (self.fits[0], self.fit))
+            return bool(worse(changes_of(one, other, test, AHEAD), rules))
+
+        while len(self.fits) > 1 and harms():
+            self.fits.pop()
+            self.diagnoses.pop()
+        self.taken_back = tuple(e for e in last if e not in self.fit.model.effects)
+
+    def note_several(
+        self, dx: Diagnosis, chosen: Sequence[str], rivals: Mapping[str, Sequence[str]]
+    ) -> None:
+        """Remember what was chosen together, and what is confounded with each of it.
+
+        So by the posterior, and as `in_place_of` finds.
+        """
+        for name in chosen:
+            self.p_values[name] = dx.family[name]
+            shared = dx.proposed.of(name)
+            others = () if shared is None else shared.effects
+            known = set(dx.family) - set(chosen)
+            alike = dict.fromkeys((*others, *rivals.get(name, ())))
+            self.rivals[name] = tuple(e for e in alike if e in known)
+
+    def note(self, dx: Diagnosis, chosen: Candidate) -> None:
+        """Remember what was chosen, and what nearly was."""
+        near = alternatives(dx, chosen)
+        self.nearly[chosen.id] = near
+        self.p_values |= {c.id: c.p_value for c in (chosen, *near)}
+        for c in near:
+            self.nearly.setdefault(c.id, alternatives(dx, c))
+            self.rivals.setdefault(c.id, c.indistinguishable_from)
+        self.rivals[chosen.id] = chosen.indistinguishable_from
+        self.sizes |= dx.sizes
+
+
+@contextmanager
+def kept(trail: Trail) -> Iterator[None]:
+    """Say after Ctrl-C in the block what is known by then.
+
+    Raises
+    ------
+    Interrupted
+    """
+    try:
+        yield
+    except KeyboardInterrupt as signal:
+        told = Interrupted(
+            f"after {len(trail.fits) - 1} step(s): {trail.told}. The models so far, the baseline "
+            "first, are the `fits` of this exception (sys.last_value.fits)"
+        )
+        told.fits = tuple(trail.fits)
+        raise told from signal
+
+
+@dataclass(frozen=True)
+class Search:
+    """Looks for the effects that a model lacks.
+
+    Attributes
+    ----------
+    test : Driving
+        Validation data, which every step must predict better.
+    ends : float
+        When refits end, by `time.perf_counter`.
+    rules : Rules
+    judged_by : float
+        Until when validation data are asked whether what was refitted holds.
+    """
+
+    test: Driving
+    candidates: Sequence[str] | None
+    most_effects: int
+    ends: float
+    rules: Rules
+    seed: int
+    progress: bool | None
+    say: Callable[[str], None]
+    judged_by: float = math.inf
+
+    def follow(self, trail: Trail) -> None:
+        """Add what is missing to the last model until nothing more is that the driving can show."""
+        while True:
+            in_time = time.perf_counter() < self.ends
+            dx = self._diagnosis(trail.fit, trail.refitted)
+            trail.diagnoses.append(dx)
+            if not in_time:
+                trail.stopped = tuple(c.id for c in dx.significant)
+                return
+            # What was refitted is not lost; what takes further refits waits for another study.
+            step, by = None, (self.ends, self.judged_by)
+            if self.most_effects:
+                step = first_that_holds(dx, trail.fit, self.test, *by)
+            single = None if step is None else step[1]
+            several = first_together(dx, self.test, single, self.most_effects, *by)
+            if step is None and several is None:
+                step = before(self.ends, partial(self._beside_another, dx, trail), None)
+            if several is not None:
+                chosen, lean = several
+                rivals = in_place_of(lean, chosen, dx, self.ends)
+                trail.note_several(dx, chosen, {e: r.names for e, r in rivals.items()})
+            elif step is not None:
+                chosen, lean = (step[0].id,), step[1]
+                trail.note(dx, step[0])
+            else:
+                if time.perf_counter() > self.ends:
+                    trail.stopped = tuple(c.id for c in dx.significant)
+                return
+            found = exchanged(
+                lean,
+                {**trail.nearly, **in_common(lean, chosen, dx.ranking)},
+                self.test,
+                most_effects=self.most_effects,
+                rules=self.rules,
+                ends=self.ends,
+            )
+            effects = set(found.model.effects)
+            # One more than allowed may make another needless.
+            if len(effects) > self.most_effects:
+                return
+            if any(set(f.model.effects) == effects for f in trail.fits):
+                return
+            known = set(trail.fit.model.effects)
+            trail.fits.append(found)
+            more = _more(found, known - effects, effects - known - set(chosen))
+            self.say(f"Added {' and '.join(chosen)}: {_sizes(found, chosen)}.{more}")
+
+    def _beside_another(self, dx: Diagnosis, trail: Trail) -> tuple[Candidate, Fit] | None:
+        """The likeliest candidate, where it holds only together with one that is missing too.
+
+        What the other one does to the validation data may be larger than what the first explains.
+        As neither has been seen to hold, they count only where together they leave nothing.
+        """
+        first = likeliest(dx)
+        if first is None or first.fit is None:
+            return None
+        if len(first.fit.model.effects) >= self.most_effects:
+            return None
+        beside = self._diagnosis(first.fit, trail.refitted)
+        step = first_that_holds(beside, trail.fit, self.test, self.ends)
+        if step is None or first.id not in step[1].model.effects:
+            return None
+        if omnibus(step[1], step[1].driving, self.rules).rejects:
+            return None
+        trail.note(beside, step[0])
+        return first, step[1]
+
+    def _diagnosis(self, fit: Fit, again: Sequence[str]) -> Diagnosis:
+        """All effects scored, some refitted again; where no time is left none is refitted."""
+        left = self.ends - time.perf_counter()
+        return diagnose(
+            fit,
+            candidates=self.candidates,
+            rules=self.rules,
+            refits=REFITS if left > 0.0 else 0,
+            again=again if left > 0.0 else (),
+            time_limit_s=left if left > 0.0 else None,
+            seed=self.seed,
+            progress=self.progress,
+        )
+
+
+def _sizes(fit: Fit, effects: Sequence[str]) -> str:
+    """Parameters of effects with standard errors, in words; those that a step dropped are not."""
+    found = [e for e in fit.estimates if e.name.split(".")[0] in effects]
+    several = len(effects) > 1
+    return ", ".join(
+        f"{e.name if several else e.name.split('.')[1]} {with_error(e.value, e.std)} {e.unit}"
+        for e in found
+    )
+
+
+def _more(fit: Fit, gone: set[str], beside: set[str]) -> str:
+    """What else a step took out of the model or put into it, in words."""
+    if gone:
+        return f" {', '.join(sorted(gone))} removed; the model has {', '.join(fit.model.effects)}."
+    return f" It is significant only together with {', '.join(sorted(beside))}." if beside else ""
