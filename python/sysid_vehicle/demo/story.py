@@ -96,15 +96,19 @@ def revelation(study: Study, truth: Model) -> str:
                 quantity(e.value),
                 interval(e),
                 unit_after(e.unit).strip(),
+                e.note,
             ]
             for e in (*shown, *study.fit.derived)
         ]
         own = next(a for a in study.added if a.id == hidden.id)
         lines.append(f"Found; {own.reserve}." if own.reserve else "Found.")
-        lines.append(text_table(("parameter", "truth", "found", "95 % interval", "unit"), rows))
+        head = ("parameter", "truth", "found", "95 % interval", "unit", "note")
+        lines.append(text_table(head, rows))
         beside = [e for e in study.model.effects if e != hidden.id]
         if beside:
-            lines.append(f"Besides it the model got {', '.join(beside)}, which do not act.")
+            lines.append(
+                f"Besides it the model got {', '.join(beside)}, which the car does not have."
+            )
         return "\n".join(lines)
     for p in hidden.parameters:
         value = truth.value(f"{hidden.id}.{p.name}")
