@@ -14,8 +14,8 @@ import numpy as np
 from sysid_vehicle import Model
 from sysid_vehicle.identify.search import Box, minimise
 from sysid_vehicle.lab import Setup, design_excitation, preview, run_closed_loop
-from sysid_vehicle.lab.information import TYRES, information, problem_of, sensor_noise
-from sysid_vehicle.lab.loop import ClosedLoop
+from sysid_vehicle.lab.design.information import TYRES, information, problem_of, sensor_noise
+from sysid_vehicle.lab.drive.loop import ClosedLoop
 
 # What is believed of tyres that are 22, 1.8, 1.6, 0.8 on both axles.
 BELIEVED = dict(zip(TYRES, (19.0, 1.7, 1.7, 0.6, 24.0, 1.7, 1.5, 0.6), strict=True))

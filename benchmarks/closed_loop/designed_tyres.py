@@ -14,9 +14,9 @@ import numpy as np
 from scipy.stats import binomtest
 
 from sysid_vehicle.lab import Setup, design_excitation, run_closed_loop
-from sysid_vehicle.lab.information import TYRES
-from sysid_vehicle.lab.tyre_data import GreyBoxVehicle, TyreLog
-from sysid_vehicle.lab.tyres import identify_tyres
+from sysid_vehicle.lab.design.information import TYRES
+from sysid_vehicle.lab.tyres.data import GreyBoxVehicle, TyreLog
+from sysid_vehicle.lab.tyres.identify import identify_tyres
 
 
 def main() -> None:

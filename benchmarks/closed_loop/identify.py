@@ -35,7 +35,7 @@ from sysid_vehicle.lab import (
     hold_value,
     identify_tyres,
 )
-from sysid_vehicle.lab.tyre_fit import PARAMETERS
+from sysid_vehicle.lab.tyres.fit import PARAMETERS
 from sysid_vehicle.published import TYRE_BOX, TYRE_START, regress_tyres
 
 CAR = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6, air_density_kgpm3=1.2929)

@@ -25,7 +25,7 @@ from ..lab import (
     learn_observer_noise,
     validate_tyres,
 )
-from ..lab.observed import READINGS
+from ..lab.observer.observed import READINGS
 from ..vehicle import AXLES, Vehicle
 from .log_arguments import LOG_HELP, add_reading, read_logs
 from .outputs import add_json, add_output, write_figures, write_picture

@@ -1,25 +1,25 @@
 """The closed-loop laboratory: drive, observe, learn the noise, identify the tyres."""
 
 from . import excitation
-from .design import Design, Limits, design_excitation
-from .em import EMResult, NoiseStructure, learn_observer_noise
-from .hold import HeldValue, hold_value
-from .information import information
-from .loop import ClosedLoop, run_closed_loop
-from .motion import TyreMotion
-from .observed import READINGS, STATES, StateEstimate
-from .observer import Observer, ObserverForm, ObserverNoise
+from .design.design import Design, Limits, design_excitation
+from .design.information import information
+from .design.preview import Coverage, Expected, Preview, preview
+from .drive.loop import ClosedLoop, run_closed_loop
+from .drive.pictures import overview
+from .drive.saturation import Saturation
+from .observer.em import EMResult, NoiseStructure, learn_observer_noise
+from .observer.observed import READINGS, STATES, StateEstimate
+from .observer.observer import Observer, ObserverForm, ObserverNoise
+from .observer.record import ObserverCar, ObserverRecord
 from .parts import Actuator, Controller, Nominal, Online, Sensor, Sensors, Simulator
-from .pictures import overview
-from .preview import Coverage, Expected, Preview, preview
-from .record import ObserverCar, ObserverRecord
-from .saturation import Saturation
 from .setup import Setup
-from .tyre_data import GreyBoxVehicle, TyreLog
-from .tyre_drive import drive_tyres
-from .tyre_fit import TyreFit
-from .tyres import identify_tyres
-from .validate import IdentifiedCar, Validation, validate_tyres
+from .tyres.data import GreyBoxVehicle, TyreLog
+from .tyres.drive import drive_tyres
+from .tyres.fit import TyreFit
+from .tyres.hold import HeldValue, hold_value
+from .tyres.identify import identify_tyres
+from .tyres.motion import TyreMotion
+from .tyres.validate import IdentifiedCar, Validation, validate_tyres
 
 __all__ = [
     "READINGS",

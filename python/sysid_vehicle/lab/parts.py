@@ -10,7 +10,7 @@ from .._common.arguments import check_not_negative
 from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput
 from ..vehicle import GRAVITY_MPS2, Vehicle
-from .observer import ObserverForm
+from .observer.observer import ObserverForm
 
 _INF = float("inf")
 

@@ -10,8 +10,8 @@ from .._common.arrays import FloatArray, as_float64
 from ..identify.objective import LinearRows
 from ..identify.starts import Runner
 from ..identify.walk import looking_alike
-from ..lab.projection import Regression
-from ..lab.regression_search import COARSE, EXACT, FINE, ROUGH, RegressionTask
+from ..lab.tyres.projection import Regression
+from ..lab.tyres.regression_search import COARSE, EXACT, FINE, ROUGH, RegressionTask
 
 _PRIOR_WEIGHT = 0.1
 _PRIOR_OF_RESIDUAL_TERMS = 0.1  # relative to that of the tyres

@@ -15,10 +15,10 @@ from .._common.text import number
 from ..errors import InvalidInput
 from ..identify.search import METHODS
 from ..identify.starts import Starts, space_filling
-from ..lab.motion import TyreMotion
-from ..lab.tyre_data import GreyBoxVehicle
-from ..lab.tyre_fit import PARAMETERS
-from ..lab.tyre_problem import BOX, GIVEN, box_of, first_point
+from ..lab.tyres.data import GreyBoxVehicle
+from ..lab.tyres.fit import PARAMETERS
+from ..lab.tyres.motion import TyreMotion
+from ..lab.tyres.problem import BOX, GIVEN, box_of, first_point
 from ..vehicle import AXLES
 from .tyre_search import LossTask, search
 

@@ -18,7 +18,7 @@ from sysid_vehicle.lab import (
     preview,
     run_closed_loop,
 )
-from sysid_vehicle.lab.information import TYRES, information, problem_of, sensor_noise
+from sysid_vehicle.lab.design.information import TYRES, information, problem_of, sensor_noise
 
 HARD = excitation.multi_sine(lateral_mps2=16.0, speed_mps=25.0, duration_s=25.0)
 EASY = excitation.multi_sine(lateral_mps2=5.0, speed_mps=25.0, duration_s=25.0)

@@ -10,9 +10,9 @@ from sysid_vehicle.lab import (
     GreyBoxVehicle,
     TyreMotion,
 )
-from sysid_vehicle.lab.projection import Regression
-from sysid_vehicle.lab.tyre_fit import PARAMETERS
-from sysid_vehicle.lab.tyre_problem import box_of
+from sysid_vehicle.lab.tyres.fit import PARAMETERS
+from sysid_vehicle.lab.tyres.problem import box_of
+from sysid_vehicle.lab.tyres.projection import Regression
 from sysid_vehicle.published import TYRE_BOX, TYRE_START, regress_tyres
 from sysid_vehicle.published.tyre_search import LossTask
 

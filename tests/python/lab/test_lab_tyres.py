@@ -21,7 +21,7 @@ from sysid_vehicle.lab import (
     hold_value,
     identify_tyres,
 )
-from sysid_vehicle.lab.tyre_problem import BOX, box_of, objective_of
+from sysid_vehicle.lab.tyres.problem import BOX, box_of, objective_of
 
 CAR = GreyBoxVehicle(780.0, 1000.0, 1.4, 1.6)
 TRUTH = {

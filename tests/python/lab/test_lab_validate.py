@@ -10,7 +10,7 @@ import pytest
 from sysid_vehicle import lab
 from sysid_vehicle.cli import main
 from sysid_vehicle.errors import InvalidInput
-from sysid_vehicle.lab.tyre_fit import PARAMETERS
+from sysid_vehicle.lab.tyres.fit import PARAMETERS
 
 SETUP = lab.Setup.default()
 CAR = lab.GreyBoxVehicle.of(SETUP.plant.vehicle)

@@ -56,7 +56,7 @@ CPP_LAYERS = [
 # `Study.report` writes the report of itself, a convenience; it imports only when it is called.
 EXCEPTIONS = {("study/study.py", "report")}
 # The same inside a folder: `Excitation.preview` says what it will teach, if it is called.
-EXCEPTIONS_INSIDE = {("lab/excitation/excitation.py", "preview")}
+EXCEPTIONS_INSIDE = {("lab/excitation/excitation.py", "design")}
 # Parts of a study take the study itself, whose type they name.
 OF_ONE_WHOLE = {"study"}
 # What repeats published experiments is out of everybody's way: only commands offer it.
@@ -214,8 +214,10 @@ def test_the_check_sees_a_circle_inside_a_folder() -> None:
     del edges["maximum"]
     assert circle(edges) == set()
     lab = PACKAGE / "lab"
-    text = "from ..preview import Preview\nfrom .driven import Driven\nfrom ...log import Log"
-    assert imports_inside(lab, lab / "excitation/weaving.py", text) == {"preview", "excitation"}
+    text = (
+        "from ..design.preview import Preview\nfrom .driven import Driven\nfrom ...log import Log"
+    )
+    assert imports_inside(lab, lab / "excitation/weaving.py", text) == {"design", "excitation"}
     assert imports_inside(lab, lab / "excitation/excitation.py", text) == {"excitation"}
 
 

@@ -16,7 +16,7 @@ from ...vehicle import Vehicle
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..preview import Preview
+    from ..design.preview import Preview
     from ..setup import Setup
 
 
@@ -112,7 +112,7 @@ class Excitation(ABC):
 
     def preview(self, setup: Setup | None = None, **options: Any) -> Preview:
         """What it will teach; see :func:`sysid_vehicle.lab.preview`."""
-        from ..preview import preview
+        from ..design.preview import preview
 
         return preview(self, setup, **options)
 

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._common.arrays import FloatArray, as_float64
-from .._common.files import read_text
-from .._common.printed import Part, Printed, Table
-from .._common.progress import doing
-from .._common.style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
-from .._common.text import number
-from ..errors import InvalidInput
-from .observed import READINGS
-from .tyre_data import GreyBoxVehicle, TyreLog
-from .tyre_fit import NOISES, PARAMETERS, TyreFit
-from .tyre_problem import tyre_problem
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.files import read_text
+from ..._common.printed import Part, Printed, Table
+from ..._common.progress import doing
+from ..._common.style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
+from ..._common.text import number
+from ...errors import InvalidInput
+from ..observer.observed import READINGS
+from .data import GreyBoxVehicle, TyreLog
+from .fit import NOISES, PARAMETERS, TyreFit
+from .problem import tyre_problem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy
 
-from .._common.arrays import FloatArray, as_float64
-from ..identify.objective import Problem
-from ..identify.search import least_within
+from ..._common.arrays import FloatArray, as_float64
+from ...identify.objective import Problem
+from ...identify.search import least_within
 
 
 @dataclass

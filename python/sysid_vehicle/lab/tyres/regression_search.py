@@ -7,13 +7,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from .._common.arrays import FloatArray, as_float64
-from ..identify.objective import LinearRows, Penalised
-from ..identify.search import Box, minimise
+from ..._common.arrays import FloatArray, as_float64
+from ...identify.objective import LinearRows, Penalised
+from ...identify.search import Box, minimise
+from .data import GreyBoxVehicle
+from .fit import PARAMETERS
 from .motion import TyreMotion
 from .projection import Regression
-from .tyre_data import GreyBoxVehicle
-from .tyre_fit import PARAMETERS
 
 COARSE = 800  # samples of a first search
 ROUGH, FINE = 1e-5, 1e-8  # of the loss: what a whole search may gain and count as none

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..log.signals import runs
+from ...log.signals import runs
 
 # In the order of the bits, and for which part of the drive each may be met before the drive is no
 # longer the one that was wanted. A speed that is stepped meets the force's ends for a while.

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import _core
-from .._common.arrays import FloatArray, as_float64
-from .._common.printed import Part, Printed, Table
-from .._common.progress import doing
-from .._common.style import AFTER, BEFORE, FLOOR, axes_or_new, tidy
-from .._common.text import number
-from ..errors import InvalidInput, NumericalError, near_names
+from ... import _core
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.printed import Part, Printed, Table
+from ..._common.progress import doing
+from ..._common.style import AFTER, BEFORE, FLOOR, axes_or_new, tidy
+from ..._common.text import number
+from ...errors import InvalidInput, NumericalError, near_names
 from .observed import READINGS, STATES
 from .observer import Observer, ObserverNoise
 from .record import ObserverRecord

@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from .. import _core
-from .._common.arguments import check_positive_fields
-from .._common.arrays import FloatArray, as_float64, filled
-from ..errors import InvalidInput
-from ..log import Log
-from ..vehicle import Vehicle, static_loads
-from .observed import READINGS, refuse
+from ... import _core
+from ..._common.arguments import check_positive_fields
+from ..._common.arrays import FloatArray, as_float64, filled
+from ...errors import InvalidInput
+from ...log import Log
+from ...vehicle import Vehicle, static_loads
+from ..observer.observed import READINGS, refuse
 
 _INPUTS = ("fx_n", "steer_rad", "fz_front_n", "fz_rear_n")
 SHORTEST = 100

@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
-from .._common.arguments import generator
-from .._common.arrays import FloatArray, as_float64
-from .._common.printed import Part, Printed
-from .._common.progress import doing
-from .._common.style import AFTER, BEFORE, axes_or_new, tidy
-from .._common.threads import Workers
-from ..errors import InvalidInput, NumericalError
-from ..manoeuvres import peak_lateral_mps2
-from ..model import Model
-from ..vehicle import AXLES
-from .excitation import Excitation, Weaving
+from ..._common.arguments import generator
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.printed import Part, Printed
+from ..._common.progress import doing
+from ..._common.style import AFTER, BEFORE, axes_or_new, tidy
+from ..._common.threads import Workers
+from ...errors import InvalidInput, NumericalError
+from ...manoeuvres import peak_lateral_mps2
+from ...model import Model
+from ...vehicle import AXLES
+from ..excitation import Excitation, Weaving
+from ..observer.observed import READINGS
+from ..setup import Setup
 from .information import TYRES
-from .observed import READINGS
 from .preview import Preview, preview
-from .setup import Setup
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from .. import _core
-from .._common.arrays import FloatArray, as_float64, filled
-from ..errors import InvalidInput
-from .tyre_data import GreyBoxVehicle, TyreLog
+from ... import _core
+from ..._common.arrays import FloatArray, as_float64, filled
+from ...errors import InvalidInput
+from .data import GreyBoxVehicle, TyreLog
 
 _COLUMNS = ("vx_mps", "vy_mps", "yaw_rate_radps", "steer_rad", "fz_front_n", "fz_rear_n")
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .._common.text import number
-from ..errors import InvalidInput, near_names
-from ..identify.profile import LEVEL, Optimum, lost_at
-from .tyre_fit import TyreFit
-from .tyre_problem import box_of, objective_of
+from ..._common.text import number
+from ...errors import InvalidInput, near_names
+from ...identify.profile import LEVEL, Optimum, lost_at
+from .fit import TyreFit
+from .problem import box_of, objective_of
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .. import _core
-from .._common.arrays import FloatArray, as_float64
-from ..errors import InvalidInput
-from ..estimate import MEASURED, NoiseModel
-from ..model import Model
-from ..vehicle import AXLES
-from .loop import ClosedLoop
-from .observed import READINGS
+from ... import _core
+from ..._common.arrays import FloatArray, as_float64
+from ...errors import InvalidInput
+from ...estimate import MEASURED, NoiseModel
+from ...model import Model
+from ...vehicle import AXLES
+from ..drive.loop import ClosedLoop
+from ..observer.observed import READINGS
 
 TYRES = tuple(f"{letter}_{axle}" for axle in AXLES for letter in "BCDE")
 """The eight tyre coefficients."""

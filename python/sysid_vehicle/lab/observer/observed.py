@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .._common.arrays import FloatArray
-from .._common.printed import Part, Printed, Table
-from .._common.style import AFTER, BEFORE, MEASURED, TRUTH, axes_or_new, tidy
-from .._common.text import HALF_95, number
-from ..errors import InvalidInput, near_names
+from ..._common.arrays import FloatArray
+from ..._common.printed import Part, Printed, Table
+from ..._common.style import AFTER, BEFORE, MEASURED, TRUTH, axes_or_new, tidy
+from ..._common.text import HALF_95, number
+from ...errors import InvalidInput, near_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .._common.arguments import generator
-from .._common.arrays import FloatArray, as_float64
-from .._common.printed import Part, Printed, Table
-from .._common.style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
-from .._common.text import number
-from ..errors import InvalidInput
-from ..log import Log
-from ..simulate import RoadDisturbance
-from .excitation import Excitation
-from .parts import Sensors
+from ..._common.arguments import generator
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.printed import Part, Printed, Table
+from ..._common.style import AFTER, BEFORE, TRUTH, axes_or_new, tidy
+from ..._common.text import number
+from ...errors import InvalidInput
+from ...log import Log
+from ...simulate import RoadDisturbance
+from ..excitation import Excitation
+from ..parts import Sensors
+from ..setup import Setup
 from .saturation import Saturation, saturation
-from .setup import Setup
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

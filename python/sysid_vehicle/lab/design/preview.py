@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._common.printed import Part, Printed, Table
-from .._common.style import AFTER, BEFORE, FLOOR, MEASURED, axes_or_new, tidy
-from .._common.text import number
-from ..identify.estimates import std_of_data
-from ..model import Model
-from ..vehicle import AXLES
-from .excitation import Excitation
+from ..._common.printed import Part, Printed, Table
+from ..._common.style import AFTER, BEFORE, FLOOR, MEASURED, axes_or_new, tidy
+from ..._common.text import number
+from ...identify.estimates import std_of_data
+from ...model import Model
+from ...vehicle import AXLES
+from ..drive.loop import ClosedLoop, run_closed_loop
+from ..excitation import Excitation
+from ..observer.observed import READINGS
+from ..setup import Setup
 from .information import MOTION, TYRES, information
-from .loop import ClosedLoop, run_closed_loop
-from .observed import READINGS
-from .setup import Setup
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -222,7 +222,7 @@ def preview(
 
     Notes
     -----
-    Equations: :mod:`sysid_vehicle.lab.information`.
+    Equations: :mod:`sysid_vehicle.lab.design.information`.
     """
     setup = setup if setup is not None else Setup.default()
     simulator = setup.simulator

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from .._common.arrays import FloatArray, as_float64
-from ..errors import InvalidInput
-from ..log import Log
-from ..vehicle import Vehicle, static_loads
+from ..._common.arrays import FloatArray, as_float64
+from ...errors import InvalidInput
+from ...log import Log
+from ...vehicle import Vehicle, static_loads
 from .observed import READINGS, refuse
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .._common.style import AFTER, BEFORE, TRUTH, legend_above, new_figure, tidy
+from ..._common.style import AFTER, BEFORE, TRUTH, legend_above, new_figure, tidy
 from .loop import ClosedLoop
 
 if TYPE_CHECKING:

@@ -8,23 +8,23 @@ from functools import partial
 
 import numpy as np
 
-from .._common.arguments import whole
-from .._common.arrays import FloatArray, as_float64
-from .._common.progress import doing
-from ..errors import InvalidInput, warn
-from ..estimate.inputs import white_noise_std
-from ..identify.estimates import BETTER_FOUND, box_covariance, profiled_estimates, wald
-from ..identify.objective import Objective
-from ..identify.search import METHODS, Box
-from ..identify.settle import bottom, descend, settle, settle_finely
-from ..identify.starts import Runner, Search, Starts, space_filling
-from ..identify.walk import alternate
-from ..vehicle import slip_angles
+from ..._common.arguments import whole
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.progress import doing
+from ...errors import InvalidInput, warn
+from ...estimate.inputs import white_noise_std
+from ...identify.estimates import BETTER_FOUND, box_covariance, profiled_estimates, wald
+from ...identify.objective import Objective
+from ...identify.search import METHODS, Box
+from ...identify.settle import bottom, descend, settle, settle_finely
+from ...identify.starts import Runner, Search, Starts, space_filling
+from ...identify.walk import alternate
+from ...vehicle import slip_angles
+from .data import GreyBoxVehicle, TyreLog
+from .fit import PARAMETERS, UNITS, Rival, TyreFit
 from .motion import TyreMotion
+from .problem import box_of, first_point, free_parameters, objective_of, tyre_problem
 from .regression_search import descend_regression
-from .tyre_data import GreyBoxVehicle, TyreLog
-from .tyre_fit import PARAMETERS, UNITS, Rival, TyreFit
-from .tyre_problem import box_of, first_point, free_parameters, objective_of, tyre_problem
 
 _THINNED = 3200  # samples that decide between starts
 _KINEMATIC_VY = 0.1  # how far integrated accelerations may be off [m/s]

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .._common.arguments import generator
-from .._common.arrays import FloatArray, as_float64
-from ..errors import InvalidInput
-from .observed import READINGS
-from .tyre_data import GreyBoxVehicle, TyreLog
-from .tyre_problem import TyreProblem, first_point
+from ..._common.arguments import generator
+from ..._common.arrays import FloatArray, as_float64
+from ...errors import InvalidInput
+from ..observer.observed import READINGS
+from .data import GreyBoxVehicle, TyreLog
+from .problem import TyreProblem, first_point
 
 _SENSORS = (0.1, 3.16e-3, 3.16e-3, 3.16e-3)  # v_x, v_y [m/s], yaw rate [rad/s], a_y [m/s2]
 

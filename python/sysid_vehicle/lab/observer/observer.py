@@ -14,11 +14,11 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from .. import _core
-from .._common.arrays import FloatArray, as_float64
-from ..errors import InvalidInput, NumericalError
-from ..estimate.inputs import white_noise_std
-from ..vehicle import GRAVITY_MPS2
+from ... import _core
+from ..._common.arrays import FloatArray, as_float64
+from ...errors import InvalidInput, NumericalError
+from ...estimate.inputs import white_noise_std
+from ...vehicle import GRAVITY_MPS2
 from .observed import READINGS, STATES, StateEstimate
 from .record import ObserverCar, ObserverRecord
 

@@ -13,17 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
-from .._common.arrays import FloatArray, as_float64
-from ..effects import base_parameters, effect
-from ..effects.formula import TARGETS, trace
-from ..errors import InvalidInput, near_names
-from ..estimate import MEASURED, NoiseModel
-from ..identify.objective import Objective, gaussian_prior
-from ..identify.search import Box
-from .observed import READINGS
-from .tyre_data import SHORTEST, GreyBoxVehicle, TyreLog
-from .tyre_fit import PARAMETERS
+from ... import _core
+from ..._common.arrays import FloatArray, as_float64
+from ...effects import base_parameters, effect
+from ...effects.formula import TARGETS, trace
+from ...errors import InvalidInput, near_names
+from ...estimate import MEASURED, NoiseModel
+from ...identify.objective import Objective, gaussian_prior
+from ...identify.search import Box
+from ..observer.observed import READINGS
+from .data import SHORTEST, GreyBoxVehicle, TyreLog
+from .fit import PARAMETERS
 
 _TYRES = base_parameters()[:8]
 BOX: dict[str, tuple[float, float]] = {

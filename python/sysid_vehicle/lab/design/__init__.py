@@ -1,0 +1,1 @@
+"""Designing a drive: what it will teach, before anything is driven."""

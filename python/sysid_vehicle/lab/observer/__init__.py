@@ -1,0 +1,1 @@
+"""The extended-state observer, and the learning of its noise."""

@@ -1,0 +1,1 @@
+"""Identification of tyres: data, search, intervals, validation."""
