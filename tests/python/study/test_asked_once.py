@@ -145,6 +145,34 @@ def test_a_lag_far_below_is_not_followed_and_any_other_to_the_same_end(
     assert whole.log_likelihood < found.log_likelihood + 10.0
 
 
+def test_a_lag_that_cannot_gain_enough_is_left_before_it_is_climbed(
+    start: Model, truth: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
+    fit = identify(start, drive(car, manoeuvres.lap(20.0), seed=5), starts=1)
+    model = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.05})
+    there = refine_above(model, fit.driving, fit)
+    assert there is not None
+    enough = refine_above(model, fit.driving, fit, there.log_likelihood - 1.0)
+    assert enough is not None
+    assert enough.log_likelihood == there.log_likelihood
+    climbed: list[object] = []
+    monkeypatch.setattr(maximum, "top", lambda *args: climbed.append(args))
+    assert refine_above(model, fit.driving, fit, there.log_likelihood + 20.0) is None
+    assert not climbed
+
+
+def test_the_score_of_the_noise_is_worked_out_once(fit: Fit) -> None:
+    problem = fit.driving.problem(fit.model)
+    objective = maximum.objective_of(fit.model, problem, fit.driving)
+    p, noise = fit.model.vector(), fit.noise.vector()
+    first = objective.noise_score(p, noise)
+    assert objective.noise_score(p.copy(), noise.copy()) is first
+    other = objective.noise_score(p, 1.1 * noise)
+    assert other[0] != first[0]
+    np.testing.assert_allclose(objective.noise_score(p, noise)[1], first[1], rtol=1e-9)
+
+
 def test_effects_that_are_fitted_together_are_left_where_one_comes_to_nothing(
     start: Model, truth: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
