@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
 from itertools import pairwise
@@ -102,6 +102,8 @@ class Study:
         the noise of the sensors.
     answers : Answers, optional
         About its validation data, for those who ask again.
+    worked_out : mapping of str to object
+        Of a study that was read what takes long to tell and had been told before, by attribute.
     """
 
     verdict: Verdict
@@ -127,6 +129,11 @@ class Study:
     matters: Mapping[str, float] | None = None
     buried: bool = False
     answers: Answers | None = None
+    worked_out: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        known = _slow()
+        self.__dict__.update({n: v for n, v in self.worked_out.items() if n in known})
 
     @property
     def fit(self) -> Fit:
@@ -141,12 +148,16 @@ class Study:
     def save(self, path: str | Path) -> None:
         """Write the study with all its fits and logs; :func:`sysid_vehicle.load` reads it.
 
+        What takes long to tell and was told by then, as by a report, stands in the file too.
+
         Raises
         ------
         InvalidInput
             If the file cannot be written.
         """
-        save(self, path)
+        known = [n for n in _slow() if n in self.__dict__ and n not in self.left_out]
+        told = {n: self.__dict__[n] for n in known if n != "left_out"}
+        save(replace(self, worked_out=told), path)
 
     @property
     def meaning(self) -> str:
@@ -306,9 +317,7 @@ class Study:
     def with_warnings(self, warnings: Sequence[str]) -> Study:
         """The same study with these warnings; what it has worked out so far it keeps."""
         other = replace(self, warnings=tuple(warnings))
-        for slow in (n for n, of in vars(Study).items() if isinstance(of, cached_property)):
-            if slow in self.__dict__:
-                other.__dict__[slow] = self.__dict__[slow]
+        other.__dict__.update({n: self.__dict__[n] for n in _slow() if n in self.__dict__})
         return other
 
     @cached_property
@@ -398,3 +407,8 @@ class Study:
         from ..report import write_report
 
         write_report(self, Path(path))
+
+
+def _slow() -> tuple[str, ...]:
+    """Attributes of a study that are worked out when they are first asked for."""
+    return tuple(name for name, of in vars(Study).items() if isinstance(of, cached_property))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -41,8 +43,9 @@ from sysid_vehicle.identify.ahead import _Ahead
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.sensors.low_pass import _Problem
 from sysid_vehicle.sensors.spectrum import _bias, _of_windows, spectrum_of
-from sysid_vehicle.study import steps, validation
+from sysid_vehicle.study import failing, steps, validation
 from sysid_vehicle.study.answers import answers_of
+from sysid_vehicle.study.failing import late
 from sysid_vehicle.study.steps import alternatives, exchanged, without_insignificant
 from sysid_vehicle.study.together import _none_at_nothing
 
@@ -160,6 +163,19 @@ def test_a_lag_that_cannot_gain_enough_is_left_before_it_is_climbed(
     monkeypatch.setattr(maximum, "top", lambda *args: climbed.append(args))
     assert refine_above(model, fit.driving, fit, there.log_likelihood + 20.0) is None
     assert not climbed
+
+
+def test_a_model_without_lags_that_a_study_came_through_is_not_fitted_again(
+    fit: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lagging = replace(fit, model=fit.model.add("steer_lag"))
+    added = [SimpleNamespace(id="steer_lag")]
+    study: Any = SimpleNamespace(model=lagging.model, fit=lagging, fits=(fit, lagging), added=added)
+    told = late(study)
+    monkeypatch.setattr(failing, "refine", None)
+    assert late(study).keys() == told.keys() == set()  # this car answers in time
+    with pytest.raises(TypeError):
+        late(SimpleNamespace(**{**vars(study), "fits": (lagging,)}))  # type: ignore[arg-type]
 
 
 def test_the_score_of_the_noise_is_worked_out_once(fit: Fit) -> None:
