@@ -43,7 +43,7 @@ from .failing import errors_with, late, where_lines
 from .foretold import Foretold
 from .hidden import hidden
 from .horizons import Horizons, horizons
-from .in_time import in_time
+from .in_time import in_time, take_over, told
 from .next_steps import next_steps
 from .predicting import Predicting, predicting
 from .record import record
@@ -132,8 +132,7 @@ class Study:
     worked_out: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        known = _slow()
-        self.__dict__.update({n: v for n, v in self.worked_out.items() if n in known})
+        take_over(self, self.worked_out)
 
     @property
     def fit(self) -> Fit:
@@ -146,18 +145,14 @@ class Study:
         return self.fit.model
 
     def save(self, path: str | Path) -> None:
-        """Write the study with all its fits and logs; :func:`sysid_vehicle.load` reads it.
-
-        What takes long to tell and was told by then, as by a report, stands in the file too.
+        """Write the study, its fits, its logs, what it told; :func:`sysid_vehicle.load` reads it.
 
         Raises
         ------
         InvalidInput
             If the file cannot be written.
         """
-        known = [n for n in _slow() if n in self.__dict__ and n not in self.left_out]
-        told = {n: self.__dict__[n] for n in known if n != "left_out"}
-        save(replace(self, worked_out=told), path)
+        save(replace(self, worked_out=told(self, whole=True)), path)
 
     @property
     def meaning(self) -> str:
@@ -292,8 +287,6 @@ class Study:
     def in_time(self, seconds: float, *, reported: bool = True) -> Study:
         """The same study with what takes long to tell worked out, as far as that is done in time.
 
-        Then printing, drawing and writing it take little.
-
         Parameters
         ----------
         seconds : float
@@ -316,9 +309,7 @@ class Study:
 
     def with_warnings(self, warnings: Sequence[str]) -> Study:
         """The same study with these warnings; what it has worked out so far it keeps."""
-        other = replace(self, warnings=tuple(warnings))
-        other.__dict__.update({n: self.__dict__[n] for n in _slow() if n in self.__dict__})
-        return other
+        return take_over(replace(self, warnings=tuple(warnings)), told(self))
 
     @cached_property
     def horizons(self) -> Horizons:
@@ -407,8 +398,3 @@ class Study:
         from ..report import write_report
 
         write_report(self, Path(path))
-
-
-def _slow() -> tuple[str, ...]:
-    """Attributes of a study that are worked out when they are first asked for."""
-    return tuple(name for name, of in vars(Study).items() if isinstance(of, cached_property))
