@@ -60,7 +60,7 @@ def refine_above(model: Model, driving: Driving, fit: Fit, least: float = -np.in
         The poorer one.
     least : float
         Log-likelihood below which nobody asks for the maximum: where neither noise of its own nor
-        a climb leads up to that it is not sought.
+        a climb leads up to that it is not sought, nor where few samples lead to no lag.
     """
     objective, thinned = objectives(model, driving)
     box, begin = free_box(model), (model.vector(), fit.noise.vector())
@@ -72,6 +72,12 @@ def refine_above(model: Model, driving: Driving, fit: Fit, least: float = -np.in
             fit.model.vector(), fit.noise.vector()
         )
         if thinned[-1].log_likelihood(*led) < told - _FAR_BELOW_BY_FEW:
+            return None
+        new = np.array([n not in fit.model.free_names for n in model.free_names])
+        # Few samples lead to no lag, which is the poorer model: from there no search leads back.
+        none = bool(np.any(new & (led[0][box.columns] <= box.lower)))
+        led_on = log_likelihood_of(objective, *led) > log_likelihood_of(objective, *begin)
+        if none and led_on and least > fit.log_likelihood:
             return None
     lowest = max(least - _CLIMBS, fit.log_likelihood - FAR_BELOW)
     found = settle(objective, *begin, box, led=led, least=least - _CLIMBS)
