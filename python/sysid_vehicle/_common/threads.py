@@ -6,9 +6,9 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import TracebackType
-from typing import TypeVar
+from typing import Any, Generic, TypeVar
 
 from .. import _core
 from .arguments import whole
@@ -138,7 +138,8 @@ class Workers(ThreadPoolExecutor):
     Parameters
     ----------
     count : int, optional
-        How many threads; all cores if left out, but one inside a thread of another pool.
+        How many threads; all cores if left out, but one inside a thread of another pool. There
+        `map` has those of that pool help which have nothing to do.
 
     Raises
     ------
@@ -148,12 +149,26 @@ class Workers(ThreadPoolExecutor):
 
     def __init__(self, count: int | None = None) -> None:
         self._stop, self._ends = _core.Stop(), _ends()
+        self._outer = _outer() if count is None else None
         threads = usual_count() if count is None else whole(count, "workers", 1)
         super().__init__(threads, initializer=self._begin)
 
     def _begin(self) -> None:
-        _here.most, _here.ends = 1, self._ends
+        _here.most, _here.ends, _here.pool = 1, self._ends, self._outer or self
         self._stop.follow()
+
+    def map(
+        self,
+        fn: Callable[..., R],
+        *iterables: Iterable[Any],
+        timeout: float | None = None,
+        chunksize: int = 1,
+    ) -> Iterator[R]:
+        """Results in order; inside a thread of another pool they are there when this returns."""
+        if self._outer is None:
+            return super().map(fn, *iterables, timeout=timeout, chunksize=chunksize)
+        items = zip(*iterables, strict=False)
+        return iter(_shared(self._outer, lambda item: fn(*item), list(items)))
 
     def __exit__(
         self,
@@ -181,7 +196,75 @@ def in_parallel(
     function : callable
     items : iterable
     workers : int, optional
-        Threads; all cores if left out, but one inside a thread of another pool.
+        Threads; all cores if left out. Inside a thread of another pool that thread works, and those
+        of the pool that have nothing to do.
     """
+    outer = _outer() if workers is None else None
+    if outer is not None:
+        return _shared(outer, function, list(items))
     with Workers(workers) as pool:
         return list(pool.map(function, items))
+
+
+def _outer() -> Workers | None:
+    """The pool whose thread this is."""
+    found: Workers | None = getattr(_here, "pool", None)
+    return found
+
+
+def _shared(pool: Workers, function: Callable[[T], R], items: list[T]) -> list[R]:
+    """Results of a function, from this thread and from those of its pool that are idle."""
+    work = _Work(function, items)
+    with suppress(RuntimeError):  # a pool that ends takes no more
+        for _ in range(min(len(items), pool._max_workers) - 1):
+            pool.submit(work.go_on)
+    work.go_on()
+    return work.results()
+
+
+class _Work(Generic[T, R]):
+    """Items that several threads take in turn.
+
+    A thread that waits for the others waits for what they have begun only. So none waits in a ring,
+    however deep calls stand in each other.
+    """
+
+    def __init__(self, function: Callable[[T], R], items: list[T]) -> None:
+        self._function, self._items, self._ends = function, items, _ends()
+        self._changed = threading.Condition()
+        self._next = self._busy = 0
+        self._found: dict[int, R] = {}
+        self._errors: dict[int, BaseException] = {}
+
+    def go_on(self) -> None:
+        """Do items until none is left, in the time of the thread that asked."""
+        outer = _ends()
+        _here.ends = self._ends
+        try:
+            while (i := self._taken()) is not None:
+                try:
+                    self._found[i] = self._function(self._items[i])
+                except BaseException as error:
+                    self._errors[i] = error
+                finally:
+                    with self._changed:
+                        self._busy -= 1
+                        self._changed.notify_all()
+        finally:
+            _here.ends = outer
+
+    def _taken(self) -> int | None:
+        with self._changed:
+            if self._errors or self._next == len(self._items):
+                return None
+            self._next, self._busy = self._next + 1, self._busy + 1
+            return self._next - 1
+
+    def results(self) -> list[R]:
+        """In the order of the items, or the first error in that order."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._busy == 0)
+            self._next = len(self._items)
+        if self._errors:
+            raise self._errors[min(self._errors)]
+        return [self._found[i] for i in range(len(self._items))]

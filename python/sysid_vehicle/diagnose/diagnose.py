@@ -120,7 +120,8 @@ def diagnose(
         hidden += _hidden_by_tyres(ranked, finished)
         asked = refits and hidden and time.perf_counter() < ends
         if asked and _leaves_more(finished[:1], left, driving, rules):
-            tried = pool.map(in_time(lambda c: from_typical(fit, c, len(ranked)), ends), hidden)
+            n = len(ranked)
+            tried = pool.map(in_time(lambda c: from_typical(fit, c, n, rules.alpha), ends), hidden)
             finished += [c for c in tried if c.finished and c.p_value < rules.alpha]
     finished.sort(key=lambda c: -_merit(c, driving.samples))
     finished = [_with_refit_rivals(c, finished, 2.0 * rules.apart) for c in finished]

@@ -27,6 +27,7 @@ _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned
 THINNED = 3000  # samples that decide between starts
 _FINER = 6.0  # times as many samples, or so, when a search goes on with more of them
 _FAR_BELOW_BY_FEW = 50.0  # nats on few samples, chosen as `FAR_BELOW`
+_CLIMBS = 4.0  # nats, most by which a lag was seen to climb from where it settled (`FAR_BELOW`)
 _ENOUGH = 0.05  # nats: a round of a refit that gains less is the last one
 # Nats, and standard errors, between maxima that are one: climbs end so far from each other.
 _SAME, _NEAR = 0.5, 0.5
@@ -45,10 +46,21 @@ def refine(
     return polish(model, driving, model.vector(), noise, Starts.none(model.free_names), inputs)
 
 
-def refine_above(model: Model, driving: Driving, fit: Fit) -> Fit | None:
+def refine_above(model: Model, driving: Driving, fit: Fit, least: float = -np.inf) -> Fit | None:
     """As `refine` under the noise of a poorer fit; None where it ends far below that.
 
     Few samples, which lead the search most of the way, tell it before all of them are asked.
+
+    Parameters
+    ----------
+    model : Model
+        With a lag that the poorer one lacks.
+    driving : Driving
+    fit : Fit
+        The poorer one.
+    least : float
+        Log-likelihood below which nobody asks for the maximum: where neither noise of its own nor
+        a climb leads up to that it is not sought, nor where few samples lead to no lag.
     """
     objective, thinned = objectives(model, driving)
     box, begin = free_box(model), (model.vector(), fit.noise.vector())
@@ -56,13 +68,20 @@ def refine_above(model: Model, driving: Driving, fit: Fit) -> Fit | None:
     if thinned:
         led = settle(thinned[-1], *begin, box, thin=thinned[:-1])[:2]
         few = driving.problem(fit.model, most_samples=_counts(objective.samples)[-1])
-        least = objective_of(fit.model, few, driving).log_likelihood(
+        told = objective_of(fit.model, few, driving).log_likelihood(
             fit.model.vector(), fit.noise.vector()
         )
-        if thinned[-1].log_likelihood(*led) < least - _FAR_BELOW_BY_FEW:
+        if thinned[-1].log_likelihood(*led) < told - _FAR_BELOW_BY_FEW:
             return None
-    found = settle(objective, *begin, box, led=led)
-    if log_likelihood_of(objective, *found[:2]) < fit.log_likelihood - FAR_BELOW:
+        new = np.array([n not in fit.model.free_names for n in model.free_names])
+        # Few samples lead to no lag, which is the poorer model: from there no search leads back.
+        none = bool(np.any(new & (led[0][box.columns] <= box.lower)))
+        led_on = log_likelihood_of(objective, *led) > log_likelihood_of(objective, *begin)
+        if none and led_on and least > fit.log_likelihood:
+            return None
+    lowest = max(least - _CLIMBS, fit.log_likelihood - FAR_BELOW)
+    found = settle(objective, *begin, box, led=led, least=least - _CLIMBS)
+    if log_likelihood_of(objective, *found[:2]) < lowest:
         return None
     return top(model, driving, objective, found, Starts.none(model.free_names), thinned)
 

@@ -180,6 +180,14 @@ class Seen(NamedTuple):
     log_likelihood: float
 
 
+class _Scored(NamedTuple):
+    """The score of the noise, and where it was asked for."""
+
+    p: FloatArray
+    noise: FloatArray
+    found: tuple[float, FloatArray, FloatArray]
+
+
 class _Linear(NamedTuple):
     """Normal equations, and where they were asked for."""
 
@@ -209,6 +217,7 @@ class Objective(Penalised):
     )
     _linear: list[_Linear] = field(default_factory=list, init=False, repr=False, compare=False)
     _seen: list[Seen] = field(default_factory=list, init=False, repr=False, compare=False)
+    _score: list[_Scored] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @property
     def likeliest(self) -> Seen | None:
@@ -305,13 +314,20 @@ class Objective(Penalised):
     def noise_score(self, p: FloatArray, noise: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Log-likelihood of the data, its derivatives by the noise's logarithms, their information.
 
-        Where the filter ran a moment ago it does not run again.
+        Where the filter ran a moment ago it does not run again. The last score is kept: what it
+        promises tells whether the noise is worth learning.
         """
         check_time()
+        for last in tuple(self._score):
+            if np.array_equal(last.p, p) and np.array_equal(last.noise, noise):
+                return last.found
         gains = self._known(p, noise)
         if gains is not None and isinstance(self.problem, Filtered):
-            return self.problem.filtered_noise_score(p, gains)
-        return self.problem.noise_score(p, noise)
+            found = self.problem.filtered_noise_score(p, gains)
+        else:
+            found = self.problem.noise_score(p, noise)
+        self._score[:] = [_Scored(p.copy(), noise.copy(), found)]
+        return found
 
     def _known(self, p: FloatArray, noise: FloatArray) -> Any:
         """Gains that were asked for last, or None."""

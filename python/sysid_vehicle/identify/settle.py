@@ -93,6 +93,7 @@ def settle(
     method: str = "gauss-newton",
     parameters_first: bool = False,
     led: tuple[FloatArray, FloatArray] | None = None,
+    least: float = -np.inf,
     rounds: int = 10,
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Alternate between noise and parameters until the likelihood stands still.
@@ -114,6 +115,8 @@ def settle(
         enough: where they may be poor and the noise is not, they move first.
     led : (p, noise), optional
         Where few samples have led already, in place of `thin`.
+    least : float
+        Log-likelihood below which nobody asks for the end: it stops where that is out of reach.
     rounds : int
 
     Returns
@@ -149,6 +152,8 @@ def settle(
         p, gains = moved(objective, p, noise, box, method=method, rounds=8)
         if learned.stands and objective.reached(p, gains) < value + _LITTLE:
             return p, noise, True  # the noise was learned where the parameters still are
+        if least > -np.inf and _hopeless(objective, least, p, gains, noise)[0]:
+            break
     return p, noise, False
 
 

@@ -47,13 +47,16 @@ def write_report(study: Study, path: str | Path, *, truth: Model | None = None) 
 
 def _work_out(study: Study) -> None:
     """Ask the study side by side for what the page tells; it keeps the answers."""
+    # What takes longest first.
     asked: tuple[Callable[[], object], ...] = (
-        lambda: (study.where, study.where_baseline),
-        lambda: study.shares,
-        lambda: study.causes,
-        lambda: study.horizons,
-        lambda: (study.errors_with, study.late),
-        lambda: study.unknown,
         lambda: study.hidden,
+        lambda: study.where,
+        lambda: study.late,
+        lambda: study.causes,
+        lambda: study.unknown,
+        lambda: study.errors_with,
+        lambda: study.shares,
+        lambda: study.where_baseline,
+        lambda: study.horizons,
     )
     in_parallel(lambda ask: ask(), asked)

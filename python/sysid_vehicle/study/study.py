@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
 from itertools import pairwise
@@ -46,7 +46,7 @@ from .judge.structure import Structure
 from .results.added import AddedEffect
 from .results.failing import errors_with, late, where_lines
 from .results.hidden import hidden
-from .results.in_time import in_time
+from .results.in_time import in_time, take_over, told
 from .results.next_steps import next_steps
 from .results.predicting import Predicting, predicting
 from .results.record import record
@@ -102,6 +102,8 @@ class Study:
         the noise of the sensors.
     answers : Answers, optional
         About its validation data, for those who ask again.
+    worked_out : mapping of str to object
+        Of a study that was read what takes long to tell and had been told before, by attribute.
     """
 
     verdict: Verdict
@@ -127,6 +129,11 @@ class Study:
     matters: Mapping[str, float] | None = None
     buried: bool = False
     answers: Answers | None = None
+    worked_out: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        take_over(self, self.worked_out)
+        object.__setattr__(self, "worked_out", {})  # of this study alone: `replace` makes another
 
     @property
     def fit(self) -> Fit:
@@ -139,14 +146,14 @@ class Study:
         return self.fit.model
 
     def save(self, path: str | Path) -> None:
-        """Write the study with all its fits and logs; :func:`sysid_vehicle.load` reads it.
+        """Write the study, its fits, its logs, what it told; :func:`sysid_vehicle.load` reads it.
 
         Raises
         ------
         InvalidInput
             If the file cannot be written.
         """
-        save(self, path)
+        save(replace(self, worked_out=told(self, whole=True)), path)
 
     @property
     def meaning(self) -> str:
@@ -281,8 +288,6 @@ class Study:
     def in_time(self, seconds: float, *, reported: bool = True) -> Study:
         """The same study with what takes long to tell worked out, as far as that is done in time.
 
-        Then printing, drawing and writing it take little.
-
         Parameters
         ----------
         seconds : float
@@ -305,11 +310,7 @@ class Study:
 
     def with_warnings(self, warnings: Sequence[str]) -> Study:
         """The same study with these warnings; what it has worked out so far it keeps."""
-        other = replace(self, warnings=tuple(warnings))
-        for slow in (n for n, of in vars(Study).items() if isinstance(of, cached_property)):
-            if slow in self.__dict__:
-                other.__dict__[slow] = self.__dict__[slow]
-        return other
+        return take_over(replace(self, warnings=tuple(warnings)), told(self))
 
     @cached_property
     def horizons(self) -> Horizons:

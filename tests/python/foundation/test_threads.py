@@ -1,6 +1,7 @@
 """Several threads work with the same objects and get what one alone gets, to the last bit."""
 
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -10,7 +11,15 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from sysid_vehicle import Fit, Log, Model, Vehicle, compare, diagnose, drive, identify
 from sysid_vehicle import manoeuvres as drives
-from sysid_vehicle._common.threads import Workers, at_most, cores, in_parallel, small_matrices
+from sysid_vehicle._common.threads import (
+    Workers,
+    at_most,
+    before,
+    check_time,
+    cores,
+    in_parallel,
+    small_matrices,
+)
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.online import SideslipObserver, estimate_sideslip
 
@@ -106,6 +115,55 @@ def test_parallel_results_stand_in_order_and_the_first_error_is_raised() -> None
     assert in_parallel(lambda x: x * x, range(50), workers=4) == [x * x for x in range(50)]
     with pytest.raises(ZeroDivisionError):
         in_parallel(lambda x: 1 / x, [1, 0, 2], workers=2)
+
+
+def test_an_idle_thread_of_a_pool_helps_one_that_asks_for_several() -> None:
+    both = threading.Barrier(2, timeout=10.0)  # breaks where one thread does all
+
+    def met(_: int) -> int:
+        both.wait()
+        return threading.get_ident()
+
+    def inside(mapped: bool) -> set[int]:
+        if not mapped:
+            return set(in_parallel(met, range(2)))
+        with Workers() as pool:
+            return set(pool.map(met, range(2)))
+
+    for mapped in (False, True):
+        (found,) = in_parallel(inside, [mapped], workers=2)
+        assert len(found) == 2
+
+
+def test_calls_stand_in_each_other_however_deep() -> None:
+    def sums(depth: int) -> int:
+        return 1 if depth == 0 else sum(in_parallel(sums, [depth - 1] * 3))
+
+    for workers in (1, 2, 5):
+        assert in_parallel(sums, [5, 4], workers=workers) == [3**5, 3**4]
+
+
+def test_a_helper_raises_the_first_error_and_keeps_to_the_time_of_who_asked() -> None:
+    def failing(_: object) -> list[float]:
+        return in_parallel(lambda x: 1 / x, [1, 0, 2, 0])
+
+    with pytest.raises(ZeroDivisionError):
+        in_parallel(failing, [None], workers=2)
+
+    def endless(_: int) -> None:
+        while True:
+            check_time()
+
+    def asked(_: object) -> str:
+        return before(time.perf_counter() + 0.05, lambda: str(in_parallel(endless, range(2))), "")
+
+    def unhurried(_: object) -> bool:
+        check_time()
+        return True
+
+    with Workers(2) as pool:
+        assert list(pool.map(asked, range(2))) == ["", ""]
+        assert all(pool.map(unhurried, range(4)))  # no thread is left with the time of another
 
 
 def test_any_number_of_threads_gives_the_same(start: Model, short: Log, fit: Fit) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -43,6 +45,8 @@ from sysid_vehicle.sensors.low_pass import _Problem
 from sysid_vehicle.sensors.spectrum import _bias, _of_windows, spectrum_of
 from sysid_vehicle.study import validation
 from sysid_vehicle.study.judge.answers import answers_of
+from sysid_vehicle.study.results import failing
+from sysid_vehicle.study.results.failing import late
 from sysid_vehicle.study.search import steps
 from sysid_vehicle.study.search.steps import alternatives, exchanged, without_insignificant
 from sysid_vehicle.study.search.together import _none_at_nothing
@@ -144,6 +148,69 @@ def test_a_lag_far_below_is_not_followed_and_any_other_to_the_same_end(
         assert refine_above(other, found.driving, found) is None
     whole = refine(other, found.driving, found.noise)
     assert whole.log_likelihood < found.log_likelihood + 10.0
+
+
+def test_a_lag_that_cannot_gain_enough_is_left_before_it_is_climbed(
+    start: Model, truth: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    car = truth.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.08})
+    fit = identify(start, drive(car, manoeuvres.lap(20.0), seed=5), starts=1)
+    model = fit.model.add("steer_lag").with_values({"steer_lag.time_constant_s": 0.05})
+    there = refine_above(model, fit.driving, fit)
+    assert there is not None
+    enough = refine_above(model, fit.driving, fit, there.log_likelihood - 1.0)
+    assert enough is not None
+    assert enough.log_likelihood == there.log_likelihood
+    climbed: list[object] = []
+    monkeypatch.setattr(maximum, "top", lambda *args: climbed.append(args))
+    assert refine_above(model, fit.driving, fit, there.log_likelihood + 20.0) is None
+    assert not climbed
+
+
+def test_where_few_samples_lead_to_no_lag_more_are_not_asked(
+    start: Model, truth: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = identify(start, drive(truth, manoeuvres.lap(32.0), seed=5), starts=1)
+    model = fit.model.add("force_lag").with_values({"force_lag.time_constant_s": 0.15})
+    asked: list[int] = []
+    settle = maximum.settle
+
+    def counted(objective: Any, *args: Any, **kwargs: Any) -> Any:
+        asked.append(objective.samples)
+        return settle(objective, *args, **kwargs)
+
+    monkeypatch.setattr(maximum, "settle", counted)
+    assert refine_above(model, fit.driving, fit, fit.log_likelihood + 8.0) is None
+    assert max(asked) < fit.driving.samples
+    # Who asks for the maximum, wherever it is, has it.
+    found = refine_above(model, fit.driving, fit)
+    assert found is not None
+    assert max(asked) == fit.driving.samples
+    assert found.log_likelihood < fit.log_likelihood + 4.0
+
+
+def test_a_model_without_lags_that_a_study_came_through_is_not_fitted_again(
+    fit: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lagging = replace(fit, model=fit.model.add("steer_lag"))
+    added = [SimpleNamespace(id="steer_lag")]
+    study: Any = SimpleNamespace(model=lagging.model, fit=lagging, fits=(fit, lagging), added=added)
+    told = late(study)
+    monkeypatch.setattr(failing, "refine", None)
+    assert late(study).keys() == told.keys() == set()  # this car answers in time
+    with pytest.raises(TypeError):
+        late(SimpleNamespace(**{**vars(study), "fits": (lagging,)}))  # type: ignore[arg-type]
+
+
+def test_the_score_of_the_noise_is_worked_out_once(fit: Fit) -> None:
+    problem = fit.driving.problem(fit.model)
+    objective = maximum.objective_of(fit.model, problem, fit.driving)
+    p, noise = fit.model.vector(), fit.noise.vector()
+    first = objective.noise_score(p, noise)
+    assert objective.noise_score(p.copy(), noise.copy()) is first
+    other = objective.noise_score(p, 1.1 * noise)
+    assert other[0] != first[0]
+    np.testing.assert_allclose(objective.noise_score(p, noise)[1], first[1], rtol=1e-9)
 
 
 def test_effects_that_are_fitted_together_are_left_where_one_comes_to_nothing(

@@ -75,23 +75,29 @@ def is_hidden_by_noise(effect: Effect) -> bool:
     return effect.scored_at_typical and len(effect.parameters) == 1
 
 
-def from_typical(fit: Fit, c: Candidate, tests: int) -> Candidate:
+def from_typical(fit: Fit, c: Candidate, tests: int, alpha: float = 1.0) -> Candidate:
     """The candidate fitted with noise of its own from its typical size, and tested by likelihood.
 
     Its p-value is that of the likelihood ratio, on one side where the parameter has one sign, over
-    the variance ratio of its score, corrected for so many tests (Bonferroni).
+    the variance ratio of its score, corrected for so many tests (Bonferroni). Where that comes out
+    above `alpha` the candidate may be left as it is: a lag that ends at nothing is not climbed.
     """
     ((name, p),) = c.effect.named.items()
     model = fit.model.add(c.effect).with_values({name: p.typical})
+    sides, ratio = 0.5 if p.one_sided else 1.0, max(c.variance_ratio, 1.0)
+    least = -np.inf
+    if is_hidden_by_noise(c.effect) and alpha < sides * tests:
+        least = fit.log_likelihood + 0.5 * ratio * float(
+            scipy.special.chdtri(1, alpha / sides / tests)
+        )
     try:
-        likelier = refine_above(model, fit.driving, fit)
+        likelier = refine_above(model, fit.driving, fit, least)
     except (NumericalError, np.linalg.LinAlgError):
         return c
     if likelier is None:
         return c
     found = _with_fit(fit, c, likelier)
-    ratio = max(found.statistic, 0.0) / max(c.variance_ratio, 1.0)
-    alone = (0.5 if p.one_sided else 1.0) * float(scipy.special.chdtrc(1, ratio))
+    alone = sides * float(scipy.special.chdtrc(1, max(found.statistic, 0.0) / ratio))
     return replace(found, finished=True, p_value=min(tests * alone, 1.0))
 
 

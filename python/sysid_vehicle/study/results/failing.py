@@ -31,7 +31,10 @@ def late(study: Study) -> dict[str, Delay]:
     model = study.model
     for name in lags:
         model = model.drop(name)
-    prompt = refine(model, study.fit.driving, study.fit.noise)
+    driving = study.fit.driving
+    known = (f for f in study.fits if f.driving is driving and f.model.effects == model.effects)
+    # What the study began with, or came through, was searched from more places.
+    prompt = next(known, None) or refine(model, driving, study.fit.noise)
     found = coherence(Evidence(prompt, prompt.driving))
     return {c.input: c.delay for c in found if c.delay is not None and c.delay.significant}
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,6 +67,31 @@ _REPORTED = {
 """What reports and files tell besides."""
 
 
+def told(study: Study, *, whole: bool = False) -> dict[str, Any]:
+    """What of a study takes long to tell and has been told, by attribute.
+
+    Parameters
+    ----------
+    study : Study
+    whole : bool
+        Without what stands for parts that were left out.
+    """
+    found = {name: study.__dict__[name] for name in _slow(study) if name in study.__dict__}
+    left_out = {*study.left_out, "left_out"} if whole else set()
+    return {name: of for name, of in found.items() if name not in left_out}
+
+
+def take_over(study: Study, found: Mapping[str, Any]) -> Study:
+    """The same study, which need not work out what another one has `told`."""
+    known = _slow(study)
+    study.__dict__.update({name: of for name, of in found.items() if name in known})
+    return study
+
+
+def _slow(study: Study) -> tuple[str, ...]:
+    return tuple(n for n, of in vars(type(study)).items() if isinstance(of, cached_property))
+
+
 def in_time(study: Study, ends: float, *, reported: bool = True) -> Study:
     """Work out side by side what takes long, and leave out what is not done in time.
 
@@ -83,16 +109,16 @@ def in_time(study: Study, ends: float, *, reported: bool = True) -> Study:
         The same study, whose `left_out` says what is missing.
     """
     parts = _PARTS | _REPORTED if reported else _PARTS
-    told = study.with_warnings(study.warnings)
+    own = study.with_warnings(study.warnings)
     for name in study.left_out:
-        del told.__dict__[name]  # it may be told now
+        del own.__dict__[name]  # it may be told now
 
     def asked(name: str) -> bool:
-        return before(ends, lambda: (getattr(told, name),), None) is not None
+        return before(ends, lambda: (getattr(own, name),), None) is not None
 
     done = in_parallel(asked, parts)
     late = {name: parts[name] for name, there in zip(parts, done, strict=True) if not there}
     for name, part in late.items():
-        told.__dict__[name] = part.otherwise(told)
-    told.__dict__["left_out"] = {name: part.words for name, part in late.items()}
-    return told
+        own.__dict__[name] = part.otherwise(own)
+    own.__dict__["left_out"] = {name: part.words for name, part in late.items()}
+    return own
