@@ -42,7 +42,7 @@ Nothing here sees a fit or a log: others measure, this decides.
 """
 
 from .accept import ErrorChange, Gain, Measures, accept, bic, worse
-from .facts import Added, Decision, Facts, Tested, Verdict, Withdrawn
+from .facts import LACKING, Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
 from .share import (
     NONE_GONE,
@@ -66,6 +66,7 @@ from .verdict import (
 )
 
 __all__ = [
+    "LACKING",
     "NONE_GONE",
     "UNKNOWN",
     "USUAL",

@@ -24,7 +24,7 @@ class AddedEffect:
     Attributes
     ----------
     parameters : tuple of Estimate
-        In the final model.
+        In the final model; of `Study.estimates`.
     error_before, error_after : float
         On the validation data, in units of the noise floor.
     p_value : float
@@ -136,6 +136,7 @@ def added_by(
     facts: Facts,
     shared: Collection[str] = (),
     rules: Rules = USUAL,
+    estimates: Sequence[Estimate] | None = None,
 ) -> tuple[AddedEffect, ...]:
     """The effects of a study in the order in which they were added.
 
@@ -155,6 +156,8 @@ def added_by(
     shared : collection of str
         Effects of which nobody knows what each takes of the error: none is sure.
     rules : Rules
+    estimates : sequence of Estimate, optional
+        Of the parameters of the final model; by default those of its fit.
     """
     added = []
     known = {
@@ -164,6 +167,7 @@ def added_by(
         for a in facts.added
     }
     final, ends = fits[-1], (on_test[0].error, on_test[-1].error)
+    estimates = final.estimates if estimates is None else estimates
     for (before, after), (poorer, richer) in zip(pairwise(on_test), pairwise(fits), strict=True):
         errors = ends[0], before.error, after.error, ends[1]
         for name in (e for e in richer.model.effects if e not in poorer.model.effects):
@@ -175,7 +179,7 @@ def added_by(
             added.append(
                 AddedEffect(
                     name,
-                    tuple(e for e in final.estimates if e.name.startswith(f"{name}.")),
+                    tuple(e for e in estimates if e.name.startswith(f"{name}.")),
                     before.error,
                     after.error,
                     trail.p_values.get(name, np.nan),

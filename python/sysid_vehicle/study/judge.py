@@ -7,15 +7,16 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from .._common.arrays import FloatArray
 from .._common.text import few
 from .._common.threads import before, in_parallel
 from ..compare import Comparison, compare
-from ..diagnose import Instead, Omnibus, Verdicts, instead, judge, omnibus
+from ..diagnose import Instead, Omnibus, Verdicts, instead, judge, omnibus, widened
 from ..errors import warn
 from ..estimate import Driving
 from ..identify import Fit, driving_of
 from ..log import unexcited
-from ..rules import Facts, Rules, incomplete, standing, verdict
+from ..rules import LACKING, Facts, Rules, Verdict, incomplete, standing, verdict
 from .added import added_by, of_one_step
 from .answers import answers_of
 from .beyond import Beyond
@@ -41,6 +42,7 @@ from .study import Study
 from .together import in_place_of
 from .validation import at_its_best, beyond_noise_ahead, serving
 from .verdict import facts_of, in_the_light_of
+from .widened import estimates_of
 
 # What a time limit may leave unknown, in words.
 _RIVALS = "whether something unknown would do in the place of what was added"
@@ -148,6 +150,7 @@ class Judge:
         on_train |= self._compared([f for f in fits if f not in on_train])
         on_test = self._compared(fits, self.test)
         told, late = in_the_light_of(decision, alone), tuple(asks.left_out)
+        wide = self._widened(decision.verdict)
         return Study(
             verdict=decision.verdict,
             fits=tuple(fits),
@@ -165,6 +168,7 @@ class Judge:
                 facts,
                 shared,
                 rules,
+                estimates_of(fit, wide),
             ),
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
@@ -182,7 +186,17 @@ class Judge:
             matters=self.sizes,
             buried=facts.buried,
             answers=answers_of(fits, self.test),
+            widened=wide,
         )
+
+    def _widened(self, verdict: Verdict) -> FloatArray | None:
+        """Covariance of the parameters by what is missing; None where nothing is, or out of time.
+
+        It says how sure they are, and neither the verdict nor a name depends on it.
+        """
+        if verdict not in LACKING:
+            return None
+        return before(self.asks.ends, lambda: widened(self.fit, self.fit.driving), None)
 
     def _compared(
         self, fits: Sequence[Fit], driving: Driving | None = None
