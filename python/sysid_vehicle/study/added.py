@@ -38,6 +38,10 @@ class AddedEffect:
     takes_little : bool
         Of the error on validation data, and of what all that was added takes off it
         (`rules.little`).
+    useful : bool
+        Whether some error on validation data, one step or 1 to 5 s ahead, is shown to fall with it
+        in its turn, or that of one step falls by a part worth a name (`Rules.taken`). True where
+        nobody asked in time.
     own, own_in_training : Share
         Of the error 1 to 5 s ahead that the final model leaves without it, all else fitted anew,
         what it takes away: on validation and on training data. Unknown where nothing is missing,
@@ -56,6 +60,7 @@ class AddedEffect:
     stands_in: str = ""
     grade: Grade = "plausible"
     takes_little: bool = False
+    useful: bool = True
     own: Share = UNKNOWN
     own_in_training: Share = UNKNOWN
     together: Share = UNKNOWN
@@ -80,8 +85,13 @@ class AddedEffect:
                 "only stands in for something else" if sure else "may stand in for something else"
             )
             said.append(f"it {what}: {self.stands_in}")
-        elif self.takes_little:
+        elif self.takes_little and self.useful:
             said.append("the error hardly falls with it: something else may explain so little")
+        if not self.useful:
+            said.append(
+                "significant, and of no use for prediction: no error on validation data is shown "
+                "to fall with it"
+            )
         return "; ".join(said)
 
     def __str__(self) -> str:
@@ -114,6 +124,7 @@ class AddedEffect:
             "stands_in": self.stands_in,
             "grade": self.grade,
             "takes_little": self.takes_little,
+            "useful": self.useful,
             "own_share": self.own.to_dict(),
             "own_share_in_training": self.own_in_training.to_dict(),
             "share_together": self.together.to_dict(),
@@ -137,6 +148,7 @@ def added_by(
     shared: Collection[str] = (),
     rules: Rules = USUAL,
     estimates: Sequence[Estimate] | None = None,
+    idle: Collection[str] = (),
 ) -> tuple[AddedEffect, ...]:
     """The effects of a study in the order in which they were added.
 
@@ -158,6 +170,8 @@ def added_by(
     rules : Rules
     estimates : sequence of Estimate, optional
         Of the parameters of the final model; by default those of its fit.
+    idle : collection of str
+        Effects with which no error on validation data is shown to fall.
     """
     added = []
     known = {
@@ -192,6 +206,7 @@ def added_by(
                         takes_little=small or name in shared,
                     ),
                     small,
+                    name not in idle or before.error - after.error > rules.taken * before.error,
                     *own,
                 )
             )

@@ -40,6 +40,7 @@ from .steps import insignificant, way
 from .structure import structure
 from .study import Study
 from .together import in_place_of
+from .useful import useless
 from .validation import at_its_best, beyond_noise_ahead, serving
 from .verdict import facts_of, in_the_light_of
 from .widened import estimates_of
@@ -151,6 +152,7 @@ class Judge:
         on_test = self._compared(fits, self.test)
         told, late = in_the_light_of(decision, alone), tuple(asks.left_out)
         wide = self._widened(decision.verdict)
+        idle = before(asks.ends, lambda: useless(fits, self.test, rules), frozenset[str]())
         return Study(
             verdict=decision.verdict,
             fits=tuple(fits),
@@ -169,6 +171,7 @@ class Judge:
                 shared,
                 rules,
                 estimates_of(fit, wide),
+                idle,
             ),
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
