@@ -25,7 +25,8 @@
    on validation data; where less than `most` of that error is gone, the whole interval of the mean
    of both is above `taken`. Of effects that act alike, and have no such share beside each other, or
    are not shown to be off nothing (`insignificant`), the share of all of them counts, and they are
-   named as a group. Nothing that has no share of either kind takes more, and moves a channel that
+   named as a group, but for one without which errors are shown to be smaller, all else fitted
+   anew. Nothing that has no share of either kind takes more, and moves a channel that
    it moves. All that was added together is shown to take a share, of that error or of what could
    be explained of it. Nothing else speaks against it: a value, not only an end of its interval,
    that no car has or that does not matter; errors ahead of its motion that grow with all that was
