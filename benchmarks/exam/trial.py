@@ -112,10 +112,10 @@ def _against(study: sv.Study, trial: Trial) -> Outcome:
     told["true_error"] = sv.compare(truth, study.validation, noise=study.fit.noise).error
     if trial.kind == "pair":
         told["shown"] = _shown(study, trial)
+    estimates = {e.name: e for e in study.estimates}
     for name, true in truths.true_values(trial).items():
-        if name.split(".")[0] in study.model.effects:
-            estimate = study.fit[name]
-            told["intervals"][name] = [estimate.value, estimate.std, true]
+        if name in estimates:
+            told["intervals"][name] = [estimates[name].value, estimates[name].std, true]
     return told
 
 

@@ -88,7 +88,7 @@ def revelation(study: Study, truth: Model) -> str:
     found = hidden.id in study.model.effects
     if found:
         true = {n: truth.value(n) for n in truth.names} | study.fit.values_of(truth)
-        shown = [e for e in study.fit.estimates if e.name.startswith(f"{hidden.id}.")]
+        shown = [e for e in study.estimates if e.name.startswith(f"{hidden.id}.")]
         rows = [
             [
                 e.name,

@@ -7,6 +7,7 @@ from .candidates.diagnosis import Diagnosis
 from .candidates.instead import Instead, instead
 from .candidates.possible import Size, considered, possible
 from .candidates.verdicts import EffectVerdict, Verdicts, judge, verdicts
+from .candidates.widened import widened
 from .change.change import Change, EffectChange, LoadChange
 from .change.changed import changed
 from .diagnose import diagnose
@@ -75,4 +76,5 @@ __all__ = [
     "unknown",
     "verdicts",
     "where",
+    "widened",
 ]

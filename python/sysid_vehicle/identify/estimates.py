@@ -74,12 +74,16 @@ def box_covariance(information: FloatArray, box: Box, x: FloatArray) -> FloatArr
     combinations that are known none either. It is that of a uniform over the box, about the
     estimate `x`: an estimate at a bound is further from the rest of the box than one amid it.
     """
-    spread = np.hypot(_SPREAD_OF_BOX * box.width, x - 0.5 * (box.lower + box.upper))
-    per_std = 1.0 / spread
+    per_std = 1.0 / spread_of(box, x)
     total = information + np.diag(per_std**2)
     scale = np.sqrt(np.diag(total))
     inverse = np.linalg.inv(total / np.outer(scale, scale))
     return as_float64(0.5 * (inverse + inverse.T) / np.outer(scale, scale))
+
+
+def spread_of(box: Box, x: FloatArray) -> FloatArray:
+    """Root mean square distance of a uniform over the box from the estimate `x`."""
+    return as_float64(np.hypot(_SPREAD_OF_BOX * box.width, x - 0.5 * (box.lower + box.upper)))
 
 
 def std_of_data(information: FloatArray) -> FloatArray:

@@ -167,7 +167,7 @@ def _parameters(study: Study, samples: Samples | None, truth: Model | None) -> l
     if truth is not None:
         real |= {name: quantity(value) for name, value in fit.values_of(truth).items()}
     rows = []
-    for e in (*fit.estimates, *fit.derived):
+    for e in study.estimates:
         row = [e.name, quantity(e.value), interval(e), unit_after(e.unit).strip(), e.note or "-"]
         rows.append(row if truth is None else [*row, real.get(e.name, "-")])
     head = ["parameter", "value", "95 % interval", "unit", "note"]

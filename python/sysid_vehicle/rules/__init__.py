@@ -25,7 +25,8 @@
    on validation data; where less than `most` of that error is gone, the whole interval of the mean
    of both is above `taken`. Of effects that act alike, and have no such share beside each other, or
    are not shown to be off nothing (`insignificant`), the share of all of them counts, and they are
-   named as a group. Nothing that has no share of either kind takes more, and moves a channel that
+   named as a group, but for one without which errors are shown to be smaller, all else fitted
+   anew. Nothing that has no share of either kind takes more, and moves a channel that
    it moves. All that was added together is shown to take a share, of that error or of what could
    be explained of it. Nothing else speaks against it: a value, not only an end of its interval,
    that no car has or that does not matter; errors ahead of its motion that grow with all that was
@@ -42,7 +43,7 @@ Nothing here sees a fit or a log: others measure, this decides.
 """
 
 from .accept import ErrorChange, Gain, Measures, accept, bic, worse
-from .facts import Added, Decision, Facts, Tested, Verdict, Withdrawn
+from .facts import LACKING, Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
 from .share import (
     NONE_GONE,
@@ -66,6 +67,7 @@ from .verdict import (
 )
 
 __all__ = [
+    "LACKING",
     "NONE_GONE",
     "UNKNOWN",
     "USUAL",

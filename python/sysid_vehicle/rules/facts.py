@@ -9,6 +9,8 @@ from typing import Literal, Protocol
 from .share import UNKNOWN, Share
 
 Verdict = Literal["adequate", "explained", "partly_explained", "unknown", "not_testable"]
+LACKING: tuple[Verdict, ...] = ("unknown", "partly_explained")
+"""Verdicts by which something is missing in the final model."""
 
 
 class Tested(Protocol):

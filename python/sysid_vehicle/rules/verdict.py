@@ -227,7 +227,8 @@ def _standing(
     that: the share must be shown to be one worth a name, of all data. So may it be what a stand-in
     takes that moves the same channel, if that is the larger part. What is not shown to be off
     nothing, while another of the model acts like it, has no name of its own: either may be there
-    for the other. Nor has what something else speaks against.
+    for the other. Nor has what something else speaks against. What errors are shown to be smaller
+    without has no part in what a group takes.
     """
 
     def worth(a: Added, *shares: Share) -> bool:
@@ -243,6 +244,7 @@ def _standing(
         a.id
         for a in named
         if a.beside
+        and not any(s.known and s.high < 0.0 for s in (a.own, a.own_in_training))
         and alone.isdisjoint({a.id, *a.beside})
         and worth(a, a.shared, a.shared_in_training)
     }

@@ -6,15 +6,15 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from html import escape
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from .._common.arguments import duration
+from .._common.arrays import FloatArray
 from .._common.files import write_json
 from .._common.tables import frame
-from .._common.text import brief, html_list, html_paragraph, html_table, text_table
+from .._common.text import brief
 from ..compare import Comparison
 from ..diagnose import (
     BiasReport,
@@ -31,9 +31,9 @@ from ..diagnose import (
     where,
 )
 from ..estimate import Driving
-from ..identify import Fit
+from ..identify import Estimate, Fit
 from ..model import Model
-from ..rules import USUAL, Rules, Verdict
+from ..rules import LACKING, USUAL, Rules, Verdict
 from ..saved import save
 from .ahead.beyond import Beyond
 from .ahead.horizons import Horizons, horizons
@@ -49,8 +49,10 @@ from .results.hidden import hidden
 from .results.in_time import in_time, take_over, told
 from .results.next_steps import next_steps
 from .results.predicting import Predicting, predicting
+from .results.printed import as_html, as_text
 from .results.record import record
-from .results.sentences import ahead, in_the_end, left_out, meaning, nuisances, small
+from .results.sentences import in_the_end, meaning, small
+from .results.widened import estimates_of
 from .validation import at_its_best
 
 
@@ -102,6 +104,9 @@ class Study:
         the noise of the sensors.
     answers : Answers, optional
         About its validation data, for those who ask again.
+    widened : array, shape (parameters, parameters), optional
+        Covariance of the final fit's parameters by what is missing too; None where nothing is, or
+        time had run out.
     worked_out : mapping of str to object
         Of a study that was read what takes long to tell and had been told before, by attribute.
     """
@@ -129,6 +134,7 @@ class Study:
     matters: Mapping[str, float] | None = None
     buried: bool = False
     answers: Answers | None = None
+    widened: FloatArray | None = None
     worked_out: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -144,6 +150,15 @@ class Study:
     def model(self) -> Model:
         """The improved model."""
         return self.fit.model
+
+    @cached_property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Parameters of the final model and what follows from them.
+
+        Where something is missing their intervals are wider than those of `fit`, which knows of
+        noise alone: by what the unknown may do to them (`diagnose.widened`).
+        """
+        return estimates_of(self.fit, self.widened)
 
     def save(self, path: str | Path) -> None:
         """Write the study, its fits, its logs, what it told; :func:`sysid_vehicle.load` reads it.
@@ -224,7 +239,7 @@ class Study:
 
         None where the verdict does not ask for it.
         """
-        if self.verdict not in ("unknown", "partly_explained"):
+        if self.verdict not in LACKING:
             return None
         return unknown(self.fit, self.validation)
 
@@ -265,7 +280,7 @@ class Study:
     @cached_property
     def disagreements(self) -> tuple[Disagreement, ...]:
         """What validation data tell differently, if something is left; some seconds."""
-        if self.verdict not in ("unknown", "partly_explained"):
+        if self.verdict not in LACKING:
             return ()
         return disagreements(self.fit, self.validation, self.rules)
 
@@ -333,25 +348,10 @@ class Study:
             horizons_s,
         )
 
-    _HEAD = ("step", "train error", "validation error")
-
-    def _rows(self) -> list[list[str]]:
-        return [
-            [label, f"{a.error:.3f}", f"{b.error:.3f}"]
-            for label, a, b in zip(self.steps, self.train, self.test, strict=True)
-        ] + [["noise floor", "1.000", "1.000"]]
-
     __repr__ = brief
 
     def __str__(self) -> str:
-        lines = [f"Verdict: {self.verdict} - {self.meaning}."]
-        lines += [f"  {a}" for a in self.added]
-        lines += [f"  {text}" for text in (*nuisances(self), *self.sensors)]
-        lines.append(text_table(self._HEAD, self._rows()))
-        lines += [text for text in (ahead(self), self.in_the_end) if text]
-        lines += [f"Next: {text}." for text in self.next_steps]
-        lines += [f"Warning: {w}" for w in dict.fromkeys((*self.warnings, *left_out(self)))]
-        return "\n".join(lines)
+        return as_text(self)
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -371,13 +371,7 @@ class Study:
         return next_steps(self)
 
     def _repr_html_(self) -> str:
-        return (
-            f"<p><b>{escape(self.verdict)}</b>: {escape(self.meaning)}.</p>"
-            + html_list([*self.added, *nuisances(self), *self.sensors])
-            + html_table(self._HEAD, self._rows())
-            + html_paragraph(f"{ahead(self)} {self.in_the_end}".lstrip())
-            + html_list([f"Next: {text}." for text in self.next_steps])
-        )
+        return as_html(self)
 
     def to_pandas(self) -> Any:
         """A DataFrame of the one-step-ahead errors of every step, in units of the noise floor."""

@@ -43,6 +43,7 @@ NUMERICAL = {
     "diagnose/candidates/instead.py": {"_MEMORIES_S", "_SHAPES_REMEMBERED"},
     "diagnose/candidates/possible.py": {"_AT_BOUND"},
     "diagnose/candidates/posterior.py": {"_KEPT", "_LEAST"},
+    "diagnose/candidates/widened.py": {"_FELT", "_ROUNDS", "_SETTLED"},
     "diagnose/unexplained/omnibus.py": {"LEAST_LEFT", "_FEW_SHAPES", "_FORCE_SHAPES"},
     "diagnose/evidence/projection.py": {"COPIED", "_SINGULAR", "_LAGS", "_ROWS", "_TERMS"},
     "diagnose/experiment/replay.py": {

@@ -67,6 +67,22 @@ def test_what_no_effect_explains_is_to_be_looked_at(unknown: Study) -> None:
     assert "<li>Next: " in unknown._repr_html_()
 
 
+def test_intervals_count_what_is_missing(adequate: Study, unknown: Study) -> None:
+    both = zip(unknown.estimates, (*unknown.fit.estimates, *unknown.fit.derived), strict=True)
+    ratios = [wide.std / e.std for wide, e in both if not e.note]
+    assert min(ratios) >= 1.0
+    assert max(ratios) > 1.2
+    shown = unknown.to_dict()["parameters"]
+    assert {n: e["std"] for n, e in shown.items()} == {e.name: e.std for e in unknown.estimates}
+    told = "Intervals of parameters"
+    assert str(unknown).count(told) == 1
+    late = replace(unknown, widened=None)
+    assert "too short" in late.in_the_end
+    assert late.estimates == (*unknown.fit.estimates, *unknown.fit.derived)
+    assert adequate.widened is None
+    assert told not in str(adequate)
+
+
 def test_what_predicts_better_some_seconds_ahead_is_to_be_used(unknown: Study) -> None:
     found = replace(unknown)
     assert unknown.predicting is not None

@@ -69,7 +69,7 @@ def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = U
     names = [n for n in fit.model.free_names if n.split(".")[0] in effects]
     # What the effects do is no nuisance here: their parameters compete.
     bare = replace(fit, model=fit.model.with_fixed(names))
-    rivals = _Rivals(Evidence(bare, driving), tuple(names))
+    rivals = Rivals(Evidence(bare, driving), tuple(names))
     found = _Competition(Directions(rivals.evidence, rivals), rivals, bare)
     every = list(range(len(names)))
     price = rules.price * float(np.log(driving.samples))
@@ -93,7 +93,7 @@ def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = U
     return Instead(tests[0], away)
 
 
-class _Rivals:
+class Rivals:
     """Sensitivities to the parameters of effects, and to unknown forces and readings.
 
     Attributes
@@ -102,6 +102,12 @@ class _Rivals:
         Columns of each unknown; one by one and all of one kind together.
     targets : dict of str to str
         By kind, what it acts on most.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    names : tuple of str
+        Parameters, whose columns come first.
     """
 
     groups = ()
@@ -130,6 +136,14 @@ class _Rivals:
         self.hypotheses[what] = several
         self.hypotheses |= {f"{what}{_ONE_OF}{i}": [c] for i, c in enumerate(several)}
         self.width += len(several)
+
+    @property
+    def kinds(self) -> npt.NDArray[np.intp]:
+        """Number of the kind of each unknown's column."""
+        found = np.zeros(self.width, dtype=np.intp)
+        for number, kind in enumerate(self.targets):
+            found[self.hypotheses[kind]] = number
+        return found
 
     def asks(self, _: object) -> None:
         """Nothing: what is asked for is told later."""
@@ -197,7 +211,7 @@ def _remembered(shapes: FloatArray, first: npt.NDArray[np.intp], rate_hz: FloatA
 class _Competition:
     """Scores of effects and unknowns together, as if the effects were not in the model."""
 
-    def __init__(self, projected: Directions, rivals: _Rivals, fit: Fit) -> None:
+    def __init__(self, projected: Directions, rivals: Rivals, fit: Fit) -> None:
         self._projected, self._rivals = projected, rivals
         known = fit.model.parameters
         # The time or place of what has no size yet means nothing.

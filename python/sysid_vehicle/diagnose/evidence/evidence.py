@@ -99,6 +99,12 @@ class Evidence:
         """Orthonormal directions of all that the free parameters can do, and offsets of logs."""
         return orthonormal_basis(np.hstack([self.fitted, self._own]))
 
+    @cached_property
+    def apart(self) -> FloatArray:
+        """Sensitivities to the free parameters, without what offsets of single logs can do."""
+        own = orthonormal_basis(self._own)
+        return as_float64(self.fitted - own @ (own.T @ self.fitted))
+
     @property
     def _own(self) -> FloatArray:
         """Sensitivities to the nuisances of each log but the last, which differ from their mean."""
@@ -220,9 +226,14 @@ class Section:
             lambda q, gains, _: q.sensitivities(model.vector(), gains, columns), "fitted"
         )
 
+    @property
+    def apart(self) -> FloatArray:
+        """The same without what offsets of logs can do, where these are all samples."""
+        return self.evidence.apart if self.whole else self.fitted
+
     @cached_property
     def basis(self) -> FloatArray:
-        """Orthonormal directions that hold those."""
+        """Orthonormal directions that hold the sensitivities to the free parameters."""
         return self.evidence.basis if self.whole else as_float64(np.linalg.qr(self.fitted)[0])
 
     @property

@@ -7,15 +7,16 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from ..._common.arrays import FloatArray
 from ..._common.text import few
 from ..._common.threads import before, in_parallel
 from ...compare import Comparison, compare
-from ...diagnose import Instead, Omnibus, Verdicts, instead, judge, omnibus
+from ...diagnose import Instead, Omnibus, Verdicts, instead, judge, omnibus, widened
 from ...errors import warn
 from ...estimate import Driving
 from ...identify import Fit, driving_of
 from ...log import unexcited
-from ...rules import Facts, Rules, incomplete, standing, verdict
+from ...rules import LACKING, Facts, Rules, Verdict, incomplete, standing, verdict
 from ..ahead.beyond import Beyond
 from ..ahead.own_share import (
     alike,
@@ -29,6 +30,7 @@ from ..ahead.own_share import (
 from ..limit import Judging
 from ..results.added import added_by, of_one_step
 from ..results.next_steps import SHORT_S
+from ..results.widened import estimates_of
 from ..search.search import Trail
 from ..search.steps import insignificant, way
 from ..search.together import in_place_of
@@ -40,6 +42,7 @@ from .foretold import foretold
 from .matters import buried, sufficient
 from .slow import slow_forces
 from .structure import structure
+from .useful import useless
 from .verdict import facts_of, in_the_light_of
 
 # What a time limit may leave unknown, in words.
@@ -148,6 +151,8 @@ class Judge:
         on_train |= self._compared([f for f in fits if f not in on_train])
         on_test = self._compared(fits, self.test)
         told, late = in_the_light_of(decision, alone), tuple(asks.left_out)
+        wide = self._widened(decision.verdict)
+        idle = before(asks.ends, lambda: useless(fits, self.test, rules), frozenset[str]())
         return Study(
             verdict=decision.verdict,
             fits=tuple(fits),
@@ -165,6 +170,8 @@ class Judge:
                 facts,
                 shared,
                 rules,
+                estimates_of(fit, wide),
+                idle,
             ),
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
@@ -182,7 +189,17 @@ class Judge:
             matters=self.sizes,
             buried=facts.buried,
             answers=answers_of(fits, self.test),
+            widened=wide,
         )
+
+    def _widened(self, verdict: Verdict) -> FloatArray | None:
+        """Covariance of the parameters by what is missing; None where nothing is, or out of time.
+
+        It says how sure they are, and neither the verdict nor a name depends on it.
+        """
+        if verdict not in LACKING:
+            return None
+        return before(self.asks.ends, lambda: widened(self.fit, self.fit.driving), None)
 
     def _compared(
         self, fits: Sequence[Fit], driving: Driving | None = None

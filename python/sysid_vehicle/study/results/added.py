@@ -24,7 +24,7 @@ class AddedEffect:
     Attributes
     ----------
     parameters : tuple of Estimate
-        In the final model.
+        In the final model; of `Study.estimates`.
     error_before, error_after : float
         On the validation data, in units of the noise floor.
     p_value : float
@@ -38,6 +38,10 @@ class AddedEffect:
     takes_little : bool
         Of the error on validation data, and of what all that was added takes off it
         (`rules.little`).
+    useful : bool
+        Whether some error on validation data, one step or 1 to 5 s ahead, is shown to fall with it
+        in its turn, or that of one step falls by a part worth a name (`Rules.taken`). True where
+        nobody asked in time.
     own, own_in_training : Share
         Of the error 1 to 5 s ahead that the final model leaves without it, all else fitted anew,
         what it takes away: on validation and on training data. Unknown where nothing is missing,
@@ -56,6 +60,7 @@ class AddedEffect:
     stands_in: str = ""
     grade: Grade = "plausible"
     takes_little: bool = False
+    useful: bool = True
     own: Share = UNKNOWN
     own_in_training: Share = UNKNOWN
     together: Share = UNKNOWN
@@ -77,8 +82,13 @@ class AddedEffect:
             sure = self.grade == "alias"
             what = "compensates for something else" if sure else "may compensate for something else"
             said.append(f"it {what}: {self.stands_in}")
-        elif self.takes_little:
+        elif self.takes_little and self.useful:
             said.append("the error hardly falls with it: another effect may explain as much")
+        if not self.useful:
+            said.append(
+                "significant, but of no use for prediction: no error on validation data "
+                "significantly falls with it"
+            )
         return "; ".join(said)
 
     def __str__(self) -> str:
@@ -111,6 +121,7 @@ class AddedEffect:
             "stands_in": self.stands_in,
             "grade": self.grade,
             "takes_little": self.takes_little,
+            "useful": self.useful,
             "own_share": self.own.to_dict(),
             "own_share_in_training": self.own_in_training.to_dict(),
             "share_together": self.together.to_dict(),
@@ -133,6 +144,8 @@ def added_by(
     facts: Facts,
     shared: Collection[str] = (),
     rules: Rules = USUAL,
+    estimates: Sequence[Estimate] | None = None,
+    idle: Collection[str] = (),
 ) -> tuple[AddedEffect, ...]:
     """The effects of a study in the order in which they were added.
 
@@ -152,6 +165,10 @@ def added_by(
     shared : collection of str
         Effects of which nobody knows what each takes of the error: none is sure.
     rules : Rules
+    estimates : sequence of Estimate, optional
+        Of the parameters of the final model; by default those of its fit.
+    idle : collection of str
+        Effects with which no error on validation data is shown to fall.
     """
     added = []
     known = {
@@ -161,6 +178,7 @@ def added_by(
         for a in facts.added
     }
     final, ends = fits[-1], (on_test[0].error, on_test[-1].error)
+    estimates = final.estimates if estimates is None else estimates
     for (before, after), (poorer, richer) in zip(pairwise(on_test), pairwise(fits), strict=True):
         errors = ends[0], before.error, after.error, ends[1]
         for name in (e for e in richer.model.effects if e not in poorer.model.effects):
@@ -172,7 +190,7 @@ def added_by(
             added.append(
                 AddedEffect(
                     name,
-                    tuple(e for e in final.estimates if e.name.startswith(f"{name}.")),
+                    tuple(e for e in estimates if e.name.startswith(f"{name}.")),
                     before.error,
                     after.error,
                     trail.p_values.get(name, np.nan),
@@ -185,6 +203,7 @@ def added_by(
                         takes_little=small or name in shared,
                     ),
                     small,
+                    name not in idle or before.error - after.error > rules.taken * before.error,
                     *own,
                 )
             )

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..._common.text import few
+from ...rules import LACKING
 from ..judge.matters import USUAL_SIZES
 from .sentences import disturbance, in_training, only_elsewhere, slow
 
@@ -34,7 +35,7 @@ def next_steps(study: Study) -> tuple[str, ...]:
     if study.verdict == "adequate":
         return ()
     found = [*_of_names(study)]
-    if study.verdict in ("unknown", "partly_explained"):
+    if study.verdict in LACKING:
         found += _of_what_is_left(study)
     if study.verdict == "not_testable":
         found.append("record corners, steps and sweeps of the steering, and study them")

@@ -62,7 +62,7 @@ def record(study: Study) -> dict[str, Any]:
             "train": [c.error for c in study.train],
             "test": [c.error for c in study.test],
         },
-        "parameters": {e.name: e.to_dict() for e in (*study.fit.estimates, *study.fit.derived)},
+        "parameters": {e.name: e.to_dict() for e in study.estimates},
         "predicting": None if study.predicting is None else study.predicting.to_dict(),
         "disagreements": [d.to_dict() for d in study.disagreements],
         "warnings": list(study.warnings),

@@ -9,10 +9,11 @@ import numpy as np
 from ..._common.text import number, with_error
 from ...estimate import UNITS
 from ...estimate.driving import WORDS
-from ...rules import NONE_GONE, share_of
+from ...rules import LACKING, NONE_GONE, share_of
 from ..ahead.horizons import LATERAL
 from ..judge.matters import sizes_that_matter, sufficient
 from ..validation import AHEAD_S
+from .widened import times_wider
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -135,11 +136,12 @@ def small(study: Study) -> bool:
 
 def nuisances(study: Study) -> list[str]:
     """Those that are clearly there and of a size that matters, in words; none is a finding."""
-    fit, found = study.fit, []
-    for part in fit.model.parts:
-        if part.id not in fit.model.nuisances:
+    model, found = study.fit.model, []
+    known = {e.name: e for e in study.estimates}
+    for part in model.parts:
+        if part.id not in model.nuisances:
             continue
-        own = [(p, fit[f"{part.id}.{p.name}"]) for p in part.parameters]
+        own = [(p, known[f"{part.id}.{p.name}"]) for p in part.parameters]
         off = [(abs(e.value - p.null_value), e.std, p.matters) for p, e in own]
         if any(by >= matters and by > study.rules.interval * std for by, std, matters in off):
             sizes = ", ".join(f"{p.name} {with_error(e.value, e.std)} {p.unit}" for p, e in own)
@@ -165,14 +167,32 @@ def disturbance(study: Study) -> bool:
 
 
 def in_the_end(study: Study) -> str:
-    """What is explained, what is left, and what a fit to predictions gains.
+    """What is explained, what is left, how sure parameters are, what a fit to predictions gains.
 
     Parameters
     ----------
     study : Study
     """
     ahead = "" if study.verdict == "not_testable" else str(study.predicting or "")
-    return f"{_left(study)} {ahead}".rstrip()
+    return " ".join(text for text in (_left(study), intervals(study), ahead) if text)
+
+
+def intervals(study: Study) -> str:
+    """What intervals count where something is missing, in words; empty where nothing is."""
+    if study.verdict not in LACKING or not study.fit.estimates:
+        return ""
+    if study.widened is None:
+        return (
+            "Intervals of parameters are those of a complete model; as something is missing, they "
+            "are too short."
+        )
+    wider = times_wider(study.estimates, study.fit)
+    return (
+        "Intervals of parameters include what is missing, as unknown forces of the size that is "
+        f"seen: in the median they are {number(wider, 2)} times as wide. They do not include what "
+        "parameters can reproduce, such as a factor on the steering angle, a mass or an "
+        "accelerometer."
+    )
 
 
 def _left(study: Study) -> str:
@@ -185,7 +205,7 @@ def _left(study: Study) -> str:
         return f"{said} Something else is wrong: {wrong}."
     seen = study.omnibus.rejects and not disturbance(study)
     told = seen or structured(study) or elsewhere(study) or slow(study)
-    if study.verdict not in ("unknown", "partly_explained") or told:
+    if study.verdict not in LACKING or told:
         return said
     # Nothing is left, yet something is missing: what took it up is not what is missing.
     stand_ins = [a.id for a in study.added if a.stands_in]

@@ -1,0 +1,50 @@
+"""Whether predictions are better with what a step added.
+
+Evidence grows with the data: an effect may be significant and matter to no prediction. A model may
+keep it, as dropping it would bend what stands beside it; its user is to know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from ...estimate import Driving
+from ...identify import Fit
+from ...rules import USUAL, Rules
+from ..ahead.along_the_car import changes_of
+from ..validation import AHEAD, fall_in_error
+
+
+def useless(fits: Sequence[Fit], test: Driving, rules: Rules = USUAL) -> frozenset[str]:
+    """Find added effects with which no error on validation data is shown to fall, in their step.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        From the baseline to the final model.
+    test : Driving
+        Validation data.
+    rules : Rules
+    """
+    steps = [pair for pair in pairwise(fits) if not serves(*pair, test, rules)]
+    return frozenset(
+        e for poorer, richer in steps for e in richer.model.effects if e not in poorer.model.effects
+    )
+
+
+def serves(poorer: Fit, richer: Fit, test: Driving, rules: Rules = USUAL) -> bool:
+    """Whether a richer model predicts validation data better, by more than chance.
+
+    One step ahead, or 1 to 5 s: any channel in the mean over these, both models as they are fitted.
+    """
+    if fall_in_error(poorer, richer, test).beyond(rules.interval):
+        return True
+    ahead = changes_of(poorer, richer, test, AHEAD)
+    own = [[c for c in ahead if c.channel == name] for name in {c.channel for c in ahead}]
+    return any(
+        np.mean([c.log_ratio for c in some]) < -rules.interval * np.mean([c.error for c in some])
+        for some in own
+    )
