@@ -20,7 +20,7 @@ from .apply import LATE, corrected
 from .colour import Colour
 from .equations import Readings, lean
 from .estimate import Estimate
-from .faults import SensorFault, to_put_right
+from .faults import SensorFault, leaning, to_put_right
 from .motion import Stretch
 from .signals import MOVING, Signal
 from .texts import ON_CORRECTION, gradient, map_line
@@ -136,12 +136,16 @@ class SensorCheck:
 
     @cached_property
     def _taken_out(self) -> dict[str, float]:
-        """What a log is freed of: with gravity by roll and pitch goes what it makes late."""
+        """What a log is freed of: with gravity by roll and pitch goes what it makes late.
+
+        Delay and leaning are told together. Where they are not off nothing both stay.
+        """
         values = to_put_right(self.faults)
         for channel, gain in _LEANING.items():
             if gain in values:
-                share, late_s = lean(channel, self.estimate.faults)
-                values[f"lean_{channel[:2]}_s"] = share * max(late_s, 0.0)
+                axis = channel[:2]
+                values.pop(f"delay_{axis}_s", None)
+                values[f"lean_{axis}_s"] = leaning(self.estimate, self.faults, axis)
         return values
 
     def apply(self, log: Log) -> Log:
@@ -201,7 +205,9 @@ class SensorCheck:
         if not share:
             return ""
         about = 1000.0 * share * late_s
-        return f"; delays stand beside the {about:.2g} ms by which such a body makes it late"
+        shown = self._taken_out.get(f"lean_{channel[:2]}_s", 0.0)
+        left = "" if shown else ", which this log does not show"
+        return f"; delays stand beside the {about:.2g} ms by which such a body makes it late{left}"
 
     def _rows(self) -> list[tuple[str, ...]]:
         rows: list[tuple[str, ...]] = []
