@@ -5,7 +5,7 @@ from .candidates.causes import Causes, CredibleSet
 from .candidates.constancy import Constancy, constancy
 from .candidates.diagnosis import Diagnosis
 from .candidates.instead import Instead, instead
-from .candidates.possible import Size, considered, possible
+from .candidates.possible import Size, considered, possible, refused
 from .candidates.verdicts import EffectVerdict, Verdicts, judge, verdicts
 from .change.change import Change, EffectChange, LoadChange
 from .change.changed import changed
@@ -70,6 +70,7 @@ __all__ = [
     "judge",
     "omnibus",
     "possible",
+    "refused",
     "separations",
     "suggest_manoeuvre",
     "unknown",
