@@ -94,12 +94,12 @@ def accept(measures: Measures, rules: Rules = USUAL) -> bool:
     Coloured noise of sensors is predicted best by a model that takes it for motion: its one-step
     errors are smaller than those of the true car. Its likelihood is not, unless its noise grew.
     Whatever speaks for an effect, predictions some seconds ahead must not become worse. Where they
-    err more in the mean, by whatever that is, the error that falls is the one of a single step
-    alone: then it speaks for nothing that has to be shown less clearly.
+    err more in the mean, however surely, the error that falls is the one of a single step alone:
+    then it speaks for nothing that has to be shown less clearly.
     """
     three = (measures.gain, measures.own_gain, measures.fall)
     falls = measures.fall.value > 0.0
-    shown = rules.lean if falls and not _grows(measures.changes) else rules.interval
+    shown = rules.lean if falls and not _grows(measures.changes, rules) else rules.interval
     speak = sum(g.beyond(shown) for g in three) >= 2
     own = measures.own_gain
     sure = own.value > rules.sure * own.error and measures.plausible and measures.as_sure
@@ -107,9 +107,10 @@ def accept(measures: Measures, rules: Rules = USUAL) -> bool:
     return confirmed and not worse(measures.changes, rules)
 
 
-def _grows(changes: Sequence[ErrorChange]) -> bool:
-    """Whether errors ahead are larger in the mean over channels and horizons."""
-    return bool(changes) and float(np.mean([c.log_ratio for c in changes])) > 0.0
+def _grows(changes: Sequence[ErrorChange], rules: Rules) -> bool:
+    """Whether errors ahead are larger in the mean over channels and horizons, by what matters."""
+    mean = float(np.mean([c.log_ratio for c in changes])) if changes else 0.0
+    return mean > math.log1p(rules.worse)
 
 
 def worse(changes: Sequence[ErrorChange], rules: Rules = USUAL) -> tuple[ErrorChange, ...]:
