@@ -5,7 +5,7 @@ from .candidates.causes import Causes, CredibleSet
 from .candidates.constancy import Constancy, constancy
 from .candidates.diagnosis import Diagnosis
 from .candidates.instead import Instead, instead
-from .candidates.possible import Size, considered, possible
+from .candidates.possible import Size, considered, possible, refused
 from .candidates.verdicts import EffectVerdict, Verdicts, judge, verdicts
 from .candidates.widened import widened
 from .change.change import Change, EffectChange, LoadChange
@@ -71,6 +71,7 @@ __all__ = [
     "judge",
     "omnibus",
     "possible",
+    "refused",
     "separations",
     "suggest_manoeuvre",
     "unknown",

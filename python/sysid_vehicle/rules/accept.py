@@ -93,15 +93,24 @@ def accept(measures: Measures, rules: Rules = USUAL) -> bool:
     weighs the channels as no rough road would. So two of them must speak for it.
     Coloured noise of sensors is predicted best by a model that takes it for motion: its one-step
     errors are smaller than those of the true car. Its likelihood is not, unless its noise grew.
-    Whatever speaks for an effect, predictions some seconds ahead must not become worse.
+    Whatever speaks for an effect, predictions some seconds ahead must not become worse. Where they
+    err more in the mean, however surely, the error that falls is the one of a single step alone:
+    then it speaks for nothing that has to be shown less clearly.
     """
     three = (measures.gain, measures.own_gain, measures.fall)
     falls = measures.fall.value > 0.0
-    speak = sum(g.beyond(rules.lean if falls else rules.interval) for g in three) >= 2
+    shown = rules.lean if falls and not _grows(measures.changes, rules) else rules.interval
+    speak = sum(g.beyond(shown) for g in three) >= 2
     own = measures.own_gain
     sure = own.value > rules.sure * own.error and measures.plausible and measures.as_sure
     confirmed = (speak and (falls or measures.plausible)) or sure
     return confirmed and not worse(measures.changes, rules)
+
+
+def _grows(changes: Sequence[ErrorChange], rules: Rules) -> bool:
+    """Whether errors ahead are larger in the mean over channels and horizons, by what matters."""
+    mean = float(np.mean([c.log_ratio for c in changes])) if changes else 0.0
+    return mean > math.log1p(rules.worse)
 
 
 def worse(changes: Sequence[ErrorChange], rules: Rules = USUAL) -> tuple[ErrorChange, ...]:

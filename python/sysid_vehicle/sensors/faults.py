@@ -10,12 +10,14 @@ import numpy as np
 import scipy
 
 from .._common.text import HALF_95
+from .equations import lean
 from .estimate import Estimate
 from .parts import scatter
 from .texts import DEG, why_not
 
 _FALSE_CLAIMS = 0.01  # over all faults of one check
 _OF_THE_SPEEDS = ("delay_vx_s", "delay_vy_s")
+_NEGLIGIBLE_S = 0.002  # of a delay, which harms nothing
 _LEARNED = 0.5  # share of what is known of a fault that has to come from the log
 
 
@@ -85,11 +87,11 @@ class _Told:
 _SHOWN = {"s": (1000.0, "ms"), "rad": (1.0 / DEG, "deg"), "": (100.0, "%")}
 _TOLD = (
     _Told("delay_vx_s", "vx_mps", "delay against ax_mps2", "s",
-          ("delay.speeds", "delay.vx_mps"), 0.03, 0.002),
+          ("delay.speeds", "delay.vx_mps"), 0.03, _NEGLIGIBLE_S),
     _Told("delay_vy_s", "vy_mps", "delay against yaw_rate_radps", "s",
-          ("delay.speeds", "delay.vy_mps"), 0.03, 0.002),
+          ("delay.speeds", "delay.vy_mps"), 0.03, _NEGLIGIBLE_S),
     _Told("delay_ay_s", "ay_mps2", "delay against yaw_rate_radps", "s",
-          ("delay.ay_mps2",), 0.02, 0.002),
+          ("delay.ay_mps2",), 0.02, _NEGLIGIBLE_S),
     _Told("gain_yaw_rate", "yaw_rate_radps", "scale error", "",
           ("gain.yaw_rate_radps",), 0.02, 0.002),
     _Told("gain_ax", "ax_mps2", "scale error, or gravity by pitch", "",
@@ -136,6 +138,45 @@ def to_put_right(faults: Sequence[SensorFault]) -> dict[str, float]:
     return values
 
 
+def leaning(found: Estimate, faults: Sequence[SensorFault], axis: str) -> float:
+    """How late an axis is by delay and leaning together, where the log tells that it is late [s].
+
+    How late a body leans is known beforehand, by no more than its share of what the axis feels lets
+    the log say. Their sum is what the log tells: 0 where it is not off nothing, at the level of a
+    fault that is found, or is mostly known beforehand.
+
+    Parameters
+    ----------
+    found : Estimate
+    faults : sequence of SensorFault
+        As they are told.
+    axis : str
+        `ax` or `ay`.
+    """
+    share, late_s = lean(f"{axis}_mps2", found.faults)
+    names = list(found.faults)
+    weights = {f"lean.{axis}_mps2": share, f"delay.{axis}_mps2": 1.0}
+    pick = np.array([weights.get(name, 0.0) for name in names])
+    delay = next((f for f in faults if f.name == f"delay_{axis}_s"), None)
+    total = share * late_s
+    variance = float(pick @ found.covariance @ pick)
+    own = names.index(f"delay.{axis}_mps2") if f"delay.{axis}_mps2" in names else None
+    if own is not None and delay is not None:
+        total += found.faults[names[own]]
+        # What parts of the driving and other explanations add to the delay.
+        variance += max(delay.std**2 - float(found.covariance[own, own]), 0.0)
+    rows = sum(math.isfinite(fault.std) for fault in faults)
+    before = float(np.sum(pick[pick > 0.0] ** 2 / found.prior[pick > 0.0]))
+    learned = 1.0 - float(pick @ np.linalg.inv(found.information) @ pick) / before
+    told = abs(total) > _critical(rows) * math.sqrt(variance) and learned > _LEARNED
+    return total if told and abs(total) > _NEGLIGIBLE_S else 0.0
+
+
+def _critical(rows: int) -> float:
+    """Standard errors beyond which one of so many faults is found."""
+    return float(scipy.stats.norm.isf(0.5 * _FALSE_CLAIMS / rows))
+
+
 def doubted(names: Sequence[str]) -> list[tuple[str, ...]]:
     """What has to be left out, to see whether the driving can do without the faults found.
 
@@ -173,7 +214,7 @@ def faults_of(
     names = list(found.faults)
     naive = np.linalg.inv(found.information)
     rows = [t for t in _TOLD if t.of[-1] in names]
-    critical = float(scipy.stats.norm.isf(0.5 * _FALSE_CLAIMS / len(rows)))
+    critical = _critical(len(rows))
     result = []
     for told in _TOLD:
         if told not in rows:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -13,15 +13,18 @@ import numpy as np
 from .._common.arrays import FloatArray
 from .._common.style import AFTER, MEASURED, axes_or_new, tidy
 from .._common.text import html_list, html_paragraph, html_table, number, text_table
+from ..effects import Effect
 from ..errors import InvalidInput, near_names
 from ..log import Log
+from ..rules import USUAL, Rules
 from ..vehicle import Vehicle
 from .apply import LATE, corrected
 from .colour import Colour
 from .equations import Readings, lean
 from .estimate import Estimate
-from .faults import SensorFault, to_put_right
+from .faults import SensorFault, leaning, to_put_right
 from .motion import Stretch
+from .settled import narrowed, settled
 from .signals import MOVING, Signal
 from .texts import ON_CORRECTION, gradient, map_line
 
@@ -31,16 +34,6 @@ if TYPE_CHECKING:
 _SURE = 3.0  # standard errors of a mean offset
 _HEAD = ("fault", "channel", "value", "95 % interval", "verdict")
 _SIGNAL_HEAD = ("channel", "rate", "held", "quantum", "missing", "noise", "colour")
-# Effects of the catalogue that are not to be looked for any more once their faults are told.
-_SETTLED = {
-    "sensor_delay": ("delay_vx_s", "delay_vy_s", "delay_ay_s"),
-    "speed_sensor_misalignment": ("imu_turn_rad",),
-    "gyro_bias": ("bias_yaw_rate_radps",),
-    "gyro_scale": ("gain_yaw_rate",),
-    "body_attitude": ("gain_ax", "gain_ay"),
-    "body_roll": ("gain_ay",),
-    "accelerometer_scale": ("gain_ax", "gain_ay"),
-}
 _GAINS = {"ax_mps2": "gain_ax", "ay_mps2": "gain_ay", "yaw_rate_radps": "gain_yaw_rate"}
 _LEANING = {"ax_mps2": "gain_ax", "ay_mps2": "gain_ay"}
 _BIASES = {"yaw_rate_radps": "bias_yaw_rate_radps", "vy_mps": "bias_vy_mps"}
@@ -108,11 +101,11 @@ class SensorCheck:
     @cached_property
     def settles(self) -> tuple[str, ...]:
         """Effects of the catalogue that :meth:`apply` has dealt with, or that are not there."""
-        return tuple(
-            effect
-            for effect, names in _SETTLED.items()
-            if all(self[name].told for name in names)
-        )  # fmt: skip
+        return settled(self.faults)
+
+    def narrowed(self, effects: Iterable[Effect], rules: Rules = USUAL) -> tuple[Effect, ...]:
+        """Effects with no more room than kinematics leaves them beside :meth:`apply`."""
+        return narrowed(effects, self.faults, rules)
 
     @property
     def offsets(self) -> dict[str, tuple[float, float]]:
@@ -136,12 +129,16 @@ class SensorCheck:
 
     @cached_property
     def _taken_out(self) -> dict[str, float]:
-        """What a log is freed of: with gravity by roll and pitch goes what it makes late."""
+        """What a log is freed of: with gravity by roll and pitch goes what it makes late.
+
+        Delay and leaning are told together. Where they are not off nothing both stay.
+        """
         values = to_put_right(self.faults)
         for channel, gain in _LEANING.items():
             if gain in values:
-                share, late_s = lean(channel, self.estimate.faults)
-                values[f"lean_{channel[:2]}_s"] = share * max(late_s, 0.0)
+                axis = channel[:2]
+                values.pop(f"delay_{axis}_s", None)
+                values[f"lean_{axis}_s"] = leaning(self.estimate, self.faults, axis)
         return values
 
     def apply(self, log: Log) -> Log:
@@ -201,7 +198,9 @@ class SensorCheck:
         if not share:
             return ""
         about = 1000.0 * share * late_s
-        return f"; delays stand beside the {about:.2g} ms by which such a body makes it late"
+        shown = self._taken_out.get(f"lean_{channel[:2]}_s", 0.0)
+        left = "" if shown else ", which this log does not show"
+        return f"; delays stand beside the {about:.2g} ms by which such a body makes it late{left}"
 
     def _rows(self) -> list[tuple[str, ...]]:
         rows: list[tuple[str, ...]] = []

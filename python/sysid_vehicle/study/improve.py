@@ -78,10 +78,10 @@ def improve(
     exclude : sequence of str, optional
         Effects not to consider.
     sensors : SensorCheck or False, optional
-        Check of the sensors: all logs are put right by it, and what kinematics settled is not
-        considered. Without one only what the likelihood cannot hold is taken out: delays of one
-        channel against another, low-passes of sensors, vibration, and another clock of the wheel
-        force; with False not even that.
+        Check of the sensors: all logs are put right by it, what kinematics settled is not
+        considered, and no effect is larger than kinematics leaves it. Without one only what the
+        likelihood cannot hold is taken out: delays of one channel against another, low-passes of
+        sensors, vibration, and another clock of the wheel force; with False not even that.
     time_limit_s : float, optional
         After so many seconds the study ends, wherever it is, but for some passes over the data:
         about as long as `compare` and one scoring of all effects take. The check of the sensors,
@@ -121,10 +121,10 @@ def improve(
     train, test, settled, checked = _ready(train, test, sensors, schedule.sensors)
     if not checked:
         judging.left_out.append(_CHANNELS)
-    exclude = (*exclude, *settled)
-    if exclude:
-        left_out = {effect(e).id for e in exclude}
-        candidates = [e.id for e in considered(model, candidates) if e.id not in left_out]
+    left_out = {effect(e).id for e in (*exclude, *settled)}
+    wanted = tuple(e for e in considered(model, candidates) if e.id not in left_out)
+    if sensors:
+        wanted = sensors.narrowed(wanted, rules)
     say = tell if tell is not None else teller(progress)
     train_driving, test_driving = set_aside(train, test)
 
@@ -142,7 +142,7 @@ def improve(
             say(f"Fitted the baseline to {train_driving}.")
             search = Search(
                 test_driving,
-                candidates=candidates,
+                candidates=wanted,
                 most_effects=len(model.effects) + min(most_effects, _room(train_driving, rules)),
                 ends=schedule.search,
                 judged_by=schedule.step,
@@ -176,7 +176,7 @@ def improve(
         test_driving,
         asks=judging,
         rules=rules,
-        lacked=[e.id for e in considered(model, candidates)],
+        lacked=[e.id for e in wanted],
         sizes=sizes,
         seed=seed,
     )

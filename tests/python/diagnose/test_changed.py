@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,10 +27,8 @@ from sysid_vehicle.diagnose.change.may_change import change as change_of
 from sysid_vehicle.diagnose.change.may_change import of_effect
 from sysid_vehicle.diagnose.change.pieces import Pieces
 from sysid_vehicle.diagnose.change.reference import Reference
-from sysid_vehicle.diagnose.change.search import Search
 from sysid_vehicle.diagnose.evidence import evidence
 from sysid_vehicle.estimate import Driving
-from sysid_vehicle.rules import USUAL
 
 OFFSET = "steer_offset.offset_rad"
 LATE = ("steer_delay", "steer_lag")
@@ -305,34 +302,6 @@ def test_long_driving_is_worked_on_piece_by_piece(
     for effect in few:
         assert pieces[effect].value == pytest.approx(whole[effect].value, rel=1e-3, abs=1e-7)
         assert pieces[effect].std == pytest.approx(whole[effect].std, rel=1e-3)
-
-
-class Told:
-    """What lines tell of a state: p-values of its changes."""
-
-    def __init__(self, put: tuple[str, ...], p_values: dict[str, float]) -> None:
-        self.put, self._p_values = put, p_values
-
-    def off_nothing(self, effects: tuple[str, ...], _: object) -> float:
-        (effect,) = effects
-        return self._p_values[effect]
-
-
-def test_what_is_named_was_put_in_and_is_off_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A likelier rival takes the place of what was put in; what no line tells goes."""
-    lines = {"steer_lag": 1e-9, "steer_delay": 1e-9, "mass": 0.3}
-    sets = [(), ("steer_lag", "mass"), ("steer_delay", "mass"), ("steer_delay",)]
-    search = Search.__new__(Search)
-    search.rules = USUAL
-    search.visited = {frozenset(p): SimpleNamespace(put=p, changes={}) for p in sets}  # type: ignore[misc]
-    likelier = search.visited[frozenset(sets[2])]
-    monkeypatch.setattr(search, "told", lambda state: Told(state.put, lines))
-    monkeypatch.setattr(search, "_leading", lambda _, state: state.put)
-    monkeypatch.setattr(
-        search, "_better", lambda state, _: likelier if state.put == sets[1] else state
-    )
-    told, state = search._settled(Told(sets[1], lines), search.visited[frozenset(sets[1])])
-    assert state.put == told.put == ("steer_delay",)
 
 
 class Drawn(Side):

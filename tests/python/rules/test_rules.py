@@ -233,6 +233,20 @@ def test_what_validation_data_confirm(
     assert accept(replace(found, plausible=False)) is (holds and fall[0] > 0.0)
 
 
+def test_where_errors_ahead_lean_to_growing_measures_must_show_more() -> None:
+    """They are unsure in few blocks, and no veto; the error of a step alone is no excuse then."""
+    faint = Measures(gain(40.0), gain(40.0), gain(40.0), plausible=True, as_sure=False)
+    unsure = [ErrorChange("yaw_rate_radps", h, g, 0.2) for h, g in ((1.0, 0.18), (2.0, 0.1))]
+    assert worse(unsure) == ()
+    for little in (-0.1, 0.04):
+        assert accept(replace(faint, changes=tuple(replace(c, log_ratio=little) for c in unsure)))
+    assert not accept(replace(faint, changes=tuple(unsure)))
+    assert accept(replace(faint, changes=tuple(unsure), gain=gain(90.0), fall=gain(90.0)))
+    # What one channel loses another may gain.
+    falls = (ErrorChange("vy_mps", 1.0, -0.4, 0.2), ErrorChange("vy_mps", 2.0, -0.3, 0.2))
+    assert accept(replace(faint, changes=(*unsure, *falls)))
+
+
 def test_the_likelihood_has_the_last_word_where_noise_did_not_grow() -> None:
     found = Measures(gain(-90.0), gain(150.0), gain(-90.0), plausible=True, as_sure=True)
     assert accept(found)

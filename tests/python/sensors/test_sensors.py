@@ -2,6 +2,7 @@
 
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from smooth_log import drift
 
 import sysid_vehicle as sv
 from sysid_vehicle.cli.main import main
+from sysid_vehicle.diagnose import considered, possible, refused
+from sysid_vehicle.effects import Effect, effect
 from sysid_vehicle.simulate import drive_truth
 
 Channels = dict[str, np.ndarray]
@@ -169,7 +172,11 @@ def test_a_turned_speed_sensor_is_no_bias_of_the_lateral_speed(perfect: Channels
 
 def test_a_log_put_right_holds_no_fault_any_more(faulty: sv.SensorCheck, perfect: Channels) -> None:
     right = faulty.apply(faulty.logs[0])
-    assert len(right.corrections) == 4  # a_y is late too: a body that leans takes its time
+    # The accelerometer is not late, whatever is usual of a body that leans.
+    assert [text.split(":")[0] for text in right.corrections] == [
+        "vy_mps", "yaw_rate_radps", "ax_mps2, ay_mps2"
+    ]  # fmt: skip
+    assert any("which this log does not show" in text for text in faulty.remarks)
     assert right.corrections[0] in str(right)
     assert right.between(5.0, 10.0).corrections == right.corrections
     for name, most in (("ay_mps2", 0.1), ("vy_mps", 0.04), ("yaw_rate_radps", 3e-3)):
@@ -312,6 +319,63 @@ def test_a_study_uses_what_the_check_settled(
     assert all(log.corrections for log in driving.logs)
     assert "gyro_bias" in faulty.settles
     assert "imu_lever_arm" not in faulty.settles
+
+
+def test_an_effect_is_no_larger_than_kinematics_leaves_it(faulty: sv.SensorCheck) -> None:
+    """What is not told well enough to be settled is known all the same."""
+    known = {f.name: f for f in faulty.faults}
+    known["gain_ax"] = replace(known["gain_ax"], value=-0.014, std=0.016, found=False, told=False)
+    known["gain_yaw_rate"] = replace(known["gain_yaw_rate"], std=np.inf, found=False, told=False)
+    check = replace(faulty, faults=tuple(known.values()))
+    scale, pitch, gyro, drag = (
+        effect(e) for e in ("accelerometer_scale", "body_attitude", "gyro_scale", "aero_drag")
+    )
+    found = check.narrowed([scale, pitch, gyro, drag])
+    assert found[2:] == (gyro, drag)
+    along, across = found[0].parameters
+    assert (along.lower, along.upper) == pytest.approx((-0.014 - 4.5 * 0.016, -0.014 + 4.5 * 0.016))
+    # What was found is put right: what may be left of it lies about nothing.
+    left = 4.5 * faulty["gain_ay"].std
+    assert (across.lower, across.upper) == pytest.approx((-left, left))
+    # A body leans to the outside; bounds of the catalogue hold.
+    assert (found[1].parameters[0].lower, found[1].parameters[0].upper) == (0.0, along.upper)
+    # A search that ends there wanted more than the sensors allow; one at nothing wanted none.
+    assert possible(scale, (0.2, 0.0), (0.02, 0.01))
+    assert not refused(scale, (0.5, 0.0))
+    assert refused(found[0], (along.upper, 0.0))
+    assert refused(found[0], (0.0, across.lower))
+    assert not refused(found[0], (0.02, 0.0))
+    assert not refused(found[1], (0.0, 0.0))
+
+
+def test_a_study_seeks_no_more_than_the_check_leaves(
+    faulty: sv.SensorCheck, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Stop(Exception):
+        pass
+
+    heard: list[Sequence[Effect]] = []
+
+    def search(*_: object, candidates: Sequence[Effect], **__: object) -> None:
+        heard.append(candidates)
+        raise Stop
+
+    from sysid_vehicle.study import improve as module
+
+    where = sys.modules[module.__module__]
+    monkeypatch.setattr(where, "maximised", lambda *_, **__: object())
+    monkeypatch.setattr(where, "Search", search)
+    unsure = replace(
+        faulty,
+        faults=tuple(replace(f, told=f.told and f.name != "gain_ax") for f in faulty.faults),
+    )
+    model = sv.Model(sv.example_vehicle())
+    with pytest.raises(Stop):
+        sv.improve(model, unsure.logs[0], unsure.logs[0], sensors=unsure)
+    ((scale,),) = ([e for e in some if e.id == "accelerometer_scale"] for some in heard)
+    assert scale.parameters[0].upper < 0.1 < effect("accelerometer_scale").parameters[0].upper
+    # Where it is considered, at whatever step, it keeps these bounds.
+    assert scale in considered(model.add("tyre_relaxation"), heard[0])
 
 
 def test_command_prints_and_writes(

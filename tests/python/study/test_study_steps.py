@@ -122,6 +122,20 @@ def test_validation_data_have_a_say_between_what_the_fit_cannot_tell_apart(
         assert chosen[0].id == (other.id if told_apart else preferred.id)
 
 
+def test_an_effect_that_wants_more_than_is_known_of_it_is_not_added(
+    baseline: Fit, driving: tuple[Driving, Driving]
+) -> None:
+    """What told its bounds refuses the size: with the largest one left it stands for another."""
+    drag = effect("aero_drag")
+    for upper in (drag.parameters[0].upper, 0.2):
+        known = replace(drag, parameters=(replace(drag.parameters[0], upper=upper),))
+        dx = diagnose(baseline, candidates=[known])
+        (found,) = dx.ranking
+        assert found.value[0] <= upper
+        chosen = first_that_holds(dx, baseline, driving[1])
+        assert (chosen is None) is (upper < HIDDEN["aero_drag.drag_area_m2"])
+
+
 @pytest.mark.manual
 def test_what_was_driven_in_part_is_not_refused_for_being_too_sure(
     start: Model, truth: Model

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -31,14 +32,37 @@ OF_A_FACTOR = "_error"
 def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple[Effect, ...]:
     """What may be added to a model: all that it lacks, or what is wanted of that.
 
-    Effects on request are among it only where they are wanted.
+    Effects on request are among it only where they are wanted. An effect that is given itself keeps
+    the bounds that it has.
     """
     if candidates is None:
         return model.candidates
-    wanted = {effect(c).id for c in candidates}
+    wanted = {e.id: e for e in map(effect, candidates)}
     asked = [e for e in catalogue() if e.on_request and e.id not in model.effects]
     known = sorted((*model.candidates, *model.seated(asked)), key=lambda e: e.index)
-    return tuple(e for e in known if e.id in wanted)
+    return tuple(_between(e, wanted[e.id]) for e in known if e.id in wanted)
+
+
+def _between(e: Effect, given: Effect) -> Effect:
+    """An effect at its place, within the bounds of the one that was given."""
+    if e.parameters == given.parameters:
+        return e
+    both = zip(e.parameters, given.parameters, strict=True)
+    return replace(e, parameters=tuple(replace(p, lower=g.lower, upper=g.upper) for p, g in both))
+
+
+def refused(given: Effect, value: Sequence[float]) -> bool:
+    """Whether a search ended at a bound that is narrower than the one of the catalogue.
+
+    What was told beforehand refuses the value that was wanted: the effect stands for something
+    else, of whatever size.
+    """
+    own = next((e for e in catalogue() if e.id == given.id), given)
+    return any(
+        (g.lower > p.lower and v < g.lower + _AT_BOUND * (g.upper - g.lower))
+        or (g.upper < p.upper and v > g.upper - _AT_BOUND * (g.upper - g.lower))
+        for p, g, v in zip(own.parameters, given.parameters, value, strict=True)
+    )
 
 
 def possible(

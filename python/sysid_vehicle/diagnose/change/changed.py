@@ -29,7 +29,7 @@ from ..candidates.causes import Causes, CredibleSet
 from ..candidates.possible import possible
 from .change import Change, EffectChange, Said
 from .changes_compete import Competition
-from .may_change import YAW_INERTIA, May, as_one
+from .may_change import YAW_INERTIA, May
 from .reference import Exact
 from .search import Search
 
@@ -182,10 +182,6 @@ class _Said:
             for n, s, usual in zip(m.names, stds, m.scale, strict=True)
         )
 
-    def _one(self, effect: str, state: Exact) -> tuple[str, ...]:
-        """What was put in as one change with an effect."""
-        return next(several for several in as_one(state.put) if effect in several)
-
     def _in_place(self, effect: str, of: CredibleSet, state: Exact) -> Exact | None:
         """The state with an effect in place of another one of its set, where it was visited."""
         others = frozenset(state.put) - set(of.effects)
@@ -197,7 +193,6 @@ class _Said:
         """What may have changed in place of an effect that was put in; None where nothing need."""
         if not self._off_nothing(effect, state, told):
             return None
-        others = frozenset(state.put) - set(self._one(effect, state))
         here = self.search.evidence(state, told, ratio)
         log_odds = self.search.odds(effect, state, told)
         linear = told.causes.of(effect)
@@ -206,13 +201,16 @@ class _Said:
             for e, weight in linear.weights.items():
                 if e not in log_odds and min(weight, own) > 0.0:
                     log_odds[e] = float(np.log(weight / own))
-        without = self.search.visited.get(others)
-        if without is not None:
-            absent = self.search.evidence(without, told, ratio) - here
-            whole = scipy.special.logsumexp(list(log_odds.values()))
-            if whole - np.logaddexp(whole, absent) < np.log(self.search.rules.credible):
-                return None
-        return CredibleSet.of(log_odds, self.search.rules.credible)
+        found = CredibleSet.of(log_odds, self.search.rules.credible)
+        absent = [
+            self.search.evidence(s, told, ratio) - here
+            for s in self.search.lacking(effect, state, found.effects)
+        ]
+        whole = scipy.special.logsumexp(list(log_odds.values()))
+        least = np.log(self.search.rules.credible)
+        if whole - scipy.special.logsumexp([whole, *absent]) < least:
+            return None
+        return found
 
     def _of(
         self,

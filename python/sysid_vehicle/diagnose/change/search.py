@@ -120,7 +120,15 @@ class Search:
             if best is not state:
                 state, told = best, self.told(best)
             told, state = self._shown(told, state)
-        return told, state
+        best = self._at_maximum(state)
+        return (told, state) if best is state else (self.told(best), best)
+
+    def _at_maximum(self, state: Exact) -> Exact:
+        """The state where its likelihood is highest, as that of nothing is."""
+        if not state.climbed:
+            with suppress(NumericalError, np.linalg.LinAlgError):
+                self.visited[frozenset(state.put)] = self.reference.climbed(self.start, state)
+        return self.visited[frozenset(state.put)]
 
     def _shown(self, told: Competition, state: Exact) -> tuple[Competition, Exact]:
         """With what lines and likelihoods both tell, and nothing else.
@@ -251,6 +259,22 @@ class Search:
             exact = self.reference.fitted(self.start, put, told_by_lines, usual, also)
             self.visited[frozenset(put)] = exact
 
+    def lacking(self, effect: str, state: Exact, group: Sequence[str]) -> list[Exact]:
+        """What was fitted, to its maximum, without an effect and all of its group.
+
+        Nothing at all is among it, and what was put in without this change; what has another effect
+        in its place is not, as `odds` knows that.
+        """
+        put, rest = frozenset(state.put), frozenset(state.put) - {effect}
+        without = put - {e for several in as_one(state.put) if effect in several for e in several}
+        return [
+            s
+            for key, s in self.visited.items()
+            if (s.climbed or key == without)
+            and key.isdisjoint((effect, *group))
+            and not (rest < key and len(key) == len(put))
+        ]
+
     def evidence(self, state: Exact, told: Competition, ratio: float) -> float:
         """Log-likelihood over the variance ratio, less the price of the changes [nats]."""
         return state.reached / ratio - told.price(state.put, state.shift)
@@ -259,8 +283,7 @@ class Search:
         """The state with most evidence, all that come close to it at their maxima."""
         ratio = told.ratio_of(state.put)
         least = max(self.evidence(s, told, ratio) for s in self.visited.values()) - _CLOSE
-        for key, s in tuple(self.visited.items()):
-            if not s.climbed and self.evidence(s, told, ratio) > least:
-                with suppress(NumericalError, np.linalg.LinAlgError):
-                    self.visited[key] = self.reference.climbed(self.start, s)
+        for s in tuple(self.visited.values()):
+            if self.evidence(s, told, ratio) > least:
+                self._at_maximum(s)
         return max(self.visited.values(), key=lambda s: self.evidence(s, told, ratio))

@@ -13,6 +13,7 @@ from ..._common.text import with_error
 from ..._common.threads import before
 from ...diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
 from ...diagnose.diagnose import REFITS
+from ...effects import Effect
 from ...errors import Interrupted
 from ...estimate import Driving
 from ...identify import Fit
@@ -162,7 +163,7 @@ class Search:
     """
 
     test: Driving
-    candidates: Sequence[str] | None
+    candidates: Sequence[str | Effect] | None
     most_effects: int
     ends: float
     rules: Rules

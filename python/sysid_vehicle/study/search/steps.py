@@ -10,7 +10,7 @@ import numpy as np
 
 from ..._common.memo import remembered
 from ..._common.threads import before, in_parallel
-from ...diagnose import Candidate, Diagnosis, possible
+from ...diagnose import Candidate, Diagnosis, possible, refused
 from ...effects import Parameter
 from ...errors import NumericalError
 from ...estimate import Driving
@@ -66,8 +66,13 @@ def likeliest(dx: Diagnosis) -> Candidate | None:
 
 
 def _sound(c: Candidate, rules: Rules) -> bool:
-    """Whether it was refitted, and gained more than its price could be by chance."""
-    return c.fit is not None and c.statistic >= rules.price * np.log(c.fit.driving.samples)
+    """Whether it was refitted, and gained more than its price could be by chance.
+
+    By a value that nothing known beforehand refuses.
+    """
+    if c.fit is None or refused(c.effect, c.value):
+        return False
+    return c.statistic >= rules.price * float(np.log(c.fit.driving.samples))
 
 
 def _measures(fit: Fit, found: Fit, plausible: bool, test: Driving) -> Measures:
