@@ -47,7 +47,7 @@ def test_what_is_of_no_use_is_told_beside_what_else_speaks_against_it() -> None:
     assert "hardly falls" not in str(named)
     assert named.to_dict()["useful"] is False
     stand_in = replace(named, stands_in="it has no share", grade="alias")
-    assert "only stands in" in stand_in.reserve
+    assert "compensates for something else" in stand_in.reserve
     assert told in stand_in.reserve
     assert told not in replace(named, useful=True).reserve
     assert "hardly falls" in replace(named, useful=True).reserve

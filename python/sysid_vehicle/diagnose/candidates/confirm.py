@@ -69,7 +69,7 @@ def confirmed(dx: Diagnosis) -> Causes:
 
 def _left(dx: Diagnosis, c: Candidate) -> Beside:
     assert c.fit is not None  # what gains its price is refitted
-    return beside(c.fit, dx.driving, {e.id for e in dx.fit.model.candidates}, dx.rules)
+    return beside(c.fit, dx.driving, dx.lacked, dx.rules)
 
 
 def hopeless(left: Beside, candidates: Sequence[Candidate], price: float) -> set[str]:

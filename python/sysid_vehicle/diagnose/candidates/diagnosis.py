@@ -181,8 +181,12 @@ class Diagnosis(Printed):
         first = self._likeliest
         fit = self.fit if first is None else first.fit
         assert fit is not None  # the likeliest is refitted
-        lacked = {e.id for e in self.fit.model.candidates}
-        return beside(fit, self.driving, lacked, self.rules)
+        return beside(fit, self.driving, self.lacked, self.rules)
+
+    @property
+    def lacked(self) -> set[str]:
+        """What the model lacks of the catalogue, and what was asked for on request."""
+        return {e.id for e in self.fit.model.candidates} | {c.id for c in self.ranking}
 
     @cached_property
     def _likeliest(self) -> Candidate | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -38,9 +38,14 @@ def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple
     if candidates is None:
         return model.candidates
     wanted = {e.id: e for e in map(effect, candidates)}
+    return tuple(_between(e, wanted[e.id]) for e in lacking(model, wanted))
+
+
+def lacking(model: Model, names: Container[str]) -> tuple[Effect, ...]:
+    """What a model lacks of these effects, those on request among them."""
     asked = [e for e in catalogue() if e.on_request and e.id not in model.effects]
     known = sorted((*model.candidates, *model.seated(asked)), key=lambda e: e.index)
-    return tuple(_between(e, wanted[e.id]) for e in known if e.id in wanted)
+    return tuple(e for e in known if e.id in names)
 
 
 def _between(e: Effect, given: Effect) -> Effect:

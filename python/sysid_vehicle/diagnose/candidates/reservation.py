@@ -19,6 +19,7 @@ from ...identify import Fit
 from ...rules import USUAL, Rules, excess, share_explained
 from ..evidence.evidence import Evidence
 from ..unexplained.omnibus import Omnibus, omnibus_of
+from .possible import lacking
 from .score import ScoreBoard, score_board_of
 
 
@@ -53,7 +54,7 @@ class Beside:
     @cached_property
     def board(self) -> ScoreBoard:
         """Scores of the other effects."""
-        others = tuple(e for e in self.fit.model.candidates if e.id in self.lacked)
+        others = lacking(self.fit.model, self.lacked)
         return score_board_of(self.evidence, others, self.rules)
 
     @cached_property

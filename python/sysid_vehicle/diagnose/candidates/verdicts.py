@@ -22,7 +22,7 @@ from ...identify import Fit
 from ...rules import USUAL, Rules
 from .constancy import constancy
 from .diagnosis import Diagnosis
-from .possible import Size, possible, sizes
+from .possible import Size, lacking, possible, sizes
 from .score import Score, score_board
 
 Finding = Literal[
@@ -210,7 +210,7 @@ def verdicts(dx: Diagnosis, *, seed: int = 0) -> Verdicts:
     told = judge(
         final,
         scored=known,
-        lacked={e.id for e in dx.fit.model.candidates},
+        lacked=dx.lacked,
         groups=groups,
         acted={c.id for c in dx.significant},
         rules=dx.rules,
@@ -266,8 +266,7 @@ def judge(
         By effect of the final model, something unknown that explains it away (`instead`).
     """
     if scored is None:
-        lacking = tuple(e for e in final.model.candidates if e.id in lacked)
-        board = score_board(final, final.driving, lacking, rules)
+        board = score_board(final, final.driving, lacking(final.model, lacked), rules)
         scored = board.scores, board.family_p_values(seed=seed)
     family = scored[1]
     scores = {s.effect.id: s for s in scored[0]}
@@ -286,9 +285,7 @@ def judge(
             because = f"an unknown {away[v.effect.id]} explains the same and more"
             found[i] = replace(v, finding="proxy", group=(), because=because)
     missing = [v.effect.id for v in found if v.finding in _NAMED]
-    for effect in final.model.candidates:
-        if effect.id not in lacked:
-            continue
+    for effect in lacking(final.model, lacked):
         score = scores.get(effect.id)
         verdict = _of_scored(effect, score, family.get(effect.id, 1.0) < rules.alpha, rules)
         if effect.id in acted and names and verdict.finding in ("absent", "not testable"):
