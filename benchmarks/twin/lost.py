@@ -101,7 +101,7 @@ def fate(study: sv.Study, name: str) -> str:
     if any(name in dx.fit.model.effects for dx in study.diagnoses):
         return "added, and dropped or exchanged later"
     taken_back = next((w for w in study.warnings if " removed again: " in w), "")
-    if name in taken_back.split(" gained ")[0].split(" and "):
+    if name in taken_back.split(" removed again: ")[0].split(" and "):
         return "added, and taken back: as the likelihood fits the model, errors ahead grow with it"
     seen = [(dx, c) for dx in study.diagnoses for c in dx.significant if c.id == name]
     if not seen:

@@ -46,7 +46,7 @@ from .judge.structure import Structure
 from .results.added import AddedEffect
 from .results.failing import errors_with, late, where_lines
 from .results.hidden import hidden
-from .results.in_time import in_time, take_over, told
+from .results.in_time import in_time, take_over, told, with_told
 from .results.next_steps import next_steps
 from .results.predicting import Predicting, predicting
 from .results.printed import as_html, as_text
@@ -168,7 +168,7 @@ class Study:
         InvalidInput
             If the file cannot be written.
         """
-        save(replace(self, worked_out=told(self, whole=True)), path)
+        save(with_told(self), path)
 
     @property
     def meaning(self) -> str:

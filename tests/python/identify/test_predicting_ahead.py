@@ -159,7 +159,7 @@ def _said(better: float, needed: float | None, fit: Fit) -> Predicting:
 
 def test_it_is_said_what_predicts_better_and_what_is_not_needed(fit: Fit) -> None:
     assert str(_said(-0.05, None, fit)) == ""
-    assert "errs less there" in str(_said(-0.5, None, fit))
+    assert "has smaller errors there" in str(_said(-0.5, None, fit))
     assert "not needed" not in str(_said(-0.5, -0.5, fit))
     assert "not needed" in str(_said(-0.5, 0.0, fit))
     # One error that grows is no help.

@@ -220,6 +220,7 @@ def test_another_end_is_followed_as_far_as_it_may_be_the_better_one(
     assert rivalled(objective, high, np.array([-0.8]), box) is high
     assert not asked
     problem.slope = 5.0
+    objective = Objective(problem, (), 0.5 * noise, 2.0 * noise)  # type: ignore[arg-type]
     assert rivalled(objective, high, np.array([-0.8]), box) is high
     assert asked == [pytest.approx(-1.0, abs=0.01)]
 

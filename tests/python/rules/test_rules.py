@@ -141,7 +141,8 @@ def test_no_limit_that_decides_a_claim_stands_elsewhere() -> None:
 
 
 def test_deciding_files_compare_with_no_number_of_their_own() -> None:
-    deciding = [f"study/{n}.py" for n in ("steps", "together", "search", "verdict", "judge")]
+    deciding = [f"study/search/{n}.py" for n in ("steps", "together", "search")]
+    deciding += ["study/judge/verdict.py", "study/judge/judge.py"]
     deciding += [
         f"diagnose/candidates/{n}.py" for n in ("reservation", "verdicts", "constancy", "possible")
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -86,6 +86,13 @@ def take_over(study: Study, found: Mapping[str, Any]) -> Study:
     known = _slow(study)
     study.__dict__.update({name: of for name, of in found.items() if name in known})
     return study
+
+
+def with_told(study: Study) -> Study:
+    """The same study for a file, which holds what has been told too."""
+    own = replace(study)
+    object.__setattr__(own, "worked_out", told(study, whole=True))
+    return own
 
 
 def _slow(study: Study) -> tuple[str, ...]:
