@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_vehicle import Model
-from sysid_vehicle.identify.search import Box, minimise
+from sysid_vehicle.identify.search.search import Box, minimise
 from sysid_vehicle.lab import Setup, design_excitation, preview, run_closed_loop
 from sysid_vehicle.lab.design.information import TYRES, information, problem_of, sensor_noise
 from sysid_vehicle.lab.drive.loop import ClosedLoop

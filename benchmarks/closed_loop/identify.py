@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
-from sysid_vehicle.identify.tyre_shape import friction, peak_slip, stiffness, top
+from sysid_vehicle.identify.search.tyre_shape import friction, peak_slip, stiffness, top
 from sysid_vehicle.lab import (
     GreyBoxVehicle,
     TyreFit,

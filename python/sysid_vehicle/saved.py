@@ -53,12 +53,14 @@ _MOVED: dict[str, str] = {
         for module in modules.split()
     },
     **{
-        f"study.{module}": f"study.{folder}.{module}"
-        for folder, modules in {
-            "ahead": "beyond horizons shares waterfall",
-            "judge": "answers disagree foretold structure",
-            "results": "added predicting",
-        }.items()
+        f"{station}.{module}": f"{station}.{folder}.{module}"
+        for station, folder, modules in (
+            ("study", "ahead", "beyond horizons shares waterfall"),
+            ("study", "judge", "answers disagree foretold structure"),
+            ("study", "results", "added predicting"),
+            ("identify", "search", "starts"),
+            ("identify", "intervals", "estimates profile"),
+        )
         for module in modules.split()
     },
 }

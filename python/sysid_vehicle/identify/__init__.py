@@ -1,19 +1,19 @@
 """Identification of parameters and noise from driving."""
 
-from .ahead import predicting_ahead
-from .box import free_box, objective_of
-from .estimates import Estimate
+from .ahead.ahead import predicting_ahead
 from .fit import Fit
 from .identify import identify, profile_fit
+from .intervals.estimates import Estimate
+from .intervals.posterior import Posterior
+from .intervals.profile import Profile
 from .maximum import refine, refine_above, refine_while, refit, relearn, unmoved
 from .offsets import driving_beside, driving_of
-from .posterior import Posterior
 from .predictive import Prediction, predict
-from .profile import Profile
-from .runs import Difference, RunsFit, identify_runs
-from .search import METHODS
-from .settle import settle
-from .starts import Start, Starts
+from .runs.runs import Difference, RunsFit, identify_runs
+from .search.box import free_box, objective_of
+from .search.search import METHODS
+from .search.settle import settle
+from .search.starts import Start, Starts
 from .suspects import explaining
 
 __all__ = [

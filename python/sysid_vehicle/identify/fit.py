@@ -15,12 +15,12 @@ from ..estimate import Driving, NoiseModel
 from ..model import Model
 from ..saved import save
 from ..vehicle import AXLES
-from .estimates import Estimate, Estimated, profiled
-from .posterior import Posterior, posterior
-from .profile import Profile
-from .quantities import Quantity, parameter, std_of, tyre_quantity
-from .starts import Starts
-from .tyre_shape import COMBINATIONS
+from .intervals.estimates import Estimate, Estimated, profiled
+from .intervals.posterior import Posterior, posterior
+from .intervals.profile import Profile
+from .intervals.quantities import Quantity, parameter, std_of, tyre_quantity
+from .search.starts import Starts
+from .search.tyre_shape import COMBINATIONS
 
 _MEANINGS = {"BCD": "cornering stiffness", "peak": "peak friction", "peak_slip": "slip at the peak"}
 _UNITS = {"cornering stiffness": "N/rad", "peak friction": "1", "slip at the peak": "rad"}

@@ -15,10 +15,9 @@ from ..errors import InvalidInput, warn
 from ..estimate import Driving, NoiseModel, first_guess
 from ..log import Log, check_car, check_excitation
 from ..model import Model
-from .ahead import predicting_ahead
-from .box import free_box, objective_of
-from .estimates import BETTER_FOUND, INTERVALS, profiled_estimates
+from .ahead.ahead import predicting_ahead
 from .fit import Fit
+from .intervals.estimates import BETTER_FOUND, INTERVALS, profiled_estimates
 from .maximum import (
     THINNED,
     another_top,
@@ -29,13 +28,14 @@ from .maximum import (
     summary,
     top,
 )
-from .objective import Objective
 from .offsets import centred
-from .search import METHODS, Box, minimise
-from .settle import rivalled, settle, settle_finely
-from .starts import Runner, Starts, apart, at_typical_sizes, space_filling
+from .search.box import free_box, objective_of
+from .search.objective import Objective
+from .search.search import METHODS, Box, minimise
+from .search.settle import rivalled, settle, settle_finely
+from .search.starts import Runner, Starts, apart, at_typical_sizes, space_filling
+from .search.usual_tyres import from_usual_tyres
 from .suspects import explaining
-from .usual_tyres import from_usual_tyres
 
 _STARTED = 0.3  # of the time that a search has, for its starts
 _OFFSETS = 2  # times that offsets of logs and what they share are found in turn

@@ -12,15 +12,15 @@ from .._common.arrays import FloatArray
 from ..errors import NumericalError
 from ..estimate import Driving, NoiseModel
 from ..model import Model
-from .box import free_box, objective_of
-from .climb import FAR_BELOW, to_the_top
-from .estimates import wald
 from .fit import Fit
-from .objective import Objective
+from .intervals.estimates import wald
 from .offsets import marginal_information
-from .other_noise import likelier_noise
-from .settle import moved, settle
-from .starts import Starts
+from .search.box import free_box, objective_of
+from .search.climb import FAR_BELOW, to_the_top
+from .search.objective import Objective
+from .search.other_noise import likelier_noise
+from .search.settle import moved, settle
+from .search.starts import Starts
 
 _SLOPES_MPS2 = (0.05, 0.2)  # of a road whose slope varies, to begin with
 _HINT, _SHOWN = 2.0, 20.0  # nats that a road gains at first sight, and learned

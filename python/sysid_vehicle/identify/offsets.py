@@ -20,11 +20,11 @@ from ..errors import InvalidInput, NumericalError
 from ..estimate import Driving, NoiseModel, noise_range
 from ..log import Log
 from ..model import Model
-from .ahead import predicting_ahead
-from .box import free_box, free_prior
+from .ahead.ahead import predicting_ahead
 from .fit import Fit
-from .objective import Objective
-from .settle import moved
+from .search.box import free_box, free_prior
+from .search.objective import Objective
+from .search.settle import moved
 
 OFFSETS = "offsets"
 """With a fit the question that `Driving.told` may answer, by `Settled`."""

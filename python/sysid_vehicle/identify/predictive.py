@@ -22,11 +22,11 @@ from .._common.memo import remembered
 from ..estimate import Driving, NoiseModel
 from ..estimate.pieces import DrivingProblem
 from ..model import Model
-from .box import free_box, objective_of
 from .fit import Fit
-from .objective import Penalised
 from .offsets import driving_of
-from .search import Box, minimise
+from .search.box import free_box, objective_of
+from .search.objective import Penalised
+from .search.search import Box, minimise
 
 _PASSES, _ROUNDS = 3, 20
 _ENOUGH = 0.1  # nats

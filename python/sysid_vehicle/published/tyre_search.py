@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
-from ..identify.objective import LinearRows
-from ..identify.starts import Runner
-from ..identify.walk import looking_alike
+from ..identify.search.objective import LinearRows
+from ..identify.search.starts import Runner
+from ..identify.search.walk import looking_alike
 from ..lab.tyres.projection import Regression
 from ..lab.tyres.regression_search import COARSE, EXACT, FINE, ROUGH, RegressionTask
 

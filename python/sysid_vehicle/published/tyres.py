@@ -13,8 +13,8 @@ from .._common.printed import Part, Printed, Table
 from .._common.progress import doing
 from .._common.text import number
 from ..errors import InvalidInput
-from ..identify.search import METHODS
-from ..identify.starts import Starts, space_filling
+from ..identify.search.search import METHODS
+from ..identify.search.starts import Starts, space_filling
 from ..lab.tyres.data import GreyBoxVehicle
 from ..lab.tyres.fit import PARAMETERS
 from ..lab.tyres.motion import TyreMotion

@@ -18,7 +18,7 @@ from sysid_vehicle.diagnose.candidates.refits import (
 from sysid_vehicle.diagnose.diagnose import _hidden_by_tyres
 from sysid_vehicle.effects import catalogue
 from sysid_vehicle.identify import refit
-from sysid_vehicle.identify.objective import Objective
+from sysid_vehicle.identify.search.objective import Objective
 from sysid_vehicle.model import NUISANCES
 
 RELAXATIONS = ("tyre_relaxation", "front_tyre_relaxation", "rear_tyre_relaxation")

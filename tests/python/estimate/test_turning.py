@@ -7,7 +7,7 @@ import pytest
 
 from sysid_vehicle import Fit, Log
 from sysid_vehicle.estimate import Driving, turning, turning_blocks
-from sysid_vehicle.identify.windows import turns_of, windows_of
+from sysid_vehicle.identify.ahead.windows import turns_of, windows_of
 from sysid_vehicle.rules import worse
 from sysid_vehicle.study.ahead.horizons import PREDICTED, changes, horizons
 

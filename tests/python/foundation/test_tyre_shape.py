@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid_vehicle.identify.tyre_shape import look_alike, peak_slip, stiffness
+from sysid_vehicle.identify.search.tyre_shape import look_alike, peak_slip, stiffness
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from sysid_vehicle import (
 )
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import METHODS, refine, refit
-from sysid_vehicle.identify.search import Box, minimise
+from sysid_vehicle.identify.search.search import Box, minimise
 
 G = 9.80665
 WHATS = ("cornering stiffness", "peak friction", "slip at the peak")

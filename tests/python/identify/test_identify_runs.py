@@ -19,7 +19,7 @@ from sysid_vehicle import (
 )
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import objective_of
-from sysid_vehicle.identify.mapped import Copied, Mapped
+from sysid_vehicle.identify.search.mapped import Copied, Mapped
 
 LOAD, GRIP = "mass.relative_error", "D_front"
 LOADS = {"full": 0.08, "empty": -0.03}

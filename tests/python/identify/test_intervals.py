@@ -5,9 +5,9 @@ import pytest
 
 from sysid_vehicle import Fit, InvalidInput, Log, Model, identify
 from sysid_vehicle.identify import profile_fit, refit
-from sysid_vehicle.identify.estimates import wald
-from sysid_vehicle.identify.objective import Penalised, gaussian_prior
-from sysid_vehicle.identify.search import Box
+from sysid_vehicle.identify.intervals.estimates import wald
+from sysid_vehicle.identify.search.objective import Penalised, gaussian_prior
+from sysid_vehicle.identify.search.search import Box
 
 SHAPES = ("C_front", "C_rear", "E_front", "E_rear")
 HALF = 0.5 * 1.96**2  # nats that the end of a 95 % interval costs

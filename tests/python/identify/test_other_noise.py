@@ -9,9 +9,9 @@ from sysid_vehicle import Model, Vehicle, effect, manoeuvres
 from sysid_vehicle.errors import NumericalError
 from sysid_vehicle.estimate import Driving, first_guess
 from sysid_vehicle.identify import Fit, refine
-from sysid_vehicle.identify.box import free_box
 from sysid_vehicle.identify.maximum import objectives
-from sysid_vehicle.identify.other_noise import likelier_noise
+from sysid_vehicle.identify.search.box import free_box
+from sysid_vehicle.identify.search.other_noise import likelier_noise
 from sysid_vehicle.simulate import RoadDisturbance, drive
 
 FAST_S, SLOW_S = 0.02, 0.7

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sysid_vehicle.identify.search import Box, _eased, minimise
-from sysid_vehicle.identify.starts import apart
+from sysid_vehicle.identify.search.search import Box, _eased, minimise
+from sysid_vehicle.identify.search.starts import apart
 
 
 def test_damping_follows_what_was_gained_of_what_was_promised() -> None:

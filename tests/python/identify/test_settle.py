@@ -8,10 +8,10 @@ import pytest
 
 from sysid_vehicle import _core
 from sysid_vehicle.errors import NumericalError
-from sysid_vehicle.identify.climb import _slope, climb
-from sysid_vehicle.identify.objective import Objective
-from sysid_vehicle.identify.search import Box
-from sysid_vehicle.identify.settle import risen, rivalled, settle
+from sysid_vehicle.identify.search.climb import _slope, climb
+from sysid_vehicle.identify.search.objective import Objective
+from sysid_vehicle.identify.search.search import Box
+from sysid_vehicle.identify.search.settle import risen, rivalled, settle
 
 
 class Ridge:

@@ -8,11 +8,11 @@ import pytest
 import sysid_vehicle as sv
 from sysid_vehicle.estimate import Driving, first_guess
 from sysid_vehicle.identify import maximum
-from sysid_vehicle.identify.box import free_box
 from sysid_vehicle.identify.maximum import objectives
-from sysid_vehicle.identify.objective import Objective
-from sysid_vehicle.identify.tyre_shape import of_usual_shape, stiffness
-from sysid_vehicle.identify.usual_tyres import from_usual_tyres
+from sysid_vehicle.identify.search.box import free_box
+from sysid_vehicle.identify.search.objective import Objective
+from sysid_vehicle.identify.search.tyre_shape import of_usual_shape, stiffness
+from sysid_vehicle.identify.search.usual_tyres import from_usual_tyres
 
 Place = tuple[Objective, list[Objective], Driving]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import InvalidInput, Model, NumericalError, Tyre, published
-from sysid_vehicle.identify.search import Box, minimise
+from sysid_vehicle.identify.search.search import Box, minimise
 from sysid_vehicle.lab import (
     Design,
     Limits,

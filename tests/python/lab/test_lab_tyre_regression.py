@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from sysid_vehicle.errors import InvalidInput
-from sysid_vehicle.identify.tyre_shape import friction
+from sysid_vehicle.identify.search.tyre_shape import friction
 from sysid_vehicle.lab import (
     GreyBoxVehicle,
     TyreMotion,

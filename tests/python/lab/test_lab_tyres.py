@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from sysid_vehicle import Log
 from sysid_vehicle.cli import main
 from sysid_vehicle.errors import InvalidInput
-from sysid_vehicle.identify.tyre_shape import peak_slip, stiffness, top
+from sysid_vehicle.identify.search.tyre_shape import peak_slip, stiffness, top
 from sysid_vehicle.lab import (
     GreyBoxVehicle,
     TyreFit,

@@ -39,7 +39,7 @@ from sysid_vehicle.identify import (
     refine_above,
     refine_while,
 )
-from sysid_vehicle.identify.ahead import _Ahead
+from sysid_vehicle.identify.ahead.ahead import _Ahead
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.sensors.low_pass import _Problem
 from sysid_vehicle.sensors.spectrum import _bias, _of_windows, spectrum_of

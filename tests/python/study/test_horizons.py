@@ -9,7 +9,7 @@ import pytest
 
 from sysid_vehicle import Fit, InvalidInput, Log, compare
 from sysid_vehicle.estimate import Driving, turning, turning_blocks
-from sysid_vehicle.identify.ahead import of_few
+from sysid_vehicle.identify.ahead.ahead import of_few
 from sysid_vehicle.rules import Share, worse
 from sysid_vehicle.study import validation
 from sysid_vehicle.study.ahead.beyond import Beyond, beyond_noise, own_share

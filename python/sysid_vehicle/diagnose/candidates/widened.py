@@ -26,9 +26,9 @@ import numpy.typing as npt
 from ..._common.arrays import FloatArray, as_float64
 from ...estimate import Driving
 from ...identify import Fit
-from ...identify.ahead import of_few
-from ...identify.box import free_box
-from ...identify.estimates import spread_of
+from ...identify.ahead.ahead import of_few
+from ...identify.intervals.estimates import spread_of
+from ...identify.search.box import free_box
 from ..evidence.directions import Directions
 from ..evidence.evidence import Evidence
 from .instead import Rivals

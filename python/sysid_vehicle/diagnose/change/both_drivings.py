@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
-from ...identify.objective import Predicting, Together
+from ...identify.search.objective import Predicting, Together
 
 
 class OneDriving(Predicting, Together, Protocol):

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..._common.arrays import FloatArray
 from ...errors import NumericalError
-from ...identify.objective import Objective
-from ...identify.search import Box
-from ...identify.settle import moved
-from ...identify.starts import SAME_VALLEY
+from ...identify.search.objective import Objective
+from ...identify.search.search import Box
+from ...identify.search.settle import moved
+from ...identify.search.starts import SAME_VALLEY
 
 _REFREEZES = 6
 _ENOUGH = 0.05  # nats that a step gains

@@ -12,8 +12,8 @@ from ..._common.arrays import FloatArray, as_float64
 from ...effects import Effect
 from ...errors import NumericalError
 from ...identify import Fit
-from ...identify.box import free_box
-from ...identify.climb import climb as to_the_maximum
+from ...identify.search.box import free_box
+from ...identify.search.climb import climb as to_the_maximum
 from ...model import Model
 from ...rules import USUAL, Rules
 from ..candidates.possible import OF_A_FACTOR

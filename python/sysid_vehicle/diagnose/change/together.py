@@ -14,8 +14,8 @@ from ..._common.arrays import FloatArray, as_float64
 from ...errors import NumericalError
 from ...estimate import noise_range
 from ...identify import Fit
-from ...identify.box import free_box
-from ...identify.objective import LinearRows, Objective, Predicting
+from ...identify.search.box import free_box
+from ...identify.search.objective import LinearRows, Objective, Predicting
 from ...model import Model
 from .beside_reference import Shared
 from .both_drivings import BothDrivings

@@ -19,7 +19,7 @@ from ..._common.threads import check_time
 from ...errors import NumericalError
 from ...estimate import MEASURED, generous
 from ...identify import Fit, free_box, objective_of, settle
-from ...identify.search import Box, minimise
+from ...identify.search.search import Box, minimise
 from ...log import Log
 from ...model import Model
 from ...simulate import RoadDisturbance

@@ -11,7 +11,7 @@ import numpy as np
 from ..._common.printed import Part, Printed, Table
 from ..._common.style import AFTER, BEFORE, FLOOR, MEASURED, axes_or_new, tidy
 from ..._common.text import number
-from ...identify.estimates import std_of_data
+from ...identify.intervals.estimates import std_of_data
 from ...model import Model
 from ...vehicle import AXLES
 from ..drive.loop import ClosedLoop, run_closed_loop

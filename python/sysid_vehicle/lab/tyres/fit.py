@@ -13,11 +13,11 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.printed import Part, Printed, Table
 from ..._common.style import AFTER, BEFORE, axes_or_new, tidy
 from ..._common.text import HALF_95, number
-from ...identify.estimates import Estimate, Estimated
-from ...identify.profile import Profile
-from ...identify.quantities import Quantity, parameter, std_of, tyre_quantity
-from ...identify.starts import Starts
-from ...identify.tyre_shape import COMBINATIONS, friction, peak_slip, slope_of
+from ...identify.intervals.estimates import Estimate, Estimated
+from ...identify.intervals.profile import Profile
+from ...identify.intervals.quantities import Quantity, parameter, std_of, tyre_quantity
+from ...identify.search.starts import Starts
+from ...identify.search.tyre_shape import COMBINATIONS, friction, peak_slip, slope_of
 from ...vehicle import AXLES
 from .data import GreyBoxVehicle, TyreLog
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..._common.text import number
 from ...errors import InvalidInput, near_names
-from ...identify.profile import LEVEL, Optimum, lost_at
+from ...identify.intervals.profile import LEVEL, Optimum, lost_at
 from .fit import TyreFit
 from .problem import box_of, objective_of
 

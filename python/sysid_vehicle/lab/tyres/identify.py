@@ -13,12 +13,12 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.progress import doing
 from ...errors import InvalidInput, warn
 from ...estimate.inputs import white_noise_std
-from ...identify.estimates import BETTER_FOUND, box_covariance, profiled_estimates, wald
-from ...identify.objective import Objective
-from ...identify.search import METHODS, Box
-from ...identify.settle import bottom, descend, settle, settle_finely
-from ...identify.starts import Runner, Search, Starts, space_filling
-from ...identify.walk import alternate
+from ...identify.intervals.estimates import BETTER_FOUND, box_covariance, profiled_estimates, wald
+from ...identify.search.objective import Objective
+from ...identify.search.search import METHODS, Box
+from ...identify.search.settle import bottom, descend, settle, settle_finely
+from ...identify.search.starts import Runner, Search, Starts, space_filling
+from ...identify.search.walk import alternate
 from ...vehicle import slip_angles
 from .data import GreyBoxVehicle, TyreLog
 from .fit import PARAMETERS, UNITS, Rival, TyreFit

@@ -19,8 +19,8 @@ from ...effects import base_parameters, effect
 from ...effects.formula import TARGETS, trace
 from ...errors import InvalidInput, near_names
 from ...estimate import MEASURED, NoiseModel
-from ...identify.objective import Objective, gaussian_prior
-from ...identify.search import Box
+from ...identify.search.objective import Objective, gaussian_prior
+from ...identify.search.search import Box
 from ..observer.observed import READINGS
 from .data import SHORTEST, GreyBoxVehicle, TyreLog
 from .fit import PARAMETERS

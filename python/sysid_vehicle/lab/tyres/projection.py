@@ -11,8 +11,8 @@ import numpy as np
 import scipy
 
 from ..._common.arrays import FloatArray, as_float64
-from ...identify.objective import Problem
-from ...identify.search import least_within
+from ...identify.search.objective import Problem
+from ...identify.search.search import least_within
 
 
 @dataclass

@@ -8,8 +8,8 @@ from typing import TypeVar
 import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
-from ...identify.objective import LinearRows, Penalised
-from ...identify.search import Box, minimise
+from ...identify.search.objective import LinearRows, Penalised
+from ...identify.search.search import Box, minimise
 from .data import GreyBoxVehicle
 from .fit import PARAMETERS
 from .motion import TyreMotion

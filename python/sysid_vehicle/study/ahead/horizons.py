@@ -20,7 +20,7 @@ from ..._common.text import html_table, number, text_table
 from ...errors import NumericalError
 from ...estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_blocks
 from ...identify import Fit
-from ...identify.ahead import of_few
+from ...identify.ahead.ahead import of_few
 from ...rules import ErrorChange
 from .waterfall import all_ahead
 

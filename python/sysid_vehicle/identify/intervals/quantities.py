@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._common.arrays import FloatArray, as_float64
-from .tyre_shape import slope_of
+from ..._common.arrays import FloatArray, as_float64
+from ..search.tyre_shape import slope_of
 
 
 @dataclass(frozen=True)

@@ -17,18 +17,18 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from .. import _core
-from .._common.arrays import FloatArray, as_float64
-from .._common.threads import in_parallel
-from ..errors import InvalidInput, NumericalError
-from ..estimate import Driving, NoiseModel
-from ..estimate.pieces import DrivingProblem
-from ..model import Model
-from .box import free_box, free_prior
-from .estimates import wald
-from .fit import Fit
-from .objective import LinearRows, Penalised
-from .search import Box, minimise
+from ... import _core
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.threads import in_parallel
+from ...errors import InvalidInput, NumericalError
+from ...estimate import Driving, NoiseModel
+from ...estimate.pieces import DrivingProblem
+from ...model import Model
+from ..fit import Fit
+from ..intervals.estimates import wald
+from ..search.box import free_box, free_prior
+from ..search.objective import LinearRows, Penalised
+from ..search.search import Box, minimise
 from .windows import Gains, Windows, blocks_of, counting, squares_of, turns_of, windows_of
 
 # Windows that err by more than so many times the typical error count as lost, but of all windows

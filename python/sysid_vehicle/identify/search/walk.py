@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from .._common.arrays import FloatArray
+from ..._common.arrays import FloatArray
 from .objective import Objective
 from .search import Box, minimise
 from .settle import descend, settle

@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from .._common.arrays import FloatArray, as_float64
-from .._common.progress import with_progress
-from .._common.style import AFTER, BEFORE, axes_or_new, tidy
-from .._common.threads import Workers
-from ..errors import NumericalError
-from ..model import Model
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.progress import with_progress
+from ..._common.style import AFTER, BEFORE, axes_or_new, tidy
+from ..._common.threads import Workers
+from ...errors import NumericalError
+from ...model import Model
 from .search import Box
 
 if TYPE_CHECKING:

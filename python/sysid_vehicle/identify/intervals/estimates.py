@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .._common.arrays import FloatArray, as_float64
-from .._common.text import HALF_95, number
-from .objective import Objective
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.text import HALF_95, number
+from ..search.objective import Objective
+from ..search.search import Box
 from .profile import Optimum, Profile, profile_all
 from .quantities import Quantity
-from .search import Box
 
 BETTER_FOUND = 4
 """Times that profiling may lead to a better optimum."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import _core
-from ..estimate import Driving, noise_range
-from ..estimate.pieces import DrivingProblem
-from ..model import Model
+from ... import _core
+from ...estimate import Driving, noise_range
+from ...estimate.pieces import DrivingProblem
+from ...model import Model
 from .objective import LinearRows, Objective, gaussian_prior
 from .search import Box
 

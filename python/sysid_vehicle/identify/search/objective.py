@@ -12,10 +12,10 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from .._common.arrays import FloatArray, as_float64
-from .._common.threads import check_time
-from ..errors import NumericalError
-from ..estimate import Learned, maximise_noise, promised_by_noise
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.threads import check_time
+from ...errors import NumericalError
+from ...estimate import Learned, maximise_noise, promised_by_noise
 
 # Gains that are kept; samples above which only the last ones are, and no normal equations.
 _KEPT, _LONG = 3, 100_000

@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from .._common.arrays import FloatArray
-from ..errors import NumericalError
-from ..estimate import Learned
-from ..estimate.noise import DISTURBANCE, TIMES
+from ..._common.arrays import FloatArray
+from ...errors import NumericalError
+from ...estimate import Learned
+from ...estimate.noise import DISTURBANCE, TIMES
 from .climb import FAR_BELOW, to_the_top
 from .objective import Objective
 from .search import SLIGHT, Box, stride

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .._common.arrays import FloatArray
-from ..errors import NumericalError
+from ..._common.arrays import FloatArray
+from ...errors import NumericalError
 from .objective import Objective
 from .search import Box, minimise
 from .starts import SAME_VALLEY

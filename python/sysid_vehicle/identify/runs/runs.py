@@ -16,21 +16,21 @@ from typing import Any
 import numpy as np
 import scipy
 
-from .._common.arrays import FloatArray, as_float64
-from .._common.printed import Part, Printed, Table
-from .._common.text import brief, number, unit_after, with_error
-from ..errors import InvalidInput, near_names
-from ..estimate import Driving, NoiseModel
-from ..log import Log
-from ..model import Model
-from .estimates import Estimate, wald
-from .fit import Fit
-from .identify import identify
-from .objective import Objective
-from .runs_layout import RunsLayout
-from .settle import settle
-from .starts import Starts
-from .suspects import explaining
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.printed import Part, Printed, Table
+from ..._common.text import brief, number, unit_after, with_error
+from ...errors import InvalidInput, near_names
+from ...estimate import Driving, NoiseModel
+from ...log import Log
+from ...model import Model
+from ..fit import Fit
+from ..identify import identify
+from ..intervals.estimates import Estimate, wald
+from ..search.objective import Objective
+from ..search.settle import settle
+from ..search.starts import Starts
+from ..suspects import explaining
+from .layout import RunsLayout
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from .._common.arguments import generator, whole
-from .._common.arrays import FloatArray, as_float64
-from .._common.printed import Part, Printed, Table
-from .._common.progress import with_progress
-from .._common.tables import frame, imported
-from .._common.text import brief, number
-from ..errors import InvalidInput
-from ..estimate import Driving, NoiseModel
-from ..model import Model
-from .box import free_box, objective_of
+from ..._common.arguments import generator, whole
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.printed import Part, Printed, Table
+from ..._common.progress import with_progress
+from ..._common.tables import frame, imported
+from ..._common.text import brief, number
+from ...errors import InvalidInput
+from ...estimate import Driving, NoiseModel
+from ...model import Model
+from ..search.box import free_box, objective_of
 from .estimates import Estimated
 
 _BATCH, _BATCHES = 4096, 400

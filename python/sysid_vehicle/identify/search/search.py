@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from .. import _core
-from .._common.arrays import FloatArray, as_float64
+from ... import _core
+from ..._common.arrays import FloatArray, as_float64
 from .objective import Problem
 
 _LEAST_DAMPING = 1e-9

@@ -10,11 +10,11 @@ from operator import itemgetter
 import numpy as np
 import numpy.typing as npt
 
-from .. import _core
-from .._common.arrays import FloatArray, as_float64
-from ..errors import InvalidInput
-from ..estimate import Driving, turning
-from ..model import Model
+from ... import _core
+from ..._common.arrays import FloatArray, as_float64
+from ...errors import InvalidInput
+from ...estimate import Driving, turning
+from ...model import Model
 
 _MOST = 400  # windows
 _BLOCK_S, _FEWEST = 10.0, 6  # windows of one such time are wrong alike; fewest such times

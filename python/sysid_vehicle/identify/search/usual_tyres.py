@@ -13,9 +13,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._common.arrays import FloatArray
-from ..errors import NumericalError
-from ..estimate.noise import DISTURBANCE
+from ..._common.arrays import FloatArray
+from ...errors import NumericalError
+from ...estimate.noise import DISTURBANCE
 from .objective import Objective
 from .search import SLIGHT, Box, stride
 from .settle import settle

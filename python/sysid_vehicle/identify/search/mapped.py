@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._common.arrays import FloatArray, as_float64
+from ..._common.arrays import FloatArray, as_float64
 from .objective import Predicting
 
 _Places = npt.NDArray[np.intp]

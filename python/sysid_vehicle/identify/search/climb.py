@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
-from .._common.arrays import FloatArray, as_float64
-from .._common.threads import in_parallel
+from ... import _core
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.threads import in_parallel
 from .objective import LinearRows, Objective
 from .search import SLIGHT, Box, minimise, stride
 from .settle import risen

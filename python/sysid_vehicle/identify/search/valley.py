@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from .._common.arrays import FloatArray, as_float64
-from ..errors import NumericalError
+from ..._common.arrays import FloatArray, as_float64
+from ...errors import NumericalError
 from .objective import Problem
 from .search import Box, least_within
 

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._common.arrays import FloatArray, as_float64
-from .._common.progress import with_progress
-from .._common.style import AFTER, FLOOR, axes_or_new, tidy
-from .._common.text import HALF_95, number
-from .._common.threads import Workers
-from .objective import Objective, Penalised
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.progress import with_progress
+from ..._common.style import AFTER, FLOOR, axes_or_new, tidy
+from ..._common.text import HALF_95, number
+from ..._common.threads import Workers
+from ..search.objective import Objective, Penalised
+from ..search.search import Box
+from ..search.valley import down_the_valley
 from .quantities import Quantity
-from .search import Box
-from .valley import down_the_valley
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import scipy
 
-from .._common.arrays import FloatArray, as_float64
-from ..tyre import Tyre, magic_formula
+from ..._common.arrays import FloatArray, as_float64
+from ...tyre import Tyre, magic_formula
 
 _PEAKLESS = 1.0 + 1e-6
 _RELATIVE = 1e-12  # error of the slip at the peak

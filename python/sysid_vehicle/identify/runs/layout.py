@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
-from .._common.arrays import FloatArray, as_float64
-from ..estimate import Driving, noise_range
-from ..model import Model
-from .box import free_box
-from .mapped import Copied, Mapped
-from .objective import Objective, gaussian_prior
-from .search import Box
+from ... import _core
+from ..._common.arrays import FloatArray, as_float64
+from ...estimate import Driving, noise_range
+from ...model import Model
+from ..search.box import free_box
+from ..search.mapped import Copied, Mapped
+from ..search.objective import Objective, gaussian_prior
+from ..search.search import Box
 
 
 @dataclass(frozen=True)

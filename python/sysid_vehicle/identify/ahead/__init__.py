@@ -1,0 +1,1 @@
+"""Parameters that predict best some seconds ahead."""

@@ -1,0 +1,1 @@
+"""Several runs at once, whose parameters differ or are tied."""
