@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from .._common.arrays import FloatArray, as_float64
 from ..sensors import SensorCheck
-from ..sensors.motion import Basis, Grid, IntArray
+from ..sensors.kinematics.motion import Basis, Grid, IntArray
 
 _AT_ONCE = 100  # draws
 

@@ -12,11 +12,11 @@ from .._common.progress import doing
 from ..errors import SysidError
 from ..log import Log, several_logs
 from ..vehicle import Vehicle
-from .equations import FAULTS, Readings
-from .estimate import Estimate, estimate, noise_of, preferred
 from .faults import Rival, SensorFault, doubted, faults_of
-from .motion import Grid, Stretch
-from .parts import cut
+from .kinematics.equations import FAULTS, Readings
+from .kinematics.estimate import Estimate, estimate, noise_of, preferred
+from .kinematics.motion import Grid, Stretch
+from .kinematics.parts import cut
 from .result import SensorCheck
 from .signals import MOVING, Signal, averaged, pieces, readings_of, refuse_mixed_up, signals
 

@@ -19,11 +19,11 @@ import scipy
 
 from .._common.arrays import ComplexArray, FloatArray
 from ..log import Log
-from .forms import Response
-from .low_pass import NoiseFit, fitted, with_low_pass
-from .motion import IntArray
+from .kinematics.motion import IntArray
+from .low_pass.forms import Response
+from .low_pass.low_pass import NoiseFit, fitted, with_low_pass
+from .low_pass.spectrum import NoiseSpectrum, Spectrum, spectrum_of, steady
 from .signals import MOVING, own_samples, quantum
-from .spectrum import NoiseSpectrum, Spectrum, spectrum_of, steady
 
 _EDGE_S: Final = 0.5
 _BESIDE_GAP_S: Final = 0.1  # which a filter that is undone carries far no more

@@ -10,9 +10,9 @@ import numpy as np
 import scipy
 
 from .._common.text import HALF_95
-from .equations import lean
-from .estimate import Estimate
-from .parts import scatter
+from .kinematics.equations import lean
+from .kinematics.estimate import Estimate
+from .kinematics.parts import scatter
 from .texts import DEG, why_not
 
 _FALSE_CLAIMS = 0.01  # over all faults of one check

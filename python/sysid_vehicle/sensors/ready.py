@@ -9,8 +9,8 @@ from ..log import Log
 from .apply import corrected
 from .check import checked
 from .condition import conditioned
-from .estimate import Estimate
 from .faults import SensorFault, to_put_right
+from .kinematics.estimate import Estimate
 
 _DELAYS = ("delay_vx_s", "delay_vy_s", "delay_ay_s")
 _LEVEL_MPS2 = 0.05  # change of gravity within a second, on a road that counts as level

@@ -19,11 +19,11 @@ from ..log import Log
 from ..rules import USUAL, Rules
 from ..vehicle import Vehicle
 from .apply import LATE, corrected
-from .colour import Colour
-from .equations import Readings, lean
-from .estimate import Estimate
 from .faults import SensorFault, leaning, to_put_right
-from .motion import Stretch
+from .kinematics.colour import Colour
+from .kinematics.equations import Readings, lean
+from .kinematics.estimate import Estimate
+from .kinematics.motion import Stretch
 from .settled import narrowed, settled
 from .signals import MOVING, Signal
 from .texts import ON_CORRECTION, gradient, map_line

@@ -15,9 +15,9 @@ from ..log import CHANNELS, MEASURED, Log, held_rows
 from ..log.regression import in_most
 from ..log.signals import runs
 from ..vehicle import GRAVITY_MPS2
-from .colour import neighbours
-from .equations import Readings
-from .motion import IntArray, Stretch
+from .kinematics.colour import neighbours
+from .kinematics.equations import Readings
+from .kinematics.motion import IntArray, Stretch
 
 MOVING = MEASURED  # channels of which the motion is made
 _SLOWEST_MPS = 3.0

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle.sensors.motion import Stretch
-from sysid_vehicle.sensors.parts import Scatter, cut, scatter
+from sysid_vehicle.sensors.kinematics.motion import Stretch
+from sysid_vehicle.sensors.kinematics.parts import Scatter, cut, scatter
 
 
 def test_parts_are_of_one_length_and_hold_all_the_driving() -> None:

@@ -30,7 +30,6 @@ from sysid_vehicle._common.threads import at_most
 from sysid_vehicle.diagnose.unexplained.ceiling import left_out
 from sysid_vehicle.estimate import Driving, first_guess
 from sysid_vehicle.identify import (
-    ahead,
     driving_of,
     maximum,
     offsets,
@@ -39,10 +38,11 @@ from sysid_vehicle.identify import (
     refine_above,
     refine_while,
 )
+from sysid_vehicle.identify.ahead import ahead
 from sysid_vehicle.identify.ahead.ahead import _Ahead
 from sysid_vehicle.rules import USUAL
-from sysid_vehicle.sensors.low_pass import _Problem
-from sysid_vehicle.sensors.spectrum import _bias, _of_windows, spectrum_of
+from sysid_vehicle.sensors.low_pass.low_pass import _Problem
+from sysid_vehicle.sensors.low_pass.spectrum import _bias, _of_windows, spectrum_of
 from sysid_vehicle.study import validation
 from sysid_vehicle.study.judge.answers import answers_of
 from sysid_vehicle.study.results import failing

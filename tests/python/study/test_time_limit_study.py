@@ -14,8 +14,8 @@ import pytest
 from sysid_vehicle import Fit, Log, Model, _core, drive, improve, manoeuvres
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify.identify import maximised
-from sysid_vehicle.sensors import estimate as _estimate
-from sysid_vehicle.sensors import low_pass as _low_pass
+from sysid_vehicle.sensors.kinematics import estimate as _estimate
+from sysid_vehicle.sensors.low_pass import low_pass as _low_pass
 from sysid_vehicle.study.judge import judge
 from sysid_vehicle.study.search.search import Search, Trail
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._common.arrays import FloatArray, as_float64
+from ..._common.arrays import FloatArray, as_float64
 from .equations import Readings
 from .system import Linearised, Normal
 

@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from .._common.arrays import FloatArray
-from .._common.threads import check_time
+from ..._common.arrays import FloatArray
+from ..._common.threads import check_time
 from .forms import ROAD, Response, count, folded, images_of, parts_of
 from .spectrum import Spectrum
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from .._common.arrays import FloatArray, as_float64
+from ..._common.arrays import FloatArray, as_float64
 
 LOWEST_HZ: Final = 5.0  # the motion of a car has next to nothing beyond
 _HIGHEST: Final = 0.45  # of the sampling rate

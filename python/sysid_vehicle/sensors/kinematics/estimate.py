@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from .._common.arrays import FloatArray, as_float64
-from .._common.threads import check_time
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.threads import check_time
 from .colour import Colour, fit_colour, neighbours
 from .covariance import covariance_of, inflated
 from .equations import FAULTS, Readings, predict

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from .._common.arrays import FloatArray
+from ..._common.arrays import FloatArray
 from .motion import Basis, Grid, IntArray
 
 

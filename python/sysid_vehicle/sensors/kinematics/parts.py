@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from .._common.text import HALF_95
+from ..._common.text import HALF_95
 from .motion import Stretch
 
 _PART_S = 60.0  # a shorter one may find another explanation by chance

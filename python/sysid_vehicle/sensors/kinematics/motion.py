@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from .._common.arrays import FloatArray
+from ..._common.arrays import FloatArray
 
 IntArray = npt.NDArray[np.intp]
 

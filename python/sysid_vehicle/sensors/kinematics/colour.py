@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from .._common.arrays import NORMAL_MAD, FloatArray
+from ..._common.arrays import NORMAL_MAD, FloatArray
 from .motion import IntArray
 
 _LONGEST = 8

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from .._common.arrays import FloatArray, as_float64
-from ..errors import NumericalError
+from ..._common.arrays import FloatArray, as_float64
+from ...errors import NumericalError
 from .colour import Colour
 from .equations import Readings, predict
 from .motion import Grid, IntArray

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from .._common.arrays import FloatArray
+from ..._common.arrays import FloatArray
 from .spectrum import LOWEST_HZ, Spectrum
 
 _ROAD_HZ: Final = (3.0, 8.0)  # corners of noise that falls by 6 dB per octave

@@ -1,0 +1,1 @@
+"""A low-pass in the spectra of a device."""
