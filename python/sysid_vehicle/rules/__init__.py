@@ -29,7 +29,8 @@
    anew. Nothing that has no share of either kind takes more, and moves a channel that
    it moves. All that was added together is shown to take a share, of that error or of what could
    be explained of it. Nothing else speaks against it: a value, not only an end of its interval,
-   that no car has or that does not matter; errors ahead of its motion that grow with all that was
+   that no car has or that does not matter; an interval that holds no effect where it includes what
+   is missing (`insignificant`); errors ahead of its motion that grow with all that was
    added, as the models are fitted; validation data that by themselves tell another one, so
    that both do not show it to be off nothing (`insignificant`); an effect like it that is likelier
    in its place (`apart`).

@@ -89,6 +89,20 @@ def test_names_are_asked_of_values_and_of_what_is_likelier_in_their_place(
     assert "validation data alone give another value" in against(0.0)["aero_downforce"]
 
 
+def test_no_name_stands_whose_interval_holds_no_effect_beside_what_is_missing(fit: Fit) -> None:
+    test = Driving.of(drive(fit.model, manoeuvres.lap(20.0), seed=4, rate_hz=50.0))
+    bare = refit(fit.model.drop("aero_downforce"), fit.driving, fit.noise)
+    name = ["aero_downforce"]
+    # Standard errors of a fifth and of the whole of its size.
+    own = fit.covariance.diagonal()[[e.name == NAME for e in fit.estimates]]
+    size = fit[NAME].value ** 2 / float(own.max())
+    sure, unsure = (times * size * fit.covariance for times in (0.04, 1.0))
+    assert spoken_against(bare, fit, name, name, {}, test, wide=sure) == {}
+    found = spoken_against(bare, fit, name, name, {}, test, wide=unsure)
+    assert "does not exclude zero" in found["aero_downforce"]
+    assert spoken_against(bare, fit, name, [], {}, test, wide=unsure) == {}  # one of a group
+
+
 def test_no_name_stands_for_what_makes_errors_grow(fit: Fit) -> None:
     """The motion that an effect moves counts; what is lost is as wrong as anything."""
     name = ["aero_downforce"]

@@ -7,7 +7,9 @@ relied on: a stand-in is known as closely as the effect itself. So such a name i
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
+from ..._common.arrays import FloatArray
 from ..._common.text import few, number, unit_after
 from ...diagnose import possible
 from ...diagnose.candidates.possible import sizes
@@ -16,6 +18,8 @@ from ...estimate import Driving
 from ...identify import Fit
 from ...rules import USUAL, Rules
 from ..ahead.horizons import errors_grow
+from ..results.widened import estimates_of
+from ..search.steps import insignificant
 from ..search.together import InPlace
 from ..validation import gain_in_log_likelihood
 from .disagree import Disagreement, disagreements
@@ -29,10 +33,12 @@ def spoken_against(
     in_place: Mapping[str, InPlace],
     test: Driving,
     rules: Rules = USUAL,
+    wide: FloatArray | None = None,
 ) -> dict[str, str]:
     """Find what speaks against names of added effects: by effect, in words.
 
     Its value itself, not an end of its interval, is one that no car has, or too small to matter.
+    Its interval, what is missing included, holds no effect at all.
     The errors ahead of what it moves grow with all that was added. Validation data by themselves
     tell another value. Or an effect that acts like it is likelier in its place, on training and on
     validation data.
@@ -50,9 +56,15 @@ def spoken_against(
     test : Driving
         Validation data.
     rules : Rules
+    wide : array, shape (parameters, parameters), optional
+        Covariance of the final model's parameters that includes what is missing.
     """
     parts = {part.id: part for part in final.model.parts}
     found = {e: of_no_use(parts[e], final, rules, small=e in alone) for e in asked}
+    unfelt = set() if wide is None else _unfelt(final, wide, rules)
+    for effect in unfelt.intersection(alone):
+        if not found[effect]:
+            found[effect] = "its interval, with what is missing included, does not exclude zero"
     for effect in asked:
         if not found[effect] and errors_grow(first, final, test, parts[effect].moved):
             found[effect] = "as fitted, the errors 0.5 to 5 s ahead of the channels it moves grow"
@@ -71,6 +83,12 @@ def spoken_against(
                     f"{few(better)} in its place would fit training and validation data better"
                 )
     return {e: because for e, because in found.items() if because}
+
+
+def _unfelt(fit: Fit, wide: FloatArray, rules: Rules) -> set[str]:
+    """Effects that are shown to be off nothing only if nothing else is missing."""
+    known = estimates_of(fit, wide)[: len(fit.estimates)]
+    return insignificant(replace(fit, estimates=known), rules) - insignificant(fit, rules)
 
 
 def of_no_use(effect: Effect, fit: Fit, rules: Rules = USUAL, *, small: bool = True) -> str:

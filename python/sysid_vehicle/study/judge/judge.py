@@ -16,7 +16,7 @@ from ...errors import warn
 from ...estimate import Driving
 from ...identify import Fit, driving_of
 from ...log import unexcited
-from ...rules import LACKING, Facts, Rules, Verdict, incomplete, standing, verdict
+from ...rules import LACKING, Facts, Rules, incomplete, standing, verdict
 from ..ahead.beyond import Beyond
 from ..ahead.own_share import (
     alike,
@@ -151,7 +151,7 @@ class Judge:
         on_train |= self._compared([f for f in fits if f not in on_train])
         on_test = self._compared(fits, self.test)
         told, late = in_the_light_of(decision, alone), tuple(asks.left_out)
-        wide = self._widened(decision.verdict)
+        wide = self._wide if decision.verdict in LACKING else None
         idle = before(asks.ends, lambda: useless(fits, self.test, rules), frozenset[str]())
         return Study(
             verdict=decision.verdict,
@@ -192,13 +192,9 @@ class Judge:
             widened=wide,
         )
 
-    def _widened(self, verdict: Verdict) -> FloatArray | None:
-        """Covariance of the parameters by what is missing; None where nothing is, or out of time.
-
-        It says how sure they are, and neither the verdict nor a name depends on it.
-        """
-        if verdict not in LACKING:
-            return None
+    @cached_property
+    def _wide(self) -> FloatArray | None:
+        """Covariance of the parameters that includes what is missing; None where time ran out."""
         return before(self.asks.ends, lambda: widened(self.fit, self.fit.driving), None)
 
     def _compared(
@@ -259,7 +255,9 @@ class Judge:
         own = asked - first.groups.keys()
         told = self.asks.asked(
             _CONTESTED,
-            lambda: spoken_against(self.outer[0], fit, asked, own, in_place, self.test, self.rules),
+            lambda: spoken_against(
+                self.outer[0], fit, asked, own, in_place, self.test, self.rules, self._wide
+            ),
         )
         facts = facts.with_against(told or {})
         known = self.trail.rivals

@@ -40,8 +40,8 @@ class AddedEffect:
         (`rules.little`).
     useful : bool
         Whether some error on validation data, one step or 1 to 5 s ahead, is shown to fall with it
-        in its turn, or that of one step falls by a part worth a name (`Rules.taken`). True where
-        nobody asked in time.
+        in its turn, that of one step falls by a part worth a name (`Rules.taken`), or it has an own
+        share there. True where nobody asked in time.
     own, own_in_training : Share
         Of the error 1 to 5 s ahead that the final model leaves without it, all else fitted anew,
         what it takes away: on validation and on training data. Unknown where nothing is missing,
@@ -168,7 +168,7 @@ def added_by(
     estimates : sequence of Estimate, optional
         Of the parameters of the final model; by default those of its fit.
     idle : collection of str
-        Effects with which no error on validation data is shown to fall.
+        Effects with which no error on validation data is shown to fall in their step.
     """
     added = []
     known = {
@@ -203,7 +203,9 @@ def added_by(
                         takes_little=small or name in shared,
                     ),
                     small,
-                    name not in idle or before.error - after.error > rules.taken * before.error,
+                    name not in idle
+                    or before.error - after.error > rules.taken * before.error
+                    or any(share.known and share.low > 0.0 for share in own[::2]),
                     *own,
                 )
             )
