@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -216,8 +216,7 @@ class Search:
                 return
             known = set(trail.fit.model.effects)
             trail.fits.append(found)
-            more = _more(found, known - effects, effects - known - set(chosen))
-            self.say(f"Added {' and '.join(chosen)}: {_sizes(found, chosen)}.{more}")
+            self.say(_step(found, known))
 
     def _beside_another(self, dx: Diagnosis, trail: Trail) -> tuple[Candidate, Fit] | None:
         """The likeliest candidate, where it holds only together with one that is missing too.
@@ -254,18 +253,23 @@ class Search:
         )
 
 
+def _step(found: Fit, known: Collection[str]) -> str:
+    """What a step put into the model, with sizes, and what it took out of it, in words.
+
+    A step may exchange what was there before, and drop what it began with itself.
+    """
+    new = [e for e in found.model.effects if e not in known]
+    gone = sorted(e for e in known if e not in found.model.effects)
+    said = [f"Added {' and '.join(new)}: {_sizes(found, new)}."] if new else []
+    said += [f"Removed {' and '.join(gone)}."] if gone else []
+    return " ".join(said)
+
+
 def _sizes(fit: Fit, effects: Sequence[str]) -> str:
-    """Parameters of effects with standard errors, in words; those that a step dropped are not."""
+    """Parameters of effects with standard errors, in words."""
     found = [e for e in fit.estimates if e.name.split(".")[0] in effects]
     several = len(effects) > 1
     return ", ".join(
         f"{e.name if several else e.name.split('.')[1]} {with_error(e.value, e.std)} {e.unit}"
         for e in found
     )
-
-
-def _more(fit: Fit, gone: set[str], beside: set[str]) -> str:
-    """What else a step took out of the model or put into it, in words."""
-    if gone:
-        return f" {', '.join(sorted(gone))} removed; the model has {', '.join(fit.model.effects)}."
-    return f" It is significant only together with {', '.join(sorted(beside))}." if beside else ""
