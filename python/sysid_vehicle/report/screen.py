@@ -23,6 +23,7 @@ def first_screen(study: Study, samples: Samples | None) -> list[str]:
         _which(study),
         _added(study),
         _falls(study),
+        _remains(study),
     ]
     return [
         paragraph(verdict, "lead"),
@@ -96,7 +97,7 @@ def _added(study: Study) -> str:
     sets = study.causes[0].sets
     if sets:
         parts.append(paragraph(f"Credible sets: {'; '.join(map(str, sets))}."))
-    return panel("4 Added", [*parts, paragraph(study.in_the_end)], 4)
+    return panel("4 Added", parts, 4)
 
 
 def _effect(study: Study, added: AddedEffect) -> str:
@@ -110,12 +111,19 @@ def _effect(study: Study, added: AddedEffect) -> str:
     for channel, by_horizon in study.horizons.gains(step).items():
         gain, shown = by_horizon[at], shown_in(channel)
         if gain is not None and channel in _SHOWN:
-            gains.append(f"{number(shown.factor * gain, 2)} {shown.unit} of {shown.name}")
-    takes = f"reduces the error {_AHEAD_S:g} s ahead by {', '.join(gains)}" if gains else ""
+            gains.append(f"{shown.name} {-shown.factor * gain:+.2g} {shown.unit}")
+    takes = f"changes the error {_AHEAD_S:g} s ahead: {', '.join(gains)}" if gains else ""
     beside = f"together with {' and '.join(others)} " if others else ""
     takes = takes and f"; {beside}{takes}"
     reserve = f"; {added.reserve}" if added.reserve else ""
     return f"{added.id} ({added.grade}): {sizes}{takes}{reserve}"
+
+
+def _remains(study: Study) -> str:
+    """What is explained and what is not, and what to do about it."""
+    steps = [f"Next: {text}." for text in study.next_steps]
+    said = [paragraph(study.in_the_end), *([bullets(steps)] if steps else [])]
+    return panel("6 What remains", said, 12)
 
 
 _SHOWN = ("vy_mps", "yaw_rate_radps", "ay_mps2")

@@ -38,10 +38,13 @@ def nothing_added(study: sv.Study) -> sv.Study:
 def test_the_first_screen_tells_the_story(
     study: sv.Study, samples: Samples, nothing_added: sv.Study
 ) -> None:
-    told = re.findall(r'<div class="panel w\d"><h2>(.*?)</h2>(.*?)(?=<div class="panel|</section>)',
-                      "".join(first_screen(study, samples)), re.DOTALL)  # fmt: skip
+    each = r'<div class="panel w\d+"><h2>(.*?)</h2>(.*?)(?=<div class="panel|</section>)'
+    told = re.findall(each, "".join(first_screen(study, samples)), re.DOTALL)
     panels = dict(told)
-    assert list(panels) == ["1 Compare", "2 Where", "3 Which", "4 Added", "5 Error falls"]
+    first = ["1 Compare", "2 Where", "3 Which", "4 Added", "5 Error falls"]
+    assert list(panels) == [*first, "6 What remains"]
+    assert study.in_the_end[:40] in panels["6 What remains"]
+    assert panels["6 What remains"].count("Next: ") == len(study.next_steps)
     assert "measured" in panels["1 Compare"]
     assert f"predicted {0.5:g} s ahead" in panels["1 Compare"]
     assert str(study.test[0].regions[0]).split(",")[0] in panels["2 Where"]
@@ -50,7 +53,7 @@ def test_the_first_screen_tells_the_story(
     assert f"{100.0 * (before - alone) / (before - 1.0):.0f} %" in panels["3 Which"]
     assert "tyre_load_sensitivity (" in panels["4 Added"]
     gain = np.degrees(study.horizons.gains(1)["yaw_rate_radps"][1])
-    assert f"{gain:.2g} deg/s of yaw rate" in panels["4 Added"]
+    assert f"yaw rate {-gain:+.2g} deg/s" in panels["4 Added"]
     assert f"{before:.2f}" in panels["5 Error falls"]
     lengths = [float(x) for x in re.findall(r"width: ([\d.]+)%", panels["5 Error falls"])]
     assert lengths == pytest.approx([100.0, 100.0 * after / before, 100.0 / before], abs=0.06)
@@ -74,7 +77,7 @@ def test_what_one_step_takes_off_is_no_single_effects(study: sv.Study) -> None:
         added=(first, replace(first, id="steer_lag")),
     )
     assert "together with" not in _effect(study, first)
-    assert "together with steer_lag reduces the error" in _effect(both, first)
+    assert "together with steer_lag changes the error" in _effect(both, first)
 
 
 def test_the_excerpt_is_where_the_baseline_predicts_worst(study: sv.Study) -> None:

@@ -44,9 +44,12 @@ def next_steps(study: Study) -> tuple[str, ...]:
 
 def _of_names(study: Study) -> list[str]:
     found = []
+    told: set[frozenset[str]] = set()
     for a in study.added:
         # Which of two it is that only stands in for something else is no question.
-        if a.confounded_with and a.grade != "alias":
+        alike = frozenset((a.id, *a.confounded_with))
+        if a.confounded_with and a.grade != "alias" and alike not in told:
+            told.add(alike)
             some = few(a.confounded_with)
             found.append(
                 f"separate {a.id} from {some}: `sysid-vehicle next-drive` designs a drive that "
@@ -59,7 +62,7 @@ def _of_names(study: Study) -> list[str]:
             "car: another effect may be missing instead"
         )
     taken = study.explained
-    if study.verdict == "unknown" and taken is not None and taken.low > 0.0:
+    if study.verdict == "unknown" and study.added and taken is not None and taken.low > 0.0:
         found.append(
             "for prediction use the final model, as a whole and in similar driving: it is better "
             "than the baseline"
