@@ -38,7 +38,7 @@ def spoken_against(
     """Find what speaks against names of added effects: by effect, in words.
 
     Its value itself, not an end of its interval, is one that no car has, or too small to matter.
-    Its interval, what is missing included, holds no effect at all.
+    Its interval at `Rules.level`, what is missing included, holds no effect at all.
     The errors ahead of what it moves grow with all that was added. Validation data by themselves
     tell another value. Or an effect that acts like it is likelier in its place, on training and on
     validation data.
@@ -64,7 +64,10 @@ def spoken_against(
     unfelt = set() if wide is None else _unfelt(final, wide, rules)
     for effect in unfelt.intersection(alone):
         if not found[effect]:
-            found[effect] = "its interval, with what is missing included, does not exclude zero"
+            found[effect] = (
+                f"its {100.0 * (1.0 - rules.level):g} % interval, with what is missing included, "
+                "does not exclude zero"
+            )
     for effect in asked:
         if not found[effect] and errors_grow(first, final, test, parts[effect].moved):
             found[effect] = "as fitted, the errors 0.5 to 5 s ahead of the channels it moves grow"
