@@ -7,27 +7,10 @@ from typing import Literal
 
 from .facts import Added, Decision, Facts, Tested, Withdrawn
 from .limits import USUAL, Rules
-from .share import Share, low_of_mean, share_of
+from .share import Share, share_of
+from .standing import without_share
 
 Grade = Literal["confirmed", "plausible", "alias"]
-_NOT_SHOWN = (
-    "beside the other effects its share of the error 1 to 5 s ahead is not significant on training "
-    "and validation data"
-)
-_NOT_TOGETHER = (
-    "together, the effects added do not significantly reduce the error 1 to 5 s ahead of this "
-    "motion on validation data: the interval of their share includes zero"
-)
-_LATE_TOGETHER = (
-    "the time limit left open which share of the error 1 to 5 s ahead the effects added remove"
-)
-_LATE = (
-    "the time limit left open its own share of the error 1 to 5 s ahead on training and validation "
-    "data"
-)
-
-_TAKES_MORE = "explains more and is not confirmed itself: both may compensate for the same cause"
-
 _UNOPPOSED = (
     "the time limit left open whether an unknown force would explain training and validation data "
     "as well"
@@ -151,40 +134,8 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
         return Decision("unknown", (Withdrawn(names, because, names),))
     left = something_left(facts, rules)
     if not names:
-        # Tyres that never met a slip angle are free, and leave chance evidence of effects.
-        if not facts.excited and facts.fitted.p_value > rules.level:
-            return Decision("not_testable")
-        return Decision("unknown" if left and not facts.small else "adequate")
-    stand_ins = frozenset(a.id for a in facts.added if a.finding == "proxy")
-    withdrawn = []
-    groups: dict[str, frozenset[str]] = {}
-    if left or stand_ins:
-        late = frozenset(a.id for a in facts.added if a.late)
-        likely = _likely(facts, rules)
-        alone, groups, led = _standing(facts, rules)
-        spoken = {a.id: a.against for a in facts.added if a.named and a.against}
-        falling = names - likely - alone - groups.keys() - led.keys() - spoken.keys()
-        if left:
-            lows = {a.id: _together_low(a, facts) for a in facts.added}
-            nothing = frozenset(e for e, low in lows.items() if low is not None and not low > 0.0)
-            unknown = frozenset(e for e, low in lows.items() if low is None)
-            withdrawn.append(Withdrawn(nothing - likely - falling, _NOT_TOGETHER, names))
-            withdrawn.append(Withdrawn(unknown - likely - falling, _LATE_TOGETHER, names))
-        withdrawn.append(Withdrawn(falling - late, _NOT_SHOWN, names))
-        withdrawn += [Withdrawn(frozenset({e}), because, names) for e, because in spoken.items()]
-        for name, leaders in led.items():
-            if name in likely:
-                continue
-            because = f"of the same errors {' and '.join(sorted(leaders))} {_TAKES_MORE}"
-            withdrawn.append(Withdrawn(frozenset({name}), because, names))
-        if falling & late:
-            withdrawn.append(Withdrawn(falling & late, _LATE, names))
-    if facts.unopposed:
-        withdrawn.append(Withdrawn(names, _UNOPPOSED, names))
-    # What only stands in for something else explains nothing, however well it fits, and what cannot
-    # be told from that is no better.
-    because = f"it acts like {', '.join(sorted(stand_ins))}, which is not confirmed either"
-    withdrawn.append(Withdrawn(stand_ins, because))
+        return _of_the_baseline(facts, left, rules)
+    withdrawn, groups = _taken_back(facts, left, rules)
     proxies = {a.id for a in facts.added if a.finding == "proxy" or _falls(a, withdrawn)}
     negligible = {a.id for a in facts.added if a.finding == "negligible"}
     if proxies == names or (left and proxies | negligible == names):
@@ -194,6 +145,32 @@ def verdict(facts: Facts, rules: Rules = USUAL) -> Decision:
     much = left and (bool(proxies) or share_of(*facts.missing) < rules.most)
     groups = {e: others for e, others in groups.items() if e not in proxies}
     return Decision("explained" if whole else "partly_explained", tuple(withdrawn), much, groups)
+
+
+def _of_the_baseline(facts: Facts, left: bool, rules: Rules) -> Decision:
+    # Tyres that never met a slip angle are free, and leave chance evidence of effects.
+    if not facts.excited and facts.fitted.p_value > rules.level:
+        return Decision("not_testable")
+    return Decision("unknown" if left and not facts.small else "adequate")
+
+
+def _taken_back(
+    facts: Facts, left: bool, rules: Rules
+) -> tuple[list[Withdrawn], dict[str, frozenset[str]]]:
+    """Names that are taken back, and by effect the others with which it stands as a group."""
+    names = frozenset(a.id for a in facts.added)
+    stand_ins = frozenset(a.id for a in facts.added if a.finding == "proxy")
+    withdrawn: list[Withdrawn] = []
+    groups: dict[str, frozenset[str]] = {}
+    if left or stand_ins:
+        withdrawn, groups = without_share(facts, left, rules)
+    if facts.unopposed:
+        withdrawn.append(Withdrawn(names, _UNOPPOSED, names))
+    # What only stands in for something else explains nothing, however well it fits, and what cannot
+    # be told from that is no better.
+    because = f"it acts like {', '.join(sorted(stand_ins))}, which is not confirmed either"
+    withdrawn.append(Withdrawn(stand_ins, because))
+    return withdrawn, groups
 
 
 def standing(facts: Facts, decision: Decision) -> frozenset[str]:
@@ -209,90 +186,6 @@ def standing(facts: Facts, decision: Decision) -> frozenset[str]:
         return frozenset()
     named = (a for a in facts.added if a.named)
     return frozenset(a.id for a in named if not _falls(a, decision.withdrawn))
-
-
-def _standing(
-    facts: Facts, rules: Rules
-) -> tuple[frozenset[str], dict[str, frozenset[str]], dict[str, frozenset[str]]]:
-    """Effects whose own share of the error ahead is shown on training and validation data.
-
-    The second are those that have none, with the others of the model that act like them, where
-    the share of all of these together is shown: each does what the others would do in its place.
-    The third are those of either kind that lead none of what they move, with what takes more.
-
-    Evidence grows with the data, whatever small misfit an effect serves; a share does not. It is
-    that of the effect beside all others, which were fitted anew without it: what one of them, or
-    the tyres, would do in its place is not its own. A stand-in serves one manoeuvre, and the next
-    one at a price. Where much is left of the motion that it moves, what it stands in for may be
-    that: the share must be shown to be one worth a name, of all data. So may it be what a stand-in
-    takes that moves the same channel, if that is the larger part. What is not shown to be off
-    nothing, while another of the model acts like it, has no name of its own: either may be there
-    for the other. Nor has what something else speaks against. What errors are shown to be smaller
-    without has no part in what a group takes.
-    """
-
-    def worth(a: Added, *shares: Share) -> bool:
-        much = share_of(*(facts.missing if a.missing is None else a.missing)) < rules.most
-        least = rules.taken if much else 0.0
-        each = all(s.value > rules.taken and s.low > 0.0 for s in shares)
-        return each and low_of_mean(shares) > least
-
-    named = [a for a in facts.added if a.named and not a.against]
-    own = [a for a in named if a.felt or not a.beside]
-    alone = {a.id for a in own if worth(a, a.own, a.own_in_training)}
-    together = {
-        a.id
-        for a in named
-        if a.beside
-        and not any(s.known and s.high < 0.0 for s in (a.own, a.own_in_training))
-        and alone.isdisjoint({a.id, *a.beside})
-        and worth(a, a.shared, a.shared_in_training)
-    }
-    shares = {a.id: (a.own, a.own_in_training) for a in facts.added if a.id in alone}
-    shares |= {a.id: (a.shared, a.shared_in_training) for a in facts.added if a.id in together}
-    # What something else speaks against was asked beside the others, and they beside it.
-    others = [a for a in facts.added if a.id not in shares and not a.against]
-    led = {}
-    for a in named:
-        if a.id in shares:
-            more = [b.id for b in others if a.moves & b.moves and _more(b, shares[a.id])]
-            led[a.id] = frozenset(more)
-    leading = {e for e, more in led.items() if not more}
-    return (
-        frozenset(alone & leading),
-        {a.id: a.beside for a in named if a.id in together & leading},
-        {e: more for e, more in led.items() if more},
-    )
-
-
-def _together_low(effect: Added, facts: Facts) -> float | None:
-    """Lower end of the share that all effects take together of the motion that one moves."""
-    return facts.taken_low if effect.taken_low is None else effect.taken_low
-
-
-def _likely(facts: Facts, rules: Rules) -> frozenset[str]:
-    """Effects whose names stand by the likelihood of validation data.
-
-    Errors below the noise of the sensors have no shares that could be shown. Where the final model
-    leaves no larger ones, what is missing in it is small, and the likelihood decides: on effects
-    that no other could be taken for, beside which no stand-in was added, and unless the training
-    data show something else beyond doubt. What is left shows on all data together, then.
-    """
-    shown = min(facts.fitted.p_value, facts.candidate) <= rules.strict
-    if not facts.buried or shown or any(a.finding == "proxy" for a in facts.added):
-        return frozenset()
-    likely = (a for a in facts.added if a.finding == "missing" and a.sure and not a.against)
-    return frozenset(a.id for a in likely)
-
-
-def _more(one: Added, shares: Sequence[Share]) -> bool:
-    """Whether an effect takes more than others do, on validation and on training data.
-
-    What it stands in for acts on both: what takes more on one of them is not the larger part.
-    """
-    own = one.own, one.own_in_training
-    pairs = [(a.value, b.value) for a, b in zip(own, shares, strict=True) if a.known and b.known]
-    return bool(pairs) and all(a > b for a, b in pairs)
 
 
 def _together(facts: Facts, rules: Rules) -> bool:
