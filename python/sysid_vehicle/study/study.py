@@ -47,11 +47,12 @@ from .results.added import AddedEffect
 from .results.failing import errors_with, late, where_lines
 from .results.hidden import hidden
 from .results.in_time import in_time, take_over, told, with_told
+from .results.meaning import meaning
 from .results.next_steps import next_steps
 from .results.predicting import Predicting, predicting
 from .results.printed import as_html, as_text
 from .results.record import record
-from .results.sentences import in_the_end, meaning, small
+from .results.sentences import in_the_end, small
 from .results.widened import estimates_of
 from .validation import at_its_best
 

@@ -89,6 +89,10 @@ def _worth_a_drive(aliases: Sequence[AddedEffect]) -> list[AddedEffect]:
 
 
 def _of_what_is_left(study: Study) -> list[str]:
+    return [*_of_the_search(study), *_of_sensors(study), *_of_driving(study), *_of_use(study)]
+
+
+def _of_the_search(study: Study) -> list[str]:
     found = []
     if study.stopped:
         was = "was" if len(study.stopped) == 1 else "were"
@@ -113,6 +117,11 @@ def _of_what_is_left(study: Study) -> list[str]:
             f"driving of that kind: {what} {in_training(study)}, and no effect can be named that "
             "they do not excite"
         )
+    return found
+
+
+def _of_sensors(study: Study) -> list[str]:
+    found = []
     if not study.sensors and not study.checked:
         found.append(
             "check the sensors, and give the result to the study: `sv.check`, or "
@@ -124,6 +133,11 @@ def _of_what_is_left(study: Study) -> list[str]:
             "give the model the offsets that every measured log has (biases, a turned speed "
             "sensor, crossfall): `model.with_nuisances()`, or `--nuisances`"
         )
+    return found
+
+
+def _of_driving(study: Study) -> list[str]:
+    found = []
     apart = "; ".join(str(d) for d in study.disagreements[:_SHOWN])
     if apart:
         found.append(
@@ -142,6 +156,11 @@ def _of_what_is_left(study: Study) -> list[str]:
             "log the wheel force `fx_n` if possible: without it drag, slopes and the split of "
             "forces cannot be determined"
         )
+    return found
+
+
+def _of_use(study: Study) -> list[str]:
+    found = []
     if study.predicting is not None and study.predicting.helps:
         which = "final" if study.predicting.explains else "baseline"
         found.append(

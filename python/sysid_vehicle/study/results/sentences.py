@@ -18,93 +18,6 @@ from .widened import times_wider
 if TYPE_CHECKING:
     from ..study import Study
 
-_MEANING = {
-    "adequate": "no effect is missing that this driving can show",
-    "explained": "the effects found explain all that depends on the driving",
-    "partly_explained": "the effects found explain part of it; something else is missing",
-    "unknown": "something is missing and no effect of the catalogue explains it",
-    "not_testable": (
-        "this driving does not excite the lateral motion, and shows next to nothing of tyres, "
-        "steering and load transfer; drive corners, steps and sweeps of the steering"
-    ),
-}
-
-
-def meaning(study: Study) -> str:
-    """The verdict of a study in words."""
-    judged = study.added and study.explained is not None
-    if study.verdict == "unknown" and study.stopped and not judged:
-        return "something is missing; the time limit ended the search for what explains it"
-    if study.verdict == "unknown" and study.added and study.explained is not None:
-        if not study.explained.share > 0.0:
-            return f"something is missing; the effects added are not confirmed: {NONE_GONE}"
-        names = [a.id for a in study.added]
-        if len(names) == 1:
-            return (
-                f"something is missing; {names[0]} explains {study.explained} of the error 1 to "
-                "5 s ahead, but beside the remaining error it is not confirmed as the cause"
-            )
-        return (
-            f"something is missing; {' and '.join(names)} together explain {study.explained} of "
-            "the error 1 to 5 s ahead; this driving does not show which of them the car has"
-        )
-    if study.verdict == "partly_explained" and study.buried:
-        return (
-            "the effects found explain part of it; the errors that remain 0.5 to 5 s ahead are "
-            "below the noise of the sensors"
-        )
-    beyond = study.explained
-    if study.verdict == "partly_explained" and beyond and beyond.share < study.rules.most:
-        part = f"{beyond} of the error 1 to 5 s ahead"
-        if not beyond.low > 0.0 and study.shares.whole.known:
-            part = (
-                f"{study.shares.whole} of what any function of the driving could explain of the "
-                "error 1 to 5 s ahead"
-            )
-        named = _named(study)
-        return (
-            f"{named}the effects added explain {part}; the rest is disturbance, and something else "
-            "that is missing"
-        )
-    seen = study.omnibus.rejects or study.diagnoses[-1].significant or structured(study)
-    seen = seen or elsewhere(study) or slow(study)
-    if study.verdict == "adequate" and study.added:
-        return (
-            "the effects added are not confirmed; the baseline (`study.fits[0]`) can be fitted so "
-            f"that its errors 0.5 to 5 s ahead are below {_matters(study)}"
-        )
-    if study.verdict == "adequate" and seen:
-        if disturbance(study):
-            return "the remaining error is disturbance: no function of the driving predicts it"
-        helps = study.predicting is not None and study.predicting.helps
-        how = " with parameters fitted to predictions (`study.predicting.final`)"
-        return (
-            f"an error remains, but 0.5 to 5 s ahead it is below {_matters(study)}"
-            f"{how if helps else ''}"
-        )
-    if study.verdict == "unknown" and not study.added and only_elsewhere(study):
-        return f"something is missing that shows in the validation data; it {in_training(study)}"
-    if study.verdict == "adequate" and _disturbed(study):
-        return (
-            f"{_MEANING['adequate']}; the validation error is {study.test[-1].error:.2g} "
-            "noise floors, from disturbances like those of the training data"
-        )
-    return _MEANING[study.verdict]
-
-
-def _named(study: Study) -> str:
-    """The names that stand, in words; rivals of one group are told once."""
-    told = {v.effect.id for v in study.verdicts.all if v.finding in ("missing", "one of a group")}
-    names: dict[frozenset[str], str] = {}
-    for a in study.added:
-        if a.id in told:
-            names.setdefault(frozenset((a.id, *a.confounded_with)), a.name)
-    return f"named: {', '.join(names.values())}; " if names else ""
-
-
-def _matters(study: Study) -> str:
-    return "the noise of the sensors" if study.matters is None else "the errors that matter"
-
 
 def left_out(study: Study) -> tuple[str, ...]:
     """What `Study.in_time` had no time for, in one sentence; none where it had."""
@@ -313,22 +226,15 @@ def in_training(study: Study) -> str:
     Where most of their error is disturbance, what is missing may be a part of it.
     """
     error = study.train[-1].error
-    if _beyond_noise(error) > study.rules.most:
+    if share_beyond_noise(error) > study.rules.most:
         floors = f"{number(error, 2)} noise floors"
         return f"cannot be separated from disturbance in the training data (error {floors})"
     return "hardly shows in the training data"
 
 
-def _beyond_noise(error: float) -> float:
+def share_beyond_noise(error: float) -> float:
     """Share of the square of an error one step ahead that is no noise of the sensors."""
     return share_of(error**2, 1.0)
-
-
-def _disturbed(study: Study) -> bool:
-    """Whether validation data err by more than noise of the sensors, as is foretold."""
-    if study.foretold is None:
-        return False
-    return _beyond_noise(study.test[-1].error) > study.rules.explainable
 
 
 def _more(study: Study) -> bool:

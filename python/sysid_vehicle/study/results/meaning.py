@@ -1,0 +1,115 @@
+"""The verdict of a study in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ...rules import NONE_GONE
+from .sentences import (
+    disturbance,
+    elsewhere,
+    in_training,
+    only_elsewhere,
+    share_beyond_noise,
+    slow,
+    structured,
+)
+
+if TYPE_CHECKING:
+    from ..study import Study
+
+_COMPLETE = "no effect is missing that this driving can show"
+_EXPLAINED = "the effects found explain all that depends on the driving"
+_NOT_TESTABLE = (
+    "this driving does not excite the lateral motion, and shows next to nothing of tyres, "
+    "steering and load transfer; drive corners, steps and sweeps of the steering"
+)
+
+
+def meaning(study: Study) -> str:
+    """The verdict of a study in words."""
+    if study.verdict == "unknown":
+        return _unknown(study)
+    if study.verdict == "partly_explained":
+        return _partly_explained(study)
+    if study.verdict == "adequate":
+        return _adequate(study)
+    return _EXPLAINED if study.verdict == "explained" else _NOT_TESTABLE
+
+
+def _unknown(study: Study) -> str:
+    taken, names = study.explained, [a.id for a in study.added]
+    if study.stopped and (not names or taken is None):
+        return "something is missing; the time limit ended the search for what explains it"
+    if names and taken is not None:
+        if not taken.share > 0.0:
+            return f"something is missing; the effects added are not confirmed: {NONE_GONE}"
+        if len(names) == 1:
+            return (
+                f"something is missing; {names[0]} explains {taken} of the error 1 to 5 s ahead, "
+                "but beside the remaining error it is not confirmed as the cause"
+            )
+        return (
+            f"something is missing; {' and '.join(names)} together explain {taken} of the error 1 "
+            "to 5 s ahead; this driving does not show which of them the car has"
+        )
+    if not names and only_elsewhere(study):
+        return f"something is missing that shows in the validation data; it {in_training(study)}"
+    return "something is missing and no effect of the catalogue explains it"
+
+
+def _partly_explained(study: Study) -> str:
+    if study.buried:
+        return (
+            "the effects found explain part of it; the errors that remain 0.5 to 5 s ahead are "
+            "below the noise of the sensors"
+        )
+    taken = study.explained
+    if not taken or not taken.share < study.rules.most:
+        return "the effects found explain part of it; something else is missing"
+    part = f"{taken} of the error 1 to 5 s ahead"
+    if not taken.low > 0.0 and study.shares.whole.known:
+        part = (
+            f"{study.shares.whole} of what any function of the driving could explain of the error "
+            "1 to 5 s ahead"
+        )
+    return (
+        f"{_named(study)}the effects added explain {part}; the rest is disturbance, and something "
+        "else that is missing"
+    )
+
+
+def _adequate(study: Study) -> str:
+    if study.added:
+        return (
+            "the effects added are not confirmed; the baseline (`study.fits[0]`) can be fitted so "
+            f"that its errors 0.5 to 5 s ahead are below {_matters(study)}"
+        )
+    seen = study.omnibus.rejects or study.diagnoses[-1].significant or structured(study)
+    if seen or elsewhere(study) or slow(study):
+        if disturbance(study):
+            return "the remaining error is disturbance: no function of the driving predicts it"
+        helps = study.predicting is not None and study.predicting.helps
+        how = " with parameters fitted to predictions (`study.predicting.final`)" if helps else ""
+        return f"an error remains, but 0.5 to 5 s ahead it is below {_matters(study)}{how}"
+    error, foretold = study.test[-1].error, study.foretold is not None
+    if foretold and share_beyond_noise(error) > study.rules.explainable:
+        return (
+            f"{_COMPLETE}; the validation error is {error:.2g} noise floors, from disturbances "
+            "like those of the training data"
+        )
+    return _COMPLETE
+
+
+def _named(study: Study) -> str:
+    """The names that stand, in words; rivals of one group are told once."""
+    told = {v.effect.id for v in study.verdicts.all if v.finding in ("missing", "one of a group")}
+    names: dict[frozenset[str], str] = {}
+    for a in study.added:
+        if a.id in told:
+            names.setdefault(frozenset((a.id, *a.confounded_with)), a.name)
+    return f"named: {', '.join(names.values())}; " if names else ""
+
+
+def _matters(study: Study) -> str:
+    return "the noise of the sensors" if study.matters is None else "the errors that matter"
