@@ -2,37 +2,45 @@
 
 The gains, and the spread that they predict, change with the parameters. Derivatives with frozen
 gains leave that out: they vanish elsewhere. In a flat valley, as that of tyres whose B C D is the
-same, this is far from the maximum, often with a parameter at its bound. Here the part that they
-leave out is worked out by differences and added to them, as a slope that stays as it is during a
-search (first-order model management: Alexandrov et al., AIAA 2000-4886). That search sees nothing
-of how fast the part changes: where parameters can copy each other it goes so far along their valley
-that the likelihood falls, be the slope tens of nats. From there on steps are damped, and the
-likelihood itself tells how much.
+same, this is far from the maximum, often with a parameter at its bound. Here the slope of the
+likelihood itself is worked out by differences. Nor do parameters and noise stand by themselves:
+disturbances take up what a model does not explain, and a search that moves one and the other in
+turn creeps along the valley of both. Here they move together. The curvature to begin with is that
+of the frozen gains and of the score of the noise; the slopes that are met on the way correct it
+(BFGS, damped: Nocedal & Wright, Numerical Optimization, 2006, 6.1 and 18.3). Steps are damped as
+much as the likelihood itself asks for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from ... import _core
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.threads import in_parallel
-from .objective import LinearRows, Objective
-from .search import SLIGHT, Box, minimise, stride
-from .settle import risen
+from ...errors import NumericalError
+from .objective import Objective
+from .search import SLIGHT, Box, least_within
 
-_GAIN = 0.05  # nats
-_STANDS = 0.5  # nats
-_CLIMBS = 10  # steps
-_CLIMBED, _STEPS = 22, 2  # times, with noise learned anew, of so many steps each
+_GAIN = 0.05  # nats: what promises less is not worth a step
+_STANDS = 0.5  # nats that two steps gain: with less it stands still
+_CLIMBS, _TOP = 10, 40  # most steps
+_ASKED = 3  # steps after which it is asked whether to go on
 _NUDGE = 0.02  # standard errors by which the likelihood is differentiated
 _NARROW = 0.01  # of the box, which is narrower than that for what the data do not tell
 _TINY = 1e-300
-_DAMPINGS = (1e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 10.0, 100.0)  # of steps tried together
-_STIFF = 1e3  # root of nats
+_DAMPINGS = (0.0, 1e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0)
+_FIRST = 4  # of these
+_FREER = 0.2  # root of how much less the noise is damped than parameters are
+_FAR = 1.5  # of a logarithm of the noise, in one step
+_LEARNED = 2  # steps of the noise alone after each: those cost far less
+_KEPT = 10  # slopes that correct the curvature
+_BENT = 0.2  # of the curvature that was expected: what is less is damped (Nocedal & Wright, 18.3)
 FAR_BELOW = 20.0
 """Nats below another maximum, from where neither a lag nor noise of another time climbs up to it.
 
@@ -54,6 +62,7 @@ def climb(
     objective : Objective
     p : array, shape (parameters,)
     noise : array, shape (noises,)
+        Which stays as it is.
     box : Box
     steps : int
         Most steps.
@@ -64,75 +73,10 @@ def climb(
     begin, reached : float
         Log-likelihoods of the start and there, priors included; the second is never the lower one.
     """
-    p, begin, reached, _ = _climbed(objective, p, noise, box, steps, False)
-    return p, begin, reached
-
-
-def _climbed(
-    objective: Objective, p: FloatArray, noise: FloatArray, box: Box, steps: int, astray: bool
-) -> tuple[FloatArray, float, float, bool]:
-    """As `climb`; the last, in and out, is whether searches are led astray here."""
-
-    def values_at(trials: FloatArray) -> FloatArray:
-        return objective.log_likelihoods(trials, noise)
-
-    gains = objective.freeze(p, noise)
-    begin = value = objective.reached(p, gains)
-    for _ in range(steps):
-        _, seen, information = objective.normal_equations(p, gains, box.columns)
-        x = p[box.columns]
-        slope = _slope(values_at, p, information, box)
-        if stride(x, slope, information, SLIGHT, box)[1] < _GAIN:
-            break
-        least = value + _GAIN
-        if not astray:
-            leaning = objective.also(_leaning(p, slope - seen, box))
-            found = minimise(leaning, p, gains, box, rounds=8, tolerance=_GAIN)
-            p, gains = risen(objective, p, gains, found.x, noise, box)
-            value = objective.reached(p, gains)
-            astray = value < least
-        if astray:
-            p, gains = _damped(objective, p, gains, noise, (slope, information), box)
-            value = objective.reached(p, gains)
-        # Damped steps that gain little creep, and hardly any are worth what they cost.
-        if value < least + (_STANDS - _GAIN if astray else 0.0):
-            break
-    return p, begin, value, astray
-
-
-def _damped(
-    objective: Objective,
-    p: FloatArray,
-    gains: Any,
-    noise: FloatArray,
-    linear: tuple[FloatArray, FloatArray],
-    box: Box,
-) -> tuple[FloatArray, Any]:
-    """The best of steps damped more and more, if it gains: the likelihood says how far to go.
-
-    All go through the filter together, in its lanes.
-
-    Parameters
-    ----------
-    linear : (slope, information)
-        Of the likelihood by the free parameters, and its Gauss-Newton matrix.
-    """
-    ways = [stride(p[box.columns], *linear, damping, box)[0] for damping in _DAMPINGS]
-    trials = box.put(p, np.array(ways))
-    values = objective.log_likelihoods(trials, noise)
-    least = objective.reached(p, gains)
-    if not values.max() > least:
-        return p, gains
-    best = trials[int(np.argmax(values))]
-    there = objective.freeze(best, noise)
-    return (best, there) if objective.reached(best, there) > least else (p, gains)
-
-
-def _leaning(p: FloatArray, slope: FloatArray, box: Box) -> LinearRows:
-    """A residual whose half square falls by that slope, and hardly bends."""
-    rows = np.zeros((1, p.size))
-    rows[0, box.columns] = slope / _STIFF
-    return LinearRows(rows, as_float64(rows @ p + _STIFF))
+    begin = _Place(p, noise, objective.log_likelihood(p, noise))
+    ways = _Ways(objective, box, np.empty(0, dtype=np.intp))
+    end = _climbed(ways, begin, steps, lambda *_: True)
+    return end.p, begin.value, end.value
 
 
 def to_the_top(
@@ -144,13 +88,12 @@ def to_the_top(
 ) -> tuple[FloatArray, FloatArray]:
     """Parameters and noise of the maximum, from where `settle` came to a stand.
 
-    Neither is searched to its end while the other is not there.
-
     Parameters
     ----------
     objective : Objective
     p : array, shape (parameters,)
     noise : array, shape (noises,)
+        What is zero is not there, and stays so.
     box : Box
     goes_on : callable, optional
         From parameters and noise on the way to whether they are worth climbing from.
@@ -160,13 +103,186 @@ def to_the_top(
     p : array, shape (parameters,)
     noise : array, shape (noises,)
     """
-    astray = False
-    for _ in range(_CLIMBED):
-        p, begin, reached, astray = _climbed(objective, p, noise, box, _STEPS, astray)
-        noise = objective.learn_noise(p, noise, rounds=1).noise
-        if reached < begin + _STANDS or not goes_on(p, noise):
+    free = (noise > 0.0) & (objective.lowest < objective.highest)
+    ways = _Ways(objective, box, np.flatnonzero(free))
+    noise = as_float64(np.where(free, np.clip(noise, objective.lowest, objective.highest), noise))
+    end = _climbed(ways, _Place(p, noise, objective.log_likelihood(p, noise)), _TOP, goes_on)
+    return end.p, end.noise
+
+
+class _Place(NamedTuple):
+    """Parameters and noise, and their log-likelihood, priors included."""
+
+    p: FloatArray
+    noise: FloatArray
+    value: float
+
+
+@dataclass(frozen=True)
+class _Ways:
+    """What moves: free parameters, on their scales, and logarithms of some of the noise."""
+
+    objective: Objective
+    box: Box
+    learned: npt.NDArray[np.intp]
+
+    def at(self, here: _Place) -> FloatArray:
+        """Coordinates."""
+        x, positive = here.p[self.box.columns], self.box.positive
+        scaled = np.where(positive, np.log(np.where(positive, x, 1.0)), x)
+        return np.concatenate([scaled, np.log(here.noise[self.learned])])
+
+    def room(self, here: _Place) -> tuple[FloatArray, FloatArray]:
+        """How far it is to the lower and to the upper bounds."""
+        lower, upper = self.box.room(here.p[self.box.columns])
+        noise = np.log(here.noise[self.learned])
+        low, high = (np.log(v[self.learned]) for v in self._limits)
+        low, high = np.maximum(low - noise, -_FAR), np.minimum(high - noise, _FAR)
+        return (
+            np.minimum(np.concatenate([lower, low]), 0.0),
+            np.maximum(np.concatenate([upper, high]), 0.0),
+        )
+
+    def moved(self, here: _Place, step: FloatArray) -> _Place:
+        """The place after a step; minus infinity where the model fails."""
+        free = len(self.box.columns)
+        p = self.box.put(here.p, self.box.moved(here.p[self.box.columns], step[:free]))
+        noise, places = here.noise.copy(), self.learned
+        low, high = (v[places] for v in self._limits)
+        noise[places] = np.clip(noise[places] * np.exp(step[free:]), low, high)
+        try:
+            return _Place(p, noise, self.objective.log_likelihood(p, noise))
+        except NumericalError:
+            return _Place(p, noise, -np.inf)
+
+    def learned_at(self, here: _Place) -> _Place:
+        """The same parameters with noise of their own, where that is likelier."""
+        if not len(self.learned):
+            return here
+        noise = self.objective.learn_noise(here.p, here.noise, rounds=_LEARNED).noise
+        value = self.objective.log_likelihood(here.p, noise)
+        return _Place(here.p, noise, value) if value > here.value else here
+
+    def slope(self, here: _Place) -> tuple[FloatArray, FloatArray]:
+        """Slope of the likelihood, and the curvature that frozen gains and the score tell."""
+        p, noise, _ = here
+        gains = self.objective.freeze(p, noise)
+        _, _, information = self.objective.normal_equations(p, gains, self.box.columns)
+        slope = _slope(
+            lambda trials: self.objective.log_likelihoods(trials, noise), p, information, self.box
+        )
+        unit, free = self.box.units(p[self.box.columns]), len(self.box.columns)
+        curvature = np.zeros((free + len(self.learned),) * 2)
+        curvature[:free, :free] = information * np.outer(unit, unit)
+        if not len(self.learned):
+            return as_float64(slope * unit), curvature
+        _, score, information = self.objective.noise_score(p, noise)
+        curvature[free:, free:] = information[np.ix_(self.learned, self.learned)]
+        return np.concatenate([slope * unit, score[self.learned]]), curvature
+
+    @property
+    def _limits(self) -> tuple[FloatArray, FloatArray]:
+        return self.objective.lowest, self.objective.highest
+
+
+@dataclass
+class _Met:
+    """Slopes that were met on the way, and how they changed: the curvature itself."""
+
+    last: tuple[FloatArray, FloatArray] | None = None
+    changes: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+
+    def meet(self, at: FloatArray, slope: FloatArray) -> None:
+        """One slope more."""
+        if self.last is not None:
+            self.changes = [*self.changes[1 - _KEPT :], (at - self.last[0], self.last[1] - slope)]
+        self.last = at, slope
+
+    def corrected(self, curvature: FloatArray, scale: FloatArray) -> FloatArray:
+        """The curvature in units of `scale`, such that the slopes change as they did."""
+        found = curvature / np.outer(scale, scale)
+        for way, change in self.changes:
+            step, seen = way * scale, change / scale
+            expected = found @ step
+            most, seen_most = step @ expected, step @ seen
+            if not most > 0.0:
+                continue
+            if seen_most < _BENT * most:
+                share = (1.0 - _BENT) * most / (most - seen_most)
+                seen = share * seen + (1.0 - share) * expected
+            found = (
+                found - np.outer(expected, expected) / most + np.outer(seen, seen) / (step @ seen)
+            )
+        return as_float64(found)
+
+
+def _climbed(
+    ways: _Ways, here: _Place, steps: int, goes_on: Callable[[FloatArray, FloatArray], bool]
+) -> _Place:
+    met, damping, before = _Met(), _FIRST, np.inf
+    for done in range(1, steps + 1):
+        slope, curvature = ways.slope(here)
+        met.meet(ways.at(here), slope)
+        scale = np.sqrt(np.maximum(np.diag(curvature), 1e-12))
+        scale[len(ways.box.columns) :] *= _FREER
+        trials = _Trials(ways, here, slope, met.corrected(curvature, scale), scale)
+        if trials.promised < _GAIN:
             break
-    return p, noise
+        damping, there = trials.best(damping)
+        there = ways.learned_at(there)
+        gained, here = there.value - here.value, there
+        if gained + before < _STANDS or (done % _ASKED == 0 and not goes_on(here.p, here.noise)):
+            break
+        before = gained
+    return here
+
+
+class _Trials:
+    """Steps from one place that are damped more or less."""
+
+    def __init__(
+        self,
+        ways: _Ways,
+        here: _Place,
+        slope: FloatArray,
+        curvature: FloatArray,
+        scale: FloatArray,
+    ) -> None:
+        self._ways, self._here, self._scale = ways, here, scale
+        self._slope, self._curvature = slope / scale, curvature
+        self._values, self._vectors = np.linalg.eigh(curvature)
+        self._room = [r * scale for r in ways.room(here)]
+        self._known: dict[int, _Place] = {}
+
+    @property
+    def promised(self) -> float:
+        """What a step that is hardly damped promises to gain [nats]."""
+        step = self._step(SLIGHT)
+        return float(self._slope @ step - 0.5 * step @ self._curvature @ step)
+
+    def best(self, damping: int) -> tuple[int, _Place]:
+        """The damping that gains most, beginning with one that did, and where it leads."""
+        most = len(_DAMPINGS) - 1
+        while damping < most and not self._at(damping).value > self._here.value:
+            damping += 1
+        for way in (-1, 1):
+            while (
+                0 <= damping + way <= most
+                and self._at(damping + way).value > self._at(damping).value
+            ):
+                damping += way
+        there = self._at(damping)
+        return damping, there if there.value > self._here.value else self._here
+
+    def _at(self, damping: int) -> _Place:
+        if damping not in self._known:
+            step = self._step(SLIGHT + _DAMPINGS[damping]) / self._scale
+            self._known[damping] = self._ways.moved(self._here, step)
+        return self._known[damping]
+
+    def _step(self, damping: float) -> FloatArray:
+        values = np.maximum(self._values, 0.0) + damping
+        return least_within(values, self._vectors, self._slope, *self._room)
 
 
 def _slope(
