@@ -24,8 +24,9 @@ from ... import _core
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.threads import in_parallel
 from ...errors import NumericalError
-from .objective import Objective
-from .search import SLIGHT, Box, least_within
+from .objective import LinearRows, Objective
+from .search import SLIGHT, Box, least_within, minimise, stride
+from .settle import risen
 
 _GAIN = 0.05  # nats: what promises less is not worth a step
 _STANDS = 0.5  # nats that two steps gain: with less it stands still
@@ -39,6 +40,7 @@ _FIRST = 4  # of these
 _FREER = 0.2  # root of how much less the noise is damped than parameters are
 _FAR = 1.5  # of a logarithm of the noise, in one step
 _LEARNED = 2  # steps of the noise alone after each: those cost far less
+_STIFF = 1e3  # root of nats
 _KEPT = 10  # slopes that correct the curvature
 _BENT = 0.2  # of the curvature that was expected: what is less is damped (Nocedal & Wright, 18.3)
 FAR_BELOW = 20.0
@@ -155,6 +157,23 @@ class _Ways:
         except NumericalError:
             return _Place(p, noise, -np.inf)
 
+    def led(self, here: _Place, slope: FloatArray) -> _Place:
+        """The end of a search of parameters with frozen gains that leans as the likelihood does.
+
+        What the gains leave out of the slope stays as it is during the search (first-order model
+        management: Alexandrov et al., AIAA 2000-4886).
+        """
+        p, noise, _ = here
+        columns = self.box.columns
+        gains = self.objective.freeze(p, noise)
+        _, seen, _ = self.objective.normal_equations(p, gains, columns)
+        rows = np.zeros((1, p.size))
+        rows[0, columns] = (slope - seen) / _STIFF
+        leaning = self.objective.also(LinearRows(rows, as_float64(rows @ p + _STIFF)))
+        found = minimise(leaning, p, gains, self.box, rounds=8, tolerance=_GAIN)
+        p, gains = risen(self.objective, p, gains, found.x, noise, self.box)
+        return _Place(p, noise, self.objective.reached(p, gains))
+
     def learned_at(self, here: _Place) -> _Place:
         """The same parameters with noise of their own, where that is likelier."""
         if not len(self.learned):
@@ -165,20 +184,26 @@ class _Ways:
 
     def slope(self, here: _Place) -> tuple[FloatArray, FloatArray]:
         """Slope of the likelihood, and the curvature that frozen gains and the score tell."""
-        p, noise, _ = here
-        gains = self.objective.freeze(p, noise)
-        _, _, information = self.objective.normal_equations(p, gains, self.box.columns)
-        slope = _slope(
-            lambda trials: self.objective.log_likelihoods(trials, noise), p, information, self.box
-        )
-        unit, free = self.box.units(p[self.box.columns]), len(self.box.columns)
+        slope, information = self.slope_of_parameters(here)
+        unit, free = self.box.units(here.p[self.box.columns]), len(self.box.columns)
         curvature = np.zeros((free + len(self.learned),) * 2)
         curvature[:free, :free] = information * np.outer(unit, unit)
         if not len(self.learned):
             return as_float64(slope * unit), curvature
-        _, score, information = self.objective.noise_score(p, noise)
+        _, score, information = self.objective.noise_score(here.p, here.noise)
         curvature[free:, free:] = information[np.ix_(self.learned, self.learned)]
         return np.concatenate([slope * unit, score[self.learned]]), curvature
+
+    def slope_of_parameters(self, here: _Place) -> tuple[FloatArray, FloatArray]:
+        """The same of the free parameters themselves."""
+        p, noise, _ = here
+        gains = self.objective.freeze(p, noise)
+        _, _, information = self.objective.normal_equations(p, gains, self.box.columns)
+
+        def values_at(trials: FloatArray) -> FloatArray:
+            return self.objective.log_likelihoods(trials, noise)
+
+        return _slope(values_at, p, information, self.box), information
 
     @property
     def _limits(self) -> tuple[FloatArray, FloatArray]:
@@ -219,8 +244,9 @@ class _Met:
 def _climbed(
     ways: _Ways, here: _Place, steps: int, goes_on: Callable[[FloatArray, FloatArray], bool]
 ) -> _Place:
+    here, promised = _searched(ways, here)
     met, damping, before = _Met(), _FIRST, np.inf
-    for done in range(1, steps + 1):
+    for done in range(1, steps + 1 if promised > _STANDS else 1):
         slope, curvature = ways.slope(here)
         met.meet(ways.at(here), slope)
         scale = np.sqrt(np.maximum(np.diag(curvature), 1e-12))
@@ -235,6 +261,19 @@ def _climbed(
             break
         before = gained
     return here
+
+
+def _searched(ways: _Ways, here: _Place) -> tuple[_Place, float]:
+    """Where a search of the parameters leads, and what a step of them promised [nats].
+
+    It follows a valley that bends, of which steps are tangents.
+    """
+    slope, information = ways.slope_of_parameters(here)
+    x = here.p[ways.box.columns]
+    promised = stride(x, slope, information, SLIGHT, ways.box)[1]
+    if promised < _GAIN:
+        return here, promised
+    return ways.learned_at(ways.led(here, slope)), promised
 
 
 class _Trials:

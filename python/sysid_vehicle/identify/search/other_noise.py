@@ -28,6 +28,7 @@ _WORTH = 10.0  # nats on few samples that a disturbance takes up, or its time sc
 _STEPS = 3  # of the noise, the time held
 _TWICE = 2.0  # times what a step of the parameters promises
 _STANDS = 0.5  # nats
+_ROUNDS = 3
 _BELOW_BY_FEW = 5.0  # nats on few samples, from where nothing comes up
 
 
@@ -59,8 +60,28 @@ def likelier_noise(
         Never less likely than those that are given.
     """
     best, value = at_top, objective.log_likelihood(*at_top)
+    known: list[FloatArray] = []
+    for _ in range(_ROUNDS):
+        found, reached = _one_round(objective, best, value, box, few, known)
+        if reached < value + _STANDS:
+            return found
+        best, value = found, reached  # where other disturbances may be there
+    return best
+
+
+def _one_round(
+    objective: Objective,
+    best: tuple[FloatArray, FloatArray],
+    value: float,
+    box: Box,
+    few: Objective,
+    known: list[FloatArray],
+) -> tuple[tuple[FloatArray, FloatArray], float]:
+    """As `likelier_noise`, from one maximum; what is `known` by then is not tried again."""
+    at_top = best
     here = few.learn_noise(*at_top, rounds=_STEPS)
-    known, least = [here.noise], few.log_likelihood(at_top[0], here.noise) - _BELOW_BY_FEW
+    known.append(here.noise)
+    least = few.log_likelihood(at_top[0], here.noise) - _BELOW_BY_FEW
     for place, time_s in _other_times(few, at_top[0], here):
         try:
             noise = _with_time(few, at_top[0], here, place, time_s, box)
@@ -81,7 +102,7 @@ def likelier_noise(
             continue
         if reached > value:
             best, value = rival, reached
-    return best
+    return best, value
 
 
 def _other_times(few: Objective, p: FloatArray, here: Learned) -> Iterator[tuple[int, float]]:
@@ -110,6 +131,10 @@ def _with_time(
     gains = few.freeze(p, learned.noise)
     _, slope, information = few.normal_equations(p, gains, box.columns)
     _, promised = stride(p[box.columns], slope, information, SLIGHT, box)
+    _, by_noise, _ = few.noise_score(p, learned.noise)
+    if by_noise[place] * np.log(time_s / here.noise[place]) > 0.0:
+        # Let go, the time would not go back: another maximum lies beyond.
+        promised += few.noise_promises(p, learned.noise)
     lost = here.log_likelihood - learned.log_likelihood
     return learned.noise if lost < _TWICE * promised + _STANDS else None
 
