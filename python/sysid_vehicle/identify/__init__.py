@@ -6,7 +6,7 @@ from .identify import identify, profile_fit
 from .intervals.estimates import Estimate
 from .intervals.posterior import Posterior
 from .intervals.profile import Profile
-from .maximum import refine, refine_above, refine_while, refit, relearn, unmoved
+from .maximum import far_below, refine, refine_above, refine_while, refit, relearn, unmoved
 from .offsets import driving_beside, driving_of
 from .predictive import Prediction, predict
 from .runs.runs import Difference, RunsFit, identify_runs
@@ -30,6 +30,7 @@ __all__ = [
     "driving_beside",
     "driving_of",
     "explaining",
+    "far_below",
     "free_box",
     "identify",
     "identify_runs",

@@ -34,7 +34,12 @@ _SAME, _NEAR = 0.5, 0.5
 
 
 def refine(
-    model: Model, driving: Driving, noise: NoiseModel, *, inputs: FloatArray | None = None
+    model: Model,
+    driving: Driving,
+    noise: NoiseModel,
+    *,
+    inputs: FloatArray | None = None,
+    least: float = -np.inf,
 ) -> Fit:
     """Go on from a model's values and a noise model that are already near: one start.
 
@@ -42,8 +47,17 @@ def refine(
     ----------
     inputs : array, shape (samples, 2), optional
         In place of the driving's own steering angle and wheel force.
+    least : float
+        Log-likelihood below which nobody asks for the maximum (`far_below`): noise of other time
+        scales is not tried from there.
     """
-    return polish(model, driving, model.vector(), noise, Starts.none(model.free_names), inputs)
+    starts = Starts.none(model.free_names)
+    return polish(model, driving, model.vector(), noise, starts, inputs, least)
+
+
+def far_below(log_likelihood: float, least: float) -> bool:
+    """Whether neither noise of another time scale nor a simpler model lifts a fit up to that."""
+    return log_likelihood < least - FAR_BELOW
 
 
 def refine_above(model: Model, driving: Driving, fit: Fit, least: float = -np.inf) -> Fit | None:
@@ -162,11 +176,15 @@ def polish(
     noise: NoiseModel,
     starts: Starts,
     inputs: FloatArray | None = None,
+    least: float = -np.inf,
 ) -> Fit:
-    """Noise and parameters of maximum likelihood, from values that are already near."""
+    """Noise and parameters of maximum likelihood, from values that are already near.
+
+    `least` as for `refine`.
+    """
     objective, thinned = objectives(model, driving, inputs)
     found = settle(objective, p, noise.vector(), free_box(model), thin=thinned)
-    return top(model, driving, objective, found, starts, thinned)
+    return top(model, driving, objective, found, starts, thinned, least)
 
 
 def objectives(
@@ -195,12 +213,16 @@ def top(
     settled: tuple[FloatArray, FloatArray, bool],
     starts: Starts,
     thinned: Sequence[Objective] = (),
+    least: float = -np.inf,
 ) -> Fit:
     """The maximum, from where a search has settled, whichever time scale its noise began with.
 
-    `thinned` is the likelihood of fewer samples, the fewest first.
+    `thinned` is the likelihood of fewer samples, the fewest first; `least` as for `refine`.
     """
     at_top = to_the_top(objective, *settled[:2], free_box(model))
+    if far_below(log_likelihood_of(objective, *at_top), least):
+        told = NoiseModel.from_vector(at_top[1])
+        return summary(model, driving, objective, at_top[0], told, starts, settled[2])
     return _likeliest(model, driving, objective, at_top, starts, thinned, settled[2])
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from sysid_vehicle import Model, diagnose, drive, identify, manoeuvres
@@ -18,10 +19,11 @@ from sysid_vehicle.study.search.steps import _with_others, exchanged, in_common
 def test_an_effect_that_was_tried_against_the_same_ones_is_not_refitted(
     start: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    driving = object()
+    driving = SimpleNamespace(samples=1000)
     tried: Any = SimpleNamespace(model=start.add("aero_drag"), driving=driving)
-    windy: Any = SimpleNamespace(model=start.add("head_wind"), driving=driving, noise=None)
-    names = {"refine": lambda *_: "refined", "without_insignificant": lambda fit, _: fit}
+    windy = windy_fit(start, driving)
+    refined = SimpleNamespace(log_likelihood=0.0)
+    names = {"refine": lambda *_, **__: refined, "without_insignificant": lambda fit, _: fit}
     for name, stand_in in names.items():
         monkeypatch.setitem(_with_others.__globals__, name, stand_in)
     drag = Candidate(
@@ -35,7 +37,43 @@ def test_an_effect_that_was_tried_against_the_same_ones_is_not_refitted(
         replace(drag, fit=elsewhere),
         replace(drag, fit=beside),
     ):
-        assert _with_others(windy, "head_wind", (other,), USUAL) == "refined"
+        assert _with_others(windy, "head_wind", (other,), USUAL) is refined
+
+
+def windy_fit(start: Model, driving: object) -> Any:
+    """A fit with a wind, of a log-likelihood of nothing."""
+    model = start.add("head_wind")
+    wind = [SimpleNamespace(name=n) for n in model.parameters if n.startswith("head_wind.")]
+    return SimpleNamespace(
+        model=model, driving=driving, noise=None, log_likelihood=0.0, estimates=wind
+    )
+
+
+@pytest.mark.parametrize(("below", "simpler"), [(10.0, True), (40.0, False)])
+def test_a_trial_far_below_is_not_made_simpler(
+    start: Model, monkeypatch: pytest.MonkeyPatch, below: float, simpler: bool
+) -> None:
+    """Twenty nats, and the price of the wind, are more than a simpler model gains."""
+    asked, told = [], {}
+
+    def refining(*_: object, least: float) -> Any:
+        told["least"] = least
+        return SimpleNamespace(log_likelihood=-below)
+
+    def simplified(fit: Any, _: object) -> Any:
+        asked.append(fit)
+        return fit
+
+    monkeypatch.setitem(_with_others.__globals__, "refine", refining)
+    monkeypatch.setitem(_with_others.__globals__, "without_insignificant", simplified)
+    drag = Candidate(effect("aero_drag"), 9.0, 0.0, (0.6,), (0.1,), 1.0, 1.0)
+    windy = windy_fit(start, SimpleNamespace(samples=1000))
+    found = _with_others(windy, "head_wind", (drag,), USUAL)
+    assert found is not None
+    assert found.log_likelihood == -below
+    price = 0.5 * len(windy.estimates) * np.log(1000.0)
+    assert told["least"] == pytest.approx(-price)
+    assert bool(asked) == simpler
 
 
 def test_two_that_are_confounded_are_tried_against_what_they_have_in_common(

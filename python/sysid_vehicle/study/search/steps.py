@@ -14,7 +14,7 @@ from ...diagnose import Candidate, Diagnosis, possible, refused
 from ...effects import Parameter
 from ...errors import NumericalError
 from ...estimate import Driving
-from ...identify import Estimate, Fit, refine
+from ...identify import Estimate, Fit, far_below, refine
 from ...rules import USUAL, Measures, Rules, accept, bic, worse
 from ..validation import as_sure, changes_ahead, error_falls, fall_in_error, gain_in_log_likelihood
 
@@ -190,7 +190,7 @@ def exchanged(
             if trial is None or frozenset(trial.model.effects) in seen:
                 continue
             if before(ends, partial(better, trial, best, test, rules), False):
-                best = trial
+                best = before(ends, partial(without_insignificant, trial, rules), trial)
         if best is fit:
             return fit
         fit = best
@@ -222,10 +222,23 @@ def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules)
     same = known is not None and set(known.model.effects) == set(model.effects)
     if known is not None and same and known.driving is fit.driving:
         return without_insignificant(known, rules)
+    # As simple as the model without all that is sought, it would need as much to be as good.
+    bare = [
+        e for e in fit.estimates if "." not in e.name or e.name.split(".")[0] in model.nuisances
+    ]
+    least = merit(fit) - bic(0.0, len(bare), fit.driving.samples)
     try:
-        return without_insignificant(refine(model, fit.driving, fit.noise), rules)
+        found = refine(model, fit.driving, fit.noise, least=least)
+        if far_below(found.log_likelihood, least):
+            return found
+        return without_insignificant(found, rules)
     except (NumericalError, np.linalg.LinAlgError):
         return None
+
+
+def _part(found: Estimate) -> str:
+    """Id of the effect that an estimate is of."""
+    return found.name.split(".")[0]
 
 
 def better(one: Fit, other: Fit, test: Driving, rules: Rules = USUAL) -> bool:
