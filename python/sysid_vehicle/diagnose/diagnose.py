@@ -152,8 +152,12 @@ def _refitted(
     """
     if not few:
         return [], []
-    # What the best one gains tells which of the others cannot come near it.
-    first = in_time(lambda c: refitted(fit, driving, c), ends)(few[0])
+    # What the best one gains tells which of the others cannot come near it, but for some.
+    work = in_time(lambda c: refitted(fit, driving, c), ends)
+    sure = [c for c in few[1:] if c.effect.along_alone == few[0].effect.along_alone]
+    sure = [c for c in sure if not _too_fast(c) and (c.id in again or _rivals(c, few[0]))]
+    first, *begun = pool.map(work, [few[0], *sure])
+    known = {c.id: c for c in begun}
     if more and first.fit is not None:
         price = rules.price * float(np.log(driving.samples))
         left = beside(first.fit, driving, set(), rules)
@@ -172,7 +176,7 @@ def _refitted(
     tried = [
         first,
         *with_progress(
-            pool.map(in_time(lambda c: refitted(fit, driving, c), ends), others),
+            pool.map(lambda c: known.get(c.id) or work(c), others),
             "refits",
             total=len(others),
             shown=progress,

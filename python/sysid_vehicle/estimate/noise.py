@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
@@ -244,6 +245,7 @@ def maximise_noise(
     rounds: int,
     enough: float = 0.01,
     likelihood: Callable[[FloatArray], float] | None = None,
+    along: bool = False,
 ) -> Learned:
     """Noise of maximum likelihood at fixed parameters of any model.
 
@@ -264,6 +266,9 @@ def maximise_noise(
     likelihood : callable, optional
         The log-likelihood alone, from noise, where that costs less than its score: after the last
         step nobody asks for more.
+    along : bool
+        Whether a score costs little more where the likelihood is known: then steps that lower it
+        are not scored either.
 
     Notes
     -----
@@ -291,13 +296,12 @@ def maximise_noise(
         for _ in range(6):
             step, _ = _step(gradient, information, low - eta, high - eta, there_is, reach)
             trial = np.clip(eta + step, low, high)
-            try:
-                if likelihood is not None and last:
+            there = (-np.inf, gradient, information)
+            with suppress(NumericalError):
+                if likelihood is not None and (last or along):
                     there = (likelihood(noise_of(trial)), gradient, information)
-                else:
+                if not last and (there[0] > value or not along):
                     there = problem.noise_score(p, noise_of(trial))
-            except NumericalError:
-                there = (-np.inf, gradient, information)
             if there[0] > value:
                 gained = there[0] - value
                 eta, (value, gradient, information) = trial, there
@@ -357,6 +361,8 @@ def _step(
     root = np.linalg.cholesky(scaled + 1e-3 * np.eye(len(size))).T
     bounds = (np.clip(low[free], -reach, -_TINY) * size, np.clip(high[free], _TINY, reach) * size)
     aim = np.linalg.solve(root.T, slope)
-    best = scipy.optimize.lsq_linear(root, aim, bounds=bounds, method="bvls").x
+    best = np.linalg.solve(root, aim)
+    if not np.all((bounds[0] <= best) & (best <= bounds[1])):
+        best = scipy.optimize.lsq_linear(root, aim, bounds=bounds, method="bvls").x
     step[free] = best / size
     return as_float64(step), float(slope @ best - 0.5 * best @ scaled @ best)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from .._common.threads import before
+from .._common.threads import before, in_parallel
 
 R = TypeVar("R")
 
@@ -64,6 +64,16 @@ class Judging:
                 self.left_out.append(what)
             return None
         return found[0]
+
+    def side_by_side(self, *questions: tuple[str, Callable[[], Any]] | None) -> list[Any]:
+        """As `asked` for each question, on all cores; None for what is no question."""
+        found = in_parallel(
+            lambda q: None if q is None else before(self.ends, lambda: (q[1](),), None), questions
+        )
+        for question, answer in zip(questions, found, strict=True):
+            if question is not None and answer is None and question[0] not in self.left_out:
+                self.left_out.append(question[0])
+        return [None if answer is None else answer[0] for answer in found]
 
     def note(self, effects: Sequence[str], what: str) -> None:
         """Note what is unknown of some effects, if there are any."""

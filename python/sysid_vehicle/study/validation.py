@@ -73,6 +73,13 @@ def gain_in_log_likelihood(
     return _with_error(after.log_density - before.log_density, test)
 
 
+def foreseen(poorer: Fit, richer: Fit, test: Driving) -> None:
+    """Work out at once the predictions that gains and sureness ask for one after the other."""
+    asked = ((poorer, poorer), (richer, poorer), (richer, richer))
+    with suppress(NumericalError, np.linalg.LinAlgError):
+        in_parallel(lambda of: _prediction(of[0], test, of[1]), asked)
+
+
 def as_sure(poorer: Fit, richer: Fit, test: Driving) -> bool:
     """Whether the richer model, with noise of its own, is no less sure of validation data.
 

@@ -147,7 +147,9 @@ class Estimated(ABC):
         """Estimates, then what follows from them, as functions of all parameters."""
 
     def __getitem__(self, name: str) -> Estimate:
-        return _named(name, (*self.estimates, *self.derived))
+        # What follows from the estimates is worked out only where it is asked for.
+        known = next((e for e in self.estimates if e.name == name), None)
+        return _named(name, (*self.estimates, *self.derived)) if known is None else known
 
     def profile(self, name: str) -> Profile:
         """Profile likelihood of an estimate, or of what follows from them."""

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from ... import _core
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.threads import check_time
 from ...errors import NumericalError
@@ -305,6 +306,7 @@ class Objective(Penalised):
             rounds=rounds,
             enough=enough,
             likelihood=lambda v: float(self.freeze(p, v).log_likelihood),
+            along=self._tells,
         )
 
     def noise_promises(self, p: FloatArray, noise: FloatArray) -> float:
@@ -314,20 +316,24 @@ class Objective(Penalised):
     def noise_score(self, p: FloatArray, noise: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Log-likelihood of the data, its derivatives by the noise's logarithms, their information.
 
-        Where the filter ran a moment ago it does not run again. The last score is kept: what it
-        promises tells whether the noise is worth learning.
+        It goes along the filter, which is kept: searches go on from it. So is the last score: what
+        it promises tells whether the noise is worth learning.
         """
         check_time()
         for last in tuple(self._score):
             if np.array_equal(last.p, p) and np.array_equal(last.noise, noise):
                 return last.found
-        gains = self._known(p, noise)
-        if gains is not None and isinstance(self.problem, Filtered):
-            found = self.problem.filtered_noise_score(p, gains)
+        if isinstance(self.problem, Filtered) and self._tells:
+            found = self.problem.filtered_noise_score(p, self.freeze(p, noise))
         else:
             found = self.problem.noise_score(p, noise)
         self._score[:] = [_Scored(p.copy(), noise.copy(), found)]
         return found
+
+    @property
+    def _tells(self) -> bool:
+        """Whether the noise is scored along a filter that has run."""
+        return isinstance(self.problem, Filtered) and self.samples <= _core.TOLD_SAMPLES
 
     def _known(self, p: FloatArray, noise: FloatArray) -> Any:
         """Gains that were asked for last, or None."""

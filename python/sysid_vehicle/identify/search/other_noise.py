@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..._common.arrays import FloatArray
+from ..._common.threads import in_parallel
 from ...errors import NumericalError
 from ...estimate import Learned
 from ...estimate.noise import DISTURBANCE, TIMES
@@ -82,11 +83,10 @@ def _one_round(
     here = few.learn_noise(*at_top, rounds=_STEPS)
     known.append(here.noise)
     least = few.log_likelihood(at_top[0], here.noise) - _BELOW_BY_FEW
-    for place, time_s in _other_times(few, at_top[0], here):
+    ways = list(_other_times(few, at_top[0], here))
+    begins = in_parallel(lambda way: _with_time(few, at_top[0], here, *way, box), ways)
+    for noise in (n for n in begins if n is not None):
         try:
-            noise = _with_time(few, at_top[0], here, place, time_s, box)
-            if noise is None:
-                continue
             p, told, _ = settle(few, at_top[0], noise, box, parameters_first=True)
             if any(_same(told, other) for other in known):
                 continue
@@ -123,18 +123,21 @@ def _other_times(few: Objective, p: FloatArray, here: Learned) -> Iterator[tuple
 def _with_time(
     few: Objective, p: FloatArray, here: Learned, place: int, time_s: float, box: Box
 ) -> FloatArray | None:
-    """Noise with that correlation time; None where it costs more than can come back."""
+    """Noise with that correlation time; None where it costs more than can come back, or fails."""
     lowest, highest = few.lowest.copy(), few.highest.copy()
     lowest[place] = highest[place] = time_s
     held = replace(few, lowest=lowest, highest=highest)
-    learned = held.learn_noise(p, here.noise, rounds=_STEPS)
-    gains = few.freeze(p, learned.noise)
-    _, slope, information = few.normal_equations(p, gains, box.columns)
-    _, promised = stride(p[box.columns], slope, information, SLIGHT, box)
-    _, by_noise, _ = few.noise_score(p, learned.noise)
-    if by_noise[place] * np.log(time_s / here.noise[place]) > 0.0:
-        # Let go, the time would not go back: another maximum lies beyond.
-        promised += few.noise_promises(p, learned.noise)
+    try:
+        learned = held.learn_noise(p, here.noise, rounds=_STEPS)
+        gains = held.freeze(p, learned.noise)
+        _, slope, information = held.normal_equations(p, gains, box.columns)
+        _, promised = stride(p[box.columns], slope, information, SLIGHT, box)
+        _, by_noise, _ = held.noise_score(p, learned.noise)
+        if by_noise[place] * np.log(time_s / here.noise[place]) > 0.0:
+            # Let go, the time would not go back: another maximum lies beyond.
+            promised += few.noise_promises(p, learned.noise)
+    except (NumericalError, np.linalg.LinAlgError):
+        return None
     lost = here.log_likelihood - learned.log_likelihood
     return learned.noise if lost < _TWICE * promised + _STANDS else None
 

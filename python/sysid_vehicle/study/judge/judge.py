@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -118,15 +119,17 @@ class Judge:
         """
         fit, outer, asks, rules = self.fit, self.outer, self.asks, self.rules
         on_train = self._compared(outer)
-        rivals = asks.asked(_RIVALS if self.added else _UNSHOWN, self._rivals)
-        explained = None
-        if self.added:
-            explained = asks.asked(_TOGETHER, lambda: beyond_noise_ahead(outer, self.test))
-        expected = asks.asked(_FORETOLD, lambda: foretold(fit, self.test, rules))
         slow = slow_forces(fit, rules)
+        endless = math.isinf(asks.ends)
+        rivals, explained, expected, pattern, small, story = asks.side_by_side(
+            (_RIVALS if self.added else _UNSHOWN, self._rivals),
+            (_TOGETHER, self._explained) if self.added else None,
+            (_FORETOLD, lambda: foretold(fit, self.test, rules)),
+            (_STRUCTURE, lambda: structure(fit, self.test)),
+            (_SMALL, lambda: self._small(slow)),
+            (_STEPS, lambda: way(self.trail.fits)) if endless else None,
+        )
         alone = self._alone(rivals)
-        pattern = asks.asked(_STRUCTURE, lambda: structure(fit, self.test))
-        small = asks.asked(_SMALL, lambda: self._small(slow))
         facts = facts_of(
             outer,
             alone,
@@ -147,7 +150,7 @@ class Judge:
             facts = self._with_shares(facts, explained)
             alone, facts = self._contested(rivals, alone, facts)
         decision = verdict(facts, rules)
-        fits, shared = self._way()
+        fits, shared = (story, ()) if endless else self._way()
         on_train |= self._compared([f for f in fits if f not in on_train])
         on_test = self._compared(fits, self.test)
         told, late = in_the_light_of(decision, alone), tuple(asks.left_out)
@@ -192,6 +195,9 @@ class Judge:
             widened=wide,
         )
 
+    def _explained(self) -> Beyond:
+        return beyond_noise_ahead(self.outer, self.test)
+
     @cached_property
     def _wide(self) -> FloatArray | None:
         """Covariance of the parameters that includes what is missing; None where time ran out."""
@@ -208,7 +214,8 @@ class Judge:
     def _way(self) -> tuple[list[Fit], tuple[str, ...]]:
         """From the baseline to the final model, an effect more each time.
 
-        It comes last: the fits between are a story, and may take longer than all that is claimed.
+        Under a time limit it comes last: the fits between are a story, and may take longer than
+        all that is claimed.
         The second are effects of one step, as there was no time for the fits between them: nobody
         knows which of them takes little of the error.
         """

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from ..._common.text import with_error
-from ..._common.threads import before
+from ..._common.threads import before, in_parallel
 from ...diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
 from ...diagnose.diagnose import REFITS
 from ...effects import Effect
@@ -93,7 +93,7 @@ class Trail:
         last = self.fit.model.effects
 
         def harms() -> bool:
-            one, other = (serving(fit, test) for fit in (self.fits[0], self.fit))
+            one, other = in_parallel(lambda fit: serving(fit, test), (self.fits[0], self.fit))
             return bool(worse(changes_of(one, other, test, AHEAD), rules))
 
         while len(self.fits) > 1 and harms():

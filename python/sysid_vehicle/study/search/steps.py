@@ -16,7 +16,14 @@ from ...errors import NumericalError
 from ...estimate import Driving
 from ...identify import Estimate, Fit, far_below, refine
 from ...rules import USUAL, Measures, Rules, accept, bic, worse
-from ..validation import as_sure, changes_ahead, error_falls, fall_in_error, gain_in_log_likelihood
+from ..validation import (
+    as_sure,
+    changes_ahead,
+    error_falls,
+    fall_in_error,
+    foreseen,
+    gain_in_log_likelihood,
+)
 
 _ALTERNATIVES = 2  # tried in place of one effect
 
@@ -77,6 +84,7 @@ def _sound(c: Candidate, rules: Rules) -> bool:
 
 def _measures(fit: Fit, found: Fit, plausible: bool, test: Driving) -> Measures:
     """What a richer model changes on validation data."""
+    foreseen(fit, found, test)
     return Measures(
         gain_in_log_likelihood(fit, found, test, same_noise=True),
         gain_in_log_likelihood(fit, found, test),
