@@ -174,6 +174,15 @@ void register_identify(py::module_& m) {
             },
             py::arg("parameters"), py::arg("noise"))
         .def(
+            "filtered_smoothed_means",
+            [](const LogwiseProblem& self, const Array& p, const LogwiseFilter& filter) {
+                check_runs(self, filter);
+                const double* values = values_of(p);
+                return filled(self.samples(), kStatesFull,
+                              [&](double* to) { smoothed_means(self, values, filter, to); });
+            },
+            py::arg("parameters"), py::arg("filter"))
+        .def(
             "look_ahead",
             [](const LogwiseProblem& self, const Array& p, const Array& noise,
                const std::vector<std::pair<std::size_t, std::size_t>>& horizons, bool readings) {

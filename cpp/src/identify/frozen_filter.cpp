@@ -94,6 +94,10 @@ std::vector<int> FrozenFilter::places(const std::vector<int>& of) const {
     return out;
 }
 
+bool FrozenFilter::tells_of(const Problem& problem) const {
+    return tells() && rows == filter_rows(problem.model.effects, noise.disturbances());
+}
+
 FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise) {
     const InTime in_time(logged, p);
     const Problem& problem = *in_time;

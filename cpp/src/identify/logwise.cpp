@@ -196,6 +196,14 @@ void smoothed_means(const LogwiseProblem& logged, const double* p, const Noise& 
     });
 }
 
+void smoothed_means(const LogwiseProblem& logged, const double* p, const LogwiseFilter& filter,
+                    double* out) {
+    each(logged, p,
+         [&](const Problem& part, const double* own, std::size_t number, std::size_t before) {
+             smoothed_means(part, own, filter.parts[number], out + before * kStatesFull);
+         });
+}
+
 void look_ahead(const LogwiseProblem& logged, const double* p, const Noise& noise,
                 const std::vector<Horizon>& horizons, double* errors, bool readings) {
     const std::size_t samples = logged.samples();

@@ -6,9 +6,8 @@
 
 #include "sysid/identify/in_time.hpp"
 #include "sysid/identify/lane_filter.hpp"
-#include "sysid/identify/local_model.hpp"
-#include "sysid/identify/prediction_error.hpp"
 #include "sysid/identify/run_system.hpp"
+#include "sysid/identify/told_path.hpp"
 #include "sysid/math/interrupt.hpp"
 
 namespace sysid {
@@ -114,15 +113,7 @@ bool in_pieces(const Problem& problem, const double* p, const Noise& noise, Sum<
                     score_of<L>(noise, run, static_cast<int>(n), static_cast<int>(moving),
                                 [&](std::size_t d) { return static_cast<int>(moving + d); }));
             for (std::size_t k = pieces[i].begin; k < pieces[i].end; ++k) {
-                ScoreSample s;
-                const double* from = place(i, k);
-                s.transition = k > 0 ? from : nullptr;
-                s.observation = from += moving * n;
-                s.gain = from += kChannels * n;
-                s.whitener = from += n * kChannels;
-                s.innovation = from += kWhitener;
-                s.mean = from += kChannels;
-                s.covariance = from + n;
+                const ScoreSample s = score_sample(place(i, k), n, moving, k);
                 score->add(s, run.measurements[k]);
             }
             if (pieces[i].end == run.size()) sum.add(*score);
@@ -133,53 +124,23 @@ bool in_pieces(const Problem& problem, const double* p, const Noise& noise, Sum<
     return true;
 }
 
-/// The same along a path that a filter has told. How single samples answer to states is worked out
-/// for many of them side by side, as for `normal_equations`.
+/// The same along a path that a filter has told.
 template <int L>
 Sum<L> along(const Problem& problem, const double* p, const FrozenFilter& filter) {
-    constexpr std::size_t kTogether = std::size_t{8} * kLanes;
-    LocalModel local(problem.model, p, {}, 0, filter.noise.disturbances());
-    const std::size_t n = filter.rows.size(), moving = local.states();
-    std::vector<PathSample> samples(kTogether);
-    std::vector<double> predicted(kTogether * n), derivatives(kTogether * local.size());
+    ToldPath path(problem, p, filter);
+    const std::size_t moving = path.moving();
     Sum<L> sum;
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         const Run& run = problem.runs[i];
-        auto score = score_of<L>(filter.noise, run, static_cast<int>(n), static_cast<int>(moving),
+        auto score = score_of<L>(filter.noise, run, static_cast<int>(path.states()),
+                                 static_cast<int>(moving),
                                  [&](std::size_t d) { return static_cast<int>(moving + d); });
-        for (std::size_t first = 0; first < run.size(); first += kTogether) {
+        for (std::size_t first = 0; first < run.size(); first += ToldPath::kTogether) {
             poll_interrupt();
-            const std::size_t count = std::min(kTogether, run.size() - first);
-            for (std::size_t j = 0; j < count; ++j) {
-                const std::size_t k = first + j;
-                const double *gain = filter.gain(i, k), *told = filter.told(i, k);
-                double* here = predicted.data() + j * n;
-                for (std::size_t a = 0; a < n; ++a) {
-                    here[a] = told[kChannels + a];
-                    for (std::size_t c = 0; c < kChannels; ++c)
-                        here[a] -= gain[a * kChannels + c] * told[c];
-                }
-                PathSample& s = samples[j];
-                s = {&run, k, 0, nullptr, nullptr, here, here + moving};
-                if (k == 0) continue;
-                s.substeps = filter.runs[i].substeps[k];
-                s.before = filter.told(i, k - 1) + kChannels;
-                s.pushed = s.before + moving;
-            }
-            local.differentiate(samples.data(), count, derivatives.data());
-            for (std::size_t j = 0; j < count; ++j) {
-                const std::size_t k = first + j;
-                const double* by = derivatives.data() + j * local.size();
-                ScoreSample s;
-                s.transition = k > 0 ? by : nullptr;
-                s.observation = by + local.read();
-                s.gain = filter.gain(i, k);
-                s.whitener = filter.whitener(i, k);
-                s.innovation = filter.told(i, k);
-                s.mean = s.innovation + kChannels;
-                s.covariance = s.mean + n;
-                score.add(s, run.measurements[k]);
-            }
+            const std::size_t end = std::min(first + ToldPath::kTogether, run.size());
+            path.linearise(i, first, end - first);
+            for (std::size_t k = first; k < end; ++k)
+                score.add(path.sample(i, k), run.measurements[k]);
         }
         sum.add(score);
     }
@@ -224,8 +185,7 @@ double noise_score(const Problem& logged, const double* p, const Noise& noise, d
 
 double noise_score(const Problem& logged, const double* p, const FrozenFilter& filter,
                    double* gradient, double* information) {
-    const std::vector<int> rows = filter_rows(logged.model.effects, filter.noise.disturbances());
-    if (!filter.tells() || rows != filter.rows)
+    if (!filter.tells_of(logged))
         return noise_score(logged, p, filter.noise, gradient, information);
     const InTime in_time(logged, p);
     return with_parameters(filter.noise, [&](auto parameters) {

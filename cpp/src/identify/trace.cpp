@@ -5,6 +5,7 @@
 #include "sysid/identify/lane_filter.hpp"
 #include "sysid/identify/prediction_error.hpp"
 #include "sysid/identify/run_system.hpp"
+#include "sysid/identify/told_path.hpp"
 #include "sysid/math/interrupt.hpp"
 
 namespace sysid {
@@ -72,55 +73,57 @@ void clear_states(std::size_t samples, double* out) {
     for (std::size_t k = 0; k < samples; ++k) std::fill_n(out + k * kStatesFull, kStatesPlain, 0.0);
 }
 
-/// The backward pass over a run that the filter has gone through: of each sample what
-/// `LaneFilter::write_sample` wrote, `wide` numbers.
+/// The backward pass over a run that the filter has gone through, from its last sample on.
 ///
 /// Smoothed means alone need no covariance but the filter's: they are what is known at a sample and
 /// that times a sum of later innovations (Bryson & Frazier 1963; de Jong, Biometrika 1988).
-bool means_of_run(const Run& run, const std::vector<double>& forget, std::size_t moving,
-                  const std::vector<int>& rows, const double* numbers, std::size_t wide,
-                  double* out) {
-    const std::size_t n = rows.size();
-    std::vector<double> later(n, 0.0), before(n);
-    for (std::size_t k = run.size(); k-- > 0;) {
-        poll_interrupt(k);
-        const double* transition = numbers + k * wide;
-        const double* observation = transition + moving * n;
-        const double* gain = observation + kChannels * n;
-        const double* whitener = gain + n * kChannels;
-        const double* innovation = whitener + kWhitener;
-        const double* mean = innovation + kChannels;
-        const double* covariance = mean + n;
+class MeansBackwards {
+  public:
+    MeansBackwards(const Run& run, const Noise& noise, std::size_t moving,
+                   const std::vector<int>& rows)
+        : run_(run), moving_(moving), rows_(rows), later_(rows.size(), 0.0), before_(rows.size()) {
+        for (std::size_t d = 0; d < noise.disturbances(); ++d)
+            forget_.push_back(noise.forget(d, run.dt));
+    }
+
+    /// Writes the means of sample `k`; false where one is no number.
+    bool add(std::size_t k, const ScoreSample& s, double* out) {
+        const std::size_t n = rows_.size();
         for (std::size_t i = 0; i < n; ++i) {
-            double sum = mean[i];
+            double sum = s.mean[i];
             for (std::size_t j = 0; j < n; ++j)
-                sum += covariance[LaneFilter::packed(std::max(i, j), std::min(i, j))] * later[j];
+                sum += s.covariance[LaneFilter::packed(std::max(i, j), std::min(i, j))] * later_[j];
             if (!std::isfinite(sum)) return false;
-            if (rows[i] < static_cast<int>(kStatesFull))
-                out[k * kStatesFull + static_cast<std::size_t>(rows[i])] = sum;
+            if (rows_[i] < static_cast<int>(kStatesFull))
+                out[static_cast<std::size_t>(rows_[i])] = sum;
         }
         std::array<double, kChannels> told{};  // inverse covariance times innovation
         for (std::size_t i = 0, entry = 0; i < kChannels; entry += ++i) {
             double white = 0.0;
-            for (std::size_t j = 0; j <= i; ++j) white += whitener[entry + j] * innovation[j];
-            for (std::size_t j = 0; j <= i; ++j) told[j] += whitener[entry + j] * white;
+            for (std::size_t j = 0; j <= i; ++j) white += s.whitener[entry + j] * s.innovation[j];
+            for (std::size_t j = 0; j <= i; ++j) told[j] += s.whitener[entry + j] * white;
         }
-        before = later;
+        before_ = later_;
         for (std::size_t c = 0; c < kChannels; ++c) {
-            if (std::isnan(run.measurements[k][static_cast<int>(c)])) continue;
+            if (std::isnan(run_.measurements[k][static_cast<int>(c)])) continue;
             double sum = told[c];
-            for (std::size_t i = 0; i < n; ++i) sum -= gain[i * kChannels + c] * later[i];
-            for (std::size_t i = 0; i < n; ++i) before[i] += observation[c * n + i] * sum;
+            for (std::size_t i = 0; i < n; ++i) sum -= s.gain[i * kChannels + c] * later_[i];
+            for (std::size_t i = 0; i < n; ++i) before_[i] += s.observation[c * n + i] * sum;
         }
-        if (k == 0) break;
-        for (std::size_t i = 0; i < n; ++i) {
-            double sum = i < moving ? 0.0 : forget[i - moving] * before[i];
-            for (std::size_t r = 0; r < moving; ++r) sum += transition[r * n + i] * before[r];
-            later[i] = sum;
+        for (std::size_t i = 0; i < n && k > 0; ++i) {
+            double sum = i < moving_ ? 0.0 : forget_[i - moving_] * before_[i];
+            for (std::size_t r = 0; r < moving_; ++r) sum += s.transition[r * n + i] * before_[r];
+            later_[i] = sum;
         }
+        return true;
     }
-    return true;
-}
+
+  private:
+    const Run& run_;
+    std::size_t moving_;
+    const std::vector<int>& rows_;
+    std::vector<double> forget_, later_, before_;
+};
 
 bool means_in_pieces(const Problem& problem, const double* p, const Noise& noise, double* out) {
     const std::vector<Piece> pieces =
@@ -140,13 +143,37 @@ bool means_in_pieces(const Problem& problem, const double* p, const Noise& noise
     clear_states(problem.samples(), out);
     for (std::size_t i = 0; i < problem.runs.size(); ++i) {
         const Run& run = problem.runs[i];
-        std::vector<double> forget;
-        forget.reserve(noise.disturbances());
-        for (std::size_t d = 0; d < noise.disturbances(); ++d)
-            forget.push_back(noise.forget(d, run.dt));
-        if (!means_of_run(run, forget, moving, rows, numbers.data() + first[i] * wide, wide,
-                          out + first[i] * kStatesFull))
-            return false;
+        MeansBackwards means(run, noise, moving, rows);
+        for (std::size_t k = run.size(); k-- > 0;) {
+            poll_interrupt(k);
+            const double* from = numbers.data() + (first[i] + k) * wide;
+            if (!means.add(k, score_sample(from, rows.size(), moving, k),
+                           out + (first[i] + k) * kStatesFull))
+                return false;
+        }
+    }
+    return true;
+}
+
+/// The same along a path that a filter has told; how single samples answer to states is worked out
+/// for many of them side by side.
+bool means_along(const Problem& problem, const double* p, const FrozenFilter& filter, double* out) {
+    ToldPath path(problem, p, filter);
+    clear_states(problem.samples(), out);
+    const std::vector<std::size_t> first = first_samples(problem);
+    for (std::size_t i = 0; i < problem.runs.size(); ++i) {
+        const Run& run = problem.runs[i];
+        MeansBackwards means(run, filter.noise, path.moving(), filter.rows);
+        for (std::size_t end = run.size(); end > 0;) {
+            poll_interrupt();
+            const std::size_t count = std::min(ToldPath::kTogether, end);
+            end -= count;
+            path.linearise(i, end, count);
+            for (std::size_t j = count; j-- > 0;)
+                if (!means.add(end + j, path.sample(i, end + j),
+                               out + (first[i] + end + j) * kStatesFull))
+                    return false;
+        }
     }
     return true;
 }
@@ -167,8 +194,18 @@ Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smo
 void smoothed_means(const Problem& logged, const double* p, const Noise& noise, double* out) {
     const InTime in_time(logged, p);
     if (means_in_pieces(*in_time, p, noise, out)) return;
+    if (logged.samples() <= kToldSamples &&
+        means_along(*in_time, p, freeze(*in_time, p, noise), out))
+        return;
     const Trace told = trace(logged, p, noise, true);
     std::copy(told.state.begin(), told.state.end(), out);
+}
+
+void smoothed_means(const Problem& logged, const double* p, const FrozenFilter& filter,
+                    double* out) {
+    const InTime in_time(logged, p);
+    if (!filter.tells_of(logged) || !means_along(*in_time, p, filter, out))
+        smoothed_means(logged, p, filter.noise, out);
 }
 
 void free_run(const Problem& logged, const double* p, double* readings) {

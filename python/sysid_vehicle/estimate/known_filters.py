@@ -83,3 +83,9 @@ class KnownProblem(_core.Problem):
             if self.samples <= _core.TOLD_SAMPLES:
                 self._known.put(asked, self.samples, gains)
         return gains
+
+    def smoothed_means(self, parameters: FloatArray, noise: FloatArray) -> FloatArray:
+        """The states that the smoother tells, along the filter."""
+        if self.samples > _core.TOLD_SAMPLES:
+            return super().smoothed_means(parameters, noise)
+        return self.filtered_smoothed_means(parameters, self.freeze(parameters, noise))

@@ -131,6 +131,13 @@ TEST_P(SideBySide, SmoothedMeansAreThoseOfTheWholeSmoother) {
                 apart = std::max(apart, std::abs(means[i] - smoothed.state[i]));
             }
             EXPECT_GT(apart, 0.0);  // other roundings: pieces were used
+            std::vector<double> along(means.size());
+            smoothed_means(problem, p.data(), freeze(problem, p.data(), noise), along.data());
+            for (std::size_t i = 0; i < means.size(); ++i) {
+                EXPECT_EQ(std::isnan(means[i]), std::isnan(along[i])) << i;
+                if (std::isnan(means[i])) continue;
+                EXPECT_NEAR(along[i], means[i], 1e-9 * (smoothed.state_std[i] + 1e-9)) << i;
+            }
         }
     }
 }

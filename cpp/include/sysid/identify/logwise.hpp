@@ -53,6 +53,8 @@ double noise_score(const LogwiseProblem& logged, const double* p, const LogwiseF
                    double* gradient, double* information);
 Trace trace(const LogwiseProblem& logged, const double* p, const Noise& noise, bool smoothed);
 void smoothed_means(const LogwiseProblem& logged, const double* p, const Noise& noise, double* out);
+void smoothed_means(const LogwiseProblem& logged, const double* p, const LogwiseFilter& filter,
+                    double* out);
 void look_ahead(const LogwiseProblem& logged, const double* p, const Noise& noise,
                 const std::vector<Horizon>& horizons, double* errors, bool readings = false);
 void free_run(const LogwiseProblem& logged, const double* p, double* readings);

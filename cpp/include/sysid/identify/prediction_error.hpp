@@ -59,6 +59,8 @@ struct FrozenFilter {
     }
     double* told(std::size_t run, std::size_t k) { return runs[run].told.data() + k * told_size(); }
     bool tells() const { return !runs.empty() && !runs[0].told.empty(); }
+    /// Whether what was told is of the states of this problem's model.
+    bool tells_of(const Problem& problem) const;
     /// Where among the gains of a sample those of such rows stand; -1 for those that have none.
     std::vector<int> places(const std::vector<int>& of) const;
 };
@@ -123,6 +125,9 @@ Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smo
 /// The states that the smoother tells, samples x kStatesFull, without how sure they are: a third of
 /// the work.
 void smoothed_means(const Problem& logged, const double* p, const Noise& noise, double* out);
+
+/// The same where the filter has run with these parameters, under its noise.
+void smoothed_means(const Problem& logged, const double* p, const FrozenFilter& filter, double* out);
 
 /// Predictions so many samples ahead, of which one sample in `every` starts one.
 struct Horizon {

@@ -84,15 +84,15 @@ def _one_round(
     known.append(here.noise)
     least = few.log_likelihood(at_top[0], here.noise) - _BELOW_BY_FEW
     ways = list(_other_times(few, at_top[0], here))
-    begins = in_parallel(lambda way: _with_time(few, at_top[0], here, *way, box), ways)
-    for noise in (n for n in begins if n is not None):
+    ends = in_parallel(lambda way: _led(few, at_top[0], here, *way, box), ways)
+    for end in (e for e in ends if e is not None):
+        p, told, reached = end
+        if any(_same(told, other) for other in known):
+            continue
+        known.append(told)
+        if reached < least:
+            continue
         try:
-            p, told, _ = settle(few, at_top[0], noise, box, parameters_first=True)
-            if any(_same(told, other) for other in known):
-                continue
-            known.append(told)
-            if few.log_likelihood(p, told) < least:
-                continue
             p, told, _ = settle(objective, p, told, box)
             if objective.log_likelihood(p, told) < value - FAR_BELOW:
                 continue
@@ -120,24 +120,39 @@ def _other_times(few: Objective, p: FloatArray, here: Learned) -> Iterator[tuple
                 yield int(place), time_s
 
 
+def _led(
+    few: Objective, p: FloatArray, here: Learned, place: int, time_s: float, box: Box
+) -> tuple[FloatArray, FloatArray, float] | None:
+    """Where few samples lead with another correlation time, and the log-likelihood there.
+
+    None where nothing comes of it.
+    """
+    held = replace(few)  # with a memory of its own
+    try:
+        noise = _with_time(held, p, here, place, time_s, box)
+        if noise is None:
+            return None
+        end, told, _ = settle(held, p, noise, box, parameters_first=True)
+        return end, told, held.log_likelihood(end, told)
+    except (NumericalError, np.linalg.LinAlgError):
+        return None
+
+
 def _with_time(
     few: Objective, p: FloatArray, here: Learned, place: int, time_s: float, box: Box
 ) -> FloatArray | None:
-    """Noise with that correlation time; None where it costs more than can come back, or fails."""
+    """Noise with that correlation time; None where it costs more than can come back."""
     lowest, highest = few.lowest.copy(), few.highest.copy()
     lowest[place] = highest[place] = time_s
     held = replace(few, lowest=lowest, highest=highest)
-    try:
-        learned = held.learn_noise(p, here.noise, rounds=_STEPS)
-        gains = held.freeze(p, learned.noise)
-        _, slope, information = held.normal_equations(p, gains, box.columns)
-        _, promised = stride(p[box.columns], slope, information, SLIGHT, box)
-        _, by_noise, _ = held.noise_score(p, learned.noise)
-        if by_noise[place] * np.log(time_s / here.noise[place]) > 0.0:
-            # Let go, the time would not go back: another maximum lies beyond.
-            promised += few.noise_promises(p, learned.noise)
-    except (NumericalError, np.linalg.LinAlgError):
-        return None
+    learned = held.learn_noise(p, here.noise, rounds=_STEPS)
+    gains = held.freeze(p, learned.noise)
+    _, slope, information = held.normal_equations(p, gains, box.columns)
+    _, promised = stride(p[box.columns], slope, information, SLIGHT, box)
+    _, by_noise, _ = held.noise_score(p, learned.noise)
+    if by_noise[place] * np.log(time_s / here.noise[place]) > 0.0:
+        # Let go, the time would not go back: another maximum lies beyond.
+        promised += few.noise_promises(p, learned.noise)
     lost = here.log_likelihood - learned.log_likelihood
     return learned.noise if lost < _TWICE * promised + _STANDS else None
 
