@@ -28,6 +28,7 @@ def study(first: float, last: float, alone: float, share: tuple[float, float, fl
     ("given", "said"),
     [
         ((1.0, 0.1, 0.1, (0.99, 0.98, 1.0)), ""),
+        ((1.0, 0.5, 0.5, (0.95, 0.9, 1.0)), ""),
         ((1.0, 0.1, 0.5, (0.5, 0.3, 0.7)), "fall by 99 %; other parameters alone lower those of "),
         ((1.0, 0.1, 1.2, (0.5, 0.3, 0.7)), "the squared lateral errors fall by 99 %."),
         ((1.0, 1.1, 0.5, (0.5, 0.3, 0.7)), "the squared lateral errors grow by 21 %."),

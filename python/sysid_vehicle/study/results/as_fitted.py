@@ -20,7 +20,8 @@ def as_fitted(study: Study) -> list[str]:
     errors, shares = study.horizons, study.shares
     first, last = (errors.error[k] for k in (0, -1))
     fall = _fall(first, last, study)
-    if study.explained.low <= fall <= study.explained.high:
+    # Errors hold the noise of the sensors, the share does not: a smaller fall says nothing yet.
+    if 0.0 <= fall <= study.explained.high:
         return []
     does = "fall" if fall >= 0.0 else "grow"
     text = (
