@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._common.text import number, with_error
+from ..._common.text import number, unit_after, with_error
 from ...estimate import UNITS
 from ...estimate.driving import WORDS
 from ...rules import LACKING, NONE_GONE, share_of
@@ -145,7 +145,9 @@ def nuisances(study: Study) -> list[str]:
         own = [(p, known[f"{part.id}.{p.name}"]) for p in part.parameters]
         off = [(abs(e.value - p.null_value), e.std, p.matters) for p, e in own]
         if any(by >= matters and by > study.rules.interval * std for by, std, matters in off):
-            sizes = ", ".join(f"{p.name} {with_error(e.value, e.std)} {p.unit}" for p, e in own)
+            sizes = ", ".join(
+                f"{p.name} {with_error(e.value, e.std)}{unit_after(p.unit)}" for p, e in own
+            )
             found.append(f"Nuisance {part.id} ({part.title}): {sizes}")
     return found
 
