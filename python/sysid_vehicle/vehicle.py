@@ -235,8 +235,8 @@ class Vehicle:
         if absent:
             usual = ", ".join(f"{k} = {v:g}" for k, v in dataclasses.asdict(USUAL_TYRE).items())
             warn(
-                f"{where}: {' and '.join(absent)} absent, so the search begins at usual values, "
-                f"{usual}; add what is known of the tyres"
+                f"{where}: {' and '.join(absent)} absent, so usual values are taken, {usual}, from "
+                f"which fits begin; add what is known of the tyres"
             )
         return vehicle
 

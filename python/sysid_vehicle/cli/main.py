@@ -6,7 +6,7 @@ import os
 import sys
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from typing import Any, TextIO
 
 from .._common.progress import note
@@ -35,14 +35,10 @@ def main(argv: list[str] | None = None) -> int:
     """
     try:
         args = parse(argv)
-        with _warnings_as_lines() as heard, _lines_that_fit(args.command):
+        with _warnings_as_lines() as heard, _read_to_the_end_or_not(args.command):
             refuse_outputs(args)
             COMMANDS[args.command](args, heard)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # The reader, such as `head`, has seen enough. Python would complain once more at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+            sys.stdout.flush()
     except (SysidError, OSError) as error:
         print(f"sysid-vehicle: error: {_one_line(str(error))}", file=sys.stderr)
         return _FAILED
@@ -53,28 +49,45 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-class _Fitting:
-    """A terminal whose lines are broken between words, not where they end."""
+class _Printed:
+    """A stream whose reader may leave; in a terminal lines are broken between words.
 
-    def __init__(self, stream: TextIO, width: int) -> None:
+    A reader such as `head` has seen enough; the files that were asked for are written all the same.
+    """
+
+    def __init__(self, stream: TextIO, width: int | None) -> None:
         self._stream, self._width = stream, width
 
     def write(self, text: str) -> int:
-        self._stream.write(wrapped(text, self._width))
+        with self._unread():
+            self._stream.write(text if self._width is None else wrapped(text, self._width))
         return len(text)
+
+    def flush(self) -> None:
+        with self._unread():
+            self._stream.flush()
+
+    @contextmanager
+    def _unread(self) -> Iterator[None]:
+        try:
+            yield
+        except BrokenPipeError:
+            # What is still buffered goes there too: Python would complain at exit.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
 
 
 @contextmanager
-def _lines_that_fit(command: str) -> Iterator[None]:
+def _read_to_the_end_or_not(command: str) -> Iterator[None]:
     """Break long lines in a terminal, but none of a file that is to be copied from it."""
-    width = columns()
-    if width is None or command == "map":
-        yield
-        return
-    with redirect_stdout(_Fitting(sys.stdout, width)):
+    width = None if command == "map" else columns()
+    with ExitStack() as streams:
+        if sys.stdout is not None:
+            streams.enter_context(redirect_stdout(_Printed(sys.stdout, width)))
+        if sys.stderr is not None:
+            streams.enter_context(redirect_stderr(_Printed(sys.stderr, None)))
         yield
 
 

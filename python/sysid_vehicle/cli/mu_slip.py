@@ -109,6 +109,7 @@ def _plain(comparison: MuSlipComparison) -> dict[str, Any]:
         "curve": comparison.best.curve.name,
         "noise_std": comparison.data.noise_std,
         "recommended": comparison.best.method,
+        "notes": list(comparison.notes),
         "estimates": [
             {
                 "method": e.method,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .._common.style import AFTER, framed, tidy
 from ..report.page import bullets, heading, page, paragraph, picture, table
+from ..rules import Share
 from .results import Fleet, Row
 
 _SHOWN = 15
@@ -22,6 +23,8 @@ def fleet_page(fleet: Fleet) -> str:
             bullets((f"{r.name}: {r.failure}" for r in fleet.failed), "warning"),
         ]
     parts += [heading("Studies"), table(_HEAD, [_line(r) for r in fleet.done], "text")]
+    if any(not e.named for r in fleet.done for e in r.effects):
+        parts.append(paragraph("In brackets: added, but not named."))
     return page("Studies of a fleet", parts)
 
 
@@ -29,7 +32,7 @@ def _causes(fleet: Fleet) -> list[str]:
     shown = [c for c in fleet.causes if c.cars][:_SHOWN]
     parts = [heading("Causes")]
     if shown:
-        figure = framed(8.0, 0.9 + 0.3 * len(shown), left=2.4, wspace=0.1)
+        figure = framed(8.0, 0.9 + 0.3 * len(shown), left=2.4, wspace=0.2)
         left, right = figure.subplots(1, 2, sharey=True)
         places = range(len(shown))[::-1]
         left.barh(places, [100.0 * c.share for c in shown], color=AFTER, height=0.6)
@@ -51,7 +54,7 @@ def _causes(fleet: Fleet) -> list[str]:
         paragraph(
             "Share: of the cars that were studied. Gain: median fall of the one-step-ahead error "
             "on validation data, in units of the noise floor. Sizes: median over the studies that "
-            "name the effect, and first to last decile."
+            "name the effect, and first to last decile where several do."
         ),
     ]
 
@@ -69,6 +72,6 @@ _HEAD = (
 def _line(r: Row) -> list[str]:
     effects = ", ".join(e.id if e.named else f"({e.id})" for e in r.effects)
     told = r.explained
-    gone = "-" if told is None else "{:.0f} % ({:.0f} to {:.0f})".format(*(100.0 * x for x in told))
+    gone = "-" if told is None else str(Share(*told))
     errors = ["-" if e is None else f"{e:.3f}" for e in (r.error_before, r.error_after)]
     return [r.name, r.verdict.replace("_", " "), effects or "-", *errors, gone]

@@ -30,7 +30,7 @@ class Effect:
         `confirmed`, `plausible` or `alias`.
     confounded_with : tuple of str
     stands_in : str
-        What tells that it only stands in for something else; empty where it is named.
+        What tells that it only stands in for something else, or may; empty where it is named.
     parameters : dict
         Value, standard error and unit by name.
     error_before, error_after : float
@@ -51,8 +51,8 @@ class Effect:
 
     @property
     def named(self) -> bool:
-        """Whether it counts as a cause."""
-        return self.grade != "alias"
+        """Whether its study names it, so that it counts as a cause."""
+        return not self.stands_in and self.grade != "alias"
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Cause:
     cars, share : int, float
         Cars in which some study names it, and their share of the cars that were studied.
     studies, aliases : int
-        Studies that name it; studies in which it only stands in for something else.
+        Studies that name it; studies in which it stands in for something else, or may.
     gain : float
         Median over the studies that name it of the fall of the one-step error it brings, over the
         noise floor; NaN where none does.
@@ -147,8 +147,11 @@ class Cause:
     @property
     def sizes(self) -> str:
         """Its parameters in words."""
+        spread = self.studies > 1  # one study has no deciles
         return ", ".join(
-            f"{n} {number(m, 3)} ({number(low, 3)} to {number(high, 3)}){unit_after(unit)}"
+            f"{n} {number(m, 3)}"
+            + (f" ({number(low, 3)} to {number(high, 3)})" if spread else "")
+            + unit_after(unit)
             for n, (m, low, high, unit) in self.parameters.items()
         )
 
@@ -251,7 +254,7 @@ class Fleet:
                 str(c.cars),
                 f"{100.0 * c.share:.0f} %",
                 f"{c.gain:.3f}" if np.isfinite(c.gain) else "-",
-                c.sizes or f"compensates for something else, in {c.aliases}",
+                c.sizes or f"not named; compensates for something else, or may, in {c.aliases}",
                 ", ".join(c.confounded_with) or "-",
             ]
             for c in self.causes

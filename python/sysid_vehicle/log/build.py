@@ -169,5 +169,6 @@ def _check(
     notes += [doubtful.text for doubtful in found if vehicle is None or not doubtful.by_the_car]
     dull = checks.excitation_note(channels, rate_hz)
     notes += checks.low_rate_note(rate_hz)
+    notes += checks.placeholder_notes(channels, excited=not dull)
     notes += checks.frozen_notes(channels, rate_hz, excited=not dull)
     notes += [dull] if dull else []

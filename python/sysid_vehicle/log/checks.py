@@ -16,6 +16,7 @@ _FROZEN_S = 1.0
 _MIN_RATE_HZ = 20.0
 _EXCITED_AY_MPS2 = 0.5
 _EXCITED_STEER_RAD = 0.002
+_CORNERING_MPS2 = 2.0  # no crossfall and no wind alone
 # What a channel must have missed, in its reference's unit, before a constant run counts as frozen.
 _FROZEN_MISSES = {"ay_mps2": 1.0, "yaw_rate_radps": 1.0, "vx_mps": 2.0, "ax_mps2": 2.0}
 
@@ -64,11 +65,38 @@ def excitation_note(columns: Mapping[str, FloatArray], rate_hz: float) -> str:
     low, high = np.nanpercentile(columns["steer_rad"], (0.5, 99.5))
     if ay >= _EXCITED_AY_MPS2 and high - low >= _EXCITED_STEER_RAD:
         return ""
+    if ay >= _CORNERING_MPS2 and high == low:
+        return (
+            f"steer_rad: constant ({low:.6g} rad) over the whole log while the lateral "
+            f"acceleration reaches {ay:.2g} m/s2: lateral parameters cannot be determined; check "
+            f"the sensor and the column"
+        )
     return (
         f"steer_rad and ay_mps2: not excited (steering varies by {high - low:.2g} rad, lateral "
         f"acceleration reaches {ay:.2g} m/s2 over the whole log): lateral parameters cannot be "
         f"determined; drive corners"
     )
+
+
+def placeholder_notes(channels: dict[str, FloatArray], excited: bool) -> list[str]:
+    """Take out a lateral speed that is one number in all corners, and say so.
+
+    Loggers fill columns of signals that nobody measures so. As a measurement without noise it
+    would outweigh all others.
+    """
+    values = channels.get("vy_mps")
+    if values is None or not excited:
+        return []
+    known = values[np.isfinite(values)]
+    if known.min() < known.max():
+        return []
+    del channels["vy_mps"]
+    note = (
+        f"vy_mps: constant ({known[0]:.6g}) over all "
+        f"{between(0, values.size, channels['time_s'])}, corners too, and is treated as absent; "
+        f"check the sensor and the column, or leave it out"
+    )
+    return [note]
 
 
 def frozen_notes(columns: Mapping[str, FloatArray], rate_hz: float, excited: bool) -> list[str]:

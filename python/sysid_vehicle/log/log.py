@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -157,6 +157,13 @@ class Log:
                 f"{self.name}: there is no channel '{channel}'{hint}{lost}; "
                 f"present are {', '.join(self._data)}"
             ) from None
+
+    def __contains__(self, channel: object) -> bool:
+        return channel in self._data
+
+    def __iter__(self) -> Iterator[str]:
+        """The names of all channels."""
+        return iter(self._data)
 
     def __len__(self) -> int:
         return self.n

@@ -155,7 +155,9 @@ def _names(have: set[str]) -> list[str]:
 
 def _floor(readings: Readings, told: Sequence[Signal]) -> float:
     quanta = [s.quantum for s in told if s.channel == readings.channel]
-    return float(max(_FLOOR * np.std(readings.values), max(quanta, default=0.0) / np.sqrt(12.0)))
+    # A channel that never changes, as in a simulated drive on a straight, has a floor too.
+    spread = float(np.std(readings.values)) or 1.0
+    return float(max(_FLOOR * spread, max(quanta, default=0.0) / np.sqrt(12.0)))
 
 
 def _step(readings: Sequence[Readings]) -> float:

@@ -218,12 +218,17 @@ class SensorCheck:
             rows.append((fault.title, fault.channel, value, span, verdict))
         return rows
 
+    @property
+    def _signal_head(self) -> tuple[str, ...]:
+        return ("log", *_SIGNAL_HEAD) if len(self.logs) > 1 else _SIGNAL_HEAD
+
     def _signal_rows(self) -> list[tuple[str, ...]]:
         rows: list[tuple[str, ...]] = []
         for s in self.signals:
             colour = self.noise[s.channel][0] if s.channel in self.noise else None
             rows.append(
                 (
+                    *((s.log,) if len(self.logs) > 1 else ()),
                     s.channel,
                     f"{s.rate_hz:.4g} Hz",
                     f"{s.held_rows:.3g}" if s.held_rows else "",
@@ -261,7 +266,7 @@ class SensorCheck:
 
     def __str__(self) -> str:
         lines = [self.headline, text_table(_HEAD, self._rows()), ""]
-        lines += [text_table(_SIGNAL_HEAD, self._signal_rows()), ""]
+        lines += [text_table(self._signal_head, self._signal_rows()), ""]
         lines += [*self._offset_lines(), *self.remarks, *self._said()]
         if self.map_lines:
             lines += ["", "For the channel map (multiply factors with those that stand there):"]
@@ -277,7 +282,7 @@ class SensorCheck:
             (
                 html_paragraph(self.headline),
                 html_table(_HEAD, self._rows()),
-                html_table(_SIGNAL_HEAD, self._signal_rows()),
+                html_table(self._signal_head, self._signal_rows()),
                 html_list([*self._offset_lines(), *self.remarks, *self._said()]),
                 f"<pre>{escape(lines)}</pre>" if lines else "",
             )
@@ -301,6 +306,8 @@ class SensorCheck:
     def plot(self, channel: str = "ay_mps2", ax: Axes | None = None) -> Axes:
         """Draw what a channel read, and what it should have read of the common motion.
 
+        Several logs stand side by side.
+
         Parameters
         ----------
         channel : str
@@ -315,12 +322,19 @@ class SensorCheck:
         time_s, values, expected = self.residuals(channel)
         ax = axes_or_new(ax, 8.0, 2.6)
         number_of = next(r.stretch for r in self.readings if r.channel == channel)
-        for k in range(len(self.stretches)):
-            at = number_of == k
-            (read,) = ax.plot(time_s[at], values[at], color=MEASURED, linewidth=0.6)
-            (of,) = ax.plot(time_s[at], expected[at], color=AFTER, linewidth=0.9)
+        begins = np.cumsum([0.0, *(log["time_s"][-1] - log["time_s"][0] for log in self.logs)])
+        for k, stretch in enumerate(self.stretches):
+            at, log = number_of == k, stretch.log
+            shift = begins[log] - self.logs[log]["time_s"][0] if log else 0.0
+            (read,) = ax.plot(time_s[at] + shift, values[at], color=MEASURED, linewidth=0.6)
+            (of,) = ax.plot(time_s[at] + shift, expected[at], color=AFTER, linewidth=0.9)
+        for begin, later in zip(begins[1:], self.logs[1:], strict=False):
+            ax.axvline(begin, color="0.6", linewidth=0.8)
+            at, by = ("data", "axes fraction"), "offset points"
+            ax.annotate(later.name, (begin, 1.0), (3, -9), xycoords=at, textcoords=by)
         ax.legend([read, of], ["read", "of the common motion"], fontsize="small")
-        return tidy(ax, xlabel="time_s", ylabel=channel)
+        along = "time_s" if len(self.logs) == 1 else "time_s, log after log"
+        return tidy(ax, xlabel=along, ylabel=channel)
 
     def to_dict(self) -> dict[str, Any]:
         """Every figure, for JSON."""

@@ -20,6 +20,7 @@ from sysid_vehicle.cli import main
 from sysid_vehicle.fleet import Cause, Effect, Row, manifest_jobs
 from sysid_vehicle.fleet.improve_many import run
 from sysid_vehicle.fleet.jobs import Job
+from sysid_vehicle.fleet.page import fleet_page
 from sysid_vehicle.fleet.store import Store
 from sysid_vehicle.saved import fingerprint
 
@@ -225,9 +226,28 @@ def test_causes_are_ranked_by_share_of_cars_and_gain() -> None:
     assert low < middle < high
     assert (steer.cars, steer.aliases) == (0, 1)
     assert np.isnan(steer.gain)
-    assert "compensates for something else, in 1" in str(fleet)
+    assert "not named; compensates for something else, or may, in 1" in str(fleet)
+    assert fleet.causes[1].sizes == "size 1 kg"
+    assert mass.sizes == "size 1.9 (1.18 to 1.98) kg"
     back = [Row.from_dict(json.loads(json.dumps(r.to_dict()))) for r in rows]
     assert tuple(back) == rows
+
+
+def test_what_a_study_does_not_name_is_no_cause() -> None:
+    unsure = replace(
+        effect("mass", 3.0, 2.0, "plausible"), stands_in="its share is not significant"
+    )
+    rows = (
+        Row("a", "a", verdict="unknown", effects=(unsure,), explained=(0.13, -0.001, 0.2)),
+        Row("b", "b", verdict="explained", effects=(effect("mass", 2.0, 1.9),)),
+    )
+    fleet = sv.Fleet(Path("nowhere"), rows)
+    (mass,) = fleet.causes
+    assert (mass.cars, mass.share, mass.studies, mass.aliases) == (1, 0.5, 1, 1)
+    text = fleet_page(fleet)
+    assert "(mass)" in text
+    assert "In brackets: added, but not named." in text
+    assert "13 % (0 to 20)" in text
 
 
 def test_processes_and_the_command_line_find_the_same(

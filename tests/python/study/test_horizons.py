@@ -145,6 +145,7 @@ def test_parameters_fitted_to_predictions_may_be_sufficient(fit: Fit, course: Lo
     ("name", "size", "words"),
     [
         ("yaw", 1.0, "'yaw' is no channel.*yaw_rate"),
+        ("foo", 1.0, "'foo' is no channel; give vx, vy, yaw_rate, ax, ay"),
         ("vy", "1kg", "vy = '1kg': give a number above 0, with m/s"),
         ("vy", -1.0, "vy = -1.0: give a number above 0"),
         ("vy", "1.2.3", "vy = '1.2.3'"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..._common.text import with_error
+from ..._common.text import unit_after, with_error
 from ...effects import Effect
 from ...identify import Fit
 
@@ -56,6 +56,6 @@ class Candidate:
     def size(self) -> str:
         """Its parameters with standard errors, in words."""
         return ", ".join(
-            f"{p.name} {with_error(v, s)} {p.unit}"
+            f"{p.name} {with_error(v, s)}{unit_after(p.unit)}"
             for p, v, s in zip(self.effect.parameters, self.value, self.std, strict=True)
         )

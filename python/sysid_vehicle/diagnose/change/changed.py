@@ -24,12 +24,12 @@ from ...identify.offsets import centred
 from ...log import Log
 from ...model import Model
 from ...rules import USUAL, Rules
-from ...vehicle import Vehicle
+from ...vehicle import GRAVITY_MPS2, Vehicle
 from ..candidates.causes import Causes, CredibleSet
 from ..candidates.possible import possible
 from .change import Change, EffectChange, Said
 from .changes_compete import Competition
-from .may_change import YAW_INERTIA, May
+from .may_change import YAW_INERTIA, May, forces_of_tyre
 from .reference import Exact
 from .search import Search
 
@@ -170,16 +170,24 @@ class _Said:
     def _off_nothing(self, effect: str, state: Exact, told: Competition) -> bool:
         """Whether a size is beyond what pieces of the drivings differ by, as far as a name asks.
 
-        What stands in for a lack of the model gains likelihood as a change does. Tyres are told
-        along their stiffness, not by one parameter.
+        What stands in for a lack of the model gains likelihood as a change does. Of tyres the
+        interval of their force has to exclude nothing, at some slip that was driven: likelihoods
+        of four coefficients that no driving tells apart gain by what the model lacks.
         """
-        m = self.search.can[effect]
+        m, rules = self.search.can[effect], self.search.rules
+        sizes = [state.changes[n] for n in m.names]
         if m in self.search.tyres:
-            return True
-        stds, bound = [told.stds[n] for n in m.names], self.search.rules.bound
+            before = [self.search.before.model.value(n) for n in m.names]
+            ay = np.abs(self.search.start.driving.channel("ay_mps2"))
+            most = float(np.nanpercentile(ay, 99.0)) / GRAVITY_MPS2
+            return any(
+                abs(share) > rules.interval * told.std_along(effect, by, state.changes)
+                for share, by in forces_of_tyre(before, sizes, most)
+            )
+        stds = [told.stds[n] for n in m.names]
         return any(
-            abs(state.changes[n]) > told.least(s, usual) - bound * s
-            for n, s, usual in zip(m.names, stds, m.scale, strict=True)
+            abs(size) > told.least(s, usual) - rules.bound * s
+            for size, s, usual in zip(sizes, stds, m.scale, strict=True)
         )
 
     def _in_place(self, effect: str, of: CredibleSet, state: Exact) -> Exact | None:

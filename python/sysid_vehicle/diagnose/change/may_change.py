@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from ..._common.arrays import FloatArray, as_float64
 from ...effects import Effect, Parameter
 from ...model import Model
+from ...tyre import magic_formula
 from ..candidates.clocks import Clock, clock_parameter
 from ..candidates.possible import OF_A_FACTOR
 from ..candidates.posterior import forms
@@ -16,6 +20,9 @@ YAW_INERTIA = "yaw_inertia_kgm2"
 _TYRES = {"B": 0.2, "C": 0.1, "D": 0.15, "E": 0.5}
 # A load changes these together, and counts as one change.
 PAYLOAD = ("mass", "cg_position", "yaw_inertia")
+# Of the largest slip that was driven, where side forces of tyres are compared.
+_PARTS = (0.01, 0.25, 0.5, 0.75, 1.0)
+_LARGEST_SLIP_RAD = 0.6
 _INERTIA = 0.25  # the same of a yaw inertia that nobody knows
 
 
@@ -96,3 +103,37 @@ def of_inertia(model: Model) -> May:
 def of_clock(clock: Clock) -> May:
     """The clock of an input."""
     return May(clock.name, (clock.name,), (clock_parameter(clock),), ((0,),))
+
+
+def forces_of_tyre(
+    before: Sequence[float], change: Sequence[float], friction: float
+) -> Iterator[tuple[float, FloatArray]]:
+    """By which share the side force of a tyre differs, from no slip to the largest one driven.
+
+    Parameters
+    ----------
+    before, change : sequence of float, shape (4,)
+        B, C, D, E of the reference, and their differences.
+    friction : float
+        The largest side force over the load that was driven.
+
+    Yields
+    ------
+    share : float
+    slope : array, shape (4,)
+        Its derivatives by the differences, at the reference.
+    """
+    known = as_float64(before)
+    after = known + as_float64(change)
+    slips = np.linspace(0.0, _LARGEST_SLIP_RAD, 500)[1:]
+    forces = magic_formula(slips, *known)
+    driven = float(slips[int(np.argmax(forces >= min(friction, float(forces.max()))))])
+    for part in _PARTS:
+        at = part * driven
+        force = float(magic_formula(at, *known))
+        step = 1e-6 * np.maximum(np.abs(known), 0.1)
+        slope = [
+            (magic_formula(at, *(known + d)) - magic_formula(at, *(known - d))) / (2.0 * force)
+            for d in np.diag(step)
+        ] / step
+        yield float(magic_formula(at, *after)) / force - 1.0, as_float64(slope)

@@ -93,13 +93,17 @@ class Starts:
         """Share of the starts that ended at the best optimum."""
         return float(self.agrees.mean())
 
-    def __str__(self) -> str:
+    @property
+    def agreement(self) -> str:
+        """How many starts ended at the best optimum, in words."""
         several = len(self) > 1
         return (
             f"{int(self.agrees.sum())} of {len(self)} start{'s' * several} "
-            f"{'end' if several else 'ends'} at the best optimum "
-            f"(log-likelihood {np.max(self.log_likelihood):.1f})"
+            f"{'end' if several else 'ends'} at the best optimum"
         )
+
+    def __str__(self) -> str:
+        return f"{self.agreement} (log-likelihood {np.max(self.log_likelihood):.1f})"
 
     def plot(self, name: str, ax: Axes | None = None) -> Axes:
         """Draw where one parameter began and ended.

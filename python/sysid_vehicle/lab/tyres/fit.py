@@ -298,7 +298,8 @@ class TyreFit(Estimated, Printed):
     def _headline(self) -> str:
         return (
             f"Tyres from {'; '.join(map(str, self.logs))}\n"
-            f"log-likelihood {self.log_likelihood:.1f}; {self.starts}"
+            # The starts have the likelihood of the thinned data that decided between them.
+            f"log-likelihood {self.log_likelihood:.1f}; {self.starts.agreement}"
         )
 
     def _closing(self) -> str:

@@ -12,7 +12,7 @@ from ...errors import InvalidInput
 from .curve import MAGIC_FORMULA, TWO_PARAMETER, MuSlipCurve
 from .data import MuSlipData
 from .filter import mu_slip_ekf, mu_slip_smooth
-from .least_squares import counted, mu_slip_fit, noise_of
+from .least_squares import counted, misfit, mu_slip_fit, noise_of
 from .results import MuSlipEstimate
 
 _ITERATIONS = 10
@@ -29,7 +29,7 @@ class MuSlipComparison(Told):
     estimates : tuple of MuSlipEstimate
         One per estimator, the recommended one last.
     notes : tuple of str
-        Which estimators failed.
+        Which estimators failed, and whether the curve fits the readings.
     """
 
     data: MuSlipData
@@ -43,10 +43,7 @@ class MuSlipComparison(Told):
 
     def __str__(self) -> str:
         names = self.best.curve.parameters
-        rows = [
-            [e.method, *(f"{x:.5f} ± {s:.5f}" for x, s in zip(e.values, e.std, strict=True))]
-            for e in self.estimates
-        ]
+        rows = [[e.method, *map(e.cell, range(len(names)))] for e in self.estimates]
         table = text_table([f"{self.best.curve.name} curve", *names], rows)
         notes = (f"  note: {note}" for note in (*self.notes, *self.best.notes))
         return "\n".join([str(self.data), table, *notes])
@@ -89,4 +86,5 @@ def compare_mu_slip(data: MuSlipData, *, curve: MuSlipCurve = TWO_PARAMETER) -> 
         found.append(smoothed)
         fit("least squares")
         fit("least squares, corrected", corrected=True)
+    notes += misfit(data, found[-1])
     return MuSlipComparison(data, tuple(found), tuple(notes))

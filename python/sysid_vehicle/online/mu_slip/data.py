@@ -17,6 +17,7 @@ from ...read.formats.csv import read_table
 from .curve import TWO_PARAMETER, MuSlipCurve
 
 _COLUMNS = ("slip", "mu")
+_SIGNED = 10  # readings; noise alone may turn the sign of fewer
 _LARGEST = {"slip": 1.5, "mu": 5.0}  # beyond them the unit is wrong
 _REMEDY = {
     "slip": "give (v - v_wheel) / v as a ratio, not in percent",
@@ -63,6 +64,13 @@ class MuSlipData:
             raise InvalidInput("mu: fewer than 3 readings; a curve needs more, record again")
         if self.noise_std is not None:
             check_noise(self.noise_std)
+        product = (self.slip * self.mu)[np.isfinite(self.mu)]
+        if product.size >= _SIGNED and np.sum(product) < -0.5 * np.sum(np.abs(product)):
+            raise InvalidInput(
+                "mu: of the other sign than slip at most readings, first at sample "
+                f"{int(np.argmax(self.slip * self.mu < 0.0))}; friction that brakes is positive, "
+                "as braking slip is: turn the sign of one of the two columns"
+            )
 
     @classmethod
     def from_csv(cls, path: str | Path, noise_std: float | None = None) -> MuSlipData:

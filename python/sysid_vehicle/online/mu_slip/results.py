@@ -17,6 +17,8 @@ from .data import MuSlipData
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_AT_BOUND = "rests at its bound"
+
 
 @dataclass(frozen=True, repr=False)
 class MuSlipEstimate(Told):
@@ -46,6 +48,15 @@ class MuSlipEstimate(Told):
     def std(self) -> FloatArray:
         """Standard deviation of each parameter."""
         return np.sqrt(np.diag(self.covariance))
+
+    def cell(self, i: int) -> str:
+        """A value with its standard deviation, or why that says nothing."""
+        kernels, value, std = self.curve.kernels, self.values[i], float(self.std[i])
+        if f"{self.curve.parameters[i]} {_AT_BOUND}" in " ".join(self.notes):
+            return f"{value:.5f} at its bound"
+        if not std < kernels.UPPER[i] - kernels.LOWER[i]:
+            return f"{value:.5f} not determined"
+        return f"{value:.5f} ± {std:.5f}"
 
     def band(self, slip: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Friction at each slip and its standard deviation (delta method)."""
@@ -83,7 +94,7 @@ def cautions(
 ) -> tuple[str, ...]:
     """Say where values are not what the readings alone tell."""
     notes = [
-        f"{name} rests at its bound {x:g}"
+        f"{name} {_AT_BOUND} {x:g}"
         for name, x, lowest, highest in zip(curve.parameters, values, low, high, strict=True)
         if x in (lowest, highest)
     ]

@@ -51,7 +51,10 @@ def sizes_that_matter(wanted: Mapping[str, float | str]) -> dict[str, float]:
     for name, size in {**USUAL_SIZES, **wanted}.items():
         channel = _NAMES.get(name, name)
         if channel not in PREDICTED:
-            raise InvalidInput(f"matters: '{name}' is no channel{near_names(name, _NAMES)}")
+            raise InvalidInput(
+                f"matters: '{name}' is no channel{near_names(name, _NAMES)}; give "
+                f"{', '.join(_NAMES)}"
+            )
         value = _size(size, UNITS[channel]) if isinstance(size, str) else real(size)
         if value is None or not 0.0 < value < np.inf:
             raise InvalidInput(

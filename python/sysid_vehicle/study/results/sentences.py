@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._common.text import number, with_error
+from ..._common.text import number, unit_after, with_error
 from ...estimate import UNITS
 from ...estimate.driving import WORDS
 from ...rules import LACKING, NONE_GONE, share_of
 from ..ahead.horizons import LATERAL
 from ..judge.matters import sizes_that_matter, sufficient
 from ..validation import AHEAD_S
+from .as_fitted import as_fitted
 from .widened import times_wider
 
 if TYPE_CHECKING:
@@ -57,7 +58,9 @@ def nuisances(study: Study) -> list[str]:
         own = [(p, known[f"{part.id}.{p.name}"]) for p in part.parameters]
         off = [(abs(e.value - p.null_value), e.std, p.matters) for p, e in own]
         if any(by >= matters and by > study.rules.interval * std for by, std, matters in off):
-            sizes = ", ".join(f"{p.name} {with_error(e.value, e.std)} {p.unit}" for p, e in own)
+            sizes = ", ".join(
+                f"{p.name} {with_error(e.value, e.std)}{unit_after(p.unit)}" for p, e in own
+            )
             found.append(f"Nuisance {part.id} ({part.title}): {sizes}")
     return found
 
@@ -139,29 +142,13 @@ def _explained(study: Study) -> list[str]:
     if not study.explained.share > 0.0:
         return [f"{NONE_GONE.capitalize()}: the effects added do not reduce it."]
     said = [f"The effects added remove {study.explained} of the error 1 to 5 s ahead."]
-    fall = _fall_as_fitted(study)
-    if fall > study.explained.high:
-        said.append(
-            "This share compares both models with the parameters that predict best. As fitted one "
-            f"step ahead, the squared lateral errors fall by {100 * fall:.0f} %; the baseline with "
-            "other parameters achieves that too."
-        )
+    said += as_fitted(study)
     whole = study.shares.whole
     if whole.known and whole.value > 0.0:
         sure = study.verdict in ("explained", "partly_explained")
         who = "The effects named explain" if sure else "The effects added explain"
         said.append(f"{who} {whole} of what any function of the driving could explain of it.")
     return said
-
-
-def _fall_as_fitted(study: Study) -> float:
-    """Fall of the squares of the median lateral errors 1 to 5 s ahead, in the mean."""
-    errors = study.horizons
-    ahead = [h >= 1.0 for h in errors.horizons_s]
-    lateral = [c in LATERAL for c in errors.channels]
-    first, last = (errors.error[k][ahead][:, lateral] for k in (0, -1))
-    known = np.isfinite(first) & np.isfinite(last) & (first > 0.0)
-    return float(1.0 - np.mean((last[known] / first[known]) ** 2)) if known.any() else 0.0
 
 
 def structured(study: Study) -> bool:

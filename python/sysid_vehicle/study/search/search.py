@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 
-from ..._common.text import with_error
+from ..._common.text import unit_after, with_error
 from ..._common.threads import before, in_parallel
 from ...diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
 from ...diagnose.diagnose import REFITS
@@ -270,6 +270,7 @@ def _sizes(fit: Fit, effects: Sequence[str]) -> str:
     found = [e for e in fit.estimates if e.name.split(".")[0] in effects]
     several = len(effects) > 1
     return ", ".join(
-        f"{e.name if several else e.name.split('.')[1]} {with_error(e.value, e.std)} {e.unit}"
+        f"{e.name if several else e.name.split('.')[1]} {with_error(e.value, e.std)}"
+        f"{unit_after(e.unit)}"
         for e in found
     )
