@@ -296,7 +296,9 @@ def summary(
         _, _, information = objective.normal_equations(p, frozen, box.columns)
     x = p[box.columns]
     units = {n: parameter.unit for n, parameter in model.parameters.items()}
-    estimates, covariance = wald(names, units, x, information, box)
+    estimates, covariance = wald(
+        names, units, x, information, box, [model.bounds(n) for n in names]
+    )
     return Fit(
         model.with_values(dict(zip(names, map(float, x), strict=True))),
         noise,

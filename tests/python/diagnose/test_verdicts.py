@@ -155,6 +155,19 @@ def test_a_value_at_its_bound_has_no_error() -> None:
     assert "physically implausible" in beyond.sentence
 
 
+def test_what_is_told_of_a_value_keeps_to_its_bounds() -> None:
+    loose = kind("tyre_relaxation", 0.05, 0.27)
+    assert loose.sentence.startswith(
+        "missing; relaxation_length_m 0.05 (95 %: 0 (bound) .. 0.579) m"
+    )
+    upper = effect("tyre_relaxation").parameters[0].upper
+    unknown = EffectVerdict(effect("tyre_relaxation"), "not testable", bound=(upper,))
+    assert f"below {upper:.2g} (bound) m at 95 %" in unknown.sentence
+    assert kind("tyre_relaxation", 0.5, 10.0 * upper).bound == (upper,)
+    # A negative prediction stays what it is.
+    assert "-0.5 +- 0.1" in kind("tyre_relaxation", -0.5, 0.1).sentence
+
+
 def test_verdicts_show_themselves(judged: Verdicts) -> None:
     assert "steer_offset" in str(judged).splitlines()[0]
     assert "<table" in judged._repr_html_()

@@ -56,6 +56,6 @@ class Candidate:
     def size(self) -> str:
         """Its parameters with standard errors, in words."""
         return ", ".join(
-            f"{p.name} {with_error(v, s)} {p.unit}"
+            f"{p.name} {with_error(v, s, (p.lower, p.upper))} {p.unit}"
             for p, v, s in zip(self.effect.parameters, self.value, self.std, strict=True)
         )

@@ -17,7 +17,7 @@ import numpy as np
 from ..._common.arguments import expect
 from ..._common.progress import doing
 from ..._common.text import brief, html_table, number, unit_after, with_error
-from ...effects import Effect
+from ...effects import Effect, Parameter
 from ...identify import Fit
 from ...rules import USUAL, Rules
 from .constancy import constancy
@@ -55,7 +55,7 @@ class EffectVerdict:
     value, std : tuple of float
         Parameters, predicted or refitted; empty where nothing is known of them.
     bound : tuple of float
-        How far from nothing each parameter may be, at 95 %.
+        How far from nothing each parameter may be, at 95 %, and within its bounds.
     group : tuple of str
         The rivals, what the proxy acted like, or beside what there is evidence.
     because : str
@@ -73,8 +73,8 @@ class EffectVerdict:
     @property
     def sentence(self) -> str:
         """The verdict in words."""
-        size = _listed(self.effect, [with_error(v, s) for v, s in self._pairs()])
-        below = _listed(self.effect, [f"below {number(b, 2)}" for b in self.bound])
+        size = _sizes(self.effect, self.value, self.std)
+        below = _listed(self.effect, _below(self.effect, self.bound))
         matters = _listed(self.effect, [number(p.matters, 2) for p in self.effect.parameters])
         rivals = ", ".join(self.group)
         if self.finding == "missing":
@@ -98,9 +98,6 @@ class EffectVerdict:
             why = "the fitted parameters reproduce it, or a channel is missing"
             return f"not testable: {why}; {takes}"
         return f"not testable; {below} at 95 %, and it would matter from {matters}; {takes}"
-
-    def _pairs(self) -> list[tuple[float, float]]:
-        return list(zip(self.value, self.std, strict=True))
 
     def __str__(self) -> str:
         return f"{self.effect.id}: {self.sentence}"
@@ -321,11 +318,15 @@ def _of_scored(effect: Effect, score: Score | None, evidence: bool, rules: Rules
         return EffectVerdict(effect, "not testable")
     if evidence:
         return _of_present(effect, score.value, score.std, (), rules)
-    bound = _bound(effect, score.value, score.std, rules)
+    reach = _reach(effect, score.value, score.std, rules)
     # The bound says it all: below what matters, the test had the power to find what does.
-    small = all(b < p.matters for b, p in zip(bound, effect.parameters, strict=True) if not p.scan)
+    small = all(b < p.matters for b, p in zip(reach, effect.parameters, strict=True) if not p.scan)
     return EffectVerdict(
-        effect, "absent" if small else "not testable", score.value, score.std, bound
+        effect,
+        "absent" if small else "not testable",
+        score.value,
+        score.std,
+        _within(effect, reach),
     )
 
 
@@ -340,21 +341,41 @@ def _of_present(
     because = ""
     if not possible(effect, value, std, rules):
         finding, group = "proxy", ()
-        size = _listed(effect, [with_error(v, s) for v, s in zip(value, std, strict=True)])
+        size = _sizes(effect, value, std)
         because = f"the value is physically implausible ({size})"
     elif all(abs(d) + s < p.matters for p, d, s in sizes(effect, value, std, rules)):
         finding, group = "negligible", ()
-    bound = _bound(effect, value, std, rules)
+    bound = _within(effect, _reach(effect, value, std, rules))
     return EffectVerdict(effect, finding, value, std, bound, group, because)
 
 
-def _bound(
+def _reach(
     effect: Effect, value: tuple[float, ...], std: tuple[float, ...], rules: Rules
 ) -> tuple[float, ...]:
     return tuple(
         float(np.abs(v - p.null_value) + rules.bound * s)
         for p, v, s in zip(effect.parameters, value, std, strict=True)
     )
+
+
+def _most(p: Parameter) -> float:
+    """How far from nothing a parameter can be."""
+    return max(p.upper - p.null_value, p.null_value - p.lower)
+
+
+def _within(effect: Effect, reach: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(min(r, _most(p)) for p, r in zip(effect.parameters, reach, strict=True))
+
+
+def _below(effect: Effect, bound: tuple[float, ...]) -> list[str]:
+    """Bounds in words, which say where nothing narrower is known than that of the parameter."""
+    told = zip(effect.parameters, bound, strict=False)
+    return [f"below {number(b, 2)}" + (" (bound)" if b >= _most(p) else "") for p, b in told]
+
+
+def _sizes(effect: Effect, value: tuple[float, ...], std: tuple[float, ...]) -> str:
+    told = zip(effect.parameters, value, std, strict=False)
+    return _listed(effect, [with_error(v, s, (p.lower, p.upper)) for p, v, s in told])
 
 
 def _listed(effect: Effect, figures: list[str]) -> str:

@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 
-from ..._common.text import with_error
 from ..._common.threads import before
 from ...diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
 from ...diagnose.diagnose import REFITS
@@ -270,6 +269,5 @@ def _sizes(fit: Fit, effects: Sequence[str]) -> str:
     found = [e for e in fit.estimates if e.name.split(".")[0] in effects]
     several = len(effects) > 1
     return ", ".join(
-        f"{e.name if several else e.name.split('.')[1]} {with_error(e.value, e.std)} {e.unit}"
-        for e in found
+        f"{e.name if several else e.name.split('.')[1]} {e.size} {e.unit}" for e in found
     )
