@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from ..._common.text import with_error
 from ...effects import Effect
 from ...identify import Fit
+from ...rules import USUAL, Rules
+from .possible import possible, possible_in
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +53,12 @@ class Candidate:
     def id(self) -> str:
         """Id of the effect."""
         return self.effect.id
+
+    def can_be(self, rules: Rules = USUAL) -> bool:
+        """Whether its 95 % intervals hold values that a car can have."""
+        if self.fit is not None:
+            return possible_in(self.fit, self.effect, rules)
+        return possible(self.effect, self.value, self.std, rules)
 
     @property
     def size(self) -> str:

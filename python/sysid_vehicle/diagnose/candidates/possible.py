@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from ...effects import Effect, Parameter, catalogue, effect
+from ...identify import Estimate, Fit
 from ...model import Model
 from ...rules import USUAL, Rules
 
@@ -90,6 +91,24 @@ def possible(
     bool
     """
     return not any(_impossible(p, d, s, rules) for p, d, s in sizes(effect, value, std, rules))
+
+
+def possible_in(fit: Fit, effect: Effect, rules: Rules = USUAL) -> bool:
+    """As `possible`, of the parameters of an effect of a fit.
+
+    Where a bound holds a value it is asked of what the data lead to beyond it: a car whose value is
+    that of the bound leads there by noise alone, half of the time.
+    """
+    asked = [_wanted(fit[n], p) for n, p in effect.named.items()]
+    return possible(effect, [v for v, _ in asked], [s for _, s in asked], rules)
+
+
+def _wanted(found: Estimate, p: Parameter) -> tuple[float, float]:
+    at_null = abs(found.value - p.null_value) < _AT_BOUND * (p.upper - p.lower)
+    # At nothing no size was wanted; a bound that was told beforehand is asked by `refused`.
+    if found.unbounded is None or at_null:
+        return found.value, found.std
+    return found.unbounded
 
 
 def sizes(

@@ -22,7 +22,7 @@ from ...identify import Fit
 from ...rules import USUAL, Rules
 from .constancy import constancy
 from .diagnosis import Diagnosis
-from .possible import Size, lacking, possible, sizes
+from .possible import Size, lacking, possible, possible_in, sizes
 from .score import Score, score_board
 
 Finding = Literal[
@@ -310,14 +310,15 @@ def judge(
 def _of_added(effect: Effect, final: Fit, group: tuple[str, ...], rules: Rules) -> EffectVerdict:
     estimates = [final[name] for name in effect.named]
     value, std = tuple(e.value for e in estimates), tuple(e.std for e in estimates)
-    return _of_present(effect, value, std, group, rules)
+    return _of_present(effect, value, std, group, rules, possible_in(final, effect, rules))
 
 
 def _of_scored(effect: Effect, score: Score | None, evidence: bool, rules: Rules) -> EffectVerdict:
     if score is None:
         return EffectVerdict(effect, "not testable")
     if evidence:
-        return _of_present(effect, score.value, score.std, (), rules)
+        can_be = possible(effect, score.value, score.std, rules)
+        return _of_present(effect, score.value, score.std, (), rules, can_be)
     reach = _reach(effect, score.value, score.std, rules)
     # The bound says it all: below what matters, the test had the power to find what does.
     small = all(b < p.matters for b, p in zip(reach, effect.parameters, strict=True) if not p.scan)
@@ -336,10 +337,11 @@ def _of_present(
     std: tuple[float, ...],
     group: tuple[str, ...],
     rules: Rules,
+    can_be: bool,
 ) -> EffectVerdict:
     finding: Finding = "one of a group" if group else "missing"
     because = ""
-    if not possible(effect, value, std, rules):
+    if not can_be:
         finding, group = "proxy", ()
         size = _sizes(effect, value, std)
         because = f"the value is physically implausible ({size})"

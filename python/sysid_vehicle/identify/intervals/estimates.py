@@ -44,6 +44,9 @@ class Estimate:
         95 % interval of the profile likelihood, where that was asked for.
     bounds : tuple of 2 floats
         Between which it may lie; its intervals end there.
+    unbounded : tuple of 2 floats, optional
+        Of what a bound holds: the value that the data lead to beyond it, to first order, and its
+        standard error.
     """
 
     name: str
@@ -53,6 +56,7 @@ class Estimate:
     note: str = ""
     ends: tuple[float, float] | None = None
     bounds: tuple[float, float] = UNBOUNDED
+    unbounded: tuple[float, float] | None = None
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -84,12 +88,15 @@ class Estimate:
     @property
     def size(self) -> str:
         """The value with its standard error, or with the interval where that ends at a bound."""
+        return self._size(3)
+
+    def _size(self, digits: int) -> str:
         if self.note and not np.isfinite(self.std):
-            return f"{number(self.value, 3)} ({self.note})"
-        return with_error(self.value, self.std, self.bounds)
+            return f"{number(self.value, digits)} ({self.note})"
+        return with_error(self.value, self.std, self.bounds, digits)
 
     def __str__(self) -> str:
-        return f"{self.name} = {with_error(self.value, self.std, self.bounds, 4)} {self.unit}"
+        return f"{self.name} = {self._size(4)} {self.unit}"
 
 
 def box_covariance(information: FloatArray, box: Box, x: FloatArray) -> FloatArray:
@@ -131,11 +138,13 @@ def wald(
     information: FloatArray,
     box: Box,
     bounds: Sequence[tuple[float, float]] | None = None,
+    descent: FloatArray | None = None,
 ) -> tuple[tuple[Estimate, ...], FloatArray]:
     """Estimates with the standard errors of the information matrix, and their covariance.
 
     `bounds` are those of the values, by default of the search: a lag is searched for from next to
-    nothing, and may be none. What the data alone do not determine is called that, even where it
+    nothing, and may be none. `descent` is the gradient of the log-likelihood at `x`, by which the
+    data press against bounds. What the data alone do not determine is called that, even where it
     ended at a bound: the bound is not what stopped it. At a bound there is no standard error, nor
     for what they never felt.
     """
@@ -147,6 +156,11 @@ def wald(
     held = (x <= box.lower + _AT_BOUND * width) | (x >= box.upper - _AT_BOUND * width)
     silent = held | np.isinf(of_data)
     ends = list(zip(box.lower, box.upper, strict=True)) if bounds is None else bounds
+    beyond: dict[int, tuple[float, float]] = {}
+    if descent is not None:
+        # Only bounds keep a maximum from being level: what else is left is of the search.
+        off = covariance[:, held] @ descent[held]
+        beyond = {i: (float(x[i] + off[i]), float(std[i])) for i in np.flatnonzero(held).tolist()}
     estimates = tuple(
         Estimate(
             name,
@@ -155,6 +169,7 @@ def wald(
             units[name],
             "not determined" if unknown[i] else "at bound" if held[i] else "",
             bounds=(float(ends[i][0]), float(ends[i][1])),
+            unbounded=None if np.isinf(of_data[i]) else beyond.get(i),
         )
         for i, name in enumerate(names)
     )
