@@ -176,6 +176,13 @@ def test_a_bound_that_the_data_do_not_press_against_is_a_value_that_a_car_can_ha
     assert can_be((most + 0.1, 0.1))  # the bound lies in its 95 % interval, as half of cars there
     assert not can_be((most + 0.3, 0.1))
     assert not can_be(None)
+    # A bound that lies beyond what any car has is no value of a car, however unsure.
+    trail = effect("aligning_moment")
+    far = trail.parameters[0].upper
+    assert far > 5.0 * trail.parameters[0].typical
+    (long,) = trail.named
+    wide = replace(held, name=long, value=far, unbounded=(1.1 * far, far))
+    assert not possible_in({long: wide}, trail)  # type: ignore[arg-type]
     # Of what is held at nothing no size was wanted.
     free = replace(held, value=0.0, unbounded=(-5.0, 0.1))
     assert possible_in({name: free}, slip)  # type: ignore[arg-type]

@@ -96,17 +96,19 @@ def possible(
 def possible_in(fit: Fit, effect: Effect, rules: Rules = USUAL) -> bool:
     """As `possible`, of the parameters of an effect of a fit.
 
-    Where a bound holds a value it is asked of what the data lead to beyond it: a car whose value is
-    that of the bound leads there by noise alone, half of the time.
+    Where a bound holds a value that a car can have, it is asked of what the data lead to beyond it:
+    a car whose value is that of the bound leads there by noise alone, half of the time.
     """
-    asked = [_wanted(fit[n], p) for n, p in effect.named.items()]
+    asked = [_wanted(fit[n], p, rules) for n, p in effect.named.items()]
     return possible(effect, [v for v, _ in asked], [s for _, s in asked], rules)
 
 
-def _wanted(found: Estimate, p: Parameter) -> tuple[float, float]:
-    at_null = abs(found.value - p.null_value) < _AT_BOUND * (p.upper - p.lower)
-    # At nothing no size was wanted; a bound that was told beforehand is asked by `refused`.
-    if found.unbounded is None or at_null:
+def _wanted(found: Estimate, p: Parameter, rules: Rules) -> tuple[float, float]:
+    off = found.value - p.null_value
+    at_null = abs(off) < _AT_BOUND * (p.upper - p.lower)
+    # At nothing no size was wanted. A bound may be further than any car, and a search that ends
+    # there wanted that.
+    if found.unbounded is None or at_null or _impossible(p, off, 0.0, rules):
         return found.value, found.std
     return found.unbounded
 
