@@ -43,7 +43,7 @@
 Nothing here sees a fit or a log: others measure, this decides.
 """
 
-from .accept import ErrorChange, Gain, Measures, accept, bic, worse
+from .accept import ErrorChange, Gain, Measures, accept, bic, harmful, worse
 from .facts import LACKING, Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
 from .share import (
@@ -88,6 +88,7 @@ __all__ = [
     "bic",
     "excess",
     "grade",
+    "harmful",
     "incomplete",
     "little",
     "low_of_mean",

@@ -9,15 +9,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 
+import numpy as np
+
 from ..._common.threads import before
 from ...diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
 from ...diagnose.diagnose import REFITS
 from ...effects import Effect
-from ...errors import Interrupted
+from ...errors import Interrupted, NumericalError
 from ...estimate import Driving
-from ...identify import Fit
-from ...rules import Rules, worse
+from ...identify import Fit, refine
+from ...rules import Rules, harmful, worse
 from ..ahead.along_the_car import changes_of
+from ..ahead.own_share import own_shares
 from ..validation import AHEAD, serving
 from .steps import (
     alternatives,
@@ -51,6 +54,8 @@ class Trail:
         Effects with evidence that the time limit left untried.
     taken_back : tuple of str
         Effects of last steps without which the model predicts better (`without_harm`).
+    harmful : tuple of str
+        Effects taken out of the last model, as errors ahead are larger with them.
     """
 
     fits: list[Fit]
@@ -61,6 +66,7 @@ class Trail:
     sizes: dict[str, Size] = field(default_factory=dict)
     stopped: tuple[str, ...] = ()
     taken_back: tuple[str, ...] = ()
+    harmful: tuple[str, ...] = ()
 
     @property
     def fit(self) -> Fit:
@@ -217,6 +223,38 @@ class Search:
             trail.fits.append(found)
             self.say(_step(found, known))
 
+    def take_out_harmful(self, trail: Trail) -> None:
+        """Take effects out of the last model with which errors ahead are shown to be larger.
+
+        Where they move something, on validation data, beside all others: when they came that may
+        not have shown, and it hides what the others take. Where nothing is left shares are noise.
+        """
+        baseline = trail.fits[0].model.effects
+        while len(trail.fits) > 1 and trail.diagnoses[-1].omnibus.rejects:
+            fit = trail.fit
+            added = [e for e in fit.model.effects if e not in baseline]
+            own = own_shares(fit, added, added, self.test, self.judged_by)
+            worst = [(s.value, e) for e, (s, _) in own.items() if harmful(s, self.rules)]
+            if not worst:
+                return
+            name = min(worst)[1]
+            poorer = before(self.judged_by, partial(self._without, fit, name), None)
+            if poorer is None:
+                return
+            trail.harmful += (name,)
+            if len(added) > 1:
+                trail.fits.append(poorer)
+                trail.diagnoses.append(self._diagnosis(poorer, (), refits=0))
+            else:
+                del trail.fits[1:], trail.diagnoses[1:]
+            self.say(f"Removed {name}.")
+
+    def _without(self, fit: Fit, name: str) -> Fit | None:
+        try:
+            return refine(fit.model.drop(name), fit.driving, fit.noise)
+        except (NumericalError, np.linalg.LinAlgError):
+            return None
+
     def _beside_another(self, dx: Diagnosis, trail: Trail) -> tuple[Candidate, Fit] | None:
         """The likeliest candidate, where it holds only together with one that is missing too.
 
@@ -237,14 +275,14 @@ class Search:
         trail.note(beside, step[0])
         return first, step[1]
 
-    def _diagnosis(self, fit: Fit, again: Sequence[str]) -> Diagnosis:
+    def _diagnosis(self, fit: Fit, again: Sequence[str], refits: int = REFITS) -> Diagnosis:
         """All effects scored, some refitted again; where no time is left none is refitted."""
         left = self.ends - time.perf_counter()
         return diagnose(
             fit,
             candidates=self.candidates,
             rules=self.rules,
-            refits=REFITS if left > 0.0 else 0,
+            refits=refits if left > 0.0 else 0,
             again=again if left > 0.0 else (),
             time_limit_s=left if left > 0.0 else None,
             seed=self.seed,
