@@ -231,7 +231,7 @@ def _explained(study: Study) -> list[str]:
         said.append(
             "This share compares both models with the parameters that predict best. As fitted one "
             f"step ahead, the squared lateral errors fall by {100 * fall:.0f} %; the baseline with "
-            "other parameters achieves that too."
+            "other parameters achieves a part of that too."
         )
     whole = study.shares.whole
     if whole.known and whole.value > 0.0:
