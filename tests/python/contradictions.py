@@ -67,6 +67,8 @@ def contradictions(text: str) -> list[str]:
         "compensates for" in text or "may compensate" in text or "; alias" in text
     ):
         found.append("explained by what only stands in for something else")
+    if "The effects named explain" in text and ("compensate" in text or "; alias" in text):
+        found.append("a share of all that was added is that of the names alone")
     if "The effects named explain" in text and verdict not in ("explained", "partly_explained"):
         found.append(f"{verdict}, and named physics explains a share")
     if verdict == "adequate" and "Next: " in text:

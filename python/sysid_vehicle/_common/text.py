@@ -5,9 +5,9 @@ from __future__ import annotations
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from html import escape
-from math import isfinite
+from math import inf, isfinite
 
 HALF_95 = 1.96
 """Standard errors on either side of a value in the 95 % intervals that are told."""
@@ -30,11 +30,52 @@ def few(names: Sequence[str], most: int = 4) -> str:
     return ", ".join(names[:most]) + f" and {more} more" if more > 1 else ", ".join(names)
 
 
-def with_error(value: float, std: float) -> str:
-    """A value with its standard error, or why it has none."""
+UNBOUNDED = (-inf, inf)
+"""Bounds of what may have any value."""
+
+
+def interval_95(
+    value: float, std: float, bounds: tuple[float, float] = UNBOUNDED
+) -> tuple[float, float]:
+    """The 95 % interval of a value, as far as its bounds allow: no length is negative.
+
+    A value beyond its bounds, as a linear prediction may be, has the nearer bound alone.
+    """
+    return within((value - HALF_95 * std, value + HALF_95 * std), bounds)
+
+
+def within(interval: tuple[float, float], bounds: tuple[float, float]) -> tuple[float, float]:
+    """An interval, as far as bounds allow."""
+    low, high = (min(max(end, bounds[0]), bounds[1]) for end in interval)
+    return low, high
+
+
+def interval_text(
+    interval: tuple[float, float],
+    bounds: tuple[float, float] = UNBOUNDED,
+    written: Callable[[float], str] = number,
+) -> str:
+    """An interval in words, which say where it ends at a bound of what a value may be."""
+    (low, high), (lower, upper) = map(written, interval), bounds
+    low += " (bound)" if isfinite(lower) and interval[0] <= lower else ""
+    high += " (bound)" if isfinite(upper) and interval[1] >= upper else ""
+    return f"{low} .. {high}"
+
+
+def with_error(
+    value: float, std: float, bounds: tuple[float, float] = UNBOUNDED, digits: int = 3
+) -> str:
+    """A value with its standard error, or why it has none.
+
+    Where its 95 % interval would pass a bound the interval is told in place of the standard error.
+    """
     if not isfinite(std):
-        return f"{number(value, 3)} (at a bound, or never felt)"
-    return f"{number(value, 3)} +- {number(std, 2)}"
+        return f"{number(value, digits)} (at a bound, or never felt)"
+    found = interval_95(value, std, bounds)
+    if bounds[0] <= value <= bounds[1] and found != interval_95(value, std):
+        told = interval_text(found, bounds, lambda x: number(x, digits))
+        return f"{number(value, digits)} (95 %: {told})"
+    return f"{number(value, digits)} +- {number(std, 2)}"
 
 
 def unit_after(unit: str) -> str:

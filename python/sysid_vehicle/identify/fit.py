@@ -24,6 +24,7 @@ from .search.tyre_shape import COMBINATIONS
 
 _MEANINGS = {"BCD": "cornering stiffness", "peak": "peak friction", "peak_slip": "slip at the peak"}
 _UNITS = {"cornering stiffness": "N/rad", "peak friction": "1", "slip at the peak": "rad"}
+_OF_TYRES = (0.0, float("inf"))  # no stiffness, friction or slip of a peak is negative
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +114,7 @@ class Fit(Estimated):
             # None of them is negative: an interval that reaches nothing tells nothing.
             wide = value < HALF_95 * std and what.name not in exactly
             note = "no peak" if not np.isfinite(std) else "not determined" if wide else ""
-            found.append(Estimate(what.name, value, std, unit, note))
+            found.append(Estimate(what.name, value, std, unit, note, bounds=_OF_TYRES))
         return tuple(profiled(e, self.profiles) for e in found)
 
     def values_of(self, model: Model) -> dict[str, float]:
@@ -189,11 +190,8 @@ class Fit(Estimated):
     def _rows(self) -> list[list[str]]:
         rows = []
         for e in (*self.estimates, *self.derived):
-            low, high = e.interval
-            told = e.ends is not None or np.isfinite(e.std)
-            spread = f"{number(low)} .. {number(high)}" if told else "-"
             std = number(e.std, 2) if np.isfinite(e.std) else "-"
-            rows.append([e.name, number(e.value), std, spread, e.unit, e.note])
+            rows.append([e.name, number(e.value), std, e.interval_text(), e.unit, e.note])
         return rows
 
     @property

@@ -312,13 +312,14 @@ def summary(
     box, names = free_box(model), model.free_names
     if frozen is None:
         frozen = objective.freeze(p, noise.vector())
+    _, descent, information = objective.normal_equations(p, frozen, box.columns)
     if driving.offsets:
         information = marginal_information(model, driving, p, noise)
-    else:
-        _, _, information = objective.normal_equations(p, frozen, box.columns)
     x = p[box.columns]
     units = {n: parameter.unit for n, parameter in model.parameters.items()}
-    estimates, covariance = wald(names, units, x, information, box)
+    estimates, covariance = wald(
+        names, units, x, information, box, [model.bounds(n) for n in names], descent
+    )
     return Fit(
         model.with_values(dict(zip(names, map(float, x), strict=True))),
         noise,

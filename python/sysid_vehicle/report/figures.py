@@ -143,27 +143,28 @@ def sizes(study: Study, truth: Model | None, caption: str) -> str:
     rows = []
     for e in estimates:
         p = known[e.name]
-        half = HALF_95 * e.std / p.typical
+        ends = e.interval if e.has_interval else (e.value, e.value)
+        low, high = sorted((end - p.null_value) / p.typical for end in ends)
         real = None if truth is None or e.name not in truth.names else truth.value(e.name)
         rows.append(
             (
                 (e.value - p.null_value) / p.typical,
-                abs(half) if np.isfinite(half) else 0.0,
+                (low, high),
                 p.matters / p.typical,
                 None if real is None else (real - p.null_value) / p.typical,
             )
         )
-    ends = [v for x, half, matters, real in rows for v in (x - half, x + half, -matters, matters)]
-    ends += [real for *_, real in rows if real is not None] + [0.0]
-    room = 0.05 * (max(ends) - min(ends))
+    shown = [v for _, reach, matters, _ in rows for v in (*reach, -matters, matters)]
+    shown += [real for *_, real in rows if real is not None] + [0.0]
+    room = 0.05 * (max(shown) - min(shown))
     chart = Chart(
-        680, 52 + 32 * len(rows), (min(ends) - room, max(ends) + room), (-0.6, len(rows) - 0.4),
+        680, 52 + 32 * len(rows), (min(shown) - room, max(shown) + room), (-0.6, len(rows) - 0.4),
         yticks=[(float(k), e.name) for k, e in enumerate(estimates)], left=260,
         xlabel="size / typical size (grey: too small to matter)",
     )  # fmt: skip
-    for k, (x, half, matters, real) in enumerate(rows):
+    for k, (x, reach, matters, real) in enumerate(rows):
         chart.band([-matters, matters], [k - 0.35] * 2, [k + 0.35] * 2, "mute")
-        chart.along(x - half, x + half, k, "after")
+        chart.along(reach[0], reach[1], k, "after")
         chart.dots([x], [k], "after large")
         if real is not None:
             chart.dots([real], [k], "truth large")

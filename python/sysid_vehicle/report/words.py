@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._common.text import few, number, unit_after
+from .._common.text import few, number, unit_after, with_error
 from ..identify import Estimate
 from ..study import AddedEffect, Study
 
@@ -38,10 +38,7 @@ def shown_in(channel: str) -> Shown:
 
 def interval(e: Estimate) -> str:
     """Print the 95 % interval; a dash where there is none."""
-    if e.ends is None and not np.isfinite(e.std):
-        return "-"
-    low, high = e.interval
-    return f"{quantity(low)} .. {quantity(high)}"
+    return e.interval_text(quantity)
 
 
 def quantity(x: float) -> str:
@@ -116,9 +113,9 @@ def ranking_rows(study: Study, which: int = 0, most: int = 10) -> list[list[str]
     known = study.errors_with[which]
     for c in study.diagnoses[which].ranking[:most]:
         size = ", ".join(
-            f"{p.name} {number(v, 3)} ± {number(s, 2)}{unit_after(p.unit)}"
+            f"{p.name} {with_error(v, s, (p.lower, p.upper))}{unit_after(p.unit)}"
             for p, v, s in zip(c.effect.parameters, c.value, c.std, strict=True)
-        )
+        ).replace("+-", "±")
         confounded = few(c.indistinguishable_from) or "-"
         rows.append(
             [

@@ -10,6 +10,7 @@
 4. Effects whose likelihoods differ by less than `apart` are confounded; validation data choose. An
    accepted effect gives way to others of its kind (`near`) that lead by `apart`, or are simpler.
 5. An effect within `insignificant` standard errors of nothing is dropped unless BIC needs it.
+   So is one with which errors ahead grow beside all others of an incomplete model (`harmful`).
 6. When nothing is added any more, the final model is tested for anything left: at `level` on the
    training data, for one effect more, and at `strict` for anything unknown on all data together.
    What the driving predicts on all data by more than `explainable` is left too; where it predicts
@@ -43,7 +44,7 @@
 Nothing here sees a fit or a log: others measure, this decides.
 """
 
-from .accept import ErrorChange, Gain, Measures, accept, bic, worse
+from .accept import ErrorChange, Gain, Measures, accept, bic, harmful, worse
 from .facts import LACKING, Added, Decision, Facts, Tested, Verdict, Withdrawn
 from .limits import USUAL, Rules
 from .share import (
@@ -88,6 +89,7 @@ __all__ = [
     "bic",
     "excess",
     "grade",
+    "harmful",
     "incomplete",
     "little",
     "low_of_mean",

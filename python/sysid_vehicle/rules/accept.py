@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .limits import USUAL, Rules
+from .share import Share
 
 
 def bic(log_likelihood: float, parameters: int, samples: int) -> float:
@@ -132,6 +133,14 @@ def worse(changes: Sequence[ErrorChange], rules: Rules = USUAL) -> tuple[ErrorCh
         if c.log_ratio > max(least, rules.interval * c.error)
         or (c.channel in lean and c.log_ratio > least)
     )
+
+
+def harmful(own: Share, rules: Rules = USUAL) -> bool:
+    """Whether errors some seconds ahead are shown to be larger with an effect, by what matters.
+
+    Its own share of them, where it moves something, is below nothing: as `worse` of one figure.
+    """
+    return own.known and own.value < -rules.worse and own.high < 0.0
 
 
 def _mean(changes: Sequence[ErrorChange], channel: str, what: str) -> float:

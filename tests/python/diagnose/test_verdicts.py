@@ -1,7 +1,9 @@
 """Every effect gets a verdict, and the verdict of what is absent holds its bound."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from sysid_vehicle import (
@@ -16,7 +18,10 @@ from sysid_vehicle import (
     verdicts,
 )
 from sysid_vehicle.diagnose import EffectVerdict, Verdicts, possible
+from sysid_vehicle.diagnose.candidates.possible import possible_in
 from sysid_vehicle.diagnose.candidates.verdicts import _of_present, judge
+from sysid_vehicle.effects import Effect
+from sysid_vehicle.identify import Estimate, refit
 from sysid_vehicle.rules import USUAL
 
 Hidden = Callable[[str, float], Fit]
@@ -132,8 +137,12 @@ def test_what_this_driving_cannot_show_is_not_testable(truth: Model, start: Mode
         assert judged[name].effect.excited_by in judged[name].sentence
 
 
+def present(of: Effect, value: tuple[float, ...], std: tuple[float, ...]) -> EffectVerdict:
+    return _of_present(of, value, std, (), USUAL, possible(of, value, std))
+
+
 def kind(name: str, value: float, std: float) -> EffectVerdict:
-    return _of_present(effect(name), (value,), (std,), (), USUAL)
+    return present(effect(name), (value,), (std,))
 
 
 def test_impossible_and_negligible_values() -> None:
@@ -147,12 +156,71 @@ def test_impossible_and_negligible_values() -> None:
 
 def test_a_value_at_its_bound_has_no_error() -> None:
     rolling = effect("rolling_resistance")
-    found = _of_present(rolling, (0.012, 0.0), (0.001, float("inf")), (), USUAL)
+    found = present(rolling, (0.012, 0.0), (0.001, float("inf")))
     assert found.sentence.startswith("missing; coefficient 0.012 +- 0.001, per_speed_spm 0 (at a")
     most = rolling.parameters[1].upper
-    beyond = _of_present(rolling, (0.012, most), (0.001, float("inf")), (), USUAL)
+    beyond = present(rolling, (0.012, most), (0.001, float("inf")))
     assert beyond.finding == "proxy"
     assert "physically implausible" in beyond.sentence
+
+
+def test_a_bound_that_the_data_do_not_press_against_is_a_value_that_a_car_can_have() -> None:
+    slip = effect("combined_slip")
+    (name,) = slip.named
+    most = slip.parameters[0].upper
+    held = Estimate(name, most, float("inf"), "1", "at bound", bounds=(0.0, most))
+
+    def can_be(unbounded: tuple[float, float] | None) -> bool:
+        return possible_in({name: replace(held, unbounded=unbounded)}, slip)  # type: ignore[arg-type]
+
+    assert can_be((most + 0.1, 0.1))  # the bound lies in its 95 % interval, as half of cars there
+    assert not can_be((most + 0.3, 0.1))
+    assert not can_be(None)
+    # A bound that lies beyond what any car has is no value of a car, however unsure.
+    trail = effect("aligning_moment")
+    far = trail.parameters[0].upper
+    assert far > 5.0 * trail.parameters[0].typical
+    (long,) = trail.named
+    wide = replace(held, name=long, value=far, unbounded=(1.1 * far, far))
+    assert not possible_in({long: wide}, trail)  # type: ignore[arg-type]
+    # Of what is held at nothing no size was wanted.
+    free = replace(held, value=0.0, unbounded=(-5.0, 0.1))
+    assert possible_in({name: free}, slip)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def much_slip(truth: Model) -> Fit:
+    car = truth.add("combined_slip").with_values({"combined_slip.ellipse": 1.5})
+    log = drive(car, manoeuvres.lap(20.0), seed=12, rate_hz=50.0)
+    return identify(car, log, starts=1)
+
+
+def test_a_true_value_at_its_bound_is_no_stand_in(much_slip: Fit) -> None:
+    name, slip = "combined_slip.ellipse", much_slip.model.parts[0]
+    assert much_slip[name].note == "at bound"
+    assert possible_in(much_slip, slip)
+    # The same data ask for more than a car with a lower bound could have.
+    least = much_slip.model.with_values({name: 0.7}).with_bounds({name: (0.0, 0.8)})
+    pressed = refit(least, much_slip.driving, much_slip.noise)
+    assert pressed[name].value == pytest.approx(0.8, abs=1e-4)
+    assert pressed[name].std == np.inf
+    value, std = pressed[name].unbounded or (0.0, 0.0)
+    assert 0.8 + 50.0 * std < value < 2.0
+    narrow = replace(slip, parameters=(replace(slip.parameters[0], upper=0.8),))
+    assert not possible_in(pressed, narrow)
+
+
+def test_what_is_told_of_a_value_keeps_to_its_bounds() -> None:
+    loose = kind("tyre_relaxation", 0.05, 0.27)
+    assert loose.sentence.startswith(
+        "missing; relaxation_length_m 0.05 (95 %: 0 (bound) .. 0.579) m"
+    )
+    upper = effect("tyre_relaxation").parameters[0].upper
+    unknown = EffectVerdict(effect("tyre_relaxation"), "not testable", bound=(upper,))
+    assert f"below {upper:.2g} (bound) m at 95 %" in unknown.sentence
+    assert kind("tyre_relaxation", 0.5, 10.0 * upper).bound == (upper,)
+    # A negative prediction stays what it is.
+    assert "-0.5 +- 0.1" in kind("tyre_relaxation", -0.5, 0.1).sentence
 
 
 def test_verdicts_show_themselves(judged: Verdicts) -> None:

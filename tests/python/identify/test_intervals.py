@@ -1,11 +1,13 @@
 """Parameters that a user fixes, bounds or knows roughly; intervals; which note takes precedence."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, InvalidInput, Log, Model, identify
 from sysid_vehicle.identify import profile_fit, refit
-from sysid_vehicle.identify.intervals.estimates import wald
+from sysid_vehicle.identify.intervals.estimates import Estimate, wald
 from sysid_vehicle.identify.search.objective import Penalised, gaussian_prior
 from sysid_vehicle.identify.search.search import Box
 
@@ -132,3 +134,46 @@ def test_priors_are_residuals_like_those_of_the_data(profiled: Fit) -> None:
     assert descent == pytest.approx(G.T @ e)
     assert information == pytest.approx(G.T @ G)
     assert e[-1] == pytest.approx((1.5 - p[columns[1]]) / 0.1)
+
+
+def test_no_interval_passes_a_bound_of_its_parameter() -> None:
+    length = Estimate("tyre_relaxation.relaxation_length_m", 0.05, 0.27, "m", bounds=(0.0, 2.0))
+    assert length.interval == (0.0, pytest.approx(0.05 + 1.96 * 0.27))
+    assert length.interval_text() == "0 (bound) .. 0.5792"
+    assert str(length) == "tyre_relaxation.relaxation_length_m = 0.05 (95 %: 0 (bound) .. 0.5792) m"
+    assert length.to_dict()["interval"] == list(length.interval)
+    # The standard error, by which rules ask whether it holds no effect, is what it was.
+    assert length.std == 0.27
+    # As far as bounds do not matter, nothing is said of them.
+    known = replace(length, std=0.01)
+    assert known.interval == pytest.approx((0.05 - 0.0196, 0.05 + 0.0196))
+    assert str(known) == "tyre_relaxation.relaxation_length_m = 0.05 +- 0.01 m"
+    # Ends of a profile that found none are those of the bounds.
+    open_ended = replace(length, ends=(-np.inf, 0.4))
+    assert open_ended.interval == (0.0, 0.4)
+    held = replace(length, value=0.0, std=np.inf)
+    assert held.interval == (0.0, 2.0)
+    assert held.interval_text() == "-"
+    assert "interval" not in held.to_dict()
+
+
+def test_every_interval_of_a_fit_keeps_to_its_bounds(truth: Model, short: Log) -> None:
+    model = truth.add("tyre_relaxation", "aero_drag").with_bounds(
+        {"aero_drag.drag_area_m2": (-0.1, 3.0)}
+    )
+    few = short.between(4.0, 8.0)  # one corner: hardly anything is known well
+    fit = identify(model, few, starts=1)
+    cut = 0
+    for e in fit.estimates:
+        lower, upper = fit.model.bounds(e.name)
+        assert e.bounds == (lower, upper)
+        assert lower <= e.interval[0] <= e.interval[1] <= upper
+        cut += bool(np.isfinite(e.std) and e.interval[0] == lower)
+    assert cut
+    assert (
+        fit["tyre_relaxation.relaxation_length_m"].bounds[0] == 0.0
+    )  # not where the search begins
+    assert all(e.interval[0] >= 0.0 for e in fit.derived)
+    assert "(bound)" in str(fit)
+    table = fit.to_pandas()
+    assert all(table["low"] >= [e.bounds[0] for e in (*fit.estimates, *fit.derived)])

@@ -234,6 +234,27 @@ def test_a_fall_that_other_parameters_of_the_baseline_take_is_told_so(unknown: S
     )
 
 
+def test_the_share_of_a_stand_in_is_not_that_of_the_names(unknown: Study) -> None:
+    lag = AddedEffect("steer_lag", (), 2.0, 1.0, 1e-9)
+    wind = AddedEffect("side_wind", (), 2.0, 1.0, 1e-9, stands_in="it is not constant")
+    richer = replace(unknown.fit, model=unknown.model.add("steer_lag", "side_wind"))
+    found = replace(
+        unknown,
+        verdict="partly_explained",
+        fits=(unknown.fit, richer),
+        explained=Beyond((1.0, 0.2), 0.8, 0.6, 0.9),
+    )
+    whole = replace(unknown.shares, whole=Share(0.9, 0.8, 1.0), named=("steer_lag",))
+
+    def said(*added: AddedEffect) -> str:
+        study = replace(found, added=added)
+        study.__dict__["shares"] = whole
+        return in_the_end(study)
+
+    assert "The effects named explain 90 % (80 to 100) of what any function" in said(lag)
+    assert "The effects added explain 90 % (80 to 100) of what any function" in said(lag, wind)
+
+
 P = (1e-60, 1e-7, 5e-5, 5e-4, 0.004, 0.02, 0.07, 0.6)
 SQUARES = (0.0, 0.05, 0.5, 1.0, 3.0)
 EFFECTS = ("tyre_load_sensitivity", "steer_lag")

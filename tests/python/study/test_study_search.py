@@ -7,10 +7,25 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Diagnosis, Fit, diagnose
-from sysid_vehicle.rules import USUAL
+from sysid_vehicle.identify import refit
+from sysid_vehicle.rules import UNKNOWN, USUAL, Share
+from sysid_vehicle.study.judge.judge import _warnings
 from sysid_vehicle.study.search.search import Search, Trail
 
 AGAINST = ["aero_drag", "rolling_resistance", "head_wind"]
+
+
+def search(fit: Fit, most_effects: int) -> Search:
+    return Search(
+        fit.driving,
+        candidates=AGAINST,
+        most_effects=most_effects,
+        ends=np.inf,
+        rules=USUAL,
+        seed=0,
+        progress=False,
+        say=lambda _: None,
+    )
 
 
 def test_what_was_near_the_best_is_refitted_in_the_next_step_too(
@@ -27,16 +42,7 @@ def test_what_was_near_the_best_is_refitted_in_the_next_step_too(
 
     monkeypatch.setattr("sysid_vehicle.study.search.search.diagnose", noted)
     trail = Trail([fit])
-    Search(
-        fit.driving,
-        candidates=AGAINST,
-        most_effects=1,
-        ends=np.inf,
-        rules=USUAL,
-        seed=0,
-        progress=False,
-        say=lambda _: None,
-    ).follow(trail)
+    search(fit, 1).follow(trail)
     assert trail.fit is not fit
     assert asked == [set(), {c.id for c in dx.significant if c.finished}]
     assert len(asked[1]) > 1
@@ -60,6 +66,50 @@ def test_steps_with_which_the_model_errs_more_ahead_than_the_baseline_are_taken_
     trail.without_harm(baseline.driving, USUAL)
     assert trail.fits == [baseline, good]
     assert trail.taken_back == ()
+
+
+def test_an_effect_with_which_errors_are_larger_where_it_acts_is_taken_out(
+    hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    baseline = hidden_fit("aero_drag.drag_area_m2", 0.6)
+    dx = diagnose(baseline, candidates=["aero_drag"])
+    assert dx.omnibus.rejects
+    good = dx.ranking[0].fit
+    assert good is not None
+    windy = good.model.add("head_wind").with_values({"head_wind.speed_mps": 8.0})
+    fits = [baseline, refit(windy, good.driving, good.noise)]
+    shares = {"aero_drag": Share(0.8, 0.7, 0.9), "head_wind": Share(-0.5, -0.7, -0.3)}
+
+    def own(_: Fit, added: Sequence[str], *__: object) -> dict[str, tuple[Share, Share]]:
+        return {e: (shares[e], UNKNOWN) for e in added}
+
+    def again(fit: Fit, **_: object) -> Diagnosis:
+        return replace(dx, fit=fit)
+
+    monkeypatch.setattr("sysid_vehicle.study.search.search.own_shares", own)
+    monkeypatch.setattr("sysid_vehicle.study.search.search.diagnose", again)
+
+    def left(last: Diagnosis = dx) -> Trail:
+        trail = Trail(list(fits), [replace(last, fit=f) for f in fits])
+        search(baseline, 2).take_out_harmful(trail)
+        return trail
+
+    trail = left()
+    assert trail.fit.model.effects == ("aero_drag",)
+    assert trail.diagnoses[-1].fit is trail.fit
+    assert trail.harmful == ("head_wind",)
+    (said,) = (text for text in _warnings(trail, ()) if "removed again" in text)
+    assert said.startswith("head_wind removed again: where such an effect acts, errors 1 to 5 s")
+    # Where nothing is left shares are noise.
+    complete = replace(dx, omnibus=replace(dx.omnibus, p_value=0.5))
+    assert left(complete).fits == fits
+    # A little, or what is not shown, does no harm; where nothing stays the baseline is the last.
+    shares["head_wind"] = Share(-0.03, -0.04, -0.01)
+    assert left().harmful == ()
+    shares["head_wind"] = Share(-0.5, -0.9, 0.1)
+    assert left().harmful == ()
+    shares |= {"aero_drag": Share(-0.2, -0.3, -0.1), "head_wind": Share(-0.5, -0.7, -0.3)}
+    assert left().fits == [baseline]
 
 
 def test_what_a_fit_left_open_does_not_speak_against_a_step(

@@ -287,7 +287,11 @@ def test_a_possible_value_comes_before_an_impossible_one(
     dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving]
 ) -> None:
     (drag,) = (c for c in dx.ranking if c.id == "aero_drag")
-    far = replace(drag, value=(drag.effect.parameters[0].upper,), std=(float("inf"),))
+    assert drag.fit is not None
+    (name,), upper, inf = drag.effect.named, drag.effect.parameters[0].upper, float("inf")
+    ends = (replace(e, value=upper, std=inf) if e.name == name else e for e in drag.fit.estimates)
+    at_its_bound = replace(drag.fit, estimates=tuple(ends))
+    far = replace(drag, value=(upper,), std=(inf,), fit=at_its_bound)
     assert not possible(far.effect, far.value, far.std)
     others = tuple(c for c in dx.ranking if c.id != "aero_drag" and c.fit is not None)
     chosen = first_that_holds(replace(dx, ranking=(far, *others)), baseline, driving[1])

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from ..._common.text import unit_after, with_error
 from ...effects import Effect
 from ...identify import Fit
+from ...rules import USUAL, Rules
+from .possible import possible, possible_in
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +54,16 @@ class Candidate:
         """Id of the effect."""
         return self.effect.id
 
+    def can_be(self, rules: Rules = USUAL) -> bool:
+        """Whether its 95 % intervals hold values that a car can have."""
+        if self.fit is not None:
+            return possible_in(self.fit, self.effect, rules)
+        return possible(self.effect, self.value, self.std, rules)
+
     @property
     def size(self) -> str:
         """Its parameters with standard errors, in words."""
         return ", ".join(
-            f"{p.name} {with_error(v, s)}{unit_after(p.unit)}"
+            f"{p.name} {with_error(v, s, (p.lower, p.upper))}{unit_after(p.unit)}"
             for p, v, s in zip(self.effect.parameters, self.value, self.std, strict=True)
         )

@@ -22,7 +22,7 @@ from ...rules import Rules
 from ..unexplained.omnibus import Omnibus
 from .candidate import Candidate
 from .causes import Causes
-from .possible import Size, possible
+from .possible import Size
 from .reservation import Beside, beside, confirmed, reservation
 from .score import Score
 
@@ -196,7 +196,7 @@ class Diagnosis(Printed):
                 c
                 for c in few
                 if c.statistic >= self.rules.near * few[0].statistic
-                and possible(c.effect, c.value, c.std, self.rules)
+                and c.can_be(self.rules)
                 and c.fit is not None
                 and confirmed(c.statistic, c.effect, self.rules)
             ),

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from ...effects import Effect, Parameter, catalogue, effect
+from ...identify import Estimate, Fit
 from ...model import Model
 from ...rules import USUAL, Rules
 
@@ -90,6 +91,26 @@ def possible(
     bool
     """
     return not any(_impossible(p, d, s, rules) for p, d, s in sizes(effect, value, std, rules))
+
+
+def possible_in(fit: Fit, effect: Effect, rules: Rules = USUAL) -> bool:
+    """As `possible`, of the parameters of an effect of a fit.
+
+    Where a bound holds a value that a car can have, it is asked of what the data lead to beyond it:
+    a car whose value is that of the bound leads there by noise alone, half of the time.
+    """
+    asked = [_wanted(fit[n], p, rules) for n, p in effect.named.items()]
+    return possible(effect, [v for v, _ in asked], [s for _, s in asked], rules)
+
+
+def _wanted(found: Estimate, p: Parameter, rules: Rules) -> tuple[float, float]:
+    off = found.value - p.null_value
+    at_null = abs(off) < _AT_BOUND * (p.upper - p.lower)
+    # At nothing no size was wanted. A bound may be further than any car, and a search that ends
+    # there wanted that.
+    if found.unbounded is None or at_null or _impossible(p, off, 0.0, rules):
+        return found.value, found.std
+    return found.unbounded
 
 
 def sizes(

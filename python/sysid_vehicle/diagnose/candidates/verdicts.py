@@ -17,12 +17,12 @@ import numpy as np
 from ..._common.arguments import expect
 from ..._common.progress import doing
 from ..._common.text import brief, html_table, number, unit_after, with_error
-from ...effects import Effect
+from ...effects import Effect, Parameter
 from ...identify import Fit
 from ...rules import USUAL, Rules
 from .constancy import constancy
 from .diagnosis import Diagnosis
-from .possible import Size, lacking, possible, sizes
+from .possible import Size, lacking, possible, possible_in, sizes
 from .score import Score, score_board
 
 Finding = Literal[
@@ -55,7 +55,7 @@ class EffectVerdict:
     value, std : tuple of float
         Parameters, predicted or refitted; empty where nothing is known of them.
     bound : tuple of float
-        How far from nothing each parameter may be, at 95 %.
+        How far from nothing each parameter may be, at 95 %, and within its bounds.
     group : tuple of str
         The rivals, what the proxy acted like, or beside what there is evidence.
     because : str
@@ -73,8 +73,8 @@ class EffectVerdict:
     @property
     def sentence(self) -> str:
         """The verdict in words."""
-        size = _listed(self.effect, [with_error(v, s) for v, s in self._pairs()])
-        below = _listed(self.effect, [f"below {number(b, 2)}" for b in self.bound])
+        size = _sizes(self.effect, self.value, self.std)
+        below = _listed(self.effect, _below(self.effect, self.bound))
         matters = _listed(self.effect, [number(p.matters, 2) for p in self.effect.parameters])
         rivals = ", ".join(self.group)
         if self.finding == "missing":
@@ -98,9 +98,6 @@ class EffectVerdict:
             why = "the fitted parameters reproduce it, or a channel is missing"
             return f"not testable: {why}; {takes}"
         return f"not testable; {below} at 95 %, and it would matter from {matters}; {takes}"
-
-    def _pairs(self) -> list[tuple[float, float]]:
-        return list(zip(self.value, self.std, strict=True))
 
     def __str__(self) -> str:
         return f"{self.effect.id}: {self.sentence}"
@@ -313,19 +310,24 @@ def judge(
 def _of_added(effect: Effect, final: Fit, group: tuple[str, ...], rules: Rules) -> EffectVerdict:
     estimates = [final[name] for name in effect.named]
     value, std = tuple(e.value for e in estimates), tuple(e.std for e in estimates)
-    return _of_present(effect, value, std, group, rules)
+    return _of_present(effect, value, std, group, rules, possible_in(final, effect, rules))
 
 
 def _of_scored(effect: Effect, score: Score | None, evidence: bool, rules: Rules) -> EffectVerdict:
     if score is None:
         return EffectVerdict(effect, "not testable")
     if evidence:
-        return _of_present(effect, score.value, score.std, (), rules)
-    bound = _bound(effect, score.value, score.std, rules)
+        can_be = possible(effect, score.value, score.std, rules)
+        return _of_present(effect, score.value, score.std, (), rules, can_be)
+    reach = _reach(effect, score.value, score.std, rules)
     # The bound says it all: below what matters, the test had the power to find what does.
-    small = all(b < p.matters for b, p in zip(bound, effect.parameters, strict=True) if not p.scan)
+    small = all(b < p.matters for b, p in zip(reach, effect.parameters, strict=True) if not p.scan)
     return EffectVerdict(
-        effect, "absent" if small else "not testable", score.value, score.std, bound
+        effect,
+        "absent" if small else "not testable",
+        score.value,
+        score.std,
+        _within(effect, reach),
     )
 
 
@@ -335,26 +337,47 @@ def _of_present(
     std: tuple[float, ...],
     group: tuple[str, ...],
     rules: Rules,
+    can_be: bool,
 ) -> EffectVerdict:
     finding: Finding = "one of a group" if group else "missing"
     because = ""
-    if not possible(effect, value, std, rules):
+    if not can_be:
         finding, group = "proxy", ()
-        size = _listed(effect, [with_error(v, s) for v, s in zip(value, std, strict=True)])
+        size = _sizes(effect, value, std)
         because = f"the value is physically implausible ({size})"
     elif all(abs(d) + s < p.matters for p, d, s in sizes(effect, value, std, rules)):
         finding, group = "negligible", ()
-    bound = _bound(effect, value, std, rules)
+    bound = _within(effect, _reach(effect, value, std, rules))
     return EffectVerdict(effect, finding, value, std, bound, group, because)
 
 
-def _bound(
+def _reach(
     effect: Effect, value: tuple[float, ...], std: tuple[float, ...], rules: Rules
 ) -> tuple[float, ...]:
     return tuple(
         float(np.abs(v - p.null_value) + rules.bound * s)
         for p, v, s in zip(effect.parameters, value, std, strict=True)
     )
+
+
+def _most(p: Parameter) -> float:
+    """How far from nothing a parameter can be."""
+    return max(p.upper - p.null_value, p.null_value - p.lower)
+
+
+def _within(effect: Effect, reach: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(min(r, _most(p)) for p, r in zip(effect.parameters, reach, strict=True))
+
+
+def _below(effect: Effect, bound: tuple[float, ...]) -> list[str]:
+    """Bounds in words, which say where nothing narrower is known than that of the parameter."""
+    told = zip(effect.parameters, bound, strict=False)
+    return [f"below {number(b, 2)}" + (" (bound)" if b >= _most(p) else "") for p, b in told]
+
+
+def _sizes(effect: Effect, value: tuple[float, ...], std: tuple[float, ...]) -> str:
+    told = zip(effect.parameters, value, std, strict=False)
+    return _listed(effect, [with_error(v, s, (p.lower, p.upper)) for p, v, s in told])
 
 
 def _listed(effect: Effect, figures: list[str]) -> str:

@@ -98,7 +98,9 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     names = model.free_names
     units = {n: parameter.unit for n, parameter in model.parameters.items()}
     x = p[box.columns]
-    estimates, covariance = wald(names, units, x, as_float64(information), box)
+    estimates, covariance = wald(
+        names, units, x, as_float64(information), box, [model.bounds(n) for n in names]
+    )
     return replace(
         fit,
         model=model.with_values(dict(zip(names, map(float, x), strict=True))),

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
-from ..._common.text import HALF_95, number
+from ..._common.text import UNBOUNDED, interval_95, interval_text, number, with_error, within
 from ..search.objective import Objective
 from ..search.search import Box
 from .profile import Optimum, Profile, profile_all
@@ -42,6 +42,11 @@ class Estimate:
         end` (of the interval).
     ends : tuple of 2 floats, optional
         95 % interval of the profile likelihood, where that was asked for.
+    bounds : tuple of 2 floats
+        Between which it may lie; its intervals end there.
+    unbounded : tuple of 2 floats, optional
+        Of what a bound holds: the value that the data lead to beyond it, to first order, and its
+        standard error.
     """
 
     name: str
@@ -50,21 +55,48 @@ class Estimate:
     unit: str
     note: str = ""
     ends: tuple[float, float] | None = None
+    bounds: tuple[float, float] = UNBOUNDED
+    unbounded: tuple[float, float] | None = None
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval: of the profile likelihood where there is one, else of the std."""
+        """95 % interval within the bounds: of the profile likelihood, or else of the std."""
         if self.ends is not None:
-            return self.ends
-        return self.value - HALF_95 * self.std, self.value + HALF_95 * self.std
+            return within(self.ends, self.bounds)
+        return interval_95(self.value, self.std, self.bounds)
+
+    @property
+    def has_interval(self) -> bool:
+        """Whether more is known than the bounds."""
+        return self.ends is not None or bool(np.isfinite(self.std))
+
+    def interval_text(self, written: Callable[[float], str] = number) -> str:
+        """The interval in words, which say where it ends at a bound; a dash where there is none.
+
+        Parameters
+        ----------
+        written : callable
+            From a number to how it is printed.
+        """
+        return interval_text(self.interval, self.bounds, written) if self.has_interval else "-"
 
     def to_dict(self) -> dict[str, Any]:
-        """Value, standard error, unit, and an interval of the profile likelihood, for JSON."""
+        """Value, standard error, unit, and the interval where there is one, for JSON."""
         told = {"value": self.value, "std": self.std, "unit": self.unit}
-        return told if self.ends is None else {**told, "interval": list(self.ends)}
+        return {**told, "interval": list(self.interval)} if self.has_interval else told
+
+    @property
+    def size(self) -> str:
+        """The value with its standard error, or with the interval where that ends at a bound."""
+        return self._size(3)
+
+    def _size(self, digits: int) -> str:
+        if self.note and not np.isfinite(self.std):
+            return f"{number(self.value, digits)} ({self.note})"
+        return with_error(self.value, self.std, self.bounds, digits)
 
     def __str__(self) -> str:
-        return f"{self.name} = {number(self.value)} +- {number(self.std, 2)} {self.unit}"
+        return f"{self.name} = {self._size(4)} {self.unit}"
 
 
 def box_covariance(information: FloatArray, box: Box, x: FloatArray) -> FloatArray:
@@ -100,12 +132,21 @@ def std_of_data(information: FloatArray) -> FloatArray:
 
 
 def wald(
-    names: Sequence[str], units: Mapping[str, str], x: FloatArray, information: FloatArray, box: Box
+    names: Sequence[str],
+    units: Mapping[str, str],
+    x: FloatArray,
+    information: FloatArray,
+    box: Box,
+    bounds: Sequence[tuple[float, float]] | None = None,
+    descent: FloatArray | None = None,
 ) -> tuple[tuple[Estimate, ...], FloatArray]:
     """Estimates with the standard errors of the information matrix, and their covariance.
 
-    What the data alone do not determine is called that, even where it ended at a bound: the bound
-    is not what stopped it. At a bound there is no standard error, nor for what they never felt.
+    `bounds` are those of the values, by default of the search: a lag is searched for from next to
+    nothing, and may be none. `descent` is the gradient of the log-likelihood at `x`, by which the
+    data press against bounds. What the data alone do not determine is called that, even where it
+    ended at a bound: the bound is not what stopped it. At a bound there is no standard error, nor
+    for what they never felt.
     """
     width = box.width
     covariance = box_covariance(information, box, x)
@@ -114,6 +155,12 @@ def wald(
     unknown = of_data > _UNKNOWN * width
     held = (x <= box.lower + _AT_BOUND * width) | (x >= box.upper - _AT_BOUND * width)
     silent = held | np.isinf(of_data)
+    ends = list(zip(box.lower, box.upper, strict=True)) if bounds is None else bounds
+    beyond: dict[int, tuple[float, float]] = {}
+    if descent is not None:
+        # Only bounds keep a maximum from being level: what else is left is of the search.
+        off = covariance[:, held] @ descent[held]
+        beyond = {i: (float(x[i] + off[i]), float(std[i])) for i in np.flatnonzero(held).tolist()}
     estimates = tuple(
         Estimate(
             name,
@@ -121,6 +168,8 @@ def wald(
             float("inf") if silent[i] else float(std[i]),
             units[name],
             "not determined" if unknown[i] else "at bound" if held[i] else "",
+            bounds=(float(ends[i][0]), float(ends[i][1])),
+            unbounded=None if np.isinf(of_data[i]) else beyond.get(i),
         )
         for i, name in enumerate(names)
     )

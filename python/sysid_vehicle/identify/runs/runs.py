@@ -253,7 +253,14 @@ def _summary(
     parameters = common.model.parameters
     labels = [f"{n} [{r}]" if r else n for n, r in layout.every]
     units = {label: parameters[n].unit for label, (n, _) in zip(labels, layout.every, strict=True)}
-    estimates, covariance = wald(labels, units, x, information, layout.box)
+    estimates, covariance = wald(
+        labels,
+        units,
+        x,
+        information,
+        layout.box,
+        [common.model.bounds(n) for n, _ in layout.every],
+    )
     told = NoiseModel.from_vector(noise)
     at = len(layout.shared)
     fits = {}

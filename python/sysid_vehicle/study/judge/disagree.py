@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ..._common.memo import remembered
-from ..._common.text import with_error
 from ...errors import NumericalError
 from ...estimate import Driving
 from ...identify import Estimate, Fit, driving_of, refine
@@ -42,7 +41,7 @@ class Disagreement:
         return abs(self.train.value - self.validation.value) / error if error > 0.0 else 0.0
 
     def __str__(self) -> str:
-        here, there = (with_error(e.value, e.std) for e in (self.train, self.validation))
+        here, there = (e.size for e in (self.train, self.validation))
         return (
             f"{self.train.name} {here} {self.train.unit} from training data, {there} from "
             "validation data"

@@ -325,6 +325,11 @@ def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:
     if trail.stopped or late:
         found.append(_cut_short(trail.stopped, late))
         warn(found[-1])
+    if trail.harmful:
+        found.append(
+            f"{' and '.join(trail.harmful)} removed again: where such an effect acts, errors 1 to "
+            "5 s ahead of validation data are larger with it, beside the others"
+        )
     if trail.taken_back:
         found.append(
             f"{' and '.join(trail.taken_back)} removed again: errors 1 to 5 s ahead fall with the "

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._common.text import number, unit_after, with_error
+from ..._common.text import number, unit_after
 from ...estimate import UNITS
 from ...estimate.driving import WORDS
 from ...rules import LACKING, NONE_GONE, share_of
@@ -58,9 +58,7 @@ def nuisances(study: Study) -> list[str]:
         own = [(p, known[f"{part.id}.{p.name}"]) for p in part.parameters]
         off = [(abs(e.value - p.null_value), e.std, p.matters) for p, e in own]
         if any(by >= matters and by > study.rules.interval * std for by, std, matters in off):
-            sizes = ", ".join(
-                f"{p.name} {with_error(e.value, e.std)}{unit_after(p.unit)}" for p, e in own
-            )
+            sizes = ", ".join(f"{p.name} {e.size}{unit_after(p.unit)}" for p, e in own)
             found.append(f"Nuisance {part.id} ({part.title}): {sizes}")
     return found
 
@@ -145,8 +143,11 @@ def _explained(study: Study) -> list[str]:
     said += as_fitted(study)
     whole = study.shares.whole
     if whole.known and whole.value > 0.0:
-        sure = study.verdict in ("explained", "partly_explained")
-        who = "The effects named explain" if sure else "The effects added explain"
+        # The share is that of all effects added: of the names only where all of these stand.
+        named = study.verdict in ("explained", "partly_explained") and not any(
+            a.stands_in for a in study.added
+        )
+        who = "The effects named explain" if named else "The effects added explain"
         said.append(f"{who} {whole} of what any function of the driving could explain of it.")
     return said
 

@@ -9,16 +9,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 
-from ..._common.text import unit_after, with_error
+import numpy as np
+
+from ..._common.text import unit_after
 from ..._common.threads import before, in_parallel
 from ...diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
 from ...diagnose.diagnose import REFITS
 from ...effects import Effect
-from ...errors import Interrupted
+from ...errors import Interrupted, NumericalError
 from ...estimate import Driving
-from ...identify import Fit
-from ...rules import Rules, worse
+from ...identify import Fit, refine
+from ...rules import Rules, harmful, worse
 from ..ahead.along_the_car import changes_of
+from ..ahead.own_share import own_shares
 from ..validation import AHEAD, serving
 from .steps import (
     alternatives,
@@ -52,6 +55,8 @@ class Trail:
         Effects with evidence that the time limit left untried.
     taken_back : tuple of str
         Effects of last steps without which the model predicts better (`without_harm`).
+    harmful : tuple of str
+        Effects taken out of the last model, as errors ahead are larger with them.
     """
 
     fits: list[Fit]
@@ -62,6 +67,7 @@ class Trail:
     sizes: dict[str, Size] = field(default_factory=dict)
     stopped: tuple[str, ...] = ()
     taken_back: tuple[str, ...] = ()
+    harmful: tuple[str, ...] = ()
 
     @property
     def fit(self) -> Fit:
@@ -218,6 +224,38 @@ class Search:
             trail.fits.append(found)
             self.say(_step(found, known))
 
+    def take_out_harmful(self, trail: Trail) -> None:
+        """Take effects out of the last model with which errors ahead are shown to be larger.
+
+        Where they move something, on validation data, beside all others: when they came that may
+        not have shown, and it hides what the others take. Where nothing is left shares are noise.
+        """
+        baseline = trail.fits[0].model.effects
+        while len(trail.fits) > 1 and trail.diagnoses[-1].omnibus.rejects:
+            fit = trail.fit
+            added = [e for e in fit.model.effects if e not in baseline]
+            own = own_shares(fit, added, added, self.test, self.judged_by)
+            worst = [(s.value, e) for e, (s, _) in own.items() if harmful(s, self.rules)]
+            if not worst:
+                return
+            name = min(worst)[1]
+            poorer = before(self.judged_by, partial(self._without, fit, name), None)
+            if poorer is None:
+                return
+            trail.harmful += (name,)
+            if len(added) > 1:
+                trail.fits.append(poorer)
+                trail.diagnoses.append(self._diagnosis(poorer, (), refits=0))
+            else:
+                del trail.fits[1:], trail.diagnoses[1:]
+            self.say(f"Removed {name}.")
+
+    def _without(self, fit: Fit, name: str) -> Fit | None:
+        try:
+            return refine(fit.model.drop(name), fit.driving, fit.noise)
+        except (NumericalError, np.linalg.LinAlgError):
+            return None
+
     def _beside_another(self, dx: Diagnosis, trail: Trail) -> tuple[Candidate, Fit] | None:
         """The likeliest candidate, where it holds only together with one that is missing too.
 
@@ -238,14 +276,14 @@ class Search:
         trail.note(beside, step[0])
         return first, step[1]
 
-    def _diagnosis(self, fit: Fit, again: Sequence[str]) -> Diagnosis:
+    def _diagnosis(self, fit: Fit, again: Sequence[str], refits: int = REFITS) -> Diagnosis:
         """All effects scored, some refitted again; where no time is left none is refitted."""
         left = self.ends - time.perf_counter()
         return diagnose(
             fit,
             candidates=self.candidates,
             rules=self.rules,
-            refits=REFITS if left > 0.0 else 0,
+            refits=refits if left > 0.0 else 0,
             again=again if left > 0.0 else (),
             time_limit_s=left if left > 0.0 else None,
             seed=self.seed,
@@ -270,7 +308,5 @@ def _sizes(fit: Fit, effects: Sequence[str]) -> str:
     found = [e for e in fit.estimates if e.name.split(".")[0] in effects]
     several = len(effects) > 1
     return ", ".join(
-        f"{e.name if several else e.name.split('.')[1]} {with_error(e.value, e.std)}"
-        f"{unit_after(e.unit)}"
-        for e in found
+        f"{e.name if several else e.name.split('.')[1]} {e.size}{unit_after(e.unit)}" for e in found
     )

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..._common.memo import remembered
 from ..._common.threads import before, in_parallel
-from ...diagnose import Candidate, Diagnosis, possible, refused
+from ...diagnose import Candidate, Diagnosis, refused
+from ...diagnose.candidates.possible import possible_in
 from ...effects import Parameter
 from ...errors import NumericalError
 from ...estimate import Driving
@@ -106,7 +107,7 @@ def speaks_for(
 
 
 def _can_be(c: Candidate, rules: Rules) -> bool:
-    return possible(c.effect, c.value, c.std, rules)
+    return c.can_be(rules)
 
 
 def alternatives(dx: Diagnosis, chosen: Candidate) -> tuple[Candidate, ...]:
@@ -288,8 +289,7 @@ def _mattering(fit: Fit) -> int:
 def real(fit: Fit, name: str, rules: Rules) -> bool:
     """Whether an effect of the model has a value that a car can have."""
     found = next(e for e in fit.model.parts if e.id == name)
-    estimates = [fit[f"{name}.{p.name}"] for p in found.parameters]
-    return possible(found, [e.value for e in estimates], [e.std for e in estimates], rules)
+    return possible_in(fit, found, rules)
 
 
 # A candidate is asked when it is chosen, and when it is tried in place of another one.

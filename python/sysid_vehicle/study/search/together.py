@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ..._common.threads import before, in_parallel
-from ...diagnose import Candidate, Diagnosis, possible
+from ...diagnose import Candidate, Diagnosis
 from ...diagnose.candidates.refits import refitted
 from ...diagnose.candidates.reservation import beside
 from ...errors import NumericalError
@@ -138,7 +138,7 @@ def _in_place(fit: Fit, name: str, dx: Diagnosis) -> InPlace:
         told = s.statistic, s.p_value, s.value, s.std, s.retained, s.variance_ratio
         c = refitted(poorer, poorer.driving, Candidate(s.effect, *told))
         as_well = c.statistic > gained - 2.0 * rules.apart
-        if as_well and possible(c.effect, c.value, c.std, rules):
+        if as_well and c.can_be(rules):
             more = len(c.effect.parameters) - len(parts[name].parameters)
             rivals.append(c)
             leads.append(bic(0.5 * (c.statistic - gained), more, fit.driving.samples))
