@@ -6,7 +6,16 @@ from .identify import identify, profile_fit
 from .intervals.estimates import Estimate
 from .intervals.posterior import Posterior
 from .intervals.profile import Profile
-from .maximum import far_below, refine, refine_above, refine_while, refit, relearn, unmoved
+from .maximum import (
+    far_below,
+    refine,
+    refine_above,
+    refine_beside,
+    refine_while,
+    refit,
+    relearn,
+    unmoved,
+)
 from .offsets import driving_beside, driving_of
 from .predictive import Prediction, predict
 from .runs.runs import Difference, RunsFit, identify_runs
@@ -40,6 +49,7 @@ __all__ = [
     "profile_fit",
     "refine",
     "refine_above",
+    "refine_beside",
     "refine_while",
     "refit",
     "relearn",

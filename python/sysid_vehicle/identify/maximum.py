@@ -34,12 +34,7 @@ _SAME, _NEAR = 0.5, 0.5
 
 
 def refine(
-    model: Model,
-    driving: Driving,
-    noise: NoiseModel,
-    *,
-    inputs: FloatArray | None = None,
-    least: float = -np.inf,
+    model: Model, driving: Driving, noise: NoiseModel, *, inputs: FloatArray | None = None
 ) -> Fit:
     """Go on from a model's values and a noise model that are already near: one start.
 
@@ -47,12 +42,8 @@ def refine(
     ----------
     inputs : array, shape (samples, 2), optional
         In place of the driving's own steering angle and wheel force.
-    least : float
-        Log-likelihood below which nobody asks for the maximum (`far_below`): noise of other time
-        scales is not tried from there.
     """
-    starts = Starts.none(model.free_names)
-    return polish(model, driving, model.vector(), noise, starts, inputs, least)
+    return polish(model, driving, model.vector(), noise, Starts.none(model.free_names), inputs)
 
 
 def far_below(log_likelihood: float, least: float) -> bool:
@@ -81,11 +72,7 @@ def refine_above(model: Model, driving: Driving, fit: Fit, least: float = -np.in
     led = None
     if thinned:
         led = settle(thinned[-1], *begin, box, thin=thinned[:-1])[:2]
-        few = driving.problem(fit.model, most_samples=_counts(objective.samples)[-1])
-        told = objective_of(fit.model, few, driving).log_likelihood(
-            fit.model.vector(), fit.noise.vector()
-        )
-        if thinned[-1].log_likelihood(*led) < told - _FAR_BELOW_BY_FEW:
+        if thinned[-1].log_likelihood(*led) < _by_few(fit, objective) - _FAR_BELOW_BY_FEW:
             return None
         new = np.array([n not in fit.model.free_names for n in model.free_names])
         # Few samples lead to no lag, which is the poorer model: from there no search leads back.
@@ -98,6 +85,39 @@ def refine_above(model: Model, driving: Driving, fit: Fit, least: float = -np.in
     if log_likelihood_of(objective, *found[:2]) < lowest:
         return None
     return top(model, driving, objective, found, Starts.none(model.free_names), thinned)
+
+
+def refine_beside(model: Model, driving: Driving, fit: Fit, least: float) -> Fit | None:
+    """As `refine`, to be compared with a fit of other effects; None where it ends far below that.
+
+    Few samples, on which it climbs to the end, tell it before all of them are asked.
+
+    Parameters
+    ----------
+    model : Model
+    driving : Driving
+    fit : Fit
+        The other one, whose noise it begins with.
+    least : float
+        Log-likelihood below which nobody asks for the maximum (`far_below`): noise of other time
+        scales is not tried from there.
+    """
+    objective, thinned = objectives(model, driving)
+    box, led = free_box(model), (model.vector(), fit.noise.vector())
+    if thinned:
+        few = thinned[-1]
+        led = to_the_top(few, *settle(few, *led, box, thin=thinned[:-1])[:2], box)
+        if few.log_likelihood(*led) < _by_few(fit, objective) - _FAR_BELOW_BY_FEW:
+            return None
+    found = settle(objective, model.vector(), fit.noise.vector(), box, led=led)
+    return top(model, driving, objective, found, Starts.none(model.free_names), thinned, least)
+
+
+def _by_few(fit: Fit, objective: Objective) -> float:
+    """Log-likelihood of a fit on the few samples that lead where an objective has all of them."""
+    few = fit.driving.problem(fit.model, most_samples=_counts(objective.samples)[-1])
+    told = objective_of(fit.model, few, fit.driving)
+    return told.log_likelihood(fit.model.vector(), fit.noise.vector())
 
 
 def refine_while(
@@ -176,15 +196,11 @@ def polish(
     noise: NoiseModel,
     starts: Starts,
     inputs: FloatArray | None = None,
-    least: float = -np.inf,
 ) -> Fit:
-    """Noise and parameters of maximum likelihood, from values that are already near.
-
-    `least` as for `refine`.
-    """
+    """Noise and parameters of maximum likelihood, from values that are already near."""
     objective, thinned = objectives(model, driving, inputs)
     found = settle(objective, p, noise.vector(), free_box(model), thin=thinned)
-    return top(model, driving, objective, found, starts, thinned, least)
+    return top(model, driving, objective, found, starts, thinned)
 
 
 def objectives(
@@ -217,7 +233,7 @@ def top(
 ) -> Fit:
     """The maximum, from where a search has settled, whichever time scale its noise began with.
 
-    `thinned` is the likelihood of fewer samples, the fewest first; `least` as for `refine`.
+    `thinned` is the likelihood of fewer samples, the fewest first; `least` as for `refine_beside`.
     """
     at_top = to_the_top(objective, *settled[:2], free_box(model))
     if far_below(log_likelihood_of(objective, *at_top), least):

@@ -23,7 +23,7 @@ def test_an_effect_that_was_tried_against_the_same_ones_is_not_refitted(
     tried: Any = SimpleNamespace(model=start.add("aero_drag"), driving=driving)
     windy = windy_fit(start, driving)
     refined = SimpleNamespace(log_likelihood=0.0)
-    names = {"refine": lambda *_, **__: refined, "without_insignificant": lambda fit, _: fit}
+    names = {"refine_beside": lambda *_: refined, "without_insignificant": lambda fit, _: fit}
     for name, stand_in in names.items():
         monkeypatch.setitem(_with_others.__globals__, name, stand_in)
     drag = Candidate(
@@ -56,7 +56,7 @@ def test_a_trial_far_below_is_not_made_simpler(
     """Twenty nats, and the price of the wind, are more than a simpler model gains."""
     asked, told = [], {}
 
-    def refining(*_: object, least: float) -> Any:
+    def refining(_: object, __: object, ___: object, least: float) -> Any:
         told["least"] = least
         return SimpleNamespace(log_likelihood=-below)
 
@@ -64,7 +64,7 @@ def test_a_trial_far_below_is_not_made_simpler(
         asked.append(fit)
         return fit
 
-    monkeypatch.setitem(_with_others.__globals__, "refine", refining)
+    monkeypatch.setitem(_with_others.__globals__, "refine_beside", refining)
     monkeypatch.setitem(_with_others.__globals__, "without_insignificant", simplified)
     drag = Candidate(effect("aero_drag"), 9.0, 0.0, (0.6,), (0.1,), 1.0, 1.0)
     windy = windy_fit(start, SimpleNamespace(samples=1000))

@@ -15,7 +15,7 @@ from ...diagnose.candidates.possible import possible_in
 from ...effects import Parameter
 from ...errors import NumericalError
 from ...estimate import Driving
-from ...identify import Estimate, Fit, far_below, refine
+from ...identify import Estimate, Fit, far_below, refine, refine_beside
 from ...rules import USUAL, Measures, Rules, accept, bic, worse
 from ..validation import (
     as_sure,
@@ -220,7 +220,7 @@ def _exchanges(
 def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules) -> Fit | None:
     """The fit with others in place of an effect, and without what is not significant then.
 
-    None where the search fails.
+    None where the search fails, or ends far below.
     """
     model = fit.model.drop(name)
     for c in others:
@@ -237,8 +237,8 @@ def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules)
     ]
     least = merit(fit) - bic(0.0, len(bare), fit.driving.samples)
     try:
-        found = refine(model, fit.driving, fit.noise, least=least)
-        if far_below(found.log_likelihood, least):
+        found = refine_beside(model, fit.driving, fit, least)
+        if found is None or far_below(found.log_likelihood, least):
             return found
         return without_insignificant(found, rules)
     except (NumericalError, np.linalg.LinAlgError):
