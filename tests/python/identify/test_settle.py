@@ -8,10 +8,11 @@ import pytest
 
 from sysid_vehicle import _core
 from sysid_vehicle.errors import NumericalError
-from sysid_vehicle.identify.search.climb import _slope, climb
+from sysid_vehicle.identify.search.climb import climb
 from sysid_vehicle.identify.search.objective import Objective
 from sysid_vehicle.identify.search.search import Box
 from sysid_vehicle.identify.search.settle import risen, rivalled, settle
+from sysid_vehicle.identify.search.ways import slope_of
 
 
 class Ridge:
@@ -139,7 +140,7 @@ def test_the_slope_of_the_likelihood_by_differences(free: int) -> None:
         return -0.5 * ((trials - top) ** 2) @ weights**2
 
     box = Box(list(range(free)), np.zeros(free) - 5.0, np.full(free, 0.9))  # all at their bounds
-    slope = _slope(values_at, at, np.diag(weights**2), box)
+    slope = slope_of(values_at, at, np.diag(weights**2), box)
     np.testing.assert_allclose(slope, weights**2 * (top - at), rtol=0.2 if free < 9 else 1e-6)
     assert sum(sets) == (2 * free if 2 * free <= _core.LANES else free + 1)
 
