@@ -37,7 +37,8 @@ _STATIONS = (
 _MOVED: dict[str, str] = {
     "compare.where": "compare.failure_map",
     "effects": "effects.catalogue",
-    **{f"log._{module}": f"log.{module}" for module in ("build", "channels", "log", "ranges")},
+    **{f"log._{module}": f"log.{module}" for module in ("build", "channels", "log")},
+    **dict.fromkeys(("log._ranges", "log.ranges"), "log.laws.ranges"),
     "diagnose.doubt": "diagnose.candidates.reservation",
     **{
         f"diagnose.{module}": f"diagnose.{folder}.{module}"

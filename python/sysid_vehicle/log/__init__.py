@@ -4,7 +4,7 @@ from .against_car import check_car, times_wheelbase
 from .channels import CHANNELS, MEASURED, Channel
 from .columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
 from .held import held_rows
-from .laws import Contradiction
+from .laws.laws import Contradiction
 from .log import Log
 from .together import check_excitation, several_logs, unexcited
 

@@ -15,11 +15,11 @@ import numpy as np
 from .._common.arrays import FloatArray
 from ..errors import InvalidInput, warn
 from ..vehicle import GRAVITY_MPS2
-from .laws import EXCITED, LINEAR_MPS2, OFFSET, WINDOW_S, Drive, spread_of
+from .laws.laws import EXCITED, LINEAR_MPS2, OFFSET, WINDOW_S, Drive, spread_of
+from .laws.longitudinal import ramp_on
+from .laws.motion import Motion
+from .laws.regression import size_of
 from .log import Log
-from .longitudinal import ramp_on
-from .motion import Motion
-from .regression import size_of
 
 _MOVING = 5.0  # m/s, with a wheelbase of `_USUAL_M`: slip and curvature are alike at like v^2 / L
 _USUAL_M = 2.6

@@ -15,8 +15,8 @@ from .channels import CHANNELS
 from .columns import Columns, collect
 from .grid import at, check_time, own_period, to_grid
 from .held import blank_held
-from .plausibility import check_coherence
-from .ranges import dropouts
+from .laws.plausibility import check_coherence
+from .laws.ranges import dropouts
 from .signals import fill_short_gaps, spikes
 
 _MIN_USABLE_S = 5.0

@@ -19,8 +19,8 @@ from ..vehicle import Vehicle
 from .build import build
 from .channels import CHANNELS
 from .columns import Columns
-from .laws import Contradiction
-from .plausibility import contradictions
+from .laws.laws import Contradiction
+from .laws.plausibility import contradictions
 from .signals import runs
 
 if TYPE_CHECKING:

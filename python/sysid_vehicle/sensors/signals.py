@@ -12,7 +12,7 @@ import numpy.typing as npt
 from .._common.arrays import FloatArray, filled
 from ..errors import InvalidInput
 from ..log import CHANNELS, MEASURED, Log, held_rows
-from ..log.regression import in_most
+from ..log.laws.regression import in_most
 from ..log.signals import runs
 from ..vehicle import GRAVITY_MPS2
 from .kinematics.colour import neighbours

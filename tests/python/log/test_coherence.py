@@ -12,7 +12,7 @@ from smooth_log import drift
 
 from sysid_vehicle import Log, Model, drive, lab, manoeuvres, published, read_log
 from sysid_vehicle.errors import InvalidInput, SysidWarning
-from sysid_vehicle.log.regression import find_lag, in_most, regress
+from sysid_vehicle.log.laws.regression import find_lag, in_most, regress
 
 Columns = dict[str, np.ndarray]
 

@@ -9,7 +9,7 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle.log import Log, check_car
-from sysid_vehicle.log.plausibility import contradictions
+from sysid_vehicle.log.laws.plausibility import contradictions
 
 
 def columns(wheelbase_m: float, seconds: float = 40.0) -> dict[str, np.ndarray]:

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
 from ...log import times_wheelbase
-from ...log.laws import LINEAR_MPS2, cosine, fit
-from ...log.motion import Windows
+from ...log.laws.laws import LINEAR_MPS2, cosine, fit
+from ...log.laws.motion import Windows
 from ...vehicle import GRAVITY_MPS2
 from .sideslip import against_the_rear_axle, usual_sideslip
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._common.arrays import FloatArray
+from ..._common.arrays import FloatArray
 from .laws import Contradiction
 from .motion import Motion
 from .regression import Lag, Sides, find_lag, regress

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .._common.arrays import FloatArray, filled
-from .grid import own_period
-from .signals import disorder, median_of_five, white_noise
+from ..._common.arrays import FloatArray, filled
+from ..grid import own_period
+from ..signals import disorder, median_of_five, white_noise
 
 _RATE_HZ = 50.0  # enough for what a car does; quicker logs are averaged down
 _MEDIAN_ABOVE_HZ = 40.0  # below, a median of five samples would take movement for spikes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._common.arrays import FloatArray
+from ..._common.arrays import FloatArray
 from .motion import Motion
 from .regression import Lag, coarse_lags, find_lag, regress
 

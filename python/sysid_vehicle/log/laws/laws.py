@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._common.arrays import FloatArray
-from ..errors import InvalidInput
+from ..._common.arrays import FloatArray
+from ...errors import InvalidInput
 from .motion import Motion
 from .regression import Regression, regress, size_of
 

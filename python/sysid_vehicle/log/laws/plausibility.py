@@ -13,9 +13,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .._common.arrays import FloatArray
-from ..vehicle import GRAVITY_MPS2
-from .channels import DEG
+from ..._common.arrays import FloatArray
+from ...vehicle import GRAVITY_MPS2
+from ..channels import DEG
 from .clock import clock_notes
 from .lags import lag_notes
 from .laws import (

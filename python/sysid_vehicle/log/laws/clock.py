@@ -6,8 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
-from .._common.arrays import NORMAL_MAD, FloatArray
-from ..errors import InvalidInput
+from ..._common.arrays import NORMAL_MAD, FloatArray
+from ...errors import InvalidInput
 from .laws import Contradiction
 from .motion import Motion
 from .steering import several_frequencies

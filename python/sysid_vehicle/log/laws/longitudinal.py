@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._common.arrays import FloatArray
-from ..vehicle import GRAVITY_MPS2
+from ..._common.arrays import FloatArray
+from ...vehicle import GRAVITY_MPS2
 from .lags import sideways
 from .laws import (
     EXCITED,

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._common.arrays import FloatArray, filled
-from .channels import CHANNELS, DEG
-from .grid import at, between
+from ..._common.arrays import FloatArray, filled
+from ..channels import CHANNELS, DEG
+from ..grid import at, between
+from ..signals import disorder, median_of_five, runs, white_noise
 from .laws import Contradiction, Implausible
-from .signals import disorder, median_of_five, runs, white_noise
 
 WHITE = 0.7  # share of white variance from which a channel has no order
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._common.arrays import NORMAL_MAD, FloatArray
+from ..._common.arrays import NORMAL_MAD, FloatArray
 
 # Of a ratio; a wrong unit leaves 70 % of corners and more within it, spins 20 to 40 %.
 _ALIKE = 0.2
