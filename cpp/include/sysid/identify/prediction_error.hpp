@@ -127,7 +127,8 @@ Trace trace(const Problem& logged, const double* p, const Noise& noise, bool smo
 void smoothed_means(const Problem& logged, const double* p, const Noise& noise, double* out);
 
 /// The same where the filter has run with these parameters, under its noise.
-void smoothed_means(const Problem& logged, const double* p, const FrozenFilter& filter, double* out);
+void smoothed_means(const Problem& logged, const double* p, const FrozenFilter& filter,
+                    double* out);
 
 /// Predictions so many samples ahead, of which one sample in `every` starts one.
 struct Horizon {
