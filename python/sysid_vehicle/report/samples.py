@@ -51,6 +51,8 @@ class Samples:
         """Of an axis: clocks of several stretches tell nothing together."""
         return "time [s]" if len(self.logs) == 1 else "seconds driven"
 
+    __iter__ = None  # numbers are no names
+
     def __getitem__(self, name: str) -> FloatArray:
         return self.columns[name]
 

@@ -83,6 +83,8 @@ class Drive14:
         """Time of each sample."""
         return as_float64(np.arange(len(self.inputs)) * self.dt_s)
 
+    __iter__ = None  # numbers are no names
+
     def __getitem__(self, name: str) -> FloatArray:
         """An output or an input by name."""
         if name in OUTPUTS:

@@ -35,6 +35,8 @@ class Readings:
     noise: Mapping[str, float]
     dt_s: float
 
+    __iter__ = None  # numbers are no names
+
     def __getitem__(self, name: str) -> FloatArray:
         """A channel by name."""
         return self.values[:, READINGS.index(name)]

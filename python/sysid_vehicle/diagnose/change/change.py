@@ -167,6 +167,8 @@ class Change(Printed):
     alike: Alike
     rules: Rules
 
+    __iter__ = None  # numbers are no names
+
     def __getitem__(self, effect: str) -> EffectChange:
         for e in self.effects:
             if e.id == effect:

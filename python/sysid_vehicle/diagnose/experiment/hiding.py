@@ -87,6 +87,8 @@ class BiasReport:
 
     _HEAD = ("effect", "size", "front stiffness", "rear stiffness", "worst")
 
+    __iter__ = None  # numbers are no names
+
     def __getitem__(self, effect: str) -> Bias:
         for b in self.biases:
             if b.effect.id == effect:

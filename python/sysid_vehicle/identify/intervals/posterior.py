@@ -45,6 +45,8 @@ class Posterior(Printed):
     log_density: FloatArray
     method: str
 
+    __iter__ = None  # numbers are no names
+
     def __getitem__(self, name: str) -> FloatArray:
         """All draws of one parameter, shape (chains, draws)."""
         for i, known in enumerate(self.names):

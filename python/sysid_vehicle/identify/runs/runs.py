@@ -97,6 +97,8 @@ class RunsFit(Printed):
     common: Fit
     converged: bool
 
+    __iter__ = None  # numbers are no names
+
     def __getitem__(self, run: str) -> Fit:
         if run not in self.fits:
             raise KeyError(f"'{run}'; there are {', '.join(self.fits)}")

@@ -103,6 +103,8 @@ class Preview(Printed):
     believed: Model
     drive: ClosedLoop
 
+    __iter__ = None  # numbers are no names
+
     def __getitem__(self, name: str) -> Expected:
         for e in self.expected:
             if e.name == name:
