@@ -99,7 +99,7 @@ class BiasReport:
         rows = []
         for b in self.biases:
             size = ", ".join(
-                f"{number(v, 3)} {p.unit}"
+                f"{number(v, 3)}{unit_after(p.unit)}"
                 for p, v in zip(b.effect.parameters, b.size, strict=True)
                 if v != 0.0
             )

@@ -10,7 +10,15 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..._common.arrays import FloatArray, as_float64
-from ..._common.text import UNBOUNDED, interval_95, interval_text, number, with_error, within
+from ..._common.text import (
+    UNBOUNDED,
+    interval_95,
+    interval_text,
+    number,
+    unit_after,
+    with_error,
+    within,
+)
 from ..search.objective import Objective
 from ..search.search import Box
 from .profile import Optimum, Profile, profile_all
@@ -96,7 +104,7 @@ class Estimate:
         return with_error(self.value, self.std, self.bounds, digits)
 
     def __str__(self) -> str:
-        return f"{self.name} = {self._size(4)} {self.unit}"
+        return f"{self.name} = {self._size(4)}{unit_after(self.unit)}"
 
 
 def box_covariance(information: FloatArray, box: Box, x: FloatArray) -> FloatArray:

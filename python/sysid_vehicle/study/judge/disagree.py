@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..._common.memo import remembered
+from ..._common.text import unit_after
 from ...errors import NumericalError
 from ...estimate import Driving
 from ...identify import Estimate, Fit, driving_of, refine
@@ -43,8 +44,8 @@ class Disagreement:
     def __str__(self) -> str:
         here, there = (e.size for e in (self.train, self.validation))
         return (
-            f"{self.train.name} {here} {self.train.unit} from training data, {there} from "
-            "validation data"
+            f"{self.train.name} {here}{unit_after(self.train.unit)} from training data, {there} "
+            "from validation data"
         )
 
     def to_dict(self) -> dict[str, Any]:

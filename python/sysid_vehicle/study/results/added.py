@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..._common.text import unit_after
 from ...compare import Comparison
 from ...diagnose import Verdicts
 from ...identify import Estimate, Fit
@@ -92,7 +93,7 @@ class AddedEffect:
 
     def __str__(self) -> str:
         size = ", ".join(
-            f"{e.name.split('.')[1]} {e.size} {e.unit}".removesuffix(" 1") for e in self.parameters
+            f"{e.name.split('.')[1]} {e.size}{unit_after(e.unit)}" for e in self.parameters
         )
         told = (f"{self.id}: {size}", self.grade, self.shared_out, self.reserve)
         return "; ".join(text for text in told if text)
