@@ -72,14 +72,14 @@ def likelier_noise(
 
 def _one_round(
     objective: Objective,
-    best: tuple[FloatArray, FloatArray],
+    at_top: tuple[FloatArray, FloatArray],
     value: float,
     box: Box,
     few: Objective,
     known: list[FloatArray],
 ) -> tuple[tuple[FloatArray, FloatArray], float]:
     """As `likelier_noise`, from one maximum; what is `known` by then is not tried again."""
-    at_top = best
+    best = at_top
     here = few.learn_noise(*at_top, rounds=_STEPS)
     known.append(here.noise)
     least = few.log_likelihood(at_top[0], here.noise) - _BELOW_BY_FEW

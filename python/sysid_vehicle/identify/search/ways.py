@@ -17,7 +17,8 @@ from .objective import LinearRows, Objective
 from .search import Box, minimise
 from .settle import risen
 
-_GAIN = 0.05  # nats: what promises less is not worth a step
+GAIN = 0.05
+"""Nats: what promises less is not worth a step."""
 _NUDGE = 0.02  # standard errors by which the likelihood is differentiated
 _NARROW = 0.01  # of the box, which is narrower than that for what the data do not tell
 _TINY = 1e-300
@@ -84,7 +85,7 @@ class Ways:
         rows = np.zeros((1, p.size))
         rows[0, columns] = (slope - seen) / _STIFF
         leaning = self.objective.also(LinearRows(rows, as_float64(rows @ p + _STIFF)))
-        found = minimise(leaning, p, gains, self.box, rounds=8, tolerance=_GAIN)
+        found = minimise(leaning, p, gains, self.box, rounds=8, tolerance=GAIN)
         p, gains = risen(self.objective, p, gains, found.x, noise, self.box)
         return Place(p, noise, self.objective.reached(p, gains))
 

@@ -232,9 +232,7 @@ def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules)
     if known is not None and same and known.driving is fit.driving:
         return without_insignificant(known, rules)
     # As simple as the model without all that is sought, it would need as much to be as good.
-    bare = [
-        e for e in fit.estimates if "." not in e.name or e.name.split(".")[0] in model.nuisances
-    ]
+    bare = [e for e in fit.estimates if "." not in e.name or _part(e) in model.nuisances]
     least = merit(fit) - bic(0.0, len(bare), fit.driving.samples)
     try:
         found = refine_beside(model, fit.driving, fit, least)

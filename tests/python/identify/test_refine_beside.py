@@ -1,0 +1,57 @@
+"""Fits of other effects, to be compared with one that is known: few samples tell the hopeless."""
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Model, Vehicle, manoeuvres
+from sysid_vehicle.estimate import Driving, first_guess
+from sysid_vehicle.identify import Fit, refine, refine_beside
+from sysid_vehicle.identify.maximum import THINNED
+from sysid_vehicle.simulate import drive
+
+_LENGTH = "tyre_relaxation.relaxation_length_m"
+
+
+@pytest.fixture(scope="module")
+def relaxing(car: Vehicle) -> Fit:
+    """The fit of a car whose tyres relax, by more samples than the few that lead."""
+    model = Model(car).add("tyre_relaxation").with_values({_LENGTH: 1.5})
+    log = drive(model, manoeuvres.lap(45.0, 7.0), seed=31, rate_hz=100.0)
+    driving = Driving.of(log)
+    fit = refine(model, driving, first_guess(driving, car))
+    assert driving.samples > THINNED
+    assert fit[_LENGTH].value == pytest.approx(1.5, abs=4.0 * fit[_LENGTH].std)
+    return fit
+
+
+def test_what_explains_nothing_of_it_is_left_after_few_samples(relaxing: Fit) -> None:
+    other = relaxing.model.drop("tyre_relaxation").add("rolling_resistance")
+    lacking = refine(other, relaxing.driving, relaxing.noise)
+    assert lacking.log_likelihood < relaxing.log_likelihood - 100.0
+    assert refine_beside(other, relaxing.driving, relaxing, relaxing.log_likelihood) is None
+
+
+def test_what_comes_near_is_refined_to_the_same_maximum(relaxing: Fit) -> None:
+    same = relaxing.model.with_values({_LENGTH: 1.2})
+    found = refine_beside(same, relaxing.driving, relaxing, relaxing.log_likelihood)
+    assert found is not None
+    assert found.log_likelihood == pytest.approx(relaxing.log_likelihood, abs=0.5)
+    assert found[_LENGTH].value == pytest.approx(relaxing[_LENGTH].value, abs=relaxing[_LENGTH].std)
+
+
+def test_noise_of_other_time_scales_is_not_tried_far_below(
+    relaxing: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[float] = []
+    known = refine_beside.__globals__["likelier_noise"]
+
+    def counted(objective, at_top, *others):  # type: ignore[no-untyped-def]
+        asked.append(objective.log_likelihood(*at_top))
+        return known(objective, at_top, *others)
+
+    monkeypatch.setitem(refine_beside.__globals__, "likelier_noise", counted)
+    for least, times in ((relaxing.log_likelihood + 30.0, 0), (relaxing.log_likelihood, 1)):
+        found = refine_beside(relaxing.model, relaxing.driving, relaxing, least)
+        assert found is not None
+        assert len(asked) == times
+        assert np.isfinite(found.log_likelihood)
