@@ -1,17 +1,18 @@
 """What a study says of the same car as its road and sensors become more real.
 
-    python benchmarks/ladder [--seeds 2] [--first 3000] [--truth relaxation] [RUNG ...]
+    python benchmarks/ladder [--seeds 2] [--first 3000] [--truth relaxation] [--pairs] [RUNG ...]
     python benchmarks/ladder --low-pass [--seeds 2] [--first 3000] [RUNG ...]
 
-Laps are fitted, handling courses judge. One imperfection at a time: forces of the road over 0.3 s
-(`pushes`) and over 0.03 s (`bumps`), a road that leans by 1.5 deg rms over 5 s (`road`), a causal
-low-pass of 15 Hz in every sensor (`filtered`), speeds 20 ms and everything else 10 ms late
-(`late`), quanta of a bus with every value held for two samples (`coarse`), vibration at 12 Hz, and
-all of them. Printed for each drive: what was claimed with its interval, whether that is the truth
-(`right`: it alone, inside its 95 % interval, beside what the rung itself brings about: the wheel
-force is on time where all else is late), the verdict, and the median errors of v_y and yaw
-rate 2 and 5 s ahead on validation data, before and after. `--low-pass` asks, in seconds, only for
-the delay of the sensors' low-pass that their noise tells, beside the true one.
+Laps are fitted, handling courses judge. One imperfection at a time, or each pair (`--pairs`):
+forces of the road over 0.3 s (`pushes`) and over 0.03 s (`bumps`), a road that leans by 1.5 deg rms
+over 5 s (`road`), a causal low-pass of 15 Hz in every sensor (`filtered`), speeds 20 ms and
+everything else 10 ms late (`late`), quanta of a bus with every value held for two samples
+(`coarse`), vibration at 12 Hz, and all of them. Printed for each drive: what was claimed with its
+interval, whether that is the truth (`right`: it alone, inside its 95 % interval, beside what the
+rung itself brings about: the wheel force is on time where all else is late), the verdict, and the
+median errors of v_y and yaw rate 2 and 5 s ahead on validation data, before and after.
+`--low-pass` asks, in seconds, only for the delay of the sensors' low-pass that their noise tells,
+beside the true one.
 """
 
 from __future__ import annotations
@@ -20,18 +21,21 @@ import argparse
 import time
 import warnings
 
-from rungs import LOW_PASS_S, PRESENT, SENSORS, TRUTHS, ride
+from rungs import PAIRS, RUNGS, TRUTHS, low_pass_s, present, ride
 
 import sysid_vehicle as sv
 from sysid_vehicle.sensors import low_passes
 
 _NEAR = 0.2  # of the size of what the rung brings about: a lag is not quite a delay
-_HEAD = "rung       seed  right  claimed; verdict; error of v_y [m/s] and yaw rate [rad/s] ahead"
+_HEAD = "rung               seed  right  claimed; verdict; error of v_y, yaw rate ahead, m/s, rad/s"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("rungs", nargs="*", metavar="RUNG", help=f"of {', '.join(SENSORS)}")
+    parser.add_argument(
+        "rungs", nargs="*", metavar="RUNG", help=f"of {', '.join(RUNGS)}; several as late+coarse"
+    )
+    parser.add_argument("--pairs", action="store_true", help="each pair of rungs")
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--first", type=int, default=3000)
     parser.add_argument("--truth", choices=list(TRUTHS), default="relaxation")
@@ -44,12 +48,16 @@ def main() -> None:
         return
     print(_HEAD)
     total = right = 0
-    for rung in args.rungs or SENSORS:
+    for rung in _rungs(args):
         for seed in range(args.first, args.first + args.seeds):
             good, line = _trial(rung, seed, args)
             total, right = total + 1, right + good
             print(line, flush=True)
     print(f"right in {right} of {total}")
+
+
+def _rungs(args: argparse.Namespace) -> tuple[str, ...]:
+    return (*args.rungs, *(PAIRS if args.pairs else ())) or RUNGS
 
 
 def _drives(rung: str, seed: int, args: argparse.Namespace) -> list[sv.Log]:
@@ -62,24 +70,24 @@ def _drives(rung: str, seed: int, args: argparse.Namespace) -> list[sv.Log]:
 
 
 def _low_passes(args: argparse.Namespace) -> None:
-    print("rung         told  largest error of the delay [ms]  inside its 95 % interval")
-    for rung in args.rungs or SENSORS:
+    print("rung                 told  largest error of the delay [ms]  inside its 95 % interval")
+    for rung in _rungs(args):
         off, inside = [], 0
         for seed in range(args.first, args.first + args.seeds):
             told = low_passes(_drives(rung, seed, args))
-            true_s = LOW_PASS_S if rung in ("filtered", "all") else 0.0
+            true_s = low_pass_s(rung)
             errors = [(response.delay_s - true_s, std_s) for response, std_s in told.values()]
             if errors:
                 off.append(max(abs(error) for error, _ in errors))
                 inside += all(abs(error) < 1.96 * std_s for error, std_s in errors)
         largest = f"{1000.0 * max(off):.2f}" if off else ""
-        print(f"{rung:10s}  {len(off):2d} of {args.seeds:2d}  {largest:>8s}  {inside}", flush=True)
+        print(f"{rung:18s}  {len(off):2d} of {args.seeds:2d}  {largest:>8s}  {inside}", flush=True)
 
 
 def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[bool, str]:
     train, test = _drives(rung, seed, args)
     began = time.process_time()
-    head = f"{rung:10s} {seed:4d}"
+    head = f"{rung:18s} {seed:4d}"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sv.SysidWarning)
         try:
@@ -97,7 +105,7 @@ def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[bool, str]:
     found = [a.id for a in study.added]
     brought = {
         name.split(".")[0]
-        for name, size in PRESENT.get(rung, {}).items()
+        for name, size in present(rung).items()
         if name in study.fit.model.free_names and abs(study.fit[name].value / size - 1.0) < _NEAR
     }
     hidden = [e for e in found if e not in brought]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 
 import numpy as np
 from scipy import signal
@@ -26,9 +27,6 @@ _DEVICES_S = {
     **dict.fromkeys(INERTIAL, 0.010),
     "steer_rad": 0.010,
 }
-# What a rung brings about: the wheel force is on time where all else is late by this at least.
-_ON_TIME = {"force_lag.time_constant_s": min(_DEVICES_S.values())}
-PRESENT = {"late": _ON_TIME, "all": _ON_TIME}
 _QUANTA = {
     "vx_mps": 0.02,
     "vy_mps": 0.02,
@@ -68,25 +66,56 @@ def _vibrating(c: Channels, rng: np.random.Generator) -> None:
         c[name] = c[name] + amplitude * np.sin(2.0 * np.pi * 12.0 * c["time_s"] + phase)
 
 
-SENSORS: dict[str, tuple[tuple[Callable[[Channels, np.random.Generator], None], ...], ...]] = {
-    # What acts on the motion, and what on the readings with their noise.
-    "none": ((), ()),
-    "pushes": ((), ()),
-    "bumps": ((), ()),
-    "road": ((), ()),
-    "filtered": ((), (_filtered,)),
-    "late": ((_late,), ()),
-    "coarse": ((), (_coarse,)),
-    "vibration": ((_vibrating,), ()),
-    "all": ((_vibrating, _late), (_filtered, _coarse)),
+_ALONE: dict[str, Callable[[Channels, np.random.Generator], None]] = {
+    # What acts on the motion comes before what acts on readings with their noise.
+    "vibration": _vibrating,
+    "late": _late,
+    "filtered": _filtered,
+    "coarse": _coarse,
 }
+_ON_MOTION = ("vibration", "late")
 _PUSHES, _SLOPE_RAD = (150.0, 200.0, 100.0), np.radians(1.5)
-_DISTURBANCES = {
-    "pushes": sv.RoadDisturbance(*_PUSHES, 0.3),
-    "bumps": sv.RoadDisturbance(*_PUSHES, 0.03),
-    "road": sv.RoadDisturbance(slope_rad=_SLOPE_RAD, slope_time_s=5.0),
-    "all": sv.RoadDisturbance(*_PUSHES, 0.03, _SLOPE_RAD, 5.0),
+_ROADS: dict[str, dict[str, float]] = {
+    "pushes": dict(zip(("fx_n", "fy_n", "mz_nm"), _PUSHES, strict=True), correlation_time_s=0.3),
+    "bumps": dict(zip(("fx_n", "fy_n", "mz_nm"), _PUSHES, strict=True), correlation_time_s=0.03),
+    "road": {"slope_rad": _SLOPE_RAD, "slope_time_s": 5.0},
 }
+_ALL = ("bumps", "road", *_ALONE)
+RUNGS = ("none", *_ROADS, "filtered", "late", "coarse", "vibration", "all")
+PAIRS = tuple(
+    f"{one}+{other}"
+    for one, other in combinations(RUNGS[1:-1], 2)
+    if {one, other} != {"pushes", "bumps"}  # the road pushes with one correlation time
+)
+
+
+def imperfections(rung: str) -> tuple[str, ...]:
+    """What a rung is made of: `none`, `all`, one, or several with a plus between them.
+
+    Raises
+    ------
+    SystemExit
+        If there is none of that name.
+    """
+    if rung in ("none", "all"):
+        return _ALL if rung == "all" else ()
+    parts = tuple(rung.split("+"))
+    for name in parts:
+        if name not in RUNGS[1:-1]:
+            raise SystemExit(f"no rung '{name}': use {', '.join(RUNGS)}, or several as late+coarse")
+    return parts
+
+
+def present(rung: str) -> dict[str, float]:
+    """What a rung brings about itself, by parameter of the catalogue."""
+    # The wheel force is on time where all else is late by this at least.
+    late = "late" in imperfections(rung)
+    return {"force_lag.time_constant_s": min(_DEVICES_S.values())} if late else {}
+
+
+def low_pass_s(rung: str) -> float:
+    """Delay of the low-pass of a rung's sensors [s]."""
+    return LOW_PASS_S if "filtered" in imperfections(rung) else 0.0
 
 
 def car(truth: str) -> sv.Model:
@@ -97,23 +126,27 @@ def car(truth: str) -> sv.Model:
 
 
 def ride(rung: str, truth: str, manoeuvre: str, seed: int) -> sv.Log:
-    """One drive on one rung; `manoeuvre` is `lap` or `handling_course`."""
+    """One drive on one rung (`imperfections`); `manoeuvre` is `lap` or `handling_course`."""
     rng = np.random.default_rng([seed, len(manoeuvre)])
+    parts = imperfections(rung)
+    road = {key: value for name in parts for key, value in _ROADS.get(name, {}).items()}
     drive = drive_truth(
         car(truth),
         getattr(sv.manoeuvres, manoeuvre)(),
         seed=rng,
         noise=sv.SensorNoise.none(),
-        disturbance=_DISTURBANCES.get(rung),
+        disturbance=sv.RoadDisturbance(**road) if road else None,
     )
     # What perfect sensors would write.
     c = {name: np.array(drive.log[name]) for name in drive.log.channels}
-    before, after = SENSORS[rung]
-    for act in before:
-        act(c, rng)
+    acting = [name for name in _ALONE if name in parts]
+    for name in acting:
+        if name in _ON_MOTION:
+            _ALONE[name](c, rng)
     n = c["time_s"].size
     for name in (*SPEEDS, *INERTIAL, "steer_rad"):
         c[name] = c[name] + getattr(NOISE, name) * rng.standard_normal(n)
-    for act in after:
-        act(c, rng)
+    for name in acting:
+        if name not in _ON_MOTION:
+            _ALONE[name](c, rng)
     return sv.Log.from_arrays(c, name=f"{manoeuvre}, {rung}, seed {seed}")
