@@ -92,16 +92,26 @@ def check_names(
     unknown = [t for t in functions if t not in TARGETS]
     if unknown:
         raise InvalidInput(f"{what}: there is no '{unknown[0]}'; there are {', '.join(TARGETS)}")
-    if not 1 <= len(parameters) <= _core.USER_PARAMETERS:
-        raise InvalidInput(f"{what}: it must have 1 to {_core.USER_PARAMETERS} parameters")
-    names = [p.name for p in parameters]
-    if len(set(names)) < len(names):
-        raise InvalidInput(f"{what}: two parameters have the same name")
+    _check_parameters(what, parameters)
     if len(states) > _core.USER_STATES:
         raise InvalidInput(f"{what}: it must have at most {_core.USER_STATES} states")
-    read = [*channels, *(s.name for s in states)]
-    for name in read:
-        if not name.isidentifier() or name in SIGNALS or read.count(name) > 1:
+    _check_read(what, [*channels, *(s.name for s in states)])
+
+
+def _check_parameters(what: str, parameters: Sequence[Parameter]) -> None:
+    if not 1 <= len(parameters) <= _core.USER_PARAMETERS:
+        raise InvalidInput(f"{what}: it must have 1 to {_core.USER_PARAMETERS} parameters")
+    if len({p.name for p in parameters}) < len(parameters):
+        raise InvalidInput(f"{what}: two parameters have the same name")
+    scanned = [i for i, p in enumerate(parameters) if p.scan]
+    if scanned and (scanned != [1] or len(parameters) != 2):
+        raise InvalidInput(f"{what}: only the second of two parameters may be scanned")
+
+
+def _check_read(what: str, names: Sequence[str]) -> None:
+    """Refuse names of channels and states that formulas could not read."""
+    for name in names:
+        if not name.isidentifier() or name in SIGNALS or names.count(name) > 1:
             raise InvalidInput(
                 f"{what}: '{name}' is taken, or no Python name; rename the column or the state"
             )
@@ -109,9 +119,6 @@ def check_names(
             raise InvalidInput(
                 f"{what}: the model has {name} itself; read {CANONICAL[name]} in its place"
             )
-    scanned = [i for i, p in enumerate(parameters) if p.scan]
-    if scanned and (scanned != [1] or len(parameters) != 2):
-        raise InvalidInput(f"{what}: only the second of two parameters may be scanned")
 
 
 def checked(

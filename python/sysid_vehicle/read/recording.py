@@ -125,34 +125,32 @@ class Recording:
                 f"channel map, which `sysid-vehicle map` or sv.propose_channels proposes "
                 f"(channels are {listed(self.entries)})"
             )
-        groups = {self.entries[name].group for name in used}
-        beside = [
-            name
-            for name, entry in self.entries.items()
-            if name not in used and entry.group in groups and last_part(name) not in CHANNELS
-        ][:_LISTED_EXTRAS]
+        time_s, columns = self._rows(used, notes)
+        # A channel that is found by the last part of its name is called by it from here on.
+        called = {**{c: c for c in found}, **wanted}
+        for channel, name in called.items():
+            columns.setdefault(name, columns[source[channel]])
+        units = {n: e.unit for n, e in self.entries.items() if n in columns and e.unit}
+        for channel, name in called.items():
+            if unit := self.entries[source[channel]].unit:
+                units[name] = unit
+        columns = {"time_s": time_s, **columns}
+        return Table(tuple(columns), columns, {}, time_s.size, units)
+
+    def _rows(self, used: list[str], notes: list[str]) -> tuple[FloatArray, dict[str, FloatArray]]:
+        """The times of all samples [s], and the channels there, with others sampled beside them."""
         signals = self.signals(used, notes)
         empty = [name for name in used if signals[name].time_s.size == 0]
         if empty:
             raise InvalidInput(f"{empty[0]}: holds no sample; map another channel, or record it")
         time_s, rows = common_rows({name: signals[name].time_s for name in used})
-        extras = self._extras(beside, used, signals)
         columns = {
             name: _spread(signal.values, rows[name], time_s.size)
             for name, signal in signals.items()
         }
-        for name, (like, values) in extras.items():
+        for name, (like, values) in self._extras(used, signals).items():
             columns[name] = _spread(values, rows[like], time_s.size)
-        # A channel that is found by the last part of its name is called by it from here on.
-        for channel, name in (*wanted.items(), *found.items()):
-            called = name if channel in wanted else channel
-            columns.setdefault(called, columns[source[channel]])
-        units = {n: e.unit for n, e in self.entries.items() if n in columns and e.unit}
-        for channel, full in source.items():
-            if self.entries[full].unit:
-                units[wanted.get(channel, channel)] = self.entries[full].unit
-        columns = {"time_s": time_s, **columns}
-        return Table(tuple(columns), columns, {}, time_s.size, units)
+        return time_s, columns
 
     def _called(self, channel: str) -> str | None:
         try:
@@ -161,12 +159,17 @@ class Recording:
             return None
 
     def _extras(
-        self, beside: list[str], used: list[str], signals: Mapping[str, Signal]
+        self, used: list[str], signals: Mapping[str, Signal]
     ) -> dict[str, tuple[str, FloatArray]]:
         """Values of other channels, each with the used one whose times it has."""
+        like = {self.entries[name].group: name for name in reversed(used)}
+        beside = [
+            name
+            for name, entry in self.entries.items()
+            if name not in used and entry.group in like and last_part(name) not in CHANNELS
+        ][:_LISTED_EXTRAS]
         if not beside:
             return {}
-        like = {self.entries[name].group: name for name in reversed(used)}
         result: dict[str, tuple[str, FloatArray]] = {}
         for name, signal in self.fetch(beside, []).items():
             other = like[self.entries[name].group]

@@ -48,29 +48,36 @@ def contents_of(leaves: list[Leaf], where: str) -> Table | Recording:
     times = {c.path: c for c in columns if c.path[-1].lower() in _TIMES and c.time_s is None}
     own_times = any(leaf.time_s is not None for leaf in columns) or len(times) > 1
     if not own_times and len({leaf.values.size for leaf in columns}) == 1:
-        named = _short({leaf.path: leaf for leaf in columns})
-        arrays = {name: np.asarray(leaf.values, dtype=np.float64) for name, leaf in named.items()}
-        units = {name: leaf.unit for name, leaf in named.items() if leaf.unit}
-        return Table(tuple(arrays), arrays, {}, columns[0].values.size, units)
+        return _table(columns)
+    return _recording([leaf for leaf in columns if leaf.path not in times], times)
+
+
+def _table(columns: list[Leaf]) -> Table:
+    """Arrays of one length, with one time for all."""
+    named = _short({leaf.path: leaf for leaf in columns})
+    arrays = {name: np.asarray(leaf.values, dtype=np.float64) for name, leaf in named.items()}
+    units = {name: leaf.unit for name, leaf in named.items() if leaf.unit}
+    return Table(tuple(arrays), arrays, {}, columns[0].values.size, units)
+
+
+def _recording(columns: list[Leaf], times: Mapping[tuple[str, ...], Leaf]) -> Recording:
+    """Channels with times of their own."""
     found: dict[tuple[str, ...], tuple[Leaf, npt.NDArray[np.float64] | None]] = {}
     for leaf in columns:
-        if leaf.path in times:
-            continue
-        time_s = leaf.time_s if leaf.time_s is not None else _time_of(leaf, times)
         path = leaf.path
         if path[-1].lower() in _VALUES and len(path) > 1 and path[:-1] not in found:
             path = path[:-1]
-        found[path] = leaf, time_s
-    named_pairs = _short(found)
+        found[path] = leaf, leaf.time_s if leaf.time_s is not None else _time_of(leaf, times)
+    named = _short(found)
     entries = {
         name: Entry(leaf.unit, str(id(time_s)) if time_s is not None else name)
-        for name, (leaf, time_s) in named_pairs.items()
+        for name, (leaf, time_s) in named.items()
     }
 
     def fetch(names: list[str], notes: list[str]) -> dict[str, Signal]:
         result = {}
         for name in names:
-            leaf, time_s = named_pairs[name]
+            leaf, time_s = named[name]
             if time_s is None or time_s.size != leaf.values.size:
                 raise InvalidInput(
                     f"{name}: has {leaf.values.size} samples and no time of that length beside it; "
