@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sysid/identify/start.hpp"
+
 namespace sysid {
 
 LaneFilter::LaneFilter(const Problem& problem, const std::vector<const double*>& sets,
@@ -58,20 +60,18 @@ void LaneFilter::begin(const Piece& piece, double* to) const {
     const std::size_t at = piece.begin > 0 ? piece.begin - 1 : 0;
     const auto x = initial_state(model_.model(), run, model_.parameters(piece.set), at);
     std::fill_n(to, state_.size(), 0.0);
-    const auto variance = [&](std::size_t i) -> double& { return to[n_ + packed(i, i)]; };
-    constexpr auto spreads = effect_state_spreads();
-    for (std::size_t i = 0; i < kMotionStates; ++i) {
-        to[i] = x[i];
-        variance(i) = kFirstVariances[i];
-    }
-    for (std::size_t i = 0; i < model_.own().count; ++i) {
-        const std::size_t place = model_.own().place[i];
-        to[kMotionStates + i] = x[kMotionStates + place];
-        variance(kMotionStates + i) = spreads[place] * spreads[place];
-    }
+    for (std::size_t i = 0; i < kMotionStates; ++i) to[i] = x[i];
+    for (std::size_t i = 0; i < model_.own().count; ++i)
+        to[kMotionStates + i] = x[kMotionStates + model_.own().place[i]];
+    const auto known =
+        start_covariance(model_.model(), x, run.inputs[at], model_.parameters(piece.set));
+    for (std::size_t i = 0; i < model_.states(); ++i)
+        for (std::size_t j = 0; j <= i; ++j)
+            to[n_ + packed(i, j)] = known(static_cast<int>(i), static_cast<int>(j));
     for (std::size_t i = 0; i < model_.externals(); ++i) {
         const double s = noise_.deviation_of(i);
-        variance(model_.states() + i) = s * s;
+        const std::size_t place = model_.states() + i;
+        to[n_ + packed(place, place)] = s * s;
     }
 }
 

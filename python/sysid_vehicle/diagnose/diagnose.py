@@ -118,11 +118,16 @@ def diagnose(
         known = {c.id for c in finished}
         hidden = [c for c in ranked if is_hidden_by_noise(c.effect) and c.id not in known]
         hidden += _hidden_by_tyres(ranked, finished)
-        asked = refits and hidden and time.perf_counter() < ends
-        if asked and _leaves_more(finished[:1], left, driving, rules):
+        if refits and hidden and time.perf_counter() < ends:
             n = len(ranked)
-            tried = pool.map(in_time(lambda c: from_typical(fit, c, n, rules.alpha), ends), hidden)
-            finished += [c for c in tried if c.finished and c.p_value < rules.alpha]
+            if _leaves_more(finished[:1], left, driving, rules):
+                work = in_time(lambda c: from_typical(fit, c, n, rules.alpha), ends)
+                tried = pool.map(work, hidden)
+                finished += [c for c in tried if c.finished and c.p_value < rules.alpha]
+            else:
+                suspects = _suspected(hidden, finished, board, rules)
+                tried = pool.map(in_time(lambda c: from_typical(fit, c, n), ends), suspects)
+                finished += [c for c in tried if c.finished]
     finished.sort(key=lambda c: -_merit(c, driving.samples))
     finished = [_with_refit_rivals(c, finished, 2.0 * rules.apart) for c in finished]
     done = {c.id for c in finished}
@@ -207,6 +212,19 @@ def _hidden_by_tyres(ranked: Sequence[Candidate], finished: Sequence[Candidate])
     few = [c for c in ranked if c.id in best.effect.confounded_with and c.effect.along_alone]
     known = {c.id for c in finished}
     return [c for c in few if len(c.effect.parameters) == 1 and c.id not in known]
+
+
+def _suspected(
+    hidden: Sequence[Candidate], finished: Sequence[Candidate], board: ScoreBoard, rules: Rules
+) -> list[Candidate]:
+    """Those that a test of each alone tells apart from nothing, and that score as the best does.
+
+    Noise may hide most of what they do.
+    """
+    scores = {s.effect.id: s for s in board.scores}
+    least = _RIVALS * max((scores[c.id].statistic for c in finished), default=0.0)
+    alone = [c for c in hidden if scores[c.id].p_value < 1.0 - rules.credible]
+    return [c for c in alone if scores[c.id].statistic > least]
 
 
 def _leaves_more(best: Sequence[Candidate], left: Omnibus, driving: Driving, rules: Rules) -> bool:

@@ -7,7 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, Log, Model, Vehicle, diagnose, drive, identify, manoeuvres
+from sysid_vehicle import (
+    Fit,
+    Log,
+    Model,
+    RoadDisturbance,
+    Vehicle,
+    diagnose,
+    drive,
+    identify,
+    manoeuvres,
+    verdicts,
+)
 from sysid_vehicle.diagnose.candidates.candidate import Candidate
 from sysid_vehicle.diagnose.candidates.refits import (
     finished,
@@ -42,6 +53,23 @@ def test_a_lag_is_found_from_its_typical_size(truth: Model, start: Model) -> Non
     assert abs(found.value[0] - 0.7) < 4.0 * found.std[0]
     assert found.fit is not None
     assert found.statistic == pytest.approx(2.0 * (found.fit.log_likelihood - fit.log_likelihood))
+
+
+def test_a_lag_that_a_road_hides_is_tried_where_its_score_alone_would_tell(
+    truth: Model, start: Model
+) -> None:
+    name = "tyre_relaxation"
+    car = truth.add(name).with_values({f"{name}.relaxation_length_m": 0.45})
+    push = RoadDisturbance(150.0, 200.0, 100.0, 0.3)
+    fit = identify(start, drive(car, manoeuvres.lap(40.0), seed=5, disturbance=push), starts=1)
+    found = diagnose(fit)
+    # Beside fifty others its score is no evidence, and that of another lag is.
+    assert found.family[name] > found.alpha > found.family["steer_lag"]
+    assert found.ranking[0].id == name
+    assert found.ranking[0].p_value < found.alpha
+    told = verdicts(found)[name]
+    assert told.finding in ("missing", "one of a group")
+    assert abs(told.value[0] - 0.45) < 2.0 * told.std[0]
 
 
 @pytest.mark.parametrize("hidden", RELAXATIONS)

@@ -92,7 +92,7 @@ def test_a_rival_of_what_is_not_missing_itself_is_not_missing_either(
 
 def test_what_time_did_not_suffice_for_is_open(found: Diagnosis) -> None:
     def of(untried: tuple[str, ...]) -> EffectVerdict:
-        known = found.scores, found.family
+        known = found.scores, found.family, found.sizes
         lacked = {e.id for e in found.fit.model.candidates}
         told = judge(
             found.fit, lacked=lacked, groups={}, acted=set(), scored=known, settled=True,

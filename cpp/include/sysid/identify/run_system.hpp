@@ -6,6 +6,7 @@
 
 #include "sysid/estimate/kalman.hpp"
 #include "sysid/identify/problem.hpp"
+#include "sysid/identify/start.hpp"
 
 namespace sysid {
 
@@ -51,14 +52,16 @@ class RunSystem {
     }
 
     Mat<NX, NX> initial_covariance() const {
-        Vec<NX> variance = Vec<NX>::Zero();
-        for (std::size_t i = 0; i < kMotionStates; ++i)
-            variance[static_cast<int>(i)] = kFirstVariances[i];
-        for (std::size_t i = 0; i < disturbances_; ++i) variance[disturbing(i)] = variance_[i];
-        constexpr auto spreads = effect_state_spreads();
-        for (std::size_t i = 0; i < own_.count; ++i)
-            variance[packed(i)] = spreads[own_.place[i]] * spreads[own_.place[i]];
-        return variance.asDiagonal();
+        Mat<NX, NX> covariance = Mat<NX, NX>::Zero();
+        const Eigen::MatrixXd known = start_covariance(model_, start_, run_.inputs[0], p_);
+        const auto at = [&](int i) {
+            return i < kMotionStates ? i : packed(static_cast<std::size_t>(i - kMotionStates));
+        };
+        for (int i = 0; i < known.rows(); ++i)
+            for (int j = 0; j < known.cols(); ++j) covariance(at(i), at(j)) = known(i, j);
+        for (std::size_t i = 0; i < disturbances_; ++i)
+            covariance(disturbing(i), disturbing(i)) = variance_[i];
+        return covariance;
     }
 
     std::size_t size() const { return run_.size(); }

@@ -75,7 +75,7 @@ def is_hidden_by_noise(effect: Effect) -> bool:
     return effect.scored_at_typical and len(effect.parameters) == 1
 
 
-def from_typical(fit: Fit, c: Candidate, tests: int, alpha: float = 1.0) -> Candidate:
+def from_typical(fit: Fit, c: Candidate, tests: int, alpha: float = np.inf) -> Candidate:
     """The candidate fitted with noise of its own from its typical size, and tested by likelihood.
 
     Its p-value is that of the likelihood ratio, on one side where the parameter has one sign, over

@@ -29,6 +29,7 @@ Finding = Literal[
     "missing", "one of a group", "open", "proxy", "negligible", "not testable", "absent"
 ]
 
+Scored = tuple[tuple[Score, ...], Mapping[str, float], Mapping[str, Size]]
 _NAMED: tuple[Finding, ...] = ("missing", "one of a group")
 _ORDER: tuple[Finding, ...] = (
     "missing",
@@ -201,9 +202,9 @@ def verdicts(dx: Diagnosis, *, seed: int = 0) -> Verdicts:
     final = dx.fit if best is None or best.fit is None else best.fit
     groups = {} if best is None else {best.id: best.indistinguishable_from}
     if final is dx.fit:
-        known = dx.scores, dx.family
+        known = dx.scores, dx.family, dx.sizes
     else:
-        known = dx.beside.board.scores, dx.beside.board.family_p_values(seed=seed)
+        known = dx.beside.board.scores, dx.beside.board.family_p_values(seed=seed), {}
     told = judge(
         final,
         scored=known,
@@ -228,7 +229,7 @@ def judge(
     acted: set[str],
     rules: Rules = USUAL,
     seed: int = 0,
-    scored: tuple[tuple[Score, ...], Mapping[str, float]] | None = None,
+    scored: Scored | None = None,
     refitted: Mapping[str, Size] | None = None,
     settled: bool = False,
     untried: Collection[str] = (),
@@ -250,8 +251,9 @@ def judge(
         By which effects are claimed.
     seed : int
         Of the draws that correct for testing many effects.
-    scored : (scores, p-values), optional
-        Of what the final model lacks, where a diagnosis of it has them already.
+    scored : (scores, p-values, sizes), optional
+        Of what the final model lacks, where a diagnosis of it has them already; sizes are those of
+        refits, of which the noise that was learned without an effect hides nothing.
     refitted : mapping, optional
         Of rivals, their parameters and standard errors in place of what they cannot be told from.
     settled : bool
@@ -264,8 +266,8 @@ def judge(
     """
     if scored is None:
         board = score_board(final, final.driving, lacking(final.model, lacked), rules)
-        scored = board.scores, board.family_p_values(seed=seed)
-    family = scored[1]
+        scored = board.scores, board.family_p_values(seed=seed), {}
+    _, family, tried = scored
     scores = {s.effect.id: s for s in scored[0]}
     names = tuple(e for e in final.model.effects if e in lacked)
     found = [
@@ -284,16 +286,18 @@ def judge(
     missing = [v.effect.id for v in found if v.finding in _NAMED]
     for effect in lacking(final.model, lacked):
         score = scores.get(effect.id)
-        verdict = _of_scored(effect, score, family.get(effect.id, 1.0) < rules.alpha, rules)
+        evidence = family.get(effect.id, 1.0) < rules.alpha
+        verdict = _of_scored(effect, score, tried.get(effect.id), evidence, rules)
         if effect.id in acted and names and verdict.finding in ("absent", "not testable"):
             # A rival of what is itself a proxy, or negligible, is no better than that.
             instead = tuple(e for e in missing if effect.id in groups.get(e, ()))
             kind: Finding = "one of a group" if instead else "proxy"
-            value, std = verdict.value, verdict.std
-            if instead and refitted is not None:
+            value, std, bound = verdict.value, verdict.std, verdict.bound
+            if instead and refitted is not None and effect.id in refitted:
                 # Beside its rival it explains nothing: its size is that of the model without it.
-                value, std = refitted.get(effect.id, (value, std))
-            verdict = EffectVerdict(effect, kind, value, std, verdict.bound, group=instead or names)
+                value, std = refitted[effect.id]
+                bound = _within(effect, _reach(effect, value, std, rules))
+            verdict = EffectVerdict(effect, kind, value, std, bound, group=instead or names)
         elif effect.id in untried and verdict.finding == "missing":
             verdict = replace(verdict, finding="open")
         elif settled and verdict.finding == "missing":
@@ -313,20 +317,23 @@ def _of_added(effect: Effect, final: Fit, group: tuple[str, ...], rules: Rules) 
     return _of_present(effect, value, std, group, rules, possible_in(final, effect, rules))
 
 
-def _of_scored(effect: Effect, score: Score | None, evidence: bool, rules: Rules) -> EffectVerdict:
+def _of_scored(
+    effect: Effect, score: Score | None, tried: Size | None, evidence: bool, rules: Rules
+) -> EffectVerdict:
     if score is None:
         return EffectVerdict(effect, "not testable")
     if evidence:
         can_be = possible(effect, score.value, score.std, rules)
         return _of_present(effect, score.value, score.std, (), rules, can_be)
-    reach = _reach(effect, score.value, score.std, rules)
+    value, std = tried or (score.value, score.std)
+    reach = _reach(effect, value, std, rules)
     # The bound says it all: below what matters, the test had the power to find what does.
     small = all(b < p.matters for b, p in zip(reach, effect.parameters, strict=True) if not p.scan)
     return EffectVerdict(
         effect,
         "absent" if small else "not testable",
-        score.value,
-        score.std,
+        value,
+        std,
         _within(effect, reach),
     )
 

@@ -234,7 +234,7 @@ class Judge:
         trail, last = self.trail, self.trail.diagnoses[-1]
         return judge(
             self.fit,
-            scored=(last.scores, last.family) if last.fit is self.fit else None,
+            scored=(last.scores, last.family, last.sizes) if last.fit is self.fit else None,
             lacked={*self.lacked},
             groups={e: g for e, g in trail.rivals.items() if e in self.fit.model.effects},
             acted={c.id for dx in trail.diagnoses for c in dx.significant},
