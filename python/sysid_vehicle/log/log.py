@@ -244,14 +244,21 @@ class Log:
         -------
         list of slice
             Ranges in which the steering angle and the longitudinal input (``fx_n``, or
-            ``ax_mps2`` in a log without it) are known. Missing measurements break nothing.
+            ``ax_mps2`` in a log without it) are known. Each begins where the speed is measured,
+            from which the model starts; missing measurements break nothing after that.
         """
         drive = "fx_n" if self.has("fx_n") else "ax_mps2"
         least = self.least_speed_mps if min_speed_mps is None else min_speed_mps
         usable = filled(self["vx_mps"]) >= least
         usable &= np.isfinite(self["steer_rad"]) & np.isfinite(self[drive])
         shortest = min_duration_s * self.rate_hz - 1e-6
-        return [slice(a, b) for a, b in runs(usable) if b - 1 - a >= shortest]
+        known = np.flatnonzero(np.isfinite(self["vx_mps"]))
+        found = []
+        for a, b in runs(usable):
+            first, last = np.searchsorted(known, (a, b))
+            if first < last and b - 1 - known[first] >= shortest:
+                found.append(slice(int(known[first]), b))
+        return found
 
     def to_csv(self, path: str | Path) -> None:
         """Write all channels as CSV that ``read_log`` reads; complete or not at all.

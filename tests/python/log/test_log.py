@@ -234,6 +234,22 @@ class TestStretches:
         np.testing.assert_allclose(log["ax_mps2"], truth)
         assert log.stretches() == [slice(0, 1001)]
 
+    def test_the_model_starts_where_the_speed_is_measured(self, data: Columns) -> None:
+        # A filter begins at the first speed; before it, it would have to guess one.
+        for channel in ("vx_mps", "ax_mps2"):
+            data[channel][:60] = np.nan
+        data["fx_n"] = np.full(1001, 800.0)
+        with pytest.warns(SysidWarning):
+            log = make(data)
+        assert log.stretches() == [slice(60, 1001)]
+
+    def test_a_stretch_without_a_speed_is_left_out(self, data: Columns) -> None:
+        data["vx_mps"][390:611] = np.nan
+        data["steer_rad"][380:400] = data["steer_rad"][600:620] = np.nan
+        with pytest.warns(SysidWarning):
+            log = make(data)
+        assert log.stretches() == [slice(0, 380), slice(620, 1001)]
+
     def test_long_hole_in_an_input_splits(self, data: Columns) -> None:
         data["steer_rad"][400:411] = np.nan
         assert make(data).stretches() == [slice(0, 400), slice(411, 1001)]

@@ -325,7 +325,9 @@ def _of_scored(
     if evidence:
         can_be = possible(effect, score.value, score.std, rules)
         return _of_present(effect, score.value, score.std, (), rules, can_be)
-    value, std = tried or (score.value, score.std)
+    value, std = score.value, score.std
+    if tried is not None and np.isfinite(tried[1]).all():  # at a bound a refit has no error
+        value, std = tried
     reach = _reach(effect, value, std, rules)
     # The bound says it all: below what matters, the test had the power to find what does.
     small = all(b < p.matters for b, p in zip(reach, effect.parameters, strict=True) if not p.scan)
