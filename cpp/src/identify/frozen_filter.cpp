@@ -1,6 +1,7 @@
 // The filter whose gains are kept: its runs one sample after the other, or pieces of them side by
 // side.
 #include <algorithm>
+#include <optional>
 
 #include "sysid/dynamics/steer_delay.hpp"
 #include "sysid/estimate/frozen.hpp"
@@ -136,22 +137,55 @@ FrozenFilter freeze(const Problem& logged, const double* p, const Noise& noise) 
 
 namespace {
 
+/// Runs for sets of parameters side by side: each with the steering of its own delay.
+class RunsOfSets {
+  public:
+    RunsOfSets(const Problem& logged, const std::vector<const double*>& sets)
+        : logged_(logged), first_(logged, sets[0]) {
+        for (const double* p : sets) {
+            const double delay = steer_delay(logged.model, p);
+            const auto known = std::find(delays_.begin(), delays_.end(), delay);
+            of_.push_back(static_cast<std::size_t>(known - delays_.begin()));
+            if (known != delays_.end()) continue;
+            delays_.push_back(delay);
+            if (delays_.size() > 1) join(p);
+        }
+    }
+
+    /// One set of runs after the other.
+    const Problem& operator*() const { return joined_ ? *joined_ : *first_; }
+    /// Where run number `run` of a set stands.
+    std::size_t of(std::size_t set, std::size_t run) const {
+        return of_[set] * logged_.runs.size() + run;
+    }
+
+  private:
+    void join(const double* p) {
+        if (!joined_) joined_ = *first_;
+        const InTime more(logged_, p);
+        joined_->runs.insert(joined_->runs.end(), (*more).runs.begin(), (*more).runs.end());
+    }
+
+    const Problem& logged_;
+    InTime first_;
+    std::optional<Problem> joined_;
+    std::vector<double> delays_;
+    std::vector<std::size_t> of_;
+};
+
 /// For sets of parameters in the lanes; false where that cannot be done.
 bool likelihoods_together(const Problem& logged, std::vector<const double*> sets,
                           const Noise& noise, double* out) {
     constexpr std::size_t kFewest = 4;  // below, lanes gain nothing
     const std::size_t count = sets.size();
     if (count < kFewest) return false;
-    const auto late = [&](const double* p) { return steer_delay(logged.model, p); };
-    for (const double* p : sets)
-        if (late(p) != late(sets[0])) return false;
-    const InTime in_time(logged, sets[0]);
-    const Problem& problem = *in_time;
     sets.resize(kLanes, sets[0]);
+    const RunsOfSets runs(logged, sets);
+    const Problem& problem = *runs;
     std::vector<Piece> pieces;
-    for (std::size_t run = 0; run < problem.runs.size(); ++run)
+    for (std::size_t run = 0; run < logged.runs.size(); ++run)
         for (std::size_t set = 0; set < kLanes; ++set)
-            pieces.push_back({run, 0, problem.runs[run].size(), set});
+            pieces.push_back({runs.of(set, run), 0, logged.runs[run].size(), set});
     try {
         LaneFilter walk(problem, sets, noise, pieces);
         if (!side_by_side(problem.runs, pieces, walk)) return false;

@@ -86,6 +86,21 @@ def test_sets_of_parameters_have_the_likelihoods_of_each(fit: Fit) -> None:
         objective.problem.log_likelihoods(sets[:, :-1], noise)  # type: ignore[attr-defined]
 
 
+def test_sets_with_delays_of_their_own_go_through_the_filter_together(
+    fit: Fit, driving: Driving
+) -> None:
+    """Each lane has the steering of its own delay: derivatives by it are asked in every climb."""
+    model = fit.model.add("steer_delay").with_values({"steer_delay.delay_s": 0.02})
+    problem, noise = driving.problem(model), fit.noise.vector()
+    sets = np.tile(model.vector(), (6, 1))
+    sets[:, model.parameters["steer_delay.delay_s"].column] += [0.0, 0.0, 0.01, -0.01, 0.01, 0.005]
+    sets[:, 2] *= np.linspace(0.95, 1.05, 6)
+    each = np.array([problem.freeze(p, noise).log_likelihood for p in sets])
+    together = problem.log_likelihoods(sets, noise)
+    np.testing.assert_allclose(together, each, rtol=1e-11)
+    assert np.any(together != each)  # other roundings: one after the other they are the same
+
+
 @pytest.mark.parametrize(
     "effects",
     [
