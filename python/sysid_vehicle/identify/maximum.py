@@ -34,7 +34,12 @@ _SAME, _NEAR = 0.5, 0.5
 
 
 def refine(
-    model: Model, driving: Driving, noise: NoiseModel, *, inputs: FloatArray | None = None
+    model: Model,
+    driving: Driving,
+    noise: NoiseModel,
+    *,
+    inputs: FloatArray | None = None,
+    least: float = -np.inf,
 ) -> Fit:
     """Go on from a model's values and a noise model that are already near: one start.
 
@@ -42,8 +47,12 @@ def refine(
     ----------
     inputs : array, shape (samples, 2), optional
         In place of the driving's own steering angle and wheel force.
+    least : float
+        Log-likelihood below which nobody asks for the maximum: what ends far below that has not
+        converged.
     """
-    return polish(model, driving, model.vector(), noise, Starts.none(model.free_names), inputs)
+    starts = Starts.none(model.free_names)
+    return polish(model, driving, model.vector(), noise, starts, inputs, least)
 
 
 def far_below(log_likelihood: float, least: float) -> bool:
@@ -196,11 +205,12 @@ def polish(
     noise: NoiseModel,
     starts: Starts,
     inputs: FloatArray | None = None,
+    least: float = -np.inf,
 ) -> Fit:
     """Noise and parameters of maximum likelihood, from values that are already near."""
     objective, thinned = objectives(model, driving, inputs)
     found = settle(objective, p, noise.vector(), free_box(model), thin=thinned)
-    return top(model, driving, objective, found, starts, thinned)
+    return top(model, driving, objective, found, starts, thinned, least)
 
 
 def objectives(
@@ -233,12 +243,12 @@ def top(
 ) -> Fit:
     """The maximum, from where a search has settled, whichever time scale its noise began with.
 
-    `thinned` is the likelihood of fewer samples, the fewest first; `least` as for `refine_beside`.
+    `thinned` is the likelihood of fewer samples, the fewest first; `least` as for `refine`.
     """
-    at_top = to_the_top(objective, *settled[:2], free_box(model))
+    at_top = to_the_top(objective, *settled[:2], free_box(model), least=least - FAR_BELOW)
     if far_below(log_likelihood_of(objective, *at_top), least):
         told = NoiseModel.from_vector(at_top[1])
-        return summary(model, driving, objective, at_top[0], told, starts, settled[2])
+        return summary(model, driving, objective, at_top[0], told, starts, False)
     return _likeliest(model, driving, objective, at_top, starts, thinned, settled[2])
 
 
@@ -254,7 +264,8 @@ def another_top(
     ends at the known maximum, of which it was tried.
     """
     model, driving, box = known.model, known.driving, free_box(known.model)
-    at_top = to_the_top(objective, *settled[:2], box)
+    least = known.log_likelihood - FAR_BELOW
+    at_top = to_the_top(objective, *settled[:2], box, least=least)
     above = log_likelihood_of(objective, *at_top) - known.log_likelihood
     if above < -FAR_BELOW:
         return None

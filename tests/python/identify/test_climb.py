@@ -80,6 +80,19 @@ def test_a_climb_goes_no_further_than_is_worth_it() -> None:
     assert objective.log_likelihood(*further) > seen[0] + 1.0
 
 
+def test_a_climb_stops_where_what_is_asked_for_is_out_of_reach() -> None:
+    asked, reached = [], []
+    for least in (-np.inf, -1.0, 1e7):
+        problem = Coupled()
+        objective, box = begun(problem)
+        end = to_the_top(objective, np.array([-9.0]), np.ones(1), box, least=least)
+        asked.append(problem.asked)
+        reached.append(objective.log_likelihood(*end))
+    assert reached[0] == reached[1] > -0.05  # the top can be had: the climb is the same
+    assert reached[2] < -1.0
+    assert asked[2] < 0.25 * asked[0]
+
+
 def test_a_climb_stays_where_the_model_does_not_fail() -> None:
     objective, box = begun(Coupled(spins_beyond=1.5))
     p, noise = to_the_top(objective, np.zeros(1), np.ones(1), box)

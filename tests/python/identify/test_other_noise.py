@@ -11,6 +11,7 @@ from sysid_vehicle.estimate import Driving, first_guess
 from sysid_vehicle.identify import Fit, refine
 from sysid_vehicle.identify.maximum import objectives
 from sysid_vehicle.identify.search.box import free_box
+from sysid_vehicle.identify.search.climb import FAR_BELOW
 from sysid_vehicle.identify.search.other_noise import likelier_noise
 from sysid_vehicle.simulate import RoadDisturbance, drive
 
@@ -70,3 +71,32 @@ def test_where_other_noise_fails_what_was_found_stays(
     p, noise = likelier_noise(objective, at_top, free_box(fit.model), objective)
     assert asked
     assert (p, noise) == at_top
+
+
+def test_other_noise_is_not_climbed_from_where_it_is_hopeless(
+    driving: Driving, car: Vehicle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = begun(driving, car, FAST_S)
+    objective, _ = objectives(fit.model, driving)
+    at_top = fit.model.vector(), fit.noise.vector()
+    value = objective.log_likelihood(*at_top)
+    told: dict[str, list[float]] = {"settle": [], "to_the_top": []}
+
+    def noting(name: str):  # type: ignore[no-untyped-def]
+        known = likelier_noise.__globals__[name]
+
+        def noted(problem, *args, least=-np.inf, **options):  # type: ignore[no-untyped-def]
+            if problem is objective:
+                told[name].append(least)
+            return known(problem, *args, least=least, **options)
+
+        return noted
+
+    for name in told:
+        monkeypatch.setitem(likelier_noise.__globals__, name, noting(name))
+    slow = replace(fit.noise, correlation_time_s=(1.0, 1.0, 1.0)).vector()
+    monkeypatch.setitem(likelier_noise.__globals__, "_led", lambda *_: (at_top[0], slow, np.inf))
+    likelier_noise(objective, at_top, free_box(fit.model), replace(objective))
+    assert told["settle"]
+    assert set(told["settle"]) == {value - FAR_BELOW}
+    assert set(told["to_the_top"]) <= {value}

@@ -97,3 +97,26 @@ def test_two_that_are_confounded_are_tried_against_what_they_have_in_common(
     found = exchanged(fit, near, Driving.of(test), most_effects=4)
     assert found.model.effects == ("imu_lever_arm",)
     assert exchanged(fit, {}, Driving.of(test), most_effects=4) is fit
+
+
+def test_what_was_not_searched_to_its_end_is_before_it_takes_a_place(
+    start: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A trial far below in training data may be what validation data are for all the same."""
+    driving = SimpleNamespace(samples=1000)
+    windy = windy_fit(start, driving)
+    drag = Candidate(effect("aero_drag"), 9.0, 0.0, (0.6,), (0.1,), 1.0, 1.0)
+    ended = SimpleNamespace(**{**vars(windy_fit(start, driving)), "model": start.add("aero_drag")})
+    begun = SimpleNamespace(**{**vars(ended), "converged": False})
+    names = {
+        "_with_others": lambda *_: begun,
+        "better": lambda *_: True,
+        "refine": lambda *_: ended,
+        "without_insignificant": lambda fit, _: fit,
+    }
+    for name, stand_in in names.items():
+        monkeypatch.setitem(exchanged.__globals__, name, stand_in)
+    nearly = {"head_wind": (drag,)}
+    assert exchanged(windy, nearly, driving, most_effects=4) is ended  # type: ignore[arg-type]
+    begun.converged = True
+    assert exchanged(windy, nearly, driving, most_effects=4) is begun  # type: ignore[arg-type]

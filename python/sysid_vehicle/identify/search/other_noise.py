@@ -93,10 +93,10 @@ def _one_round(
         if reached < least:
             continue
         try:
-            p, told, _ = settle(objective, p, told, box)
+            p, told, _ = settle(objective, p, told, box, least=value - FAR_BELOW)
             if objective.log_likelihood(p, told) < value - FAR_BELOW:
                 continue
-            rival = to_the_top(objective, p, told, box)
+            rival = to_the_top(objective, p, told, box, least=value)
             reached = objective.log_likelihood(*rival)
         except (NumericalError, np.linalg.LinAlgError):
             continue

@@ -51,17 +51,17 @@ def first_that_holds(
             continue
         if c.fit is None or not _sound(c, rules):
             continue
-        lean: Fit | None = c.fit
-        if insignificant(c.fit, rules):
-            lean = before(ends, partial(without_insignificant, c.fit, rules), None)
-        if lean is None or c.id not in lean.model.effects:
-            continue
+        # Validation data come first: what they do not confirm need not be made simpler.
         found = before(
             judged_by, partial(speaks_for, fit, c.fit, _can_be(c, rules), test, rules), None
         )
-        if found is not None:
-            first = first or c
-            holding[c.id] = (merit(c.fit) + found.gain.value, c, lean)
+        lean: Fit | None = c.fit
+        if found is not None and insignificant(c.fit, rules):
+            lean = before(ends, partial(without_insignificant, c.fit, rules), None)
+        if found is None or lean is None or c.id not in lean.model.effects:
+            continue
+        first = first or c
+        holding[c.id] = (merit(c.fit) + found.gain.value, c, lean)
     if not holding:
         return None
     _, chosen, lean = max(holding.values(), key=lambda h: h[0])
@@ -199,11 +199,18 @@ def exchanged(
             if trial is None or frozenset(trial.model.effects) in seen:
                 continue
             if before(ends, partial(better, trial, best, test, rules), False):
-                best = before(ends, partial(without_insignificant, trial, rules), trial)
+                best = before(ends, partial(_to_its_end, trial, rules), trial)
         if best is fit:
             return fit
         fit = best
         seen.add(frozenset(fit.model.effects))
+
+
+def _to_its_end(fit: Fit, rules: Rules) -> Fit:
+    """The fit at its maximum, and without what is not significant then."""
+    if not fit.converged:  # far below in training data, and validation data are for it all the same
+        fit = refine(fit.model, fit.driving, fit.noise)
+    return without_insignificant(fit, rules)
 
 
 def _exchanges(
@@ -304,7 +311,9 @@ def without_insignificant(fit: Fit, rules: Rules = USUAL) -> Fit:
         if not weak:
             return fit
         weakest = min(sorted(weak), key=lambda name: strength(fit, name))
-        without = refine(fit.model.drop(weakest), fit.driving, fit.noise)
+        poorer = fit.model.drop(weakest)
+        least = merit(fit) - rules.apart - bic(0.0, len(poorer.free_names), fit.driving.samples)
+        without = refine(poorer, fit.driving, fit.noise, least=least)
         if merit(without) + rules.apart < merit(fit):
             kept.add(weakest)
         else:
