@@ -99,4 +99,4 @@ def test_other_noise_is_not_climbed_from_where_it_is_hopeless(
     likelier_noise(objective, at_top, free_box(fit.model), replace(objective))
     assert told["settle"]
     assert set(told["settle"]) == {value - FAR_BELOW}
-    assert set(told["to_the_top"]) <= {value}
+    assert told["to_the_top"] == []  # it settles to the noise of the maximum that is known

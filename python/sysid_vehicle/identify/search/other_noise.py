@@ -79,7 +79,7 @@ def _one_round(
     known: list[FloatArray],
 ) -> tuple[tuple[FloatArray, FloatArray], float]:
     """As `likelier_noise`, from one maximum; what is `known` by then is not tried again."""
-    best = at_top
+    best, tops = at_top, [at_top[1]]
     here = few.learn_noise(*at_top, rounds=_STEPS)
     known.append(here.noise)
     least = few.log_likelihood(at_top[0], here.noise) - _BELOW_BY_FEW
@@ -94,12 +94,16 @@ def _one_round(
             continue
         try:
             p, told, _ = settle(objective, p, told, box, least=value - FAR_BELOW)
-            if objective.log_likelihood(p, told) < value - FAR_BELOW:
+            settled = objective.log_likelihood(p, told)
+            # By all samples it may be the noise of a maximum that is known.
+            back = settled < value and any(_same(told, other) for other in tops)
+            if back or settled < value - FAR_BELOW:
                 continue
             rival = to_the_top(objective, p, told, box, least=value)
             reached = objective.log_likelihood(*rival)
         except (NumericalError, np.linalg.LinAlgError):
             continue
+        tops.append(rival[1])
         if reached > value:
             best, value = rival, reached
     return best, value
