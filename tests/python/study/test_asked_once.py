@@ -237,9 +237,9 @@ def test_what_is_insignificant_is_dropped_once(fit: Fit, monkeypatch: pytest.Mon
     richer = refine(fit.model.add("gyro_scale"), fit.driving, fit.noise)
     calls: list[int] = []
 
-    def counted(*args: Any) -> Fit:
+    def counted(*args: Any, **kwargs: Any) -> Fit:
         calls.append(1)
-        return refine(*args)
+        return refine(*args, **kwargs)
 
     monkeypatch.setattr(steps, "refine", counted)
     lean = without_insignificant(richer, USUAL)

@@ -102,6 +102,26 @@ def test_several_effects_never_end_below_a_model_that_they_contain(
     assert found.log_likelihood >= single.log_likelihood
 
 
+@pytest.mark.parametrize(("lag", "begins"), [("steer_lag", 2), ("sensor_delay", 1)])
+def test_of_several_lags_none_is_no_begin(
+    start: Model, monkeypatch: pytest.MonkeyPatch, lag: str, begins: int
+) -> None:
+    """The model without them is not the one with each at its smallest."""
+    contained: Any = SimpleNamespace(
+        model=start, estimates=(), driving=None, noise=None, log_likelihood=0.0
+    )
+    below, asked = SimpleNamespace(log_likelihood=-9.0), []
+
+    def refitting(model: Model, *_: object) -> Any:
+        asked.append(model.value("gyro_bias.bias_radps"))
+        return below
+
+    monkeypatch.setattr(together, "refit", refitting)
+    bare = start.add(lag, "gyro_bias")
+    assert _from_within(bare, {"gyro_bias.bias_radps": 0.01}, contained) is below
+    assert asked == [0.01, 0.0][:begins]
+
+
 def test_what_fits_as_well_in_the_place_of_one_of_several_is_told(
     truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -199,11 +199,13 @@ def _from_within(bare: Model, foretold: Mapping[str, float], contained: Fit) -> 
     """Parameters of a model refitted from one that it contains; None where that fails.
 
     Its other effects begin at sizes that were foretold. These come from a poorer model and may lead
-    below the contained one: then they begin at nothing.
+    below the contained one: then they begin at nothing. Of several lags none is there.
     """
     there = {e.name: e.value for e in contained.estimates}
+    new = [e for e in bare.parts if e.id not in contained.model.effects]
+    lags = any(e.scored_at_typical and len(e.parameters) > 1 for e in new)
     ends: list[Fit] = []
-    for sizes in (foretold, {}):
+    for sizes in (foretold,) if lags else (foretold, {}):
         with suppress(NumericalError, np.linalg.LinAlgError):
             model = bare.with_values({**sizes, **there})
             ends.append(refit(model, contained.driving, contained.noise))
