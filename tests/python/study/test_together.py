@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 
 from sysid_vehicle import Model, diagnose, drive, identify, manoeuvres
+from sysid_vehicle.diagnose import Candidate
 from sysid_vehicle.diagnose.candidates.reservation import beside
+from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import refine
 from sysid_vehicle.rules import USUAL
@@ -24,6 +26,12 @@ from sysid_vehicle.study.search.together import (
 )
 
 RATE_HZ = 50.0  # tells as much of these effects as 100 Hz, in half the time
+
+
+class Known(SimpleNamespace):
+    """A fit of which little is known; as fits are, it is itself alone."""
+
+    __hash__ = object.__hash__  # type: ignore[assignment]
 
 
 def test_two_are_added_together_where_the_posterior_names_both(truth: Model, start: Model) -> None:
@@ -120,6 +128,27 @@ def test_of_several_lags_none_is_no_begin(
     bare = start.add(lag, "gyro_bias")
     assert _from_within(bare, {"gyro_bias.bias_radps": 0.01}, contained) is below
     assert asked == [0.01, 0.0][:begins]
+
+
+@pytest.mark.parametrize(
+    ("lag", "gained", "tried"),
+    [("sensor_delay", 0.0, False), ("sensor_delay", 1.0, True), ("steer_lag", 0.0, True)],
+)
+def test_lags_that_were_lost_alone_are_not_tried_beside_others(
+    start: Model, monkeypatch: pytest.MonkeyPatch, lag: str, gained: float, tried: bool
+) -> None:
+    fit: Any = Known(model=start, log_likelihood=0.0, driving=None)
+    alike = {"retained": 1.0, "variance_ratio": 1.0, "fit": fit}
+    ranking = tuple(
+        Candidate(effect(name), size, 0.0, (), (), **alike)
+        for name, size in ((lag, gained), ("gyro_bias", 9.0))
+    )
+    proposed = SimpleNamespace(sizes={})
+    dx: Any = SimpleNamespace(fit=fit, ranking=ranking, proposed=proposed, rules=USUAL)
+    asked = []
+    monkeypatch.setattr(together, "_from_within", lambda *_: asked.append(1))
+    assert _with_subset(dx, (lag, "gyro_bias")) is None
+    assert bool(asked) == tried
 
 
 def test_what_fits_as_well_in_the_place_of_one_of_several_is_told(

@@ -13,6 +13,7 @@ from ..._common.threads import before, in_parallel
 from ...diagnose import Candidate, Diagnosis
 from ...diagnose.candidates.refits import refitted
 from ...diagnose.candidates.reservation import beside
+from ...effects import Effect
 from ...errors import NumericalError
 from ...estimate import Driving
 from ...identify import Fit, refine_while, refit
@@ -157,10 +158,14 @@ def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:
 def _with_subset(dx: Diagnosis, names: Sequence[str], known: Sequence[Fit] = ()) -> Fit | None:
     """The model with several effects, refitted; None where that fails, or no car has the values.
 
+    It is not refitted with lags that were lost alone (`_lost`).
+
     Parameters come first, under the noise of the model that they begin at: that shows where they
     lead at a fraction of the time. Where an effect comes to nothing on the way the refit does not
     go on. It never ends below the likeliest of the models `known` that it contains.
     """
+    if any(_lost(c) for c in dx.ranking if c.id in names):
+        return None
     effects = {c.id: c.effect for c in dx.ranking}
     values: dict[str, float] = {}
     for name in (n for n in names if n in dx.proposed.sizes):
@@ -203,15 +208,26 @@ def _from_within(bare: Model, foretold: Mapping[str, float], contained: Fit) -> 
     """
     there = {e.name: e.value for e in contained.estimates}
     new = [e for e in bare.parts if e.id not in contained.model.effects]
-    lags = any(e.scored_at_typical and len(e.parameters) > 1 for e in new)
     ends: list[Fit] = []
-    for sizes in (foretold,) if lags else (foretold, {}):
+    for sizes in (foretold,) if any(map(_several_lags, new)) else (foretold, {}):
         with suppress(NumericalError, np.linalg.LinAlgError):
             model = bare.with_values({**sizes, **there})
             ends.append(refit(model, contained.driving, contained.noise))
             if ends[-1].log_likelihood >= contained.log_likelihood:
                 break
     return max(ends, key=_height, default=None)
+
+
+def _several_lags(effect: Effect) -> bool:
+    return effect.scored_at_typical and len(effect.parameters) > 1
+
+
+def _lost(c: Candidate) -> bool:
+    """Whether no search led back from several lags to none of them, which it began amid alone.
+
+    It begins there beside other effects too.
+    """
+    return _several_lags(c.effect) and c.fit is not None and c.statistic <= 0.0
 
 
 def _height(fit: Fit) -> float:
