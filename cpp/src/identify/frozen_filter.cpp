@@ -173,12 +173,24 @@ class RunsOfSets {
     std::vector<std::size_t> of_;
 };
 
+/// How many delays of the steering sets of parameters have.
+std::size_t delays_of(const SingleTrack& model, const std::vector<const double*>& sets) {
+    std::vector<double> delays;
+    delays.reserve(sets.size());
+    for (const double* p : sets) delays.push_back(steer_delay(model, p));
+    std::sort(delays.begin(), delays.end());
+    return static_cast<std::size_t>(std::unique(delays.begin(), delays.end()) - delays.begin());
+}
+
 /// For sets of parameters in the lanes; false where that cannot be done.
 bool likelihoods_together(const Problem& logged, std::vector<const double*> sets,
                           const Noise& noise, double* out) {
     constexpr std::size_t kFewest = 4;  // below, lanes gain nothing
     const std::size_t count = sets.size();
     if (count < kFewest) return false;
+    // Each delay takes a copy of the runs.
+    const std::size_t delays = delays_of(logged.model, sets);
+    if (delays > 1 && delays * logged.samples() > kLanes * kToldSamples) return false;
     sets.resize(kLanes, sets[0]);
     const RunsOfSets runs(logged, sets);
     const Problem& problem = *runs;
