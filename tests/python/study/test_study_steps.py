@@ -9,7 +9,7 @@ from sysid_vehicle import Diagnosis, Fit, Model, compare, diagnose, drive, ident
 from sysid_vehicle.diagnose import possible
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
-from sysid_vehicle.identify import Estimate, far_below, refine
+from sysid_vehicle.identify import Estimate, refine
 from sysid_vehicle.rules import USUAL, share_explained
 from sysid_vehicle.study.search.search import Search, Trail, _step
 from sysid_vehicle.study.search.steps import (
@@ -281,48 +281,6 @@ def test_what_is_at_a_bound_stays_only_where_it_is_needed(
     assert not np.isfinite(bounded["rolling_resistance.per_speed_spm"].std)
     assert without_insignificant(bounded).model.effects == ("rolling_resistance",)
     assert _distance(Estimate("a", 0.3, 0.1, "m2", ""), drag) == pytest.approx(3.0)
-
-
-def test_what_validation_data_do_not_confirm_is_not_made_simpler(
-    dx: Diagnosis, baseline: Fit, driving: tuple[Driving, Driving], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked = []
-
-    def simpler(fit: Fit, _: object) -> Fit:
-        asked.append(fit)
-        return fit
-
-    known = first_that_holds.__globals__
-    monkeypatch.setitem(known, "insignificant", lambda *_: {"aero_drag"})
-    monkeypatch.setitem(known, "without_insignificant", simpler)
-    held = first_that_holds(dx, baseline, driving[1])
-    assert held is not None
-    assert held[1] in asked
-    asked.clear()
-    monkeypatch.setitem(known, "speaks_for", lambda *_: None)
-    assert first_that_holds(dx, baseline, driving[1]) is None
-    assert asked == []
-
-
-def test_what_is_needed_is_not_searched_to_the_end_without_it(
-    dx: Diagnosis, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The poorer model has to come near what the richer one is worth, or nobody asks for it."""
-    fit, told = by_id(dx, "aero_drag"), []
-
-    def refining(model: Model, driving: Driving, noise: object, *, least: float) -> Fit:
-        told.append(least)
-        return refine(model, driving, fit.noise, least=least)
-
-    known = without_insignificant._function.__globals__
-    monkeypatch.setitem(known, "insignificant", lambda *_: {"aero_drag"})
-    monkeypatch.setitem(known, "refine", refining)
-    assert without_insignificant._function(fit, USUAL) is fit
-    price = 0.5 * np.log(fit.driving.samples)
-    assert told == [pytest.approx(fit.log_likelihood - USUAL.apart - price)]
-    poorer = refining(fit.model.drop("aero_drag"), fit.driving, None, least=told[0])
-    assert far_below(poorer.log_likelihood, told[0])
-    assert not poorer.converged
 
 
 def test_a_possible_value_comes_before_an_impossible_one(
