@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -210,57 +211,77 @@ def faults_of(
         Explanations by what they leave out; one that is as likely as `found` makes all faults
         unsure in which the two differ.
     """
-    rivals = rivals or {}
-    names = list(found.faults)
-    naive = np.linalg.inv(found.information)
-    rows = [t for t in _TOLD if t.of[-1] in names]
-    critical = _critical(len(rows))
-    result = []
-    for told in _TOLD:
-        if told not in rows:
-            why = why_not(told.name, absent=absent)
-            result.append(
-                SensorFault(
-                    told.name, told.channel, told.title, 0.0, math.inf, told.unit, False, False, why
-                )
-            )
-            continue
-        pick = np.array([1.0 if name in told.of else 0.0 for name in names])
-        value, std = _size(found, pick, found.covariance)
+    rows = [t for t in _TOLD if t.of[-1] in found.faults]
+    asked = _Asked(found, parts, rivals or {}, _critical(len(rows)))
+    return tuple(
+        asked.fault(told) if told in rows else _untold(told, why_not(told.name, absent=absent))
+        for told in _TOLD
+    )
+
+
+def _untold(told: _Told, why: str) -> SensorFault:
+    return SensorFault(
+        told.name, told.channel, told.title, 0.0, math.inf, told.unit, False, False, why
+    )
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What `faults_of` is told, and how many standard errors make a claim."""
+
+    found: Estimate
+    parts: Sequence[Estimate]
+    rivals: Mapping[tuple[str, ...], Rival]
+    critical: float
+
+    @cached_property
+    def naive(self) -> np.ndarray:
+        """Covariance of a complete model with the noise as it is."""
+        return np.linalg.inv(self.found.information)
+
+    def fault(self, told: _Told) -> SensorFault:
+        """What the estimate tells of one fault."""
+        found = self.found
+        pick = np.array([1.0 if name in told.of else 0.0 for name in found.faults])
+        value = _size(found, pick, found.covariance)[0]
+        std = self._std(told, pick)
         at_null = _size(found, pick, found.null_covariance)[1]
-        own = [(*_size(part, pick, part.covariance), part) for part in parts]
-        spread = scatter(
-            [v for v, _, _ in own],
-            [max(s, _size(part, pick, part.null_covariance)[1]) for _, s, part in own],
-        )
-        if spread is not None:
-            std = spread.widened(value, std)
-        std = math.hypot(std, *(_apart(other, told, value) for other in rivals.values()))
         widest = max(std, at_null)
-        prior = 1.0 / float(np.sum(1.0 / found.prior[pick > 0.0]))
-        others = [rival for without, rival in rivals.items() if {*told.of} <= {*without}]
-        rival = min(others, key=lambda rival: rival.worse, default=None)
-        alone = rival is None or rival.share < _FALSE_CLAIMS
-        claimed = alone and abs(value) > max(critical * widest, told.negligible)
-        variance = float(pick @ naive @ pick)
+        rival = self._likeliest_without(told)
+        claimed = rival is None and abs(value) > max(self.critical * widest, told.negligible)
+        variance = float(pick @ self.naive @ pick)
         if not claimed:
             # No fault is as likely: its interval is that of no fault, if that is wider.
             std, variance = widest, max(variance, at_null**2)
-        learned = 1.0 - variance * prior
+        learned = 1.0 - variance / float(np.sum(1.0 / found.prior[pick > 0.0]))
         claimed = claimed and learned > 0.0
-        well = alone and learned > _LEARNED and abs(value) + HALF_95 * std < told.enough
+        well = rival is None and learned > _LEARNED and abs(value) + HALF_95 * std < told.enough
         reason = ""
-        if rival is not None and not alone:
+        if rival is not None:
             reason = why_not(told.name, other=_instead(found, rival.estimate, told))
         elif not (claimed or well):
-            reason = _confounded(told, pick, found, naive, names)
-        result.append(
-            SensorFault(
-                told.name, told.channel, told.title, value, std, told.unit, claimed or well,
-                claimed, reason,
-            )
+            reason = _confounded(told, pick, found, self.naive, list(found.faults))
+        return SensorFault(
+            told.name, told.channel, told.title, value, std, told.unit, claimed or well, claimed,
+            reason,
         )  # fmt: skip
-    return tuple(result)
+
+    def _std(self, told: _Told, pick: np.ndarray) -> float:
+        """Standard deviation of a fault, with what parts of the driving and rivals add."""
+        value, std = _size(self.found, pick, self.found.covariance)
+        own = [
+            (_size(p, pick, p.covariance), _size(p, pick, p.null_covariance)) for p in self.parts
+        ]
+        spread = scatter([v for (v, _), _ in own], [max(s, null) for (_, s), (_, null) in own])
+        if spread is not None:
+            std = spread.widened(value, std)
+        return math.hypot(std, *(_apart(other, told, value) for other in self.rivals.values()))
+
+    def _likeliest_without(self, told: _Told) -> Rival | None:
+        """The likeliest explanation without a fault, if it is as likely as the estimate."""
+        others = [rival for without, rival in self.rivals.items() if {*told.of} <= {*without}]
+        rival = min(others, key=lambda rival: rival.worse, default=None)
+        return None if rival is None or rival.share < _FALSE_CLAIMS else rival
 
 
 def _size(found: Estimate, pick: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:
