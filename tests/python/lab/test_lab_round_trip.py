@@ -8,8 +8,15 @@ import pytest
 
 import sysid_vehicle as sv
 from sysid_vehicle import published
-from sysid_vehicle.errors import SysidWarning
-from sysid_vehicle.lab import excitation, run_closed_loop
+from sysid_vehicle.errors import InvalidInput, SysidWarning
+from sysid_vehicle.lab import (
+    GreyBoxVehicle,
+    Setup,
+    TyreLog,
+    excitation,
+    identify_tyres,
+    run_closed_loop,
+)
 from sysid_vehicle.lab.excitation import Excitation
 
 DURATIONS_S = (60.0, 120.0, 200.0)
@@ -58,3 +65,17 @@ def test_a_drive_is_read_again_without_error_or_warning(asked: Excitation, tmp_p
     assert set(read.channels) == set(written.channels)
     for name in written.channels:
         np.testing.assert_allclose(read[name], written[name], rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+def test_tyres_of_a_car_whose_front_wheels_drive_and_brake() -> None:
+    plain = Setup.default().plant.vehicle
+    vehicle = plain.replace(drive_front_share=1.0, brake_front_share=0.65)
+    hard = excitation.Weaving(lateral_mps2=14.0, swing_mps=7.0, swing_period_s=6.0, duration_s=12.0)
+    drive = run_closed_loop(hard, Setup.of(sv.Model(vehicle)), seed=5)
+    car = GreyBoxVehicle.of(vehicle)
+    fit = identify_tyres(car, TyreLog.from_log(drive.to_log(), car), starts=1, profiles=False)
+    assert fit["D_rear"].value == pytest.approx(vehicle.tyre_rear.D, rel=1e-3)
+    assert fit["C_rear"].value == pytest.approx(vehicle.tyre_rear.C, rel=0.02)
+    assert fit.noise[:4] == pytest.approx([0.1, 3.16e-3, 3.16e-3, 3.16e-3], rel=0.08)
+    with pytest.raises(InvalidInput, match="drive_front_share is 2"):
+        dataclasses.replace(car, drive_front_share=2.0)

@@ -35,6 +35,8 @@ class GreyBoxVehicle:
     mass_tolerance, yaw_inertia_tolerance : float
         Relative standard deviation of the mass and of the yaw inertia; 0 where they are exact. A
         tolerance makes them unknowns with that prior, and every interval includes it.
+    brake_front_share, drive_front_share : float
+        The front axle's share of the wheel force, 0 to 1; it turns with the front wheels.
     """
 
     mass_kg: float
@@ -45,6 +47,8 @@ class GreyBoxVehicle:
     cg_height_m: float = 0.0
     mass_tolerance: float = 0.0
     yaw_inertia_tolerance: float = 0.0
+    brake_front_share: float = 0.0
+    drive_front_share: float = 0.0
 
     def __post_init__(self) -> None:
         check_positive_fields(
@@ -58,6 +62,9 @@ class GreyBoxVehicle:
                 raise InvalidInput(
                     f"{name} is {value}; give a relative standard deviation from 0 to below 0.5"
                 )
+        for name in ("brake_front_share", "drive_front_share"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise InvalidInput(f"{name} is {getattr(self, name)}; give a share from 0 to 1")
 
     @classmethod
     def of(cls, vehicle: Vehicle, *, mass_tolerance: float = 0.0) -> GreyBoxVehicle:
@@ -75,14 +82,18 @@ class GreyBoxVehicle:
             vehicle.cg_height_m,
             mass_tolerance,
             0.1 if known is None else 0.0,
+            vehicle.brake_front_share,
+            vehicle.drive_front_share,
         )
 
     def core(self) -> _core.VehicleData:
-        """For the compiled core; the wheel force acts along the car."""
+        """For the compiled core."""
         car = _core.VehicleData()
-        for name in ("mass_kg", "lf_m", "lr_m", "air_density_kgpm3", "cg_height_m"):
+        for name in (
+            *("mass_kg", "lf_m", "lr_m", "air_density_kgpm3", "cg_height_m"),
+            *("brake_front_share", "drive_front_share"),
+        ):
             setattr(car, name, getattr(self, name))
-        car.brake_front_share = car.drive_front_share = 0.0
         return car
 
 
