@@ -168,8 +168,9 @@ void SideslipUkf<method>::start(const SensorSample& s) {
     const AxleForces loads = axle_forces(car_, ax, 0.0);
     const double slip_r = vx * r / (kGravity * car_.rear.slope());
     const double beta = std::clamp(car_.data.lr_m * r / vx - slip_r, -0.5, 0.5);
-    const double deviation =
-        std::isnan(s.yaw_rate_radps) ? 0.1 : std::max(0.03, 0.5 * std::abs(slip_r));
+    const double deviation = std::isnan(s.yaw_rate_radps) ? 0.1
+                                                          : std::max(0.03, 0.5 * std::abs(slip_r)) +
+                                                                may_slide(car_.wheelbase_m(), s);
     const double weight = car_.data.mass_kg * kGravity;
     filter_.restart(Vec<3>(beta, loads.fx_f, loads.fx_r),
                     Vec<3>(deviation, 0.2 * weight, 0.2 * weight).cwiseAbs2().asDiagonal());

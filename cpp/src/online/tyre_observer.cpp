@@ -165,7 +165,7 @@ void TyreObserver::start(double dt, const SensorSample& s, const TyreModel::Inpu
     b[TyreModel::kLean] = ay / (1.0 + b[TyreModel::kRoll]);
     const double stiff = settings_.stiffness_prior, grip = settings_.friction_prior;
     const bool blind = std::isnan(s.yaw_rate_radps) || std::isnan(s.ay_mps2);
-    const double unseen = blind ? kBlindSideslip : 0.0;
+    const double unseen = blind ? kBlindSideslip : may_slide(car_.wheelbase_m(), s);
     deviation << 0.01 + std::abs(slip_r) + unseen, blind ? kBlindYawRate : 0.1,
         0.005 + std::abs(slip_f), 0.005 + std::abs(slip_r), stiff, stiff, grip, grip,
         settings_.relaxation_std, settings_.steer_late_s, settings_.ahead_m,

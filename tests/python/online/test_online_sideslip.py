@@ -53,6 +53,11 @@ def test_the_dual_observer_finds_the_sideslip_and_says_how_well(vehicle, log):
     assert error.rms_deg < 0.2
     assert error.covered > 0.9
     assert "inside 2 sigma" in str(run)
+    # A racing car corners harder: its error is told there too, and of every sample.
+    faster = dataclasses.replace(run, ay_mps2=2.0 * run.ay_mps2)
+    bands = faster.error().bands
+    assert bands[-1][0] >= 14.0
+    assert sum(samples for *_, samples in bands) == np.count_nonzero(run.mode != 1)
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
@@ -112,6 +117,22 @@ def test_a_slow_car_rolls_without_slip(vehicle):
     assert observer.step(0.01, 0.0, 3.5, 0.0, 0.0, 0.0).mode == 1.0  # hysteresis
     assert observer.step(0.01, 0.0, 4.5, 0.0, 0.0, 0.0).mode == 0.0
     assert observer.step(0.01, 0.0, 3.5, 0.0, 0.0, 0.0).mode == 0.0
+
+
+@pytest.mark.parametrize("kind", ["dual", "ukf"])
+def test_a_slow_car_that_spins_does_not_roll_without_slip(vehicle, kind):
+    """Two thirds through a spin the speed along the car is small; it moves sideways at 10 m/s."""
+
+    def first(vx, yaw_rate):
+        return SideslipObserver(vehicle, kind=kind).step(0.01, 0.0, vx, yaw_rate, 0.0, 0.8)
+
+    assert first(2.0, 0.003).beta_std_rad == pytest.approx(0.01, abs=0.003)
+    spinning = first(2.0, 1.4)
+    assert spinning.mode == 1.0
+    assert abs(np.arctan2(-10.0, 2.0) - spinning.beta_rad) < 2.0 * spinning.beta_std_rad
+    again = first(4.5, 1.4)
+    assert again.mode == 0.0
+    assert again.beta_std_rad > 0.1
 
 
 def test_what_cannot_be_is_refused(vehicle, log):

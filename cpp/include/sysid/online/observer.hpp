@@ -60,11 +60,18 @@ inline std::array<double, kEstimateColumns> columns_of(const SideslipEstimate& e
     };
 }
 
+/// How far a car may point from where it rolls [rad], as far as the yaw rate and the steering tell:
+/// without slip it turns at v tan(delta) / l, and what it turns otherwise is slip of an axle.
+inline double may_slide(double wheelbase_m, const SensorSample& s) {
+    const double told = wheelbase_m * s.yaw_rate_radps - s.vx_mps * std::tan(s.steer_rad);
+    return std::isnan(told) ? 0.0 : std::atan(std::abs(told) / std::max(std::abs(s.vx_mps), 1.0));
+}
+
 /// A car too slow for slip to be seen; for the rest of the estimate there is nothing to say.
 inline SideslipEstimate rolling_without_slip(double lf_m, double lr_m, const SensorSample& s) {
     SideslipEstimate out;
     out.beta_rad = std::atan(lr_m * std::tan(s.steer_rad) / (lf_m + lr_m));
-    out.beta_std_rad = 0.01 + 0.2 * std::abs(out.beta_rad);
+    out.beta_std_rad = std::hypot(0.01 + 0.2 * std::abs(out.beta_rad), may_slide(lf_m + lr_m, s));
     out.vx_mps = s.vx_mps;
     out.yaw_rate_radps = s.yaw_rate_radps;
     out.fyf_n = out.fyr_n = out.fx_n = std::nan("");
