@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_BANDS_MPS2 = (0.0, 2.0, 4.0, 6.0, 8.0, 10.0)
+_BAND_MPS2 = 2.0
 
 
 @dataclass(frozen=True)
@@ -129,11 +128,11 @@ class SideslipRun(Told):
         off = (self.beta_rad - truth)[known]
         degrees, size = np.degrees(off), np.abs(self.ay_mps2[known])
         bands = []
-        for low, high in itertools.pairwise(_BANDS_MPS2):
-            inside = (size >= low) & (size < high)
-            if inside.any():
-                rms = float(np.sqrt(np.mean(degrees[inside] ** 2)))
-                bands.append((low, high, rms, int(inside.sum())))
+        floors = _BAND_MPS2 * np.floor(size / _BAND_MPS2)
+        for low in np.unique(floors[np.isfinite(floors)]).tolist():
+            inside = floors == low
+            rms = float(np.sqrt(np.mean(degrees[inside] ** 2)))
+            bands.append((low, low + _BAND_MPS2, rms, int(inside.sum())))
         return SideslipError(
             float(np.sqrt(np.mean(degrees**2))),
             float(np.abs(degrees).max()),
@@ -170,7 +169,7 @@ class SideslipRun(Told):
         for number, meaning in ((1, "too slow to tell"), (2, "with a sensor missing or refused")):
             share = float(np.mean(self.mode == number))
             if share > 0.0:
-                lines.append(f"  {100.0 * share:.1f} % of samples {meaning}")
+                lines.append(f"  {100.0 * share:.3g} % of samples {meaning}")
         found = self.error()
         return "\n".join([*lines, *([str(found)] if found is not None else [])])
 
