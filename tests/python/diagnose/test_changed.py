@@ -249,7 +249,12 @@ def test_tyres_of_an_axle_may_change(truth: Model, before: Fit) -> None:
     assert abs(share + 0.1) < 3.0 * std
     assert std < 0.04  # driving tells it before B, C and D one by one
     assert front.size.startswith("cornering stiffness -")
-    assert change["tyre_rear"].stiffness is not None
+    rear = change["tyre_rear"]
+    assert rear.stiffness is not None
+    for name, value, bound in zip(rear.names, rear.value, rear.bound, strict=True):
+        p, reference = before.model.parameters[name], before.model.value(name)
+        assert p.lower <= reference + value <= p.upper
+        assert bound <= max(p.upper - reference, reference - p.lower)
     assert change["steer_ratio"].stiffness is None
 
 

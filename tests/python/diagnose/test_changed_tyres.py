@@ -8,7 +8,7 @@ import pytest
 
 from sysid_vehicle import Model
 from sysid_vehicle.diagnose.change.changed import _Said
-from sysid_vehicle.diagnose.change.may_change import forces_of_tyre, of_tyre
+from sysid_vehicle.diagnose.change.may_change import beyond, forces_of_tyre, of_tyre, room
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.tyre import magic_formula
 
@@ -45,3 +45,16 @@ def test_an_interval_that_holds_nothing_names_no_tyre(
     said = cast(Any, _Said.__new__(_Said))
     said.search = search
     assert said._off_nothing(m.id, SimpleNamespace(changes=changes), told) is named
+
+
+def test_no_line_is_followed_beyond_what_a_tyre_can_be(truth: Model) -> None:
+    ends = room(of_tyre(truth, "front"), truth)
+    p = truth.parameters["D_front"]
+    value = truth.value("D_front")
+    assert ends[2] == pytest.approx((p.lower - value, p.upper - value))
+    inside = (1.0, 0.1, -0.2, 0.0)
+    assert beyond(inside, (0.0,) * 4, ends) == 0.0
+    # All of a tyre is cut together: its stiffness follows from all of it.
+    far = (1.0, 0.1, 10.0 * ends[2][0], 0.0)
+    assert beyond(far, (0.0,) * 4, ends) == pytest.approx(0.9)
+    assert beyond(far, (0.0, 0.0, -9.0 * ends[2][0], 0.0), ends) == pytest.approx(0.0)

@@ -29,7 +29,7 @@ from ..candidates.causes import Causes, CredibleSet
 from ..candidates.possible import possible
 from .change import Change, EffectChange, Said
 from .changes_compete import Competition
-from .may_change import YAW_INERTIA, May, forces_of_tyre
+from .may_change import YAW_INERTIA, May, beyond, forces_of_tyre, room
 from .reference import Exact
 from .search import Search
 
@@ -229,8 +229,18 @@ class _Said:
         told: Competition,
     ) -> EffectChange:
         rules, own = self.search.rules, causes.of(m.id)
-        value, std = (tuple(known[n] for n in m.names) for known in (sizes, stds))
-        bound = tuple(abs(v) + rules.bound * s for v, s in zip(value, std, strict=True))
+        ends = room(m, self.search.before.model)
+        raw = [sizes[n] for n in m.names], [stds[n] for n in m.names]
+        # A line that leads further beyond what a parameter can be than its error is followed to
+        # there, all of its effect; what is cut off is no less uncertain than it is large.
+        cut = beyond(raw[0], [rules.bound * s for s in raw[1]], ends)
+        told_by = [(1.0 - cut) * v for v in raw[0]]
+        value = tuple(float(np.clip(v, *both)) for v, both in zip(told_by, ends, strict=True))
+        std = tuple(max(s, cut * abs(v)) for v, s in zip(*raw, strict=True))
+        bound = tuple(
+            min(abs(v) + rules.bound * s, max(-low, high))
+            for v, s, (low, high) in zip(value, std, ends, strict=True)
+        )
         matters = [p.matters for p in m.parameters]
         least = tuple(
             max(told.least(s, usual), w + (rules.bound - 1.0) * s)
@@ -241,7 +251,7 @@ class _Said:
         if own is not None:
             group = tuple(e for e in own.effects if e != m.id)
             said = "one of a group" if group else "changed"
-            if not possible(m, value, std, rules):
+            if not possible(m, *raw, rules):
                 said = "implausible"
             elif all(abs(v) + s < w for v, s, w in zip(value, std, matters, strict=True)):
                 said, group = "negligible", ()
@@ -249,13 +259,16 @@ class _Said:
             said = "unchanged"
         names, units = zip(*((p.name, p.unit) for p in m.parameters), strict=True)
         probability = causes.inclusion.get(m.id, 0.0)
-        stiffness = self._stiffness(m, value)
+        stiffness = self._stiffness(m, told_by, cut)
         return EffectChange(
             m.id, names, units, value, std, bound, probability, said, group, least, stiffness
         )
 
-    def _stiffness(self, m: May, sizes: Sequence[float]) -> tuple[float, float] | None:
-        """By which share the cornering stiffness of an axle's tyres differs, per load, +- what."""
+    def _stiffness(self, m: May, sizes: Sequence[float], cut: float) -> tuple[float, float] | None:
+        """By which share the cornering stiffness of an axle's tyres differs, per load, +- what.
+
+        `cut` is the share of the sizes that leads beyond any tyre.
+        """
         if m not in self.search.tyres:
             return None
         own = self.search.before.model
@@ -266,4 +279,5 @@ class _Said:
         slope = float(np.prod(after)) / whole / after
         value = float(np.prod(after)) / whole - 1.0 if put else float(slope @ np.array(sizes[:3]))
         known = {**dict(zip(m.names, sizes, strict=True)), **self.state.changes}
-        return value, self.told.std_along(m.id, as_float64([*slope, 0.0]), known)
+        std = self.told.std_along(m.id, as_float64([*slope, 0.0]), known)
+        return value, max(std, abs(value) * cut / (1.0 - cut) if cut < 1.0 else np.inf)

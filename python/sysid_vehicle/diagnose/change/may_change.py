@@ -105,6 +105,34 @@ def of_clock(clock: Clock) -> May:
     return May(clock.name, (clock.name,), (clock_parameter(clock),), ((0,),))
 
 
+def room(m: May, model: Model) -> list[tuple[float, float]]:
+    """Lowest and highest difference that leaves each parameter of a reference within its bounds.
+
+    Where the model has none of them, the reference may have any value.
+    """
+    found = []
+    for name, own in zip(m.names, m.parameters, strict=True):
+        p = model.parameters.get(name)
+        ends = (own.lower, own.upper)
+        if p is not None:
+            before = model.value(name)
+            ends = change(name, before, p.lower), change(name, before, p.upper)
+        found.append(ends)
+    return found
+
+
+def beyond(
+    sizes: Sequence[float], reach: Sequence[float], ends: Sequence[tuple[float, float]]
+) -> float:
+    """Share of the differences of an effect that leads further than their ends and errors."""
+    kept = 1.0
+    for size, r, (low, high) in zip(sizes, reach, ends, strict=True):
+        end = high + r if size > 0.0 else low - r
+        if not low - r <= size <= high + r:
+            kept = min(kept, max(end / size, 0.0))
+    return 1.0 - kept
+
+
 def forces_of_tyre(
     before: Sequence[float], change: Sequence[float], friction: float
 ) -> Iterator[tuple[float, FloatArray]]:
