@@ -285,6 +285,8 @@ void SideslipDual::report() {
         out_.cr_npr * std::hypot(std_of(TyreModel::kStiffR), kAtOrigin * settings_.error_curve);
     out_.mu_f = car_.front.D * std::exp(mean_of(TyreModel::kGripF));
     out_.mu_r = car_.rear.D * std::exp(mean_of(TyreModel::kGripR));
+    out_.mu_f_std = out_.mu_f * std_of(TyreModel::kGripF);
+    out_.mu_r_std = out_.mu_r * std_of(TyreModel::kGripR);
     out_.nis = b.nis();
     out_.observed = b.state().update.observed;
     out_.log_likelihood = LogDensity::of(b.state().update);

@@ -101,7 +101,8 @@ const SideslipEstimate& PublishedDual::step(double dt, const SensorSample& s) {
     out_.cr_npr = cr_ + tyres_.x[2];
     out_.cf_std_npr = std::sqrt(std::max(tyres_.P(1, 1), 0.0));
     out_.cr_std_npr = std::sqrt(std::max(tyres_.P(2, 2), 0.0));
-    out_.mu_f = out_.mu_r = out_.nis = out_.log_likelihood = std::nan("");
+    out_.mu_f = out_.mu_r = out_.mu_f_std = out_.mu_r_std = std::nan("");
+    out_.nis = out_.log_likelihood = std::nan("");
     out_.observed = 3.0;
     return out_;
 }

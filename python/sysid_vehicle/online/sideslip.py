@@ -33,8 +33,9 @@ class SideslipEstimate(NamedTuple):
     """What an observer knows after a sample; NaN where it does not say.
 
     `cf_npr` and `cr_npr` are the cornering stiffness of the axles at their static load [N/rad],
-    `mu_f` and `mu_r` the friction at the peak. `mode` is 0 while running, 1 while the car is too
-    slow, 2 while a sensor is missing or refused and the tyre model stands in.
+    `mu_f` and `mu_r` the friction at the peak, with standard deviations last. `mode` is 0 while
+    running, 1 while the car is too slow, 2 while a sensor is missing or refused and the tyre model
+    stands in.
     """
 
     beta_rad: float
@@ -54,6 +55,8 @@ class SideslipEstimate(NamedTuple):
     observed: float
     log_likelihood: float
     mode: float
+    mu_f_std: float
+    mu_r_std: float
 
 
 class SideslipObserver:
@@ -144,7 +147,7 @@ class SideslipObserver:
 
         Returns
         -------
-        ndarray, shape (n, 17)
+        ndarray, shape (n, 19)
             Columns in the order of :class:`SideslipEstimate`.
         """
         dt_s, sensors = as_float64(dt_s), as_float64(sensors)

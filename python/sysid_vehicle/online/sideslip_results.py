@@ -72,8 +72,8 @@ class SideslipRun(Told):
         Sideslip and its standard deviation.
     vx_mps, yaw_rate_radps, fyf_n, fyr_n, fx_n : ndarray
         Speed, yaw rate, lateral axle forces, longitudinal force without drag.
-    cf_npr, cr_npr, cf_std_npr, cr_std_npr, mu_f, mu_r : ndarray
-        Cornering stiffness at the static load [N/rad], its standard deviation, peak friction.
+    cf_npr, cr_npr, cf_std_npr, cr_std_npr, mu_f, mu_r, mu_f_std, mu_r_std : ndarray
+        Cornering stiffness at the static load [N/rad], peak friction, and standard deviations.
     nis, observed, log_likelihood : ndarray
         Squared whitened innovation, readings it is made of, log density of the readings.
     mode : ndarray
@@ -105,6 +105,8 @@ class SideslipRun(Told):
     observed: FloatArray
     log_likelihood: FloatArray
     mode: FloatArray
+    mu_f_std: FloatArray
+    mu_r_std: FloatArray
 
     @property
     def vy_mps(self) -> FloatArray:
@@ -158,14 +160,15 @@ class SideslipRun(Told):
                     axle,
                     f"{c[k] / 1e3:.1f}",
                     f"{s[k] / 1e3:.1f}",
-                    f"{mu[k]:.2f}" if np.isfinite(mu[k]) else "-",
+                    *([f"{x[k]:.2f}" for x in mu] if np.isfinite(mu[0][k]) else ["-", "-"]),
                 ]
                 for axle, c, s, mu in (
-                    ("front", self.cf_npr, self.cf_std_npr, self.mu_f),
-                    ("rear", self.cr_npr, self.cr_std_npr, self.mu_r),
+                    ("front", self.cf_npr, self.cf_std_npr, (self.mu_f, self.mu_f_std)),
+                    ("rear", self.cr_npr, self.cr_std_npr, (self.mu_r, self.mu_r_std)),
                 )
             ]
-            lines.append(text_table(["axle", "stiffness [kN/rad]", "std", "friction"], rows))
+            head = ["axle", "stiffness [kN/rad]", "std", "friction", "std"]
+            lines.append(text_table(head, rows))
         for number, meaning in ((1, "too slow to tell"), (2, "with a sensor missing or refused")):
             share = float(np.mean(self.mode == number))
             if share > 0.0:
@@ -175,7 +178,18 @@ class SideslipRun(Told):
 
     def to_dict(self) -> dict[str, Any]:
         """All figures and series as plain numbers."""
-        series = ("time_s", "beta_rad", "beta_std_rad", "cf_npr", "cr_npr", "mu_f", "mu_r", "mode")
+        series = (
+            "time_s",
+            "beta_rad",
+            "beta_std_rad",
+            "cf_npr",
+            "cr_npr",
+            "mu_f",
+            "mu_r",
+            "mode",
+            "mu_f_std",
+            "mu_r_std",
+        )
         found = self.error()
         return {
             "log": self.log_name,

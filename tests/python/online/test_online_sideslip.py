@@ -53,6 +53,9 @@ def test_the_dual_observer_finds_the_sideslip_and_says_how_well(vehicle, log):
     assert error.rms_deg < 0.2
     assert error.covered > 0.9
     assert "inside 2 sigma" in str(run)
+    # Driving far from the peak tells little of it: its error is told with it.
+    assert abs(run.mu_f[-1] - vehicle.tyre_front.D) < 2.0 * run.mu_f_std[-1] < 0.5
+    assert "friction   std" in str(run)
     # A racing car corners harder: its error is told there too, and of every sample.
     faster = dataclasses.replace(run, ay_mps2=2.0 * run.ay_mps2)
     bands = faster.error().bands

@@ -25,18 +25,20 @@ struct SideslipEstimate {
     double cf_npr = 0.0, cr_npr = 0.0;  // cornering stiffness at the static load [N/rad]
     double cf_std_npr = 0.0, cr_std_npr = 0.0;
     double mu_f = 0.0, mu_r = 0.0;  // friction at the peak [-]
-    double nis = 0.0;               // squared whitened innovation
-    double observed = 0.0;          // readings that it is made of
+    double mu_f_std = 0.0, mu_r_std = 0.0;
+    double nis = 0.0;       // squared whitened innovation
+    double observed = 0.0;  // readings that it is made of
     double log_likelihood = 0.0;
     ObserverMode mode = ObserverMode::kRunning;
 
     template <class Row>
     void remember(Row& row) {
         row(beta_rad, beta_std_rad, vx_mps, yaw_rate_radps, fyf_n, fyr_n, fx_n, cf_npr, cr_npr,
-            cf_std_npr, cr_std_npr, mu_f, mu_r, nis, observed, log_likelihood, mode);
+            cf_std_npr, cr_std_npr, mu_f, mu_r, nis, observed, log_likelihood, mode, mu_f_std,
+            mu_r_std);
     }
 };
-constexpr std::size_t kEstimateColumns = 17;
+constexpr std::size_t kEstimateColumns = 19;
 
 inline std::array<double, kEstimateColumns> columns_of(const SideslipEstimate& e) {
     return {
@@ -57,6 +59,8 @@ inline std::array<double, kEstimateColumns> columns_of(const SideslipEstimate& e
         e.observed,
         e.log_likelihood,
         static_cast<double>(e.mode),
+        e.mu_f_std,
+        e.mu_r_std,
     };
 }
 
@@ -76,7 +80,7 @@ inline SideslipEstimate rolling_without_slip(double lf_m, double lr_m, const Sen
     out.yaw_rate_radps = s.yaw_rate_radps;
     out.fyf_n = out.fyr_n = out.fx_n = std::nan("");
     out.cf_npr = out.cr_npr = out.cf_std_npr = out.cr_std_npr = std::nan("");
-    out.mu_f = out.mu_r = out.nis = std::nan("");
+    out.mu_f = out.mu_r = out.mu_f_std = out.mu_r_std = out.nis = std::nan("");
     out.mode = ObserverMode::kHolding;
     return out;
 }
