@@ -179,7 +179,8 @@ class Observation(Told):
 
     def __str__(self) -> str:
         lines = [f"Observer over {self.time_s[-1]:.0f} s; parameters from first to last:"]
-        for name in self.moved():
+        # What was looked for and did not move is as unknown as at first, which is to be seen.
+        for name in [n for n, v in self.parameters.items() if n in self.spread or np.ptp(v) > 0.0]:
             spread = f" +- {self.spread[name]:.3g}" if name in self.spread else ""
             first = self.parameters[name][0]
             lines.append(f"  {name:12s} {first:10.5g} -> {self.last(name):.5g}{spread}")

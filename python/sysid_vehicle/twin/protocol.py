@@ -21,7 +21,7 @@ import numpy as np
 from .._common.arguments import whole
 from .._common.arrays import FloatArray, as_float64
 from .._common.progress import doing
-from ..errors import InvalidInput, NumericalError
+from ..errors import InvalidInput, NumericalError, near_names
 from .car import LOAD_NAMES
 from .checks import checked_rows, checked_step
 from .observer import Observation, Observer, judged
@@ -128,6 +128,7 @@ def observe_with(
     stride = whole(stride, "stride", 1)
     read = _table(twin, measured, n, dt)
     _check(twin, observer)
+    _heard(observer, measured)
     laws = observer.core_laws(names, twin.output_names, dt)
     batch, scaled, count = None, [], 1
     if observer.batch is not None:
@@ -205,6 +206,18 @@ def _table(twin: Twin, measured: Mapping[str, FloatArray], n: int, dt: float) ->
             raise InvalidInput(f"measured '{name}' has {len(values)} samples; the inputs have {n}")
         read[:, twin.output_names.index(name)] = as_float64(values)
     return checked_rows(read, twin.output_names, "measured", dt, missing=True, any_size=True)
+
+
+def _heard(observer: Observer, measured: Mapping[str, FloatArray]) -> None:
+    """Refuse an observer that compares what is not measured: it would teach nothing, silently."""
+    compared = [part.channel for part in (*observer.gains, *observer.laws)]
+    compared += [] if observer.batch is None else observer.batch.channels
+    for name in compared:
+        if name not in measured:
+            raise InvalidInput(
+                f"the observer compares '{name}', which is not measured{near_names(name, measured)}"
+                f"; there are {', '.join(measured) or 'no readings'}"
+            )
 
 
 def _check(twin: Twin, observer: Observer) -> None:

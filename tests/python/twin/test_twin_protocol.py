@@ -109,6 +109,15 @@ def test_a_twin_of_functions_finds_its_mass() -> None:
     assert found.last("mass_kg") == pytest.approx(1200.0, rel=0.05)
 
 
+def test_what_nothing_tells_is_told_as_unknown() -> None:
+    batch = SideBySide([MASS], {"ax_mps2": 0.05})
+    still = {"ax_mps2": np.full(400, np.nan)}
+    found = observe_with(point_mass(), np.zeros((400, 1)), still, Observer(batch=batch))
+    assert str(found).endswith(f" 1000 -> 1000 +- {MASS.spread:g}")
+    with pytest.raises(InvalidInput, match="'ax_mps2', which is not measured"):
+        observe_with(point_mass(), np.zeros((9, 1)), {"ax_mps": np.zeros(9)}, Observer(batch=batch))
+
+
 def test_without_states_to_set_velocities_are_corrected_by_a_push() -> None:
     car = TwinCar()
     inputs = np.zeros((400, 24))
