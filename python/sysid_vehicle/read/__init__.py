@@ -32,6 +32,8 @@ __all__ = [
     "read_log",
 ]
 
+_OF_FRAMES = ("can_log", "mdf")  # modules of formats that may hold CAN frames
+
 
 def read_log(
     source: str | Path | Columns,
@@ -110,6 +112,8 @@ def contents(
     """Return what a file or an object holds, under its own names."""
     if not isinstance(source, (str, Path)):
         return contents_of_object(source)
+    if dbc is not None and (entry is None or entry.module not in _OF_FRAMES):
+        warn(f"{as_path(source).stem}: holds no CAN frames; {dbc} is not used")
     if entry is None:
         return read_table(source)
     return read_with(entry, Path(source), None if dbc is None else as_path(dbc))

@@ -50,6 +50,8 @@ class Table:
         Units that the file states.
     seconds : mapping of ndarray, shape (n,)
         Columns of time stamps, as seconds since the first.
+    notes : tuple of str
+        What was corrected while reading.
     """
 
     names: tuple[str, ...]
@@ -58,6 +60,7 @@ class Table:
     n: int
     units: Mapping[str, str] = field(default_factory=dict)
     seconds: Mapping[str, FloatArray] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def counts(self) -> Counter[str]:

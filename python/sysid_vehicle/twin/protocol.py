@@ -210,7 +210,8 @@ def _table(twin: Twin, measured: Mapping[str, FloatArray], n: int, dt: float) ->
 
 def _heard(observer: Observer, measured: Mapping[str, FloatArray]) -> None:
     """Refuse an observer that compares what is not measured: it would teach nothing, silently."""
-    compared = [part.channel for part in (*observer.gains, *observer.laws)]
+    compared = [gain.channel for gain in observer.gains]
+    compared += [law.channel for law in observer.laws]
     compared += [] if observer.batch is None else observer.batch.channels
     for name in compared:
         if name not in measured:

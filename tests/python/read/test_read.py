@@ -24,6 +24,19 @@ def read(path: Path, channels: Any = None) -> Log:
     return read_log(path, channels, check=False)
 
 
+def test_lines_that_repeat_the_names_are_left_out(tmp_path: Path) -> None:
+    path = write(tmp_path, HEADER, *ROWS[:2], HEADER, ROWS[2])
+    with pytest.warns(SysidWarning, match="run: line 4 repeats column names or units"):
+        log = read(path)
+    np.testing.assert_array_equal(log["vx_mps"], [20.0, 21.0, 22.0])
+
+
+def test_a_database_without_frames_is_not_ignored_in_silence(tmp_path: Path) -> None:
+    path = write(tmp_path, HEADER, *ROWS)
+    with pytest.warns(SysidWarning, match="run: holds no CAN frames; car.dbc is not used"):
+        read_log(path, dbc="car.dbc", check=False)
+
+
 def test_canonical_file(tmp_path: Path) -> None:
     log = read(write(tmp_path, HEADER, *ROWS))
     assert log.name == "run"

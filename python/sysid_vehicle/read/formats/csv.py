@@ -174,8 +174,14 @@ def _read_slow(
 ) -> Table:
     rows: list[list[str]] = []
     lines: list[int] = []
+    # A logger that begins anew, or files that were joined.
+    heads = (names, tuple(units.get(name, "") for name in names))
+    repeated: list[int] = []
     for line, row in _rows(body, delimiter, first_line):
         if not row or not any(cell.strip() for cell in row):
+            continue
+        if tuple(cell.strip() for cell in row) in heads:
+            repeated.append(line)
             continue
         if len(row) != len(names):
             raise InvalidInput(
@@ -200,4 +206,9 @@ def _read_slow(
                 seconds[name] = stamps
         else:
             columns[name] = values
-    return Table(names, columns, not_numbers, len(rows), units, seconds)
+    notes = [
+        f"line {line} repeats column names or units and was left out; read logs that were joined "
+        f"one by one"
+        for line in repeated[:1]
+    ]
+    return Table(names, columns, not_numbers, len(rows), units, seconds, tuple(notes))

@@ -157,6 +157,7 @@ class ChannelMap:
         InvalidInput
             If a source column is not in the table (near names are given) or not numeric.
         """
+        notes += table.notes
         result: dict[str, FloatArray] = {}
         for channel, source in self.sources.items():
             unit = source.unit_of(channel)
