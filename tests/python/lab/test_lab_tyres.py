@@ -96,6 +96,16 @@ def test_every_start_ends_at_the_best_optimum() -> None:
     assert np.ptp(ends.end[:, 0]) < 0.1
 
 
+def test_intervals_end_where_values_do() -> None:
+    fit = gentle()
+    assert fit.rivals  # another tyre that is as likely, with a region of its own
+    for name, (lower, upper) in BOX.items():
+        if name in {e.name for e in fit.estimates}:
+            low, high = fit.interval(name)
+            assert lower <= low <= high <= upper, name
+    assert all(fit.interval(e.name)[0] >= 0.0 for e in fit.derived if np.isfinite(e.std))
+
+
 def test_noise_is_learned() -> None:
     noise = found().noise
     assert noise[:4] == pytest.approx([0.1, 3.16e-3, 3.16e-3, 3.16e-3], rel=0.08)

@@ -12,7 +12,7 @@ import numpy as np
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.printed import Part, Printed, Table
 from ..._common.style import AFTER, BEFORE, axes_or_new, tidy
-from ..._common.text import HALF_95, number
+from ..._common.text import HALF_95, number, within
 from ...identify.intervals.estimates import Estimate, Estimated
 from ...identify.intervals.profile import Profile
 from ...identify.intervals.quantities import Quantity, parameter, std_of, tyre_quantity
@@ -56,6 +56,7 @@ NOISES = (
 
 _CHI_SQUARE = 3.84  # 95 % quantile, one degree of freedom
 _KNOWN_WELL = 0.05  # relative standard error
+_POSITIVE = (0.0, float("inf"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +162,7 @@ class TyreFit(Estimated, Printed):
         for rival in self.rivals:
             there = rival.interval(what, self.columns)
             low, high = min(low, there[0]), max(high, there[1])
+        low, high = within((low, high), self[name].bounds)
         return (low if np.isfinite(low) else -np.inf), (high if np.isfinite(high) else np.inf)
 
     @property
@@ -197,7 +199,8 @@ class TyreFit(Estimated, Printed):
                 # Nobody has seen a peak that was not driven to.
                 beyond = name != "BCD" and self.driven_rad[i] < peak
                 note = "beyond the driven slip" if beyond else ""
-                found.append(Estimate(what.name, what.of(self.parameters), std, unit, note))
+                value = what.of(self.parameters)
+                found.append(Estimate(what.name, value, std, unit, note, bounds=_POSITIVE))
         return tuple(found)
 
     @property
