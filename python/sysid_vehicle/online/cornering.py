@@ -187,6 +187,10 @@ def cornering_stiffness(
 ) -> CorneringRun:
     """Cornering stiffness over a log, by recursive least squares.
 
+    It knows neither tyres that answer late nor load that braking moves between the axles: of a slow
+    vehicle with a long relaxation length (a bus at 8 to 20 m/s, 0.6 m) the front stiffness came
+    out 19 % low, beyond its standard deviation. `estimate_sideslip` knows both.
+
     Parameters
     ----------
     vehicle : Vehicle
