@@ -175,7 +175,7 @@ def _read_slow(
     rows: list[list[str]] = []
     lines: list[int] = []
     # A logger that begins anew, or files that were joined.
-    heads = (names, tuple(units.get(name, "") for name in names))
+    heads = {names, tuple(units.get(name, "") for name in names)} - {("",) * len(names)}
     repeated: list[int] = []
     for line, row in _rows(body, delimiter, first_line):
         if not row or not any(cell.strip() for cell in row):
