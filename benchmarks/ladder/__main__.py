@@ -106,7 +106,7 @@ def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[bool, str]:
     brought = {
         name.split(".")[0]
         for name, size in present(rung).items()
-        if name in study.fit.model.free_names and abs(study.fit[name].value / size - 1.0) < _NEAR
+        if name in study.fit.model.free_names and _is(study.fit[name], size)
     }
     hidden = [e for e in found if e not in brought]
     good = hidden == ([effect] if effect else [])
@@ -129,6 +129,11 @@ def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[bool, str]:
         f"{head}  {'yes' if good else 'no ':4s}  {said or 'nothing'}; {study.verdict}; {errors}; "
         f"{took:.0f} s"
     )
+
+
+def _is(found: sv.Estimate, size: float) -> bool:
+    """Whether it is of a size, as closely as it is known."""
+    return abs(found.value - size) < max(_NEAR * size, 1.96 * found.std)
 
 
 if __name__ == "__main__":
