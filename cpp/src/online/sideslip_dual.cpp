@@ -10,18 +10,20 @@ namespace {
 constexpr double kSteerUnknown = 0.15;  // random walk of its angle [rad/sqrt(s)]
 constexpr double kAtOrigin = 1.5;  // error of the curve's slope there over that at larger slips
 /// What a tyre filter expects, each over the settings: errors of the tyre model, bank of the road
-/// and how long it lasts, change of the friction, and errors of what is told of the car. `doubt` is
-/// the logarithm by which it is less likely before any reading.
+/// and how long it lasts, change of the friction, errors of what is told of the car, and offsets of
+/// sensors with forces from outside. These act like a bank where they last: where one filter takes
+/// readings for the one and another for the others, the band is wide. `doubt` is the logarithm by
+/// which it is less likely before any reading.
 struct Departures {
-    double model, road, road_lasts, grip, car, doubt;
+    double model, road, road_lasts, grip, car, offsets, doubt;
 };
 constexpr std::array<Departures, 5> kDepartures = {{
-    {0.12, 0.12, 1.0, 1.0, 0.02, 0.0},
-    {0.45, 0.45, 1.0, 1.0, 0.02, 0.0},
-    {2.0, 2.0, 1.0, 1.0, 0.02, 0.0},
-    // Banks, and biases of sensors, which act alike: slow, as quick ones are the body that rolls.
-    {0.2, 40.0, 10.0, 5.0, 0.05, 5.0},
-    {0.45, 0.45, 1.0, 5.0, 1.0, 0.0},  // other tyres, inertia or sensors than was told
+    {0.12, 0.12, 1.0, 1.0, 0.02, 0.02, 0.0},
+    {0.45, 0.45, 1.0, 1.0, 0.02, 0.02, 0.0},
+    {2.0, 2.0, 1.0, 1.0, 0.02, 0.02, 0.0},
+    // Banks: slow, as quick ones are the body that rolls.
+    {0.2, 40.0, 10.0, 5.0, 0.05, 0.02, 5.0},
+    {0.45, 0.45, 1.0, 5.0, 1.0, 1.0, 0.0},  // other tyres, inertia or sensors than was told
 }};
 constexpr double kWeightTimeS = 5.0;  // of readings that decide between them
 // Errors of the model make innovations that follow each other: one tells less than its likelihood.
@@ -39,6 +41,9 @@ ObserverSettings expecting(ObserverSettings s, const Departures& d) {
     s.road_time_s *= d.road_lasts;
     s.friction_prior *= d.grip;
     for (double* told : {&s.inertia_prior, &s.ahead_m, &s.steer_late_s}) *told *= d.car;
+    for (double* offset : {&s.steer_offset_rad, &s.ay_bias_mps2, &s.yaw_rate_bias_radps,
+                           &s.push_mps2, &s.turn_radps2})
+        *offset *= d.offsets;
     return s;
 }
 

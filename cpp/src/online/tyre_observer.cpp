@@ -43,7 +43,7 @@ void TyreModel::predict(const Input& u, const S* x, S* next) const {
     const double steer = 0.5 * (u.steer + u.steer_before);
     // Late wheels stand where the angle was; what is taken off is linear in the time.
     const double gone = steer - 0.5 * (u.steer_slow + u.steer_slow_before);
-    const S turned = steer - (gone / kSteerLagS) * x[kLate];
+    const S turned = steer + x[kSteerOff] - (gone / kSteerLagS) * x[kLate];
     const double cosine = std::cos(steer), side = u.loads.fx_f * std::sin(steer);
     const S inverse_inertia = exp(-1.0 * x[kInertia]) / car.yaw_inertia_kgm2;
     S felt;
@@ -51,12 +51,13 @@ void TyreModel::predict(const Input& u, const S* x, S* next) const {
         S front, rear;
         forces(u, at, front, rear);
         const S front_across = cosine * front + side;
-        felt = (front_across + rear) / c.mass_kg;
+        felt = (front_across + rear) / c.mass_kg + at[kPush];
         const S ay = felt + at[kRoad];
         const S along = cos(at[kBeta]);
         beta_rate = (ay * along - ax * sin(at[kBeta])) * along / vx - at[kYawRate];
         yaw_acceleration =
-            (c.lf_m * front_across - c.lr_m * rear + u.drive_nm * at[kDrive]) * inverse_inertia;
+            (c.lf_m * front_across - c.lr_m * rear + u.drive_nm * at[kDrive]) * inverse_inertia +
+            at[kTurn];
     };
     const S keep = exp((-vx * u.dt / settings.relaxation_m) * exp(-1.0 * x[kRelax]));
     const auto relax = [&](const S& beta, const S& r, S* to) {
@@ -70,6 +71,8 @@ void TyreModel::predict(const Input& u, const S* x, S* next) const {
     next[kGripF] = x[kGripF] * share_of(u.dt, settings.friction_time_s);
     next[kGripR] = x[kGripR] * share_of(u.dt, settings.friction_time_s);
     next[kRoad] = x[kRoad] * share_of(u.dt, settings.road_time_s);
+    next[kPush] = x[kPush] * share_of(u.dt, settings.push_time_s);
+    next[kTurn] = x[kTurn] * share_of(u.dt, settings.push_time_s);
     next[kErrorF] = x[kErrorF] * share_of(u.dt, settings.error_time_s);
     next[kErrorR] = x[kErrorR] * share_of(u.dt, settings.error_time_s);
     next[kDrive] = x[kDrive] * share_of(u.dt, settings.error_time_s);
@@ -91,12 +94,14 @@ void TyreModel::observe(const Input& u, const S* x, S* y) const {
     using std::exp;
     S front, rear;
     forces(u, x, front, rear);
-    y[0] = x[kYawRate];
+    y[0] = x[kYawRate] + x[kGyroBias];
     const VehicleData& c = car.data;
     const S across = std::cos(u.steer) * front + std::sin(u.steer) * u.loads.fx_f;
     const S turn = (c.lf_m * across - c.lr_m * rear + u.drive_nm * x[kDrive]) *
-                   exp(-1.0 * x[kInertia]) / car.yaw_inertia_kgm2;
-    y[1] = (across + rear) / c.mass_kg + x[kAhead] * turn + x[kRoll] * x[kLean];
+                       exp(-1.0 * x[kInertia]) / car.yaw_inertia_kgm2 +
+                   x[kTurn];
+    y[1] = (across + rear) / c.mass_kg + x[kPush] + x[kAhead] * turn + x[kRoll] * x[kLean] +
+           x[kAyBias];
 }
 
 Mat<TyreModel::kStates, TyreModel::kStates> TyreModel::process_noise(const Input& u) const {
@@ -112,6 +117,9 @@ Mat<TyreModel::kStates, TyreModel::kStates> TyreModel::process_noise(const Input
     q[kRelax] = u.dt * squared(kRelaxationWalk);
     q[kGripF] = q[kGripR] = squared(s.friction_prior) * fresh(s.friction_time_s);
     q[kRoad] = squared(s.road_mps2) * fresh(s.road_time_s);
+    q[kPush] = squared(s.push_mps2) * fresh(s.push_time_s);
+    q[kTurn] = squared(s.turn_radps2) * fresh(s.push_time_s);
+    q[kSteerOff] = q[kAyBias] = q[kGyroBias] = 1e-16;
     q[kLate] = q[kAhead] = q[kInertia] = q[kRoll] = 1e-16;  // properties of the car and its sensors
     q[kErrorF] = q[kErrorR] = q[kDrive] = fresh(s.error_time_s);
     q[kLean] = 1e-10;  // it follows from the forces
@@ -159,8 +167,8 @@ void TyreObserver::start(double dt, const SensorSample& s, const TyreModel::Inpu
     b[TyreModel::kYawRate] = r;
     b[TyreModel::kSlipF] = slip_f;
     b[TyreModel::kSlipR] = slip_r;
-    for (const int i :
-         {TyreModel::kRoad, TyreModel::kErrorF, TyreModel::kErrorR, TyreModel::kDrive})
+    for (const int i : {TyreModel::kRoad, TyreModel::kPush, TyreModel::kTurn, TyreModel::kErrorF,
+                        TyreModel::kErrorR, TyreModel::kDrive})
         b[i] = 0.0;
     b[TyreModel::kLean] = ay / (1.0 + b[TyreModel::kRoll]);
     const double stiff = settings_.stiffness_prior, grip = settings_.friction_prior;
@@ -169,7 +177,9 @@ void TyreObserver::start(double dt, const SensorSample& s, const TyreModel::Inpu
     deviation << 0.01 + std::abs(slip_r) + unseen, blind ? kBlindYawRate : 0.1,
         0.005 + std::abs(slip_f), 0.005 + std::abs(slip_r), stiff, stiff, grip, grip,
         settings_.relaxation_std, settings_.steer_late_s, settings_.ahead_m,
-        settings_.inertia_prior, settings_.roll_share, settings_.road_mps2, 1.0, 1.0, 1.0, 0.5;
+        settings_.inertia_prior, settings_.steer_offset_rad, settings_.ay_bias_mps2,
+        settings_.yaw_rate_bias_radps, settings_.roll_share, settings_.road_mps2,
+        settings_.push_mps2, settings_.turn_radps2, 1.0, 1.0, 1.0, 0.5;
     Mat<kN, kN> P = deviation.cwiseAbs2().asDiagonal();
     if (!first) P.block<learnt, learnt>(at, at) = known;
     // An error of beta is one of both slip angles, which have errors of their own as well.

@@ -229,6 +229,14 @@ class Effect:
         return self.moved <= {"vx_mps", "ax_mps2"}
 
     @property
+    def felt_alone(self) -> bool:
+        """Whether it changes what the accelerometer reads and nothing else, as its bias does.
+
+        A force that both accelerations feel moves the speed or the yaw rate too.
+        """
+        return self.moved <= {"ax_mps2", "ay_mps2"}
+
+    @property
     def scanned(self) -> Parameter | None:
         """Its parameter that means nothing while the effect is null, if there is one."""
         return next((p for p in self.parameters if p.scan), None)

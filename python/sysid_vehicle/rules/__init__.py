@@ -19,7 +19,8 @@
    and a disturbance of it that lasts as long as any may: slow forces have a cause.
 7. Nothing left: what was added explains it. An added effect is not named if its value is physically
    implausible, or differs between pieces of the driving by a size that matters, or if something
-   unknown does all that it does and more.
+   unknown does all that it does and more: by a part worth a name (`explainable`), where it is so
+   flexible that it contains the effect.
 8. Something left, or taken up by what only stands in for it: a name stands by its own share, what
    comes back of the error 1 to 5 s ahead, of the motion that it moves, where the final model lacks
    it and all else is fitted anew. It is above `taken` and shown not to be chance, on training and

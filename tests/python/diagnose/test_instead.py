@@ -48,6 +48,25 @@ def test_what_is_missing_beside_an_effect_does_not_take_its_place(fit: Fit, trut
     assert found.away == {}
 
 
+@pytest.mark.parametrize(
+    ("hidden", "away"),
+    [
+        ({"aero_drag.drag_area_m2": 0.45, "force_gain.drive_error": 0.03}, {}),
+        ({"force_gain.drive_error": 0.1}, {"aero_drag": "F_x"}),
+    ],
+)
+def test_forces_that_contain_an_effect_explain_more_by_what_they_add(
+    fit: Fit, truth: Model, hidden: dict[str, float], away: dict[str, str]
+) -> None:
+    """Forces along the car that depend on the driving contain a drag, whatever else is missing."""
+    car = truth.add(*(name.split(".")[0] for name in hidden)).with_values(hidden)
+    driving = Driving.of(drive(car, manoeuvres.lap(20.0), seed=5, rate_hz=50.0))
+    found = instead(replace(fit, model=fit.model.add("aero_drag")), driving, ["aero_drag"])
+    assert found.omnibus.p_value < 1e-3
+    assert found.omnibus.strongest in ("F_x", "dv_x/dt", "a_x")
+    assert found.away == away
+
+
 def test_signals_of_unknown_forces() -> None:
     slip = np.linspace(-0.2, 0.2, 401)
     curves = _hats(slip)

@@ -56,6 +56,15 @@ def test_what_moves_the_car_along_and_no_other_way() -> None:
     assert {"steer_lag", "imu_lever_arm", "speed_sensor_lever_arm"}.isdisjoint(along)
 
 
+def test_what_the_accelerometer_alone_feels() -> None:
+    assert {e.id for e in catalogue() if e.felt_alone} == {
+        "accelerometer_bias",
+        "accelerometer_scale",
+        "body_attitude",
+        "imu_lever_arm",
+    }
+
+
 def test_twins_name_each_other_and_needs_are_channels() -> None:
     for e in catalogue():
         assert e.needs

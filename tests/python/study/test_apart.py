@@ -109,6 +109,28 @@ def test_lateral_errors_are_one_figure_beside_an_effect_along_the_car(
         assert changes_of(fit, found, driving, AHEAD) == changes(fit, found, driving, AHEAD)
 
 
+def test_what_the_accelerometer_feels_answers_for_no_motion(fit: Fit, course: Log) -> None:
+    """Beside a body that leans the tyres are fitted anew, to another compromise."""
+    driving = Driving.of(course)
+    other_tyres = {"B_front": 0.7 * fit.model.value("B_front")}
+    leans = fit.model.add("body_attitude")
+    upright = {"body_attitude.pitch_per_g_rad": 0.0, "body_attitude.roll_per_g_rad": 0.0}
+    other = replace(fit, model=leans.with_values({**upright, **other_tyres}))
+    grown = {c.channel for c in worse(changes(fit, other, driving, AHEAD))}
+    assert {"vy_mps", "yaw_rate_radps"} <= grown
+    told = changes_of(fit, other, driving, AHEAD)
+    assert {c.channel for c in told} == {"ax_mps2", "ay_mps2", "motion"}
+    assert "motion" not in {c.channel for c in worse(told)}
+    # What it makes the accelerometer read counts.
+    strong = {"body_attitude.roll_per_g_rad": 0.4}
+    far = replace(fit, model=leans.with_values({**upright, **strong}))
+    assert "ay_mps2" in {c.channel for c in worse(changes_of(fit, far, driving, AHEAD))}
+    # Where the accelerometer drives the car, it moves it.
+    few = {name: course[name] for name in course.channels if name != "fx_n"}
+    blind = Driving.of(Log.from_arrays(few, check=False))
+    assert changes_of(fit, other, blind, AHEAD) == changes(fit, other, blind, AHEAD)
+
+
 def test_the_error_falls_along_the_car_beside_other_tyres(
     fit: Fit, course: Log, altered: Callable[..., Log]
 ) -> None:

@@ -10,7 +10,7 @@ from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refit
 from sysid_vehicle.rules import Gain
-from sysid_vehicle.study.ahead.horizons import errors_grow
+from sysid_vehicle.study.ahead.horizons import errors_grow, moved_by
 from sysid_vehicle.study.judge import contested
 from sysid_vehicle.study.judge.contested import of_no_use, other_values, spoken_against
 from sysid_vehicle.study.judge.disagree import Disagreement
@@ -113,9 +113,9 @@ def test_no_name_stands_for_what_makes_errors_grow(fit: Fit) -> None:
     name = ["aero_downforce"]
     test = Driving.of(drive(fit.model, manoeuvres.lap(20.0), seed=4, rate_hz=50.0))
     bare = refit(fit.model.drop("aero_downforce"), fit.driving, fit.noise)
-    assert not errors_grow(bare, fit, test, fit.model.parts[0].moved)
+    assert not errors_grow(bare, fit, test, moved_by(fit.model.parts[0]))
     wrong = replace(fit, model=fit.model.with_values({NAME: 6.0}))
-    assert errors_grow(fit, wrong, test, fit.model.parts[0].moved)
+    assert errors_grow(fit, wrong, test, moved_by(fit.model.parts[0]))
     found = spoken_against(fit, wrong, name, name, {}, test)
     assert found[name[0]] == "as fitted, the errors 0.5 to 5 s ahead of the channels it moves grow"
     assert not errors_grow(fit, fit, test, ["vx_mps"])

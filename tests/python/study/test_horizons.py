@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, InvalidInput, Log, compare
+from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving, turning, turning_blocks
 from sysid_vehicle.identify.ahead.ahead import of_few
 from sysid_vehicle.rules import Share, worse
@@ -19,6 +20,7 @@ from sysid_vehicle.study.ahead.horizons import (
     block_errors,
     changes,
     horizons,
+    moved_by,
     moving_with,
 )
 from sysid_vehicle.study.ahead.waterfall import look_ahead
@@ -212,6 +214,10 @@ def test_only_errors_of_the_motion_that_is_moved_count(fit: Fit, late: Fit, cour
     )
     assert along.value < 0.3 < every.value < 0.8 < lateral.value
     assert moving_with({"ay_mps2", "ax_mps2"}) == set(PREDICTED)
+    # A lever arm of the accelerometer leaves the motion as it is; the speed sensor's tells of both.
+    assert moved_by(effect("imu_lever_arm")) == {"ax_mps2", "ay_mps2"}
+    assert moved_by(effect("speed_sensor_lever_arm")) == set(PREDICTED)
+    assert moved_by(effect("mass")) == moving_with({"vx_mps"})
     # What is not predicted at all leaves all that is.
     assert own_share(late, fit, driving, (1.0, 2.0), channels=moving_with({"steer_rad"})) == every
 

@@ -28,6 +28,17 @@ def search(fit: Fit, most_effects: int) -> Search:
     )
 
 
+def test_what_is_in_the_model_beside_an_effect_is_no_rival_of_it(
+    hidden_fit: Callable[[str, float], Fit],
+) -> None:
+    """A rolling resistance was nearly chosen for a drag, and was needed beside it later."""
+    drag = hidden_fit("aero_drag.drag_area_m2", 0.6)
+    both = replace(drag, model=drag.model.add("aero_drag", "rolling_resistance"))
+    rivals = {"rolling_resistance": ("aero_drag", "head_wind"), "head_wind": ("aero_drag",)}
+    trail = Trail([drag, both], rivals=rivals)
+    assert trail.confounded == {"rolling_resistance": ("head_wind",)}
+
+
 def test_what_was_near_the_best_is_refitted_in_the_next_step_too(
     hidden_fit: Callable[[str, float], Fit], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -99,6 +99,10 @@ struct ObserverSettings {
     double friction_prior = 0.1, friction_time_s = 50.0;
     double relaxation_m = 0.3, relaxation_std = 0.6;
     double steer_late_s = 0.03, ahead_m = 0.3, inertia_prior = 0.1;
+    // Half the typical sizes of the catalogue's effects; of forces a fifth, as with more of them no
+    // other departure of a car that goes straight is seen.
+    double steer_offset_rad = 0.003, ay_bias_mps2 = 0.125, yaw_rate_bias_radps = 0.003;
+    double push_mps2 = 0.05, turn_radps2 = 0.02, push_time_s = 20.0;
     double error_curve = 0.06, error_slip_rad = 0.0004, learning_use = 0.2;
     double gate_probability = 1e-6, gate_patience_s = 3.0, frozen_after_s = 0.2;
     double stop_below_mps = 3.0, go_above_mps = 4.0;
@@ -155,6 +159,16 @@ inline constexpr ObserverSetting kObserverSettings[] = {
      "standard deviation of the accelerometer's place ahead of the centre of gravity [m]"},
     {"inertia_prior", &ObserverSettings::inertia_prior,
      "standard deviation of the yaw inertia (of its logarithm)"},
+    {"steer_offset_rad", &ObserverSettings::steer_offset_rad,
+     "standard deviation of a constant error of the steering angle [rad]"},
+    {"ay_bias_mps2", &ObserverSettings::ay_bias_mps2,
+     "standard deviation of a bias of the lateral acceleration [m/s2]"},
+    {"yaw_rate_bias_radps", &ObserverSettings::yaw_rate_bias_radps,
+     "standard deviation of a bias of the yaw rate [rad/s]"},
+    {"push_mps2", &ObserverSettings::push_mps2,
+     "lateral acceleration by forces from outside, as wind [m/s2]"},
+    {"turn_radps2", &ObserverSettings::turn_radps2, "yaw acceleration by these [rad/s2]"},
+    {"push_time_s", &ObserverSettings::push_time_s, "time over which these change [s]"},
     {"learning_use", &ObserverSettings::learning_use,
      "lateral force over load up to which slip tells less of the stiffness"},
     {"error_slip_rad", &ObserverSettings::error_slip_rad,

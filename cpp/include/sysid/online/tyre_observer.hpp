@@ -2,9 +2,10 @@
 //
 // State: beta, r, both slip angles behind their relaxation length, and what is uncertain of the
 // tyres: stiffness, grip, an error of the force for each axle, and the relaxation length; of what
-// was told of the car: how late the wheels turn, where the accelerometer sits, the yaw inertia; of
-// the road, of body roll, and of the yaw moment by drive and brakes (a locking differential makes
-// one as large as a tenth of the tyres'). It reads r and a_y.
+// was told of the car: how late the wheels turn, where the accelerometer sits, the yaw inertia, and
+// offsets of the sensors; of the road, of forces from outside, of body roll, and of the yaw moment
+// by drive and brakes (a locking differential makes one as large as a tenth of the tyres'). It
+// reads r and a_y.
 #pragma once
 
 #include "sysid/estimate/filter.hpp"
@@ -26,18 +27,24 @@ struct TyreModel {  // observer B
         kStiffR,
         kGripF,
         kGripR,
-        kRelax,    // logarithm of what the relaxation length is multiplied by
-        kLate,     // time by which the wheels turn after the steering angle that is read [s]
-        kAhead,    // how far ahead of the centre of gravity the accelerometer sits [m]
-        kInertia,  // logarithm of what the yaw inertia is multiplied by
+        kRelax,     // logarithm of what the relaxation length is multiplied by
+        kLate,      // time by which the wheels turn after the steering angle that is read [s]
+        kAhead,     // how far ahead of the centre of gravity the accelerometer sits [m]
+        kInertia,   // logarithm of what the yaw inertia is multiplied by
+        kSteerOff,  // what the steering angle that is read lacks [rad]
+        kAyBias,    // what the accelerometer reads too much [m/s2]
+        kGyroBias,  // what the gyro reads too much [rad/s]
         kRoll,  // share of `kLean` that the accelerometer feels too much, by gravity in body roll
         kRoad,  // lateral acceleration that moves the car and that no accelerometer feels
+        kPush,  // lateral acceleration by forces from outside, as wind, that the accelerometer
+                // feels
+        kTurn,  // yaw acceleration by these [rad/s2]
         kErrorF,
         kErrorR,
         kDrive,  // yaw moment of wheels that drive or brake unlike left and right
         kLean,   // lateral acceleration that the body has rolled with by now
     };
-    static constexpr int kStates = 18;
+    static constexpr int kStates = 23;
     // What is learnt of the car and outlives a stop.
     static constexpr int kLearnt = kStiffF, kLearntStates = kRoll - kStiffF + 1;
     static constexpr int kMeasured = 2;  // r, a_y

@@ -6,7 +6,9 @@ place one by one and target by target: those of the omnibus test, curves of eith
 over its slip angle, and forces that remember the driving. One that is significant beside the
 effect, and takes over what speaks for it until the rest is not worth its price, explains it away:
 the choice between the two is by what each adds to the other (Davidson & MacKinnon, Econometrica
-1981).
+1981). Several functions of the driving may contain the effect itself, and then take over whatever
+speaks for it: twelve forces along the car have a drag among them. They explain more only where what
+they add is a part worth a name of all that they explain without the effects they copy.
 """
 
 from __future__ import annotations
@@ -74,6 +76,7 @@ def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = U
     every = list(range(len(names)))
     price = rules.price * float(np.log(driving.samples))
     away: dict[str, str] = {}
+    copied: set[str] = set()  # by what explains no more than they do
     tests: list[Omnibus] = []
     known: list[int] = []
     # The most significant first, then what is significant beside it: much leaks into the others.
@@ -82,13 +85,19 @@ def instead(fit: Fit, driving: Driving, effects: Sequence[str], rules: Rules = U
         tests.append(test)
         if not test.rejects:
             break
-        columns = rivals.hypotheses[what]
-        for effect in effects:
-            own = [i for i in every if names[i].split(".")[0] == effect]
-            others = [i for i in (*every, *known) if i not in own]
-            alone = found.gain(others, own)[0]
-            if found.gain([*others, *columns], own)[0] < min(price, rules.taken * alone):
-                away.setdefault(effect, what.split(_ONE_OF)[0])
+        columns, beside = rivals.hypotheses[what], [*every, *known]
+        of = {e: [i for i in every if names[i].split(".")[0] == e] for e in effects}
+        taken = []
+        for effect in (e for e in effects if e not in copied):
+            others = [i for i in beside if i not in of[effect]]
+            alone = found.gain(others, of[effect])[0]
+            left = found.gain([*others, *columns], of[effect])[0]
+            if left < min(price, rules.taken * alone):
+                taken.append(effect)
+        if found.is_richer(beside, [i for e in taken for i in of[e]], columns, rules):
+            away |= {e: what.split(_ONE_OF)[0] for e in taken if e not in away}
+        else:
+            copied.update(taken)
         known += [c for c in columns if c not in known]
     return Instead(tests[0], away)
 
@@ -242,6 +251,19 @@ class _Competition:
         direction[few] = inverse @ S[kept]
         direction[given] = -copy[:, few] @ direction[few]
         return float(S[kept] @ direction[few]), rank, direction
+
+    def is_richer(
+        self, beside: list[int], own: list[int], columns: list[int], rules: Rules
+    ) -> bool:
+        """Whether an unknown that takes over parameters explains more than they, by what matters.
+
+        One of no more columns than these parameters needs only be significant beside them.
+        """
+        if len(columns) <= len(own):
+            return True
+        without = [i for i in beside if i not in own]
+        more, whole = self.gain(beside, columns)[0], self.gain(without, columns)[0]
+        return more > rules.explainable * whole
 
     def strongest(
         self, given: list[int], hypotheses: Mapping[str, list[int]], rules: Rules

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from ..._common.arrays import NORMAL_MAD, FloatArray, as_float64, median_of_known
 from ..._common.memo import remembered
 from ..._common.text import html_table, number, text_table
+from ...effects import Effect
 from ...errors import NumericalError
 from ...estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_blocks
 from ...identify import Fit
@@ -127,6 +128,15 @@ def moving_with(channels: Collection[str]) -> frozenset[str]:
     """
     motions = (m for m in (ALONG, LATERAL) if not set(m).isdisjoint(channels))
     return frozenset(c for motion in motions for c in motion)
+
+
+def moved_by(effect: Effect) -> frozenset[str]:
+    """Predicted channels whose errors an effect can take away, or make.
+
+    Those of the motions that it moves (`moving_with`). What the accelerometer alone feels leaves
+    the motion as it is.
+    """
+    return effect.moved if effect.felt_alone else moving_with(effect.moved)
 
 
 def _finite(figures: FloatArray) -> list[list[float | None]]:
@@ -311,7 +321,7 @@ def changes(
 
 
 def errors_grow(first: Fit, final: Fit, test: Driving, channels: Collection[str]) -> bool:
-    """Whether the errors ahead of a motion grow, in the mean over its channels and horizons.
+    """Whether the errors ahead of some channels grow, in the mean over these and all horizons.
 
     Shares are asked of parameters that predict best (`at_its_best`). What a study prints, and its
     user gets, is the model as it was fitted.
@@ -322,10 +332,10 @@ def errors_grow(first: Fit, final: Fit, test: Driving, channels: Collection[str]
     test : Driving
         Validation data.
     channels : collection of str
-        Of the motion.
+        As `moved_by` finds them.
     """
     found = horizons((first, final), ("first", "final"), test)
-    moved = [c in moving_with(channels) for c in found.channels]
+    moved = [c in channels for c in found.channels]
     before, after = (error[:, moved] for error in found.error)
     with np.errstate(divide="ignore", invalid="ignore"):
         grown = np.log(after) - np.log(before)

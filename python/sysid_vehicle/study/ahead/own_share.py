@@ -15,7 +15,7 @@ from ...identify import Fit, refit
 from ...rules import UNKNOWN, USUAL, Rules, Share
 from ..validation import AHEAD, at_its_best, gain_in_log_likelihood
 from .beyond import Beyond, own_share, taken_of
-from .horizons import LATERAL, moving_with
+from .horizons import LATERAL, moved_by
 from .shares import shares
 
 
@@ -124,7 +124,7 @@ def without_idle(
 
 
 def _act_alike(one: Effect, other: Effect) -> bool:
-    return one.is_like(other) and moving_with(one.moved) == moving_with(other.moved)
+    return one.is_like(other) and moved_by(one) == moved_by(other)
 
 
 def _shares(
@@ -145,7 +145,7 @@ def _shares(
         found = {e: one[0] for e, one in zip(asked, told, strict=True) if one is not None}
         return {e: one for e, one in found.items() if one is not None}
 
-    parts = {part.id: moving_with(part.moved) for part in final.model.parts}
+    parts = {part.id: moved_by(part) for part in final.model.parts}
     moved = {few: frozenset(c for e in few for c in parts[e]) for few in asked}
 
     def on_train(few: tuple[str, ...]) -> Share | None:
@@ -262,7 +262,7 @@ def together_by_motion(
         final model, and the lower end of the share.
     """
     first, last = (at_its_best(fit, test) for fit in (fits[0], fits[-1]))
-    parts = {part.id: moving_with(part.moved) for part in fits[-1].model.parts}
+    parts = {part.id: moved_by(part) for part in fits[-1].model.parts}
     found: dict[frozenset[str], tuple[tuple[float, float], float]] = {}
     for channels in {parts[e] for e in added}:
         taken = taken_of(first, last, test, AHEAD, channels)

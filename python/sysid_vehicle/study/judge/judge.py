@@ -236,7 +236,7 @@ class Judge:
             self.fit,
             scored=(last.scores, last.family, last.sizes) if last.fit is self.fit else None,
             lacked={*self.lacked},
-            groups={e: g for e, g in trail.rivals.items() if e in self.fit.model.effects},
+            groups=trail.confounded,
             acted={c.id for dx in trail.diagnoses for c in dx.significant},
             rules=self.rules,
             seed=self.seed,

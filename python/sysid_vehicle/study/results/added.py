@@ -184,7 +184,7 @@ def added_by(
             finding, because = told[name].finding, told[name].because
             own = known.get(name, (UNKNOWN, UNKNOWN))
             small = little(*errors, own[:2], rules)
-            others = [e for e in trail.rivals.get(name, ()) if e not in final.model.effects]
+            others = list(trail.confounded.get(name, ()))
             others = [*sorted(decision.groups.get(name, ())), *others]
             added.append(
                 AddedEffect(

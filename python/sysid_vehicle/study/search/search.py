@@ -80,6 +80,13 @@ class Trail:
         return tuple(c.id for dx in self.diagnoses[-1:] for c in dx.significant if c.finished)
 
     @property
+    def confounded(self) -> dict[str, tuple[str, ...]]:
+        """By effect of the last model, its rivals that are not in the model beside it."""
+        there = self.fit.model.effects
+        found = {e: names for e, names in self.rivals.items() if e in there}
+        return {e: tuple(n for n in names if n not in there) for e, names in found.items()}
+
+    @property
     def told(self) -> str:
         """The effects so far with their sizes, in words."""
         effects = [e for e in self.fit.model.effects if e not in self.fits[0].model.effects]
