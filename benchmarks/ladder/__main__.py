@@ -24,6 +24,7 @@ import warnings
 from rungs import PAIRS, RUNGS, TRUTHS, low_pass_s, present, ride
 
 import sysid_vehicle as sv
+from sysid_vehicle.identify import Estimate
 from sysid_vehicle.sensors import low_passes
 
 _NEAR = 0.2  # of the size of what the rung brings about: a lag is not quite a delay
@@ -131,7 +132,7 @@ def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[bool, str]:
     )
 
 
-def _is(found: sv.Estimate, size: float) -> bool:
+def _is(found: Estimate, size: float) -> bool:
     """Whether it is of a size, as closely as it is known."""
     return abs(found.value - size) < max(_NEAR * size, 1.96 * found.std)
 
