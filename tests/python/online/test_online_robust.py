@@ -9,10 +9,17 @@ import numpy as np
 import pytest
 
 import sysid_vehicle as sv
-from sysid_vehicle.online import KINDS, CorneringRls, MuSlipFilter, SideslipObserver
+from sysid_vehicle.online import (
+    KINDS,
+    CorneringRls,
+    MuSlipFilter,
+    SideslipEstimate,
+    SideslipObserver,
+)
 from sysid_vehicle.published import PublishedSideslipObserver
 
 SENSORS = ("steer_rad", "vx_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2")
+MODE = SideslipEstimate._fields.index("mode")
 THREADS = 4
 
 
@@ -153,7 +160,7 @@ def test_one_absurd_reading_does_little_harm_and_is_told(
     found = SideslipObserver(vehicle, kind=kind).run(dt, spoilt)
     assert np.isfinite(found[:, :2]).all()
     assert np.degrees(np.abs(found[:, 0] - clean[:, 0])).max() < 1.0
-    assert found[at, -1] == 2.0
+    assert found[at, MODE] == 2.0
     assert found[at, 1] > 0.999 * clean[at, 1]  # nothing is learnt from it
 
 
@@ -168,7 +175,7 @@ def test_absurd_readings_on_and_on_leave_a_doubtful_but_possible_sideslip(
     found = SideslipObserver(vehicle, kind=kind).run(dt, spoilt)
     assert np.isfinite(found[:, :2]).all()
     assert np.abs(found[:, 0]).max() < 1.2
-    assert (found[half:, -1] == 2.0).all()
+    assert (found[half:, MODE] == 2.0).all()
     usual = undisturbed(kind)
     # The dual observer has the longitudinal force from the speed, too.
     least = 0.9 if (kind, column) == ("dual", 3) else 1.0
@@ -182,7 +189,7 @@ def test_a_yaw_rate_that_jumps_and_returns_is_refused(vehicle, dt, sensors, undi
     spoilt = sensors.copy()
     spoilt[at : at + 3, 2] += 4.0  # no car turns so fast of a sudden
     found = SideslipObserver(vehicle, kind=kind).run(dt, spoilt)
-    assert (found[at : at + 3, -1] == 2.0).all()
+    assert (found[at : at + 3, MODE] == 2.0).all()
     assert np.degrees(np.abs(found[:, 0] - clean[:, 0])).max() < 1.0
 
 
