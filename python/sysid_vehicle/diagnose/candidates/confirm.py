@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _HOPELESS = 0.25  # of the price that a refit has to gain: a score below is not refitted
 
 
-def confirmed(dx: Diagnosis) -> Causes:
+def confirmed_causes(dx: Diagnosis) -> Causes:
     """The proposed causes, without sets that no exact refit confirms.
 
     Where nothing was refitted, or nothing that was gains its price, they stay as proposed.

@@ -72,9 +72,9 @@ class Diagnosis(Printed):
 
         A second or two at first, where several sets are proposed.
         """
-        from .confirm import confirmed  # it needs refits, which make candidates
+        from .confirm import confirmed_causes  # it needs refits, which make candidates
 
-        return confirmed(self)
+        return confirmed_causes(self)
 
     @property
     def alpha(self) -> float:
