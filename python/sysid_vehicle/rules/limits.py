@@ -121,7 +121,11 @@ class Rules:
         Beyond it measures speak for an effect whose error does not fall, and errors at one horizon
         against any.
         """
-        return NormalDist().inv_cdf(0.5 + 0.5 * self.credible)
+        return self.interval_of(1)
+
+    def interval_of(self, tests: int) -> float:
+        """The same where all of so many intervals are `credible` together (Bonferroni)."""
+        return NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - self.credible) / max(tests, 1))
 
     @property
     def bound(self) -> float:

@@ -279,6 +279,16 @@ def test_what_grows_clearly_and_by_more_than_matters() -> None:
     assert worse((grown,), replace(USUAL, worse=0.2)) == ()
 
 
+def test_of_several_channels_one_grows_by_chance() -> None:
+    channels = ("vx_mps", "ax_mps2", "vy_mps", "yaw_rate_radps", "ay_mps2")
+    found = [ErrorChange(c, h, -0.03, 0.04) for h in (5.0, 1.0, 2.0) for c in channels]
+    found[2] = replace(found[2], log_ratio=2.4 * found[2].error)
+    assert worse([c for c in found if c.channel == "vy_mps"]) == (found[2],)
+    assert worse(found) == ()
+    found[2] = replace(found[2], log_ratio=2.7 * found[2].error)
+    assert worse(found) == (found[2],)
+
+
 def test_what_a_channel_leans_to_at_all_its_horizons_has_grown() -> None:
     leaning = [
         ErrorChange("vy_mps", h, g, 0.08) for h, g in ((1.0, 0.10), (2.0, 0.13), (5.0, 0.04))
