@@ -14,7 +14,8 @@ const char* name_of(Scan scan) {
 }
 
 const char* name_of(Breaks breaks) {
-    constexpr std::array names{"", "readings late", "answers late", "on a slope"};
+    constexpr std::array names{"", "readings late", "readings elsewhere", "answers late",
+                               "on a slope"};
     return names[static_cast<std::size_t>(breaks)];
 }
 

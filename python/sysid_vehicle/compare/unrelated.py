@@ -88,7 +88,10 @@ def incoherent(driving: Driving, effects: Iterable[str | Effect]) -> dict[str, s
         A sentence for each such channel.
     """
     breaks = {effect(e).breaks for e in effects}
-    delayed = {*MEASURED, "steer_rad"} if "readings late" in breaks else set()
+    delayed: set[str] = {*MEASURED, "steer_rad"} if "readings late" in breaks else set()
+    if "readings elsewhere" in breaks:
+        # At constant speed an arm ahead of the others reads as a yaw rate that is early.
+        delayed |= {"vy_mps", "yaw_rate_radps", "ay_mps2"}
     found: dict[str, str] = {}
     for log in driving.logs:
         for c in log.contradictions:

@@ -124,7 +124,7 @@ class Effect:
         Effect through which it chiefly acts, if any: weak in a model without that.
     breaks : str
         Law of motion that readings seem to break where it acts, through no fault of theirs:
-        `readings late`, `answers late`, `on a slope`, or empty.
+        `readings late`, `readings elsewhere`, `answers late`, `on a slope`, or empty.
     same_in_all_logs : bool
         As a nuisance it is the same in all logs of a car, where others differ from log to log.
     on_request : bool

@@ -81,6 +81,7 @@ def test_effects_say_what_they_break_and_what_logs_share() -> None:
     late = ("steer_delay", "steer_lag", "steer_compliance", "tyre_relaxation")
     late = (*late, "front_tyre_relaxation")
     expected = dict.fromkeys(late, "answers late") | {"sensor_delay": "readings late"}
+    expected |= dict.fromkeys(("speed_sensor_lever_arm", "imu_lever_arm"), "readings elsewhere")
     assert broken == expected | {"road_grade": "on a slope"}
     assert all(f"breaks      laws of motion: {e.breaks}" in str(e) for e in map(effect, broken))
     shared = {e.id for e in catalogue() if e.same_in_all_logs}

@@ -21,7 +21,7 @@ enum class Scan { kNone, kTime, kRange };
 
 /// A law of motion that readings seem to break where the effect acts, through no fault of theirs:
 /// all channels come late, the car answers its steering late, gravity acts along the car.
-enum class Breaks { kNothing, kReadingsLate, kAnswersLate, kOnASlope };
+enum class Breaks { kNothing, kReadingsLate, kReadingsElsewhere, kAnswersLate, kOnASlope };
 
 struct Range {
     double low = 0.0, high = 0.0;

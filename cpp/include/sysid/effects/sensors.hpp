@@ -96,6 +96,7 @@ struct SpeedSensorLeverArm : Effect {
         .needs = "steer_rad, vx_mps, yaw_rate_radps, vy_mps",
         .confounded_with = "cg_position, ins_lever_arm",
         .parameters = {arm_forward(0.8, 0.1, 1.5), arm_left(0.4, 0.1, 0.8)},
+        .breaks = Breaks::kReadingsElsewhere,
         .same_in_all_logs = true,
     };
 
@@ -148,6 +149,7 @@ struct ImuLeverArm : Effect {
         .needs = "ay_mps2, yaw_rate_radps",
         .confounded_with = "cg_position, ins_lever_arm",
         .parameters = {arm_forward(0.5, 0.05, 0.8), arm_left(0.3, 0.05, 0.5)},
+        .breaks = Breaks::kReadingsElsewhere,
         .same_in_all_logs = true,
     };
 
