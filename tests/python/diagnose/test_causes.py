@@ -122,7 +122,7 @@ def test_what_is_scored_over_a_grid_is_refitted_too(
     sets = (*found.proposed.sets, grid)
     with_grid = replace(found, proposed=replace(found.proposed, sets=sets))
     assert "friction_change" not in with_grid.proposed.sizes
-    causes = confirm.confirmed(with_grid)
+    causes = confirm.confirmed_causes(with_grid)
     assert causes.sets[0].effects == ("steer_offset",)
     assert str(causes)
 
