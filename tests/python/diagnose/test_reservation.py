@@ -141,8 +141,9 @@ def test_a_slope_explains_a_car_that_brakes_all_the_time(truth: Model) -> None:
     log = Log.from_arrays(columns, check=False)
     assert [c.channel for c in log.contradictions] == ["fx_n"]
     driving = Driving.of(log)
-    assert set(incoherent(driving, ())) == set(incoherent(driving, ("mass",))) == {"fx_n"}
-    assert incoherent(driving, ("road_grade",)) == {}
+    assert set(incoherent(driving, truth)) == {"fx_n"}
+    assert set(incoherent(driving, truth.add("mass"))) == {"fx_n"}
+    assert incoherent(driving, downhill) == {}
     dx = diagnose(identify(truth, log, starts=1), candidates=["road_grade", "gyro_scale"])
     assert dx.best.id == "road_grade"
 
@@ -166,30 +167,40 @@ def test_without_evidence_what_is_wrong_is_told_all_the_same(
 
 
 def test_what_the_model_delays_itself_is_no_contradiction(
-    clean: Log, altered: Callable[..., Log]
+    truth: Model, clean: Log, altered: Callable[..., Log]
 ) -> None:
     time_s = clean["time_s"]
 
-    def late(name: str, by_s: float, *effects: str) -> dict[str, str]:
+    def late(name: str, by_s: float, **values: float) -> dict[str, str]:
         log = altered(clean, **{name: np.interp(time_s - by_s, time_s, clean[name])})
-        return incoherent(Driving.of(log), effects)
+        own = {n.replace("__", "."): v for n, v in values.items()}
+        model = truth.add(*{n.split(".")[0] for n in own}).with_values(own)
+        return incoherent(Driving.of(log), model)
 
-    assert incoherent(Driving.of(clean), ()) == {}
+    assert incoherent(Driving.of(clean), truth) == {}
     assert set(late("yaw_rate_radps", 0.1)) == {"yaw_rate_radps"}
-    assert late("yaw_rate_radps", 0.1, "sensor_delay") == {}
-    assert set(late("yaw_rate_radps", 0.1, "steer_delay")) == {"yaw_rate_radps"}
-    assert set(late("steer_rad", 0.1, "steer_delay")) == {"steer_rad"}
+    assert late("yaw_rate_radps", 0.1, sensor_delay__inertial_s=0.1) == {}
+    assert set(late("yaw_rate_radps", 0.1, sensor_delay__inertial_s=0.01)) == {"yaw_rate_radps"}
+    assert set(late("yaw_rate_radps", 0.1, steer_delay__delay_s=0.1)) == {"yaw_rate_radps"}
+    assert set(late("steer_rad", 0.1, steer_delay__delay_s=0.1)) == {"steer_rad"}
     assert set(late("steer_rad", -0.25)) == {"steer_rad"}
-    assert late("steer_rad", -0.25, "steer_delay") == {}
+    assert late("steer_rad", -0.25, steer_delay__delay_s=0.25) == {}
+    assert set(late("steer_rad", -0.25, steer_delay__delay_s=0.02)) == {"steer_rad"}
 
 
-def test_an_arm_of_a_sensor_that_the_model_has_is_no_contradiction(truth: Model) -> None:
-    arm = {"speed_sensor_lever_arm.forward_m": 1.6, "speed_sensor_lever_arm.left_m": 0.8}
-    elsewhere = truth.add("speed_sensor_lever_arm").with_values(arm)
-    driving = Driving.of(drive(elsewhere, manoeuvres.slalom(), seed=3))
-    # It reads v_y + 1.6 m r: at 20 m/s a yaw rate that is 80 ms early.
-    assert "runs ahead of ay_mps2" in incoherent(driving, ("mass",))["yaw_rate_radps"]
-    assert incoherent(driving, ("speed_sensor_lever_arm",)) == {}
+@pytest.mark.parametrize("effect", ["speed_sensor_lever_arm", "imu_lever_arm"])
+def test_an_arm_of_a_sensor_that_the_model_has_is_no_contradiction(
+    truth: Model, effect: str
+) -> None:
+    def model(forward_m: float) -> Model:
+        return truth.add(effect).with_values({f"{effect}.forward_m": forward_m})
+
+    driving = Driving.of(drive(model(-1.6), manoeuvres.ramp_steer(), seed=3))
+    # v_y - 1.6 m r reads, at 20 m/s, like a yaw rate that is 80 ms late.
+    assert set(incoherent(driving, truth.add("mass"))) == {"yaw_rate_radps"}
+    assert incoherent(driving, model(-1.6)) == {}
+    # An arm of a few centimetres is none that shifts by that much.
+    assert set(incoherent(driving, model(-0.05))) == {"yaw_rate_radps"}
 
 
 @pytest.mark.manual
