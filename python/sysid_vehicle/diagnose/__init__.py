@@ -5,8 +5,9 @@ from .candidates.causes import Causes, CredibleSet
 from .candidates.constancy import Constancy, constancy
 from .candidates.diagnosis import Diagnosis
 from .candidates.instead import Instead, instead
+from .candidates.judge import judge, verdicts
 from .candidates.possible import Size, considered, possible, refused
-from .candidates.verdicts import EffectVerdict, Verdicts, judge, verdicts
+from .candidates.verdicts import EffectVerdict, Verdicts
 from .candidates.widened import widened
 from .change.change import Change, EffectChange, LoadChange
 from .change.changed import changed

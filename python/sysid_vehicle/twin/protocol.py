@@ -129,56 +129,15 @@ def observe_with(
     read = _table(twin, measured, n, dt)
     _check(twin, observer)
     _heard(observer, measured)
-    laws = observer.core_laws(names, twin.output_names, dt)
-    batch, scaled, count = None, [], 1
-    if observer.batch is not None:
-        batch = observer.batch.core(names, twin.output_names, dt, twin.input_names)
-        scaled = observer.batch.scaled(twin.input_names)
-        count += len(observer.batch.looked_for(twin.input_names))
-    parameters = twin.get_parameters() if "parameters" in twin.capabilities else {}
-    estimate = [parameters.get(name, 0.0) for name in names]
-    estimate += [0.0] * (_MOST_PARAMETERS - len(estimate)) + [1.0]
-    twins = [twin, *(twin.clone() for _ in range(count - 1))]
-    told = np.repeat(inputs[:1], count, axis=0)
-    scales = np.ones((count, 1))
-
-    def put() -> None:
-        for j, t in enumerate(twins):
-            own = estimate if batch is None else batch.of_twin(j, estimate)
-            t.set_parameters(_named(names, own))
-            scales[j] = own[-1]
-
-    if batch is not None:
-        put()
-    gains = [g.row(twin.output_names, _correctable(twin)) for g in observer.gains]
+    several = _Several(twin, observer, dt)
     kept: list[tuple[list[float], FloatArray, int]] = []
     for k in range(n):
-        told[:] = inputs[k]
-        told[:, scaled] *= scales
-        outputs = np.array(
-            [t.outputs(u) for t, u in zip(twins, told, strict=True)], dtype=np.float64
-        )
-        if not np.all(np.isfinite(outputs[0])):
-            where = twin.output_names[int(np.flatnonzero(~np.isfinite(outputs[0]))[0])]
-            raise NumericalError(
-                f"the twin's {where} is no number at sample {k}, t = {k * dt:.6g} s; take smaller "
-                f"gains or a nearer start"
-            )
+        outputs = several.outputs(inputs[k])
+        _all_numbers(twin, outputs[0], k, dt)
         if k % stride == 0:
-            kept.append((list(estimate), outputs[0], laws.stage if laws is not None else 0))
-        if gains:
-            for t, y in zip(twins, outputs, strict=True):
-                _correct(t, gains, read[k] - y, dt, _named(names, estimate))
-        if laws is not None:
-            estimate = laws.update(read[k], outputs[0], estimate)
-        if batch is not None:
-            estimate, moved = batch.update(read[k], outputs, estimate)
-            if "state" in twin.capabilities and np.any(moved):
-                _follow(twins, moved)
-        if batch is not None or laws is not None:
-            put()
-        for t, u in zip(twins, told, strict=True):
-            t.step(u)
+            kept.append((list(several.estimate), outputs[0], several.stage))
+        several.learn(read[k], outputs)
+        several.step()
     history = np.array([row[0] for row in kept])
     seen = np.array([row[1] for row in kept])
     return judged(
@@ -188,9 +147,85 @@ def observe_with(
         {name: history[:, i] for i, name in enumerate(names)},
         {name: seen[:, i] for i, name in enumerate(twin.output_names)},
         np.array([float(row[2]) for row in kept]),
-        [] if batch is None else batch.spread.tolist(),
+        several.spread,
         {name: read[::stride, i] for i, name in enumerate(twin.output_names)},
     )
+
+
+class _Several:
+    """A twin and, where parameters are looked for, its clones with other values of them."""
+
+    def __init__(self, twin: Twin, observer: Observer, dt: float) -> None:
+        self._names, read = twin.parameter_names, twin.output_names
+        self._dt = dt
+        self._laws = observer.core_laws(self._names, read, dt)
+        self._batch, self._scaled, count = None, [], 1
+        if observer.batch is not None:
+            self._batch = observer.batch.core(self._names, read, dt, twin.input_names)
+            self._scaled = observer.batch.scaled(twin.input_names)
+            count += len(observer.batch.looked_for(twin.input_names))
+        known = twin.get_parameters() if "parameters" in twin.capabilities else {}
+        self.estimate = [known.get(name, 0.0) for name in self._names]
+        self.estimate += [0.0] * (_MOST_PARAMETERS - len(self.estimate)) + [1.0]
+        self._gains = [g.row(read, _correctable(twin)) for g in observer.gains]
+        self._twins = [twin, *(twin.clone() for _ in range(count - 1))]
+        self._has_states = "state" in twin.capabilities
+        self._told = np.zeros((count, len(twin.input_names)))
+        self._scales = np.ones((count, 1))
+        if self._batch is not None:
+            self._put()
+
+    @property
+    def stage(self) -> int:
+        """Of the laws by which the load is found."""
+        return self._laws.stage if self._laws is not None else 0
+
+    @property
+    def spread(self) -> list[float]:
+        """Standard errors of what the batch looks for; none without one."""
+        return [] if self._batch is None else list(self._batch.spread.tolist())
+
+    def outputs(self, inputs: FloatArray) -> FloatArray:
+        """What each of them reads with these inputs, the twin itself first."""
+        self._told[:] = inputs
+        self._told[:, self._scaled] *= self._scales
+        pairs = zip(self._twins, self._told, strict=True)
+        return np.array([t.outputs(u) for t, u in pairs], dtype=np.float64)
+
+    def learn(self, read: FloatArray, outputs: FloatArray) -> None:
+        """Correct states and estimates by what the car read."""
+        if self._gains:
+            load = _named(self._names, self.estimate)
+            for t, y in zip(self._twins, outputs, strict=True):
+                _correct(t, self._gains, read - y, self._dt, load)
+        if self._laws is not None:
+            self.estimate = self._laws.update(read, outputs[0], self.estimate)
+        if self._batch is not None:
+            self.estimate, moved = self._batch.update(read, outputs, self.estimate)
+            if self._has_states and np.any(moved):
+                _follow(self._twins, moved)
+        if self._batch is not None or self._laws is not None:
+            self._put()
+
+    def step(self) -> None:
+        """Advance all of them with the inputs held."""
+        for t, u in zip(self._twins, self._told, strict=True):
+            t.step(u)
+
+    def _put(self) -> None:
+        for j, t in enumerate(self._twins):
+            own = self.estimate if self._batch is None else self._batch.of_twin(j, self.estimate)
+            t.set_parameters(_named(self._names, own))
+            self._scales[j] = own[-1]
+
+
+def _all_numbers(twin: Twin, outputs: FloatArray, k: int, dt: float) -> None:
+    if not np.all(np.isfinite(outputs)):
+        where = twin.output_names[int(np.flatnonzero(~np.isfinite(outputs))[0])]
+        raise NumericalError(
+            f"the twin's {where} is no number at sample {k}, t = {k * dt:.6g} s; take smaller "
+            f"gains or a nearer start"
+        )
 
 
 def _named(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:

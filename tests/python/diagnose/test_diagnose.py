@@ -19,7 +19,7 @@ from sysid_vehicle import (
     identify,
     manoeuvres,
 )
-from sysid_vehicle.diagnose.diagnose import _rivals, _too_fast
+from sysid_vehicle.diagnose.candidates.refitting import _rivals, _too_fast
 
 Hidden = Callable[[str, float], Fit]
 OFFSET = "steer_offset.offset_rad", 0.002

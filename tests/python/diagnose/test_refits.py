@@ -26,7 +26,7 @@ from sysid_vehicle.diagnose.candidates.refits import (
     is_hidden_by_noise,
     refitted,
 )
-from sysid_vehicle.diagnose.diagnose import _hidden_by_tyres
+from sysid_vehicle.diagnose.candidates.refitting import _hidden_by_tyres
 from sysid_vehicle.effects import catalogue
 from sysid_vehicle.identify import refit
 from sysid_vehicle.identify.search.objective import Objective

@@ -18,8 +18,8 @@ from sysid_vehicle import (
     verdicts,
 )
 from sysid_vehicle.diagnose import EffectVerdict, Verdicts, possible
+from sysid_vehicle.diagnose.candidates.judge import _of_present, judge
 from sysid_vehicle.diagnose.candidates.possible import possible_in
-from sysid_vehicle.diagnose.candidates.verdicts import _of_present, judge
 from sysid_vehicle.effects import Effect
 from sysid_vehicle.identify import Estimate, refit
 from sysid_vehicle.rules import USUAL

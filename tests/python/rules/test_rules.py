@@ -36,7 +36,10 @@ NUMERICAL = {
     "diagnose/change/together.py": {"_FAR", "_SHARES"},
     "diagnose/candidates/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
     "diagnose/evidence/coordinates.py": {"BLOCK_S"},
-    "diagnose/diagnose.py": {"REFITS", "_HOPELESS", "_HOPELESS_WITH_STATES", "_RIVALS"},
+    "diagnose/diagnose.py": {"REFITS"},
+    "diagnose/candidates/refitting.py": {
+        "_HOPELESS", "_HOPELESS_WITH_STATES", "_NEAR", "_RIVALS",
+    },
     "diagnose/evidence/directions.py": {"_ROWS"},
     "diagnose/evidence/evidence.py": {"HELD", "_AT_ONCE"},
     "diagnose/experiment/information.py": {"_COPIED"},

@@ -51,8 +51,8 @@ def test_what_has_no_noise_of_its_own_in_time_is_held_against_the_like(
         done.append(c.id)
         return replace(c, statistic=1e9) if len(done) == 1 else c
 
-    module = sys.modules["sysid_vehicle.diagnose.diagnose"]
-    monkeypatch.setattr(module, "finished_of", one_only)
+    module = sys.modules["sysid_vehicle.diagnose.candidates.refitting"]
+    monkeypatch.setattr(module, "finished", one_only)
     ranking = diagnose(baseline, candidates=ALIKE, workers=1).ranking
     assert len(done) > 1
     assert max(c.statistic for c in ranking) < 1e9

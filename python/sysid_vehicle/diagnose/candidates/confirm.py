@@ -9,7 +9,7 @@ Scores beside those before it are asked first: what gains next to nothing there 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -38,22 +38,34 @@ def confirmed_causes(dx: Diagnosis) -> Causes:
     if best is None or best.fit is None or not proposed.sets:
         return proposed
     first = next((s for s in proposed.sets if best.id in s.effects), None)
-    kept = [_leading(best, dx, first)]
     known = {c.id: c for c in dx.ranking}
     told = {
         s: next((e for e in s.effects if e in known), "") for s in proposed.sets if s is not first
     }
-    vague = [s for s, effect in told.items() if not effect]
     # What the naming of the likeliest effect has asked already is not asked again.
     left = dx.beside if dx.beside.fit is best.fit else _left(dx, best)
-    waiting = {s: effect for s, effect in told.items() if effect}
-    # The one that gains most comes first: beside what is still missing any effect gains something.
+    waiting = {s: known[e] for s, e in told.items() if e}
+    kept, left = _one_by_one(dx, left, waiting, price)
+    kept = [_leading(best, dx, first), *kept]
+    if left.omnibus.rejects:
+        kept += [s for s, effect in told.items() if not effect]
+    return proposed.only(kept, dx.sizes)
+
+
+def _one_by_one(
+    dx: Diagnosis, left: Beside, waiting: Mapping[CredibleSet, Candidate], price: float
+) -> tuple[list[CredibleSet], Beside]:
+    """Sets that gain their price one beside the other, and what is left beside all of them.
+
+    The one that gains most comes first: beside what is still missing any effect gains something.
+    """
+    kept = []
     while waiting:
-        none = hopeless(left, [known[e] for e in waiting.values()], price)
+        none = hopeless(left, list(waiting.values()), price)
         tried = {
-            s: _refitted(left, known[e], dx)
-            for s, e in waiting.items()
-            if e not in left.fit.model.effects and e not in none
+            s: _refitted(left, c, dx)
+            for s, c in waiting.items()
+            if c.id not in left.fit.model.effects and c.id not in none
         }
         waiting = {s: waiting[s] for s, c in tried.items() if c.statistic >= price}
         if not waiting:
@@ -62,9 +74,7 @@ def confirmed_causes(dx: Diagnosis) -> Causes:
         kept.append(found)
         del waiting[found]
         left = _left(dx, tried[found])
-    if vague and left.omnibus.rejects:
-        kept += vague
-    return proposed.only(kept, dx.sizes)
+    return kept, left
 
 
 def _left(dx: Diagnosis, c: Candidate) -> Beside:

@@ -1,0 +1,228 @@
+"""Which candidates are refitted with exact dynamics, and how far: refits are what takes time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..._common.progress import with_progress
+from ..._common.threads import Workers
+from ...estimate import Driving
+from ...identify import Fit
+from ...rules import Rules
+from ..unexplained.omnibus import Omnibus, omnibus
+from .candidate import Candidate
+from .confirm import hopeless
+from .refits import finished, from_typical, in_time, is_hidden_by_noise, refitted
+from .reservation import beside
+from .score import ScoreBoard
+
+# Of the best statistic: what scores less than this share does not overtake it. States of their own
+# make a refit slow, and what has some is scored at its typical size, not far from the refit.
+_HOPELESS = 0.15
+_HOPELESS_WITH_STATES = 0.6
+_RIVALS = 0.3  # of the score of the best, with which one that acts like it may overtake it
+_NEAR = 0.4  # of the best refit, with which one is finished with noise of its own
+
+
+@dataclass(frozen=True, eq=False)
+class Refitting:
+    """Refits of the candidates of one diagnosis.
+
+    Attributes
+    ----------
+    fit : Fit
+        What lacks them.
+    driving : Driving
+    rules : Rules
+    again : collection of str
+        Effects to refit beside the best ones where there is evidence.
+    pool : Workers
+    ends : float
+        When refits end [s of `time.perf_counter`].
+    progress : bool or None
+    """
+
+    fit: Fit
+    driving: Driving
+    rules: Rules
+    again: Collection[str]
+    pool: Workers
+    ends: float
+    progress: bool | None
+
+    def leading(
+        self, significant: Sequence[Candidate], refits: int
+    ) -> tuple[list[Candidate], list[Candidate]]:
+        """Those near the best with noise of their own, and the others under that of the fit.
+
+        Of another motion than the best one those are left of which nothing remains beside that.
+        """
+        few = self._worth_refitting(significant, refits)
+        more = _of_the_other_motion(significant, few)
+        if not few:
+            return [], []
+        # What the best one gains tells which of the others cannot come near it, but for some.
+        work = in_time(lambda c: refitted(self.fit, self.driving, c), self.ends)
+        sure = [c for c in few[1:] if c.effect.along_alone == few[0].effect.along_alone]
+        sure = [c for c in sure if not _too_fast(c) and self._is_asked_for(c, few[0])]
+        first, *begun = self.pool.map(work, [few[0], *sure])
+        known = {c.id: c for c in begun}
+        few = [*few, *self._left_beside(first, more)]
+        hopeful = self._hopeful(first, few)
+        others = [c for c in few[1:] if not _too_fast(c) and hopeful(c)]
+        rest = self.pool.map(lambda c: known.get(c.id) or work(c), others)
+        shown = with_progress(rest, "refits", total=len(others), shown=self.progress)
+        return self._finished([first, *shown])
+
+    def hidden(
+        self,
+        ranked: Sequence[Candidate],
+        known: Sequence[Candidate],
+        left: Omnibus,
+        board: ScoreBoard,
+    ) -> list[Candidate]:
+        """Refits of what noise or tyres that are wrong may hide, from its typical size.
+
+        Parameters
+        ----------
+        ranked : sequence of Candidate
+            All of them.
+        known : sequence of Candidate
+            Refitted already, the best one first.
+        left : Omnibus
+            Of the fit.
+        board : ScoreBoard
+        """
+        done = {c.id for c in known}
+        hidden = [c for c in ranked if is_hidden_by_noise(c.effect) and c.id not in done]
+        hidden += _hidden_by_tyres(ranked, known)
+        if not hidden or time.perf_counter() >= self.ends:
+            return []
+        n, rules = len(ranked), self.rules
+        if self._leaves_more(known[:1], left):
+            work = in_time(lambda c: from_typical(self.fit, c, n, rules.alpha), self.ends)
+            tried = self.pool.map(work, hidden)
+            return [c for c in tried if c.finished and c.p_value < rules.alpha]
+        suspects = _suspected(hidden, known, board, rules)
+        work = in_time(lambda c: from_typical(self.fit, c, n), self.ends)
+        return [c for c in self.pool.map(work, suspects) if c.finished]
+
+    def _worth_refitting(self, significant: Sequence[Candidate], refits: int) -> list[Candidate]:
+        """The best few, those asked for, and what the catalogue says acts like the very best."""
+        few = list(significant[:refits])
+        more = {*few[0].effect.confounded_with, *self.again} if few else set()
+        return few + [c for c in significant[refits:] if c.id in more]
+
+    def _is_asked_for(self, c: Candidate, best: Candidate) -> bool:
+        return c.id in self.again or _rivals(c, best)
+
+    def _left_beside(self, first: Candidate, more: Sequence[Candidate]) -> list[Candidate]:
+        """Those that may gain something beside the first one."""
+        if not more or first.fit is None:
+            return list(more)
+        price = self.rules.price * float(np.log(self.driving.samples))
+        none = hopeless(beside(first.fit, self.driving, set(), self.rules), more, price)
+        return [c for c in more if c.id not in none]
+
+    def _hopeful(self, first: Candidate, few: Sequence[Candidate]) -> Callable[[Candidate], bool]:
+        """Whether one may come near the best of its motion, by what the first one gained."""
+        best = max(first.statistic, few[0].statistic)
+        leaders = {c.effect.along_alone: c for c in reversed(few)}
+
+        def hopeful(c: Candidate) -> bool:
+            leader = leaders[c.effect.along_alone]
+            most = best if leader is few[0] else leader.statistic
+            return c.statistic > _hopeless(c) * most or self._is_asked_for(c, leader)
+
+        return hopeful
+
+    def _finished(self, tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
+        """Those near the best of their motion with noise of their own, and the others."""
+        # Under the noise of the poorer model they differ less than they really do.
+        top: dict[bool, float] = {}
+        for c in tried:
+            top[c.effect.along_alone] = max(top.get(c.effect.along_alone, 0.0), c.statistic)
+        near = [c for c in tried if c.statistic > _NEAR * top[c.effect.along_alone]]
+        done = list(self.pool.map(in_time(lambda c: finished(self.fit, c), self.ends), near))
+        if any(c is begun and c.fit for c, begun in zip(done, near, strict=True)):
+            done = near  # with noise of their own only some would seem the likelier ones
+        ids = {c.id for c in done}
+        far = sorted((c for c in tried if c.id not in ids), key=lambda c: -c.statistic)
+        return done, far
+
+    def _leaves_more(self, best: Sequence[Candidate], left: Omnibus) -> bool:
+        """Whether something is left with the best candidate, or where there is none."""
+        for c in best:
+            if c.fit is not None:
+                left = omnibus(c.fit, self.driving, self.rules)
+        return left.p_value < self.rules.strict
+
+
+def _hidden_by_tyres(ranked: Sequence[Candidate], finished: Sequence[Candidate]) -> list[Candidate]:
+    """What acts like the best along the car, and may have no score beside tyres that are wrong.
+
+    A mass moves the car along and divides its side forces: the score adds what the speed says and
+    what tyres say that are not those of the car.
+    """
+    best = next((c for c in finished if c.effect.along_alone), None)
+    if best is None:
+        return []
+    few = [c for c in ranked if c.id in best.effect.confounded_with and c.effect.along_alone]
+    known = {c.id for c in finished}
+    return [c for c in few if len(c.effect.parameters) == 1 and c.id not in known]
+
+
+def _suspected(
+    hidden: Sequence[Candidate], finished: Sequence[Candidate], board: ScoreBoard, rules: Rules
+) -> list[Candidate]:
+    """Those that a test of each alone tells apart from nothing, and that score as the best does.
+
+    Noise may hide most of what they do.
+    """
+    scores = {s.effect.id: s for s in board.scores}
+    least = _RIVALS * max((scores[c.id].statistic for c in finished), default=0.0)
+    alone = [c for c in hidden if scores[c.id].p_value < 1.0 - rules.credible]
+    return [c for c in alone if scores[c.id].statistic > least]
+
+
+def _of_the_other_motion(
+    significant: Sequence[Candidate], few: Sequence[Candidate]
+) -> list[Candidate]:
+    """The best that moves the car otherwise than the very best, and what acts like it.
+
+    What the lateral model lacks says nothing of a mass, and several lateral effects may lead of
+    which validation data confirm none.
+    """
+    if not few:
+        return []
+    along = not few[0].effect.along_alone
+    leader = next((c for c in significant if c.effect.along_alone == along), None)
+    if leader is None:
+        return []
+    known = {c.id for c in few}
+    alike = {leader.id, *leader.effect.confounded_with}
+    return [c for c in significant if c.id in alike and c.id not in known]
+
+
+def _hopeless(c: Candidate) -> float:
+    return _HOPELESS_WITH_STATES if c.effect.states > 1 else _HOPELESS
+
+
+def _rivals(c: Candidate, best: Candidate) -> bool:
+    """Whether it acts like the best one and scores nearly as well.
+
+    Score is held against score: at the fit a refit starts from, such effects lead it astray alike,
+    and what the first one gains when it is refitted the others may gain too.
+    """
+    return c.effect.is_like(best.effect) and c.statistic > _RIVALS * best.statistic
+
+
+def _too_fast(c: Candidate) -> bool:
+    """Whether its states would be so fast that they matter to nothing but the time they take."""
+    pairs = zip(c.effect.parameters, c.value, strict=True)
+    small = all(abs(v - p.null_value) < p.matters for p, v in pairs)
+    return c.effect.states > 1 and c.effect.scored_at_typical and small
