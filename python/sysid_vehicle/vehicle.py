@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import html
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -192,31 +193,7 @@ class Vehicle:
         if not isinstance(name, str):
             raise InvalidInput(f"{where}: name = {name!r} is not a text; put it in quotes")
         tyre_tables = content.pop("tyre", {})
-        if not isinstance(tyre_tables, dict):
-            raise InvalidInput(f"{where}: 'tyre' must be two tables, [tyre.front] and [tyre.rear]")
-        values = {key: content.get(key) for key in _VEHICLE_RANGES}
-        missing = [key for key, value in values.items() if value is None and key not in _OPTIONAL]
-        for key in set(content).intersection(_GEARS):
-            raise InvalidInput(
-                f"{where}: {key} is no property of the model, whose steering angle is that of the "
-                f'road wheels; put it into the channel map: steer_rad = {{ column = "...", factor '
-                f"= ... }}, with 1 / {key} in the factor, and remove it here"
-            )
-        refuse_unknown(content, _VEHICLE_RANGES, where, likely=missing)
-        refuse_unknown(tyre_tables, AXLES, f"{where}, [tyre]")
-        for axle in AXLES:
-            table = tyre_tables.get(axle, {})
-            if not isinstance(table, dict):
-                raise InvalidInput(f"{where}: 'tyre.{axle}' must be a table [tyre.{axle}]")
-            refuse_unknown(table, TYRE_RANGES, f"{where}, [tyre.{axle}]")
-            if axle in tyre_tables:
-                missing += [f"tyre.{axle}.{key}" for key in TYRE_RANGES if key not in table]
-        if missing:
-            raise InvalidInput(f"{where}: missing keys: {', '.join(missing)}; add them to the file")
-        for axle in AXLES:
-            check_ranges(TYRE_RANGES, tyre_tables.get(axle, {}), f"{where}, [tyre.{axle}]")
-        given = {key: value for key, value in values.items() if value is not None}
-        check_ranges(_VEHICLE_RANGES, given, where)
+        given = _checked_keys(content, tyre_tables, where)
         try:
             vehicle = cls(
                 **given,
@@ -274,3 +251,40 @@ class Vehicle:
             for key, text in self._rows()
         )
         return f"<table><caption>{html.escape(self.name)}</caption>{cells}</table>"
+
+
+def _checked_keys(content: Mapping[str, Any], tyres: Any, where: str) -> dict[str, Any]:
+    """Refuse keys of a vehicle file that are unknown, missing or out of range; those that it has.
+
+    Parameters
+    ----------
+    content : mapping
+        Without name and tyres.
+    tyres : mapping
+        The table of each tyre that is there.
+    where : str
+        The file, for messages.
+    """
+    if not isinstance(tyres, dict):
+        raise InvalidInput(f"{where}: 'tyre' must be two tables, [tyre.front] and [tyre.rear]")
+    given = {key: content[key] for key in _VEHICLE_RANGES if content.get(key) is not None}
+    missing = [key for key in _VEHICLE_RANGES if key not in given and key not in _OPTIONAL]
+    for key in set(content).intersection(_GEARS):
+        raise InvalidInput(
+            f"{where}: {key} is no property of the model, whose steering angle is that of the "
+            f'road wheels; put it into the channel map: steer_rad = {{ column = "...", factor '
+            f"= ... }}, with 1 / {key} in the factor, and remove it here"
+        )
+    refuse_unknown(content, _VEHICLE_RANGES, where, likely=missing)
+    refuse_unknown(tyres, AXLES, f"{where}, [tyre]")
+    for axle, table in tyres.items():
+        if not isinstance(table, dict):
+            raise InvalidInput(f"{where}: 'tyre.{axle}' must be a table [tyre.{axle}]")
+        refuse_unknown(table, TYRE_RANGES, f"{where}, [tyre.{axle}]")
+        missing += [f"tyre.{axle}.{key}" for key in TYRE_RANGES if key not in table]
+    if missing:
+        raise InvalidInput(f"{where}: missing keys: {', '.join(missing)}; add them to the file")
+    for axle, table in tyres.items():
+        check_ranges(TYRE_RANGES, table, f"{where}, [tyre.{axle}]")
+    check_ranges(_VEHICLE_RANGES, given, where)
+    return given

@@ -32,6 +32,7 @@ CANONICAL = {
 
 _SLIPS = {"alpha_fl", "alpha_fr", "alpha_rl", "alpha_rr"}
 _LATERAL = {"v_y", "r", "steer", "alpha_f", "alpha_r", "F_yf", "F_yr", "a_y", "r_dot"} | _SLIPS
+_NEAR_NULL = 1e-4  # of the way to the typical value
 _OTHER_SIDE = str.maketrans("lr", "rl")
 _TURNING = {"force_y", "moment_z", "force_y_front", "force_y_rear"} | {
     "vy_mps",
@@ -146,15 +147,7 @@ def checked(
         with np.errstate(all="ignore"):
             return {t: evaluate(f, t, given, at) for t, f in functions.items()}
 
-    for target, y in values(null | scanned, signals).items():
-        if not np.isfinite(y).all():
-            raise InvalidInput(f"{what}, {target}: it is not finite for all of brisk driving")
-        if np.any(y != 0.0):
-            at = ", ".join(f"{n} = {v:g}" for n, v in (null | scanned).items())
-            raise InvalidInput(
-                f"{what}, {target}: at the null values ({at}) it must vanish exactly, "
-                f"and is up to {np.abs(y).max():g}"
-            )
+    _check_null(what, null | scanned, values(null | scanned, signals))
     steep = False
     seen = []
     for p in parameters:
@@ -162,21 +155,10 @@ def checked(
             seen.append(p)
             continue
         full = values(null | scanned | {p.name: p.typical}, signals)
-        few = values(
-            null | scanned | {p.name: p.null_value + 1e-4 * (p.typical - p.null_value)}, signals
-        )
-        size = sum(float(np.linalg.norm(y)) for y in full.values())
-        if not np.isfinite(size):
-            raise InvalidInput(
-                f"{what}: with {p.name} = {p.typical:g} it is not finite for all of brisk driving"
-            )
-        if size == 0.0:
-            raise InvalidInput(
-                f"{what}: {p.name} does nothing by itself; where it means nothing while another "
-                "is null, give it scan='range'"
-            )
-        slope = sum(float(np.linalg.norm(y)) for y in few.values()) / (1e-4 * size)
-        steep |= not 0.02 < slope < 50.0
+        size = _size_of(p, full, what)
+        near = p.null_value + _NEAR_NULL * (p.typical - p.null_value)
+        few = values(null | scanned | {p.name: near}, signals)
+        steep |= not 0.02 < _norm(few) / (_NEAR_NULL * size) < 50.0
         turned = values(null | scanned | {p.name: p.typical}, mirror)
         other = all(
             np.allclose(turned[t], y if t in _TURNING else -y, rtol=1e-9, atol=1e-12)
@@ -184,6 +166,38 @@ def checked(
         )
         seen.append(replace(p, mirrored=other))
     return tuple(seen), steep
+
+
+def _norm(values: Mapping[str, FloatArray]) -> float:
+    return sum(float(np.linalg.norm(y)) for y in values.values())
+
+
+def _size_of(p: Parameter, full: Mapping[str, FloatArray], what: str) -> float:
+    """Size of what the effect does where one parameter is typical; refuse none, and no number."""
+    size = _norm(full)
+    if not np.isfinite(size):
+        raise InvalidInput(
+            f"{what}: with {p.name} = {p.typical:g} it is not finite for all of brisk driving"
+        )
+    if size == 0.0:
+        raise InvalidInput(
+            f"{what}: {p.name} does nothing by itself; where it means nothing while another "
+            "is null, give it scan='range'"
+        )
+    return size
+
+
+def _check_null(what: str, at: Mapping[str, float], found: Mapping[str, FloatArray]) -> None:
+    """Refuse an effect that is no number, or that is there, at its null values."""
+    for target, y in found.items():
+        if not np.isfinite(y).all():
+            raise InvalidInput(f"{what}, {target}: it is not finite for all of brisk driving")
+        if np.any(y != 0.0):
+            values = ", ".join(f"{n} = {v:g}" for n, v in at.items())
+            raise InvalidInput(
+                f"{what}, {target}: at the null values ({values}) it must vanish exactly, "
+                f"and is up to {np.abs(y).max():g}"
+            )
 
 
 def _mirrored(

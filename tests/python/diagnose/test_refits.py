@@ -150,7 +150,8 @@ def test_of_the_other_motion_what_the_best_explains_is_not_refitted(
         return {c.id for c in ranking if c.effect.along_alone and c.fit is not None}
 
     found = along()
-    monkeypatch.setattr(sys.modules["sysid_vehicle.diagnose.diagnose"], "hopeless", lambda *_: ())
+    module = sys.modules["sysid_vehicle.diagnose.candidates.refitting"]
+    monkeypatch.setattr(module, "hopeless", lambda *_: ())
     assert found < along()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from .causes import UNKNOWN, Causes, CredibleSet
 from .clocks import clock_parameter, clock_scores
 from .possible import Size
 from .score import ScoreBoard
-from .single_effects import Hypothesis, ScoreModel
+from .single_effects import Hypothesis, Posterior, ScoreModel
 
 _KEPT = 40  # of the leading subsets
 _LEAST = 1e-6  # probability that is remembered
@@ -171,29 +171,9 @@ def causes_in(
     )
     included = 1.0 - np.prod(1.0 - by_effect, axis=0)
     order = np.argsort(-included, kind="stable")
-    sets: list[CredibleSet] = []
-    scattered = []
-    for weights in by_effect:
-        likeliest = np.argsort(-weights, kind="stable")
-        reached = np.cumsum(weights[likeliest])
-        if reached[-1] < rules.credible:
-            scattered.append(weights)
-            continue  # it may be nothing
-        few = likeliest[: int(np.argmax(reached >= rules.credible)) + 1]
-        effects = tuple(model.effects[i] for i in few)
-        if not any(effects[0] == s.effects[0] for s in sets):
-            likely = {model.effects[i]: float(weights[i]) for i in likeliest if weights[i] > _LEAST}
-            sets.append(CredibleSet(effects, tuple(float(weights[i]) for i in few), likely))
+    sets, scattered = _credible_sets(model.effects, by_effect, rules)
     rest = 1.0 - np.prod(1.0 - np.reshape(scattered, (-1, len(model.effects))), axis=0)
-    sizes: dict[str, Size] = {}
-    for h, weights in zip(model.hypotheses, posterior.weights.T, strict=True):
-        if h.name not in parameters or len(h.columns) != len(parameters[h.name]):
-            continue
-        null = np.array([p.null_value for p in parameters[h.name]])
-        at = int(np.argmax(weights))
-        own = list(h.columns)
-        mean, std = (x[at, own] * scale[own] for x in (posterior.means, posterior.stds))
-        sizes[h.name] = tuple(map(float, null + mean)), tuple(map(float, std))
+    sizes = _sizes_of(model, posterior, scale, parameters)
     return Causes(
         {model.effects[i]: float(included[i]) for i in order},
         tuple(sets),
@@ -203,3 +183,43 @@ def causes_in(
         {e: tuple((p.name, p.unit) for p in parameters[e]) for e in sizes},
         {e: float(p) for e, p in zip(model.effects, rest, strict=True) if p > _LEAST},
     )
+
+
+def _credible_sets(
+    effects: Sequence[str], by_effect: FloatArray, rules: Rules
+) -> tuple[list[CredibleSet], list[FloatArray]]:
+    """The set of each effect of a sum, and the weights of those that may be nothing."""
+    sets: list[CredibleSet] = []
+    scattered = []
+    for weights in by_effect:
+        likeliest = np.argsort(-weights, kind="stable")
+        reached = np.cumsum(weights[likeliest])
+        if reached[-1] < rules.credible:
+            scattered.append(weights)
+            continue
+        few = likeliest[: int(np.argmax(reached >= rules.credible)) + 1]
+        if any(effects[few[0]] == s.effects[0] for s in sets):
+            continue
+        likely = {effects[i]: float(weights[i]) for i in likeliest if weights[i] > _LEAST}
+        own = tuple(effects[i] for i in few)
+        sets.append(CredibleSet(own, tuple(float(weights[i]) for i in few), likely))
+    return sets, scattered
+
+
+def _sizes_of(
+    model: ScoreModel,
+    posterior: Posterior,
+    scale: FloatArray,
+    parameters: Mapping[str, tuple[Parameter, ...]],
+) -> dict[str, Size]:
+    """Parameters of each effect and their standard errors, where it is likeliest."""
+    sizes: dict[str, Size] = {}
+    for h, weights in zip(model.hypotheses, posterior.weights.T, strict=True):
+        if h.name not in parameters or len(h.columns) != len(parameters[h.name]):
+            continue
+        null = np.array([p.null_value for p in parameters[h.name]])
+        at = int(np.argmax(weights))
+        own = list(h.columns)
+        mean, std = (x[at, own] * scale[own] for x in (posterior.means, posterior.stds))
+        sizes[h.name] = tuple(map(float, null + mean)), tuple(map(float, std))
+    return sizes
