@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from .._common.arrays import FloatArray
+from .._common.arrays import FloatArray, as_float64
 from .._common.tables import frame
 from .._common.text import HALF_95, brief, html_list, html_paragraph, html_table, number, text_table
 from ..estimate import Driving, NoiseModel
@@ -53,6 +53,9 @@ class Fit(Estimated):
     horizon_s : float
         What the parameters predict best: this many seconds ahead; zero for one step, the
         likelihood.
+    pushed : array, shape (n, times)
+        Change of the estimates by one standard error of each time by which readings were moved
+        (`Log.retimed`); the covariance holds it.
     """
 
     model: Model
@@ -65,6 +68,13 @@ class Fit(Estimated):
     converged: bool
     profiles: tuple[Profile, ...] = ()
     horizon_s: float = 0.0
+    pushed: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def by_noise(self) -> FloatArray:  # noqa: D102 - as of all fits
+        if not self.pushed.size:
+            return self.covariance
+        return as_float64(self.covariance - self.pushed @ self.pushed.T)
 
     def save(self, path: str | Path) -> None:
         """Write the fit, with the driving it was fitted to; :func:`sysid_vehicle.load` reads it.
@@ -119,7 +129,8 @@ class Fit(Estimated):
 
     def values_of(self, model: Model) -> dict[str, float]:
         """What `derived` is of another model, which may lack this one's effects: the true one."""
-        bare = replace(self, model=model, estimates=(), covariance=np.zeros((0, 0)), profiles=())
+        none = np.zeros((0, 0))
+        bare = replace(self, model=model, estimates=(), covariance=none, profiles=(), pushed=none)
         return {e.name: e.value for e in bare.derived}
 
     @property

@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from .. import _core
-from .._common.arrays import FloatArray
+from .._common.arrays import FloatArray, as_float64
 from ..errors import NumericalError
 from ..estimate import Driving, NoiseModel
 from ..model import Model
 from .fit import Fit
-from .intervals.estimates import wald
+from .intervals.estimates import box_covariance, wald
+from .intervals.retimed import pushes_of_time
 from .offsets import marginal_information
 from .search.box import free_box, objective_of
 from .search.climb import FAR_BELOW, to_the_top
@@ -344,9 +345,9 @@ def summary(
         information = marginal_information(model, driving, p, noise)
     x = p[box.columns]
     units = {n: parameter.unit for n, parameter in model.parameters.items()}
-    estimates, covariance = wald(
-        names, units, x, information, box, [model.bounds(n) for n in names], descent
-    )
+    pushes = pushes_of_time(model, driving, p, frozen, box.columns)
+    ends = [model.bounds(n) for n in names]
+    estimates, covariance = wald(names, units, x, information, box, ends, descent, pushes)
     return Fit(
         model.with_values(dict(zip(names, map(float, x), strict=True))),
         noise,
@@ -356,4 +357,5 @@ def summary(
         driving,
         starts,
         converged,
+        pushed=as_float64(box_covariance(information, box, x) @ pushes),
     )

@@ -5,7 +5,7 @@ from .channels import CHANNELS, MEASURED, Channel
 from .columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
 from .held import held_rows
 from .laws.laws import Contradiction
-from .log import Log
+from .log import Log, Retimed
 from .together import check_excitation, several_logs, unexcited
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "Columns",
     "Contradiction",
     "Log",
+    "Retimed",
     "as_floats",
     "as_seconds",
     "check_car",

@@ -33,6 +33,21 @@ _SHOWN = ("vx_mps", "steer_rad", "yaw_rate_radps", "ay_mps2", "ax_mps2", "vy_mps
 _LEAST_MPS, _LEAST_ANY_MPS, _LEAST_SHARE = 3.0, 1.0, 0.4
 
 
+@dataclass(frozen=True)
+class Retimed:
+    """Readings that were put at another time together, and how sure that time is.
+
+    Attributes
+    ----------
+    channels : tuple of str
+    std_s : float
+        Standard error of the time, the same error for all of them [s].
+    """
+
+    channels: tuple[str, ...]
+    std_s: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Log:
     """One run of the car; build it with :meth:`from_arrays` or ``read_log``.
@@ -54,6 +69,8 @@ class Log:
         Whether the source was uniform; False if it was resampled or gaps were filled with NaN.
     corrections : tuple of str
         What was put right in the channels after they had been read, a sentence each.
+    retimed : tuple of Retimed
+        What of that has moved readings in time by an estimate: intervals of fits count its error.
     """
 
     name: str
@@ -61,6 +78,7 @@ class Log:
     uniform: bool
     _data: dict[str, FloatArray]
     corrections: tuple[str, ...] = ()
+    retimed: tuple[Retimed, ...] = ()
 
     @classmethod
     def from_arrays(
@@ -187,9 +205,14 @@ class Log:
             )
         part = {name: values[first:last] for name, values in self._data.items()}
         name = f"{self.name} [{time_s[first]:.6g} to {time_s[last - 1]:.6g} s]"
-        return Log(name, self.rate_hz, self.uniform, part, self.corrections)
+        return Log(name, self.rate_hz, self.uniform, part, self.corrections, self.retimed)
 
-    def corrected(self, channels: Mapping[str, FloatArray], what: Sequence[str]) -> Log:
+    def corrected(
+        self,
+        channels: Mapping[str, FloatArray],
+        what: Sequence[str],
+        retimed: Sequence[Retimed] = (),
+    ) -> Log:
         """Return the log with some channels replaced, and with what was done recorded.
 
         Parameters
@@ -198,6 +221,8 @@ class Log:
             New values of channels that are present.
         what : sequence of str
             Sentences for `corrections`.
+        retimed : sequence of Retimed
+            Those that were moved in time by an estimate.
         """
         data = dict(self._data)
         for name, values in channels.items():
@@ -207,7 +232,8 @@ class Log:
                 )
             data[name] = np.array(values, dtype=float)
             data[name].flags.writeable = False
-        return Log(self.name, self.rate_hz, self.uniform, data, (*self.corrections, *what))
+        said, moved = (*self.corrections, *what), (*self.retimed, *retimed)
+        return Log(self.name, self.rate_hz, self.uniform, data, said, moved)
 
     def missing(self) -> dict[str, str]:
         """Return each absent optional channel with what cannot be seen without it, in words."""

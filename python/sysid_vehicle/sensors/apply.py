@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import scipy
 
 from .._common.arrays import FloatArray, filled
-from ..log import Log
+from ..log import Log, Retimed
+from .faults import SensorFault
 
 _SMOOTH_S = 0.2  # yaw acceleration is that of a parabola over this time
 _HALF_TAPS = 8  # of the interpolation, on either side
@@ -61,6 +62,28 @@ def corrected(log: Log, found: Mapping[str, float]) -> tuple[dict[str, FloatArra
         now["ay_mps2"] = values("ay_mps2") / (1.0 + found["gain_ay"])
         what.append(f"ay_mps2: scale error of {100.0 * found['gain_ay']:.3g} % taken out")
     return now, what
+
+
+def retimed(log: Log, found: Mapping[str, float], faults: Sequence[SensorFault]) -> list[Retimed]:
+    """How sure the times are by which `corrected` moves channels.
+
+    Parameters
+    ----------
+    log : Log
+    found : mapping of float
+        As for `corrected`.
+    faults : sequence of SensorFault
+        With their standard errors.
+    """
+    std = {fault.name: fault.std for fault in faults}
+    moved = []
+    for channel, names in LATE.items():
+        # How late an axis is because the body leans is told together with its delay.
+        told = {name.replace("lean_", "delay_") for name in names if found.get(name)}
+        error_s = max((std.get(name, 0.0) for name in told), default=0.0)
+        if log.has(channel) and 0.0 < error_s < np.inf:
+            moved.append(Retimed((channel,), error_s))
+    return moved
 
 
 def _accelerations(

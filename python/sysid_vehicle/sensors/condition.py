@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 
 from .._common.arrays import ComplexArray, FloatArray
-from ..log import Log
+from ..log import Log, Retimed
 from .kinematics.motion import IntArray
 from .low_pass.forms import Response
 from .low_pass.low_pass import NoiseFit, fitted, with_low_pass
@@ -197,7 +197,16 @@ def _put_right(log: Log, channels: Sequence[_Channel], filters: dict[str, _Filte
             )
         elif lines:
             now[name] = _passed(log[name], s, noise.gain)
-    return log.corrected(now, what) if now else log
+    if not now:
+        return log
+    # What one filter has made late comes late by the same time.
+    together: dict[float, list[str]] = {}
+    for channel in channels:
+        if channel.name in filters:
+            std_s = filters[channel.name].fit.delay_std_s
+            together.setdefault(std_s, []).append(channel.name)
+    moved = [Retimed(tuple(names), std_s) for std_s, names in together.items()]
+    return log.corrected(now, what, moved)
 
 
 def _passed(

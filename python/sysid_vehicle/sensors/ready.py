@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..errors import SysidError
 from ..log import Log
-from .apply import corrected
+from .apply import corrected, retimed
 from .check import checked
 from .condition import conditioned
 from .faults import SensorFault, to_put_right
@@ -47,7 +47,7 @@ def made_ready(logs: Sequence[Log], others: Sequence[Log]) -> tuple[list[Log], l
     late = to_put_right([found[name] for name in _DELAYS])
     if not late:
         return own, rest, False
-    done = [log.corrected(*corrected(log, late)) for log in ready]
+    done = [log.corrected(*corrected(log, late), retimed(log, late, found.faults)) for log in ready]
     return done[: len(logs)], done[len(logs) :], True
 
 

@@ -18,7 +18,7 @@ from ..errors import InvalidInput, near_names
 from ..log import Log
 from ..rules import USUAL, Rules
 from ..vehicle import Vehicle
-from .apply import LATE, corrected
+from .apply import LATE, corrected, retimed
 from .faults import SensorFault, leaning, to_put_right
 from .kinematics.colour import Colour
 from .kinematics.equations import Readings, lean
@@ -156,7 +156,7 @@ class SensorCheck:
         if log.has("ax_mps2") and not log.has("fx_n") and abs(bias) > _SURE * std:
             channels["ax_mps2"] = channels.get("ax_mps2", log["ax_mps2"]) - bias
             what.append(f"ax_mps2: {bias:.3g} m/s2 on average beyond the motion taken out")
-        return log.corrected(channels, what)
+        return log.corrected(channels, what, retimed(log, self._taken_out, self.faults))
 
     @property
     def remarks(self) -> tuple[str, ...]:

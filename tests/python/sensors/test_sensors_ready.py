@@ -143,6 +143,10 @@ def test_a_filter_that_is_told_is_undone(log: sv.Log) -> None:
         assert _delay(ready[channel], log[channel]) == pytest.approx(0.0, abs=0.001)
     assert len(ready.corrections) == 5
     assert "low-pass of 1" in ready.corrections[0]
+    # One filter for both devices: their times are off together.
+    (moved,) = ready.retimed
+    assert sorted(moved.channels) == sorted(MOTION)
+    assert 0.0 < moved.std_s < 0.001
 
 
 def test_beside_a_gap_a_filter_is_not_undone(log: sv.Log) -> None:
@@ -208,6 +212,8 @@ def test_late_speeds_are_read_earlier_in_all_logs(log: sv.Log) -> None:
             off = ready[channel][inner] - log[channel][inner]
             assert abs(np.mean(np.gradient(log[channel])[inner] * off)) < 2e-4
         assert sum("later in the file" in text for text in ready.corrections) == 2
+        assert [moved.channels for moved in ready.retimed] == [("vx_mps",), ("vy_mps",)]
+        assert all(0.0 < moved.std_s < 0.01 for moved in ready.retimed)
 
 
 def test_on_a_road_that_wanders_kinematics_tells_no_delays(

@@ -66,7 +66,7 @@ def widened(fit: Fit, driving: Driving) -> FloatArray:
     copied = np.zeros((len(fit.covariance), rivals.width))
     for section in evidence.sections():
         copied += section.apart.T @ rivals.of(section)
-    off = fit.covariance @ (copied[:, felt] / scale)
+    off = fit.by_noise @ (copied[:, felt] / scale)
     return as_float64(
         fit.covariance + _within(fit, of_few(told + 1) ** 2 * (off * variance) @ off.T)
     )

@@ -95,6 +95,7 @@ def changed(
         driving=driving,
         estimates=(),
         covariance=np.zeros((0, 0)),
+        pushed=np.zeros((0, 0)),
         profiles=(),
     )
     if len(driving.logs) > 1 and start.model.offset_names:

@@ -106,6 +106,7 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
         model=model.with_values(dict(zip(names, map(float, x), strict=True))),
         estimates=estimates,
         covariance=covariance,
+        pushed=np.zeros((0, 0)),
         log_likelihood=float(ahead.whole.freeze(p, fit.noise.vector()).log_likelihood),
         converged=end.settled,
         profiles=(),

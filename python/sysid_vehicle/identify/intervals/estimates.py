@@ -147,17 +147,23 @@ def wald(
     box: Box,
     bounds: Sequence[tuple[float, float]] | None = None,
     descent: FloatArray | None = None,
+    pushes: FloatArray | None = None,
 ) -> tuple[tuple[Estimate, ...], FloatArray]:
     """Estimates with the standard errors of the information matrix, and their covariance.
 
     `bounds` are those of the values, by default of the search: a lag is searched for from next to
     nothing, and may be none. `descent` is the gradient of the log-likelihood at `x`, by which the
-    data press against bounds. What the data alone do not determine is called that, even where it
-    ended at a bound: the bound is not what stopped it. At a bound there is no standard error, nor
-    for what they never felt.
+    data press against bounds; columns of `pushes` are what it changes by where something that is no
+    noise, and not sure, is one standard error off. What the data alone do not determine is called
+    that, even where it ended at a bound: the bound is not what stopped it. At a bound there is no
+    standard error, nor for what they never felt.
     """
     width = box.width
-    covariance = box_covariance(information, box, x)
+    of_noise = box_covariance(information, box, x)
+    covariance = of_noise
+    if pushes is not None:
+        pushed = of_noise @ pushes
+        covariance = as_float64(of_noise + pushed @ pushed.T)
     std = np.sqrt(np.diag(covariance))
     of_data = std_of_data(information)
     unknown = of_data > _UNKNOWN * width
@@ -167,7 +173,7 @@ def wald(
     beyond: dict[int, tuple[float, float]] = {}
     if descent is not None:
         # Only bounds keep a maximum from being level: what else is left is of the search.
-        off = covariance[:, held] @ descent[held]
+        off = of_noise[:, held] @ descent[held]
         beyond = {i: (float(x[i] + off[i]), float(std[i])) for i in np.flatnonzero(held).tolist()}
     estimates = tuple(
         Estimate(
@@ -192,6 +198,11 @@ class Estimated(ABC):
     profiles: tuple[Profile, ...]
 
     __iter__ = None  # numbers are no names
+
+    @property
+    def by_noise(self) -> FloatArray:
+        """The covariance by noise alone, the inverse of the information."""
+        return self.covariance
 
     @property
     @abstractmethod
@@ -248,7 +259,7 @@ def profiled_estimates(
     better : array, shape (parameters,), or None
         Parameters of higher likelihood, where profiling came upon some.
     """
-    at = Optimum.of(objective, p, noise, box, fit.covariance)
+    at = Optimum.of(objective, p, noise, box, fit.by_noise)
     wanted = list(fit.quantities.values())
     found, better = profile_all(at, wanted, workers=workers, progress=progress)
     estimates = tuple(
