@@ -1,6 +1,7 @@
 """Does the diagnosis name what is physically in the multi-body car of another package?
 
-python benchmarks/twin/multibody_truth.py [HIDDEN ...] [--seeds 1] [--first 0] [--keep FILE]
+python benchmarks/twin/multibody_truth.py [HIDDEN ...] [--driving SET ...] [--seeds 1] [--first 0]
+    [--keep FILE]
 
 The car is one of `commonroad-vehicle-models` (29 states; `benchmarks/online/multibody.py`), another
 one by seed, driven in closed loop; claims are counted as in `diagnosis_truth.py`. What is in the
@@ -59,17 +60,20 @@ CASES = {
     "steering ratio": Other({"steer_ratio"}, ratio=1.1),
     "steering lag": Other({"steer_lag"}, lag_s=0.06),
 }
+_STEPS, _RAMPS = (
+    manoeuvres.step_steer((18.0, 28.0), (3.0, 6.5)),
+    manoeuvres.ramp_steer((18.0, 27.0), 7.5, 4.0),
+)
+_SWEEP, _LANES = (
+    manoeuvres.sine_sweep(30.0, 25.0, 5.0),
+    manoeuvres.double_lane_change((20.0, 26.0)),
+)
+_COURSE, _LAP = manoeuvres.handling_course(40.0, 7.5), manoeuvres.lap(40.0, 7.5)
+# What is fitted, and what judges.
 SETS = {
-    "steps and ramps, course": (
-        manoeuvres.step_steer((18.0, 28.0), (3.0, 6.5)),
-        manoeuvres.ramp_steer((18.0, 27.0), 7.5, 4.0),
-        manoeuvres.handling_course(40.0, 7.5),
-    ),
-    "sweep and lanes, lap": (
-        manoeuvres.sine_sweep(30.0, 25.0, 5.0),
-        manoeuvres.double_lane_change((20.0, 26.0)),
-        manoeuvres.lap(40.0, 7.5),
-    ),
+    "steps and ramps, course": ((_STEPS, _RAMPS), (_COURSE,)),
+    "sweep and lanes, lap": ((_SWEEP, _LANES), (_LAP,)),
+    "all of these": ((_STEPS, _RAMPS, _SWEEP, _LANES), (_COURSE, _LAP)),
 }
 # Of the lateral acceleration of a drive; the van spins where it brakes into a corner at more.
 CARS = {2: 1.0, 1: 1.0, 3: 0.75}
@@ -123,7 +127,7 @@ def driven(which: str) -> dict[tuple[int, str, int], dict[str, np.ndarray]]:
     RuntimeError
         A car was lost: what it does in a spin is no test of names.
     """
-    drives = SETS[which]
+    drives = [m for some in SETS[which] for m in some]
     lanes = [(car, name, i) for car in CARS for name in CASES for i in range(len(drives))]
     n = round(max(m.duration_s for m in drives) * _RATE_HZ)
     time_s = np.arange(n) / _RATE_HZ
@@ -150,11 +154,12 @@ def driven(which: str) -> dict[tuple[int, str, int], dict[str, np.ndarray]]:
 
 
 def improved(name: str, which: str, seed: int) -> sv.Study:
-    """Improve the single track on all drives of a set but the last, which judges."""
+    """Improve the single track on the drives of a set that are fitted; the others judge."""
     case, number = CASES[name], list(CARS)[seed % len(CARS)]
+    fitted, judging = SETS[which]
     sensors, logs = sv.SensorNoise(), []
-    first = list(CASES).index(name) * len(SETS[which])
-    for i, manoeuvre in enumerate(SETS[which]):
+    first = list(CASES).index(name) * (len(fitted) + len(judging))
+    for i, manoeuvre in enumerate((*fitted, *judging)):
         columns = {c: values.copy() for c, values in driven(which)[number, name, i].items()}
         n = len(columns["steer_rad"])
         steer = columns["steer_rad"]
@@ -164,7 +169,8 @@ def improved(name: str, which: str, seed: int) -> sv.Study:
             columns[f.name] += getattr(sensors, f.name) * rng.standard_normal(n)
         columns["time_s"] = np.arange(n) / _RATE_HZ
         logs.append(sv.Log.from_arrays(columns, name=manoeuvre.name, check=False))
-    return sv.improve(sv.Model(workshop(number)), logs[:-1], logs[-1], seed=seed)
+    train, test = logs[: len(fitted)], logs[len(fitted) :]
+    return sv.improve(sv.Model(workshop(number)), train, test, seed=seed)
 
 
 if __name__ == "__main__":
