@@ -1,7 +1,6 @@
 """Sensors: whether the channels of a log agree, before any tyre is assumed."""
 
 from .check import check
-from .condition import low_passes
 from .faults import SensorFault
 from .ready import made_ready
 from .result import SensorCheck, put_right
@@ -11,7 +10,6 @@ __all__ = [
     "SensorCheck",
     "SensorFault",
     "check",
-    "low_passes",
     "made_ready",
     "put_right",
     "quantum",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from .._common.progress import doing
 from ..errors import SysidError
 from ..log import Log, several_logs
 from ..vehicle import Vehicle
+from .condition import Conditioning
 from .faults import Rival, SensorFault, doubted, faults_of
 from .kinematics.equations import FAULTS, Readings
 from .kinematics.estimate import Estimate, estimate, noise_of, preferred
@@ -39,7 +41,8 @@ def check(
     The motion is free; speeds, yaw rate and accelerations must only be readings of the same one.
     What does not fit is laid to time offsets, scales, biases, the place and the direction of the
     IMU, gravity by roll and pitch, the road, and noise of any colour. Delays are against the yaw
-    rate, places against the speed sensor.
+    rate, places against the speed sensor. Low-passes of the sensors and vibration, which the noise
+    shows, are taken out before.
 
     Parameters
     ----------
@@ -69,7 +72,11 @@ def check(
     together = several_logs(logs, "check")
     if vehicle is not None:
         expect(vehicle, Vehicle, "check")
-    return checked(together, vehicle, seed=whole(seed, "seed"))
+    conditioning = Conditioning.of(together)
+    ready = [conditioning.apply(log) for log in together]
+    told = tuple(signal for log in together for signal in signals(log))
+    found = checked(ready, vehicle, seed=whole(seed, "seed"), told=told)
+    return replace(found, logs=tuple(together), conditioning=conditioning)
 
 
 @doing("check of the sensors")
@@ -79,18 +86,21 @@ def checked(
     *,
     seed: int = 0,
     enough: Told = lambda *_: False,
+    told: tuple[Signal, ...] | None = None,
 ) -> SensorCheck:
-    """As `check`, or no more than its first estimate where that is all that was asked for.
+    """As `check` of logs whose noise is white, or no more than its first estimate.
 
-    `enough` is asked with this estimate and the faults that it tells. Parts of the driving only
-    take claims back; explanations without a fault do too, unless one of them is the better one.
+    `told` are signals of the logs as they were read, by default of these. `enough` is asked with
+    this estimate and the faults that it tells. Parts of the driving only take claims back;
+    explanations without a fault do too, unless one of them is the better one.
     """
     stretches = pieces(together)
     readings = readings_of(together, stretches)
     refuse_mixed_up(together, readings)
     have = {r.channel for r in readings}
     lacking = [c for c in MOVING if c not in have]
-    told = tuple(signal for log in together for signal in signals(log))
+    if told is None:
+        told = tuple(signal for log in together for signal in signals(log))
     floors = {r.channel: _floor(r, told) for r in readings}
     step_s = _step(readings)
 

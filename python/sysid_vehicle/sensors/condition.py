@@ -37,6 +37,7 @@ _MISMATCH: Final = 1.3  # of forms that are taken for right
 _DELAY_STD_S: Final = 0.0015  # of a delay that is taken out
 _RAISED: Final = 4.0  # times the power of noise at low frequencies, up to which it comes up
 _DAMPING: Final = (0.5, 0.95)  # Butterworth's is 0.71, Bessel's 0.87; one of 1 may be none in time
+_VIBRATION: Final = "taken out"
 _BAND: Final = 0.45  # of the rate; a corner beyond it is not seen
 
 
@@ -64,23 +65,11 @@ def conditioned(logs: Sequence[Log]) -> list[Log]:
         The same logs where their noise is white already.
     """
     channels = _channels(logs)
-    found = _filters(channels, logs)
+    found = Conditioning(_filters(channels, logs))
     return [
-        _put_right(log, [c for c in channels if c.log == number], found)
+        found.put_right(log, [c for c in channels if c.log == number])
         for number, log in enumerate(logs)
     ]
-
-
-def low_passes(logs: Sequence[Log]) -> dict[str, tuple[Response, float]]:
-    """The low-pass of each channel's sensor where it is told, and the delay's standard error [s].
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        Of the same sensors.
-    """
-    found = _filters(_channels(logs), logs)
-    return {name: (f.response, f.fit.delay_std_s) for name, f in found.items()}
 
 
 def _channels(logs: Sequence[Log]) -> list[_Channel]:
@@ -122,6 +111,26 @@ class _Filtered:
             and self.response.corner_hz < _BAND * lowest_hz
         )
 
+    @property
+    def sentence(self) -> str:
+        """What it is."""
+        delay, std = 1000.0 * self.response.delay_s, 1000.0 * self.fit.delay_std_s
+        return (
+            f"the noise is that of a low-pass of {self.response.corner_hz:.3g} Hz, "
+            f"{delay:.3g} +- {std:.1g} ms late"
+        )
+
+    def known(self, name: str, channel: _Channel | None, log: Log) -> _Channel | None:
+        """The channel that told the filter: of this log, or of another one at the same rate."""
+        if channel in self.channels:
+            return channel
+        at, every = own_samples(log[name])
+        if at.size < 2:
+            return None
+        rate_hz = log.rate_hz / every
+        alike = (c for c in self.channels if c.name == name)
+        return next((c for c in alike if np.isclose(c.spectrum.rate_hz, rate_hz, rtol=1e-3)), None)
+
     def undone(self, channel: _Channel) -> ComplexArray:
         """Factor at each frequency that undoes the filter.
 
@@ -137,6 +146,87 @@ class _Filtered:
     def smooth_of(self, channel: _Channel) -> FloatArray:
         """Power of a channel's noise without lines."""
         return self.fit.smooth[self.channels.index(channel)]
+
+
+@dataclass(frozen=True, eq=False)
+class Conditioning:
+    """Low-passes of some sensors, and how logs of them are freed of these and of vibration.
+
+    Attributes
+    ----------
+    filters : dict of str to _Filtered
+        By channel.
+    """
+
+    filters: dict[str, _Filtered]
+
+    @classmethod
+    def of(cls, logs: Sequence[Log]) -> Conditioning:
+        """That of logs of the same sensors."""
+        return cls(_filters(_channels(logs), logs))
+
+    def apply(self, log: Log) -> Log:
+        """A log of the same sensors, with white noise and in time with the motion."""
+        return self.put_right(log, _channels([log]))
+
+    @property
+    def low_passes(self) -> dict[str, tuple[Response, float]]:
+        """The low-pass of each channel's sensor, and the delay's standard error [s]."""
+        return {name: (f.response, f.fit.delay_std_s) for name, f in self.filters.items()}
+
+    @property
+    def figures(self) -> dict[str, dict[str, float]]:
+        """The same in numbers."""
+        return {
+            name: {
+                "corner_hz": response.corner_hz,
+                "damping": response.damping,
+                "delay_s": response.delay_s,
+                "delay_std_s": std_s,
+            }
+            for name, (response, std_s) in self.low_passes.items()
+        }
+
+    def remarks(self, logs: Sequence[Log]) -> list[str]:
+        """What is taken out of some logs, in sentences."""
+        filters = {id(f): f for f in self.filters.values()}
+        said = []
+        for f in filters.values():
+            names = ", ".join(name for name, own in self.filters.items() if own is f)
+            said.append(f"{names}: {f.sentence}; studies undo it")
+        for log in logs:
+            shaken = (t for t in self.apply(log).corrections if t.endswith(_VIBRATION))
+            said += [f"{log.name}, {t}" if len(logs) > 1 else t for t in shaken]
+        return said
+
+    def put_right(self, log: Log, channels: Sequence[_Channel]) -> Log:
+        """The same, where those of its channels are known whose noise is the same at all times."""
+        now: dict[str, FloatArray] = {}
+        what: list[str] = []
+        own = {c.name: c for c in channels}
+        # What one filter has made late comes late by the same time.
+        together: dict[float, list[str]] = {}
+        for name in filter(log.has, MOVING):
+            found, channel = self.filters.get(name), own.get(name)
+            known = None if found is None else found.known(name, channel, log)
+            factor: FloatArray | ComplexArray | None = None
+            if channel is not None:
+                smooth = channel.plain.smooth[0]
+                if found is not None and known is not None:
+                    smooth = found.smooth_of(known)
+                factor = _without_vibration(channel, smooth, what)
+            if found is not None and known is not None:
+                undone = found.undone(known)
+                factor = undone if factor is None else undone * factor
+                what.append(f"{name}: {found.sentence}; undone")
+                together.setdefault(found.fit.delay_std_s, []).append(name)
+            spectrum = channel if known is None else known
+            if factor is not None and spectrum is not None:
+                now[name] = _passed(log[name], spectrum.spectrum, factor)
+        if not now:
+            return log
+        moved = [Retimed(tuple(names), std_s) for std_s, names in together.items()]
+        return log.corrected(now, what, moved)
 
 
 def _filters(channels: Sequence[_Channel], logs: Sequence[Log]) -> dict[str, _Filtered]:
@@ -176,37 +266,16 @@ def _filtered(channels: tuple[_Channel, ...]) -> _Filtered | None:
     return _Filtered(channels, fit, fit.response)
 
 
-def _put_right(log: Log, channels: Sequence[_Channel], filters: dict[str, _Filtered]) -> Log:
-    now: dict[str, FloatArray] = {}
-    what = []
-    for channel in channels:
-        name, s = channel.name, channel.spectrum
-        found = filters.get(name)
-        smooth = found.smooth_of(channel) if found else channel.plain.smooth[0]
-        noise = NoiseSpectrum(s.rate_hz, s.frequency_hz, s.power, smooth)
-        lines = noise.vibration_hz
-        if lines:
-            shown = ", ".join(f"{f:.3g}" for f in lines)
-            what.append(f"{name}: vibration at {shown} Hz taken out")
-        if found:
-            now[name] = _passed(log[name], s, found.undone(channel) * noise.gain)
-            delay, std = 1000.0 * found.response.delay_s, 1000.0 * found.fit.delay_std_s
-            what.append(
-                f"{name}: its noise is that of a low-pass of {found.response.corner_hz:.3g} Hz, "
-                f"{delay:.3g} +- {std:.1g} ms late; undone"
-            )
-        elif lines:
-            now[name] = _passed(log[name], s, noise.gain)
-    if not now:
-        return log
-    # What one filter has made late comes late by the same time.
-    together: dict[float, list[str]] = {}
-    for channel in channels:
-        if channel.name in filters:
-            std_s = filters[channel.name].fit.delay_std_s
-            together.setdefault(std_s, []).append(channel.name)
-    moved = [Retimed(tuple(names), std_s) for std_s, names in together.items()]
-    return log.corrected(now, what, moved)
+def _without_vibration(channel: _Channel, smooth: FloatArray, what: list[str]) -> FloatArray | None:
+    """Factor at each frequency that takes vibration out; what is taken out is told."""
+    s = channel.spectrum
+    noise = NoiseSpectrum(s.rate_hz, s.frequency_hz, s.power, smooth)
+    lines = noise.vibration_hz
+    if not lines:
+        return None
+    shown = ", ".join(f"{f:.3g}" for f in lines)
+    what.append(f"{channel.name}: vibration at {shown} Hz {_VIBRATION}")
+    return noise.gain
 
 
 def _passed(

@@ -19,6 +19,7 @@ from ..log import Log
 from ..rules import USUAL, Rules
 from ..vehicle import Vehicle
 from .apply import LATE, corrected, retimed
+from .condition import Conditioning
 from .faults import SensorFault, leaning, to_put_right
 from .kinematics.colour import Colour
 from .kinematics.equations import Readings, lean
@@ -61,6 +62,9 @@ class SensorCheck:
         The driving that was used.
     vehicle : Vehicle or None
         The car.
+    conditioning : Conditioning or None
+        Low-passes of the sensors, and what takes them and vibration out; None where the logs had
+        been freed of these.
     """
 
     logs: tuple[Log, ...]
@@ -71,6 +75,7 @@ class SensorCheck:
     readings: tuple[Readings, ...]
     stretches: tuple[Stretch, ...]
     vehicle: Vehicle | None = None
+    conditioning: Conditioning | None = None
 
     @property
     def found(self) -> tuple[SensorFault, ...]:
@@ -81,6 +86,14 @@ class SensorCheck:
     def not_told(self) -> tuple[SensorFault, ...]:
         """Faults that this log cannot show."""
         return tuple(fault for fault in self.faults if not fault.told)
+
+    @property
+    def low_passes(self) -> dict[str, dict[str, float]]:
+        """The low-pass of the second order that each channel's noise shows: `apply` undoes it.
+
+        `corner_hz`, `damping`, `delay_s` of slow motion, and the standard error `delay_std_s`.
+        """
+        return {} if self.conditioning is None else self.conditioning.figures
 
     __iter__ = None  # numbers are no names
 
@@ -144,13 +157,16 @@ class SensorCheck:
     def apply(self, log: Log) -> Log:
         """Return the log with what was found put right, and with what was done recorded.
 
-        Where the delay of one speed was found, a like one of the other is put right too. Time
-        offsets, biases and scales (gravity by roll and pitch is one) are taken out; the
-        accelerations are those of the speed sensor's place, in its direction. Faults that were not
-        found are left alone; so is the steering angle. Where no wheel force is logged the measured
-        a_x is what drives the car, and its mean beyond the motion is taken out: bias of the sensor
-        and slope of the road are one there. That of a_y is left to the tyres, which can tell them.
+        Low-passes of the sensors and vibration are taken out, and time offsets, biases and scales
+        (gravity by roll and pitch is one); the accelerations are those of the speed sensor's place,
+        in its direction. Where the delay of one speed was found, a like one of the other is put
+        right too. Faults that were not found are left alone; so is the steering angle. Where no
+        wheel force is logged the measured a_x is what drives the car, and its mean beyond the
+        motion is taken out: bias of the sensor and slope of the road are one there. That of a_y is
+        left to the tyres, which can tell them.
         """
+        if self.conditioning is not None:
+            log = self.conditioning.apply(log)
         channels, what = corrected(log, self._taken_out)
         bias, std = self.offsets["ax_mps2"]
         if log.has("ax_mps2") and not log.has("fx_n") and abs(bias) > _SURE * std:
@@ -160,8 +176,8 @@ class SensorCheck:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What follows from the faults, in sentences."""
-        said = []
+        """What follows from the faults and the noise, in sentences."""
+        said = [] if self.conditioning is None else self.conditioning.remarks(self.logs)
         for axis, channel, name in (
             ("roll", "ay_mps2", "gain_ay"),
             ("pitch", "ax_mps2", "gain_ax"),
@@ -256,13 +272,14 @@ class SensorCheck:
     def headline(self) -> str:
         """One sentence."""
         names = ", ".join(log.name for log in self.logs)
+        filtered = " Sensors have a low-pass." if self.low_passes else ""
         if len(self.found) == 1:
-            return f"{names}: 1 sensor fault was found."
+            return f"{names}: 1 sensor fault was found.{filtered}"
         if self.found:
-            return f"{names}: {len(self.found)} sensor faults were found."
+            return f"{names}: {len(self.found)} sensor faults were found.{filtered}"
         if not self.estimate.settled:
-            return f"{names}: no fault was found, but the sensors do not agree."
-        return f"{names}: the sensors agree; no fault was found."
+            return f"{names}: no fault was found, but the sensors do not agree.{filtered}"
+        return f"{names}: the sensors agree; no fault was found.{filtered}"
 
     def __str__(self) -> str:
         lines = [self.headline, text_table(_HEAD, self._rows()), ""]
@@ -357,6 +374,7 @@ class SensorCheck:
                 c: {"std": k.std, "white_std": k.white_std, "phi": k.phi.tolist()}
                 for c, (k, _) in self.noise.items()
             },
+            "low_passes": self.low_passes,
             "signals": [vars(s) for s in self.signals],
             "settles": list(self.settles),
             "channel_map": list(self.map_lines),

@@ -12,8 +12,9 @@ import sysid_vehicle as sv
 from sysid_vehicle.sensors import made_ready
 from sysid_vehicle.sensors import ready as _ready
 from sysid_vehicle.sensors.apply import shifted
-from sysid_vehicle.sensors.condition import conditioned, low_passes
+from sysid_vehicle.sensors.condition import Conditioning, conditioned
 from sysid_vehicle.sensors.faults import SensorFault, to_put_right
+from sysid_vehicle.sensors.low_pass.forms import Response
 
 SPEEDS, INERTIAL = ("vx_mps", "vy_mps"), ("yaw_rate_radps", "ax_mps2", "ay_mps2")
 MOTION = (*SPEEDS, *INERTIAL)
@@ -44,6 +45,10 @@ def _delay(values: np.ndarray, true: np.ndarray) -> float:
     return float(-(slope[there] @ (values - slow)[there]) / (slope[there] @ slope[there]))
 
 
+def low_passes_of(logs: list[sv.Log]) -> dict[str, tuple[Response, float]]:
+    return Conditioning.of(logs).low_passes
+
+
 def test_white_noise_is_left_as_it_is(log: sv.Log) -> None:
     assert conditioned([log])[0] is log
     own, others, delayed = made_ready([log], [log])
@@ -53,7 +58,7 @@ def test_white_noise_is_left_as_it_is(log: sv.Log) -> None:
 
 
 def test_a_low_pass_is_told_from_the_noise_it_leaves(log: sv.Log) -> None:
-    told = low_passes([_with(log, **{c: _low_pass(log[c]) for c in MOTION})])
+    told = low_passes_of([_with(log, **{c: _low_pass(log[c]) for c in MOTION})])
     assert sorted(told) == sorted(MOTION)
     for response, std_s in told.values():
         assert std_s < 0.001
@@ -63,16 +68,16 @@ def test_a_low_pass_is_told_from_the_noise_it_leaves(log: sv.Log) -> None:
 
 
 def test_one_filter_serves_both_devices_where_it_explains_them(log: sv.Log) -> None:
-    alike = low_passes([_with(log, **{c: _low_pass(log[c]) for c in MOTION})])
+    alike = low_passes_of([_with(log, **{c: _low_pass(log[c]) for c in MOTION})])
     assert len({response for response, _ in alike.values()}) == 1
     unlike = {c: _low_pass(log[c], 22.0) for c in SPEEDS}
     unlike |= {c: _low_pass(log[c], 11.0) for c in INERTIAL}
-    told = {c: response for c, (response, _) in low_passes([_with(log, **unlike)]).items()}
+    told = {c: response for c, (response, _) in low_passes_of([_with(log, **unlike)]).items()}
     assert told["vx_mps"] == told["vy_mps"] != told["ax_mps2"] == told["yaw_rate_radps"]
     assert told["vx_mps"].delay_s == pytest.approx(np.sqrt(0.5) / (np.pi * 22.0), abs=0.002)
     assert told["ax_mps2"].delay_s == pytest.approx(np.sqrt(0.5) / (np.pi * 11.0), abs=0.003)
     alone = {c: _low_pass(log[c]) for c in INERTIAL}
-    assert sorted(low_passes([_with(log, **alone)])) == sorted(INERTIAL)
+    assert sorted(low_passes_of([_with(log, **alone)])) == sorted(INERTIAL)
 
 
 def test_a_filter_is_told_behind_vibration_quanta_and_held_samples(log: sv.Log) -> None:
@@ -93,7 +98,7 @@ def test_a_filter_is_told_behind_vibration_quanta_and_held_samples(log: sv.Log) 
         shaken[channel] = np.repeat(counted[::2], 2)[: log.n]
     with pytest.warns(sv.SysidWarning, match="held for 2 samples"):
         coarse = sv.Log.from_arrays(shaken)
-    told = low_passes([coarse])
+    told = low_passes_of([coarse])
     assert sorted(told) == sorted(MOTION)
     response, std_s = told["ay_mps2"]
     assert std_s < 0.0015
@@ -108,18 +113,18 @@ def test_bumps_of_the_road_are_no_low_pass(log: sv.Log) -> None:
         road = signal.lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(log.n))
         bumps[channel] = log[channel] + 2.5 * getattr(NOISE, channel) * road
     shaken = _with(log, **bumps)
-    assert not low_passes([shaken])
+    assert not low_passes_of([shaken])
     assert conditioned([shaken])[0] is shaken
 
 
 def test_what_no_form_fits_tells_no_delay(log: sv.Log) -> None:
     # Steeper filters, and smoothing without delay, are not of the form that is fitted.
-    assert not low_passes([_with(log, **{c: _low_pass(log[c], order=4) for c in MOTION})])
+    assert not low_passes_of([_with(log, **{c: _low_pass(log[c], order=4) for c in MOTION})])
     b, a = signal.butter(1, 15.0, fs=100.0)
     smooth = {c: signal.filtfilt(b, a, log[c]) for c in MOTION}
-    assert not low_passes([_with(log, **smooth)])
+    assert not low_passes_of([_with(log, **smooth)])
     # One channel shifted against the others of its device would be an error of its own.
-    assert not low_passes([_with(log, ay_mps2=_low_pass(log["ay_mps2"]))])
+    assert not low_passes_of([_with(log, ay_mps2=_low_pass(log["ay_mps2"]))])
 
 
 def test_motion_that_no_noise_covers_is_no_noise(log: sv.Log) -> None:
@@ -147,6 +152,34 @@ def test_a_filter_that_is_told_is_undone(log: sv.Log) -> None:
     (moved,) = ready.retimed
     assert sorted(moved.channels) == sorted(MOTION)
     assert 0.0 < moved.std_s < 0.001
+
+
+def test_a_check_tells_low_passes_and_takes_them_out_of_other_logs(log: sv.Log) -> None:
+    late = _with(log, **{c: _low_pass(log[c]) for c in MOTION})
+    check = sv.check(late)
+    assert check.logs == (late,)
+    assert check.headline.endswith("no fault was found. Sensors have a low-pass.")
+    told = f"{', '.join(MOTION)}: the noise is that of a low-pass of 1"
+    assert sum(text.startswith(told) for text in check.remarks) == 1
+    figures = check.to_dict()["low_passes"]
+    assert sorted(figures) == sorted(MOTION)
+    off = figures["ay_mps2"]["delay_s"] - DELAY_S
+    assert abs(off) < 2.5 * figures["ay_mps2"]["delay_std_s"]
+    # Eight seconds are too short to tell a filter of their own.
+    short = late.between(20.0, 28.0)
+    assert conditioned([short])[0] is short
+    for part in (late, short):
+        ready = check.apply(part)
+        true = log.between(part["time_s"][0], part["time_s"][-1])
+        for channel in ("yaw_rate_radps", "ay_mps2"):
+            assert _delay(ready[channel], true[channel][: part.n]) == pytest.approx(0.0, abs=0.0015)
+        assert ready.retimed[0].std_s == figures["ay_mps2"]["delay_std_s"]
+
+
+def test_a_check_of_white_noise_has_no_low_pass(log: sv.Log) -> None:
+    check = sv.check(log.between(0.0, 30.0))
+    assert check.low_passes == {}
+    assert "low-pass" not in str(check)
 
 
 def test_beside_a_gap_a_filter_is_not_undone(log: sv.Log) -> None:
