@@ -158,6 +158,8 @@ def leaning(found: Estimate, faults: Sequence[SensorFault], axis: str) -> float:
     names = list(found.faults)
     weights = {f"lean.{axis}_mps2": share, f"delay.{axis}_mps2": 1.0}
     pick = np.array([weights.get(name, 0.0) for name in names])
+    if not pick.any():  # an axis that feels too little has no gravity in it, and no delay
+        return 0.0
     delay = next((f for f in faults if f.name == f"delay_{axis}_s"), None)
     total = share * late_s
     variance = float(pick @ found.covariance @ pick)

@@ -183,7 +183,9 @@ class SensorCheck:
             ("pitch", "ax_mps2", "gain_ax"),
         ):
             fault = self[name]
-            if fault.found:
+            if fault.found and fault.value < 0.0:
+                said.append(f"{channel}: reads too little, where gravity by {axis} only adds")
+            elif fault.found:
                 low, high = (gradient(x) for x in fault.interval)
                 said.append(
                     f"{channel}: the scale is that of an accelerometer on a body with a {axis} "

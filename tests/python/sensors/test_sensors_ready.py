@@ -292,6 +292,22 @@ def test_a_check_says_what_it_takes_out_with_the_other_speed(log: sv.Log) -> Non
     assert [text.split(":")[0] for text in late.apply(log).corrections] == ["vx_mps", "vy_mps"]
 
 
+@pytest.mark.parametrize("factor", [0.94, 1.06])
+def test_a_scale_of_the_longitudinal_acceleration_is_told_and_taken_out(
+    log: sv.Log, factor: float
+) -> None:
+    part = log.between(0.0, 40.0)
+    check = sv.check(_with(part, ax_mps2=factor * part["ax_mps2"]))
+    assert [f.name for f in check.found] == ["gain_ax"]
+    low, high = check["gain_ax"].interval
+    assert low < factor - 1.0 < high
+    assert "scale error, or gravity by pitch" in str(check)
+    by_the_body = [text for text in check.remarks if "pitch gradient" in text]
+    assert len(by_the_body) == (factor > 1.0)
+    ready = check.apply(_with(part, ax_mps2=factor * part["ax_mps2"]))
+    np.testing.assert_allclose(ready["ax_mps2"], part["ax_mps2"], atol=0.03, rtol=0.01)
+
+
 def test_a_body_that_rolls_makes_no_sensor_late(truth: sv.Model) -> None:
     roll = {"body_roll.roll_per_g_rad": 0.09, "body_roll.frequency_hz": 1.5}
     rolling = truth.add("body_roll").with_values(roll)
