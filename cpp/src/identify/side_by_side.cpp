@@ -77,7 +77,7 @@ double time_constant_s(const Axis& axis, double dt) {
     for (int n = 0; n < kDoublings && before > -kTimesMet; ++n) {
         const Mat<3, 3> known = (Mat<3, 3>::Identity() + read * spread).inverse();
         const Mat<3, 3> half = through * known;
-        const Mat<3, 3> more = through.transpose() * spread * half;
+        const Mat<3, 3> more = through.transpose() * spread * known * through;
         read += half * read * through.transpose();
         spread += more;
         through = half * through;

@@ -192,7 +192,7 @@ TEST(Pieces, WaitUntilAForceIsToldFromTheSlopeOfTheRoad) {
     noise.road_time_s = road_s;
     const double force = force_mps2 * force_mps2 / force_s, road = road_mps2 * road_mps2 / road_s;
     const double zero = (force / (road_s * road_s) + road / (force_s * force_s)) / (force + road);
-    EXPECT_NEAR(forgets_s(problem, noise) * std::sqrt(zero) / -std::log(kMet), 1.0, 0.01);
+    EXPECT_NEAR(forgets_s(problem, noise) * std::sqrt(zero) / -std::log(kMet), 1.0, 1e-3);
 }
 
 struct Score {
