@@ -24,12 +24,12 @@ from ...identify.offsets import centred
 from ...log import Log
 from ...model import Model
 from ...rules import USUAL, Rules
-from ...vehicle import GRAVITY_MPS2, Vehicle
+from ...vehicle import Vehicle
 from ..candidates.causes import Causes, CredibleSet
 from ..candidates.possible import possible
 from .change import Change, EffectChange, Said
 from .changes_compete import Competition
-from .may_change import YAW_INERTIA, May, beyond, forces_of_tyre, room
+from .may_change import YAW_INERTIA, May, beyond, room
 from .reference import Exact
 from .search import Search
 
@@ -142,7 +142,8 @@ class _Said:
                 continue
             # As many standard errors from nothing as the likelihood ratio says, at most.
             ((name, size),) = self._sizes_in(other, e).items()
-            rises = 2.0 * (other.reached - one.reached) / told.ratio_of((e,))
+            gain = other.among - one.among if without else other.reached - one.reached
+            rises = 2.0 * gain / told.ratio_of((e,))
             sizes[name] = size if rises > 0.0 else sizes[name]
             stds[name] = max(stds[name], abs(sizes[name]) / float(np.sqrt(max(rises, 1.0))))
         for s in (s for s in exact.values() if s is not None):
@@ -178,13 +179,8 @@ class _Said:
         m, rules = self.search.can[effect], self.search.rules
         sizes = [state.changes[n] for n in m.names]
         if m in self.search.tyres:
-            before = [self.search.before.model.value(n) for n in m.names]
-            ay = np.abs(self.search.start.driving.channel("ay_mps2"))
-            most = float(np.nanpercentile(ay, 99.0)) / GRAVITY_MPS2
-            return any(
-                abs(share) > rules.interval * told.std_along(effect, by, state.changes)
-                for share, by in forces_of_tyre(before, sizes, most)
-            )
+            forces = self.search.forces(effect, state, told)
+            return any(abs(share) > rules.interval * std for share, std in forces)
         stds = [told.stds[n] for n in m.names]
         return any(
             abs(size) > told.least(s, usual) - rules.bound * s
@@ -213,6 +209,8 @@ class _Said:
         found = CredibleSet.of(log_odds, self.search.rules.credible)
         absent = [
             self.search.evidence(s, told, ratio) - here
+            if s.put
+            else -self.search.over_nothing(state, told, ratio)
             for s in self.search.lacking(effect, state, found.effects)
         ]
         whole = scipy.special.logsumexp(list(log_odds.values()))
@@ -276,9 +274,10 @@ class _Said:
         before = np.array([own.value(n) for n in m.names[:3]])  # B, C, D
         put = m.id in self.state.put
         after = before + np.array(sizes[:3]) if put else before
-        whole = float(np.prod(before))
-        slope = float(np.prod(after)) / whole / after
-        value = float(np.prod(after)) / whole - 1.0 if put else float(slope @ np.array(sizes[:3]))
+        ratio = float(np.prod(after) / np.prod(before))
+        later, earlier = (as_float64([*(x * ratio / own), 0.0])
+                          for x, own in ((1.0, after), (-1.0, before)))  # fmt: skip
+        value = ratio - 1.0 if put else float(later[:3] @ np.array(sizes[:3]))
         known = {**dict(zip(m.names, sizes, strict=True)), **self.state.changes}
-        std = self.told.std_along(m.id, as_float64([*slope, 0.0]), known)
+        std = self.told.std_along(m.id, (later, earlier), known)
         return value, max(std, abs(value) * cut / (1.0 - cut) if cut < 1.0 else np.inf)
