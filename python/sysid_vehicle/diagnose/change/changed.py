@@ -27,8 +27,9 @@ from ...rules import USUAL, Rules
 from ...vehicle import Vehicle
 from ..candidates.causes import Causes, CredibleSet
 from ..candidates.possible import possible
-from .change import Change, EffectChange, Said
+from .change import Change
 from .changes_compete import Competition
+from .effect_change import EffectChange, Said
 from .may_change import YAW_INERTIA, May, beyond, room
 from .reference import Exact
 from .search import Search
@@ -154,12 +155,35 @@ class _Said:
                     sizes |= self._sizes_in(other, e)
                     lines = self._of_the_car(beside.stds, other)
                     stds |= {n: max(lines[n], stds[n]) for n in self.search.can[e].names}
-        found = [self._of(m, causes, sizes, stds, told) for m in self.search.may]
+        nothing = self._nothing()
+        calm = nothing > 1.0 - search.rules.credible
+        found = [self._of(m, causes, sizes, stds, told, calm=calm) for m in self.search.may]
         order = [e for s in causes.sets for e in s.effects]
+        sure = causes.inclusion
         found.sort(
-            key=lambda e: (order.index(e.id) if e.id in order else len(order), -e.probability)
+            key=lambda e: (order.index(e.id) if e.id in order else len(order), -sure.get(e.id, 0.0))
         )
-        return Change(search.before, state.fit, causes, tuple(found), search.alike, search.rules)
+        return Change(
+            search.before, state.fit, causes, tuple(found), nothing, search.alike, search.rules
+        )
+
+    def _nothing(self) -> float:
+        """Probability that nothing changed, beside all that was fitted."""
+        search, told = self.search, self.told
+        odds = [
+            search.over_nothing(s, told, told.ratio_of(s.put))
+            for s in search.visited.values()
+            if s.put
+        ]
+        return float(scipy.special.expit(-scipy.special.logsumexp(odds))) if odds else 1.0
+
+    def _likely(self, effect: str, probability: float) -> bool:
+        """Whether an effect that is not named is likelier than not, and no refit speaks against."""
+        other = self.search.visited.get(frozenset({*self.state.put, effect}))
+        ratio = self.told.ratio_of(self.state.put)
+        states = [s for s in (other, self.state) if s is not None]
+        best = max(states, key=lambda s: self.search.evidence(s, self.told, ratio))
+        return probability > 0.5 and (other is None or best is other)
 
     def _sizes_in(self, state: Exact, effect: str) -> dict[str, float]:
         return {n: state.changes[n] for n in self.search.can[effect].names}
@@ -226,6 +250,8 @@ class _Said:
         sizes: dict[str, float],
         stds: dict[str, float],
         told: Competition,
+        *,
+        calm: bool,
     ) -> EffectChange:
         rules, own = self.search.rules, causes.of(m.id)
         ends = room(m, self.search.before.model)
@@ -256,12 +282,21 @@ class _Said:
                 said, group = "negligible", ()
         elif all(b < w for b, w in zip(bound, matters, strict=True)):
             said = "unchanged"
+        elif not calm and self._likely(m.id, causes.inclusion.get(m.id, 0.0)):
+            said = "likely"
         names, units = zip(*((p.name, p.unit) for p in m.parameters), strict=True)
-        probability = causes.inclusion.get(m.id, 0.0)
+        # Of what driving does not tell, its line has a probability that says nothing.
+        sure = None if said in ("unchanged", "not testable") else causes.inclusion.get(m.id, 0.0)
         stiffness = self._stiffness(m, told_by, cut)
-        return EffectChange(
-            m.id, names, units, value, std, bound, probability, said, group, least, stiffness
-        )
+        least_stiffness = None if stiffness is None else self._least_stiffness(m, stiffness[1])
+        figures = (value, std, bound, sure, said, group, least, stiffness, least_stiffness)
+        return EffectChange(m.id, names, units, *figures)
+
+    def _least_stiffness(self, m: May, std: float) -> float:
+        """Of tyres, the smallest share of their cornering stiffness that would be named."""
+        before = [self.search.before.model.value(n) for n in m.names[:3]]  # B, C, D
+        usual = float(np.linalg.norm(np.array(m.scale[:3]) / before))
+        return self.told.least(std, usual, self.told.price([m.id], dict.fromkeys(m.names, 0.0)))
 
     def _stiffness(self, m: May, sizes: Sequence[float], cut: float) -> tuple[float, float] | None:
         """By which share the cornering stiffness of an axle's tyres differs, per load, +- what.

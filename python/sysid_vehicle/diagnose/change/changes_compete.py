@@ -314,7 +314,7 @@ class Competition:
         odds = self._rules.nothing / (1.0 - self._rules.nothing) * len(self._whole)
         return float(np.log(odds))
 
-    def least(self, std: float, usual: float) -> float:
+    def least(self, std: float, usual: float, price: float | None = None) -> float:
         """The smallest change of one parameter that is named with probability `Rules.credible`.
 
         Where its evidence, less what `price` takes off, is as large as a name asks for; and by as
@@ -324,11 +324,15 @@ class Competition:
         ----------
         std, usual : float
             Standard error, and standard deviation of the prior.
+        price : float, optional
+            What the change costs [nats], where that is not of one parameter.
         """
         if std >= usual:
             return np.inf
         share, rules = (std / usual) ** 2, self._rules
-        nats = self._of_one + rules.told + 0.5 * float(np.log1p(1.0 / share))
+        if price is None:
+            price = self._of_one + 0.5 * float(np.log1p(1.0 / share))
+        nats = price + rules.told
         return std * (float(np.sqrt(2.0 * nats / (1.0 - share))) + rules.bound)
 
     def wald(self, effect: str, beside: str, changes: Mapping[str, float]) -> float:
