@@ -40,6 +40,9 @@ class Change(Printed):
         How like the reference the later driving is; where it is not, intervals are as much wider
         as estimates differ between pieces of the reference.
     rules : Rules
+    lacks : tuple of str
+        Effects that the reference lacked, and that were put into its model: in both drivings the
+        same they explain more than what seemed to have changed without them.
     """
 
     before: Fit
@@ -49,6 +52,7 @@ class Change(Printed):
     nothing: float
     alike: Alike
     rules: Rules
+    lacks: tuple[str, ...] = ()
 
     __iter__ = None  # numbers are no names
 
@@ -67,6 +71,12 @@ class Change(Printed):
     def unknown(self) -> tuple[CredibleSet, ...]:
         """Changes that are there and that no effect of the catalogue explains."""
         return tuple(s for s in self.causes.sets if s.effects[0].startswith(UNKNOWN))
+
+    @property
+    def calm(self) -> bool:
+        """Whether no change is shown, and none is likely."""
+        told = bool(self.named or self.unknown)
+        return not told and not any(e.said == "likely" for e in self.effects)
 
     @property
     def load(self) -> LoadChange | None:
@@ -124,6 +134,12 @@ class Change(Printed):
             "same again to be sure"
         )
         told = [other] if self.alike.beyond > self.rules.taken else []
+        if self.lacks:
+            told.insert(
+                0,
+                f"the reference lacks {', '.join(self.lacks)}, in both drivings the same: compared "
+                "with it in the model",
+            )
         if self.load is not None:
             told.insert(0, f"mass and centre of gravity: as {self.load} would change them")
         return [self._headline(), *told, self._power(), Table(self._HEAD, self._rows())]
@@ -165,5 +181,6 @@ class Change(Printed):
             "beyond": self.alike.beyond,
             "causes": self.causes.to_dict(),
             "nothing": self.nothing,
+            "lacks": list(self.lacks),
             "effects": {e.id: e.to_dict() for e in self.effects},
         }

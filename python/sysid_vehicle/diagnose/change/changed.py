@@ -19,7 +19,7 @@ from ..._common.arrays import as_float64
 from ...effects import Effect
 from ...errors import InvalidInput
 from ...estimate import Driving
-from ...identify import Fit, explaining
+from ...identify import Fit, explaining, identify
 from ...identify.offsets import centred
 from ...log import Log
 from ...model import Model
@@ -34,6 +34,8 @@ from .may_change import YAW_INERTIA, May, beyond, room
 from .reference import Exact
 from .search import Search
 
+_LACKS = 2  # effects that are put into the model of a reference, at most
+
 
 @explaining
 def changed(
@@ -46,7 +48,9 @@ def changed(
 ) -> Change:
     """Tell what of a car changed since a reference: yesterday's log fits the model, today's not.
 
-    What the reference left unexplained counts only as far as the later driving leaves more. Both
+    What the reference left unexplained counts only as far as the later driving leaves more. Where
+    an effect that is in both the same explains more than what seems to have changed, the reference
+    lacks it: it is put into its model, and the drivings are compared again (`Change.lacks`). Both
     are taken as independent; noise is that of the reference. What a model lacks acts otherwise at
     other speeds or lateral accelerations: as far as the later driving is there (`Change.alike`),
     standard errors hold what estimates differ by between pieces of the reference.
@@ -90,6 +94,19 @@ def changed(
             "the wheel force fx_n is known in one of the drivings only; log it in both, or leave "
             "it out of both"
         )
+    lacks: list[str] = []
+    while True:
+        said = _Said(Search(before, _later(before, driving, vehicle), candidates, rules))
+        change = said.change()
+        lack = said.lack() if len(lacks) < _LACKS and not change.calm else None
+        if lack is None:
+            return replace(change, lacks=tuple(lacks))
+        lacks.append(lack.id)
+        before = identify(before.model.add(lack), before.driving, starts=1)
+
+
+def _later(before: Fit, driving: Driving, vehicle: Vehicle | None) -> Fit:
+    """The reference as it is, on the later driving."""
     start = replace(
         before,
         model=before.model if vehicle is None else _of_vehicle(before.model, vehicle),
@@ -100,8 +117,8 @@ def changed(
         profiles=(),
     )
     if len(driving.logs) > 1 and start.model.offset_names:
-        start = replace(start, driving=centred(start)[1])
-    return _Said(Search(before, start, candidates, rules)).change()
+        return replace(start, driving=centred(start)[1])
+    return start
 
 
 def _of_vehicle(model: Model, vehicle: Vehicle) -> Model:
@@ -109,6 +126,11 @@ def _of_vehicle(model: Model, vehicle: Vehicle) -> Model:
     stays = (n for n in model.names if n != YAW_INERTIA or n in model.values)
     values = {n: model.value(n) for n in stays}
     return replace(model, vehicle=vehicle, values=values)
+
+
+def _within(least: float, most: float) -> float:
+    """A change that is larger than any is none."""
+    return least if least <= most else np.inf
 
 
 class _Said:
@@ -177,6 +199,20 @@ class _Said:
         ]
         return float(scipy.special.expit(-scipy.special.logsumexp(odds))) if odds else 1.0
 
+    def lack(self) -> Effect | None:
+        """What the reference lacks: in both drivings the same it explains more than any change."""
+        search, told = self.search, self.told
+        nothing = search.visited[frozenset()].reached
+        found = None
+        most = self.state.among - nothing
+        for e in search.reference.effects:
+            s = search.visited.get(frozenset({e.id}))
+            left = 0.0 if s is None else s.log_likelihood - s.reached
+            shown = left / told.ratio_of((e.id,)) > told.price((e.id,), dict.fromkeys(e.named, 0.0))
+            if left > most and shown:
+                found, most = e, left
+        return found
+
     def _likely(self, effect: str, probability: float) -> bool:
         """Whether an effect that is not named is likelier than not, and no refit speaks against."""
         other = self.search.visited.get(frozenset({*self.state.put, effect}))
@@ -230,7 +266,7 @@ class _Said:
             for e, weight in linear.weights.items():
                 if e not in log_odds and min(weight, own) > 0.0:
                     log_odds[e] = float(np.log(weight / own))
-        found = CredibleSet.of(log_odds, self.search.rules.credible)
+        found = self._told_apart(effect, log_odds, state)
         absent = [
             self.search.evidence(s, told, ratio) - here
             if s.put
@@ -242,6 +278,27 @@ class _Said:
         if whole - scipy.special.logsumexp([whole, *absent]) < least:
             return None
         return found
+
+    def _told_apart(self, effect: str, log_odds: dict[str, float], state: Exact) -> CredibleSet:
+        """The credible set of an effect and its rivals, but for those that are nothing beside it.
+
+        What the reference lacks gains likelihood as a change of it does: beside each other lines
+        tell which of the two differs.
+        """
+        while True:
+            found = CredibleSet.of(log_odds, self.search.rules.credible)
+            for e in found.effects:
+                both = self.search.visited.get(frozenset({*state.put, e}))
+                if e == effect or both is None:
+                    continue
+                beside = self.search.told(both)
+                if not self._off_nothing(e, both, beside) and self._off_nothing(
+                    effect, both, beside
+                ):
+                    del log_odds[e]
+                    break
+            else:
+                return found
 
     def _of(
         self,
@@ -268,8 +325,8 @@ class _Said:
         )
         matters = [p.matters for p in m.parameters]
         least = tuple(
-            max(told.least(s, usual), w + (rules.bound - 1.0) * s)
-            for s, usual, w in zip(std, m.scale, matters, strict=True)
+            _within(max(told.least(s, usual), w + (rules.bound - 1.0) * s), max(-low, high))
+            for s, usual, w, (low, high) in zip(std, m.scale, matters, ends, strict=True)
         )
         group: tuple[str, ...] = ()
         said: Said = "not testable"

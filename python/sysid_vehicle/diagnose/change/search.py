@@ -113,8 +113,9 @@ class Search:
         # Lines are drawn from the reference: where nothing may change it goes far from any car.
         told = self.told(replace(begin, fit=self.start, shift=np.zeros_like(begin.shift)))
         alone = [(e,) for e in told.alone if e in self.can][:_TRIED]
-        load = [PAYLOAD] if self.can.keys() >= set(PAYLOAD) else []
-        for few in (self._leading(told, begin), *alone, *load):
+        # A load, and another set of tyres, change several at once, of which none may lead.
+        at_once = [s for s in (PAYLOAD, tuple(e.id for e in SCALINGS)) if self.can.keys() >= set(s)]
+        for few in (self._leading(told, begin), *alone, *at_once):
             self._visit(few, told)
         state = max(self.visited.values(), key=lambda s: self.evidence(s, told, 1.0))
         seen: set[tuple[str, ...]] = set()
