@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from sysid_vehicle.diagnose.change.changed import _Said
+from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.diagnose.change.search import Search
 from sysid_vehicle.rules import USUAL
 
@@ -67,7 +67,7 @@ def test_what_is_named_is_likelier_than_all_that_was_fitted_without_it() -> None
         search.evidence = lambda state, *_: told[state.put]  # type: ignore[method-assign, assignment]
         search.over_nothing = lambda *_: -nothing  # type: ignore[method-assign]
         search.odds = lambda *_: {"cg_position": 0.0}  # type: ignore[method-assign, assignment]
-        said = _Said.__new__(_Said)
+        said = Saying.__new__(Saying)
         said.search = search
         said._off_nothing = lambda *_: True  # type: ignore[method-assign, assignment]
         lines = SimpleNamespace(causes=SimpleNamespace(of=lambda _: None))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Model, changed, drive, identify, manoeuvres
-from sysid_vehicle.diagnose.change.changed import _Said
 from sysid_vehicle.diagnose.change.may_change import beyond, forces_of_tyre, of_tyre, room
+from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.diagnose.change.search import Search
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.tyre import magic_formula
@@ -41,7 +41,7 @@ def test_an_interval_that_holds_nothing_names_no_tyre(
     search.before = SimpleNamespace(model=truth)
     search.start = SimpleNamespace(driving=driving)
     told = SimpleNamespace(std_along=lambda *_: std)
-    said = cast(Any, _Said.__new__(_Said))
+    said = cast(Any, Saying.__new__(Saying))
     said.search = search
     assert said._off_nothing(m.id, SimpleNamespace(changes=changes), told) is named
 
