@@ -74,7 +74,8 @@ def drawn(seed: int, number: int, kind: str = "") -> Pair:
     car, baseline, lacks = _car(rng, kind)
     truths: list[Truth] = []
     changed = car
-    several = rng.permutation([k for k in KINDS if k not in ("nothing", "two")])
+    order = rng.permutation([k for k in KINDS if k not in ("nothing", "two")])
+    several = [k for k in order if k != "downforce"]  # of cars that have some
     first = [str(several[0])]
     apart = [str(k) for k in several[1:] if not {first[0], str(k)} <= {"grip", "friction"}]
     todo = [*first, apart[0]] if kind == "two" else [kind]
@@ -181,8 +182,6 @@ def _changed(car: sv.Model, what: str, rng: np.random.Generator, truths: list[Tr
     if what == "cg":
         return shifted("cg_position.shift_rearward_m", sign * rng.uniform(0.05, 0.12))
     if what == "downforce":
-        if "aero_downforce" not in car.effects:
-            return _changed(car, "drag", rng, truths)
         names = ("aero_downforce.cl_a_front_m2", "aero_downforce.cl_a_rear_m2")
         truths.append(Truth(("aero_downforce",), "", 0.0))
         return scaled(dict.fromkeys(names, 0.5))

@@ -210,7 +210,10 @@ class Reference:
         # What gains too little to be named, or to replace the best: what it shares is not asked.
         leads = max(self._best - self._nothing, 0.0)
         if put and value - self._nothing > max(self._rules.told, self._rules.near * leads):
-            same, allowed = self._same(start, own, model, climb=climbed)
+            seconds = [d.usable_s for d in (self.before.driving, start.driving)]
+            wanted = self._fitted[frozenset(put)][1] - self._alone
+            wanted *= sum(seconds) / seconds[0]  # as much in each second of both
+            same, allowed = self._same(start, own, model, wanted, climb=climbed)
             reached -= max(same - self._nothing, 0.0)
             among -= max(allowed - self._nothing, 0.0)
         self._best = max(self._best, reached)
@@ -236,11 +239,14 @@ class Reference:
         values = {n: float(p[model.parameters[n].column]) for n in model.free_names}
         return model.with_values(values), reached
 
-    def _same(self, start: Fit, own: Model, apart: Model, *, climb: bool) -> tuple[float, float]:
+    def _same(
+        self, start: Fit, own: Model, apart: Model, wanted: float, *, climb: bool
+    ) -> tuple[float, float]:
         """Log-likelihoods of both drivings where what was put in is in both the same.
 
-        The second one as the reference alone tells it, where that is far from a compromise of both.
-        Tyres that are multiplied in both are other tyres of both.
+        The second one gains no more than the reference alone wants (`wanted`, of both drivings),
+        where it refuses the compromise of both. Tyres that are multiplied in both are other tyres
+        of both.
         """
         own, apart = without(own), as_tyres(apart)
         noise, box = self.before.noise.vector(), free_box(apart)
@@ -255,12 +261,9 @@ class Reference:
         p, value = highest(objective, begin, noise, box)
         if climb:
             p, _, value = to_the_maximum(objective, p, noise, box)
-        least = self._nothing
-        with suppress(NumericalError):
-            least = max(least, objective.log_likelihood(starts[-1], noise))
         off = {n: float(p[apart.parameters[n].column]) - own.value(n) for n in changed}
         loss = 0.5 * self._squared(off)
-        return value, value if loss <= self._rules.told else min(value, least)
+        return value, value if loss <= self._rules.told else min(value, self._nothing + wanted)
 
     def _squared(self, off: Mapping[str, float]) -> float:
         """Squared standard errors of the reference by which parameters are off, all else free."""
