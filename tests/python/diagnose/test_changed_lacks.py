@@ -5,14 +5,49 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from sysid_vehicle import Model, changed, drive, effect, identify, manoeuvres
+from sysid_vehicle.diagnose.change.may_change import of_effect
+from sysid_vehicle.diagnose.change.reference import Exact, Reference
 from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.effects import Effect
+from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import USUAL
 
 DOWNFORCE = "aero_downforce"
+
+
+def fitted(truth: Model, start: Model, of: str, before: float, after: float) -> tuple[Exact, Exact]:
+    """Nothing, and a change of an effect, where it has these sizes in the two drives."""
+    known = effect(of)
+    (name,), (p,) = known.named, known.parameters
+    logs = []
+    for seed, size in ((41, before), (42, after)):
+        car = truth.add(known).with_values({name: size})
+        logs.append(drive(car, manoeuvres.lap(15.0), seed=seed, rate_hz=50.0))
+    reference = identify(start, logs[0], starts=1)
+    later = replace(reference, driving=Driving.of(logs[1]), estimates=())
+    later = replace(later, covariance=np.zeros((0, 0)), pushed=np.zeros((0, 0)))
+    both = Reference(reference, [of_effect(known)], [known])
+    nothing = both.fitted(later, (), {}, {})
+    return nothing, both.fitted(later, (of,), {name: 0.0}, {name: p.typical})
+
+
+def test_half_of_a_large_change_is_no_lack_of_the_reference(truth: Model, start: Model) -> None:
+    """Put into both drives it gains far more than any lack does."""
+    nothing, changed = fitted(truth, start, "mass", 0.0, 0.17)
+    gain = changed.log_likelihood - nothing.log_likelihood
+    assert changed.reached - nothing.reached < 0.9 * gain
+    assert changed.among - nothing.among > 0.999 * gain
+
+
+def test_a_lack_of_the_reference_is_no_change(truth: Model, start: Model) -> None:
+    nothing, changed = fitted(truth, start, "tyre_relaxation", 0.4, 0.4)
+    gain = changed.log_likelihood - nothing.log_likelihood
+    assert gain > 20.0
+    assert changed.among - nothing.among < 5.0
 
 
 def said(found: float) -> Any:
