@@ -332,11 +332,15 @@ class Search:
     def evidence(self, state: Exact, told: Competition, ratio: float) -> float:
         """Log-likelihood over the variance ratio, less the price of the changes [nats].
 
-        Among what is likelier than nothing, that by which these compare.
+        Among what is likelier than nothing, and than each part of it, that by which these compare:
+        what is added and only gains as a lack of the reference does is no change.
         """
         price = told.price(state.put, state.sizes)
         nothing = self.visited[frozenset()].reached / ratio
-        told_by = state.among if state.reached / ratio - price > nothing else state.reached
+        put = frozenset(state.put)
+        parts = [v.reached for k, v in self.visited.items() if k < put]
+        more = state.reached / ratio - price > nothing and state.reached >= max(parts)
+        told_by = state.among if more else state.reached
         return told_by / ratio - price
 
     def over_nothing(self, state: Exact, told: Competition, ratio: float) -> float:
