@@ -78,3 +78,27 @@ def contradictions(text: str) -> list[str]:
     if _NONE in text and "a function of steering, speed and acceleration history explains" in text:
         found.append("nothing depends on the driving, and a function of it explains a part")
     return found
+
+
+def contradictions_of_changes(text: str) -> list[str]:
+    """The same of what `changed` prints."""
+    head, _, table = text.partition("  ---")
+    first = head.partition("\n")[0]
+    found, rows = [], {}
+    for row in table.splitlines()[1:]:
+        cells = [c for c in re.split(r"\s{2,}", row.strip()) if c]
+        if len(cells) == 4:
+            rows[cells[0]] = (cells[2], cells[3])
+    for effect, (sure, sentence) in rows.items():
+        said = re.split("[:;]", sentence)[0]
+        silent = said in ("not testable", "unchanged")
+        if silent != (sure == "-"):
+            found.append(f"{effect}: {sure} sure, and {said}")
+        if silent and re.search(rf"(changed|likeliest)[^;]*\\b{effect} ?[:(]", first):
+            found.append(f"{effect} is told as changed, and its row says {said}")
+        if said == "changed" and first.startswith("no change is shown"):
+            found.append("nothing is shown, and a row says changed")
+    likely = any(sentence.startswith("likely") for _, sentence in rows.values())
+    if "something changed, likeliest" in first and not likely:
+        found.append("something is likely, and no row says so")
+    return found

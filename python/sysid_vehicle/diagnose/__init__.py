@@ -9,8 +9,9 @@ from .candidates.judge import judge, verdicts
 from .candidates.possible import Size, considered, possible, refused
 from .candidates.verdicts import EffectVerdict, Verdicts
 from .candidates.widened import widened
-from .change.change import Change, EffectChange, LoadChange
+from .change.change import Change
 from .change.changed import changed
+from .change.effect_change import EffectChange, LoadChange
 from .diagnose import diagnose
 from .evidence.coordinates import blocks
 from .evidence.evidence import Evidence

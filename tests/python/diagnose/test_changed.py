@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from sysid_vehicle import (
     changed,
     drive,
     identify,
-    load,
     manoeuvres,
 )
 from sysid_vehicle._common.arrays import FloatArray
@@ -256,34 +254,6 @@ def test_tyres_of_an_axle_may_change(truth: Model, before: Fit) -> None:
         assert p.lower <= reference + value <= p.upper
         assert bound <= max(p.upper - reference, reference - p.lower)
     assert change["steer_ratio"].stiffness is None
-
-
-def test_what_is_likely_and_not_shown_is_no_calm(offset: Change) -> None:
-    """Two changes that act alike may both be likelier than not, and neither be shown."""
-    few = (replace(e, said="not testable", probability=0.1) for e in offset.effects[1:])
-    likely = replace(offset.effects[0], said="not testable", probability=0.8)
-    assert "something changed, likeliest steer_offset (80 % sure)" in str(
-        replace(offset, effects=(likely, *few))
-    )
-    calm = replace(likely, probability=0.3)
-    assert str(replace(offset, effects=(calm,))).startswith("no change is shown\n")
-
-
-def test_a_change_prints_and_is_kept(offset: Change, tmp_path: Path) -> None:
-    text = str(offset)
-    assert text.startswith("changed: steer_offset: offset_rad +0.00")
-    assert "<table>" in offset._repr_html_()
-    told = offset.to_dict()["effects"]["steer_offset"]
-    assert told["said"] == "changed"
-    assert told["change"]["offset_rad"]["value"] == offset["steer_offset"].value[0]
-    assert told["change"]["offset_rad"]["least"] == offset["steer_offset"].least[0]
-    frame = offset.to_pandas()
-    assert frame.loc[OFFSET, "said"] == "changed"
-    offset.before.save(tmp_path / "before.npz")
-    again = load(tmp_path / "before.npz")
-    assert again.log_likelihood == offset.before.log_likelihood
-    with pytest.raises(KeyError, match="there are steer_offset"):
-        offset["no_effect"]
 
 
 def test_drives_with_and_without_wheel_force_do_not_compare(fit: Fit, course: Log) -> None:

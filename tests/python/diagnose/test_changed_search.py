@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from sysid_vehicle.diagnose.change.changed import _Said
+from sysid_vehicle.diagnose.change.saying import Saying
 from sysid_vehicle.diagnose.change.search import Search
 from sysid_vehicle.rules import USUAL
 
@@ -14,6 +14,9 @@ class Told:
 
     def __init__(self, put: tuple[str, ...], p_values: dict[str, float]) -> None:
         self.put, self._p_values = put, p_values
+
+    def ratio_of(self, _: tuple[str, ...]) -> float:
+        return 1.0
 
     def off_nothing(self, effects: tuple[str, ...], _: object) -> float:
         (effect,) = effects
@@ -25,9 +28,10 @@ def test_what_is_named_was_put_in_and_is_off_nothing(monkeypatch: pytest.MonkeyP
     lines = {"steer_lag": 1e-9, "steer_delay": 1e-9, "mass": 0.3}
     sets = [(), ("steer_lag", "mass"), ("steer_delay", "mass"), ("steer_delay",)]
     search = Search.__new__(Search)
-    search.rules = USUAL
+    search.rules, search.tyres = USUAL, ()
+    search.can = {e: SimpleNamespace() for e in lines}  # type: ignore[misc]
     search.visited = {
-        frozenset(p): SimpleNamespace(put=p, changes={}, climbed=len(p) > 1)  # type: ignore[misc]
+        frozenset(p): SimpleNamespace(put=p, changes={}, among=0.0, climbed=len(p) > 1)  # type: ignore[misc]
         for p in sets
     }
     search.start = None  # type: ignore[assignment]
@@ -37,6 +41,7 @@ def test_what_is_named_was_put_in_and_is_off_nothing(monkeypatch: pytest.MonkeyP
     likelier = search.visited[frozenset(sets[2])]
     monkeypatch.setattr(search, "told", lambda state: Told(state.put, lines))
     monkeypatch.setattr(search, "_leading", lambda _, state: state.put)
+    monkeypatch.setattr(search, "evidence", lambda state, *_: -len(state.put))
     monkeypatch.setattr(
         search, "_better", lambda state, _: likelier if state.put == sets[1] else state
     )
@@ -60,8 +65,9 @@ def test_what_is_named_is_likelier_than_all_that_was_fitted_without_it() -> None
         search.rules, search.tyres = USUAL, ()
         search.visited = {frozenset(p): s for p, s in states.items()}  # type: ignore[misc]
         search.evidence = lambda state, *_: told[state.put]  # type: ignore[method-assign, assignment]
+        search.over_nothing = lambda *_: -nothing  # type: ignore[method-assign]
         search.odds = lambda *_: {"cg_position": 0.0}  # type: ignore[method-assign, assignment]
-        said = _Said.__new__(_Said)
+        said = Saying.__new__(Saying)
         said.search = search
         said._off_nothing = lambda *_: True  # type: ignore[method-assign, assignment]
         lines = SimpleNamespace(causes=SimpleNamespace(of=lambda _: None))

@@ -6,9 +6,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from sysid_vehicle import Model
-from sysid_vehicle.diagnose.change.changed import _Said
+from sysid_vehicle import Model, changed, drive, identify, manoeuvres
 from sysid_vehicle.diagnose.change.may_change import beyond, forces_of_tyre, of_tyre, room
+from sysid_vehicle.diagnose.change.saying import Saying
+from sysid_vehicle.diagnose.change.search import Search
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.tyre import magic_formula
 
@@ -17,10 +18,11 @@ def test_forces_differ_by_the_shares_that_are_told() -> None:
     before, change = (10.0, 1.4, 1.0, 0.1), (0.0, 0.0, -0.1, 0.0)
     found = list(forces_of_tyre(before, change, 0.9))
     np.testing.assert_allclose([share for share, _ in found], -0.1)
-    for _, slope in found:
-        assert slope[2] == pytest.approx(1.0, rel=1e-6)  # D alone scales all forces
-    first, last = found[0][1], found[-1][1]
-    np.testing.assert_allclose(first[:3], 1.0 / np.array(before[:3]), rtol=1e-2)  # as B C D
+    for _, (later, earlier) in found:
+        assert later[2] == pytest.approx(1.0, rel=1e-6)  # D alone scales all forces
+        assert earlier[2] == pytest.approx(-0.9, rel=1e-6)
+    first, last = found[0][1][0], found[-1][1][0]
+    assert first[:3] == pytest.approx(0.9 / np.array([10.0, 1.4, 0.9]), rel=1e-2)  # as B C D
     assert abs(last[0]) < 0.5 * first[0]  # at much slip stiffness says less
     slips = np.linspace(0.0, 0.3, 3000)
     driven = slips[np.argmax(magic_formula(slips, *before) >= 0.9)]
@@ -34,17 +36,28 @@ def test_an_interval_that_holds_nothing_names_no_tyre(
     m = of_tyre(truth, "rear")
     changes = dict(zip(m.names, (0.0, 0.0, -0.1 * truth.value("D_rear"), 0.0), strict=True))
     driving = SimpleNamespace(channel=lambda _: np.linspace(-8.0, 8.0, 100))
-    search = SimpleNamespace(
-        can={m.id: m},
-        tyres=(m,),
-        before=SimpleNamespace(model=truth),
-        start=SimpleNamespace(driving=driving),
-        rules=USUAL,
-    )
+    search = cast(Any, Search.__new__(Search))
+    search.can, search.tyres, search.rules = {m.id: m}, (m,), USUAL
+    search.before = SimpleNamespace(model=truth)
+    search.start = SimpleNamespace(driving=driving)
     told = SimpleNamespace(std_along=lambda *_: std)
-    said = cast(Any, _Said.__new__(_Said))
+    said = cast(Any, Saying.__new__(Saying))
     said.search = search
     assert said._off_nothing(m.id, SimpleNamespace(changes=changes), told) is named
+
+
+def test_errors_of_a_tyre_are_those_of_its_force(truth: Model) -> None:
+    """Where the stiffness is known and B, C and D are not, and a large change bends that line."""
+    log = drive(truth, manoeuvres.lap(20.0, lateral_mps2=4.0), seed=31, rate_hz=50.0)
+    softer = truth.with_values({"B_rear": 0.8 * truth.value("B_rear")})
+    later = drive(softer, manoeuvres.lap(20.0, lateral_mps2=4.0), seed=32, rate_hz=50.0)
+    known = identify(truth, log, starts=1)
+    assert known["B_rear"].std > 0.3 * known["B_rear"].value
+    change = changed(known, later, candidates=("steer_ratio",))
+    assert [e.id for e in change.named] == ["tyre_rear"]
+    share, std = change["tyre_rear"].stiffness or (0.0, np.inf)
+    assert share == pytest.approx(-0.2, abs=3.0 * std)
+    assert std < 0.01
 
 
 def test_no_line_is_followed_beyond_what_a_tyre_can_be(truth: Model) -> None:

@@ -17,8 +17,9 @@ independent; how the terms of a score hang together in time is read from both.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -78,6 +79,8 @@ class Side:
         Whose units the unknown forces have.
     residuals_of : Side, optional
         Of the same driving, whose residuals count: those of another model.
+    factors : mapping of str to float, optional
+        By which the model multiplies parameters: columns are of what is multiplied.
 
     Attributes
     ----------
@@ -93,6 +96,7 @@ class Side:
         effects: Sequence[Effect],
         like: Side | None = None,
         residuals_of: Side | None = None,
+        factors: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
         model = fit.model
         self._residuals_of = residuals_of
@@ -115,8 +119,10 @@ class Side:
         rest = len(own) + lacked.width
         self._order = np.r_[[found.index(n) for n in names], rest : len(found)].astype(np.intp)
         self.names = tuple(found[i] for i in self._order)
-        self.information = self._directions.information[np.ix_(self._order, self._order)]
-        self.score = self._directions.score[self._order]
+        self._factors = as_float64([factors.get(n, 1.0) for n in self.names])
+        information = self._directions.information[np.ix_(self._order, self._order)]
+        self.information = information * np.outer(self._factors, self._factors)
+        self.score = self._directions.score[self._order] * self._factors
         if residuals_of is not None:
             self.score = as_float64(sum(G.T @ e for _, G, e in self.rows()))
 
@@ -132,7 +138,7 @@ class Side:
         for where, columns, e in self._directions.rows(*self._directions.sources):
             if other is not self:
                 _, _, e = next(residuals)
-            yield where, np.hstack(columns)[:, self._order], e
+            yield where, np.hstack(columns)[:, self._order] * self._factors, e
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,6 +193,7 @@ class Differences:
         scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
         inverse = np.linalg.inv(whole / np.outer(scale, scale) + _RIDGE * np.eye(len(scale)))
         K = inverse / np.outer(scale, scale)
+        self._shared = K
         self._common = K @ (reference.score + score + precision * known.centre)
         self._response = K @ later.information
         information = later.information - later.information @ self._response
@@ -197,6 +204,23 @@ class Differences:
     def samples(self) -> int:
         """Of both drivings."""
         return self._reference.driving.samples + self._later.driving.samples
+
+    def of_both(self, later: FloatArray, shared: FloatArray) -> tuple[FloatArray, float]:
+        """What depends on changes and on what both drivings share: by changes alone, and the rest.
+
+        Parameters
+        ----------
+        later, shared : array, shape (n,)
+            Derivatives by the changes and by what is shared.
+
+        Returns
+        -------
+        along : array, shape (n,)
+            Derivatives by the changes, what is shared being what they leave it.
+        variance : float
+            Of what is shared beside them.
+        """
+        return as_float64(later - self._response.T @ shared), float(shared @ self._shared @ shared)
 
     def ratios(
         self, along: FloatArray, sizes: FloatArray, of: FloatArray

@@ -3,139 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from ..._common.printed import Part, Printed, Table
 from ..._common.tables import frame
-from ..._common.text import brief, number, unit_after, with_error
+from ..._common.text import brief, number
 from ...identify import Fit
 from ...rules import Rules
 from ..candidates.causes import UNKNOWN, Causes, CredibleSet
+from .both_axles import FRICTION, STIFFNESS
+from .effect_change import EffectChange, LoadChange
 from .pieces import Alike
-
-Said = Literal[
-    "changed",
-    "one of a group",
-    "implausible",
-    "negligible",
-    "unchanged",
-    "not testable",
-]
-
-_NAMED: tuple[Said, ...] = ("changed", "one of a group")
-
-
-def _signed(value: float, std: float) -> str:
-    told = with_error(value, std)
-    return told if told.startswith("-") else f"+{told}"
-
-
-@dataclass(frozen=True)
-class EffectChange:
-    """By how much an effect, or the tyres of an axle, differ from the reference.
-
-    Attributes
-    ----------
-    id : str
-        Of the effect; `tyre_front`, `tyre_rear` of the tyres that are fitted.
-    names, units : tuple of str
-        Of its parameters.
-    value, std : tuple of float
-        Differences of its parameters and their standard errors, beside what else changed.
-    bound : tuple of float
-        How far from nothing each difference may be, at 95 %.
-    least : tuple of float
-        Of each parameter, were it alone, the smallest difference that this driving would have named
-        with a probability of 95 %; infinite where it would have named none.
-    probability : float
-        Of being among what changed.
-    said : str
-        `changed`; `one of a group` that explain the driving as well; `implausible`: it acts like
-        what changed, with a size that no car has; `negligible`; `unchanged`, with a bound below
-        what matters; or `not testable` with this driving.
-    group : tuple of str
-        The others of the group.
-    stiffness : tuple of float, optional
-        Of tyres, by which share of the reference their cornering stiffness at the same load
-        differs, and its standard error: driving tells it long before B, C, D and E one by one.
-    """
-
-    id: str
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    value: tuple[float, ...]
-    std: tuple[float, ...]
-    bound: tuple[float, ...]
-    probability: float
-    said: Said
-    group: tuple[str, ...] = ()
-    least: tuple[float, ...] = ()
-    stiffness: tuple[float, float] | None = None
-
-    @property
-    def named(self) -> bool:
-        """Whether it is named, perhaps as one of a group."""
-        return self.said in _NAMED
-
-    @property
-    def size(self) -> str:
-        """The differences with standard errors, in words."""
-        told = [_signed(v, s) for v, s in zip(self.value, self.std, strict=True)]
-        if self.stiffness is None:
-            return self._listed(told)
-        value, std = (100.0 * x for x in self.stiffness)
-        return f"cornering stiffness {_signed(value, std)} %, {self._listed(told)}"
-
-    @property
-    def sure(self) -> str:
-        """Its probability in words: of a change that is beyond doubt no more than 99 %."""
-        return f"{min(int(100.0 * self.probability), 99)} % sure"
-
-    @property
-    def sentence(self) -> str:
-        """What is said of it, in words."""
-        if self.said == "one of a group":
-            return f"changed; confounded with {', '.join(self.group)}"
-        if self.said == "implausible":
-            return "significant, but the change is physically implausible"
-        if self.said in ("unchanged", "not testable"):
-            below = self._listed([f"below {number(b, 2)}" for b in self.bound])
-            return f"{self.said}: {below} at 95 %"
-        return self.said
-
-    def _listed(self, figures: list[str]) -> str:
-        told = zip(self.names, figures, self.units, strict=True)
-        return ", ".join(f"{n} {x}{unit_after(u)}" for n, x, u in told)
-
-    def __str__(self) -> str:
-        return f"{self.id}: {self.size}"
-
-
-@dataclass(frozen=True)
-class LoadChange:
-    """A load that was put into the car, or taken out of it.
-
-    Attributes
-    ----------
-    mass_kg, mass_std_kg : float
-        Negative where it was taken out.
-    rearward_m, rearward_std_m : float
-        How far behind the centre of gravity of the car without the change, and standard error.
-    """
-
-    mass_kg: float
-    mass_std_kg: float
-    rearward_m: float
-    rearward_std_m: float
-
-    def __str__(self) -> str:
-        what = "a load of" if self.mass_kg > 0.0 else "taking out"
-        where = "behind" if self.rearward_m > 0.0 else "ahead of"
-        mass = with_error(abs(self.mass_kg), self.mass_std_kg)
-        place = with_error(abs(self.rearward_m), self.rearward_std_m)
-        return f"{what} {mass} kg, {place} m {where} the centre of gravity,"
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,18 +34,25 @@ class Change(Printed):
         with `unknown` is a change that no effect of the catalogue explains.
     effects : tuple of EffectChange
         What is named first, then by probability.
+    nothing : float
+        Probability that nothing changed, by what was fitted.
     alike : Alike
         How like the reference the later driving is; where it is not, intervals are as much wider
         as estimates differ between pieces of the reference.
     rules : Rules
+    lacks : tuple of str
+        Effects that the reference lacked, and that were put into its model: in both drivings the
+        same they explain more than what seemed to have changed without them.
     """
 
     before: Fit
     after: Fit
     causes: Causes
     effects: tuple[EffectChange, ...]
+    nothing: float
     alike: Alike
     rules: Rules
+    lacks: tuple[str, ...] = ()
 
     __iter__ = None  # numbers are no names
 
@@ -184,6 +71,12 @@ class Change(Printed):
     def unknown(self) -> tuple[CredibleSet, ...]:
         """Changes that are there and that no effect of the catalogue explains."""
         return tuple(s for s in self.causes.sets if s.effects[0].startswith(UNKNOWN))
+
+    @property
+    def calm(self) -> bool:
+        """Whether no change is shown, and none is likely."""
+        told = bool(self.named or self.unknown)
+        return not told and not any(e.said == "likely" for e in self.effects)
 
     @property
     def load(self) -> LoadChange | None:
@@ -215,7 +108,7 @@ class Change(Printed):
             return f"{what}; beside it {more}" if what else more
         if what:
             return what
-        likely = [f"{e.id} ({e.sure})" for e in self.effects if e.probability > 0.5]
+        likely = [f"{e.id} ({e.sure})" for e in self.effects if e.said == "likely"]
         if likely:
             return (
                 f"no single change is significant; something changed, likeliest {', '.join(likely)}"
@@ -230,7 +123,7 @@ class Change(Printed):
 
     def _rows(self, most: int = 8) -> list[list[str]]:
         few = self.effects[: max(most, len(self.named))]
-        return [[e.id, e.size, e.sure.removesuffix(" sure"), e.sentence] for e in few]
+        return [[e.id, e.size, e.sure.removesuffix(" sure") or "-", e.sentence] for e in few]
 
     __repr__ = brief
 
@@ -241,9 +134,32 @@ class Change(Printed):
             "same again to be sure"
         )
         told = [other] if self.alike.beyond > self.rules.taken else []
+        if self.lacks:
+            told.insert(
+                0,
+                f"the reference lacks {', '.join(self.lacks)}, in both drivings the same: compared "
+                "with it in the model",
+            )
         if self.load is not None:
             told.insert(0, f"mass and centre of gravity: as {self.load} would change them")
-        return [self._headline(), *told, Table(self._HEAD, self._rows())]
+        return [self._headline(), *told, self._power(), Table(self._HEAD, self._rows())]
+
+    def _power(self) -> str:
+        """Which changes of the tyres this driving would not show."""
+        known = {e.id: e for e in self.effects}
+        sizes = {
+            "cornering stiffness of the front axle": ("tyre_front", "least_stiffness"),
+            "of the rear axle": ("tyre_rear", "least_stiffness"),
+            "of both": (STIFFNESS, "least"),
+            "friction of both": (FRICTION, "least"),
+        }
+        told = []
+        for what, (effect, of) in sizes.items():
+            if effect in known:
+                least = np.atleast_1d(getattr(known[effect], of))[0]
+                below = f"below {number(100.0 * least, 2)} %"
+                told.append(f"{what} {below if np.isfinite(least) else 'of any size'}")
+        return f"changes that would not be seen: {', '.join(told)}" if told else ""
 
     def to_pandas(self) -> Any:
         """A DataFrame of all parameters, by effect and parameter."""
@@ -264,25 +180,7 @@ class Change(Printed):
             "headline": self._headline(),
             "beyond": self.alike.beyond,
             "causes": self.causes.to_dict(),
-            "effects": {
-                e.id: {
-                    "said": e.said,
-                    "probability": e.probability,
-                    "group": list(e.group),
-                    "stiffness": None if e.stiffness is None else list(e.stiffness),
-                    "change": {
-                        n: {
-                            "value": v,
-                            "std": s,
-                            "bound": b,
-                            "least": m if np.isfinite(m) else None,
-                            "unit": u,
-                        }
-                        for n, v, s, b, m, u in zip(
-                            e.names, e.value, e.std, e.bound, e.least, e.units, strict=True
-                        )
-                    },
-                }
-                for e in self.effects
-            },
+            "nothing": self.nothing,
+            "lacks": list(self.lacks),
+            "effects": {e.id: e.to_dict() for e in self.effects},
         }

@@ -9,29 +9,26 @@ likelihoods decide between what was fitted.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
-from ..._common.arrays import as_float64
 from ...effects import Effect
 from ...errors import InvalidInput
 from ...estimate import Driving
-from ...identify import Fit, explaining
+from ...identify import Fit, explaining, identify
 from ...identify.offsets import centred
 from ...log import Log
 from ...model import Model
 from ...rules import USUAL, Rules
-from ...vehicle import GRAVITY_MPS2, Vehicle
-from ..candidates.causes import Causes, CredibleSet
-from ..candidates.possible import possible
-from .change import Change, EffectChange, Said
-from .changes_compete import Competition
-from .may_change import YAW_INERTIA, May, beyond, forces_of_tyre, room
-from .reference import Exact
+from ...vehicle import Vehicle
+from .change import Change
+from .may_change import YAW_INERTIA
+from .saying import Saying
 from .search import Search
+
+_LACKS = 2  # effects that are put into the model of a reference, at most
 
 
 @explaining
@@ -45,7 +42,9 @@ def changed(
 ) -> Change:
     """Tell what of a car changed since a reference: yesterday's log fits the model, today's not.
 
-    What the reference left unexplained counts only as far as the later driving leaves more. Both
+    What the reference left unexplained counts only as far as the later driving leaves more. Where
+    an effect that is in both the same explains more than what seems to have changed, the reference
+    lacks it: it is put into its model, and the drivings are compared again (`Change.lacks`). Both
     are taken as independent; noise is that of the reference. What a model lacks acts otherwise at
     other speeds or lateral accelerations: as far as the later driving is there (`Change.alike`),
     standard errors hold what estimates differ by between pieces of the reference.
@@ -89,6 +88,19 @@ def changed(
             "the wheel force fx_n is known in one of the drivings only; log it in both, or leave "
             "it out of both"
         )
+    lacks: list[str] = []
+    while True:
+        said = Saying(Search(before, _later(before, driving, vehicle), candidates, rules))
+        change = said.change()
+        lack = said.lack() if len(lacks) < _LACKS and not change.calm else None
+        if lack is None:
+            return replace(change, lacks=tuple(lacks))
+        lacks.append(lack.id)
+        before = identify(before.model.add(lack), before.driving, starts=1)
+
+
+def _later(before: Fit, driving: Driving, vehicle: Vehicle | None) -> Fit:
+    """The reference as it is, on the later driving."""
     start = replace(
         before,
         model=before.model if vehicle is None else _of_vehicle(before.model, vehicle),
@@ -99,8 +111,8 @@ def changed(
         profiles=(),
     )
     if len(driving.logs) > 1 and start.model.offset_names:
-        start = replace(start, driving=centred(start)[1])
-    return _Said(Search(before, start, candidates, rules)).change()
+        return replace(start, driving=centred(start)[1])
+    return start
 
 
 def _of_vehicle(model: Model, vehicle: Vehicle) -> Model:
@@ -108,177 +120,3 @@ def _of_vehicle(model: Model, vehicle: Vehicle) -> Model:
     stays = (n for n in model.names if n != YAW_INERTIA or n in model.values)
     values = {n: model.value(n) for n in stays}
     return replace(model, vehicle=vehicle, values=values)
-
-
-class _Said:
-    """What is said of everything that may have changed."""
-
-    def __init__(self, search: Search) -> None:
-        self.search = search
-        self.told, self.state = search.found()
-
-    def change(self) -> Change:
-        """Exact likelihoods decide on what was put in, scores on all else."""
-        search, told, state = self.search, self.told, self.state
-        ratio = told.ratio_of(state.put)
-        exact = {e: self._exact(e, state, told, ratio) for e in state.put}
-        rest = [
-            s
-            for s in told.causes.sets
-            if not any(e in state.put for e in s.effects)
-            and not told.acts_like(s.effects[0])
-            and frozenset({*state.put, s.effects[0]})
-            not in self.search.visited  # refused by a refit
-        ]
-        causes = told.causes.only([*(s for s in exact.values() if s is not None), *rest], {})
-        sizes, stds = (self._of_the_car(told_by, state) for told_by in (told.sizes, told.stds))
-        # Of what was put in the exact size: no line is drawn from the reference to there.
-        for e in state.put:
-            sizes |= self._sizes_in(state, e)
-        for e, m in self.search.can.items():
-            without, put = frozenset(state.put) - {e}, frozenset({*state.put, e})
-            one, other = self.search.visited.get(without), self.search.visited.get(put)
-            if len(m.names) > 1 or one is None or other is None:
-                continue
-            # As many standard errors from nothing as the likelihood ratio says, at most.
-            ((name, size),) = self._sizes_in(other, e).items()
-            rises = 2.0 * (other.reached - one.reached) / told.ratio_of((e,))
-            sizes[name] = size if rises > 0.0 else sizes[name]
-            stds[name] = max(stds[name], abs(sizes[name]) / float(np.sqrt(max(rises, 1.0))))
-        for s in (s for s in exact.values() if s is not None):
-            for e in s.effects:
-                other = self._in_place(e, s, state)
-                if other is not None and e not in state.put:
-                    beside = self.search.told(other)
-                    sizes |= self._sizes_in(other, e)
-                    lines = self._of_the_car(beside.stds, other)
-                    stds |= {n: max(lines[n], stds[n]) for n in self.search.can[e].names}
-        found = [self._of(m, causes, sizes, stds, told) for m in self.search.may]
-        order = [e for s in causes.sets for e in s.effects]
-        found.sort(
-            key=lambda e: (order.index(e.id) if e.id in order else len(order), -e.probability)
-        )
-        return Change(search.before, state.fit, causes, tuple(found), search.alike, search.rules)
-
-    def _sizes_in(self, state: Exact, effect: str) -> dict[str, float]:
-        return {n: state.changes[n] for n in self.search.can[effect].names}
-
-    def _of_the_car(self, told_by: Mapping[str, float], state: Exact) -> dict[str, float]:
-        """Lines tell differences of parameters: of relative errors as shares of what there was."""
-        own = self.search.reference.factors(state)
-        return {n: x / own.get(n, 1.0) for n, x in told_by.items()}
-
-    def _off_nothing(self, effect: str, state: Exact, told: Competition) -> bool:
-        """Whether a size is beyond what pieces of the drivings differ by, as far as a name asks.
-
-        What stands in for a lack of the model gains likelihood as a change does. Of tyres the
-        interval of their force has to exclude nothing, at some slip that was driven: likelihoods
-        of four coefficients that no driving tells apart gain by what the model lacks.
-        """
-        m, rules = self.search.can[effect], self.search.rules
-        sizes = [state.changes[n] for n in m.names]
-        if m in self.search.tyres:
-            before = [self.search.before.model.value(n) for n in m.names]
-            ay = np.abs(self.search.start.driving.channel("ay_mps2"))
-            most = float(np.nanpercentile(ay, 99.0)) / GRAVITY_MPS2
-            return any(
-                abs(share) > rules.interval * told.std_along(effect, by, state.changes)
-                for share, by in forces_of_tyre(before, sizes, most)
-            )
-        stds = [told.stds[n] for n in m.names]
-        return any(
-            abs(size) > told.least(s, usual) - rules.bound * s
-            for size, s, usual in zip(sizes, stds, m.scale, strict=True)
-        )
-
-    def _in_place(self, effect: str, of: CredibleSet, state: Exact) -> Exact | None:
-        """The state with an effect in place of another one of its set, where it was visited."""
-        others = frozenset(state.put) - set(of.effects)
-        return self.search.visited.get(others | {effect})
-
-    def _exact(
-        self, effect: str, state: Exact, told: Competition, ratio: float
-    ) -> CredibleSet | None:
-        """What may have changed in place of an effect that was put in; None where nothing need."""
-        if not self._off_nothing(effect, state, told):
-            return None
-        here = self.search.evidence(state, told, ratio)
-        log_odds = self.search.odds(effect, state, told)
-        linear = told.causes.of(effect)
-        if linear is not None:
-            own = linear.weights.get(effect, 0.0)
-            for e, weight in linear.weights.items():
-                if e not in log_odds and min(weight, own) > 0.0:
-                    log_odds[e] = float(np.log(weight / own))
-        found = CredibleSet.of(log_odds, self.search.rules.credible)
-        absent = [
-            self.search.evidence(s, told, ratio) - here
-            for s in self.search.lacking(effect, state, found.effects)
-        ]
-        whole = scipy.special.logsumexp(list(log_odds.values()))
-        least = np.log(self.search.rules.credible)
-        if whole - scipy.special.logsumexp([whole, *absent]) < least:
-            return None
-        return found
-
-    def _of(
-        self,
-        m: May,
-        causes: Causes,
-        sizes: dict[str, float],
-        stds: dict[str, float],
-        told: Competition,
-    ) -> EffectChange:
-        rules, own = self.search.rules, causes.of(m.id)
-        ends = room(m, self.search.before.model)
-        raw = [sizes[n] for n in m.names], [stds[n] for n in m.names]
-        # A line that leads further beyond what a parameter can be than its error is followed to
-        # there, all of its effect; what is cut off is no less uncertain than it is large.
-        cut = beyond(raw[0], [rules.bound * s for s in raw[1]], ends)
-        told_by = [(1.0 - cut) * v for v in raw[0]]
-        value = tuple(float(np.clip(v, *both)) for v, both in zip(told_by, ends, strict=True))
-        std = tuple(max(s, cut * abs(v)) for v, s in zip(*raw, strict=True))
-        bound = tuple(
-            min(abs(v) + rules.bound * s, max(-low, high))
-            for v, s, (low, high) in zip(value, std, ends, strict=True)
-        )
-        matters = [p.matters for p in m.parameters]
-        least = tuple(
-            max(told.least(s, usual), w + (rules.bound - 1.0) * s)
-            for s, usual, w in zip(std, m.scale, matters, strict=True)
-        )
-        group: tuple[str, ...] = ()
-        said: Said = "not testable"
-        if own is not None:
-            group = tuple(e for e in own.effects if e != m.id)
-            said = "one of a group" if group else "changed"
-            if not possible(m, *raw, rules):
-                said = "implausible"
-            elif all(abs(v) + s < w for v, s, w in zip(value, std, matters, strict=True)):
-                said, group = "negligible", ()
-        elif all(b < w for b, w in zip(bound, matters, strict=True)):
-            said = "unchanged"
-        names, units = zip(*((p.name, p.unit) for p in m.parameters), strict=True)
-        probability = causes.inclusion.get(m.id, 0.0)
-        stiffness = self._stiffness(m, told_by, cut)
-        return EffectChange(
-            m.id, names, units, value, std, bound, probability, said, group, least, stiffness
-        )
-
-    def _stiffness(self, m: May, sizes: Sequence[float], cut: float) -> tuple[float, float] | None:
-        """By which share the cornering stiffness of an axle's tyres differs, per load, +- what.
-
-        `cut` is the share of the sizes that leads beyond any tyre.
-        """
-        if m not in self.search.tyres:
-            return None
-        own = self.search.before.model
-        before = np.array([own.value(n) for n in m.names[:3]])  # B, C, D
-        put = m.id in self.state.put
-        after = before + np.array(sizes[:3]) if put else before
-        whole = float(np.prod(before))
-        slope = float(np.prod(after)) / whole / after
-        value = float(np.prod(after)) / whole - 1.0 if put else float(slope @ np.array(sizes[:3]))
-        known = {**dict(zip(m.names, sizes, strict=True)), **self.state.changes}
-        std = self.told.std_along(m.id, as_float64([*slope, 0.0]), known)
-        return value, max(std, abs(value) * cut / (1.0 - cut) if cut < 1.0 else np.inf)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import scipy
@@ -41,9 +42,12 @@ class Competition:
     put : sequence of str
         Changes that the model of the later driving has already.
     rules : Rules
+    moves : mapping of str to mapping
+        What a parameter that has no column of its own does to those that have one.
 
     Attributes
     ----------
+    put : tuple of str
     sizes, stds : dict of str to float
         By parameter: the change beside what was put in, in place of what acts like it.
     causes : Causes
@@ -61,9 +65,11 @@ class Competition:
         samples: int,
         put: Sequence[str],
         rules: Rules = USUAL,
+        moves: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
     ) -> None:
         self._differences, self._may, self._place = differences, may, place
-        self._put, self._rules = tuple(put), rules
+        self._moves = moves
+        self.put, self._rules = tuple(put), rules
         self._hypotheses: list[Hypothesis] = []
         self._turns, self._scale = self._competing(targets, before, float(np.sqrt(samples)))
         self._information = self._turns.T @ differences.information @ self._turns
@@ -86,7 +92,11 @@ class Competition:
         scale: list[float] = []
         for m in self._may:
             at = len(columns)
-            columns += [every[:, self._place[n]] for n in m.names]
+            for n in m.names:
+                moved = self._moves.get(n, {n: 1.0})
+                columns.append(
+                    as_float64(sum(x * every[:, self._place[c]] for c, x in moved.items()))
+                )
             scale += m.scale
             self._hypotheses += [
                 Hypothesis(
@@ -131,9 +141,9 @@ class Competition:
 
     def acts_like(self, effect: str) -> str:
         """What was put in that the effect is, or acts like; empty where there is none."""
-        if effect in self._put:
+        if effect in self.put:
             return effect
-        near = {p: self._alike[effect, p] for p in self._put if effect in self._whole}
+        near = {p: self._alike[effect, p] for p in self.put if effect in self._whole}
         best = max(near, key=lambda p: near[p], default="")
         return best if best and near[best] >= self._rules.near else ""
 
@@ -148,14 +158,14 @@ class Competition:
         told = np.eye(n)
         for name, h in self._whole.items():
             own = list(h.columns)
-            beside = [p for p in self._put if p != name and self._alike[name, p] < self._rules.near]
+            beside = [p for p in self.put if p != name and self._alike[name, p] < self._rules.near]
             both, inverse = self._solved([*beside, name])
             size = inverse @ self._score[both]
             for c in own:
                 i = both.index(c)
                 along[both, c] = inverse[:, i]
                 mine[c] = size[i], np.sqrt(max(inverse[i, i], 0.0))
-            every, inverse = self._solved([*self._put, name])
+            every, inverse = self._solved([*self.put, name])
             sizes[np.ix_(every, own)] = (inverse @ self._score[every])[:, None]
             if name.startswith(UNKNOWN):
                 # One score: along all that it explains.
@@ -174,33 +184,42 @@ class Competition:
         for name, h in self._whole.items():
             own = list(h.columns)
             ratio[own] = (ratios[:n] if name.startswith(UNKNOWN) else ratio)[own].max()
-        return self._shared(ratio) if self._put else ratio
+        return self._shared(ratio) if self.put else ratio
 
-    def std_along(self, effect: str, slope: FloatArray, changes: Mapping[str, float]) -> float:
+    def std_along(
+        self, effect: str, slopes: tuple[FloatArray, FloatArray], changes: Mapping[str, float]
+    ) -> float:
         """Standard error of what follows from an effect's changes, beside what was put in.
+
+        What the drivings tell of parameters that neither tells one by one is along other lines in
+        the later one, where the change is large.
 
         Parameters
         ----------
         effect : str
-        slope : array, shape (k,)
-            Derivatives by its parameters.
+        slopes : tuple of array, shape (k,)
+            Derivatives by its parameters as they are in the later driving, and in the reference.
         changes : mapping of str to float
             What is taken off before the colour of residuals is asked for.
         """
-        beside = [p for p in self._put if p != effect and self._alike[effect, p] < self._rules.near]
+        beside = [p for p in self.put if p != effect and self._alike[effect, p] < self._rules.near]
         both, inverse = self._solved([*beside, effect])
-        own = [both.index(c) for c in self._whole[effect].columns]
-        variance = float(slope @ inverse[np.ix_(own, own)] @ slope)
+        later, shared = np.zeros((2, len(self._turns)))
+        at = [self._place[n] for n in self._of(effect).names]
+        later[at], shared[at] = slopes[0], slopes[0] + slopes[1]
+        by_changes, rest = self._differences.of_both(later, shared)
+        slope = (self._turns.T @ by_changes)[both]
+        variance = float(slope @ inverse @ slope)
         if variance <= 0.0:
             return np.inf
         along, of, off = np.zeros((3, len(self._score), 1))
-        along[both, 0] = inverse[:, own] @ slope
-        of[list(self._whole[effect].columns), 0] = inverse[np.ix_(own, own)] @ slope / variance
-        for name in {*self._put, effect}:
+        along[both, 0] = of[both, 0] = inverse @ slope
+        of /= variance
+        for name in {*self.put, effect}:
             columns = self._whole[name].columns
             off[list(columns), 0] = [changes.get(n, 0.0) for n in self._of(name).names]
         turned = (self._turns @ x for x in (along, off, of))
-        return float(np.sqrt(variance * self._differences.ratios(*turned)[1][0]))
+        return float(np.sqrt((variance + rest) * self._differences.ratios(*turned)[1][0]))
 
     def off_nothing(self, effects: Sequence[str], changes: Mapping[str, float]) -> float:
         """Of what was put in as one change, the p-value of nothing by lines, beside the others.
@@ -210,7 +229,7 @@ class Competition:
         """
         beside = [
             p
-            for p in self._put
+            for p in self.put
             if p not in effects and all(self._alike[e, p] < self._rules.near for e in effects)
         ]
         both, inverse = self._solved([*beside, *effects])
@@ -270,7 +289,7 @@ class Competition:
         columns = [c for name in put for c in self._whole[name].columns]
         return float(self._ratio[columns].max(initial=1.0))
 
-    def price(self, put: Sequence[str], shift: FloatArray) -> float:
+    def price(self, put: Sequence[str], changed_by: Mapping[str, float]) -> float:
         """Of some changes, by how much they are told better than their priors do [nats].
 
         With the priors of their sizes, and that of each being the one of all that changed.
@@ -278,14 +297,14 @@ class Competition:
         Parameters
         ----------
         put : sequence of str
-        shift : array, shape (n,)
-            Sizes by column of the differences.
+        changed_by : mapping of str to float
+            Differences of their parameters.
         """
         columns = [c for name in put for c in self._whole[name].columns]
         scale = self._scale[columns]
         block = self._information[np.ix_(columns, columns)] * np.outer(scale, scale)
         known = np.eye(len(columns)) + block / self.ratio_of(put)
-        sizes = (self._turns.T @ shift)[columns] / scale
+        sizes = np.array([changed_by[n] for e in put for n in self._of(e).names]) / scale
         occam = 0.5 * float(np.linalg.slogdet(known)[1]) + 0.5 * float(sizes @ sizes)
         return occam + len(as_one(put)) * self._of_one
 
@@ -295,7 +314,7 @@ class Competition:
         odds = self._rules.nothing / (1.0 - self._rules.nothing) * len(self._whole)
         return float(np.log(odds))
 
-    def least(self, std: float, usual: float) -> float:
+    def least(self, std: float, usual: float, price: float | None = None) -> float:
         """The smallest change of one parameter that is named with probability `Rules.credible`.
 
         Where its evidence, less what `price` takes off, is as large as a name asks for; and by as
@@ -305,11 +324,15 @@ class Competition:
         ----------
         std, usual : float
             Standard error, and standard deviation of the prior.
+        price : float, optional
+            What the change costs [nats], where that is not of one parameter.
         """
         if std >= usual:
             return np.inf
         share, rules = (std / usual) ** 2, self._rules
-        nats = self._of_one + rules.told + 0.5 * float(np.log1p(1.0 / share))
+        if price is None:
+            price = self._of_one + 0.5 * float(np.log1p(1.0 / share))
+        nats = price + rules.told
         return std * (float(np.sqrt(2.0 * nats / (1.0 - share))) + rules.bound)
 
     def wald(self, effect: str, beside: str, changes: Mapping[str, float]) -> float:

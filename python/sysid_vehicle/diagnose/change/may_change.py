@@ -135,7 +135,7 @@ def beyond(
 
 def forces_of_tyre(
     before: Sequence[float], change: Sequence[float], friction: float
-) -> Iterator[tuple[float, FloatArray]]:
+) -> Iterator[tuple[float, tuple[FloatArray, FloatArray]]]:
     """By which share the side force of a tyre differs, from no slip to the largest one driven.
 
     Parameters
@@ -148,8 +148,8 @@ def forces_of_tyre(
     Yields
     ------
     share : float
-    slope : array, shape (4,)
-        Its derivatives by the differences, at the reference.
+    slopes : tuple of array, shape (4,)
+        Its derivatives by the tyre as it is later, and by that of the reference.
     """
     known = as_float64(before)
     after = known + as_float64(change)
@@ -158,10 +158,13 @@ def forces_of_tyre(
     driven = float(slips[int(np.argmax(forces >= min(friction, float(forces.max()))))])
     for part in _PARTS:
         at = part * driven
-        force = float(magic_formula(at, *known))
-        step = 1e-6 * np.maximum(np.abs(known), 0.1)
-        slope = [
-            (magic_formula(at, *(known + d)) - magic_formula(at, *(known - d))) / (2.0 * force)
-            for d in np.diag(step)
-        ] / step
-        yield float(magic_formula(at, *after)) / force - 1.0, as_float64(slope)
+        ratio = float(magic_formula(at, *after) / magic_formula(at, *known))
+        yield ratio - 1.0, (ratio * _relative(at, after), -ratio * _relative(at, known))
+
+
+def _relative(slip: float, tyre: FloatArray) -> FloatArray:
+    """Derivatives of the logarithm of a side force by the coefficients of its tyre."""
+    step = 1e-6 * np.maximum(np.abs(tyre), 0.1)
+    sides = [(magic_formula(slip, *(tyre + d)), magic_formula(slip, *(tyre - d)))
+             for d in np.diag(step)]  # fmt: skip
+    return as_float64([(high - low) / (high + low) for high, low in sides] / step)

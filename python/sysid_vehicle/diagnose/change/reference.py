@@ -18,6 +18,7 @@ from ...model import Model
 from ...rules import USUAL, Rules
 from ..candidates.possible import OF_A_FACTOR
 from .beside_reference import Shared, Side
+from .both_axles import SCALINGS, as_tyres, moves, without
 from .maximum import along, highest, highest_of
 from .may_change import May, change
 from .together import Together, cost, starts_of
@@ -37,25 +38,37 @@ class Exact:
     put : tuple of str
         Ids of what changed.
     fit : Fit
+        With tyres that are multiplied by what was put in (`both_axles.py`).
+    searched : Model
+        The same model where these are not.
     shift : array, shape (n,)
-        By which its parameters differ from those of the reference as it was.
+        By which its parameters differ from those of the reference as it was; as much as lines say
+        that what multiplies tyres makes of them.
+    sizes : dict of str to float
+        The same of the parameters of what changed.
     changes : dict of str to float
         By which parameters of what changed differ from the reference fitted in the same way.
     log_likelihood : float
         Of both drivings.
     reached : float
         The same, less what the changes gain where they are in both the same: what the reference
-        left is no evidence.
+        left is no evidence. By this it is likelier than nothing.
+    among : float
+        The same, less what of that the reference allows: where it knows better, half of a large
+        change in both drivings is no more than a compromise. By this it is likelier than others.
     climbed : bool
         Whether that is the maximum of the likelihood itself, and not where a search stands still.
     """
 
     put: tuple[str, ...]
     fit: Fit
+    searched: Model
     shift: FloatArray
+    sizes: dict[str, float]
     changes: dict[str, float]
     log_likelihood: float
     reached: float
+    among: float
     climbed: bool = False
 
 
@@ -120,7 +133,8 @@ class Reference:
         model = self.before.model
         if name in model.parameters:
             return model.value(name)
-        return next(e.named[name].null_value for e in self.effects if name in e.named)
+        several = (*self.effects, *SCALINGS)
+        return next(e.named[name].null_value for e in several if name in e.named)
 
     def factors(self, state: Exact) -> dict[str, float]:
         """What relative errors multiply by in the reference, fitted as some state is."""
@@ -177,7 +191,7 @@ class Reference:
         if state.climbed:
             return state
         own, names = self._fitted[frozenset(state.put)][0], list(state.changes)
-        model, value = self._climbed(start, state.fit.model, own, names, names)
+        model, value = self._climbed(start, state.searched, own, names, names)
         return self._exact(start, state.put, names, model, value, climbed=True)
 
     def _exact(
@@ -191,20 +205,29 @@ class Reference:
         climbed: bool,
     ) -> Exact:
         """What was fitted, less what the changes gain where they are in both the same."""
-        own, reached = self._fitted[frozenset(put)][0], value
+        own, reached, among = self._fitted[frozenset(put)][0], value, value
         self._likeliest = max(self._likeliest, value)
         # What gains too little to be named, or to replace the best: what it shares is not asked.
         leads = max(self._best - self._nothing, 0.0)
         if put and value - self._nothing > max(self._rules.told, self._rules.near * leads):
-            same = self._same(start, own, model, climb=climbed)
+            seconds = [d.usable_s for d in (self.before.driving, start.driving)]
+            wanted = self._fitted[frozenset(put)][1] - self._alone
+            wanted *= sum(seconds) / seconds[0]  # as much in each second of both
+            same, allowed = self._same(start, own, model, wanted, climb=climbed)
             reached -= max(same - self._nothing, 0.0)
+            among -= max(allowed - self._nothing, 0.0)
         self._best = max(self._best, reached)
         shift = np.zeros(len(self.side.names))
-        for n in model.free_names:
+        for n in without(model).free_names:
             shift[self.place[n]] = model.value(n) - self.value(n)
+        sizes = {n: model.value(n) - self.value(n) for n in names}
+        for e in (e for e in SCALINGS if e.id in put):
+            for n, moved in moves(e.id, model).items():
+                shift[self.place[n]] += moved * sum(sizes[own] for own in e.named)
         changes = {n: change(n, own.value(n), model.value(n)) for n in names}
-        fit = replace(start, model=model)
-        return Exact(tuple(put), fit, shift, changes, value, reached, climbed)
+        fit = replace(start, model=as_tyres(model))
+        told = (value, reached, among)
+        return Exact(tuple(put), fit, model, shift, sizes, changes, *told, climbed)
 
     def _climbed(
         self, start: Fit, model: Model, own: Model, loose: Sequence[str], changed: Sequence[str]
@@ -216,8 +239,16 @@ class Reference:
         values = {n: float(p[model.parameters[n].column]) for n in model.free_names}
         return model.with_values(values), reached
 
-    def _same(self, start: Fit, own: Model, apart: Model, *, climb: bool) -> float:
-        """Log-likelihood of both drivings where what was put in is in both the same."""
+    def _same(
+        self, start: Fit, own: Model, apart: Model, wanted: float, *, climb: bool
+    ) -> tuple[float, float]:
+        """Log-likelihoods of both drivings where what was put in is in both the same.
+
+        The second one gains no more than the reference alone wants (`wanted`, of both drivings),
+        where it refuses the compromise of both. Tyres that are multiplied in both are other tyres
+        of both.
+        """
+        own, apart = without(own), as_tyres(apart)
         noise, box = self.before.noise.vector(), free_box(apart)
         changed = [n for n in apart.free_names if n not in self.before.model.free_names]
         objective = self._both.objective(start, apart, own, changed, [])
@@ -228,12 +259,36 @@ class Reference:
         gains = objective.freeze(starts[0], noise)
         begin = min(starts, key=lambda p: cost(objective, p, gains))
         p, value = highest(objective, begin, noise, box)
-        return to_the_maximum(objective, p, noise, box)[2] if climb else value
+        if climb:
+            p, _, value = to_the_maximum(objective, p, noise, box)
+        off = {n: float(p[apart.parameters[n].column]) - own.value(n) for n in changed}
+        loss = 0.5 * self._squared(off)
+        return value, value if loss <= self._rules.told else min(value, self._nothing + wanted)
+
+    def _squared(self, off: Mapping[str, float]) -> float:
+        """Squared standard errors of the reference by which parameters are off, all else free."""
+        own = [self.place[n] for n in off]
+        rest = [self.place[n] for n in self.before.model.free_names if n not in off]
+        known = self.side.information + np.diag(self.shared.precision)
+        inverse = np.linalg.pinv(known[np.ix_(rest, rest)], hermitian=True)
+        alone = self.side.information[np.ix_(own, own)]
+        cross = self.side.information[np.ix_(own, rest)]
+        size = np.array(list(off.values()))
+        return max(float(size @ (alone - cross @ inverse @ cross.T) @ size), 0.0)
 
     def _own(
         self, put: Sequence[str], sizes: Mapping[str, float], usual: Mapping[str, float]
     ) -> tuple[Model, float]:
         """The same of the reference."""
+        scalings = [e for e in SCALINGS if e.id in put]
+        if scalings:  # one driving knows its tyres as they are
+            rest = [e for e in put if e not in {s.id for s in scalings}]
+            few = {n: v for n, v in sizes.items() if not any(n in s.named for s in scalings)}
+            key = frozenset(rest)
+            if key not in self._fitted:
+                self._fitted[key] = self._own(rest, few, {n: usual[n] for n in few})
+            model, reached = self._fitted[key]
+            return model.add(*scalings), reached
         if not put:
             return self.before.model, self._alone
         model, reached = self._fit(self.before, put, dict.fromkeys(sizes, 0.0), usual)
@@ -252,7 +307,7 @@ class Reference:
         also: Sequence[Mapping[str, float]] = (),
     ) -> tuple[Model, float]:
         """A model with some changes, and its log-likelihood; beside the reference where given."""
-        model = start.model.add(*(e for e in self.effects if e.id in put))
+        model = start.model.add(*(e for e in (*self.effects, *SCALINGS) if e.id in put))
         if own is not None:  # changes begin where the reference ends
             model = model.with_values({n: own.value(n) for n in model.free_names})
         noise, box = self.before.noise.vector(), free_box(model)

@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from ...effects import Effect
-from ...errors import NumericalError
+from ...errors import InvalidInput, NumericalError
 from ...identify import Fit
 from ...rules import Rules
-from ...vehicle import AXLES
+from ...vehicle import AXLES, GRAVITY_MPS2
 from ..candidates.clocks import CLOCKS
 from ..candidates.possible import considered
 from .beside_reference import Differences, Side
+from .both_axles import SCALINGS, factors, moves, without
 from .changes_compete import Competition
-from .may_change import PAYLOAD, YAW_INERTIA, as_one, of_clock, of_effect, of_inertia, of_tyre
+from .may_change import (
+    PAYLOAD,
+    YAW_INERTIA,
+    as_one,
+    forces_of_tyre,
+    of_clock,
+    of_effect,
+    of_inertia,
+    of_tyre,
+)
 from .pieces import Pieces
 from .reference import Exact, Reference
 
@@ -79,10 +90,21 @@ class Search:
             several.append(of_inertia(model))
         clocks = [c for c in CLOCKS if c.channel != "fx_n" or start.driving.force_known]
         fitted = [m for m in several if m.id in {e.id for e in effects} or free.issuperset(m.names)]
+        self.reference = Reference(before, fitted, effects, rules)
+        self._scalings = self._seated(free, [e for e in effects if e.acts])
+        fitted += map(of_effect, self._scalings)
         self.can = {m.id: m for m in fitted}
         self.may = [*fitted, *map(of_clock, clocks)]
-        self.reference = Reference(before, fitted, effects, rules)
         self.visited: dict[frozenset[str], Exact] = {}
+
+    def _seated(self, free: set[str], users: Sequence[Effect]) -> tuple[Effect, ...]:
+        """Changes of the tyres of both axles, where these are fitted and there is room for them."""
+        if not all(free.issuperset(m.names) for m in self.tyres):
+            return ()
+        with suppress(InvalidInput):
+            self.start.model.add(*users, *SCALINGS)
+            return SCALINGS
+        return ()
 
     def found(self) -> tuple[Competition, Exact]:
         """What competes where the changes that explain most have been put in, and these."""
@@ -91,8 +113,9 @@ class Search:
         # Lines are drawn from the reference: where nothing may change it goes far from any car.
         told = self.told(replace(begin, fit=self.start, shift=np.zeros_like(begin.shift)))
         alone = [(e,) for e in told.alone if e in self.can][:_TRIED]
-        load = [PAYLOAD] if self.can.keys() >= set(PAYLOAD) else []
-        for few in (self._leading(told, begin), *alone, *load):
+        # A load, and another set of tyres, change several at once, of which none may lead.
+        at_once = [s for s in (PAYLOAD, tuple(e.id for e in SCALINGS)) if self.can.keys() >= set(s)]
+        for few in (self._leading(told, begin), *alone, *at_once):
             self._visit(few, told)
         state = max(self.visited.values(), key=lambda s: self.evidence(s, told, 1.0))
         seen: set[tuple[str, ...]] = set()
@@ -135,9 +158,10 @@ class Search:
 
         A likelihood gains by what the model lacks, whatever is fitted; and no line holds far away.
         """
+        gone: set[frozenset[str]] = set()
         for _ in range(_ROUNDS):
             while state.put:
-                p_values = {e: told.off_nothing(e, state.changes) for e in as_one(state.put)}
+                p_values = {e: self._off_nothing(e, state, told) for e in as_one(state.put)}
                 least = max(p_values, key=lambda e: p_values[e])
                 rest = tuple(e for e in state.put if e not in least)
                 if p_values[least] <= 1.0 - self.rules.credible:
@@ -145,16 +169,18 @@ class Search:
                 self._visit(rest, told)
                 if frozenset(rest) not in self.visited:
                     break
+                gone.add(frozenset(state.put))
                 state = self.visited[frozenset(rest)]
                 told = self.told(state)
-            more = [e for e in self._leading(told, state) if e not in state.put]
-            tried = [(*state.put, e) for e in more]
-            tried = [put for put in tried if frozenset(put) not in self.visited]
-            if not tried:
+            for e in self._leading(told, state):
+                if e not in state.put:
+                    self._visit((*state.put, e), told)
+            # What was fitted beside its rival may belong there, whatever lines lead to.
+            few, many = frozenset(state.put), len(state.put) + 1
+            more = [k for k in self.visited if few < k and len(k) == many and k not in gone]
+            found = [self.visited[k] for k in more]
+            if not found:
                 break
-            for put in tried:
-                self._visit(put, told)
-            found = [self.visited[frozenset(p)] for p in tried if frozenset(p) in self.visited]
             ratio = told.ratio_of(state.put)
             best = max((state, *found), key=lambda s: self.evidence(s, told, ratio))
             if best is state:
@@ -162,6 +188,27 @@ class Search:
             state = best
             told = self.told(state)
         return told, state
+
+    def _off_nothing(self, effects: tuple[str, ...], state: Exact, told: Competition) -> float:
+        """Of what was put in as one change, the p-value of nothing.
+
+        Four coefficients of a tyre lie in a bent valley, where no line tells how far they are from
+        nothing: its forces do, the most of them as all sums of four (Scheffe, Biometrika 1953).
+        """
+        if len(effects) == 1 and self.can[effects[0]] in self.tyres:
+            most = max((share / std) ** 2 for share, std in self.forces(effects[0], state, told))
+            return float(scipy.stats.chi2.sf(most, len(self.can[effects[0]].names)))
+        return told.off_nothing(effects, state.changes)
+
+    def forces(self, axle: str, state: Exact, told: Competition) -> Iterator[tuple[float, float]]:
+        """By which shares the side forces of an axle's tyres differ, and their standard errors."""
+        m = self.can[axle]
+        before = [self.before.model.value(n) for n in m.names]
+        sizes = [state.changes[n] for n in m.names]
+        ay = np.abs(self.start.driving.channel("ay_mps2"))
+        most = float(np.nanpercentile(ay, 99.0)) / GRAVITY_MPS2
+        for share, slopes in forces_of_tyre(before, sizes, most):
+            yield share, told.std_along(axle, slopes, state.changes)
 
     def _better(self, state: Exact, told: Competition) -> Exact:
         """The same with a rival in place of an effect, where both together say it is the rival."""
@@ -177,7 +224,7 @@ class Search:
 
         A rival is fitted together with it too, in the reference and in the later driving: which of
         the two differs tells more than which of them alone is likelier, as what the reference left
-        may speak for one of them.
+        may speak for one of them. Of tyres no line tells it (`_off_nothing`).
         """
         ratio, odds = told.ratio_of(state.put), {effect: 0.0}
         here, nothing = self.evidence(state, told, ratio), self.visited[frozenset()]
@@ -193,7 +240,7 @@ class Search:
             begin = dict.fromkeys((*state.changes, *other.changes), 0.0)
             self._visit(both, told, (begin | state.changes, begin | other.changes))
             pair = self.visited.get(frozenset(both))
-            if pair is not None:
+            if pair is not None and not {effect, rival} & {m.id for m in self.tyres}:
                 # No line tells more of one than the likelihood loses without it.
                 w, v = (
                     min(
@@ -202,24 +249,30 @@ class Search:
                     )
                     for a, b, alone in ((rival, effect, state), (effect, rival, other))
                 )
-                prices = (told.price(s.put, s.shift) for s in (state, other))
+                prices = (told.price(s.put, s.sizes) for s in (state, other))
                 odds[rival] = 0.5 * (w - v) / ratio + next(prices) - next(prices)
         return odds
 
     def _rivals(self, effect: str, told: Competition) -> list[str]:
         """What may have changed in its place."""
         own = told.causes.of(effect)
-        several = (*self.can[effect].rivals, *(() if own is None else own.effects))
-        return [e for e in dict.fromkeys(several) if e in self.can and e != effect]
+        several = (
+            *self.can[effect].rivals,
+            *(e for e, m in self.can.items() if effect in m.rivals),
+            *(() if own is None else own.effects),
+        )
+        return [e for e in dict.fromkeys(several) if e in self.can and e not in told.put]
 
     def told(self, state: Exact) -> Competition:
         """What competes beside what was put in."""
         reference, side = self.reference, self.reference.side
-        later = Side(state.fit, reference.names, reference.effects, like=side)
+        multiplied = factors(state.searched)
+        names, effects = reference.names, reference.effects
+        later = Side(state.fit, names, effects, like=side, factors=multiplied)
         if self.start.model.vehicle != self.before.model.vehicle:
             # What both share is told in terms of the vehicle file of the later driving.
-            same = replace(self.before, model=state.fit.model)
-            side = Side(same, reference.names, reference.effects, like=side, residuals_of=side)
+            same = replace(self.before, model=without(state.searched))
+            side = Side(same, names, effects, like=side, residuals_of=side)
         differences = Differences(
             side, later, state.shift, reference.shared, self._pieces, self.alike.unlike
         )
@@ -232,6 +285,7 @@ class Search:
             self.start.driving.samples,
             state.put,
             self.rules,
+            {n: moves(e.id, state.searched) for e in self._scalings for n in e.named},
         )
 
     def _leading(self, told: Competition, state: Exact) -> tuple[str, ...]:
@@ -276,8 +330,23 @@ class Search:
         ]
 
     def evidence(self, state: Exact, told: Competition, ratio: float) -> float:
-        """Log-likelihood over the variance ratio, less the price of the changes [nats]."""
-        return state.reached / ratio - told.price(state.put, state.shift)
+        """Log-likelihood over the variance ratio, less the price of the changes [nats].
+
+        Among what is likelier than nothing, and than each part of it, that by which these compare:
+        what is added and only gains as a lack of the reference does is no change.
+        """
+        price = told.price(state.put, state.sizes)
+        nothing = self.visited[frozenset()].reached / ratio
+        put = frozenset(state.put)
+        parts = [v.reached for k, v in self.visited.items() if k < put]
+        more = state.reached / ratio - price > nothing and state.reached >= max(parts)
+        told_by = state.among if more else state.reached
+        return told_by / ratio - price
+
+    def over_nothing(self, state: Exact, told: Competition, ratio: float) -> float:
+        """By how much a state is likelier than that nothing changed [nats]."""
+        nothing = self.visited[frozenset()].reached
+        return (state.reached - nothing) / ratio - told.price(state.put, state.sizes)
 
     def _best(self, told: Competition, state: Exact) -> Exact:
         """The state with most evidence, all that come close to it at their maxima."""

@@ -18,6 +18,7 @@ from ...identify.search.box import free_box
 from ...identify.search.objective import LinearRows, Objective, Predicting
 from ...model import Model
 from .beside_reference import Shared
+from .both_axles import Scaled
 from .both_drivings import BothDrivings
 
 _FAR = 3.0  # usual sizes, within which a search begins
@@ -74,11 +75,11 @@ class Together:
         rows[np.arange(len(names)), [model_before.parameters[n].column for n in names]] = root
         centre = [model_before.value(n) + self.shared.centre[self.place[n]] for n in names]
         stays = LinearRows(rows, as_float64(root * centre))
-        later = start.driving.problem(model)
+        later = Scaled.of(start.driving, model)
         problem: Predicting = later
         if own is not None:
             shared = [own.parameters[n].column for n in own.free_names if n not in changed]
-            before = self.before.driving.problem(own)
+            before = Scaled.of(self.before.driving, own)
             problem = BothDrivings(later, before, own.vector(), shared)
         return Objective(problem, (stays,), *noise_range(model.vehicle, start.driving))
 

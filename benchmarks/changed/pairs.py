@@ -1,0 +1,223 @@
+"""Cars that nobody has seen, driven before and after one change, two, or none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+import sysid_vehicle as sv
+
+KINDS = (
+    "nothing",
+    "grip",
+    "friction",
+    "front stiffness",
+    "rear stiffness",
+    "mass",
+    "cg",
+    "downforce",
+    "drag",
+    "relaxation",
+    "steer ratio",
+    "two",
+)
+"""What may change: `grip` is all side force of both axles, `friction` what they reach at most."""
+
+_RATE_HZ = 50.0
+_SECONDS = 40.0
+_EASIER = (1.0, 0.85, 0.7, 0.55, 0.4)
+_SHARES = {"limit": 0.88, "gentle": 0.45}  # of what the tyres give
+_LACKING = ("", "", "body_attitude", "tyre_relaxation", "lateral_load_transfer", "steer_compliance")
+
+Names = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What changed in one respect.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        Ids that are right names; any one of them.
+    name : str
+        The parameter whose interval is judged, `stiffness` of tyres; empty for none.
+    size : float
+    """
+
+    effects: tuple[str, ...]
+    name: str
+    size: float
+
+
+@dataclass
+class Pair:
+    """Two drives of a car, and what is between them."""
+
+    kind: str
+    driving: str
+    lacks: str
+    road: bool
+    truths: list[Truth]
+    baseline: sv.Model
+    before: sv.Log
+    after: sv.Log
+    more: Names = field(default_factory=dict)
+
+
+def drawn(seed: int, number: int, kind: str = "") -> Pair:
+    """Pair `number` of a seed, of a kind that is drawn where none is given."""
+    rng = np.random.default_rng([seed, number])
+    drew = str(rng.choice(KINDS))
+    kind = kind or drew
+    car, baseline, lacks = _car(rng, kind)
+    truths: list[Truth] = []
+    changed = car
+    order = rng.permutation([k for k in KINDS if k not in ("nothing", "two")])
+    several = [k for k in order if k != "downforce"]  # of cars that have some
+    first = [str(several[0])]
+    apart = [str(k) for k in several[1:] if not {first[0], str(k)} <= {"grip", "friction"}]
+    todo = [*first, apart[0]] if kind == "two" else [kind]
+    for what in todo:
+        changed = _changed(changed, what, rng, truths)
+    name = str(rng.choice(list(_SHARES)))
+    road = bool(rng.random() < 0.5)
+    courses = [str(rng.choice(("lap", "handling"))) for _ in range(2)]
+    if rng.random() < 0.4:
+        courses[1] = courses[0]
+    noise = sv.SensorNoise().scaled(float(rng.choice((0.7, 1.0, 1.5))))
+    seeds = [int(s) for s in rng.integers(2**31, size=2)]
+    logs = [
+        _driven(model, course, _SHARES[name] * _limit(model), road, noise, s)
+        for model, course, s in zip((car, changed), courses, seeds, strict=True)
+    ]
+    return Pair(kind, f"{name} {'-'.join(courses)}", lacks, road, truths, baseline, *logs)
+
+
+def _car(rng: np.random.Generator, kind: str) -> tuple[sv.Model, sv.Model, str]:
+    """The true car, the model that is fitted to it, and what that lacks."""
+    base = rng.uniform(2.3, 3.1)
+    lf = base * rng.uniform(0.43, 0.54)
+    mass = rng.uniform(900.0, 2200.0)
+    vehicle = sv.Vehicle(
+        name="drawn",
+        mass_kg=mass,
+        yaw_inertia_kgm2=mass * lf * (base - lf) * rng.uniform(0.85, 1.1),
+        lf_m=lf,
+        lr_m=base - lf,
+        cg_height_m=rng.uniform(0.45, 0.65),
+        track_front_m=rng.uniform(1.45, 1.65),
+        track_rear_m=rng.uniform(1.45, 1.65),
+        drag_area_m2=rng.uniform(0.55, 0.9),
+        brake_front_share=rng.uniform(0.6, 0.72),
+        drive_front_share=float(rng.choice((0.0, 0.4, 1.0))),
+        tyre_front=sv.Tyre(*_tyre(rng, 8.0, 12.0)),
+        tyre_rear=sv.Tyre(*_tyre(rng, 10.0, 15.0)),
+    )
+    vague = vehicle.replace(
+        tyre_front=sv.Tyre(B=10.0, C=1.4, D=1.0, E=0.0),
+        tyre_rear=sv.Tyre(B=12.0, C=1.4, D=1.0, E=0.0),
+    )
+    car, model = sv.Model(vehicle), sv.Model(vague)
+    lacks = str(rng.choice(_LACKING))
+    told = bool(rng.random() < 0.5)
+    own: dict[str, Names] = {}
+    if kind == "downforce":
+        low, high = rng.uniform(0.8, 1.6), rng.uniform(0.8, 1.8)
+        own["aero_downforce"] = {"cl_a_front_m2": low, "cl_a_rear_m2": high}
+    if kind == "relaxation":
+        own["tyre_relaxation"] = {"relaxation_length_m": rng.uniform(0.25, 0.5)}
+    if lacks and lacks not in own:
+        e = sv.effect(lacks)
+        own[lacks] = {p.name: p.null_value + (p.typical - p.null_value) for p in e.parameters}
+    for effect, values in own.items():
+        car = car.add(effect).with_values({f"{effect}.{n}": v for n, v in values.items()})
+        if effect != lacks and told:
+            model = model.add(effect)
+    return car, model, lacks
+
+
+def _tyre(rng: np.random.Generator, low: float, high: float) -> tuple[float, float, float, float]:
+    return (
+        rng.uniform(low, high),
+        rng.uniform(1.3, 1.55),
+        rng.uniform(0.9, 1.15),
+        rng.uniform(-0.4, 0.2),
+    )
+
+
+def _limit(model: sv.Model) -> float:
+    return 9.81 * min(model.value("D_front"), model.value("D_rear"))
+
+
+def _changed(car: sv.Model, what: str, rng: np.random.Generator, truths: list[Truth]) -> sv.Model:
+    """The car with one change more."""
+
+    def scaled(factors: Names) -> sv.Model:
+        return car.with_values({n: f * car.value(n) for n, f in factors.items()})
+
+    def shifted(name: str, by: float, *right: str) -> sv.Model:
+        effect = name.split(".")[0]
+        model = car if effect in car.effects else car.add(effect)
+        truths.append(Truth((effect, *right), name.split(".")[1], by))
+        return model.with_values({name: model.value(name) + by})
+
+    sign = float(rng.choice((-1.0, 1.0)))
+    if what in ("grip", "friction"):
+        f = 1.0 - rng.uniform(0.15, 0.4)
+        # Each direction of tyres of both axles may be told by any two changes that span it.
+        truths.append(Truth(("friction_both_axles",), "relative_error", f - 1.0))
+        names = {"D_front": f, "D_rear": f}
+        if what == "friction":
+            return scaled(names | {"B_front": 1.0 / f, "B_rear": 1.0 / f})
+        truths.append(Truth(("stiffness_both_axles",), "relative_error", f - 1.0))
+        return scaled(names)
+    if what.endswith("stiffness"):
+        axle, by = what.split()[0], sign * rng.uniform(0.10, 0.25)
+        truths.append(Truth((f"tyre_{axle}",), "stiffness", by))
+        return scaled({f"B_{axle}": 1.0 + by})
+    if what == "mass":
+        return shifted("mass.relative_error", rng.uniform(0.08, 0.2))
+    if what == "cg":
+        return shifted("cg_position.shift_rearward_m", sign * rng.uniform(0.05, 0.12))
+    if what == "downforce":
+        names = ("aero_downforce.cl_a_front_m2", "aero_downforce.cl_a_rear_m2")
+        truths.append(Truth(("aero_downforce",), "", 0.0))
+        return scaled(dict.fromkeys(names, 0.5))
+    if what == "drag":
+        return shifted("aero_drag.drag_area_m2", rng.uniform(0.15, 0.4))
+    if what == "relaxation":
+        name = "tyre_relaxation.relaxation_length_m"
+        model = car if "tyre_relaxation" in car.effects else car.add("tyre_relaxation")
+        by = max(model.value(name), 0.3)
+        like = ("front_tyre_relaxation", "rear_tyre_relaxation")
+        truths.append(Truth(("tyre_relaxation", *like), "relaxation_length_m", by))
+        return model.with_values({name: model.value(name) + by})
+    if what == "steer ratio":
+        return shifted("steer_ratio.ratio_error", 0.03 * sign)
+    return car
+
+
+def _driven(
+    model: sv.Model, course: str, mps2: float, road: bool, noise: sv.SensorNoise, seed: int
+) -> sv.Log:
+    """A course, more easily where the car is lost."""
+    pushes = sv.RoadDisturbance()
+    if road:
+        pushes = sv.RoadDisturbance(fx_n=120.0, fy_n=150.0, mz_nm=150.0, correlation_time_s=0.3)
+    made = sv.manoeuvres.lap if course == "lap" else sv.manoeuvres.handling_course
+    for ease in _EASIER:
+        try:
+            return sv.drive(
+                model,
+                made(_SECONDS, lateral_mps2=ease * mps2),
+                seed=seed,
+                noise=noise,
+                disturbance=pushes,
+                rate_hz=_RATE_HZ,
+            )
+        except (sv.NumericalError, sv.InvalidInput):
+            if ease == _EASIER[-1]:
+                raise
+    raise AssertionError("unreachable")

@@ -1,0 +1,266 @@
+"""What is said of everything that may have changed: exact likelihoods first, lines of all else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import scipy
+
+from ..._common.arrays import as_float64
+from ...effects import Effect
+from ..candidates.causes import Causes, CredibleSet
+from ..candidates.possible import possible
+from .change import Change
+from .changes_compete import Competition
+from .effect_change import EffectChange, Said
+from .may_change import May, beyond, room
+from .reference import Exact
+from .search import Search
+
+
+def _within(least: float, most: float) -> float:
+    """A change that is larger than any is none."""
+    return least if least <= most else np.inf
+
+
+class Saying:
+    """What is said of everything that may have changed."""
+
+    def __init__(self, search: Search) -> None:
+        self.search = search
+        self.told, self.state = search.found()
+
+    def change(self) -> Change:
+        """Exact likelihoods decide on what was put in, scores on all else."""
+        search, told, state = self.search, self.told, self.state
+        ratio = told.ratio_of(state.put)
+        exact = {e: self._exact(e, state, told, ratio) for e in state.put}
+        rest = [
+            s
+            for s in told.causes.sets
+            if not any(e in state.put for e in s.effects)
+            and not told.acts_like(s.effects[0])
+            and frozenset({*state.put, s.effects[0]})
+            not in self.search.visited  # refused by a refit
+        ]
+        causes = told.causes.only([*(s for s in exact.values() if s is not None), *rest], {})
+        sizes, stds = (self._of_the_car(told_by, state) for told_by in (told.sizes, told.stds))
+        # Of what was put in the exact size: no line is drawn from the reference to there.
+        for e in state.put:
+            sizes |= self._sizes_in(state, e)
+        for e, m in self.search.can.items():
+            without, put = frozenset(state.put) - {e}, frozenset({*state.put, e})
+            one, other = self.search.visited.get(without), self.search.visited.get(put)
+            if len(m.names) > 1 or one is None or other is None:
+                continue
+            # As many standard errors from nothing as the likelihood ratio says, at most.
+            ((name, size),) = self._sizes_in(other, e).items()
+            gain = other.among - one.among if without else other.reached - one.reached
+            rises = 2.0 * gain / told.ratio_of((e,))
+            sizes[name] = size if rises > 0.0 else sizes[name]
+            stds[name] = max(stds[name], abs(sizes[name]) / float(np.sqrt(max(rises, 1.0))))
+        for s in (s for s in exact.values() if s is not None):
+            for e in s.effects:
+                other = self._in_place(e, s, state)
+                if other is not None and e not in state.put:
+                    beside = self.search.told(other)
+                    sizes |= self._sizes_in(other, e)
+                    lines = self._of_the_car(beside.stds, other)
+                    stds |= {n: max(lines[n], stds[n]) for n in self.search.can[e].names}
+        nothing = self._nothing()
+        calm = nothing > 1.0 - search.rules.credible
+        found = [self._of(m, causes, sizes, stds, told, calm=calm) for m in self.search.may]
+        order = [e for s in causes.sets for e in s.effects]
+        sure = causes.inclusion
+        found.sort(
+            key=lambda e: (order.index(e.id) if e.id in order else len(order), -sure.get(e.id, 0.0))
+        )
+        return Change(
+            search.before, state.fit, causes, tuple(found), nothing, search.alike, search.rules
+        )
+
+    def _nothing(self) -> float:
+        """Probability that nothing changed, beside all that was fitted."""
+        search, told = self.search, self.told
+        odds = [
+            search.over_nothing(s, told, told.ratio_of(s.put))
+            for s in search.visited.values()
+            if s.put
+        ]
+        return float(scipy.special.expit(-scipy.special.logsumexp(odds))) if odds else 1.0
+
+    def lack(self) -> Effect | None:
+        """What the reference lacks: in both drivings the same it explains more than any change."""
+        search, told = self.search, self.told
+        nothing = search.visited[frozenset()].reached
+        found = None
+        most = self.state.among - nothing
+        for e in search.reference.effects:
+            s = search.visited.get(frozenset({e.id}))
+            left = 0.0 if s is None else s.log_likelihood - s.reached
+            shown = left / told.ratio_of((e.id,)) > told.price((e.id,), dict.fromkeys(e.named, 0.0))
+            if left > most and shown:
+                found, most = e, left
+        return found
+
+    def _likely(self, effect: str, probability: float) -> bool:
+        """Whether an effect that is not named is likelier than not, and no refit speaks against."""
+        other = self.search.visited.get(frozenset({*self.state.put, effect}))
+        ratio = self.told.ratio_of(self.state.put)
+        states = [s for s in (other, self.state) if s is not None]
+        best = max(states, key=lambda s: self.search.evidence(s, self.told, ratio))
+        return probability > 0.5 and (other is None or best is other)
+
+    def _sizes_in(self, state: Exact, effect: str) -> dict[str, float]:
+        return {n: state.changes[n] for n in self.search.can[effect].names}
+
+    def _of_the_car(self, told_by: Mapping[str, float], state: Exact) -> dict[str, float]:
+        """Lines tell differences of parameters: of relative errors as shares of what there was."""
+        own = self.search.reference.factors(state)
+        return {n: x / own.get(n, 1.0) for n, x in told_by.items()}
+
+    def _off_nothing(self, effect: str, state: Exact, told: Competition) -> bool:
+        """Whether a size is beyond what pieces of the drivings differ by, as far as a name asks.
+
+        What stands in for a lack of the model gains likelihood as a change does. Of tyres the
+        interval of their force has to exclude nothing, at some slip that was driven: likelihoods
+        of four coefficients that no driving tells apart gain by what the model lacks.
+        """
+        m, rules = self.search.can[effect], self.search.rules
+        sizes = [state.changes[n] for n in m.names]
+        if m in self.search.tyres:
+            forces = self.search.forces(effect, state, told)
+            return any(abs(share) > rules.interval * std for share, std in forces)
+        stds = [told.stds[n] for n in m.names]
+        return any(
+            abs(size) > told.least(s, usual) - rules.bound * s
+            for size, s, usual in zip(sizes, stds, m.scale, strict=True)
+        )
+
+    def _in_place(self, effect: str, of: CredibleSet, state: Exact) -> Exact | None:
+        """The state with an effect in place of another one of its set, where it was visited."""
+        others = frozenset(state.put) - set(of.effects)
+        return self.search.visited.get(others | {effect})
+
+    def _exact(
+        self, effect: str, state: Exact, told: Competition, ratio: float
+    ) -> CredibleSet | None:
+        """What may have changed in place of an effect that was put in; None where nothing need."""
+        if not self._off_nothing(effect, state, told):
+            return None
+        here = self.search.evidence(state, told, ratio)
+        log_odds = self.search.odds(effect, state, told)
+        linear = told.causes.of(effect)
+        if linear is not None:
+            own = linear.weights.get(effect, 0.0)
+            for e, weight in linear.weights.items():
+                if e not in log_odds and min(weight, own) > 0.0:
+                    log_odds[e] = float(np.log(weight / own))
+        found = self._told_apart(effect, log_odds, state)
+        absent = [
+            self.search.evidence(s, told, ratio) - here
+            if s.put
+            else -self.search.over_nothing(state, told, ratio)
+            for s in self.search.lacking(effect, state, found.effects)
+        ]
+        whole = scipy.special.logsumexp(list(log_odds.values()))
+        least = np.log(self.search.rules.credible)
+        if whole - scipy.special.logsumexp([whole, *absent]) < least:
+            return None
+        return found
+
+    def _told_apart(self, effect: str, log_odds: dict[str, float], state: Exact) -> CredibleSet:
+        """The credible set of an effect and its rivals, but for those that are nothing beside it.
+
+        What the reference lacks gains likelihood as a change of it does: beside each other lines
+        tell which of the two differs.
+        """
+        while True:
+            found = CredibleSet.of(log_odds, self.search.rules.credible)
+            for e in found.effects:
+                both = self.search.visited.get(frozenset({*state.put, e}))
+                if e == effect or both is None:
+                    continue
+                beside = self.search.told(both)
+                if not self._off_nothing(e, both, beside) and self._off_nothing(
+                    effect, both, beside
+                ):
+                    del log_odds[e]
+                    break
+            else:
+                return found
+
+    def _of(
+        self,
+        m: May,
+        causes: Causes,
+        sizes: dict[str, float],
+        stds: dict[str, float],
+        told: Competition,
+        *,
+        calm: bool,
+    ) -> EffectChange:
+        rules, own = self.search.rules, causes.of(m.id)
+        ends = room(m, self.search.before.model)
+        raw = [sizes[n] for n in m.names], [stds[n] for n in m.names]
+        # A line that leads further beyond what a parameter can be than its error is followed to
+        # there, all of its effect; what is cut off is no less uncertain than it is large.
+        cut = beyond(raw[0], [rules.bound * s for s in raw[1]], ends)
+        told_by = [(1.0 - cut) * v for v in raw[0]]
+        value = tuple(float(np.clip(v, *both)) for v, both in zip(told_by, ends, strict=True))
+        std = tuple(max(s, cut * abs(v)) for v, s in zip(*raw, strict=True))
+        bound = tuple(
+            min(abs(v) + rules.bound * s, max(-low, high))
+            for v, s, (low, high) in zip(value, std, ends, strict=True)
+        )
+        matters = [p.matters for p in m.parameters]
+        least = tuple(
+            _within(max(told.least(s, usual), w + (rules.bound - 1.0) * s), max(-low, high))
+            for s, usual, w, (low, high) in zip(std, m.scale, matters, ends, strict=True)
+        )
+        group: tuple[str, ...] = ()
+        said: Said = "not testable"
+        if own is not None:
+            group = tuple(e for e in own.effects if e != m.id)
+            said = "one of a group" if group else "changed"
+            if not possible(m, *raw, rules):
+                said = "implausible"
+            elif all(abs(v) + s < w for v, s, w in zip(value, std, matters, strict=True)):
+                said, group = "negligible", ()
+        elif all(b < w for b, w in zip(bound, matters, strict=True)):
+            said = "unchanged"
+        elif not calm and self._likely(m.id, causes.inclusion.get(m.id, 0.0)):
+            said = "likely"
+        names, units = zip(*((p.name, p.unit) for p in m.parameters), strict=True)
+        # Of what driving does not tell, its line has a probability that says nothing.
+        sure = None if said in ("unchanged", "not testable") else causes.inclusion.get(m.id, 0.0)
+        stiffness = self._stiffness(m, told_by, cut)
+        least_stiffness = None if stiffness is None else self._least_stiffness(m, stiffness[1])
+        figures = (value, std, bound, sure, said, group, least, stiffness, least_stiffness)
+        return EffectChange(m.id, names, units, *figures)
+
+    def _least_stiffness(self, m: May, std: float) -> float:
+        """Of tyres, the smallest share of their cornering stiffness that would be named."""
+        before = [self.search.before.model.value(n) for n in m.names[:3]]  # B, C, D
+        usual = float(np.linalg.norm(np.array(m.scale[:3]) / before))
+        return self.told.least(std, usual, self.told.price([m.id], dict.fromkeys(m.names, 0.0)))
+
+    def _stiffness(self, m: May, sizes: Sequence[float], cut: float) -> tuple[float, float] | None:
+        """By which share the cornering stiffness of an axle's tyres differs, per load, +- what.
+
+        `cut` is the share of the sizes that leads beyond any tyre.
+        """
+        if m not in self.search.tyres:
+            return None
+        own = self.search.before.model
+        before = np.array([own.value(n) for n in m.names[:3]])  # B, C, D
+        put = m.id in self.state.put
+        after = before + np.array(sizes[:3]) if put else before
+        ratio = float(np.prod(after) / np.prod(before))
+        later, earlier = (as_float64([*(x * ratio / own), 0.0])
+                          for x, own in ((1.0, after), (-1.0, before)))  # fmt: skip
+        value = ratio - 1.0 if put else float(later[:3] @ np.array(sizes[:3]))
+        known = {**dict(zip(m.names, sizes, strict=True)), **self.state.changes}
+        std = self.told.std_along(m.id, (later, earlier), known)
+        return value, max(std, abs(value) * cut / (1.0 - cut) if cut < 1.0 else np.inf)

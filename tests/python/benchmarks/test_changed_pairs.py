@@ -1,0 +1,49 @@
+"""The benchmark of changes draws what it says that it draws, and counts as it says."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+BENCHMARK = ("changed", "pairs", "counts")
+
+
+def test_a_pair_is_drawn_again(program: SimpleNamespace) -> None:
+    one, again = (program.pairs.drawn(3, 5, "friction") for _ in range(2))
+    np.testing.assert_array_equal(one.after["ay_mps2"], again.after["ay_mps2"])
+    (truth,) = one.truths
+    assert truth.effects == ("friction_both_axles",)
+    assert -0.4 <= truth.size <= -0.15
+    other = program.pairs.drawn(3, 6, "friction")
+    assert other.baseline.vehicle.mass_kg != one.baseline.vehicle.mass_kg
+    assert other.before.n == one.before.n
+
+
+@pytest.mark.parametrize("kind", ["nothing", "two", "downforce", "relaxation"])
+def test_what_changed_is_what_is_told(program: SimpleNamespace, kind: str) -> None:
+    pair = program.pairs.drawn(11, 2, kind)
+    assert pair.kind == kind
+    least = {"nothing": 0, "two": 2}.get(kind, 1)
+    assert least <= len(pair.truths) <= (4 if kind == "two" else least)
+    assert not np.array_equal(pair.before["vy_mps"], pair.after["vy_mps"])
+
+
+def row(truths: int, named: bool, wrong: int) -> dict[str, object]:
+    told = {"first": named, "group": named, "least": named, "inside": named}
+    return {
+        "kind": "mass" if truths else "nothing",
+        "truths": [told] * truths,
+        "wrong": ["rear_toe"] * wrong,
+        "named": ["mass"] * named + ["rear_toe"] * wrong,
+        "unknown": [],
+        "headline": "",
+    }
+
+
+def test_what_is_said_is_counted(program: SimpleNamespace) -> None:
+    rows = [row(1, True, 0), row(1, False, 0), row(1, True, 1), row(0, False, 0), row(0, False, 1)]
+    text = program.counts.table(rows)
+    mass = next(line for line in text.splitlines() if line.split()[0] == "mass")
+    assert mass.split()[1:] == ["3", "2", "2", "2", "2", "2/3", "1"]
+    assert "nothing changed: 2, claims 1," in text
+    assert "pairs with a change 3, with a wrong name 1" in text

@@ -1,0 +1,117 @@
+"""What the reference lacks is put into its model before a change is named."""
+
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from sysid_vehicle import Model, changed, drive, effect, identify, manoeuvres
+from sysid_vehicle.diagnose.change.may_change import of_effect
+from sysid_vehicle.diagnose.change.reference import Exact, Reference
+from sysid_vehicle.diagnose.change.saying import Saying
+from sysid_vehicle.effects import Effect
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.rules import USUAL
+
+DOWNFORCE = "aero_downforce"
+
+
+def fitted(truth: Model, start: Model, of: str, before: float, after: float) -> tuple[Exact, Exact]:
+    """Nothing, and a change of an effect, where it has these sizes in the two drives."""
+    known = effect(of)
+    (name,), (p,) = known.named, known.parameters
+    logs = []
+    for seed, size in ((41, before), (42, after)):
+        car = truth.add(known).with_values({name: size})
+        logs.append(drive(car, manoeuvres.lap(15.0), seed=seed, rate_hz=50.0))
+    reference = identify(start, logs[0], starts=1)
+    later = replace(reference, driving=Driving.of(logs[1]), estimates=())
+    later = replace(later, covariance=np.zeros((0, 0)), pushed=np.zeros((0, 0)))
+    both = Reference(reference, [of_effect(known)], [known])
+    nothing = both.fitted(later, (), {}, {})
+    return nothing, both.fitted(later, (of,), {name: 0.0}, {name: p.typical})
+
+
+def test_half_of_a_large_change_is_no_lack_of_the_reference(truth: Model, start: Model) -> None:
+    """Put into both drives it gains far more than any lack does."""
+    nothing, changed = fitted(truth, start, "mass", 0.0, 0.17)
+    gain = changed.log_likelihood - nothing.log_likelihood
+    assert changed.reached - nothing.reached < 0.9 * gain
+    assert changed.among - nothing.among > 0.999 * gain
+
+
+def test_a_lack_of_the_reference_is_no_change(truth: Model, start: Model) -> None:
+    nothing, changed = fitted(truth, start, "tyre_relaxation", 0.4, 0.4)
+    gain = changed.log_likelihood - nothing.log_likelihood
+    assert gain > 20.0
+    assert changed.among - nothing.among < 5.0
+
+
+def said(found: float) -> Any:
+    """Of a driving whose changes explain so many nats; downforce in both the same explains 616."""
+    aero = SimpleNamespace(put=(DOWNFORCE,), log_likelihood=626.0, reached=10.0)
+    nothing = SimpleNamespace(put=(), reached=0.0)
+    said = cast(Any, Saying.__new__(Saying))
+    said.search = SimpleNamespace(
+        visited={frozenset(): nothing, frozenset({DOWNFORCE}): aero},
+        reference=SimpleNamespace(effects=(effect("steer_lag"), effect(DOWNFORCE))),
+    )
+    said.told = SimpleNamespace(ratio_of=lambda _: 2.0, price=lambda *_: 14.0)
+    said.state = SimpleNamespace(among=found)
+    return said
+
+
+def test_what_is_lacked_explains_more_than_what_seems_to_have_changed() -> None:
+    lack = said(47.0).lack()
+    assert lack is not None
+    assert lack.id == DOWNFORCE
+    assert said(700.0).lack() is None
+    little = said(5.0)
+    little.search.visited[frozenset({DOWNFORCE})].log_likelihood = 30.0
+    assert little.lack() is None  # no more than its price
+
+
+@pytest.mark.parametrize("calm", [False, True])
+def test_it_is_put_into_the_model_of_the_reference(
+    truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch, calm: bool
+) -> None:
+    """Once, and where something seems to have changed."""
+    before = identify(start, drive(truth, manoeuvres.lap(10.0), seed=3, rate_hz=50.0), starts=1)
+    (log,) = before.driving.logs
+    found = changed(before, log, candidates=("steer_ratio",))
+    row = replace(found["steer_ratio"], said="not testable" if calm else "likely", probability=0.6)
+    asked: list[tuple[str, ...]] = []
+
+    class Lacking(Saying):
+        def __init__(self, search: Any) -> None:
+            asked.append(search.before.model.effects)
+
+        def change(self) -> Any:
+            return replace(found, effects=(row,))
+
+        def lack(self) -> Effect | None:
+            return effect(DOWNFORCE) if len(asked) < 2 else None
+
+    monkeypatch.setattr(sys.modules[changed.__module__], "Saying", Lacking)
+    change = changed(before, log, candidates=("steer_ratio",))
+    assert asked == ([()] if calm else [(), (DOWNFORCE,)])
+    assert change.lacks == (() if calm else (DOWNFORCE,))
+    assert change.to_dict()["lacks"] == list(change.lacks)
+    assert (f"the reference lacks {DOWNFORCE}, in both drivings" in str(change)) is not calm
+
+
+def test_a_rival_that_is_nothing_beside_an_effect_does_not_take_its_place() -> None:
+    """Its likelihood gains by what the reference lacks."""
+    both = frozenset({"tyre_front", "steer_compliance"})
+    said = cast(Any, Saying.__new__(Saying))
+    said.search = SimpleNamespace(
+        visited={both: SimpleNamespace(put=tuple(both))}, told=lambda _: None, rules=USUAL
+    )
+    state = cast(Any, SimpleNamespace(put=("tyre_front",)))
+    for nothing, first in (({"steer_compliance"}, "tyre_front"), (set(both), "steer_compliance")):
+        said._off_nothing = lambda e, *_, nothing=nothing: e not in nothing
+        odds = {"tyre_front": 0.0, "steer_compliance": 24.0}
+        assert said._told_apart("tyre_front", odds, state).effects == (first,)

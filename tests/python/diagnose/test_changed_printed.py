@@ -1,0 +1,98 @@
+"""What is printed and kept of what changed: sizes, probabilities, and what would have been seen."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from contradictions import contradictions_of_changes
+
+from sysid_vehicle import Change, Fit, Log, Model, changed, drive, identify, load, manoeuvres
+from sysid_vehicle._common.text import number
+
+OFFSET = "steer_offset.offset_rad"
+LATE = ("steer_delay", "steer_lag")
+FEW = ("steer_offset", "steer_ratio", "steer_delay")
+
+
+def later(truth: Model, **values: float) -> Log:
+    """A quarter of a minute of other driving of the car, with parameters of effects."""
+    told = {name.replace("__", "."): value for name, value in values.items()}
+    more = [n.split(".")[0] for n in told if "." in n and n.split(".")[0] not in truth.effects]
+    car = truth.add(*dict.fromkeys(more)).with_values(told)
+    return drive(car, manoeuvres.handling_course(15.0, lateral_mps2=7.5), seed=42, rate_hz=50.0)
+
+
+@pytest.fixture(scope="module")
+def before(start: Model, truth: Model) -> Fit:
+    """A reference of half a lap: searches take as long as the driving."""
+    return identify(start, drive(truth, manoeuvres.lap(20.0), seed=1, rate_hz=50.0), starts=1)
+
+
+@pytest.fixture(scope="module")
+def offset(truth: Model, before: Fit) -> Change:
+    return changed(before, later(truth, steer_offset__offset_rad=0.006), candidates=FEW)
+
+
+def test_what_is_likely_and_not_shown_is_no_calm(offset: Change) -> None:
+    """Two changes that act alike may both be likelier than not, and neither be shown."""
+    few = (replace(e, said="not testable", probability=None) for e in offset.effects[1:])
+    likely = replace(offset.effects[0], said="likely", probability=0.8)
+    text = str(replace(offset, effects=(likely, *few)))
+    assert "something changed, likeliest steer_offset (80 % sure)" in text
+    assert "likely, but not shown: offset_rad below 0.00" in text
+    assert contradictions_of_changes(text) == []
+    calm = replace(likely, said="not testable", probability=None)
+    text = str(replace(offset, effects=(calm,)))
+    assert text.startswith("no change is shown\n")
+    assert contradictions_of_changes(text) == []
+
+
+def test_what_is_not_testable_has_no_probability(fit: Fit, course: Log, offset: Change) -> None:
+    """Nor has what is shown to be unchanged; and each says what it would take to see it."""
+    for change in (offset, changed(fit, course)):
+        assert contradictions_of_changes(str(change)) == []
+        for e in change.effects:
+            told = e.said in ("not testable", "unchanged")
+            assert (e.probability is None) is (e.sure == "") is told
+            assert (e.power in e.sentence) is told
+            assert change.to_dict()["effects"][e.id]["probability"] == e.probability
+
+
+def test_contradictions_of_a_text_are_found(offset: Change) -> None:
+    rival = replace(offset.effects[1], said="not testable", probability=0.64)
+    text = str(replace(offset, effects=(offset.effects[0], rival)))
+    (found,) = contradictions_of_changes(text)
+    assert found == f"{rival.id}: 64 % sure, and not testable"
+    calm = text.replace("changed: steer_offset: ", "no change is shown: ", 1)
+    assert "nothing is shown, and a row says changed" in contradictions_of_changes(calm)
+
+
+def test_a_stiffness_that_would_be_seen_is_seen(truth: Model, before: Fit, offset: Change) -> None:
+    """Of tyres as well; it is printed, and far below that nothing is named."""
+    least = offset["tyre_front"].least_stiffness
+    assert least is not None
+    assert 0.002 < least < 0.1
+    told = f"cornering stiffness of the front axle below {number(100.0 * least, 2)} %"
+    assert told in str(offset)
+    assert offset.to_dict()["effects"]["tyre_front"]["least_stiffness"] == least
+    for share, named in ((least, True), (0.1 * least, False)):
+        softer = later(truth, B_front=(1.0 - share) * truth.value("B_front"))
+        change = changed(before, softer, candidates=("steer_ratio",))
+        assert ("tyre_front" in {e.id for e in change.named}) is named
+
+
+def test_a_change_prints_and_is_kept(offset: Change, tmp_path: Path) -> None:
+    text = str(offset)
+    assert text.startswith("changed: steer_offset: offset_rad +0.00")
+    assert "<table>" in offset._repr_html_()
+    told = offset.to_dict()["effects"]["steer_offset"]
+    assert told["said"] == "changed"
+    assert told["change"]["offset_rad"]["value"] == offset["steer_offset"].value[0]
+    assert told["change"]["offset_rad"]["least"] == offset["steer_offset"].least[0]
+    frame = offset.to_pandas()
+    assert frame.loc[OFFSET, "said"] == "changed"
+    offset.before.save(tmp_path / "before.npz")
+    again = load(tmp_path / "before.npz")
+    assert again.log_likelihood == offset.before.log_likelihood
+    with pytest.raises(KeyError, match="there are steer_offset"):
+        offset["no_effect"]
