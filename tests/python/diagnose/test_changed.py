@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from changed_drives import FEW, LATE, OFFSET, later
 
 from sysid_vehicle import (
     Change,
@@ -27,29 +28,6 @@ from sysid_vehicle.diagnose.change.pieces import Pieces
 from sysid_vehicle.diagnose.change.reference import Reference
 from sysid_vehicle.diagnose.evidence import evidence
 from sysid_vehicle.estimate import Driving
-
-OFFSET = "steer_offset.offset_rad"
-LATE = ("steer_delay", "steer_lag")
-FEW = ("steer_offset", "steer_ratio", "steer_delay")
-
-
-def later(truth: Model, **values: float) -> Log:
-    """A quarter of a minute of other driving of the car, with parameters of effects."""
-    told = {name.replace("__", "."): value for name, value in values.items()}
-    more = [n.split(".")[0] for n in told if "." in n and n.split(".")[0] not in truth.effects]
-    car = truth.add(*dict.fromkeys(more)).with_values(told)
-    return drive(car, manoeuvres.handling_course(15.0, lateral_mps2=7.5), seed=42, rate_hz=50.0)
-
-
-@pytest.fixture(scope="module")
-def before(start: Model, truth: Model) -> Fit:
-    """A reference of half a lap: searches take as long as the driving."""
-    return identify(start, drive(truth, manoeuvres.lap(20.0), seed=1, rate_hz=50.0), starts=1)
-
-
-@pytest.fixture(scope="module")
-def offset(truth: Model, before: Fit) -> Change:
-    return changed(before, later(truth, steer_offset__offset_rad=0.006), candidates=FEW)
 
 
 def inside(change: Change, effect: str, value: float) -> bool:

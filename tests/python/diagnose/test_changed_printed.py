@@ -4,33 +4,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from changed_drives import OFFSET, later
 from contradictions import contradictions_of_changes
 
-from sysid_vehicle import Change, Fit, Log, Model, changed, drive, identify, load, manoeuvres
+from sysid_vehicle import Change, Fit, Log, Model, changed, load
 from sysid_vehicle._common.text import number
-
-OFFSET = "steer_offset.offset_rad"
-LATE = ("steer_delay", "steer_lag")
-FEW = ("steer_offset", "steer_ratio", "steer_delay")
-
-
-def later(truth: Model, **values: float) -> Log:
-    """A quarter of a minute of other driving of the car, with parameters of effects."""
-    told = {name.replace("__", "."): value for name, value in values.items()}
-    more = [n.split(".")[0] for n in told if "." in n and n.split(".")[0] not in truth.effects]
-    car = truth.add(*dict.fromkeys(more)).with_values(told)
-    return drive(car, manoeuvres.handling_course(15.0, lateral_mps2=7.5), seed=42, rate_hz=50.0)
-
-
-@pytest.fixture(scope="module")
-def before(start: Model, truth: Model) -> Fit:
-    """A reference of half a lap: searches take as long as the driving."""
-    return identify(start, drive(truth, manoeuvres.lap(20.0), seed=1, rate_hz=50.0), starts=1)
-
-
-@pytest.fixture(scope="module")
-def offset(truth: Model, before: Fit) -> Change:
-    return changed(before, later(truth, steer_offset__offset_rad=0.006), candidates=FEW)
 
 
 def test_what_is_likely_and_not_shown_is_no_calm(offset: Change) -> None:

@@ -36,38 +36,9 @@ class Saying:
         search, told, state = self.search, self.told, self.state
         ratio = told.ratio_of(state.put)
         exact = {e: self._exact(e, state, told, ratio) for e in state.put}
-        rest = [
-            s
-            for s in told.causes.sets
-            if not any(e in state.put for e in s.effects)
-            and not told.acts_like(s.effects[0])
-            and frozenset({*state.put, s.effects[0]})
-            not in self.search.visited  # refused by a refit
-        ]
-        causes = told.causes.only([*(s for s in exact.values() if s is not None), *rest], {})
-        sizes, stds = (self._of_the_car(told_by, state) for told_by in (told.sizes, told.stds))
-        # Of what was put in the exact size: no line is drawn from the reference to there.
-        for e in state.put:
-            sizes |= self._sizes_in(state, e)
-        for e, m in self.search.can.items():
-            without, put = frozenset(state.put) - {e}, frozenset({*state.put, e})
-            one, other = self.search.visited.get(without), self.search.visited.get(put)
-            if len(m.names) > 1 or one is None or other is None:
-                continue
-            # As many standard errors from nothing as the likelihood ratio says, at most.
-            ((name, size),) = self._sizes_in(other, e).items()
-            gain = other.among - one.among if without else other.reached - one.reached
-            rises = 2.0 * gain / told.ratio_of((e,))
-            sizes[name] = size if rises > 0.0 else sizes[name]
-            stds[name] = max(stds[name], abs(sizes[name]) / float(np.sqrt(max(rises, 1.0))))
-        for s in (s for s in exact.values() if s is not None):
-            for e in s.effects:
-                other = self._in_place(e, s, state)
-                if other is not None and e not in state.put:
-                    beside = self.search.told(other)
-                    sizes |= self._sizes_in(other, e)
-                    lines = self._of_the_car(beside.stds, other)
-                    stds |= {n: max(lines[n], stds[n]) for n in self.search.can[e].names}
+        shown = [s for s in exact.values() if s is not None]
+        causes = told.causes.only([*shown, *self._not_refused()], {})
+        sizes, stds = self._told_sizes(shown)
         nothing = self._nothing()
         calm = nothing > 1.0 - search.rules.credible
         found = [self._of(m, causes, sizes, stds, told, calm=calm) for m in self.search.may]
@@ -79,6 +50,55 @@ class Saying:
         return Change(
             search.before, state.fit, causes, tuple(found), nothing, search.alike, search.rules
         )
+
+    def _not_refused(self) -> list[CredibleSet]:
+        """Sets by scores whose likeliest is not what was put in, and no refit has refused it."""
+        told, put = self.told, self.state.put
+        return [
+            s
+            for s in told.causes.sets
+            if not any(e in put for e in s.effects)
+            and not told.acts_like(s.effects[0])
+            and frozenset({*put, s.effects[0]}) not in self.search.visited
+        ]
+
+    def _told_sizes(
+        self, shown: Sequence[CredibleSet]
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Sizes and standard errors by parameter: exact ones where there are, lines elsewhere."""
+        told, state = self.told, self.state
+        sizes, stds = (self._of_the_car(told_by, state) for told_by in (told.sizes, told.stds))
+        # Of what was put in the exact size: no line is drawn from the reference to there.
+        for e in state.put:
+            sizes |= self._sizes_in(state, e)
+        for e in self.search.can:
+            self._by_ratio(e, sizes, stds)
+        for s in shown:
+            for e in s.effects:
+                other = self._in_place(e, s, state)
+                if other is not None and e not in state.put:
+                    beside = self.search.told(other)
+                    sizes |= self._sizes_in(other, e)
+                    lines = self._of_the_car(beside.stds, other)
+                    stds |= {n: max(lines[n], stds[n]) for n in self.search.can[e].names}
+        return sizes, stds
+
+    def _by_ratio(self, effect: str, sizes: dict[str, float], stds: dict[str, float]) -> None:
+        """As many standard errors from nothing as the likelihood ratio says, at most.
+
+        Of a parameter that was fitted with the change and without it.
+        """
+        put = frozenset(self.state.put)
+        without, beside = put - {effect}, put | {effect}
+        one, other = self.search.visited.get(without), self.search.visited.get(beside)
+        if len(self.search.can[effect].names) > 1 or one is None or other is None:
+            return
+        ((name, size),) = self._sizes_in(other, effect).items()
+        gain = other.among - one.among if without else other.reached - one.reached
+        rises = 2.0 * gain / self.told.ratio_of((effect,))
+        if rises > 0.0:
+            sizes[name] = size
+        stds[name] = max(stds[name], abs(sizes[name]) / float(np.sqrt(max(rises, 1.0))))
 
     def _nothing(self) -> float:
         """Probability that nothing changed, beside all that was fitted."""
@@ -201,7 +221,7 @@ class Saying:
         *,
         calm: bool,
     ) -> EffectChange:
-        rules, own = self.search.rules, causes.of(m.id)
+        rules = self.search.rules
         ends = room(m, self.search.before.model)
         raw = [sizes[n] for n in m.names], [stds[n] for n in m.names]
         # A line that leads further beyond what a parameter can be than its error is followed to
@@ -219,19 +239,13 @@ class Saying:
             _within(max(told.least(s, usual), w + (rules.bound - 1.0) * s), max(-low, high))
             for s, usual, w, (low, high) in zip(std, m.scale, matters, ends, strict=True)
         )
-        group: tuple[str, ...] = ()
-        said: Said = "not testable"
-        if own is not None:
-            group = tuple(e for e in own.effects if e != m.id)
-            said = "one of a group" if group else "changed"
-            if not possible(m, *raw, rules):
-                said = "implausible"
-            elif all(abs(v) + s < w for v, s, w in zip(value, std, matters, strict=True)):
-                said, group = "negligible", ()
-        elif all(b < w for b, w in zip(bound, matters, strict=True)):
-            said = "unchanged"
-        elif not calm and self._likely(m.id, causes.inclusion.get(m.id, 0.0)):
-            said = "likely"
+        small = all(abs(v) + s < w for v, s, w in zip(value, std, matters, strict=True))
+        said, group = self._verdict(m, causes, can_be=possible(m, *raw, rules), small=small)
+        if said == "not testable":
+            if all(b < w for b, w in zip(bound, matters, strict=True)):
+                said = "unchanged"
+            elif not calm and self._likely(m.id, causes.inclusion.get(m.id, 0.0)):
+                said = "likely"
         names, units = zip(*((p.name, p.unit) for p in m.parameters), strict=True)
         # Of what driving does not tell, its line has a probability that says nothing.
         sure = None if said in ("unchanged", "not testable") else causes.inclusion.get(m.id, 0.0)
@@ -239,6 +253,21 @@ class Saying:
         least_stiffness = None if stiffness is None else self._least_stiffness(m, stiffness[1])
         figures = (value, std, bound, sure, said, group, least, stiffness, least_stiffness)
         return EffectChange(m.id, names, units, *figures)
+
+    @staticmethod
+    def _verdict(
+        m: May, causes: Causes, *, can_be: bool, small: bool
+    ) -> tuple[Said, tuple[str, ...]]:
+        """What is said of what is in a credible set, and what else it may be."""
+        own = causes.of(m.id)
+        if own is None:
+            return "not testable", ()
+        group = tuple(e for e in own.effects if e != m.id)
+        if not can_be:
+            return "implausible", group
+        if small:
+            return "negligible", ()
+        return ("one of a group" if group else "changed"), group
 
     def _least_stiffness(self, m: May, std: float) -> float:
         """Of tyres, the smallest share of their cornering stiffness that would be named."""
@@ -253,13 +282,12 @@ class Saying:
         """
         if m not in self.search.tyres:
             return None
-        own = self.search.before.model
-        before = np.array([own.value(n) for n in m.names[:3]])  # B, C, D
+        before = np.array([self.search.before.model.value(n) for n in m.names[:3]])  # B, C, D
         put = m.id in self.state.put
         after = before + np.array(sizes[:3]) if put else before
         ratio = float(np.prod(after) / np.prod(before))
-        later, earlier = (as_float64([*(x * ratio / own), 0.0])
-                          for x, own in ((1.0, after), (-1.0, before)))  # fmt: skip
+        later = as_float64([*(ratio / after), 0.0])
+        earlier = as_float64([*(-ratio / before), 0.0])
         value = ratio - 1.0 if put else float(later[:3] @ np.array(sizes[:3]))
         known = {**dict(zip(m.names, sizes, strict=True)), **self.state.changes}
         std = self.told.std_along(m.id, (later, earlier), known)
