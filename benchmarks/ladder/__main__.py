@@ -25,7 +25,7 @@ from rungs import PAIRS, RUNGS, TRUTHS, low_pass_s, present, ride
 
 import sysid_vehicle as sv
 from sysid_vehicle.identify import Estimate
-from sysid_vehicle.sensors import low_passes
+from sysid_vehicle.sensors import Conditioning
 
 _NEAR = 0.2  # of the size of what the rung brings about: a lag is not quite a delay
 _HEAD = "rung               seed  right  claimed; verdict; error of v_y, yaw rate ahead, m/s, rad/s"
@@ -75,7 +75,7 @@ def _low_passes(args: argparse.Namespace) -> None:
     for rung in _rungs(args):
         off, inside = [], 0
         for seed in range(args.first, args.first + args.seeds):
-            told = low_passes(_drives(rung, seed, args))
+            told = Conditioning.of(_drives(rung, seed, args)).low_passes
             true_s = low_pass_s(rung)
             errors = [(response.delay_s - true_s, std_s) for response, std_s in told.values()]
             if errors:
