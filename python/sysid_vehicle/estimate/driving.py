@@ -130,6 +130,12 @@ class Driving:
         log = self.logs[stretch.log]
         return replace(self, logs=(log,), offsets=own, part=Stretch(0, stretch.where))
 
+    def read_otherwise(self, logs: Sequence[Log]) -> Driving:
+        """The same stretches, whose ends hang on readings, of logs that differ in these."""
+        other = replace(self, logs=tuple(logs))
+        vars(other)["stretches"] = self.stretches
+        return other
+
     def channel(self, name: str) -> FloatArray:
         """A channel over all stretches; NaN throughout where a log lacks it."""
         parts = []

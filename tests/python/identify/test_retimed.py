@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, Log, Model, drive, example_vehicle, identify, load, manoeuvres
+from sysid_vehicle.estimate import Driving
+from sysid_vehicle.identify.intervals.retimed import pushes_of_time
 from sysid_vehicle.log import Retimed
 from sysid_vehicle.sensors.apply import shifted
 
@@ -67,6 +69,24 @@ def test_one_time_of_several_logs_is_one_error(model: Model, log: Log, sure: Fit
     assert both.pushed.shape[1] == 1
     place = [e.name for e in one.estimates].index(LENGTH)
     assert both.pushed[place, 0] == pytest.approx(one.pushed[place, 0], rel=0.15)
+
+
+def test_stretches_stay_where_a_moved_speed_crosses_the_least(
+    model: Model, log: Log, sure: Fit
+) -> None:
+    """A car that slows down through the speed below which no model is run."""
+    time_s, vx = log["time_s"], np.array(log["vx_mps"])
+    first = int(0.8 * log.n)
+    slows = log.least_speed_mps + 1e-4 - 2.0 * (time_s - time_s[first])
+    vx = np.minimum(vx, np.maximum(slows, 0.5))
+    driven = log.corrected({"vx_mps": vx}, (), [Retimed(MOTION, STD_S)])
+    driving = Driving.of(driven)
+    moved = driving.read_otherwise([earlier(driven, STD_S)])
+    assert Driving.of(earlier(driven, STD_S)).stretches != driving.stretches
+    assert moved.stretches == driving.stretches
+    p, columns = model.vector(), sure.columns
+    gains = driving.problem(model).freeze(p, sure.noise.vector())
+    assert pushes_of_time(model, driving, p, gains, columns).shape == (len(columns), 1)
 
 
 def test_it_stands_in_files(tmp_path: Path, model: Model, log: Log) -> None:

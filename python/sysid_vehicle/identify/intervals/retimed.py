@@ -12,7 +12,6 @@ sensitivities to the parameters.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -53,7 +52,7 @@ def pushes_of_time(
         return found
 
     here = slope(driving)
-    later = [replace(driving, logs=tuple(_moved(log, t) for log in driving.logs)) for t in times]
+    later = [driving.read_otherwise([_moved(log, t) for log in driving.logs]) for t in times]
     return np.column_stack([slope(d) - here for d in later])
 
 
