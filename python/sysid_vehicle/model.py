@@ -15,7 +15,7 @@ import numpy as np
 from . import _core
 from ._common.arrays import FloatArray
 from ._common.text import html_text
-from .effects import Effect, Parameter, base_parameters, catalogue, effect
+from .effects import Effect, Parameter, base_parameters, catalogue, effect, in_car
 from .errors import InvalidInput
 from .saved import save
 from .tyre import Tyre
@@ -91,7 +91,7 @@ class Model:
         if isinstance(names, str):
             raise InvalidInput(f"effects = {names!r}: give a tuple of names")
         own = {e.id: e for e in self.parts}
-        found = [own.get(e) or effect(e) for e in self.effects]
+        found = [self.effect(own.get(e) or e) for e in self.effects]
         ids = tuple(e.id for e in found)
         if len(set(ids)) != len(ids):
             raise InvalidInput(f"an effect is named twice: {', '.join(ids)}")
@@ -111,10 +111,21 @@ class Model:
 
     def add(self, *names: str | Effect) -> Model:
         """The same model with more effects, at their null values."""
-        new = [effect(n) for n in names]
+        new = [self.effect(n) for n in names]
         return replace(
             self, effects=(*self.effects, *(e.id for e in new)), parts=(*self.parts, *new)
         )
+
+    def effect(self, name: str | Effect) -> Effect:
+        """An effect with the sizes that it has in this car.
+
+        Raises
+        ------
+        InvalidInput
+            No effect has this id; the message names the nearest ones.
+        """
+        car = self.vehicle
+        return in_car(effect(name), wheelbase_m=car.wheelbase_m, mass_kg=car.mass_kg)
 
     def drop(self, *names: str | Effect) -> Model:
         """The same model with fewer effects."""
@@ -271,7 +282,7 @@ class Model:
         """Effects of the catalogue that are considered where no others are named."""
         unknown_inertia = _YAW_INERTIA in self.free_names
         return self.seated(
-            e
+            self.effect(e)
             for e in catalogue()
             if e.id not in self.effects
             and not e.on_request

@@ -109,10 +109,10 @@ def _print_where(study: Study) -> None:
 
 def _effects(args: argparse.Namespace, heard: Warnings) -> None:
     _define(args)
+    sized = effect if args.vehicle is None else Model(Vehicle.from_toml(args.vehicle)).effect
+    print("\n\n".join(str(sized(e)) for e in args.names or catalogue()))
     if args.names:
-        print("\n\n".join(str(effect(name)) for name in args.names))
         return
-    print("\n\n".join(str(e) for e in catalogue()))
     known = {e.id for e in catalogue()}
     others = [str(p) for p in installed_effects() if p.id not in known]
     if others:

@@ -24,8 +24,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--between", required=True, metavar="A,B", help="the two effects, the likelier one first"
     )
+    parser.add_argument(
+        "--top-speed",
+        type=float,
+        metavar="M/S",
+        help=f"highest speed (default: {_USUAL.speed_mps:g}, less for a small car)",
+    )
     limits = {
-        "--top-speed": (_USUAL.speed_mps, "M/S", "highest speed"),
         "--lateral": (_USUAL.lateral_mps2, "M/S2", "highest lateral acceleration"),
         "--duration": (_USUAL.duration_s, "S", "longest drive"),
     }
@@ -48,7 +53,10 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     model = Model(Vehicle.from_toml(args.vehicle))
     logs = read_logs(args.logs, args, model.vehicle)
     area = None if args.area is None else (args.area[0], args.area[1])
-    limits = DriveLimits(args.top_speed, args.lateral, area, args.duration)
+    known = {"lateral_mps2": args.lateral, "area_m": area, "duration_s": args.duration}
+    if args.top_speed is not None:
+        known["speed_mps"] = args.top_speed
+    limits = DriveLimits.usual(model.vehicle, **known)
     fit = identify(model, logs)
     found = suggest_manoeuvre(fit, *pair, limits=limits)
     print(found)

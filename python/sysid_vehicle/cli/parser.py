@@ -78,6 +78,9 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     mu_slip.add_parser(commands)
     effects = commands.add_parser("effects", help="the catalogue of effects")
     effects.add_argument("names", nargs="*", metavar="EFFECT", help="those to print; all if none")
+    effects.add_argument(
+        "--vehicle", metavar="TOML", help="vehicle file: sizes in this car (default: ordinary ones)"
+    )
     _define(effects)
     lab.add_parser(commands)
     twin.add_parser(commands)

@@ -10,6 +10,7 @@ from .catalogue import (
     effect,
 )
 from .plugins import Plugin, installed_effects
+from .scale import in_car, length_beyond
 from .user import define_effect, forget_effect, load_effects, parameter, state
 
 __all__ = [
@@ -23,7 +24,9 @@ __all__ = [
     "define_effect",
     "effect",
     "forget_effect",
+    "in_car",
     "installed_effects",
+    "length_beyond",
     "load_effects",
     "parameter",
     "state",

@@ -15,7 +15,6 @@ _AROUND_S = 0.5  # on either side
 _LEAST = 0.25
 _BLOCK_S, _FEWEST = 5.0, 6
 _MOST_MPS2 = 15.0  # of v_x r that counts: a spin is no measure of corners
-_SLOWEST_MPS = 3.0
 
 _Bools = npt.NDArray[np.bool_]
 
@@ -39,7 +38,8 @@ def turning(driving: Driving) -> _Bools:
     """
     r = driving.channel("yaw_rate_radps")
     v = driving.channel("vx_mps")
-    v = np.maximum(np.where(np.isfinite(v), v, 0.0), _SLOWEST_MPS)
+    least = min(log.least_speed_mps for log in driving.logs)
+    v = np.maximum(np.where(np.isfinite(v), v, 0.0), least)
     side = np.clip(v * r, -_MOST_MPS2, _MOST_MPS2)
     found = np.zeros(driving.samples, dtype=bool)
     for motion in (side / v, side):

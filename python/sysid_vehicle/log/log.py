@@ -21,16 +21,13 @@ from .channels import CHANNELS
 from .columns import Columns
 from .laws.laws import Contradiction
 from .laws.plausibility import contradictions
-from .signals import runs
+from .signals import least_speed_mps, runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _HEADINGS = ("channel", "unit", "min", "max", "missing %")
 _SHOWN = ("vx_mps", "steer_rad", "yaw_rate_radps", "ay_mps2", "ax_mps2", "vy_mps", "fx_n")
-
-# Speeds at which the model is run, and the share of its usual top speed for a slow car.
-_LEAST_MPS, _LEAST_ANY_MPS, _LEAST_SHARE = 3.0, 1.0, 0.4
 
 
 @dataclass(frozen=True)
@@ -245,13 +242,8 @@ class Log:
 
     @property
     def least_speed_mps(self) -> float:
-        """Slowest speed at which the model is run: 3 m/s, less where all the driving is slow.
-
-        Tyres slip little below, and slip angles are noise. Cars on a scale slip at less: it is 0.4
-        of a speed that is seldom exceeded then, and 1 m/s at least.
-        """
-        usual = float(np.nanpercentile(np.append(self["vx_mps"], 0.0), 95.0))
-        return min(_LEAST_MPS, max(_LEAST_SHARE * usual, _LEAST_ANY_MPS))
+        """Slowest speed at which the model is run: 3 m/s, less where all the driving is slow."""
+        return least_speed_mps(self["vx_mps"])
 
     def stretches(
         self, min_speed_mps: float | None = None, min_duration_s: float = 1.0

@@ -12,6 +12,18 @@ _SPIKE_NOISE, _SPIKE_QUANTA, _SPIKE_RANGE = 8.0, 3.0, 0.05
 _SPIKE_NEIGHBOURS = 0.3  # the neighbours of a spike differ by less than this part of it
 _SPIKE_APPROACH = 3.0  # and it exceeds by this factor the steps just before and just after
 _SPIKE_WINDOW = 51
+# Speeds at which the model is run, and the share of its usual top speed for a slow car.
+_LEAST_MPS, _LEAST_ANY_MPS, _LEAST_SHARE = 3.0, 1.0, 0.4
+
+
+def least_speed_mps(speed_mps: FloatArray) -> float:
+    """Slowest speed at which the model is run: 3 m/s, less where all the driving is slow.
+
+    Tyres slip little below, and slip angles are noise. Cars on a scale slip at less: it is 0.4 of a
+    speed that is seldom exceeded then, and 1 m/s at least.
+    """
+    usual = float(np.nanpercentile(np.append(speed_mps, 0.0), 95.0))
+    return min(_LEAST_MPS, max(_LEAST_SHARE * usual, _LEAST_ANY_MPS))
 
 
 def runs(mask: np.ndarray) -> list[tuple[int, int]]:

@@ -12,6 +12,7 @@ from .._common.arrays import FloatArray, as_float64
 from .._common.style import axes_or_new
 from .._common.text import html_text
 from ..errors import InvalidInput
+from ..log.signals import least_speed_mps
 from ..vehicle import Vehicle
 from .curves import Curve
 from .steady import peak_lateral_mps2, slip_difference, steady_steer, understeer_gradient
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 # A driver on a path may come this near to the peak before the manoeuvre is refused.
 _LARGEST_SHARE = 0.95
+_SLOWEST_MPS = 1.2  # a car that is simulated has stopped at 1 m/s
 
 
 @dataclass(frozen=True)
@@ -64,12 +66,13 @@ class Manoeuvre:
             )
         time_s = self._times(10.0)
         speed = self.speed_mps(time_s)
-        slow = np.flatnonzero(~(speed >= 3.0))
+        least = max(least_speed_mps(speed), _SLOWEST_MPS)
+        slow = np.flatnonzero(~(speed >= least))
         if slow.size:
             k = int(slow[0])
             raise InvalidInput(
                 f"{self.name}: the wanted speed is {speed[k]:.3g} m/s at {time_s[k]:.6g} s; the "
-                f"single track needs 3 m/s or more, ask for a higher speed"
+                f"single track needs {least:.3g} m/s or more, ask for a higher speed"
             )
 
     def _times(self, rate_hz: float) -> FloatArray:

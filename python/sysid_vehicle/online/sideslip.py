@@ -199,7 +199,7 @@ def estimate_sideslip(
     NumericalError
         If the filter leaves the range of numbers; the message gives the sample.
     """
-    settings = settings if settings is not None else SideslipSettings.of(log)
+    settings = settings if settings is not None else SideslipSettings.of(log, vehicle)
     return run_over(log, SideslipObserver(vehicle, settings, kind), settings)
 
 

@@ -115,7 +115,7 @@ def calibrate_sideslip(
         raise InvalidInput(f"{log.name}: vy_mps is not there; calibrate on a drive that has it")
     if runs < 1 or not learnt:
         raise InvalidInput("learnt, runs: give one setting and one run at least")
-    start = settings if settings is not None else SideslipSettings.of(log)
+    start = settings if settings is not None else SideslipSettings.of(log, vehicle)
     names = list(learnt)
     rng = generator(seed)
 

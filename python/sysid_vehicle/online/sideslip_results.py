@@ -10,7 +10,7 @@ import numpy as np
 from .._common.arrays import FloatArray
 from .._common.printed import Told
 from .._common.style import AFTER, MEASURED, TRUTH, axes_or_new, new_figure, tidy
-from .._common.text import text_table
+from .._common.text import number, text_table
 from ..vehicle import Vehicle
 from .sideslip_settings import SideslipSettings
 
@@ -158,8 +158,8 @@ class SideslipRun(Told):
             rows = [
                 [
                     axle,
-                    f"{c[k] / 1e3:.1f}",
-                    f"{s[k] / 1e3:.1f}",
+                    number(float(c[k]) / 1e3, 3),
+                    number(float(s[k]) / 1e3, 2),
                     *([f"{x[k]:.2f}" for x in mu] if np.isfinite(mu[0][k]) else ["-", "-"]),
                 ]
                 for axle, c, s, mu in (
@@ -169,8 +169,8 @@ class SideslipRun(Told):
             ]
             head = ["axle", "stiffness [kN/rad]", "std", "friction", "std"]
             lines.append(text_table(head, rows))
-        for number, meaning in ((1, "too slow to tell"), (2, "with a sensor missing or refused")):
-            share = float(np.mean(self.mode == number))
+        for mode, meaning in ((1, "too slow to tell"), (2, "with a sensor missing or refused")):
+            share = float(np.mean(self.mode == mode))
             if share > 0.0:
                 lines.append(f"  {100.0 * share:.3g} % of samples {meaning}")
         found = self.error()

@@ -8,9 +8,11 @@ from collections.abc import Iterator, Mapping
 from .. import _core
 from .._common.files import refuse_unknown
 from .._common.text import html_text, text_table
+from ..effects import length_beyond
 from ..errors import InvalidInput
 from ..estimate.inputs import white_noise_std
 from ..log import Log
+from ..vehicle import Vehicle
 
 # Quieter than these no sensor of a car is; simulated channels without noise are.
 _QUIETEST = {"vx_mps": 0.01, "yaw_rate_radps": 5e-4, "ax_mps2": 0.02, "ay_mps2": 0.02}
@@ -47,14 +49,23 @@ class SideslipSettings(Mapping[str, float]):
             )
 
     @classmethod
-    def of(cls, log: Log, **changes: float) -> SideslipSettings:
-        """Take the noise of the sensors from the fast scatter of the log's channels."""
+    def of(cls, log: Log, vehicle: Vehicle | None = None, **changes: float) -> SideslipSettings:
+        """Take the noise of the sensors from the fast scatter of the log's channels.
+
+        The observer starts at the speed from which models are run (`Log.least_speed_mps`). Lengths
+        are those of a car of ordinary size, or of `vehicle`.
+        """
         noise = {
             name: max(white_noise_std(log[name], NOISE_BLOCK), least)
             for name, least in _QUIETEST.items()
             if log.has(name)
         }
-        return cls(**{**noise, **changes})
+        usual = _core.sideslip_defaults()
+        slow = log.least_speed_mps / usual["stop_below_mps"]
+        length = 1.0 if vehicle is None else length_beyond(vehicle.wheelbase_m)
+        sizes = {name: slow * usual[name] for name in ("stop_below_mps", "go_above_mps")}
+        sizes |= {name: length * usual[name] for name in ("relaxation_m", "ahead_m")}
+        return cls(**{**noise, **sizes, **changes})
 
     def replace(self, **changes: float) -> SideslipSettings:
         """Return a copy with some settings changed."""

@@ -20,7 +20,6 @@ from .kinematics.equations import Readings
 from .kinematics.motion import IntArray, Stretch
 
 MOVING = MEASURED  # channels of which the motion is made
-_SLOWEST_MPS = 3.0
 _SHORTEST_S = 3.0
 _LONGEST_HOLE_S = 0.6  # without a sample of a channel the motion is not told
 _PIECE_S = 20.0
@@ -102,7 +101,7 @@ def pieces(logs: Sequence[Log]) -> list[Stretch]:
     found: list[tuple[float, Stretch]] = []
     for number, log in enumerate(logs):
         time_s = log["time_s"]
-        usable = filled(log["vx_mps"]) > _SLOWEST_MPS
+        usable = filled(log["vx_mps"]) > log.least_speed_mps
         for channel in MOVING:
             if log.has(channel):
                 usable &= ~_in_holes(time_s, log[channel])
@@ -120,8 +119,9 @@ def pieces(logs: Sequence[Log]) -> list[Stretch]:
             kept.append(piece)
     if not kept:
         names = ", ".join(log.name for log in logs)
+        least = min(log.least_speed_mps for log in logs)
         raise InvalidInput(
-            f"{names}: nowhere does the car move faster than {_SLOWEST_MPS:g} m/s for "
+            f"{names}: nowhere does the car move faster than {least:.3g} m/s for "
             f"{_SHORTEST_S:g} s with all channels alive; give a log of driving"
         )
     return _joined(sorted(kept, key=lambda s: (s.log, s.first_s)), logs)

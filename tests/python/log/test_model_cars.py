@@ -1,5 +1,6 @@
 """A car on a scale has a short wheelbase: the car's own numbers tell it from a wrong unit."""
 
+import re
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -61,3 +62,40 @@ def test_its_numbers_must_be_those_of_the_log() -> None:
 def test_no_car_is_so_short() -> None:
     with pytest.raises(sv.InvalidInput, match=r"steer_rad: .* small for the yaw rate.*its unit"):
         Log.from_arrays(columns(0.05))
+
+
+def driven(mass_kg: float, wheelbase_m: float = 0.33) -> dict[str, np.ndarray]:
+    """The same with a wheel force."""
+    table = columns(wheelbase_m)
+    drag = 0.001 * mass_kg * table["vx_mps"] ** 2
+    return {**table, "fx_n": mass_kg * 0.48 * np.cos(0.4 * table["time_s"]) + drag}
+
+
+def test_the_force_of_a_model_car_is_read_with_a_note() -> None:
+    with pytest.warns(sv.SysidWarning) as heard:
+        log = Log.from_arrays(driven(3.7))
+    (told,) = (str(w.message) for w in heard if "fx_n" in str(w.message))
+    assert re.search(r"mass of 3\.\d* kg; if this is no model car, and it is in kN", told)
+    assert not log.contradictions
+    check_car(log, mass_kg=3.7, wheelbase_m=0.33)
+    with pytest.raises(sv.InvalidInput, match=r"mass_kg = 1500, but fx_n moves the car as if"):
+        check_car(log, mass_kg=1500.0, wheelbase_m=0.33)
+
+
+def test_a_force_in_kn_moves_no_car_of_usual_length() -> None:
+    with pytest.raises(sv.InvalidInput, match=r"fx_n: .* mass of 1.* kg; if it is in kN"):
+        Log.from_arrays(driven(1.5, 2.7))
+
+
+def test_a_fast_model_car_needs_little_force() -> None:
+    """Three kilograms at 16 m/s, where the drag of any other car takes more than 30 N."""
+    table = driven(3.0)
+    fast = 3.6  # times as fast, in as many times as wide bends
+    for name in ("vx_mps", "ax_mps2", "fx_n"):
+        table[name] = fast * table[name]
+    table["yaw_rate_radps"] = table["yaw_rate_radps"] / fast
+    table["steer_rad"] = table["steer_rad"] / fast**2
+    with pytest.warns(sv.SysidWarning, match="model car"):
+        log = Log.from_arrays(table)
+    assert np.abs(log["fx_n"]).max() < 30.0
+    assert np.median(log["vx_mps"]) > 15.0

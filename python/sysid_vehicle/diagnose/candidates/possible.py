@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ...effects import Effect, Parameter, catalogue, effect
+from ...effects import Effect, Parameter, catalogue
 from ...identify import Estimate, Fit
 from ...model import Model
 from ...rules import USUAL, Rules
@@ -38,13 +38,13 @@ def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple
     """
     if candidates is None:
         return model.candidates
-    wanted = {e.id: e for e in map(effect, candidates)}
+    wanted = {e.id: e for e in map(model.effect, candidates)}
     return tuple(_between(e, wanted[e.id]) for e in lacking(model, wanted))
 
 
 def lacking(model: Model, names: Container[str]) -> tuple[Effect, ...]:
     """What a model lacks of these effects, those on request among them."""
-    asked = [e for e in catalogue() if e.on_request and e.id not in model.effects]
+    asked = [model.effect(e) for e in catalogue() if e.on_request and e.id not in model.effects]
     known = sorted((*model.candidates, *model.seated(asked)), key=lambda e: e.index)
     return tuple(e for e in known if e.id in names)
 
@@ -57,13 +57,13 @@ def _between(e: Effect, given: Effect) -> Effect:
     return replace(e, parameters=tuple(replace(p, lower=g.lower, upper=g.upper) for p, g in both))
 
 
-def refused(given: Effect, value: Sequence[float]) -> bool:
+def refused(given: Effect, value: Sequence[float], model: Model) -> bool:
     """Whether a search ended at a bound that is narrower than the one of the catalogue.
 
     What was told beforehand refuses the value that was wanted: the effect stands for something
-    else, of whatever size.
+    else, of whatever size. `model` has the bounds of its car.
     """
-    own = next((e for e in catalogue() if e.id == given.id), given)
+    own = next((model.effect(e) for e in catalogue() if e.id == given.id), given)
     return any(
         (g.lower > p.lower and v < g.lower + _AT_BOUND * (g.upper - g.lower))
         or (g.upper < p.upper and v > g.upper - _AT_BOUND * (g.upper - g.lower))

@@ -17,7 +17,7 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.progress import with_progress
 from ..._common.text import HALF_95, brief, html_table, number, text_table, unit_after
 from ..._common.threads import Workers
-from ...effects import Effect, base_parameters, effect
+from ...effects import Effect, base_parameters
 from ...errors import InvalidInput, NumericalError
 from ...identify import Fit, explaining
 from ...vehicle import AXLES
@@ -158,7 +158,7 @@ def bias_report(
         An effect that the model has already, or that it identifies otherwise.
     """
     candidates = fit.model.candidates
-    wanted = candidates if effects is None else tuple(effect(e) for e in effects)
+    wanted = candidates if effects is None else tuple(fit.model.effect(e) for e in effects)
     known = {e.id for e in candidates}
     for e in wanted:
         if e.id not in known:

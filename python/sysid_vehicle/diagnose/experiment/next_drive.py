@@ -19,7 +19,7 @@ from ..._common.arguments import check_positive
 from ..._common.printed import Part, Printed, Table
 from ..._common.progress import with_progress
 from ..._common.text import brief
-from ...effects import Effect, effect
+from ...effects import Effect, length_beyond
 from ...errors import InvalidInput, NumericalError
 from ...estimate import MEASURED, Driving
 from ...estimate.inputs import white_noise_std
@@ -28,6 +28,7 @@ from ...log import Log
 from ...manoeuvres import Manoeuvre
 from ...model import Model
 from ...simulate import Drive, SensorNoise, drive_truth
+from ...vehicle import Vehicle
 from .information import Information, information_of
 from .suggestion import Suggestion, ground_m
 
@@ -60,6 +61,20 @@ class DriveLimits:
         check_positive("DriveLimits", **limits, duration_s=self.duration_s)
         if self.area_m is not None and not min(self.area_m) > 0.0:
             raise InvalidInput(f"area_m is {self.area_m}; give two positive lengths")
+
+    @classmethod
+    def usual(cls, vehicle: Vehicle, **others: Any) -> DriveLimits:
+        """Limits that a car may have: its top speed goes as the root of its length.
+
+        Parameters
+        ----------
+        vehicle : Vehicle
+            An ordinary one drives up to 36 m/s.
+        **others
+            Limits that are known.
+        """
+        length = length_beyond(vehicle.wheelbase_m)
+        return cls(**{"speed_mps": length**0.5 * cls.speed_mps, **others})
 
     def hold(self, drive: Drive) -> bool:
         """Whether a drive stayed within them."""
@@ -156,7 +171,7 @@ def separations(
     dict of (effect, effect) to float
         The nearer of both directions.
     """
-    several = tuple(effect(e) for e in effects)
+    several = tuple(fit.model.effect(e) for e in effects)
     known = information if information is not None else information_of(fit, fit.driving, several)
     shown = [e for e in several if any(e.id == k.id for k in known.effects)]
     return {
@@ -187,7 +202,7 @@ def suggest_manoeuvre(
     size : sequence of float, optional
         Size of the first, as distance from its null values; by default a typical one.
     limits : DriveLimits, optional
-        What can be driven.
+        What can be driven; by default `DriveLimits.usual`.
     enough : float
         Standard errors that are wanted.
     seed : int
@@ -204,15 +219,16 @@ def suggest_manoeuvre(
     InvalidInput
         The model has one of the effects already, or the driving cannot show it.
     """
-    a, b = effect(first), effect(second)
+    a, b = fit.model.effect(first), fit.model.effect(second)
     for e in (a, b):
         if e.id in fit.model.effects:
             raise InvalidInput(f"the model has '{e.id}' already; give a fit without it")
-    bounds = limits if limits is not None else DriveLimits()
+    car = fit.model.vehicle
+    bounds = limits if limits is not None else DriveLimits.usual(car)
     here = information_of(fit, fit.driving, (a, b))
     psi = None if size is None else tuple(size)
     now = _apart(here, a, b, psi)
-    menu = _menu(bounds)
+    menu = _menu(bounds, length_beyond(car.wheelbase_m))
     truth = fit.model.add(a).with_values(_values(a, psi))
     found, refused = [], 0
     for manoeuvre in with_progress(menu, "manoeuvres", shown=progress):
@@ -251,8 +267,11 @@ def _values(e: Effect, size: tuple[float, ...] | None) -> dict[str, float]:
     }
 
 
-def _menu(limits: DriveLimits) -> list[Manoeuvre]:
-    """Manoeuvres of the library at several speeds and strengths within the limits."""
+def _menu(limits: DriveLimits, length: float) -> list[Manoeuvre]:
+    """Manoeuvres of the library at several speeds and strengths within the limits.
+
+    Circles and rows of cones are as many times those of ordinary cars as the car is.
+    """
     top, lateral = limits.speed_mps, limits.lateral_mps2
     slow, fast = 0.5 * top, 0.8 * top
     menu = [
@@ -268,15 +287,15 @@ def _menu(limits: DriveLimits) -> list[Manoeuvre]:
         manoeuvres.ramp_steer((slow,), 0.95 * lateral),
         manoeuvres.ramp_steer((slow, fast), 0.95 * lateral),
         manoeuvres.sine_with_dwell(0.6 * top, (0.3 * lateral, 0.5 * lateral, 0.7 * lateral)),
-        manoeuvres.slalom(speed_mps=slow, lateral_mps2=0.65 * lateral),
-        manoeuvres.brake_in_turn(lateral_mps2=0.6 * lateral),
+        manoeuvres.slalom(speed_mps=slow, lateral_mps2=0.65 * lateral, spacing_m=30.0 * length),
+        manoeuvres.brake_in_turn(100.0 * length, 0.6 * lateral),
         manoeuvres.straight_acceleration(top_speed_mps=top, low_speed_mps=0.3 * top),
         manoeuvres.lap(lateral_mps2=0.95 * lateral, top_speed_mps=0.95 * top),
         manoeuvres.handling_course(lateral_mps2=0.95 * lateral, top_speed_mps=0.95 * top),
     ]
     menu += [
         manoeuvres.constant_radius(radius, 0.95 * lateral, 40.0)
-        for radius in (30.0, 60.0, 100.0)
+        for radius in (30.0 * length, 60.0 * length, 100.0 * length)
         if radius * 0.95 * lateral < top**2
     ]
     return menu

@@ -13,7 +13,9 @@ from .motion import Motion
 from .regression import Regression, regress, size_of
 
 WINDOW_S = 1.0
+MIN_WINDOWS = 8
 EXCITED = 0.5  # m/s2 that one side must reach before anything is compared
+CLEARLY = 1.5  # m/s2 that it must reach before channels are called unrelated
 # Scale errors of good sensors, gravity through roll, and geometry that is not known.
 SCALE_STD = 0.12
 LINEAR_MPS2 = 5.0  # lateral acceleration up to which tyres are nearly linear

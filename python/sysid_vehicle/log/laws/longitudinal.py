@@ -31,6 +31,7 @@ _CLEARLY_RAMP, _CLEARLY_DRIVEN, _CLEARLY_FELT = (
     2.0,
 )  # m/s2 beyond which channels must follow each other
 _DRIVEN_MPS, _LEAST_FORCE_N = 12.0, 30.0  # at that speed drag takes more
+_LIGHTEST_KG, _HEAVIEST_KG = 50.0, 1e5  # of cars that carry a driver
 _HELD_MPS2 = 0.05  # a speed that falls no faster on average is held
 _FRONT_SHARE, _FRONT_SPREAD = 0.5, 0.2  # of the lateral force: what the front axle bears
 _DRAG_PER_M = 0.003  # half the air's density times a large drag area, over the mass of a light car
@@ -102,11 +103,18 @@ def ramp_on(drive: Drive, name: str) -> tuple[FloatArray, FloatArray, Regression
     return ramp, driver, found
 
 
-def check_force(drive: Drive) -> None:
-    """Refuse a wheel force that the speed contradicts."""
+def check_force(drive: Drive, *, model_car: bool) -> list[Contradiction]:
+    """Refuse a wheel force that the speed contradicts; doubt one that moves a model car.
+
+    Parameters
+    ----------
+    drive : Drive
+    model_car : bool
+        Whether the steering is that of so short a car.
+    """
     ramp, force, found = ramp_on(drive, "fx_n")
     if spread_of(ramp) < EXCITED or np.ptp(force) == 0.0:
-        return
+        return []
     inverse, deviation = float(found.coefficients[0]), float(found.deviations[0])
     if inverse < -4.0 * deviation and found.coherence > 0.3 and cosine(ramp, force) < -0.3:
         text = "moves against the change of vx_mps"
@@ -118,16 +126,23 @@ def check_force(drive: Drive) -> None:
             f"holds the force of all wheels, in the order of time, or leave it out",
         )
     if found.coherence < 0.6 or inverse <= 0.0:
-        return
+        return []
     mass = 1.0 / inverse
+    if _LIGHTEST_KG < mass < _HEAVIEST_KG:
+        return []
     i = int(np.argmax(np.abs(force)))
-    if not 50.0 < mass < 1e5:
-        what = "kN, put factor = 1000" if mass < 50.0 else "mN, put factor = 0.001"
-        raise Implausible(
-            "fx_n",
-            f"fx_n: {force[i]:.4g} at t = {drive.motion.times_s[drive.rows][i]:.6g} s gives the "
-            f"car a mass of {mass:.3g} kg; if it is in {what} in the channel map",
-        )
+    told = (
+        f"fx_n: {force[i]:.4g} at t = {drive.motion.times_s[drive.rows][i]:.6g} s gives the car a "
+        f"mass of {mass:.3g} kg"
+    )
+    if mass > _HEAVIEST_KG:
+        what = "if it is in mN, put factor = 0.001 in the channel map"
+        raise Implausible("fx_n", f"{told}; {what}")
+    what = "it is in kN, put factor = 1000 in the channel map"
+    if model_car:
+        text = f"{told}; if this is no model car, and {what}"
+        return [Contradiction("fx_n", text, by_the_car=True)]
+    raise Implausible("fx_n", f"{told}; if {what}")
 
 
 def held_speed_note(drive: Drive) -> list[Contradiction]:

@@ -16,12 +16,13 @@ import numpy as np
 from ..._common.arrays import FloatArray
 from ...vehicle import GRAVITY_MPS2
 from ..channels import DEG
+from ..signals import least_speed_mps
 from .clock import clock_notes
 from .lags import lag_notes
 from .laws import (
+    CLEARLY,
     EXCITED,
-    LINEAR_MPS2,
-    OFFSET,
+    MIN_WINDOWS,
     SCALE_STD,
     VX_KMH,
     VX_MPH,
@@ -42,27 +43,14 @@ from .longitudinal import check_force, check_longitudinal, held_speed_note
 from .motion import Motion
 from .ranges import WHITE, blank, check_lost, check_ranges, dropouts
 from .regression import in_most, size_of
+from .wheelbase import check_steering, gripping, is_model_car
 
-_MOVING = 3.0  # in whatever unit vx has; only windows above are compared
-_MIN_WINDOWS = 8
 _SLIDING = 0.2  # m/s2, the same for the change of vy, which is a small part of ay
 _ABOVE_NOISE = 6.0  # noise of the regressor itself makes every coefficient too small
 _HOLDS = 0.2  # of what it demands: a law that holds this closely needs no regression
-_CLEARLY = 1.5  # m/s2 that it must reach before channels are called unrelated
 
 # Lever arms and roll bend the lateral speed more than the accelerations.
 _SLIDE_STD = 0.35
-
-# The wheelbase that answers, from karts to coaches [m], what understeer adds [m/(m/s)^2], how far
-# they vary, and the deviations from them at which the steering angle is none of road wheels.
-_WHEELBASE_M, _WHEELBASE_STD = 2.9, 0.45
-_UNDERSTEER, _UNDERSTEER_STD = 0.002, 0.003
-_NOT_A_WHEELBASE = 3.5
-# Change of the lateral speed over a window, and sideslip, that a car has which does not slide; and
-# the share of windows that must be left to tell of the steering.
-_GRIP_MPS2, _GRIP_RAD, _GRIP_SHARE = 2.5, 0.15, 0.2
-_MODEL_CAR_M = 0.1  # the shortest wheelbase of a car on a scale, 1:24
-_LEAST_OFFSET_RAD = 1e-6  # a steering angle that stays at zero has no size
 
 _YAW_DEG = ("yaw_rate_radps", "degrees per second", f"factor = {DEG}")
 _AY_G = ("ay_mps2", "g", "factor = 9.80665")
@@ -105,30 +93,31 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[C
     """
     implausible: list[Contradiction] = []
     clock: list[Contradiction] = []
-    steer: list[Contradiction] = []
     lost = {name: dropouts(name, values) for name, values in columns.items()}
     given, columns = columns, blank(columns, lost)
     motion = Motion(columns, rate_hz)
     motion.windows(WINDOW_S)
     speed = motion.mean(motion.channels["vx_mps"])
-    rows = motion.usable & (np.abs(speed) > _MOVING)
-    if np.count_nonzero(rows) < _MIN_WINDOWS:
+    # In whatever unit it has.
+    rows = motion.usable & (np.abs(speed) > least_speed_mps(np.abs(speed)))
+    if np.count_nonzero(rows) < MIN_WINDOWS:
         return check_ranges(columns, rate_hz) + check_lost(given, lost)
     drive = Drive(motion, rows)
+    model_car = is_model_car(drive)
     problem: Implausible | None = None
     try:
-        implausible = check_ranges(columns, rate_hz)
+        implausible = check_ranges(columns, rate_hz, model_car=model_car)
     except Implausible as error:
         problem = error  # the unit, if it can be told, says more
     try:
-        clock, steer = _check_laws(drive)
+        clock, doubtful = _check_laws(drive, model_car)
     except KnownUnit:
         raise
     except Implausible as error:
         raise problem or error from None
     if problem is not None:
         raise problem
-    implausible += steer + check_lost(given, lost)
+    implausible += doubtful + check_lost(given, lost)
     if "fx_n" in columns:
         implausible += held_speed_note(drive)
     return implausible + (clock or lag_notes(motion))
@@ -142,24 +131,24 @@ def contradictions(columns: Mapping[str, FloatArray], rate_hz: float) -> tuple[C
         return (error.contradiction,)
 
 
-def _check_laws(drive: Drive) -> tuple[list[Contradiction], list[Contradiction]]:
-    """Refuse what breaks a law; return notes on the clock of the steering, and on its size."""
+def _check_laws(drive: Drive, model_car: bool) -> tuple[list[Contradiction], list[Contradiction]]:
+    """Refuse what breaks a law; return notes on the clock of the steering, and on sizes."""
     channels = drive.motion.channels
     speed = drive.mean(channels["vx_mps"])
     if np.median(speed) < 0.0:
         raise wrong_sign("vx_mps", "is negative for most of the drive", speed, drive)
     _check_lateral(drive)
     clock = clock_notes(drive.motion)
-    steer = [] if clock else _check_steer(drive)
+    doubtful = [] if clock else check_steering(drive)
     if "vy_mps" in channels:
         _check_sliding(drive)
     # Without the lateral speed nothing tells what a slide takes from the speed.
-    driven = drive if "vy_mps" in channels else _gripping(drive)
+    driven = drive if "vy_mps" in channels else gripping(drive)
     if driven is not None and "ax_mps2" in channels:
         check_longitudinal(driven)
     if driven is not None and "fx_n" in channels:
-        check_force(driven)
-    return clock, steer
+        doubtful += check_force(driven, model_car=model_car)
+    return clock, doubtful
 
 
 def _check_lateral(drive: Drive) -> None:
@@ -175,7 +164,7 @@ def _check_lateral(drive: Drive) -> None:
     spread = [np.inf, *[np.inf] * len(slide), 0.5]
     both = fit(ay, [turn, *slide, ones(drive)], spread)
     alone = cosine(turn, ay)
-    if both.coherence < 0.3 and abs(alone) < 0.6 and max(spread_of(turn), spread_of(ay)) > _CLEARLY:
+    if both.coherence < 0.3 and abs(alone) < 0.6 and max(spread_of(turn), spread_of(ay)) > CLEARLY:
         _refuse_lateral(drive, turn, ay)
     ratio, deviation = float(both.coefficients[0]), float(both.deviations[0])
     if alone < -0.5 and ratio < -3.0 * deviation and both.coherence > 0.3:
@@ -223,99 +212,6 @@ def _refuse_lateral(drive: Drive, turn: FloatArray, ay: FloatArray) -> None:
     )
 
 
-def _check_steer(drive: Drive) -> list[Contradiction]:
-    """Compare the steering angle with the path curvature: the wheelbase that would answer so."""
-    c = drive.motion.channels
-    ay = drive.mean(c["ay_mps2"])
-    speed = np.maximum(np.abs(c["vx_mps"]), 1.0)
-    curvature, steer = drive.mean(c["yaw_rate_radps"] / speed), drive.mean(c["steer_rad"])
-    if size_of(ay) < EXCITED:
-        return []
-    grip = _in_grip(drive)
-    if not _enough(grip):
-        return []
-    gentle = grip & (np.abs(ay) < LINEAR_MPS2)
-    if (
-        np.count_nonzero(gentle) > max(_MIN_WINDOWS, 0.2 * ay.size)
-        and size_of(ay[gentle]) > EXCITED
-    ):
-        rows = gentle
-    else:
-        rows = grip
-    yaw = drive.change(c["yaw_rate_radps"])
-    columns = [curvature[rows], yaw[rows], np.ones(np.count_nonzero(rows))]
-    # On a circle of one radius only a small offset keeps the slope from being anything.
-    offset = max(OFFSET * size_of(steer[rows]), _LEAST_OFFSET_RAD)
-    answer = fit(steer[rows], columns, [np.inf, np.inf, offset])
-    alone = cosine(curvature[rows], steer[rows])
-    if answer.coherence < 0.25 and abs(alone) < 0.45 and spread_of(ay[rows]) > _CLEARLY:
-        raise Implausible(
-            "steer_rad",
-            f"steer_rad: does not turn with yaw_rate_radps and ay_mps2, {drive.place(ay)}; check "
-            f"that the column holds the steering angle, in the order of time",
-        )
-    base, deviation = float(answer.coefficients[0]), float(answer.deviations[0])
-    if base < -3.0 * deviation and alone < -0.5 and answer.coherence > 0.3:
-        text = "moves against both yaw_rate_radps and ay_mps2"
-        raise wrong_sign("steer_rad", text, steer, drive)
-    if base <= 0.0 or answer.coherence < 0.5:
-        return []
-    speed_2 = float(np.median(drive.mean(c["vx_mps"]))) ** 2
-    expected = _WHEELBASE_M + _UNDERSTEER * speed_2
-    spread = math.hypot(_WHEELBASE_STD * _WHEELBASE_M, _UNDERSTEER_STD * speed_2) / expected
-    off = abs(math.log(base / expected)) / math.hypot(spread, deviation / base)
-    if off < _NOT_A_WHEELBASE or 0.2 < base / expected < 5.0:
-        return []
-    ratio = base / expected
-    i = int(np.argmax(np.abs(steer)))
-    told = (
-        f"steer_rad: {steer[i]:.4g} at t = {drive.motion.times_s[drive.rows][i]:.6g} s is "
-        f"{'large' if ratio > 1.0 else 'small'} for the yaw rate: a wheelbase of {base:.3g} m "
-        f"would answer so"
-    )
-    if ratio < 1.0:
-        fits = f"check its unit; factor = {1.0 / ratio:.2g} would make it fit a car of usual size"
-        if base > _MODEL_CAR_M:
-            text = f"{told}; if this is no model car, {fits}"
-            return [Contradiction("steer_rad", text, by_the_car=True)]
-        raise Implausible("steer_rad", f"{told}; {fits}")
-    what = (
-        f"if it is the angle of the steering wheel, put factor = 1 / steering ratio (about "
-        f"{1.0 / ratio:.2g}) in the channel map"
-        if ratio < 32.0
-        else f"if it is in degrees, put factor = {DEG} in the channel map"
-        if ratio < 200.0
-        else f"if it is the angle of the steering wheel in degrees, put factor = {DEG} / steering "
-        f"ratio in the channel map"
-    )
-    raise Implausible("steer_rad", f"{told}; {what}")
-
-
-def _in_grip(drive: Drive) -> np.ndarray:
-    """Windows in which the car does not slide: there the driver may steer against the turn."""
-    c = drive.motion.channels
-    slides = drive.mean(c["ay_mps2"]) - drive.mean(c["vx_mps"] * c["yaw_rate_radps"])
-    grip: np.ndarray = np.abs(slides) < _GRIP_MPS2
-    if "vy_mps" in c:
-        speed = np.maximum(np.abs(drive.mean(c["vx_mps"])), 1.0)
-        grip &= np.abs(drive.mean(c["vy_mps"])) < _GRIP_RAD * speed
-    return grip
-
-
-def _enough(grip: np.ndarray) -> bool:
-    return bool(np.count_nonzero(grip) >= max(_MIN_WINDOWS, _GRIP_SHARE * grip.size))
-
-
-def _gripping(drive: Drive) -> Drive | None:
-    """The windows without a slide; None where they are too few."""
-    grip = _in_grip(drive)
-    if not _enough(grip):
-        return None
-    rows = drive.rows.copy()
-    rows[drive.rows] = grip
-    return Drive(drive.motion, rows)
-
-
 def _check_sliding(drive: Drive) -> None:
     c = drive.motion.channels
     slide = drive.change(c["vy_mps"])
@@ -339,7 +235,7 @@ def _check_sliding(drive: Drive) -> None:
         raise wrong_sign("vy_mps", text, drive.mean(c["vy_mps"]), drive)
     # Of a channel in disorder nothing of the change is left, and it is white.
     lost = found.coherence < 0.1 and ratio + 5.0 * deviation < 0.8 and ratio < 0.3
-    clear = spread_of(expected - found.coefficients[1] * turn) > _CLEARLY
+    clear = spread_of(expected - found.coefficients[1] * turn) > CLEARLY
     if lost and (clear or drive.motion.disorder["vy_mps"] > WHITE):
         raise Implausible(
             "vy_mps",

@@ -136,10 +136,12 @@ def check_lost(
     return notes
 
 
-def check_ranges(columns: Mapping[str, FloatArray], rate_hz: float) -> list[Contradiction]:
+def check_ranges(
+    columns: Mapping[str, FloatArray], rate_hz: float, *, model_car: bool = False
+) -> list[Contradiction]:
     """Refuse a channel that leaves its range for longer than a spike; warn of spikes beyond it.
 
-    Dropouts are taken out of `columns` before.
+    Dropouts are taken out of `columns` before. A `model_car` needs little force.
 
     Raises
     ------
@@ -172,7 +174,7 @@ def check_ranges(columns: Mapping[str, FloatArray], rate_hz: float) -> list[Cont
         if rate_hz > _MIN_RATE_HZ:
             notes += _check_jumps(name, values, limits, time_s)
     if "fx_n" in columns:
-        _check_force(columns)
+        _check_force(columns, model_car)
     return notes
 
 
@@ -206,10 +208,11 @@ def _check_jumps(
     return []
 
 
-def _check_force(columns: Mapping[str, FloatArray]) -> None:
+def _check_force(columns: Mapping[str, FloatArray], model_car: bool) -> None:
     force, speed = filled(columns["fx_n"]), filled(columns["vx_mps"])
     typical, largest = float(np.median(speed)), float(np.abs(force).max())
-    if typical > _DRIVEN_MPS and 0.0 < largest < _LEAST_FORCE_N and np.ptp(force) > 0.0:
+    weak = 0.0 < largest < _LEAST_FORCE_N and np.ptp(force) > 0.0
+    if typical > _DRIVEN_MPS and weak and not model_car:
         raise Implausible(
             "fx_n",
             f"fx_n: is at most {largest:.3g} N over samples 0 to {force.size - 1} at "

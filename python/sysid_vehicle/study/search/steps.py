@@ -78,7 +78,7 @@ def _sound(c: Candidate, rules: Rules) -> bool:
 
     By a value that nothing known beforehand refuses.
     """
-    if c.fit is None or refused(c.effect, c.value):
+    if c.fit is None or refused(c.effect, c.value, c.fit.model):
         return False
     return c.statistic >= rules.price * float(np.log(c.fit.driving.samples))
 
