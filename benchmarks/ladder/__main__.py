@@ -9,8 +9,10 @@ over 5 s (`road`), a causal low-pass of 15 Hz in every sensor (`filtered`), spee
 everything else 10 ms late (`late`), quanta of a bus with every value held for two samples
 (`coarse`), vibration at 12 Hz, and all of them. Printed for each drive: what was claimed with its
 interval, whether that is the truth (`right`: it alone, inside its 95 % interval, beside what the
-rung itself brings about: the wheel force is on time where all else is late), the verdict, and the
-median errors of v_y and yaw rate 2 and 5 s ahead on validation data, before and after.
+rung itself brings about: the wheel force is on time where all else is late; `group`: another effect
+of which the study says that this driving cannot tell it from the truth, inside its 95 % interval
+too), the verdict, and the median errors of v_y and yaw rate 2 and 5 s ahead on validation data,
+before and after.
 `--low-pass` asks, in seconds, only for the delay of the sensors' low-pass that their noise tells,
 beside the true one.
 """
@@ -20,6 +22,7 @@ from __future__ import annotations
 import argparse
 import time
 import warnings
+from collections.abc import Mapping
 
 from rungs import PAIRS, RUNGS, TRUTHS, low_pass_s, present, ride
 
@@ -28,7 +31,9 @@ from sysid_vehicle.identify import Estimate
 from sysid_vehicle.sensors import Conditioning
 
 _NEAR = 0.2  # of the size of what the rung brings about: a lag is not quite a delay
-_HEAD = "rung               seed  right  claimed; verdict; error of v_y, yaw rate ahead, m/s, rad/s"
+_HEAD = (
+    "rung               seed  right   claimed; verdict; error of v_y, yaw rate ahead, m/s, rad/s"
+)
 
 
 def main() -> None:
@@ -48,13 +53,16 @@ def main() -> None:
         _low_passes(args)
         return
     print(_HEAD)
-    total = right = 0
+    outcomes = []
     for rung in _rungs(args):
         for seed in range(args.first, args.first + args.seeds):
-            good, line = _trial(rung, seed, args)
-            total, right = total + 1, right + good
+            outcome, line = _trial(rung, seed, args)
+            outcomes.append(outcome)
             print(line, flush=True)
-    print(f"right in {right} of {total}")
+    print(
+        f"right in {outcomes.count('yes')} of {len(outcomes)}, in the group in "
+        f"{outcomes.count('group')}"
+    )
 
 
 def _rungs(args: argparse.Namespace) -> tuple[str, ...]:
@@ -85,7 +93,7 @@ def _low_passes(args: argparse.Namespace) -> None:
         print(f"{rung:18s}  {len(off):2d} of {args.seeds:2d}  {largest:>8s}  {inside}", flush=True)
 
 
-def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[bool, str]:
+def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[str, str]:
     train, test = _drives(rung, seed, args)
     began = time.process_time()
     head = f"{rung:18s} {seed:4d}"
@@ -100,7 +108,7 @@ def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[bool, str]:
                 sensors=False if args.raw else None,
             )
         except sv.SysidError as error:
-            return False, f"{head}  no     {type(error).__name__}: {error}"
+            return "no", f"{head}  no     {type(error).__name__}: {error}"
         ahead = study.horizons
     effect, values = TRUTHS[args.truth]
     found = [a.id for a in study.added]
@@ -109,13 +117,12 @@ def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[bool, str]:
         for name, size in present(rung).items()
         if name in study.fit.model.free_names and _is(study.fit[name], size)
     }
-    hidden = [e for e in found if e not in brought]
-    good = hidden == ([effect] if effect else [])
-    for name, true in values.items():
-        good = good and abs(study.fit[name].value - true) <= 1.96 * study.fit[name].std
+    outcome = _outcome(study, [e for e in found if e not in brought], effect, values)
     said = ", ".join(
         str(study.fit[n]) for n in study.fit.model.free_names if n.split(".")[0] in found
     )
+    rivals = {r for a in study.added for r in a.confounded_with}
+    said += f" or {', '.join(sorted(rivals))}" if rivals else ""
     errors = "; ".join(
         f"{h:g} s: "
         + ", ".join(
@@ -126,10 +133,38 @@ def _trial(rung: str, seed: int, args: argparse.Namespace) -> tuple[bool, str]:
         for h in (2.0, 5.0)
     )
     took = time.process_time() - began
-    return good, (
-        f"{head}  {'yes' if good else 'no ':4s}  {said or 'nothing'}; {study.verdict}; {errors}; "
-        f"{took:.0f} s"
+    return outcome, (
+        f"{head}  {outcome:5s}  {said or 'nothing'}; {study.verdict}; {errors}; {took:.0f} s"
     )
+
+
+def _outcome(study: sv.Study, hidden: list[str], effect: str, values: Mapping[str, float]) -> str:
+    """Whether the truth is claimed: `yes`, as one of a `group`, or `no`.
+
+    `hidden` is what is claimed beside what the rung itself brings about.
+    """
+    if not effect:
+        return "no" if hidden else "yes"
+    sizes = _sizes(study, effect)
+    inside = len(sizes) == len(values) and all(
+        abs(value - true) <= 1.96 * std
+        for true, (value, std) in zip(values.values(), sizes, strict=True)
+    )
+    if not inside or len(hidden) != 1:
+        return "no"
+    if hidden == [effect]:
+        return "yes"
+    (claimed,) = (a for a in study.added if a.id == hidden[0])
+    return "group" if not claimed.stands_in and effect in claimed.confounded_with else "no"
+
+
+def _sizes(study: sv.Study, effect: str) -> list[tuple[float, float]]:
+    """Values of an effect and their errors: in the model, or as a verdict gives them."""
+    names = [n for n in study.fit.model.free_names if n.split(".")[0] == effect]
+    if names:
+        return [(study.fit[n].value, study.fit[n].std) for n in names]
+    verdict = study.verdicts[effect]
+    return list(zip(verdict.value, verdict.std, strict=True))
 
 
 def _is(found: Estimate, size: float) -> bool:
