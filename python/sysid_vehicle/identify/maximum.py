@@ -345,9 +345,17 @@ def summary(
         information = marginal_information(model, driving, p, noise)
     x = p[box.columns]
     units = {n: parameter.unit for n, parameter in model.parameters.items()}
-    pushes = pushes_of_time(model, driving, p, frozen, box.columns)
     ends = [model.bounds(n) for n in names]
-    estimates, covariance = wald(names, units, x, information, box, ends, descent, pushes)
+
+    def slope(of: Driving) -> FloatArray:
+        if of is driving:
+            return descent
+        other = objective_of(model, of.problem(model), of)
+        return other.normal_equations(p, frozen, box.columns)[1]
+
+    pushes = pushes_of_time(driving, slope)
+    pushed = as_float64(box_covariance(information, box, x) @ pushes)
+    estimates, covariance = wald(names, units, x, information, box, ends, descent, pushed)
     return Fit(
         model.with_values(dict(zip(names, map(float, x), strict=True))),
         noise,
@@ -357,5 +365,5 @@ def summary(
         driving,
         starts,
         converged,
-        pushed=as_float64(box_covariance(information, box, x) @ pushes),
+        pushed=pushed,
     )

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import scipy
@@ -37,7 +37,6 @@ _MISMATCH: Final = 1.3  # of forms that are taken for right
 _DELAY_STD_S: Final = 0.0015  # of a delay that is taken out
 _RAISED: Final = 4.0  # times the power of noise at low frequencies, up to which it comes up
 _DAMPING: Final = (0.5, 0.95)  # Butterworth's is 0.71, Bessel's 0.87; one of 1 may be none in time
-_VIBRATION: Final = "taken out"
 _BAND: Final = 0.45  # of the rate; a corner beyond it is not seen
 
 
@@ -148,6 +147,15 @@ class _Filtered:
         return self.fit.smooth[self.channels.index(channel)]
 
 
+class _Repaired(NamedTuple):
+    """Channels with white noise and in time, what was done to them, and times that are not sure."""
+
+    channels: dict[str, FloatArray]
+    undone: list[str]
+    shaken: list[str]
+    moved: list[Retimed]
+
+
 @dataclass(frozen=True, eq=False)
 class Conditioning:
     """Low-passes of some sensors, and how logs of them are freed of these and of vibration.
@@ -195,17 +203,22 @@ class Conditioning:
             names = ", ".join(name for name, own in self.filters.items() if own is f)
             said.append(f"{names}: {f.sentence}; studies undo it")
         for log in logs:
-            shaken = (t for t in self.apply(log).corrections if t.endswith(_VIBRATION))
+            shaken = self._repaired(log, _channels([log])).shaken
             said += [f"{log.name}, {t}" if len(logs) > 1 else t for t in shaken]
         return said
 
     def put_right(self, log: Log, channels: Sequence[_Channel]) -> Log:
         """The same, where those of its channels are known whose noise is the same at all times."""
-        now: dict[str, FloatArray] = {}
-        what: list[str] = []
+        done = self._repaired(log, channels)
+        if not done.channels:
+            return log
+        return log.corrected(done.channels, (*done.undone, *done.shaken), done.moved)
+
+    def _repaired(self, log: Log, channels: Sequence[_Channel]) -> _Repaired:
         own = {c.name: c for c in channels}
+        done = _Repaired({}, [], [], [])
         # What one filter has made late comes late by the same time.
-        together: dict[float, list[str]] = {}
+        together: dict[int, list[str]] = {}
         for name in filter(log.has, MOVING):
             found, channel = self.filters.get(name), own.get(name)
             known = None if found is None else found.known(name, channel, log)
@@ -214,19 +227,19 @@ class Conditioning:
                 smooth = channel.plain.smooth[0]
                 if found is not None and known is not None:
                     smooth = found.smooth_of(known)
-                factor = _without_vibration(channel, smooth, what)
+                factor = _without_vibration(channel, smooth, done.shaken)
             if found is not None and known is not None:
                 undone = found.undone(known)
                 factor = undone if factor is None else undone * factor
-                what.append(f"{name}: {found.sentence}; undone")
-                together.setdefault(found.fit.delay_std_s, []).append(name)
+                done.undone.append(f"{name}: {found.sentence}; undone")
+                together.setdefault(id(found), []).append(name)
             spectrum = channel if known is None else known
             if factor is not None and spectrum is not None:
-                now[name] = _passed(log[name], spectrum.spectrum, factor)
-        if not now:
-            return log
-        moved = [Retimed(tuple(names), std_s) for std_s, names in together.items()]
-        return log.corrected(now, what, moved)
+                done.channels[name] = _passed(log[name], spectrum.spectrum, factor)
+        for names in together.values():
+            std_s = self.filters[names[0]].fit.delay_std_s
+            done.moved.append(Retimed(tuple(names), std_s))
+        return done
 
 
 def _filters(channels: Sequence[_Channel], logs: Sequence[Log]) -> dict[str, _Filtered]:
@@ -266,7 +279,9 @@ def _filtered(channels: tuple[_Channel, ...]) -> _Filtered | None:
     return _Filtered(channels, fit, fit.response)
 
 
-def _without_vibration(channel: _Channel, smooth: FloatArray, what: list[str]) -> FloatArray | None:
+def _without_vibration(
+    channel: _Channel, smooth: FloatArray, shaken: list[str]
+) -> FloatArray | None:
     """Factor at each frequency that takes vibration out; what is taken out is told."""
     s = channel.spectrum
     noise = NoiseSpectrum(s.rate_hz, s.frequency_hz, s.power, smooth)
@@ -274,7 +289,7 @@ def _without_vibration(channel: _Channel, smooth: FloatArray, what: list[str]) -
     if not lines:
         return None
     shown = ", ".join(f"{f:.3g}" for f in lines)
-    what.append(f"{channel.name}: vibration at {shown} Hz {_VIBRATION}")
+    shaken.append(f"{channel.name}: vibration at {shown} Hz taken out")
     return noise.gain
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import Fit, Log, Model, drive, example_vehicle, identify, load, manoeuvres
+from sysid_vehicle._common.arrays import FloatArray
 from sysid_vehicle.estimate import Driving
+from sysid_vehicle.identify import predicting_ahead
 from sysid_vehicle.identify.intervals.retimed import pushes_of_time
 from sysid_vehicle.log import Retimed
 from sysid_vehicle.sensors.apply import shifted
@@ -52,6 +54,21 @@ def test_a_fit_goes_with_the_time_of_its_readings(model: Model, log: Log, sure: 
     assert fit[stiffness].std > sure[stiffness].std
 
 
+def test_so_does_a_fit_to_predictions(model: Model) -> None:
+    sweep = drive(model, manoeuvres.sine_sweep(), seed=4)
+    unsure = sweep.corrected({}, (), [Retimed(MOTION, STD_S)])
+    fit, without, moved = (
+        predicting_ahead(identify(model, log, starts=1))
+        for log in (unsure, sweep, earlier(sweep, STD_S))
+    )
+    assert [e.value for e in fit.estimates] == [e.value for e in without.estimates]
+    np.testing.assert_allclose(fit.by_noise, without.covariance, rtol=1e-9, atol=1e-12)
+    place = [e.name for e in fit.estimates].index(LENGTH)
+    expected = moved[LENGTH].value - without[LENGTH].value
+    assert abs(expected) > 2.0 * without[LENGTH].std
+    assert fit.pushed[place, 0] == pytest.approx(expected, rel=0.15)
+
+
 def test_times_of_their_own_add_up_as_squares(model: Model, log: Log, sure: Fit) -> None:
     two = [Retimed((c,), STD_S) for c in ("yaw_rate_radps", "ay_mps2")]
     fit = identify(model, log.corrected({}, (), two), starts=1)
@@ -86,7 +103,11 @@ def test_stretches_stay_where_a_moved_speed_crosses_the_least(
     assert moved.stretches == driving.stretches
     p, columns = model.vector(), sure.columns
     gains = driving.problem(model).freeze(p, sure.noise.vector())
-    assert pushes_of_time(model, driving, p, gains, columns).shape == (len(columns), 1)
+
+    def slope(of: Driving) -> FloatArray:
+        return of.problem(model).normal_equations(p, gains, columns)[1]
+
+    assert pushes_of_time(driving, slope).shape == (len(columns), 1)
 
 
 def test_it_stands_in_files(tmp_path: Path, model: Model, log: Log) -> None:

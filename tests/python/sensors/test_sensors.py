@@ -340,12 +340,13 @@ def test_an_effect_is_no_larger_than_kinematics_leaves_it(faulty: sv.SensorCheck
     # A body leans to the outside; bounds of the catalogue hold.
     assert (found[1].parameters[0].lower, found[1].parameters[0].upper) == (0.0, along.upper)
     # A search that ends there wanted more than the sensors allow; one at nothing wanted none.
+    model = sv.Model(sv.example_vehicle())
     assert possible(scale, (0.2, 0.0), (0.02, 0.01))
-    assert not refused(scale, (0.5, 0.0))
-    assert refused(found[0], (along.upper, 0.0))
-    assert refused(found[0], (0.0, across.lower))
-    assert not refused(found[0], (0.02, 0.0))
-    assert not refused(found[1], (0.0, 0.0))
+    assert not refused(scale, (0.5, 0.0), model)
+    assert refused(found[0], (along.upper, 0.0), model)
+    assert refused(found[0], (0.0, across.lower), model)
+    assert not refused(found[0], (0.02, 0.0), model)
+    assert not refused(found[1], (0.0, 0.0), model)
 
 
 def test_a_study_seeks_no_more_than_the_check_leaves(

@@ -25,7 +25,8 @@ from ...estimate import Driving, NoiseModel
 from ...estimate.pieces import DrivingProblem
 from ...model import Model
 from ..fit import Fit
-from ..intervals.estimates import wald
+from ..intervals.estimates import box_covariance, wald
+from ..intervals.retimed import pushes_of_time
 from ..search.box import free_box, free_prior
 from ..search.objective import LinearRows, Penalised
 from ..search.search import Box, minimise
@@ -95,18 +96,28 @@ def predicting_ahead(fit: Fit, horizon_s: float = 2.0) -> Fit:
     for rows in ahead.prior:
         stated = rows(p)[1][:, box.columns]
         information = information + stated.T @ stated
+    information = as_float64(information)
+    # What the driving does not tell, the box holds.
+    told = box_covariance(information, box, p[box.columns]) @ information
+    pushed = as_float64(told @ ahead.pushed(end))
     names = model.free_names
     units = {n: parameter.unit for n, parameter in model.parameters.items()}
     x = p[box.columns]
     estimates, covariance = wald(
-        names, units, x, as_float64(information), box, [model.bounds(n) for n in names]
+        names,
+        units,
+        x,
+        information,
+        box,
+        [model.bounds(n) for n in names],
+        pushed=pushed,
     )
     return replace(
         fit,
         model=model.with_values(dict(zip(names, map(float, x), strict=True))),
         estimates=estimates,
         covariance=covariance,
-        pushed=np.zeros((0, 0)),
+        pushed=pushed,
         log_likelihood=float(ahead.whole.freeze(p, fit.noise.vector()).log_likelihood),
         converged=end.settled,
         profiles=(),
@@ -198,6 +209,26 @@ class _Ahead:
             tolerance=_SETTLED,
         )
         return _End(self.box.put(p, found.x), errors, gains, counted, found.settled)
+
+    def pushed(self, end: _End) -> FloatArray:
+        """What an end moves by where readings were moved in time by one standard error more."""
+        if not any(log.retimed for log in self.fit.driving.logs):
+            return np.empty((len(self.box.columns), 0))
+        curvature = Penalised(end.errors, self.prior).normal_equations(
+            end.p, end.gains, self.box.columns
+        )[2]
+
+        def slope(of: Driving) -> FloatArray:
+            """Downhill; priors are the same whatever was read."""
+            motion = as_float64(
+                of.problem(self.fit.model).smoothed_means(end.p, self.fit.noise.vector())
+            )
+            problems = counting(of, self.fit.model, end.counted, motion, 1.0).problems
+            errors = replace(end.errors, problems=problems)
+            return errors.normal_equations(end.p, end.gains, self.box.columns)[1]
+
+        pushes = pushes_of_time(self.fit.driving, slope)
+        return as_float64(np.linalg.pinv(curvature, hermitian=True) @ pushes)
 
     def trimmed(self, look: _Look) -> float:
         """Mean square of the windows in which the car turns, without those that err most."""

@@ -147,23 +147,20 @@ def wald(
     box: Box,
     bounds: Sequence[tuple[float, float]] | None = None,
     descent: FloatArray | None = None,
-    pushes: FloatArray | None = None,
+    pushed: FloatArray | None = None,
 ) -> tuple[tuple[Estimate, ...], FloatArray]:
     """Estimates with the standard errors of the information matrix, and their covariance.
 
     `bounds` are those of the values, by default of the search: a lag is searched for from next to
     nothing, and may be none. `descent` is the gradient of the log-likelihood at `x`, by which the
-    data press against bounds; columns of `pushes` are what it changes by where something that is no
-    noise, and not sure, is one standard error off. What the data alone do not determine is called
+    data press against bounds; columns of `pushed` are what `x` changes by where something that is
+    no noise, and not sure, is one standard error off. What the data alone do not determine is called
     that, even where it ended at a bound: the bound is not what stopped it. At a bound there is no
     standard error, nor for what they never felt.
     """
     width = box.width
     of_noise = box_covariance(information, box, x)
-    covariance = of_noise
-    if pushes is not None:
-        pushed = of_noise @ pushes
-        covariance = as_float64(of_noise + pushed @ pushed.T)
+    covariance = of_noise if pushed is None else as_float64(of_noise + pushed @ pushed.T)
     std = np.sqrt(np.diag(covariance))
     of_data = std_of_data(information)
     unknown = of_data > _UNKNOWN * width

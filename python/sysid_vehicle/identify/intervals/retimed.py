@@ -12,48 +12,34 @@ sensitivities to the parameters.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
 from ..._common.arrays import FloatArray
 from ...estimate import Driving
 from ...log import Log, Retimed
-from ...model import Model
 
 
-def pushes_of_time(
-    model: Model, driving: Driving, p: FloatArray, gains: Any, columns: list[int]
-) -> FloatArray:
-    """Change of the likelihood's slope for each time that is not sure, by one standard error.
+def pushes_of_time(driving: Driving, slope: Callable[[Driving], FloatArray]) -> FloatArray:
+    """Change of the slope of a criterion for each time that is not sure, by one standard error.
 
     Parameters
     ----------
-    model : Model
     driving : Driving
-    p : array, shape (parameters,)
-        Of the core.
-    gains : frozen gains
-        Of the filter with these parameters.
-    columns : list of int
-        Of the free parameters.
+    slope : callable
+        From this driving, or one of the same stretches whose readings differ, to the slope of the
+        criterion of the fit by its free parameters, shape (n,); downhill.
 
     Returns
     -------
     array, shape (n, times)
-        Its product with the covariance is what the parameters change by.
+        Its product with the inverse of the curvature is what the parameters change by.
     """
     times = dict.fromkeys(moved for log in driving.logs for moved in log.retimed)
-    if not times:
-        return np.empty((len(columns), 0))
-
-    def slope(of: Driving) -> FloatArray:
-        found: FloatArray = of.problem(model).normal_equations(p, gains, columns)[1]
-        return found
-
     here = slope(driving)
     later = [driving.read_otherwise([_moved(log, t) for log in driving.logs]) for t in times]
-    return np.column_stack([slope(d) - here for d in later])
+    return np.array([slope(d) - here for d in later]).reshape(len(later), len(here)).T
 
 
 def _moved(log: Log, by: Retimed) -> Log:
