@@ -154,9 +154,9 @@ def wald(
     `bounds` are those of the values, by default of the search: a lag is searched for from next to
     nothing, and may be none. `descent` is the gradient of the log-likelihood at `x`, by which the
     data press against bounds; columns of `pushed` are what `x` changes by where something that is
-    no noise, and not sure, is one standard error off. What the data alone do not determine is called
-    that, even where it ended at a bound: the bound is not what stopped it. At a bound there is no
-    standard error, nor for what they never felt.
+    no noise, and not sure, is one standard error off. What the data alone do not determine is
+    called that, even where it ended at a bound: the bound is not what stopped it. At a bound there
+    is no standard error, nor for what they never felt.
     """
     width = box.width
     of_noise = box_covariance(information, box, x)
