@@ -258,6 +258,21 @@ class Model:
         return tuple(n for n in self.names if told.get(n, not (known and n == _YAW_INERTIA)))
 
     @property
+    def sought(self) -> tuple[Effect, ...]:
+        """Effects that driving has something to tell of, each with its free parameters alone.
+
+        What is known of the car, with values that are fixed, is not among them.
+        """
+        free = set(self.free_names)
+        return tuple(
+            e
+            if free.issuperset(e.named)
+            else replace(e, parameters=tuple(p for n, p in e.named.items() if n in free))
+            for e in self.parts
+            if not free.isdisjoint(e.named)
+        )
+
+    @property
     def channels(self) -> tuple[str, ...]:
         """Columns that a log must have beside the canonical ones: effects of users read them."""
         return tuple(dict.fromkeys(c for e in self.parts for c in e.channels))

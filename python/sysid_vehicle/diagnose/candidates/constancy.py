@@ -84,7 +84,7 @@ def constancy(fit: Fit, rules: Rules = USUAL) -> dict[str, Constancy]:
         driving that is one short piece tells nothing.
     """
     pieces = _pieces(fit.driving)
-    parts = [_as_felt(e, fit) for e in fit.model.parts if e.scanned is None]
+    parts = [_as_felt(e, fit) for e in fit.model.sought if e.scanned is None]
     parts = [e for e in parts if e.parameters]
     if len(pieces) < 2 or not parts:
         return {}

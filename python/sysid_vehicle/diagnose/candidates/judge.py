@@ -191,7 +191,7 @@ def _all_added(
     """Verdicts on the effects of the final model: names fall that nothing holds up."""
     kept = constancy(final, rules)
     found = []
-    for e in final.model.parts:
+    for e in final.model.sought:
         if e.id not in lacked:
             continue
         verdict, because = _of_added(e, final, groups.get(e.id, ()), rules), ""

@@ -148,7 +148,7 @@ def in_common(
         Of what the model lacked before.
     """
     found = {}
-    parts = {e.id: e for e in fit.model.parts if e.id not in fit.model.nuisances}
+    parts = {e.id: e for e in fit.model.sought if e.id not in fit.model.nuisances}
     for name, part in parts.items():
         for other in parts.keys() & {*part.confounded_with}:
             if {name, other} & {*chosen}:
@@ -344,7 +344,7 @@ def way(fits: Sequence[Fit], ends: float = np.inf) -> list[Fit]:
 
 def insignificant(fit: Fit, rules: Rules = USUAL) -> set[str]:
     """Effects of the model that cannot be told from nothing, by the parameters of each."""
-    sought = (e.id for e in fit.model.parts if e.id not in fit.model.nuisances)
+    sought = (e.id for e in fit.model.sought if e.id not in fit.model.nuisances)
     return {name for name in sought if strength(fit, name) < rules.insignificant}
 
 
