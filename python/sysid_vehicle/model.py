@@ -19,7 +19,7 @@ from .effects import Effect, Parameter, base_parameters, catalogue, effect, in_c
 from .errors import InvalidInput
 from .saved import save
 from .tyre import Tyre
-from .vehicle import Vehicle
+from .vehicle import Vehicle, vehicle_data
 
 NUISANCES = (
     "steer_offset",
@@ -387,22 +387,3 @@ class Model:
         return "\n".join(lines)
 
     _repr_html_ = html_text
-
-
-def vehicle_data(vehicle: Vehicle) -> _core.VehicleData:
-    """What the compiled core knows of the car."""
-    data = _core.VehicleData()
-    for name in (
-        "mass_kg",
-        "lf_m",
-        "lr_m",
-        "cg_height_m",
-        "track_front_m",
-        "track_rear_m",
-        "drag_area_m2",
-        "air_density_kgpm3",
-        "brake_front_share",
-        "drive_front_share",
-    ):
-        setattr(data, name, getattr(vehicle, name))
-    return data

@@ -288,3 +288,22 @@ def _checked_keys(content: Mapping[str, Any], tyres: Any, where: str) -> dict[st
         check_ranges(TYRE_RANGES, table, f"{where}, [tyre.{axle}]")
     check_ranges(_VEHICLE_RANGES, given, where)
     return given
+
+
+def vehicle_data(vehicle: Vehicle) -> _core.VehicleData:
+    """What the compiled core knows of the car."""
+    data = _core.VehicleData()
+    for name in (
+        "mass_kg",
+        "lf_m",
+        "lr_m",
+        "cg_height_m",
+        "track_front_m",
+        "track_rear_m",
+        "drag_area_m2",
+        "air_density_kgpm3",
+        "brake_front_share",
+        "drive_front_share",
+    ):
+        setattr(data, name, getattr(vehicle, name))
+    return data

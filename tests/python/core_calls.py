@@ -9,8 +9,8 @@ import numpy as np
 
 from sysid_vehicle import Model, Vehicle, _core
 from sysid_vehicle.lab import GreyBoxVehicle, Setup
-from sysid_vehicle.model import vehicle_data
 from sysid_vehicle.twin import INPUTS, NOMINAL_SUV, READINGS, TwinCar
+from sysid_vehicle.vehicle import vehicle_data
 
 Arguments = dict[str, Any]
 Call = tuple[Callable[..., Any], Arguments]

@@ -4,6 +4,7 @@ from ..log import MEASURED
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
 from .driving import UNITS, Driving
 from .filters import FilterRun, FilterState, StateFilter, StateModel
+from .input_noise import noisier
 from .late import LateMeasurements
 from .noise import (
     Learned,
@@ -38,6 +39,7 @@ __all__ = [
     "nees_check",
     "nis_check",
     "noise_range",
+    "noisier",
     "promised_by_noise",
     "turning",
     "turning_blocks",

@@ -3,6 +3,7 @@
 from .ahead.ahead import predicting_ahead
 from .fit import Fit
 from .identify import identify, profile_fit
+from .input_noise import lost_to_input_noise, with_exact_inputs
 from .intervals.estimates import Estimate
 from .intervals.posterior import Posterior
 from .intervals.profile import Profile
@@ -43,6 +44,7 @@ __all__ = [
     "free_box",
     "identify",
     "identify_runs",
+    "lost_to_input_noise",
     "objective_of",
     "predict",
     "predicting_ahead",
@@ -55,4 +57,5 @@ __all__ = [
     "relearn",
     "settle",
     "unmoved",
+    "with_exact_inputs",
 ]

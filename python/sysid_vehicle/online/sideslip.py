@@ -12,9 +12,8 @@ from .._common.arrays import FloatArray, as_float64
 from ..errors import InvalidInput, warn
 from ..estimate.inputs import white_noise_std
 from ..log import Log
-from ..model import vehicle_data
 from ..tyre import Tyre
-from ..vehicle import Vehicle
+from ..vehicle import Vehicle, vehicle_data
 from .sideslip_results import SideslipRun
 from .sideslip_settings import NOISE_BLOCK, SideslipSettings
 

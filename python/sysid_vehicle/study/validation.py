@@ -15,7 +15,14 @@ from .._common.threads import in_parallel
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
 from ..estimate import MEASURED, Driving
-from ..identify import Fit, Prediction, driving_of, predict, predicting_ahead
+from ..identify import (
+    Fit,
+    Prediction,
+    driving_of,
+    lost_to_input_noise,
+    predict,
+    predicting_ahead,
+)
 from ..log import Log, several_logs
 from ..rules import ErrorChange, Gain
 from .ahead.along_the_car import along_alone, changes_of
@@ -71,6 +78,14 @@ def gain_in_log_likelihood(
     except (NumericalError, np.linalg.LinAlgError):
         return _NONE
     return _with_error(after.log_density - before.log_density, test)
+
+
+def gain_with_exact_inputs(
+    poorer: Fit, richer: Fit, test: Driving, *, same_noise: bool = False
+) -> float:
+    """What the richer model would gain on validation data whose inputs had no noise [nats]."""
+    gain = gain_in_log_likelihood(poorer, richer, test, same_noise=same_noise).value
+    return gain + lost_to_input_noise(richer, test) - lost_to_input_noise(poorer, test)
 
 
 def foreseen(poorer: Fit, richer: Fit, test: Driving) -> None:

@@ -20,6 +20,7 @@ from sysid_vehicle import (
     manoeuvres,
 )
 from sysid_vehicle.diagnose.candidates.refitting import _rivals, _too_fast
+from sysid_vehicle.identify import with_exact_inputs
 
 Hidden = Callable[[str, float], Fit]
 OFFSET = "steer_offset.offset_rad", 0.002
@@ -45,7 +46,7 @@ def test_its_size_is_that_of_the_refit(found: Diagnosis) -> None:
     estimate = first.fit[OFFSET[0]]
     assert (first.value, first.std) == ((estimate.value,), (estimate.std,))
     assert abs(estimate.value - OFFSET[1]) < 4.0 * estimate.std
-    gain = 2.0 * (first.fit.log_likelihood - found.fit.log_likelihood)
+    gain = 2.0 * (with_exact_inputs(first.fit) - with_exact_inputs(found.fit))
     assert first.statistic == pytest.approx(gain, rel=1e-12)
     # What `compare` prints of the model with it, without it far above.
     assert first.error == compare(first.fit, found.driving).error

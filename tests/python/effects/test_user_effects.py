@@ -225,7 +225,7 @@ def test_a_file_of_effects(tmp_path: Path) -> None:
 
 
 def test_the_core_refuses_formulas_that_read_what_is_not_there() -> None:
-    data = sv.model.vehicle_data(sv.example_vehicle())
+    data = sv.vehicle.vehicle_data(sv.example_vehicle())
     for steps in (
         [],
         [(0, (0, 0, 0), 1.0)] * 257,

@@ -9,7 +9,6 @@ from sysid_vehicle.diagnose import Candidate
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.identify import Estimate, refit
-from sysid_vehicle.rules import Gain
 from sysid_vehicle.study.ahead.horizons import errors_grow, moved_by
 from sysid_vehicle.study.judge import contested
 from sysid_vehicle.study.judge.contested import of_no_use, other_values, spoken_against
@@ -74,9 +73,7 @@ def test_names_are_asked_of_values_and_of_what_is_likelier_in_their_place(
 
     def against(lead: float, gain: float = 1.0) -> dict[str, str]:
         known = {"aero_downforce": InPlace((rival,), (lead,))}
-        monkeypatch.setattr(
-            contested, "gain_in_log_likelihood", lambda *_: Gain(gain, 0.1, gain, 0.1)
-        )
+        monkeypatch.setattr(contested, "gain_with_exact_inputs", lambda *_: gain)
         return spoken_against(bare, fit, ["aero_downforce"], ["aero_downforce"], known, test)
 
     assert against(4.0) == {}

@@ -12,7 +12,7 @@ from ..._common.threads import before
 from ...effects import Effect
 from ...errors import NumericalError
 from ...estimate import Driving
-from ...identify import Fit, refine, refine_above, refit, unmoved
+from ...identify import Fit, refine, refine_above, refit, unmoved, with_exact_inputs
 from .candidate import Candidate
 
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
@@ -105,7 +105,7 @@ def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:
     names = c.effect.named
     return replace(
         c,
-        statistic=2.0 * (found.log_likelihood - fit.log_likelihood),
+        statistic=2.0 * (with_exact_inputs(found) - with_exact_inputs(fit)),
         value=tuple(found[n].value for n in names),
         std=tuple(found[n].std for n in names),
         fit=found,

@@ -27,8 +27,8 @@ import scipy
 
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import HALF_95
+from ...estimate import noisier
 from ...estimate.driving import Span
-from ...estimate.inputs import quiet, white_noise_std
 from ...identify import refine, refit, relearn
 from ..evidence.evidence import Evidence, solve
 from .omnibus import omnibus_of
@@ -195,20 +195,10 @@ def _by_input_noise(
     What `quiet` leaves of it is slow, and to the noise model, which knows white noise only, it
     looks smaller than it is.
     """
-    driving = evidence.driving
-    pull = driving.channel("fx_n" if driving.force_known else "ax_mps2")
-    measured = np.column_stack([driving.channel("steer_rad"), pull])
-    p = evidence.fit.model.vector()
-    parts = [
-        (slice(begin, end), i, u, quiet(u), white_noise_std(u))
-        for begin, end, _ in evidence.driving.spans
-        for i, u in enumerate(measured[begin:end].T)
-    ]
+    driving, p = evidence.driving, evidence.fit.model.vector()
     scores = []
     for _ in range(_DRAWS):
-        noisy = inputs.copy()
-        for where, i, u, quieted, std in parts:
-            noisy[where, i] += quiet(u + std * rng.standard_normal(len(u))) - quieted
+        noisy = noisier(driving, inputs, rng)
         problem = driving.problem(evidence.fit.model, other_inputs=noisy)
         change = evidence.residual - problem.residuals(p, evidence.frozen).ravel()
         scores.append(float(direction @ change))

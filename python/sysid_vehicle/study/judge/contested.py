@@ -21,7 +21,7 @@ from ..ahead.horizons import errors_grow, moved_by
 from ..results.widened import estimates_of
 from ..search.steps import insignificant
 from ..search.together import InPlace
-from ..validation import gain_in_log_likelihood
+from ..validation import gain_with_exact_inputs
 from .disagree import Disagreement, disagreements
 
 
@@ -79,7 +79,7 @@ def spoken_against(
             better = [
                 c.id
                 for c in rivals.better(rules)
-                if c.fit is not None and gain_in_log_likelihood(final, c.fit, test).value > 0.0
+                if c.fit is not None and gain_with_exact_inputs(final, c.fit, test) > 0.0
             ]
             if better:
                 found[effect] = (

@@ -15,7 +15,15 @@ from ...diagnose.candidates.possible import possible_in
 from ...effects import Parameter
 from ...errors import NumericalError
 from ...estimate import Driving
-from ...identify import Estimate, Fit, far_below, refine, refine_beside
+from ...identify import (
+    Estimate,
+    Fit,
+    far_below,
+    lost_to_input_noise,
+    refine,
+    refine_beside,
+    with_exact_inputs,
+)
 from ...rules import USUAL, Measures, Rules, accept, bic, worse
 from ..validation import (
     as_sure,
@@ -24,6 +32,7 @@ from ..validation import (
     fall_in_error,
     foreseen,
     gain_in_log_likelihood,
+    gain_with_exact_inputs,
 )
 
 _ALTERNATIVES = 2  # tried in place of one effect
@@ -61,7 +70,8 @@ def first_that_holds(
         if found is None or lean is None or c.id not in lean.model.effects:
             continue
         first = first or c
-        holding[c.id] = (merit(c.fit) + found.gain.value, c, lean)
+        gain = found.gain.value + lost_to_input_noise(c.fit, test)
+        holding[c.id] = (merit(c.fit) + gain, c, lean)
     if not holding:
         return None
     _, chosen, lean = max(holding.values(), key=lambda h: h[0])
@@ -240,7 +250,7 @@ def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules)
         return without_insignificant(known, rules)
     # As simple as the model without all that is sought, it would need as much to be as good.
     bare = [e for e in fit.estimates if "." not in e.name or _part(e) in model.nuisances]
-    least = merit(fit) - bic(0.0, len(bare), fit.driving.samples)
+    least = _as_searched(fit) - bic(0.0, len(bare), fit.driving.samples)
     try:
         found = refine_beside(model, fit.driving, fit, least)
         if found is None or far_below(found.log_likelihood, least):
@@ -274,8 +284,7 @@ def better(one: Fit, other: Fit, test: Driving, rules: Rules = USUAL) -> bool:
 
 def lead(one: Fit, other: Fit, test: Driving) -> float:
     """Log-likelihood, less the price of the parameters, that one fit is ahead on all driving."""
-    gain = gain_in_log_likelihood(other, one, test, same_noise=True)
-    return merit(one) - merit(other) + gain.value
+    return merit(one) - merit(other) + gain_with_exact_inputs(other, one, test, same_noise=True)
 
 
 def _mattering(fit: Fit) -> int:
@@ -312,7 +321,8 @@ def without_insignificant(fit: Fit, rules: Rules = USUAL) -> Fit:
             return fit
         weakest = min(sorted(weak), key=lambda name: strength(fit, name))
         poorer = fit.model.drop(weakest)
-        least = merit(fit) - rules.apart - bic(0.0, len(poorer.free_names), fit.driving.samples)
+        price = bic(0.0, len(poorer.free_names), fit.driving.samples)
+        least = _as_searched(fit) - rules.apart - price
         without = refine(poorer, fit.driving, fit.noise, least=least)
         if merit(without) + rules.apart < merit(fit):
             kept.add(weakest)
@@ -349,7 +359,12 @@ def insignificant(fit: Fit, rules: Rules = USUAL) -> set[str]:
 
 
 def merit(fit: Fit) -> float:
-    """Log-likelihood less the Bayesian price of the parameters."""
+    """Log-likelihood with exact inputs less the Bayesian price of the parameters."""
+    return bic(with_exact_inputs(fit), len(fit.estimates), fit.driving.samples)
+
+
+def _as_searched(fit: Fit) -> float:
+    """The same with inputs as they were measured, which searches maximise."""
     return bic(fit.log_likelihood, len(fit.estimates), fit.driving.samples)
 
 

@@ -16,7 +16,7 @@ from ...diagnose.candidates.reservation import beside
 from ...effects import Effect
 from ...errors import NumericalError
 from ...estimate import Driving
-from ...identify import Fit, refine_while, refit
+from ...identify import Fit, refine_while, refit, with_exact_inputs
 from ...model import Model
 from ...rules import USUAL, Rules, bic
 from ..ahead.own_share import without
@@ -133,7 +133,7 @@ def _in_place(fit: Fit, name: str, dx: Diagnosis) -> InPlace:
     # An effect that parameters of the poorer model can copy has no score there.
     least = rules.near * by.get(name, 0.0)
     near = [s for s in scores if s.effect.id in alike and by[s.effect.id] > least]
-    gained = 2.0 * (fit.log_likelihood - poorer.log_likelihood)
+    gained = 2.0 * (with_exact_inputs(fit) - with_exact_inputs(poorer))
     rivals, leads = [], []
     for s in sorted(near, key=lambda s: -by[s.effect.id]):
         told = s.statistic, s.p_value, s.value, s.std, s.retained, s.variance_ratio
