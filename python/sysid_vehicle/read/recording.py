@@ -61,7 +61,7 @@ class Recording:
     fetch: Callable[[list[str], list[str]], Mapping[str, Signal]]
 
     def resolve(self, name: str, channel: str) -> str:
-        """Return the full name of what a channel map calls `name`: in full, or its last part.
+        """Return the full name of what a channel map calls `name`: in full, or its last parts.
 
         Raises
         ------
@@ -70,7 +70,7 @@ class Recording:
         """
         if name in self.entries:
             return name
-        found = [full for full in self.entries if last_part(full) == name]
+        found = [full for full in self.entries if _ends_with(full, name)]
         if len(found) == 1:
             return found[0]
         if found:
@@ -181,6 +181,10 @@ class Recording:
 def last_part(name: str) -> str:
     """Return what stands behind the last slash or point of a full name."""
     return name.rpartition("/")[2].rpartition(".")[2]
+
+
+def _ends_with(full: str, name: str) -> bool:
+    return last_part(full) == name or full.endswith((f".{name}", f"/{name}"))
 
 
 def common_rows(

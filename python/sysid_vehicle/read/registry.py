@@ -119,6 +119,7 @@ FORMATS: tuple[Format, ...] = (
         (b"LOGG", b";$FILEVERSION"),
         re.compile(
             rb"\A(\(\d+\.\d+\) +\w+ +[0-9A-Fa-f]+#|date [^\n]*\n\s*base +(hex|dec)"
+            rb"|\s*(\([-\d. :]+\) +)?[a-z]\w* +([RT]X [-BE ]+)?[0-9A-F]{3,8} +\[\d+\] "
             rb"|timestamp,arbitration_id,)"
         ),
         extra="can",
