@@ -71,12 +71,20 @@ FORMATS: tuple[Format, ...] = (
     Format(
         "an Arrow file",
         "arrow",
-        (".arrow", ".feather", ".ipc"),
-        (b"ARROW1",),
+        (".arrow", ".arrows", ".feather", ".ipc"),
+        (b"ARROW1", b"\xff\xff\xff\xff"),
         extra="parquet",
         libraries=("pyarrow",),
     ),
-    Format("a MATLAB file", "matlab", (".mat",), (b"MATLAB 5.0 MAT-file",)),
+    Format(
+        "a MATLAB file",
+        "matlab",
+        (".mat",),
+        (b"MATLAB 5.0 MAT-file",),
+        # Version 4 begins with type, rows, columns, whether complex, length of the name, the name.
+        re.compile(rb"(?s)\A[\0-\x34]\0{3}.{8}[\0\1]\0{3}[\x02-\x40]\0{3}[A-Za-z]\w*\0"),
+    ),
+    Format("a netCDF 3 file", "netcdf", (".nc",), (b"CDF\x01", b"CDF\x02")),
     Format(
         "a MATLAB 7.3 file",
         "hdf5",
@@ -137,7 +145,7 @@ FORMATS: tuple[Format, ...] = (
         "motec",
         (".csv",),
         (),
-        re.compile(rb"\A(\xef\xbb\xbf)?\"?Format\"?[,;] *\"?(MoTeC|AiM) CSV"),
+        re.compile(rb"(?i)\A(\xef\xbb\xbf)?\"?Format\"?[,;\t] *\"?(MoTeC|AiM) CSV"),
     ),
 )
 
