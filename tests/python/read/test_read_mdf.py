@@ -1,5 +1,7 @@
 """What measuring tools put into MDF files beside numbers in seconds, written by asammdf."""
 
+import gc
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -115,3 +117,21 @@ def test_the_unit_of_the_time_counts(tmp_path: Path) -> None:
     path = Path(mdf.save(tmp_path / "run.mf4"))
     mdf.close()
     check_values(read_told(path))
+
+
+def test_a_file_that_breaks_off_is_one_sentence(tmp_path: Path) -> None:
+    """And nothing that the library's half-made object writes when it is deleted."""
+    mdf = asammdf.MDF(version="4.10")
+    mdf.append(others())
+    path = save(mdf, tmp_path / "run.mf4")
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) * 2 // 3])
+    heard: list[Any] = []
+    told, sys.unraisablehook = sys.unraisablehook, heard.append
+    try:
+        with pytest.raises(InvalidInput, match=r"run\.mf4: is an ASAM MDF file, but asammdf canno"):
+            read_log(path, MAP, check=False)
+        gc.collect()
+    finally:
+        sys.unraisablehook = told
+    assert not heard

@@ -7,6 +7,9 @@ of a number, such as "signal not available", is no measurement.
 
 from __future__ import annotations
 
+import gc
+import sys
+import traceback
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -66,11 +69,25 @@ def _check_header(path: Path) -> None:
 def _opened(path: Path, dbc: Path | None) -> Any:
     from asammdf import MDF
 
-    mdf = MDF(path)
+    try:
+        mdf = MDF(path)
+    except Exception as error:
+        _forget(error)
+        raise
     if dbc is None:
         return mdf
     with mdf:
         return mdf.extract_bus_logging({"CAN": [(dbc, 0)]})
+
+
+def _forget(error: Exception) -> None:
+    """Delete the half-made object of a broken file here, where what it writes then is not heard."""
+    told, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        traceback.clear_frames(error.__traceback__)
+        gc.collect()
+    finally:
+        sys.unraisablehook = told
 
 
 def _listed(mdf: Any) -> tuple[dict[str, Entry], dict[str, Place]]:
