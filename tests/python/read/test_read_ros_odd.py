@@ -134,3 +134,28 @@ def test_bags_without_their_description(tmp_path: Path) -> None:
     bag.write_bytes(b"#ROSBAG V2.0\n" + bytes(200))
     with pytest.raises(InvalidInput, match="mend it with rosbag reindex"):
         read_log(bag, MAP)
+
+
+@pytest.mark.parametrize("later_ns", [1_000_000, 10**11])
+def test_two_publishers_of_a_topic(tmp_path: Path, later_ns: int) -> None:
+    """At the same time they are mixed, which is told; one after the other they are one drive."""
+    with (tmp_path / "run.mcap").open("wb") as file:
+        writer = writers.Writer(file)
+        writer.start()
+        schema = writer.register_schema("any", "jsonschema", b"{}")
+        channels = [
+            {t: writer.register_channel(t, "json", schema, {"k": str(k)}) for t in LATE_NS}
+            for k in range(2)
+        ]
+        for k, moved in enumerate((0, later_ns)):
+            for topic, ns, message in messages():
+                message["header"]["stamp"]["sec"] += (ns + moved) // 10**9 - ns // 10**9
+                message["header"]["stamp"]["nanosec"] += k * 5_000_000
+                writer.add_message(
+                    channels[k][topic], ns + moved, json.dumps(message).encode(), ns + moved
+                )
+        writer.finish()
+    with pytest.warns(SysidWarning) as caught:
+        read_log(tmp_path / "run.mcap", MAP, check=False)
+    told = " ".join(str(warning.message) for warning in caught)
+    assert ("/imu: 2 publishers send it at the same time" in told) is (later_ns < 10**9)

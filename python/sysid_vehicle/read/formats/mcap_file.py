@@ -53,7 +53,7 @@ def read(path: Path, dbc: Path | None) -> Recording:
         held = _by_index(path, topics) if indexed is not None else _from_beginning(path, topics)[0]
         for schema, channel, message in held:
             if (decode := decoder(schema, channel)) is not None:
-                yield channel.topic, decode(message.data), message.log_time
+                yield channel.topic, decode(message.data), message.log_time, channel.id
 
     recording = recording_of(firsts.items(), messages)
     if not recording.entries and unread:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from operator import attrgetter, itemgetter
 from typing import Any
 
@@ -19,7 +20,7 @@ _SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nsec", "nsecs")
 _SAME_CLOCK_S = 1.0  # stamps that are farther from the recorder's time are of another clock
 
 Getter = Callable[[Any], Any]
-Taken = tuple[str, Any, int]  # topic, message, time of the recorder [ns]
+Taken = tuple[str, Any, int, int]  # topic, message, time of the recorder [ns], publisher
 
 
 def numbers(message: Any, depth: int = _DEPTH) -> Iterator[tuple[str, Getter]]:
@@ -87,9 +88,12 @@ class Topic:
     stamps: list[int] = field(default_factory=list)
     recorded: list[int] = field(default_factory=list)
     values: dict[str, list[float]] = field(default_factory=dict)
+    publishers: dict[int, tuple[int, int]] = field(default_factory=dict)  # first and last times
 
-    def take(self, message: Any, recorded_ns: int) -> None:
+    def take(self, message: Any, recorded_ns: int, publisher: int) -> None:
         """Take one message."""
+        first, last = self.publishers.get(publisher, (recorded_ns, recorded_ns))
+        self.publishers[publisher] = min(first, recorded_ns), max(last, recorded_ns)
         self.stamps.append(stamp_ns(message))
         self.recorded.append(recorded_ns)
         for path, get in self.getters.items():
@@ -123,8 +127,8 @@ def recording_of(
         for name in names:
             topic, path, get = places[name]
             topics.setdefault(topic, Topic({})).getters[path] = get
-        for topic, message, recorded_ns in messages(list(topics)):
-            topics[topic].take(message, recorded_ns)
+        for topic, message, recorded_ns, publisher in messages(list(topics)):
+            topics[topic].take(message, recorded_ns, publisher)
         return _signals_of(topics, notes)
 
     return Recording({name: Entry("", topic) for name, (topic, _, _) in places.items()}, fetch)
@@ -140,6 +144,12 @@ def _signals_of(topics: dict[str, Topic], notes: list[str]) -> dict[str, Signal]
     """
     times, offsets = {}, {}
     for name, topic in topics.items():
+        spans = sorted(topic.publishers.values())
+        if any(begin < end for (_, end), (begin, _) in pairwise(spans)):
+            notes.append(
+                f"{name}: {len(spans)} publishers send it at the same time, and their messages are "
+                f"mixed; record them under topics of their own"
+            )
         recorded, stamps = np.array(topic.recorded), np.array(topic.stamps)
         stamped = stamps > 0
         if stamped.any() and not stamped.all():

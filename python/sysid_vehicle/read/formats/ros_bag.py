@@ -40,7 +40,8 @@ def read(path: Path, dbc: Path | None) -> Recording:
 
 def _messages(reader: Any, connections: list[Any]) -> Iterator[Taken]:
     for connection, recorded_ns, raw in reader.messages(connections=connections):
-        yield connection.topic, reader.deserialize(raw, connection.msgtype), recorded_ns
+        message = reader.deserialize(raw, connection.msgtype)
+        yield connection.topic, message, recorded_ns, connection.id
 
 
 def _opened(path: Path) -> Any:
