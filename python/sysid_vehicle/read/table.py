@@ -120,7 +120,8 @@ def table_of(data: object) -> Table:
     pairs = [(name, _one_dimensional(raw)) for name, raw in named_columns(data)]
     name, index = _index(data, dict(pairs))
     if index is not None and _is_time(index, name):
-        pairs = [*((n, index) for n in ("time_s", name) if n and n not in dict(pairs)), *pairs]
+        new = [n for n in dict.fromkeys(("time_s", name)) if n and n not in dict(pairs)]
+        pairs = [*((n, index) for n in new), *pairs]
     for name, raw in pairs:
         stamps = as_seconds(raw)
         values = as_floats(raw, name, required=False) if stamps is None else None
