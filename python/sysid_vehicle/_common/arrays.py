@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -71,3 +72,24 @@ def spread_of_known(values: FloatArray, axis: int) -> FloatArray:
     """Standard deviation of what is known, and NaN where nothing is; never with a warning."""
     middle = np.expand_dims(mean_of_known(values, axis), axis)
     return as_float64(np.sqrt(mean_of_known(as_float64((values - middle) ** 2), axis)))
+
+
+def as_array(values: Any) -> np.ndarray:
+    """Return a column as an array; masked values become NaN, ragged ones an array of objects."""
+    if isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "biuf":
+        return np.ma.filled(values.astype(np.float64), np.nan)
+    try:
+        raw = np.asarray(values)
+        if raw.dtype.kind == "O" and hasattr(values, "to_numpy") and _is_nullable(values):
+            return np.asarray(values.to_numpy(dtype=np.float64, na_value=np.nan))
+        return raw
+    except ValueError:
+        ragged = np.empty(len(values), dtype=object)
+        ragged[:] = list(values)
+        return ragged
+
+
+def _is_nullable(values: Any) -> bool:
+    """Whether a pandas series holds numbers beside a mask, which numpy does not know."""
+    kind = getattr(values, "dtype", None)
+    return hasattr(kind, "na_value") and getattr(kind, "kind", "O") in tuple("biuf")

@@ -2,10 +2,11 @@
 
 from .against_car import check_car, times_wheelbase
 from .channels import CHANNELS, MEASURED, Channel
-from .columns import Columns, as_floats, as_seconds, listed, named_columns, seconds_of_stamps
+from .columns import Columns, as_floats, listed, named_columns
 from .held import held_rows
 from .laws.laws import Contradiction
 from .log import Log, Retimed
+from .stamps import as_seconds, seconds_of_stamps
 from .together import check_excitation, several_logs, unexcited
 
 __all__ = [

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 
-from .._common.arrays import FloatArray
+from .._common.arrays import FloatArray, as_array
 from ..errors import InvalidInput, near_names
 from .channels import CHANNELS, REQUIRED
 from .grid import at
+from .stamps import as_seconds
 
 _SHOWN_NAMES = 20
 _LARGEST = 1e12  # in any channel's unit: nothing that a sensor of a car measures
-_STAMP = re.compile(
-    r"(\d{4}-\d\d-\d\d[T ]|\d\d?[./]\d\d?[./]\d{4} )?"
-    r"(\d\d?:\d\d:\d\d(?:[.,]\d+)?) ?(Z|[+-]\d\d:?\d\d)?"
-)
-_DAY_S = 86400.0
-_YEAR_LAST = re.compile(r"(\d\d?)[./](\d\d?)[./](\d{4})T(.*)")
 
 
 class Columns(Protocol):
@@ -165,7 +159,7 @@ def as_floats(values: Any, name: str, required: bool) -> FloatArray | None:
     InvalidInput
         If a `required` column is not one of numbers.
     """
-    raw = _as_array(values)
+    raw = as_array(values)
     try:
         if raw.dtype.kind in "mMcV":  # dates would become nanoseconds, complex numbers lose a part
             raise TypeError
@@ -188,112 +182,3 @@ def as_floats(values: Any, name: str, required: bool) -> FloatArray | None:
             return None
         raise InvalidInput(f"{name}: has shape {array.shape}; give a one-dimensional array")
     return array
-
-
-def _as_array(values: Any) -> np.ndarray:
-    """Return a column as an array; masked values become NaN, ragged ones an array of objects."""
-    if isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "biuf":
-        return np.ma.filled(values.astype(np.float64), np.nan)
-    try:
-        raw = np.asarray(values)
-        if raw.dtype.kind == "O" and hasattr(values, "to_numpy") and _is_nullable(values):
-            return np.asarray(values.to_numpy(dtype=np.float64, na_value=np.nan))
-        return raw
-    except ValueError:
-        ragged = np.empty(len(values), dtype=object)
-        ragged[:] = list(values)
-        return ragged
-
-
-def _is_nullable(values: Any) -> bool:
-    """Whether a pandas series holds numbers beside a mask, which numpy does not know."""
-    kind = getattr(values, "dtype", None)
-    return hasattr(kind, "na_value") and getattr(kind, "kind", "O") in tuple("biuf")
-
-
-def as_seconds(values: Any) -> FloatArray | None:
-    """Return time stamps (datetime64, pandas, ISO 8601 text) as seconds since the first.
-
-    None if `values` are no time stamps.
-    """
-    raw = _as_array(values)
-    if raw.ndim != 1 or raw.size == 0:
-        return None
-    if raw.dtype.kind == "M":
-        return _seconds(raw - raw[0])
-    if raw.dtype.kind == "m":
-        return _seconds(raw)
-    if raw.dtype.kind in "US" or (raw.dtype.kind == "O" and isinstance(raw[0], str)):
-        return seconds_of_stamps([str(value) for value in raw])
-    if raw.dtype.kind == "O" and hasattr(raw[0], "tzinfo"):  # datetime, pandas.Timestamp
-        try:
-            return np.array([(value - raw[0]).total_seconds() for value in raw], dtype=np.float64)
-        except (TypeError, AttributeError):
-            return None
-    return None
-
-
-def _seconds(span: np.ndarray) -> FloatArray:
-    """Return timedelta64 as seconds; ``NaT`` becomes NaN."""
-    seconds: FloatArray = span / np.timedelta64(1, "s")
-    return seconds
-
-
-def seconds_of_stamps(cells: Sequence[str]) -> FloatArray | None:
-    """Return ISO 8601 dates with time, or times of day, as seconds since the first; else None.
-
-    Of dates with the year last, ``05/03/2026``, the order of day and month is the one in which
-    less time passes. Times of day are counted on where the day ends.
-
-    Parameters
-    ----------
-    cells : sequence of str
-        One stamp per sample, all with the same offset from UTC; empty ones become NaN.
-    """
-    stamps, zones, dated = [], set(), set()
-    for cell in cells:
-        if not cell.strip():
-            stamps.append("NaT")
-            continue
-        match = _STAMP.fullmatch(cell.strip())
-        if match is None:
-            return None
-        day, clock, zone = match.groups()
-        zones.add(zone)
-        dated.add(day is None)
-        clock = clock.replace(",", ".").zfill(len(clock) + (clock[1] == ":"))
-        stamps.append((day or "1970-01-01T").replace(" ", "T") + clock)
-    if len(zones) != 1 or len(dated) != 1:
-        return None
-    read = [_times(stamps, day_at) for day_at in (0, 1)]
-    known = [times for times in read if times is not None]
-    if dated == {True}:
-        known = [_counted_on(times) for times in known]
-    return min(known, key=lambda times: float(np.nanmax(times) - np.nanmin(times)), default=None)
-
-
-def _counted_on(seconds: FloatArray) -> FloatArray:
-    """Add a day after each midnight."""
-    result = seconds.copy()
-    there = np.flatnonzero(np.isfinite(seconds))
-    ends = np.diff(seconds[there]) < -0.5 * _DAY_S
-    result[there[1:]] += _DAY_S * np.cumsum(ends)
-    return result
-
-
-def _times(stamps: Sequence[str], day_at: int) -> FloatArray | None:
-    """Seconds since the first stamp, `day_at` the place of the day in dates with the year last."""
-
-    def iso(stamp: str) -> str:
-        parts = _YEAR_LAST.fullmatch(stamp)
-        if parts is None:
-            return stamp
-        day, month = parts[1 + day_at].zfill(2), parts[2 - day_at].zfill(2)
-        return f"{parts[3]}-{month}-{day}T{parts[4]}"
-
-    try:
-        times = np.array([iso(stamp) for stamp in stamps], dtype="datetime64[ns]")
-    except ValueError:
-        return None
-    known = times[~np.isnat(times)]
-    return _seconds(times - known[0]) if known.size else None

@@ -16,6 +16,7 @@ _LONGEST_S = 1e18  # nanoseconds of thirty years: time beyond is broken
 _SECONDS_BELOW = 1.0
 # Steps below these look like that unit: a rate from 2.5 Hz to 2.5 kHz.
 _FINER = ((400.0, "milli", "0.001"), (4e5, "micro", "1e-6"), (np.inf, "nano", "1e-9"))
+_SHORTEST_S = 1e-5  # no car is logged at 100 kHz: 0.5 s is more than that in days
 _MIN_STEP = 1e-6  # of the usual step: below, two rows are one that was written twice
 _OWN_GAP = 1.5  # a channel is interpolated between samples that are no farther apart, in periods
 _BEATS = 5  # longer steps, evenly spaced, that show a step of no whole number of decimals
@@ -48,9 +49,15 @@ def check_time(time_s: FloatArray) -> None:
     if wrong.size:
         i = int(wrong[0]) + 1
         if step[i - 1] == 0.0:
+            repeats = int(np.count_nonzero(step == 0.0))
+            often = f" ({repeats} such samples)" if repeats > 1 else ""
+            rounded = (
+                ", or, where the times are rounded, number the rows in the channel map: "
+                "time_s = { rate_hz = 100 }, with the rate of the log"
+            )
             raise InvalidInput(
-                f"time_s: repeats at {at(i, time_s)}, equal to sample {i - 1}; "
-                f"delete one of the two rows"
+                f"time_s: repeats at {at(i, time_s)}, equal to sample {i - 1}{often}; "
+                f"delete one of the two rows{rounded if repeats > 1 else ''}"
             )
         raise InvalidInput(
             f"time_s: goes back at {at(i, time_s)} after {time_s[i - 1]:.6g} s; sort the rows, "
@@ -68,6 +75,12 @@ def check_time(time_s: FloatArray) -> None:
         raise InvalidInput(
             f"time_s: steps of {typical:.4g} from sample 0 (t = {time_s[0]:.6g}) on look like "
             f"{unit}seconds; put factor = {factor} in the channel map"
+        )
+    if step.size and typical < _SHORTEST_S:
+        raise InvalidInput(
+            f"time_s: steps of {typical:.4g} from sample 0 (t = {time_s[0]:.6g}) on look like "
+            f"days, as spreadsheets count them, or hours; put factor = 86400 or 3600 in the "
+            f"channel map"
         )
     if step.size and float(step.min()) < _MIN_STEP * typical:
         i = int(np.argmin(step)) + 1

@@ -55,13 +55,17 @@ class Recording:
         By full name, such as ``/imu/data/angular_velocity/z`` or ``Motion.YawRate``.
     fetch : callable
         Gives the signals of some full names, and may tell what it noticed.
+    clocked : callable, optional
+        Where a time is an array like any other: gives the same channels, of which those that are as
+        long as the array called so have it for their time, or, with a rate [Hz], are sampled so.
     """
 
     entries: Mapping[str, Entry]
     fetch: Callable[[list[str], list[str]], Mapping[str, Signal]]
+    clocked: Callable[[str, float | None], Recording] | None = None
 
     def resolve(self, name: str, channel: str) -> str:
-        """Return the full name of what a channel map calls `name`: in full, or its last part.
+        """Return the full name of what a channel map calls `name`: in full, or its last parts.
 
         Raises
         ------
@@ -70,7 +74,7 @@ class Recording:
         """
         if name in self.entries:
             return name
-        found = [full for full in self.entries if last_part(full) == name]
+        found = [full for full in self.entries if ends_with(full, name)]
         if len(found) == 1:
             return found[0]
         if found:
@@ -181,6 +185,11 @@ class Recording:
 def last_part(name: str) -> str:
     """Return what stands behind the last slash or point of a full name."""
     return name.rpartition("/")[2].rpartition(".")[2]
+
+
+def ends_with(full: str, name: str) -> bool:
+    """Tell whether a full name ends with some parts of a name, such as ``Message.Signal``."""
+    return last_part(full) == name or full.endswith((f".{name}", f"/{name}"))
 
 
 def common_rows(

@@ -45,6 +45,8 @@ class Format:
         Extra of the package that brings the libraries; empty if none is needed.
     libraries : tuple of str
         Modules that have to be there.
+    mend : str
+        What to do with a broken one.
     """
 
     what: str
@@ -54,6 +56,7 @@ class Format:
     pattern: re.Pattern[bytes] | None = None
     extra: str = ""
     libraries: tuple[str, ...] = ()
+    mend: str = "record or export it again"
 
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -71,12 +74,20 @@ FORMATS: tuple[Format, ...] = (
     Format(
         "an Arrow file",
         "arrow",
-        (".arrow", ".feather", ".ipc"),
-        (b"ARROW1",),
+        (".arrow", ".arrows", ".feather", ".ipc"),
+        (b"ARROW1", b"\xff\xff\xff\xff"),
         extra="parquet",
         libraries=("pyarrow",),
     ),
-    Format("a MATLAB file", "matlab", (".mat",), (b"MATLAB 5.0 MAT-file",)),
+    Format(
+        "a MATLAB file",
+        "matlab",
+        (".mat",),
+        (b"MATLAB 5.0 MAT-file",),
+        # Version 4 begins with type, rows, columns, whether complex, length of the name, the name.
+        re.compile(rb"(?s)\A[\0-\x34]\0{3}.{8}[\0\1]\0{3}[\x02-\x40]\0{3}[A-Za-z]\w*\0"),
+    ),
+    Format("a netCDF 3 file", "netcdf", (".nc",), (b"CDF\x01", b"CDF\x02")),
     Format(
         "a MATLAB 7.3 file",
         "hdf5",
@@ -103,6 +114,7 @@ FORMATS: tuple[Format, ...] = (
         (b"\x89MCAP0\r\n",),
         extra="mcap",
         libraries=("mcap", "mcap_ros2"),
+        mend="mend it with mcap recover, or record it again",
     ),
     Format(
         "a ROS bag",
@@ -111,6 +123,7 @@ FORMATS: tuple[Format, ...] = (
         (b"#ROSBAG V", b"SQLite format 3"),
         extra="ros",
         libraries=("rosbags",),
+        mend="mend it with rosbag reindex or ros2 bag reindex, or record it again",
     ),
     Format(
         "a CAN log",
@@ -119,6 +132,7 @@ FORMATS: tuple[Format, ...] = (
         (b"LOGG", b";$FILEVERSION"),
         re.compile(
             rb"\A(\(\d+\.\d+\) +\w+ +[0-9A-Fa-f]+#|date [^\n]*\n\s*base +(hex|dec)"
+            rb"|\s*(\([-\d. :]+\) +)?[a-z]\w* +([RT]X [-BE ]+)?[0-9A-F]{3,8} +\[\d+\] "
             rb"|timestamp,arbitration_id,)"
         ),
         extra="can",
@@ -136,7 +150,7 @@ FORMATS: tuple[Format, ...] = (
         "motec",
         (".csv",),
         (),
-        re.compile(rb"\A(\xef\xbb\xbf)?\"?Format\"?[,;] *\"?(MoTeC|AiM) CSV"),
+        re.compile(rb"(?i)\A(\xef\xbb\xbf)?\"?Format\"?[,;\t] *\"?(MoTeC|AiM) CSV"),
     ),
 )
 
@@ -150,9 +164,12 @@ def recognised(path: Path) -> Format | None:
         If the file cannot be read.
     """
     if path.is_dir():
-        return next(
-            (f for f in FORMATS if "/" in f.suffixes and (path / "metadata.yaml").exists()), None
-        )
+        if not (path / "metadata.yaml").exists():
+            raise InvalidInput(
+                f"{path}: is a folder without metadata.yaml, so no ROS 2 bag; give one file in it, "
+                f"or make that with ros2 bag reindex"
+            )
+        return next(f for f in FORMATS if "/" in f.suffixes)
     begin = read_bytes(path, _BEGINNING)
     for entry in FORMATS:
         if any(begin.startswith(signature) for signature in entry.signatures):
@@ -187,8 +204,7 @@ def blamed(entry: Format | None, path: object) -> Iterator[None]:
             raise
         reader = f"{entry.libraries[0]} cannot read it" if entry.libraries else "it is broken"
         raise InvalidInput(
-            f"{path}: is {entry.what}, but {reader} ({type(error).__name__}: {error}); record or "
-            f"export it again"
+            f"{path}: is {entry.what}, but {reader} ({type(error).__name__}: {error}); {entry.mend}"
         ) from error
 
 

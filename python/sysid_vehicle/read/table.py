@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +16,8 @@ from .._common.arrays import FloatArray
 from ..errors import InvalidInput
 from ..log import as_floats, as_seconds, named_columns
 from .units import unit_in_name
+
+_SEPARATED = re.compile(r"[+-]?\d+([.,'\s]\d{3})*([.,]\d+)?")  # no number to a computer
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,12 @@ class Table:
         """How many columns have a name."""
         return Counter(self.names)
 
+    def renamed(self, name: str, to: str) -> Table:
+        """Return the table with another name for one column of numbers."""
+        names = tuple(to if n == name else n for n in self.names)
+        columns = {to if n == name else n: values for n, values in self.columns.items()}
+        return replace(self, names=names, columns=columns)
+
     def unit(self, name: str, si_unit: str) -> str:
         """Return the unit that the file states for a column of some quantity; empty if none."""
         return self.units.get(name) or unit_in_name(name, si_unit)
@@ -84,18 +93,21 @@ class Table:
                 f"{name}: {self.counts[name]} columns have this name; rename or delete one"
             )
         if name in self.not_numbers:
-            raise InvalidInput(
-                f"{name}: {self.not_numbers[name]} is not a number; correct the cell, or empty it "
-                f"for a missing measurement"
-            )
+            bad = self.not_numbers[name]
+            remedy = "correct the cell, or empty it for a missing measurement"
+            if _SEPARATED.fullmatch(bad.text):
+                remedy = "export it with decimal points and without separators of thousands"
+            raise InvalidInput(f"{name}: {bad} is not a number; {remedy}")
         return self.columns[name]
 
 
 def table_of(data: object) -> Table:
     """Return the columns of a mapping of arrays or of a table in memory (pandas, polars, Arrow).
 
-    An index of times becomes the column ``time_s`` where there is none. Units are taken from the
-    metadata of Arrow's fields, and from ``attrs`` of pandas' columns.
+    An index of times becomes the column ``time_s`` where there is none, and keeps its own name
+    beside it; so does one that pandas wrote into Arrow or Parquet. An array of one column or one
+    row counts as a column. Units are taken from the metadata of Arrow's fields, and from ``attrs``
+    of pandas' columns.
 
     Raises
     ------
@@ -105,10 +117,11 @@ def table_of(data: object) -> Table:
     columns: dict[str, FloatArray] = {}
     not_numbers: dict[str, BadCell] = {}
     seconds: dict[str, FloatArray] = {}
-    pairs = named_columns(data)
-    index = getattr(data, "index", None)
-    if index is not None and "time_s" not in dict(pairs) and _is_time(index):
-        pairs = [("time_s", index), *pairs]
+    pairs = [(name, _one_dimensional(raw)) for name, raw in named_columns(data)]
+    name, index = _index(data, dict(pairs))
+    if index is not None and _is_time(index, name):
+        new = [n for n in dict.fromkeys(("time_s", name)) if n and n not in dict(pairs)]
+        pairs = [*((n, index) for n in new), *pairs]
     for name, raw in pairs:
         stamps = as_seconds(raw)
         values = as_floats(raw, name, required=False) if stamps is None else None
@@ -126,10 +139,30 @@ def table_of(data: object) -> Table:
     return Table(names, columns, not_numbers, n, _stated_units(data, pairs), seconds)
 
 
-def _is_time(index: Any) -> bool:
+def _one_dimensional(raw: Any) -> Any:
+    """Return an array with one dimension longer than 1 as one of a single dimension."""
+    if isinstance(raw, np.ndarray) and raw.ndim > 1 and raw.size == max(raw.shape) > 1:
+        return raw.ravel()
+    return raw
+
+
+def _index(data: object, columns: Mapping[str, Any]) -> tuple[str, Any]:
+    """Name and values of the index of a frame, or of the one that pandas left in Arrow's schema."""
+    index = getattr(data, "index", None)
+    if index is not None and not callable(index):
+        own = getattr(index, "name", None)
+        return ("" if own is None else str(own)), index
+    told = getattr(getattr(data, "schema", None), "pandas_metadata", None) or {}
+    names = [name for name in told.get("index_columns", ()) if isinstance(name, str)]
+    if len(names) != 1 or names[0] not in columns:
+        return "", None
+    return names[0], np.asarray(columns[names[0]])
+
+
+def _is_time(index: Any, name: str) -> bool:
     """Tell whether the index of a frame is one of stamps or durations, or says that it is time."""
     kind = getattr(getattr(index, "dtype", None), "kind", "O")
-    named = str(getattr(index, "name", "")).lower() in ("time", "time_s", "timestamps", "t")
+    named = name.lower() in ("time", "time_s", "timestamps", "t")
     return kind in tuple("mM") or (named and kind in tuple("iuf"))
 
 

@@ -1,6 +1,7 @@
 """Units that a file states: what they measure, and their factors to the units of the channels.
 
-One table is all that converts; a unit that it does not have is never guessed.
+One table is all that converts; a unit that it does not have is never guessed. Names that begin with
+``unit_`` are those of Volkswagen's databases of CAN frames.
 """
 
 from __future__ import annotations
@@ -22,10 +23,13 @@ FACTORS: dict[str, dict[str, float]] = {
         **dict.fromkeys(("ns", "nanosecond", "nanoseconds"), 1e-9),
         **dict.fromkeys(("min", "minutes"), 60.0),
         **dict.fromkeys(("h", "hr", "hours"), 3600.0),
+        **dict.fromkeys(("d", "day", "days"), 86400.0),
     },
     "m/s": {
         **dict.fromkeys(("m/s", "mps", "ms-1", "m/sec"), 1.0),
-        **dict.fromkeys(("km/h", "kmh", "kph", "kmph", "km/hr"), 1.0 / 3.6),
+        **dict.fromkeys(
+            ("km/h", "kmh", "kph", "kmph", "km/hr", "unit_kilometerperhour"), 1.0 / 3.6
+        ),
         **dict.fromkeys(("mph", "mi/h", "miles/h"), 0.44704),
         "mm/s": 1e-3,
         "cm/s": 1e-2,
@@ -37,11 +41,14 @@ FACTORS: dict[str, dict[str, float]] = {
         **dict.fromkeys(
             ("deg/s", "degps", "dps", "°/s", "deg/sec", "degree/s", "degrees/s", "degs-1"), _DEG
         ),
+        **dict.fromkeys(("°/sec", "degree/sec", "degrees/sec", "grad/s", "degrees-1"), _DEG),
+        "unit_degreofarcpersecon": _DEG,
         "mrad/s": 1e-3,
         **dict.fromkeys(("rpm", "1/min", "r/min", "rev/min", "min-1"), math.pi / 30.0),
     },
     "m/s2": {
         **dict.fromkeys(("m/s2", "mps2", "m/s/s", "m/ss", "ms2", "m/sec2"), 1.0),
+        "unit_meterperseconsquar": 1.0,
         **dict.fromkeys(("g", "gn", "gee"), GRAVITY_MPS2),
         "mg": 1e-3 * GRAVITY_MPS2,
         **dict.fromkeys(("km/h/s", "kmh/s"), 1.0 / 3.6),
@@ -52,8 +59,11 @@ FACTORS: dict[str, dict[str, float]] = {
     "rad": {
         **dict.fromkeys(("rad", "radian", "radians"), 1.0),
         "mrad": 1e-3,
-        **dict.fromkeys(("deg", "°", "degree", "degrees", "grad°"), _DEG),
-        **dict.fromkeys(("gon", "grad"), math.pi / 200.0),
+        # "Grad" is degree in German, which loggers use; no log of a car has angles in gon.
+        **dict.fromkeys(
+            ("deg", "°", "degree", "degrees", "grad°", "grad", "unit_degreofarc"), _DEG
+        ),
+        "gon": math.pi / 200.0,
         **dict.fromkeys(("arcmin", "'"), _DEG / 60.0),
         **dict.fromkeys(("rev", "revs", "turn", "turns"), 2.0 * math.pi),
     },
@@ -103,11 +113,16 @@ _QUOTIENT = re.compile(r"^(.*[^\W_])[\s_.]+([A-Za-z]+)[\s_]([A-Za-z]+2?)$")
 # Units that are words of other meanings in names.
 _WORDS = {"turn", "turns", "rev", "revs", "min", "h", "grad"}
 _AT_END = re.compile(r"[\[({]([^\[\](){}]+)[\])}]\s*$")
-_NONE = {"", "-", "1", "none", "n/a", "na", "[]", "unitless", "no_unit", "nounit"}
+_NONE = {"", "-", "1", "none", "null", "n/a", "na", "[]", "unitless", "no_unit", "nounit"}
 
 
 def plain(text: str) -> str:
-    """Return a unit as it is looked up: without brackets, spaces, powers written in other ways."""
+    """Return a unit as it is looked up: without brackets, spaces, powers written in other ways.
+
+    UTF-8 that was read as Latin-1 is mended. Times ``since`` a date, as in netCDF, have the unit
+    before that word.
+    """
+    text = text.replace("Â°", "°").replace("Â²", "²").partition(" since ")[0]
     text = text.strip().strip("[](){}").replace(" ", "").replace("²", "2").replace("^", "")
     text = text.replace("**", "").replace("*", "").replace("·", "").replace("s-2", "s2").lower()
     return {"m/s-2": "m/s2", "ms2": "m/s2"}.get(text, text)

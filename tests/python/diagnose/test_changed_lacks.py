@@ -50,30 +50,6 @@ def test_a_lack_of_the_reference_is_no_change(truth: Model, start: Model) -> Non
     assert changed.among - nothing.among < 5.0
 
 
-def said(found: float) -> Any:
-    """Of a driving whose changes explain so many nats; downforce in both the same explains 616."""
-    aero = SimpleNamespace(put=(DOWNFORCE,), log_likelihood=626.0, reached=10.0)
-    nothing = SimpleNamespace(put=(), reached=0.0)
-    said = cast(Any, Saying.__new__(Saying))
-    said.search = SimpleNamespace(
-        visited={frozenset(): nothing, frozenset({DOWNFORCE}): aero},
-        reference=SimpleNamespace(effects=(effect("steer_lag"), effect(DOWNFORCE))),
-    )
-    said.told = SimpleNamespace(ratio_of=lambda _: 2.0, price=lambda *_: 14.0)
-    said.state = SimpleNamespace(among=found)
-    return said
-
-
-def test_what_is_lacked_explains_more_than_what_seems_to_have_changed() -> None:
-    lack = said(47.0).lack()
-    assert lack is not None
-    assert lack.id == DOWNFORCE
-    assert said(700.0).lack() is None
-    little = said(5.0)
-    little.search.visited[frozenset({DOWNFORCE})].log_likelihood = 30.0
-    assert little.lack() is None  # no more than its price
-
-
 @pytest.mark.parametrize("calm", [False, True])
 def test_it_is_put_into_the_model_of_the_reference(
     truth: Model, start: Model, monkeypatch: pytest.MonkeyPatch, calm: bool

@@ -59,6 +59,14 @@ def test_a_stiffness_that_would_be_seen_is_seen(truth: Model, before: Fit, offse
         assert ("tyre_front" in {e.id for e in change.named}) is named
 
 
+def test_more_than_all_of_a_stiffness_is_printed_as_a_number(offset: Change) -> None:
+    """It was 1.5e+02 %."""
+    tyre = replace(offset["tyre_front"], least_stiffness=1.517, said="not testable")
+    text = str(replace(offset, effects=(offset.effects[0], tyre)))
+    assert "cornering stiffness of the front axle below 152 %" in text
+    assert "its cornering stiffness is seen to change from 152 % on" in text
+
+
 def test_a_change_prints_and_is_kept(offset: Change, tmp_path: Path) -> None:
     text = str(offset)
     assert text.startswith("changed: steer_offset: offset_rad +0.00")

@@ -35,7 +35,8 @@ class Change(Printed):
     effects : tuple of EffectChange
         What is named first, then by probability.
     nothing : float
-        Probability that nothing changed, by what was fitted.
+        Probability that nothing changed, by what was fitted; in other driving likelihoods count as
+        much less as intervals are wider.
     alike : Alike
         How like the reference the later driving is; where it is not, intervals are as much wider
         as estimates differ between pieces of the reference.
@@ -157,7 +158,7 @@ class Change(Printed):
         for what, (effect, of) in sizes.items():
             if effect in known:
                 least = np.atleast_1d(getattr(known[effect], of))[0]
-                below = f"below {number(100.0 * least, 2)} %"
+                below = f"below {number(100.0 * least, 2 if least < 1.0 else 3)} %"
                 told.append(f"{what} {below if np.isfinite(least) else 'of any size'}")
         return f"changes that would not be seen: {', '.join(told)}" if told else ""
 

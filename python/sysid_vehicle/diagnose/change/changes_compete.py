@@ -175,6 +175,7 @@ class Competition:
         turned = self._turns @ np.hstack([along, np.eye(n)])
         off = self._turns @ np.hstack([sizes, sizes])
         ratios, wide = self._differences.ratios(turned, off, self._turns @ told)
+        self._wide = wide
         for m in self._may:
             own = list(self._whole[m.id].columns)
             for name, c in zip(m.names, own, strict=True):
@@ -288,6 +289,11 @@ class Competition:
         """Long-run over naive variance of the scores of some changes, the largest."""
         columns = [c for name in put for c in self._whole[name].columns]
         return float(self._ratio[columns].max(initial=1.0))
+
+    def width_of(self, put: Sequence[str]) -> float:
+        """As `ratio_of`, with what pieces of both drivings differ by, as in standard errors."""
+        columns = [c for name in put for c in self._whole[name].columns]
+        return max(self.ratio_of(put), float(self._wide[columns].max(initial=1.0)))
 
     def price(self, put: Sequence[str], changed_by: Mapping[str, float]) -> float:
         """Of some changes, by how much they are told better than their priors do [nats].

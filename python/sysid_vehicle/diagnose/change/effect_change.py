@@ -120,7 +120,7 @@ class EffectChange:
         if self.least_stiffness is not None:
             if not np.isfinite(self.least_stiffness):
                 return "no cornering stiffness would be seen to change"
-            least = number(100.0 * self.least_stiffness, 2)
+            least = number(100.0 * self.least_stiffness, 2 if self.least_stiffness < 1.0 else 3)
             return f"its cornering stiffness is seen to change from {least} % on"
         seen = [
             f"{n} {number(least, 2)}{unit_after(u)}"

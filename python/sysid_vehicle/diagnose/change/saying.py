@@ -101,10 +101,13 @@ class Saying:
         stds[name] = max(stds[name], abs(sizes[name]) / float(np.sqrt(max(rises, 1.0))))
 
     def _nothing(self) -> float:
-        """Probability that nothing changed, beside all that was fitted."""
+        """Probability that nothing changed, beside all that was fitted.
+
+        Likelihoods count as much less as intervals are wider by what a model lacks elsewhere.
+        """
         search, told = self.search, self.told
         odds = [
-            search.over_nothing(s, told, told.ratio_of(s.put))
+            search.over_nothing(s, told, told.width_of(s.put))
             for s in search.visited.values()
             if s.put
         ]

@@ -4,28 +4,36 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from ..._common.arrays import FloatArray
 from ...errors import InvalidInput
 from ...log import seconds_of_stamps
 from ..table import BadCell, Table
 from ..units import is_unit
 from .text import read_text_table
 
+_DELIMITERS = ",;\t|"
+_NUMBER_WITH = r"(?:^|[{0}\n])\s*\"?([+-]?\d*{1}\d+(?:[eE][+-]?\d+)?)\"?\s*(?=[{0}\n]|$)"
+# What programs write for a measurement that is missing: R, SQL, spreadsheets, Windows, loggers.
+_MISSING = {"na", "n/a", "#n/a", "#na", "#nv", "null", "none", "nil", "-", "--", "---",
+            "1.#qnan", "-1.#ind", "1.#ind"}  # fmt: skip
 _LAST_ROWS = 20  # that tell how many cells a row has
 _FEWEST_CELLS = 3
 _LONGEST_PREAMBLE = 100
 
 
 def read_table(path: str | Path) -> Table:
-    """Read a CSV file whose first line names the columns (comma, semicolon or tab between).
+    """Read a CSV file whose first line names the columns.
 
-    Lines that begin with ``#`` are comments; where only they come before the numbers the last of
-    them names the columns. So are lines of another form before the one with the names. A second
-    line of units is kept with the columns.
+    Between them is a comma, semicolon, tab or bar, or blanks where there is none of these. Lines
+    that begin with ``#`` are comments; where only they come before the numbers the last of them
+    names the columns. So are lines of another form before the one with the names. A second line of
+    units is kept with the columns.
 
     Raises
     ------
@@ -43,8 +51,9 @@ def table_of_text(text: str, *, units_row: bool | None = None) -> Table:
     InvalidInput
         As :func:`read_table`.
     """
-    header, body, first_line = _split(text.replace("\r\n", "\n").replace("\r", "\n"))
-    delimiter = max(",;\t", key=header.count)
+    text = _blanks_as_tabs(text.replace("\r\n", "\n").replace("\r", "\n"))
+    header, body, first_line = _split(text)
+    delimiter = max(_DELIMITERS, key=header.count)
     _, cells = next(_rows(header, delimiter, 1), (1, []))
     names = tuple(name.strip() for name in cells)
     if not any(names):
@@ -57,11 +66,52 @@ def table_of_text(text: str, *, units_row: bool | None = None) -> Table:
     units, body, first_line = _units_row(body, delimiter, names, first_line, units_row)
     if not body.strip():
         raise InvalidInput("there are no rows below the column names; record the log again")
-    # With semicolons or tabs between cells a comma inside a cell is a decimal comma.
     if delimiter != "," and "," in body:
-        body = body.replace(",", ".")
+        body = _with_points(body, delimiter, first_line)
     table = _read_fast(body, delimiter, names, units)
     return table if table is not None else _read_slow(body, delimiter, names, units, first_line)
+
+
+def _blanks_as_tabs(text: str) -> str:
+    """Return text whose cells are numbers with blanks between them with tabs in their place."""
+    lines = text.split("\n")
+    last = [line for line in lines[-_LAST_ROWS:] if line.strip()]
+    widths = {len(line.split()) for line in last}
+    if len(widths) != 1 or min(widths) < _FEWEST_CELLS:
+        return text
+    if any(mark in line for line in last for mark in _DELIMITERS):
+        return text
+    if not all(is_number(cell) for cell in last[-1].split()):
+        return text
+    return "\n".join(
+        ("# " if line.startswith("#") else "") + "\t".join(line.lstrip("#").split())
+        for line in lines
+    )
+
+
+def _with_points(body: str, delimiter: str, first_line: int) -> str:
+    """Return the body with decimal points: with other marks between cells a comma is a decimal one.
+
+    Raises
+    ------
+    InvalidInput
+        If numbers have points too, as then one of both separates thousands.
+    """
+    if "." not in body:
+        return body.replace(",", ".")
+    comma = re.search(_NUMBER_WITH.format(delimiter, ","), body)
+    if comma is None:
+        return body
+    point = re.search(_NUMBER_WITH.format(delimiter, r"\."), body)
+    if point is not None:
+        k, text = min((m.start(1), m[1]) for m in (comma, point))
+        other = comma[1] if text == point[1] else point[1]
+        raise InvalidInput(
+            f"line {first_line + body.count(chr(10), 0, k)} holds '{text}', and '{other}' stands "
+            f"there or below: commas and points cannot both be decimal; export the file without "
+            f"separators of thousands"
+        )
+    return body.replace(",", ".")
 
 
 def _split(text: str) -> tuple[str, str, int]:
@@ -74,7 +124,7 @@ def _split(text: str) -> tuple[str, str, int]:
         header = lines[at]
     if 0 < at < len(lines):
         named = lines[at - 1].lstrip("# ")
-        delimiter = max(",;\t", key=header.count)
+        delimiter = max(_DELIMITERS, key=header.count)
         numbers = all(is_number(cell) for cell in header.split(delimiter) if cell.strip())
         if numbers and header.strip() and named.count(delimiter) == header.count(delimiter):
             header, at = named, at - 1
@@ -94,14 +144,15 @@ def _preamble(lines: list[str]) -> int:
     last = [line for line in lines[-_LAST_ROWS:] if line.strip()]
     if len(lines) < 2 * _LAST_ROWS or not last:
         return 0
-    for delimiter in ";\t,":  # a comma between others is one of decimals
+    for delimiter in ";\t|,":  # a comma between others is one of decimals
         widths = {len(_cells(line, delimiter)) for line in last}
         width = min(widths)
         if len(widths) > 1 or width < _FEWEST_CELLS:
             continue
         for k, line in enumerate(lines[:_LONGEST_PREAMBLE]):
             named = _cells(line, delimiter)
-            if len(named) == width and not any(map(is_number, named)):
+            filled = sum(bool(cell.strip()) for cell in named)
+            if len(named) == width < 2 * filled and not any(map(is_number, named)):
                 return k
     return 0
 
@@ -177,11 +228,20 @@ def _read_slow(
     # A logger that begins anew, or files that were joined.
     heads = {names, tuple(units.get(name, "") for name in names)} - {("",) * len(names)}
     repeated: list[int] = []
+    notes: list[str] = []
+    last = first_line + body.rstrip().count("\n")
     for line, row in _rows(body, delimiter, first_line):
         if not row or not any(cell.strip() for cell in row):
             continue
         if tuple(cell.strip() for cell in row) in heads:
             repeated.append(line)
+            continue
+        if len(row) == len(names) + 1 and not row[-1].strip():  # a mark behind the last cell
+            del row[-1]
+        elif len(row) == len(names) - 1 and not names[-1]:  # only behind the last name
+            row.append("")
+        if len(row) < len(names) and line == last and rows:
+            notes.append(f"line {line}, the last, has only {len(row)} cells and was left out")
             continue
         if len(row) != len(names):
             raise InvalidInput(
@@ -197,7 +257,7 @@ def _read_slow(
     columns, not_numbers, seconds = {}, {}, {}
     for name, cells in zip(names, zip(*rows, strict=True), strict=True):
         try:
-            values = np.array([float(cell) if cell.strip() else np.nan for cell in cells])
+            values = _floats(cells)
         except ValueError:
             first = next(k for k, c in enumerate(cells) if c.strip() and not is_number(c))
             not_numbers[name] = BadCell(cells[first].strip(), first, lines[first])
@@ -206,9 +266,20 @@ def _read_slow(
                 seconds[name] = stamps
         else:
             columns[name] = values
-    notes = [
+    notes += [
         f"line {line} repeats column names or units and was left out; read logs that were joined "
         f"one by one"
         for line in repeated[:1]
     ]
     return Table(names, columns, not_numbers, len(rows), units, seconds, tuple(notes))
+
+
+def _floats(cells: Sequence[str]) -> FloatArray:
+    """The numbers of a column, NaN where a cell is empty or says that there is none."""
+    try:
+        return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
+    except ValueError:
+        missing = [not cell.strip() or cell.strip().lower() in _MISSING for cell in cells]
+        if all(missing):
+            raise
+        return np.array([np.nan if m else float(c) for c, m in zip(cells, missing, strict=True)])

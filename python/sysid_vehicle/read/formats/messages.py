@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from operator import attrgetter, itemgetter
 from typing import Any
 
@@ -14,10 +15,12 @@ from ..recording import Entry, Recording, Signal
 
 _MOST_ELEMENTS = 64  # of an array that are listed one by one: more are an image or a scan
 _DEPTH = 8
+_HEADERS = ("header", "stamp")  # hold the time, no measurement
+_SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nsec", "nsecs")
 _SAME_CLOCK_S = 1.0  # stamps that are farther from the recorder's time are of another clock
 
 Getter = Callable[[Any], Any]
-Taken = tuple[str, Any, int]  # topic, message, time of the recorder [ns]
+Taken = tuple[str, Any, int, int]  # topic, message, time of the recorder [ns], publisher
 
 
 def numbers(message: Any, depth: int = _DEPTH) -> Iterator[tuple[str, Getter]]:
@@ -39,7 +42,7 @@ def _then(first: Getter, second: Getter) -> Getter:
 def _fields(message: Any) -> Iterator[tuple[str, Getter]]:
     if isinstance(message, dict):
         for key in message:
-            if key != "header":
+            if key not in _HEADERS:
                 yield str(key), itemgetter(key)
     elif isinstance(message, (list, tuple, np.ndarray)):
         if len(message) <= _MOST_ELEMENTS:
@@ -48,17 +51,29 @@ def _fields(message: Any) -> Iterator[tuple[str, Getter]]:
     else:
         fields = getattr(message, "__dataclass_fields__", None)
         for name in fields if fields is not None else getattr(message, "__slots__", ()):
-            if not name.startswith("_") and name != "header":
+            if not name.startswith("_") and name not in _HEADERS:
                 yield name, attrgetter(name)
 
 
 def stamp_ns(message: Any) -> int:
-    """Return the time in a message's header [ns]; 0 if it has none."""
-    stamp = _part(_part(message, "header"), "stamp")
-    if stamp is None:
-        return 0
-    fraction = next((f for n in ("nanosec", "nsec") if (f := _part(stamp, n)) is not None), 0)
-    return int(_part(stamp, "sec") or 0) * 10**9 + int(fraction)
+    """Return the time at which a message was measured [ns]; 0 if it has none.
+
+    It is the stamp of the header, or that of the message itself, or what Foxglove's schemas call
+    ``timestamp``: seconds and nanoseconds each.
+    """
+    for stamp in (
+        _part(_part(message, "header"), "stamp"),
+        _part(message, "stamp"),
+        _part(message, "timestamp"),
+    ):
+        seconds = _first_part(stamp, _SECONDS)
+        if seconds is not None:
+            return int(seconds) * 10**9 + int(_first_part(stamp, _NANOSECONDS) or 0)
+    return 0
+
+
+def _first_part(stamp: Any, names: tuple[str, ...]) -> Any:
+    return next((part for name in names if (part := _part(stamp, name)) is not None), None)
 
 
 def _part(message: Any, name: str) -> Any:
@@ -73,9 +88,12 @@ class Topic:
     stamps: list[int] = field(default_factory=list)
     recorded: list[int] = field(default_factory=list)
     values: dict[str, list[float]] = field(default_factory=dict)
+    publishers: dict[int, tuple[int, int]] = field(default_factory=dict)  # first and last times
 
-    def take(self, message: Any, recorded_ns: int) -> None:
+    def take(self, message: Any, recorded_ns: int, publisher: int) -> None:
         """Take one message."""
+        first, last = self.publishers.get(publisher, (recorded_ns, recorded_ns))
+        self.publishers[publisher] = min(first, recorded_ns), max(last, recorded_ns)
         self.stamps.append(stamp_ns(message))
         self.recorded.append(recorded_ns)
         for path, get in self.getters.items():
@@ -109,8 +127,8 @@ def recording_of(
         for name in names:
             topic, path, get = places[name]
             topics.setdefault(topic, Topic({})).getters[path] = get
-        for topic, message, recorded_ns in messages(list(topics)):
-            topics[topic].take(message, recorded_ns)
+        for topic, message, recorded_ns, publisher in messages(list(topics)):
+            topics[topic].take(message, recorded_ns, publisher)
         return _signals_of(topics, notes)
 
     return Recording({name: Entry("", topic) for name, (topic, _, _) in places.items()}, fetch)
@@ -126,14 +144,28 @@ def _signals_of(topics: dict[str, Topic], notes: list[str]) -> dict[str, Signal]
     """
     times, offsets = {}, {}
     for name, topic in topics.items():
+        spans = sorted(topic.publishers.values())
+        if any(begin < end for (_, end), (begin, _) in pairwise(spans)):
+            notes.append(
+                f"{name}: {len(spans)} publishers send it at the same time, and their messages are "
+                f"mixed; record them under topics of their own"
+            )
         recorded, stamps = np.array(topic.recorded), np.array(topic.stamps)
-        stamped = bool(stamps.size) and bool((stamps > 0).all())
-        times[name] = stamps if stamped else recorded
-        if not stamped and stamps.size:
+        stamped = stamps > 0
+        if stamped.any() and not stamped.all():
+            notes.append(
+                f"{name}: {np.count_nonzero(~stamped)} of {stamps.size} messages have no stamp, "
+                f"first message {int(np.argmin(stamped))}, and were left out; stamp the messages "
+                f"where they are measured"
+            )
+            recorded, stamps = recorded[stamped], stamps[stamped]
+            topic.values = {p: list(np.array(v)[stamped]) for p, v in topic.values.items()}
+        elif stamps.size and not stamped.any():
             notes.append(
                 f"{name}: its messages have no stamps, so the times are those of the recorder, "
                 f"which come late; stamp the messages where they are measured"
             )
+        times[name] = stamps if stamped.any() else recorded
         offsets[name] = float(np.median(times[name] - recorded)) * 1e-9 if stamps.size else 0.0
     apart = sorted(offsets, key=lambda name: offsets[name])
     if apart and offsets[apart[-1]] - offsets[apart[0]] > _SAME_CLOCK_S:

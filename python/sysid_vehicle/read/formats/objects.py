@@ -11,6 +11,7 @@ from ...errors import InvalidInput
 from ...log import as_floats, as_seconds
 from ..recording import Entry, Recording, Signal
 from ..table import Table, table_of
+from ..units import factor_to
 
 _PAIR = 2
 
@@ -65,6 +66,8 @@ def _of_xarray(data: Any) -> Recording:
         for name in names:
             time, array = found[name]
             values = time.values if begins is None else time.values - begins
+            if values.dtype.kind in "iuf":
+                values = values * (factor_to("s", str(time.attrs.get("units", ""))) or 1.0)
             result[name] = _signal(name, values, array.values)
         return result
 

@@ -13,6 +13,11 @@ from .messages import Taken, recording_of
 
 def read(path: Path, dbc: Path | None) -> Recording:
     """List the numbers in the first message of each topic whose type is known."""
+    if path.suffix == ".db3" and not (path.parent / "metadata.yaml").exists():
+        raise InvalidInput(
+            f"{path}: has no metadata.yaml beside it, which tells its topics; make it with "
+            f"ros2 bag reindex {path.parent}"
+        )
     firsts: list[tuple[str, Any]] = []
     with _opened(path) as reader:
         for connection in reader.connections:
@@ -35,7 +40,8 @@ def read(path: Path, dbc: Path | None) -> Recording:
 
 def _messages(reader: Any, connections: list[Any]) -> Iterator[Taken]:
     for connection, recorded_ns, raw in reader.messages(connections=connections):
-        yield connection.topic, reader.deserialize(raw, connection.msgtype), recorded_ns
+        message = reader.deserialize(raw, connection.msgtype)
+        yield connection.topic, message, recorded_ns, connection.id
 
 
 def _opened(path: Path) -> Any:

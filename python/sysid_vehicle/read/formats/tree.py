@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from ...errors import InvalidInput
-from ..recording import Entry, Recording, Signal
+from ...errors import InvalidInput, near_names
+from ...log import listed
+from ..recording import Entry, Recording, Signal, ends_with
 from ..table import Table
+from ..units import factor_to
 
 T = TypeVar("T")
 
@@ -34,7 +36,8 @@ def contents_of(leaves: list[Leaf], where: str) -> Table | Recording:
     """Return a table where all arrays have one length and time, else channels with their own.
 
     A channel's time is the array called ``time``, ``t``, ... of its length beside it, or else in a
-    struct around it. A struct of a time and ``data`` is one channel, called like the struct.
+    struct around it, in seconds or in the unit that it states. A struct of a time and ``data`` is
+    one channel, called like the struct.
 
     Raises
     ------
@@ -73,6 +76,16 @@ def _recording(columns: list[Leaf], times: Mapping[tuple[str, ...], Leaf]) -> Re
         name: Entry(leaf.unit, str(id(time_s)) if time_s is not None else name)
         for name, (leaf, time_s) in named.items()
     }
+    arrays = {**_short({c.path: c for c in (*times.values(), *columns)})}
+
+    def clocked(name: str, rate_hz: float | None) -> Recording:
+        clock = _found(arrays, name)
+        n = clock.values.size
+        time_s = _kept(clock) if rate_hz is None else np.arange(n) / rate_hz
+        own = columns if rate_hz is not None else [c for c in columns if c is not clock]
+        return _recording(
+            [replace(c, time_s=time_s) if c.values.size == n else c for c in own], times
+        )
 
     def fetch(names: list[str], notes: list[str]) -> dict[str, Signal]:
         result = {}
@@ -81,12 +94,25 @@ def _recording(columns: list[Leaf], times: Mapping[tuple[str, ...], Leaf]) -> Re
             if time_s is None or time_s.size != leaf.values.size:
                 raise InvalidInput(
                     f"{name}: has {leaf.values.size} samples and no time of that length beside it; "
-                    f"save its time in the same struct, called 'time'"
+                    f"save its time in the same struct, called 'time', or name the time in the "
+                    f"channel map, time_s = 'its name'"
                 )
             result[name] = Signal(time_s, np.asarray(leaf.values, dtype=np.float64))
         return result
 
-    return Recording(entries, fetch)
+    return Recording(entries, fetch, clocked)
+
+
+def _found(arrays: Mapping[str, Leaf], name: str) -> Leaf:
+    """The array that a channel map calls so, in full or by its last part."""
+    found = [full for full in arrays if full == name] or [f for f in arrays if ends_with(f, name)]
+    if len(found) != 1:
+        hint = near_names(name, arrays) or f"; arrays are {listed(arrays)}"
+        raise InvalidInput(
+            f"time_s: the channel map names '{name}', which {len(found)} arrays of the file are "
+            f"called{hint}"
+        )
+    return arrays[found[0]]
 
 
 def _columns(leaf: Leaf) -> list[Leaf]:
@@ -117,13 +143,12 @@ def _time_of(leaf: Leaf, times: Mapping[tuple[str, ...], Leaf]) -> npt.NDArray[n
 
 
 def _kept(time: Leaf) -> npt.NDArray[np.float64]:
-    """The same array for all channels of a time, which makes them a group."""
-    values = time.values
-    if values.dtype != np.float64:
-        values = values.astype(np.float64)
-        object.__setattr__(time, "values", values)
-    result: npt.NDArray[np.float64] = values  # type: ignore[assignment]
-    return result
+    """The time in seconds, the same array for all its channels, which makes them a group."""
+    if time.time_s is None:
+        seconds = time.values.astype(np.float64) * (factor_to("s", time.unit) or 1.0)
+        object.__setattr__(time, "time_s", seconds)
+    assert time.time_s is not None
+    return time.time_s
 
 
 def _short(found: dict[tuple[str, ...], T]) -> dict[str, T]:

@@ -24,10 +24,17 @@ def read(path: Path, dbc: Path | None) -> Table:
     """Read a file; its time is seconds since midnight, counted on where the day ends."""
     parts, first_line = _sections(read_text_table(path))
     names = " ".join(parts.get("column names", [])).split()
-    rows = [(line, text.split()) for line, text in enumerate(parts.get("data", []), first_line)]
+    data = parts.get("data", [])
+    if all("." not in text for text in data):  # written where the comma is decimal
+        data = [text.replace(",", ".") for text in data]
+    rows = [(line, text.split()) for line, text in enumerate(data, first_line)]
     rows = [(line, cells) for line, cells in rows if cells]
     if not names or not rows:
         raise InvalidInput(f"{path}: has no [column names] or no [data]; export it again")
+    notes: list[str] = []
+    if len(rows) > 1 and len(rows[-1][1]) < len(names):
+        line, cells = rows.pop()
+        notes.append(f"line {line}, the last, has only {len(cells)} cells and was left out")
     columns: dict[str, np.ndarray] = {}
     bad: dict[str, BadCell] = {}
     for line, cells in rows:
@@ -45,7 +52,8 @@ def read(path: Path, dbc: Path | None) -> Table:
     if _TIME in columns:
         columns["time_s"] = _since_midnight(columns.pop(_TIME))
         names = ["time_s" if name == _TIME else name for name in names]
-    return Table(tuple(names), columns, bad, len(rows), _units(names, parts))
+    units = _units(names, parts, notes)
+    return Table(tuple(names), columns, bad, len(rows), units, notes=tuple(notes))
 
 
 def _sections(text: str) -> tuple[dict[str, list[str]], int]:
@@ -64,14 +72,21 @@ def _sections(text: str) -> tuple[dict[str, list[str]], int]:
     return parts, first_line
 
 
-def _units(names: list[str], parts: dict[str, list[str]]) -> dict[str, str]:
+def _units(names: list[str], parts: dict[str, list[str]], notes: list[str]) -> dict[str, str]:
     units: dict[str, str] = {}
     titles = [line.strip() for line in parts.get("header", []) if line.strip()]
+    ended = [title.rpartition(" ") for title in titles]
     if len(titles) == len(names):
-        for name, title in zip(names, titles, strict=True):
-            unit = title.split()[-1]
-            if len(title.split()) > 1 and is_unit(unit):
+        for name, (words, _, unit) in zip(names, ended, strict=True):
+            if words and is_unit(unit):
                 units[name] = unit
+    elif titles:
+        units = {words: unit for words, _, unit in ended if words in names and is_unit(unit)}
+        notes.append(
+            f"[header] has {len(titles)} titles for {len(names)} columns, so units are known only "
+            f"of {', '.join(units) or 'none'} and of [channel units]; put factors of the others in "
+            f"the channel map"
+        )
     told = [line.strip() for line in parts.get("channel units", [])]
     while told and not told[-1]:
         told.pop()

@@ -134,17 +134,22 @@ class ChannelMap:
         InvalidInput
             If a source is not there, or if the map gives the time, which each channel has itself.
         """
-        if "time_s" in self.sources or self.rate_hz is not None:
-            raise InvalidInput(
-                "time_s: every channel of this log has its own time; take time_s out of the "
-                "channel map"
-            )
-        wanted = {channel: source.column for channel, source in self.sources.items()}
+        wanted = {c: source.column for c, source in self.sources.items() if c != "time_s"}
+        time = self.sources["time_s"].column if "time_s" in self.sources else "time_s"
+        if self.rate_hz is not None or time != "time_s":
+            if recording.clocked is None:
+                raise InvalidInput(
+                    "time_s: every channel of this log has its own time; take time_s out of the "
+                    "channel map, or leave only a factor there: time_s = { factor = 0.001 }"
+                )
+            like = time if self.rate_hz is None else next(iter(wanted.values()), "")
+            recording = recording.clocked(like, self.rate_hz)
         skipped = self.absent
         if self.ground is not None:
             wanted.update({part: s.column for part, s in self.ground.sources.items()})
             skipped = (*skipped, *_OVER_GROUND)
-        return recording.table(wanted, skipped, notes)
+        table = recording.table(wanted, skipped, notes)
+        return table if time == "time_s" else table.renamed("time_s", time)
 
     def apply(self, table: Table, notes: list[str]) -> dict[str, FloatArray]:
         """Return the canonical channels of `table`, then its other numeric columns.
@@ -162,7 +167,7 @@ class ChannelMap:
         for channel, source in self.sources.items():
             unit = source.unit_of(channel)
             result[channel] = source.read(table, channel, unit, notes)
-        if self.rate_hz is not None:
+        if self.rate_hz is not None and "time_s" not in table.counts:
             result["time_s"] = np.arange(table.n) / self.rate_hz
         elif "time_s" not in result and "time_s" in table.counts:
             factor = stated_factor(table, "time_s", "time_s", "s", notes)

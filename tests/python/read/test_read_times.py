@@ -1,0 +1,112 @@
+"""Times in other units, of other names, and stamps as spreadsheets and loggers write them."""
+
+import datetime
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from log_formats import FACTORS, FAST, MAP, SLOW, UNITS, check_values, measured
+from scipy.io import savemat
+
+from sysid_vehicle.errors import InvalidInput
+from sysid_vehicle.read import read_log
+
+SI: dict[str, Any] = {c: {"column": n, "factor": FACTORS.get(c, 1.0)} for c, n in MAP.items()}
+START = datetime.datetime(2024, 3, 31, 0, 59, 58, tzinfo=datetime.UTC)
+
+
+def two_rates(unit_s: float = 1.0) -> dict[str, Any]:
+    fast = {n: v for n, v in measured(FAST).items() if n != "Speed"}
+    return {
+        "imu": {"t": FAST / unit_s, **fast},
+        "gps": {"t": SLOW / unit_s, "Speed": measured(SLOW)["Speed"]},
+    }
+
+
+def test_times_that_state_no_unit_are_refused_with_a_remedy_that_works(tmp_path: Path) -> None:
+    savemat(tmp_path / "run.mat", two_rates(1e-3))
+    with pytest.raises(InvalidInput, match=r"milliseconds; put factor = 0\.001 in the channel map"):
+        read_log(tmp_path / "run.mat", SI, check=False)
+    check_values(read_log(tmp_path / "run.mat", {**SI, "time_s": {"factor": 0.001}}, check=False))
+    pairs: dict[str, Any] = {n: (1e3 * FAST, v) for n, v in measured(FAST).items()}
+    log = read_log(pairs, {**SI, "time_s": {"factor": 0.001}}, check=False)
+    check_values(log, slow=())
+
+
+@pytest.mark.parametrize("unit", ["ms", "milliseconds since 2024-01-01 00:00:00"])
+def test_times_that_state_their_unit_are_converted(tmp_path: Path, unit: str) -> None:
+    h5py: Any = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        for group, held in two_rates(1e-3).items():
+            for name, values in held.items():
+                file[f"{group}/{name}"] = values
+            file[f"{group}/t"].attrs["units"] = unit
+    check_values(read_log(tmp_path / "run.h5", SI, check=False))
+
+
+def test_coordinates_of_xarray_state_their_unit() -> None:
+    xr: Any = pytest.importorskip("xarray")
+    data = xr.Dataset(coords={"t": ("t", 1e3 * FAST, {"units": "ms"})})
+    for name in UNITS:
+        data[name] = ("t", measured(FAST)[name])
+    check_values(read_log(data, SI, check=False), slow=())
+
+
+def test_a_map_names_the_time_of_arrays(tmp_path: Path) -> None:
+    """Of any name, beside arrays of other lengths; or the rate, where there is none."""
+    fast = measured(FAST)
+    path = tmp_path / "run.mat"
+    savemat(path, {"Zeit": 1e3 * FAST, **fast, "cal": np.arange(20.0)})
+    clock = {"column": "Zeit", "factor": 0.001}
+    check_values(read_log(path, {**SI, "time_s": clock}, check=False), slow=())
+    with pytest.raises(InvalidInput, match=r"names 'zeitt', which 0 arrays .*did you mean 'Zeit'"):
+        read_log(path, {**SI, "time_s": "zeitt"}, check=False)
+    savemat(path, {**fast, "cal": np.arange(20.0)})
+    with pytest.raises(InvalidInput, match=r"name the time in the channel map"):
+        read_log(path, SI, check=False)
+    check_values(read_log(path, {**SI, "time_s": {"rate_hz": 100}}, check=False), slow=())
+
+
+def csv(folder: Path, stamp: Callable[[float], str]) -> Path:
+    rows = [",".join([stamp(t), *(f"{measured(t)[n]:.9f}" for n in UNITS)]) for t in FAST]
+    path = folder / "run.csv"
+    path.write_text("\n".join([",".join(["Time", *UNITS]), *rows]))
+    return path
+
+
+def at(t: float, offset_h: int) -> str:
+    moved = START + datetime.timedelta(seconds=float(t), hours=offset_h)
+    return f"{moved:%Y-%m-%d %H:%M:%S.%f}+{offset_h:02d}:00"
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    [
+        lambda t: f"11:59:{58 + t:06.3f} AM" if t < 2 else f"12:00:{t - 2:06.3f} PM",
+        lambda t: f"5/31/2026 11:59:{58 + t} pm" if t < 2 else f"6/1/2026 12:00:{t - 2:06.3f} am",
+        lambda t: f"59:{58 + t:06.3f}" if t < 2 else f"00:{t - 2:06.3f}",
+        lambda t: at(t, 1 if t < 2 else 2),
+    ],
+    ids=["noon", "midnight", "minutes over the hour", "summer time begins"],
+)  # fmt: skip
+def test_stamps(tmp_path: Path, stamp: Callable[[float], str]) -> None:
+    log = read_log(csv(tmp_path, stamp), {**SI, "time_s": "Time"}, check=False)
+    np.testing.assert_allclose(log["time_s"], FAST, atol=1e-6)
+
+
+def test_days_of_a_spreadsheet(tmp_path: Path) -> None:
+    path = csv(tmp_path, lambda t: f"{45382.5 + t / 86400:.12f}")
+    with pytest.raises(InvalidInput, match=r"look like days.*put factor = 86400"):
+        read_log(path, {**SI, "time_s": "Time"}, check=False)
+    log = read_log(path, {**SI, "time_s": {"column": "Time", "factor": 86400}}, check=False)
+    np.testing.assert_allclose(log["time_s"], FAST, atol=1e-4)
+
+
+def test_times_that_are_rounded(tmp_path: Path) -> None:
+    path = csv(tmp_path, lambda t: f"{t:.1f}")
+    with pytest.raises(InvalidInput, match=r"\(359 such samples\).*time_s = { rate_hz = 100 }"):
+        read_log(path, {**SI, "time_s": "Time"}, check=False)
+    log = read_log(path, {**SI, "time_s": {"rate_hz": 100}}, check=False)
+    check_values(log, slow=(), atol=1e-8)
