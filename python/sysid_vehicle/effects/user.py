@@ -151,6 +151,7 @@ def define_effect(
     source: str = "defined by the user",
     excited_by: str = "",
     confounded_with: Sequence[str] = (),
+    breaks: str = "",
 ) -> Effect:
     """Define an effect, checked and from then on used like one of the catalogue.
 
@@ -186,6 +187,9 @@ def define_effect(
         For the lists; the equation is that of the functions unless you give another.
     confounded_with : sequence of str
         Effects that act alike in most driving.
+    breaks : str
+        Law of motion that readings seem to break where it acts, through no fault of theirs, as
+        `Effect.breaks` has them: `on a slope` of a road that is banked or climbs.
 
     Raises
     ------
@@ -215,6 +219,11 @@ def define_effect(
         if function is not None
     }
     what = f"effect '{id}'"
+    known = {e.breaks for e in catalogue()}
+    if breaks not in known:
+        raise InvalidInput(
+            f"{what}: breaks = {breaks!r}; there are {', '.join(sorted(known - {''}))}"
+        )
     columns = dict(channels or {})
     check_names(id, what, parameters, functions, columns, states)
     names = [p.name for p in parameters]
@@ -253,6 +262,7 @@ def define_effect(
         needs=(*_NEEDS, *columns),
         confounded_with=tuple(confounded_with),
         through="",
+        breaks=breaks,
         states=len(own_states),
         acts=tuple((TARGETS.index(t), f.steps) for t, f in formulas.items()),
         channels=tuple(columns),

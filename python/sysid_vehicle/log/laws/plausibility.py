@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from ..._common.arrays import FloatArray
 from ...vehicle import GRAVITY_MPS2
 from ..channels import DEG
 from ..signals import least_speed_mps
+from .bank import leans_deg
 from .clock import clock_notes
 from .lags import lag_notes
 from .laws import (
@@ -47,6 +49,7 @@ from .wheelbase import check_steering, gripping, is_model_car
 
 _SLIDING = 0.2  # m/s2, the same for the change of vy, which is a small part of ay
 _ABOVE_NOISE = 6.0  # noise of the regressor itself makes every coefficient too small
+_LATERAL = ("vy_mps", "yaw_rate_radps", "ay_mps2", "steer_rad")
 _HOLDS = 0.2  # of what it demands: a law that holds this closely needs no regression
 
 # Lever arms and roll bend the lateral speed more than the accelerations.
@@ -120,7 +123,20 @@ def check_coherence(columns: Mapping[str, FloatArray], rate_hz: float) -> list[C
     implausible += doubtful + check_lost(given, lost)
     if "fx_n" in columns:
         implausible += held_speed_note(drive)
-    return implausible + (clock or lag_notes(motion))
+    # Before lags are sought in shorter windows.
+    bank_deg = leans_deg(drive) if "vy_mps" in columns else None
+    return implausible + (clock or _beside_a_bank(lag_notes(motion), bank_deg))
+
+
+def _beside_a_bank(notes: list[Contradiction], bank_deg: float | None) -> list[Contradiction]:
+    """Notes on lags, which a road that leans into its turns brings about as well."""
+    if bank_deg is None:
+        return notes
+    told = f"; a road that leans by up to {bank_deg:.2g} deg into its turns looks like that, too"
+    return [
+        replace(n, text=f"{n.text}{told}", on_the_level=True) if n.channel in _LATERAL else n
+        for n in notes
+    ]
 
 
 def contradictions(columns: Mapping[str, FloatArray], rate_hz: float) -> tuple[Contradiction, ...]:
@@ -141,7 +157,7 @@ def _check_laws(drive: Drive, model_car: bool) -> tuple[list[Contradiction], lis
     clock = clock_notes(drive.motion)
     doubtful = [] if clock else check_steering(drive)
     if "vy_mps" in channels:
-        _check_sliding(drive)
+        doubtful += _check_sliding(drive)
     # Without the lateral speed nothing tells what a slide takes from the speed.
     driven = drive if "vy_mps" in channels else gripping(drive)
     if driven is not None and "ax_mps2" in channels:
@@ -212,7 +228,7 @@ def _refuse_lateral(drive: Drive, turn: FloatArray, ay: FloatArray) -> None:
     )
 
 
-def _check_sliding(drive: Drive) -> None:
+def _check_sliding(drive: Drive) -> list[Contradiction]:
     c = drive.motion.channels
     slide = drive.change(c["vy_mps"])
     ay, turn = drive.mean(c["ay_mps2"]), drive.mean(c["vx_mps"] * c["yaw_rate_radps"])
@@ -221,10 +237,10 @@ def _check_sliding(drive: Drive) -> None:
     speed = float(np.median(drive.mean(c["vx_mps"])))
     own = math.hypot(noise["ay_mps2"], speed * noise["yaw_rate_radps"]) / WINDOW_S**0.5
     if size_of(expected) < max(_SLIDING, _ABOVE_NOISE * own):
-        return
+        return []
     # At one speed the change of yaw rate has the same shape, and a regression would have to choose.
     if spread_of(slide - expected) < _HOLDS * spread_of(expected):
-        return
+        return []
     # The expected change is the small difference of two large readings, each with an own scale;
     # and where the speed is not measured at the centre of gravity the yaw rate adds to it.
     columns = [expected, turn, drive.change(c["yaw_rate_radps"]), ones(drive)]
@@ -237,6 +253,14 @@ def _check_sliding(drive: Drive) -> None:
     lost = found.coherence < 0.1 and ratio + 5.0 * deviation < 0.8 and ratio < 0.3
     clear = spread_of(expected - found.coefficients[1] * turn) > CLEARLY
     if lost and (clear or drive.motion.disorder["vy_mps"] > WHITE):
+        bank_deg = leans_deg(drive)
+        if bank_deg is not None:
+            text = (
+                f"vy_mps: changes as on a road that leans by up to {bank_deg:.2g} deg into its "
+                f"turns, {drive.place(expected)}; if it does not, check that the column holds the "
+                f"lateral speed, in the order of time"
+            )
+            return [Contradiction("vy_mps", text, on_the_level=True)]
         raise Implausible(
             "vy_mps",
             f"vy_mps: does not change as ay_mps2 - vx_mps * yaw_rate_radps demands, "
@@ -247,3 +271,4 @@ def _check_sliding(drive: Drive) -> None:
         formula = "(d vy_mps / dt) / (ay_mps2 - vx_mps * yaw_rate_radps)"
         slips = _SLIDING_SLIPS
         check_scale(ratio, deviation, _SLIDE_STD, slips, "vy_mps", formula, slide, drive)
+    return []
