@@ -12,7 +12,6 @@ from .._common.arrays import FloatArray, as_float64
 from .._common.style import axes_or_new
 from .._common.text import html_text
 from ..errors import InvalidInput
-from ..log.signals import least_speed_mps
 from ..vehicle import Vehicle
 from .curves import Curve
 from .steady import peak_lateral_mps2, slip_difference, steady_steer, understeer_gradient
@@ -66,13 +65,12 @@ class Manoeuvre:
             )
         time_s = self._times(10.0)
         speed = self.speed_mps(time_s)
-        least = max(least_speed_mps(speed), _SLOWEST_MPS)
-        slow = np.flatnonzero(~(speed >= least))
+        slow = np.flatnonzero(~(speed >= _SLOWEST_MPS))
         if slow.size:
             k = int(slow[0])
             raise InvalidInput(
                 f"{self.name}: the wanted speed is {speed[k]:.3g} m/s at {time_s[k]:.6g} s; the "
-                f"single track needs {least:.3g} m/s or more, ask for a higher speed"
+                f"single track needs {_SLOWEST_MPS:g} m/s or more, ask for a higher speed"
             )
 
     def _times(self, rate_hz: float) -> FloatArray:

@@ -111,7 +111,9 @@ def test_improve_finds_the_effect_and_writes_json_and_report(
     assert lag["unit"] == "s"
     assert abs(lag["value"] - 0.06) < 4.0 * lag["std"]
     assert found["error_after"] < found["error_before"]
-    assert result["ranking"][0]["id"] == "steer_lag"
+    # Half a minute of a lap hardly tells a lag from a delay; the course does.
+    first = result["ranking"][0]
+    assert "steer_lag" in {first["id"], *first["indistinguishable_from"]}
     assert not {"rear_toe", "gyro_bias"} & {c["id"] for c in result["ranking"]}
     assert set(result["horizons"]["channels"]) >= {"vy_mps", "yaw_rate_radps", "ay_mps2"}
     assert 0.5 < result["explained"]["share"] <= 1.0
