@@ -146,8 +146,18 @@ def _score_rivals(board: ScoreBoard, score: Score, apart: float) -> tuple[str, .
 
 
 def _with_refit_rivals(c: Candidate, all_: list[Candidate], apart: float) -> Candidate:
-    """Among refitted effects the likelihood itself says which cannot be told apart."""
-    near = tuple(o.id for o in all_ if o is not c and abs(o.statistic - c.statistic) < apart)
+    """Among refitted effects the likelihood itself says which cannot be told apart.
+
+    A lag filters noise of the inputs. What that is worth is told to first order, before noise is
+    learned anew: it may be as wrong as it is large.
+    """
+
+    def unsure(o: Candidate) -> float:
+        return abs(o.of_inputs - c.of_inputs) if o.effect.states or c.effect.states else 0.0
+
+    near = tuple(
+        o.id for o in all_ if o is not c and abs(o.statistic - c.statistic) < apart + unsure(o)
+    )
     refitted = {o.id for o in all_}
     confounded = (*near, *(t for t in c.indistinguishable_from if t not in refitted))
     return replace(c, indistinguishable_from=confounded)

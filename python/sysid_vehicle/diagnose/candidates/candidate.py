@@ -18,7 +18,7 @@ class Candidate:
     Attributes
     ----------
     statistic : float
-        Score statistic; after a refit, twice the gain in log-likelihood.
+        Score statistic; after a refit, twice the gain in log-likelihood, with exact inputs.
     p_value : float
         Of the baseline being complete, corrected for testing all effects.
     value, std : tuple of float
@@ -35,6 +35,9 @@ class Candidate:
     finished : bool
         Whether noise was learned with it; else it was refitted under the noise of the model without
         the effect.
+    of_inputs : float
+        After a refit, the part of the statistic that noise of the inputs had taken
+        (`identify.lost_to_input_noise`).
     """
 
     effect: Effect
@@ -48,6 +51,7 @@ class Candidate:
     indistinguishable_from: tuple[str, ...] = ()
     fit: Fit | None = None
     finished: bool = False
+    of_inputs: float = 0.0
 
     @property
     def id(self) -> str:

@@ -12,7 +12,15 @@ from ..._common.threads import before
 from ...effects import Effect
 from ...errors import NumericalError
 from ...estimate import Driving
-from ...identify import Fit, refine, refine_above, refit, unmoved, with_exact_inputs
+from ...identify import (
+    Fit,
+    lost_to_input_noise,
+    refine,
+    refine_above,
+    refit,
+    unmoved,
+    with_exact_inputs,
+)
 from .candidate import Candidate
 
 _BEYOND = 8.0  # predicted parameters are cut at so many typical sizes before a refit
@@ -103,9 +111,11 @@ def from_typical(fit: Fit, c: Candidate, tests: int, alpha: float = np.inf) -> C
 
 def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:
     names = c.effect.named
+    lost = [lost_to_input_noise(f, f.driving) for f in (fit, found)]
     return replace(
         c,
         statistic=2.0 * (with_exact_inputs(found) - with_exact_inputs(fit)),
+        of_inputs=2.0 * (lost[1] - lost[0]),
         value=tuple(found[n].value for n in names),
         std=tuple(found[n].std for n in names),
         fit=found,
