@@ -111,8 +111,7 @@ def test_improve_finds_the_effect_and_writes_json_and_report(
     assert lag["unit"] == "s"
     assert abs(lag["value"] - 0.06) < 4.0 * lag["std"]
     assert found["error_after"] < found["error_before"]
-    # Half a minute of a lap hardly tells a lag from a delay; the course does.
-    first = result["ranking"][0]
+    first = result["ranking"][0]  # half a minute of a lap hardly tells a lag from a delay
     assert "steer_lag" in {first["id"], *first["indistinguishable_from"]}
     assert not {"rear_toe", "gyro_bias"} & {c["id"] for c in result["ranking"]}
     assert set(result["horizons"]["channels"]) >= {"vy_mps", "yaw_rate_radps", "ay_mps2"}
