@@ -23,19 +23,20 @@
    flexible that it contains the effect.
 8. Something left, or taken up by what only stands in for it: a name stands by its own share, what
    comes back of the error 1 to 5 s ahead, of the motion that it moves, where the final model lacks
-   it and all else is fitted anew. It is above `taken` and shown not to be chance, on training and
-   on validation data; where less than `most` of that error is gone, the whole interval of the mean
-   of both is above `taken`. Of effects that act alike, and have no such share beside each other, or
-   are not shown to be off nothing (`insignificant`), the share of all of them counts, and they are
-   named as a group, but for one without which errors are shown to be smaller, all else fitted
-   anew. Nothing that has no share of either kind takes more, and moves a channel that
-   it moves. All that was added together is shown to take a share, of that error or of what could
-   be explained of it. Nothing else speaks against it: a value, not only an end of its interval,
-   that no car has or that does not matter; an interval that holds no effect where it includes what
-   is missing (`insignificant`); errors ahead of its motion that grow with all that was
-   added, as the models are fitted; validation data that by themselves tell another one, so
-   that both do not show it to be off nothing (`insignificant`); an effect like it that is likelier
-   in its place (`apart`).
+   it and all else is fitted anew. Where slip angles of validation data are larger than those that
+   were fitted, errors are those of extrapolated tyres, and do not count. It is above `taken` and
+   shown not to be chance, on training and on validation data; where less than `most` of that error
+   is gone, the whole interval of the mean of both is above `taken`. Of effects that act alike, and
+   have no such share beside each other, or are not shown to be off nothing (`insignificant`), the
+   share of all of them counts, and they are named as a group, but for one without which errors are
+   shown to be smaller, all else fitted anew. Nothing that has no share of either kind takes more,
+   and moves a channel that it moves. All that was added together is shown to take a share, of that
+   error or of what could be explained of it. Nothing else speaks against it: a value, not only an
+   end of its interval, that no car has or that does not matter; an interval that holds no effect
+   where it includes what is missing (`insignificant`); errors ahead of its motion that grow with
+   all that was added, as the models are fitted; validation data that by themselves tell another
+   one, so that both do not show it to be off nothing (`insignificant`); an effect like it that is
+   likelier in its place (`apart`).
    Where the final model errs by less than the noise of the sensors (`buried`), no share can be
    shown: an effect without rivals, and without a stand-in beside it, keeps its name if the
    likelihood of validation data needs it (`interval`), unless training data show more (`strict`).

@@ -12,6 +12,7 @@ from ..._common.arrays import FloatArray, as_float64, in_turn, mean_of_known, me
 from ...estimate import Driving
 from ...identify import Fit
 from ...rules import UNKNOWN, Share, share_of
+from .fitted_range import fitted, within_fitted_range
 from .horizons import squares_ahead
 from .where_models_differ import apart
 
@@ -29,12 +30,15 @@ class Beyond:
         sensor noise, over the square of the first model's error.
     share, low, high : float
         Of the first one's, what the last model takes away; 95 % interval from draws of the blocks.
+    within : float
+        Share of the driving in which no slip angle is larger than those that were fitted.
     """
 
     squares: tuple[float, ...]
     share: float
     low: float
     high: float
+    within: float = 1.0
 
     def __str__(self) -> str:
         # What grows is not taken away: how many times it grows is another figure.
@@ -42,8 +46,9 @@ class Beyond:
         return f"{share} % ({low} to {high})"
 
     def to_dict(self) -> dict[str, float]:
-        """Share and interval, ready for JSON."""
-        return {"share": self.share, "low": self.low, "high": self.high}
+        """Share, interval, and of how much of the driving, ready for JSON."""
+        figures = {"share": self.share, "low": self.low, "high": self.high}
+        return {**figures, "within_fitted_range": self.within}
 
 
 _UNSEEN = Beyond((0.0, 0.0), 1.0, 0.0, 1.0)
@@ -54,6 +59,8 @@ def beyond_noise(
 ) -> Beyond:
     """Work out what errors some seconds ahead are beyond the noise of the sensors.
 
+    Of predictions in which the tyres work as far as they were fitted (`within_fitted_range`).
+
     Parameters
     ----------
     fits : sequence of Fit
@@ -63,12 +70,13 @@ def beyond_noise(
     seed : int
         Of the draws.
     """
-    squares, sensor, seen = squares_ahead(fits, driving, horizons_s)
+    counted = within_fitted_range(fits[-1], driving, horizons_s)
+    squares, sensor, seen = squares_ahead(fits, driving, horizons_s, counted)
     if not seen.any():  # too short for any prediction
         return replace(_UNSEEN, squares=(0.0,) * len(fits))
-    return _taken(
-        squares[:, :, seen], as_float64(np.broadcast_to(sensor**2, seen.shape)[seen]), seed
-    )
+    noise = as_float64(np.broadcast_to(sensor**2, seen.shape)[seen])
+    within = float(np.mean(fitted(fits[-1], driving)))
+    return replace(_taken(squares[:, :, seen], noise, seed), within=within)
 
 
 def own_share(

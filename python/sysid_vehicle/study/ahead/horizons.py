@@ -210,16 +210,27 @@ def block_errors(
 
 
 def squares_ahead(
-    fits: Sequence[Fit], driving: Driving, horizons_s: Sequence[float]
+    fits: Sequence[Fit],
+    driving: Driving,
+    horizons_s: Sequence[float],
+    counted: npt.NDArray[np.bool_] | None = None,
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
     """Squares of errors, noise of the sensors, and which horizons and channels are seen.
 
     The squares have shape (models, blocks, horizons, channels). The last model's noise starts every
-    prediction.
+    prediction. Of these some may be counted alone, (horizons, samples), by where they end.
     """
-    noise = fits[-1].noise.floor()
+    noise, ahead = fits[-1].noise.floor(), tuple(horizons_s)
     sensor = np.array([noise.sensor[MEASURED.index(c)] for c in PREDICTED])
-    squares = np.stack([block_errors(f, noise, driving, tuple(horizons_s)) for f in fits]) ** 2
+
+    def of(fit: Fit) -> FloatArray:
+        if counted is None or counted.all():
+            return as_float64(block_errors(fit, noise, driving, ahead))
+        errors = errors_ahead(fit, noise, driving, ahead)
+        errors[~counted] = np.nan
+        return _by_block(errors, driving)
+
+    squares = np.stack([of(fit) for fit in fits]) ** 2
     seen = np.isfinite(squares).any(axis=(0, 1))
     seen &= np.isin(PREDICTED, explainable(driving))
     return lost_as_large(as_float64(squares)), as_float64(sensor), seen

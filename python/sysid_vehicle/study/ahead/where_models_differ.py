@@ -15,6 +15,7 @@ import numpy.typing as npt
 from ..._common.arrays import FloatArray, as_float64, spread_of_known
 from ...estimate import MEASURED, Driving, equal_blocks, moving
 from ...identify import Fit
+from .fitted_range import within_fitted_range
 from .horizons import PREDICTED, errors_ahead, explainable, lost_as_large
 
 
@@ -41,7 +42,8 @@ def apart(
 
     That is by the prediction of some channels, where it differs by a quarter at least of what it
     does over all the driving (`moving`), for each horizon by itself. Blocks hold equal times of
-    that.
+    that. Predictions in which tyres work further than they were fitted are left out
+    (`within_fitted_range`).
 
     Parameters
     ----------
@@ -60,6 +62,7 @@ def apart(
     errors = np.stack(
         [errors_ahead(fit, noise, driving, ahead)[..., columns] for fit in (one, other)]
     )
+    errors[:, ~within_fitted_range(other, driving, ahead)] = np.nan
     differ = np.stack([_differ(e, counted, driving) for e in errors.swapaxes(0, 1)])
     there = ~np.any(np.isnan(errors), axis=0) & differ[..., None]
     starts = equal_blocks(as_float64(differ.mean(axis=0)), driving)

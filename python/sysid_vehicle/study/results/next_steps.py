@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..._common.text import few
 from ...rules import LACKING
 from ..judge.matters import USUAL_SIZES
-from .sentences import disturbance, in_training, only_elsewhere, slow
+from .sentences import disturbance, extrapolates, in_training, only_elsewhere, slow
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -142,6 +142,11 @@ def _of_driving(study: Study) -> list[str]:
     if apart:
         found.append(
             f"find out what differs between the drives (speed, load, tyres, road, sensors): {apart}"
+        )
+    if extrapolates(study):
+        found.append(
+            "add driving with slip angles as large as those of the validation data to the training "
+            "data: beyond those that were fitted shares of the error are not counted"
         )
     open_ = [
         e.name for e in study.fit.estimates if e.note == "not determined" and "." not in e.name

@@ -138,8 +138,10 @@ def _explained(study: Study) -> list[str]:
     if study.explained is None:
         return []
     if not study.explained.share > 0.0:
-        return [f"{NONE_GONE.capitalize()}: the effects added do not reduce it."]
-    said = [f"The effects added remove {study.explained} of the error 1 to 5 s ahead."]
+        return [f"{NONE_GONE.capitalize()}: the effects added do not reduce it{_within(study)}."]
+    said = [
+        f"The effects added remove {study.explained} of the error 1 to 5 s ahead{_within(study)}."
+    ]
     said += as_fitted(study)
     whole = study.shares.whole
     if whole.known and whole.value > 0.0:
@@ -150,6 +152,20 @@ def _explained(study: Study) -> list[str]:
         who = "The effects named explain" if named else "The effects added explain"
         said.append(f"{who} {whole} of what any function of the driving could explain of it.")
     return said
+
+
+def extrapolates(study: Study) -> bool:
+    """Whether a part of the validation data has slip angles beyond those that were fitted."""
+    return study.explained is not None and 1.0 - study.explained.within > study.rules.explainable
+
+
+def _within(study: Study) -> str:
+    if study.explained is None or not extrapolates(study):
+        return ""
+    return (
+        f" where slip angles are no larger than fitted, {100 * study.explained.within:.0f} % of "
+        "the validation data"
+    )
 
 
 def structured(study: Study) -> bool:

@@ -1,0 +1,102 @@
+"""Where tyres work as far as they were fitted: beyond, their curves are extrapolated.
+
+What a model errs there its tyres do, with whatever effect beside them: that says of no effect
+whether the car has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ..._common.arrays import FloatArray, as_float64
+from ..._common.memo import remembered
+from ...errors import NumericalError
+from ...estimate import Driving
+from ...identify import Fit, driving_of
+from ...rules import USUAL, share_of
+from ...vehicle import slip_angles
+
+_Bools = npt.NDArray[np.bool_]
+
+_RARE = 99.5  # percentile, as of the tyre curves of a report
+
+
+def within_fitted_range(fit: Fit, driving: Driving, horizons_s: Sequence[float]) -> _Bools:
+    """Find the predictions in which both axles stay within the slip angles that were fitted.
+
+    Parameters
+    ----------
+    fit : Fit
+    driving : Driving
+        Of that of the fit itself, all is within.
+    horizons_s : sequence of float
+
+    Returns
+    -------
+    array of bool, shape (horizons, samples)
+        By the sample at which a prediction ends. All, where none is at any horizon.
+    """
+    beyond = np.concatenate([[0], np.cumsum(~fitted(fit, driving))])
+    found = np.zeros((len(horizons_s), driving.samples), dtype=bool)
+    for first, end, rate in driving.spans:
+        for within, horizon in zip(found, horizons_s, strict=True):
+            ahead = max(round(horizon * rate), 1)
+            ends = np.arange(first + ahead, end)
+            within[ends] = beyond[ends + 1] == beyond[ends - ahead]
+    return found if found.any() else ~found
+
+
+@remembered(16)
+def fitted(fit: Fit, driving: Driving) -> _Bools:
+    """At which samples the slip angle of neither axle is larger than those that were fitted.
+
+    One fitted sample in 200 may be an outlier, and is no measure. A model that errs no more beyond
+    holds there too: then all is within.
+
+    Parameters
+    ----------
+    fit : Fit
+    driving : Driving
+
+    Returns
+    -------
+    array of bool, shape (samples,)
+        All samples of the driving of the fit, and where the model fails.
+    """
+    every = np.ones(driving.samples, dtype=bool)
+    if driving is fit.driving:
+        return every
+    try:
+        most = np.percentile(_slips(fit, fit.driving), _RARE, axis=1)
+        within = np.asarray((_slips(fit, driving) <= most[:, None]).all(axis=0))
+        squares = _squares(fit, driving)
+    except NumericalError:
+        return every
+    if within.all() or not within.any():
+        return every
+    beyond, inside = float(np.mean(squares[~within])), float(np.mean(squares[within]))
+    return within if share_of(beyond, inside) > USUAL.explainable else every
+
+
+@remembered(16)
+def _slips(fit: Fit, driving: Driving) -> FloatArray:
+    """Size of the slip angles by the filtered motion and the logged steering, (2, samples).
+
+    What effects do to the steering angle they do in all driving.
+    """
+    problem = driving_of(fit, driving).problem(fit.model)
+    motion = problem.trace(fit.model.vector(), fit.noise.vector(), False)["state"]
+    least = min(log.least_speed_mps for log in driving.logs)
+    vehicle, steer = fit.model.vehicle, driving.channel("steer_rad")
+    v_x, v_y, yaw_rate = np.maximum(motion[:, 0], least), motion[:, 1], motion[:, 2]
+    return as_float64(np.abs(slip_angles(vehicle.lf_m, vehicle.lr_m, steer, v_x, v_y, yaw_rate)))
+
+
+def _squares(fit: Fit, driving: Driving) -> FloatArray:
+    """Squared errors one step ahead in units of the noise floor, over all channels."""
+    problem = driving_of(fit, driving).problem(fit.model)
+    trace = problem.trace(fit.model.vector(), fit.noise.floor().vector(), False)
+    return as_float64(np.sum(trace["whitened"] ** 2, axis=1))
