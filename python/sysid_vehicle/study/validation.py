@@ -27,6 +27,7 @@ from ..log import Log, several_logs
 from ..rules import ErrorChange, Gain
 from .ahead.along_the_car import along_alone, changes_of
 from .ahead.beyond import Beyond, beyond_noise
+from .ahead.fitted_range import within_fitted_range
 from .ahead.horizons import ALONG, typical_error
 
 _SHARE = 0.3
@@ -184,8 +185,8 @@ def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[ErrorChange,
 
 
 def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
-    """Errors 1 to 5 s ahead beyond the noise, of models with the parameters of `at_its_best`."""
-    return beyond_noise(in_parallel(lambda fit: at_its_best(fit, test), fits), test, AHEAD)
+    """Errors 1 to 5 s ahead beyond the noise, of models with the parameters of `best_within`."""
+    return beyond_noise(in_parallel(lambda fit: best_within(fit, test), fits), test, AHEAD)
 
 
 def as_elsewhere(fit: Fit, test: Driving) -> Fit:
@@ -207,14 +208,31 @@ def at_its_best(fit: Fit, test: Driving) -> Fit:
     """
     if (BEST, fit) in test.told:
         return cast(Fit, test.told[BEST, fit])
+    noise = fit.noise.floor()
+    return min(_ways(fit, test), key=lambda f: typical_error(f, noise, test, AHEAD))
+
+
+@remembered(16)
+def best_within(fit: Fit, test: Driving) -> Fit:
+    """As `at_its_best`, by predictions that stay within the slip angles that were fitted.
+
+    Where parameters that are best everywhere err more beyond (`within_fitted_range`).
+    """
+    best, noise = at_its_best(fit, test), fit.noise.floor()
+    within = within_fitted_range(best, test, AHEAD)
+    if within.all():
+        return best
+    return min(_ways(fit, test), key=lambda f: typical_error(f, noise, test, AHEAD, within))
+
+
+def _ways(fit: Fit, test: Driving) -> list[Fit]:
     found = [fit]
     with suppress(NumericalError, np.linalg.LinAlgError):
         found.append(replace(fit, model=_prediction(fit, test, fit).model))
     ahead = fitted_ahead(fit)
     if ahead is not None:
         found.append(ahead)
-    noise = fit.noise.floor()
-    return min(found, key=lambda f: typical_error(f, noise, test, AHEAD))
+    return found
 
 
 @remembered(16)

@@ -222,15 +222,7 @@ def squares_ahead(
     """
     noise, ahead = fits[-1].noise.floor(), tuple(horizons_s)
     sensor = np.array([noise.sensor[MEASURED.index(c)] for c in PREDICTED])
-
-    def of(fit: Fit) -> FloatArray:
-        if counted is None or counted.all():
-            return as_float64(block_errors(fit, noise, driving, ahead))
-        errors = errors_ahead(fit, noise, driving, ahead)
-        errors[~counted] = np.nan
-        return _by_block(errors, driving)
-
-    squares = np.stack([of(fit) for fit in fits]) ** 2
+    squares = np.stack([_errors_of(f, noise, driving, ahead, counted) for f in fits]) ** 2
     seen = np.isfinite(squares).any(axis=(0, 1))
     seen &= np.isin(PREDICTED, explainable(driving))
     return lost_as_large(as_float64(squares)), as_float64(sensor), seen
@@ -271,15 +263,35 @@ def _by_block(e: FloatArray, driving: Driving) -> FloatArray:
         return as_float64(np.where(count > 0.0, np.sqrt(squares / count), np.nan).swapaxes(0, 1))
 
 
+def _errors_of(
+    fit: Fit,
+    noise: NoiseModel,
+    driving: Driving,
+    horizons_s: tuple[float, ...],
+    counted: npt.NDArray[np.bool_] | None,
+) -> FloatArray:
+    """As `block_errors`, of the predictions that count."""
+    if counted is None or counted.all():
+        return block_errors(fit, noise, driving, horizons_s)
+    errors = errors_ahead(fit, noise, driving, horizons_s)
+    errors[~counted] = np.nan
+    return _by_block(errors, driving)
+
+
 def typical_error(
-    fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: Sequence[float]
+    fit: Fit,
+    noise: NoiseModel,
+    driving: Driving,
+    horizons_s: Sequence[float],
+    counted: npt.NDArray[np.bool_] | None = None,
 ) -> float:
     """Mean logarithm of the median errors of the lateral channels, over all horizons.
 
-    Infinite where the model loses the car in most blocks.
+    Infinite where the model loses the car in most blocks. Of the predictions some may be counted
+    alone, as for `squares_ahead`.
     """
     found = []
-    for by_block in block_errors(fit, noise, driving, tuple(horizons_s)).swapaxes(0, 1):
+    for by_block in _errors_of(fit, noise, driving, tuple(horizons_s), counted).swapaxes(0, 1):
         by_block = by_block[:, _LATERAL]
         known = ~np.isnan(by_block).all(axis=0)
         found += list(median_of_known(by_block[:, known], axis=0))

@@ -13,7 +13,7 @@ from ...errors import NumericalError
 from ...estimate import Driving
 from ...identify import Fit, refit
 from ...rules import UNKNOWN, USUAL, Rules, Share
-from ..validation import AHEAD, at_its_best, gain_in_log_likelihood
+from ..validation import AHEAD, at_its_best, best_within, gain_in_log_likelihood
 from .beyond import Beyond, own_share, taken_of
 from .horizons import LATERAL, moved_by
 from .shares import shares
@@ -29,7 +29,7 @@ def own_shares(
     """Find the share of the error 1 to 5 s ahead that is an effect's own.
 
     The model without it is fitted anew under the same noise: tyres and the other effects take up
-    what they can. On validation data both models have the parameters of `at_its_best`. Errors of
+    what they can. On validation data both models have the parameters of `best_within`. Errors of
     the motion that it moves count, along the car or lateral: others it cannot take away, and what
     parameters fitted anew change there is none of its doing. They count where the two models
     predict something else (`apart`).
@@ -157,13 +157,13 @@ def _shares(
     def on_test(few: tuple[str, ...]) -> Share:
         fit = without(final, few)
         assert fit is not None  # its share of the training data is known
-        best, poorer = at_its_best(final, test), at_its_best(fit, test)
+        best, poorer = best_within(final, test), best_within(fit, test)
         return own_share(poorer, best, test, AHEAD, channels=moved[few])
 
     fitted = in_time(on_train, asked)
     judged: dict[tuple[str, ...], Share] = {}
     if any(fitted[e].low > 0.0 for e in fitted if e in named):
-        before(ends, lambda: at_its_best(final, test), None)  # once for all of them
+        before(ends, lambda: best_within(final, test), None)  # once for all of them
         judged = in_time(on_test, fitted)
     return {e: (judged.get(e, UNKNOWN), fitted.get(e, UNKNOWN)) for e in asked if e not in late}
 
@@ -261,7 +261,7 @@ def together_by_motion(
         By effect, of the motion that it moves: squares of the errors of the baseline and of the
         final model, and the lower end of the share.
     """
-    first, last = (at_its_best(fit, test) for fit in (fits[0], fits[-1]))
+    first, last = (best_within(fit, test) for fit in (fits[0], fits[-1]))
     parts = {part.id: moved_by(part) for part in fits[-1].model.parts}
     found: dict[frozenset[str], tuple[tuple[float, float], float]] = {}
     for channels in {parts[e] for e in added}:

@@ -68,7 +68,7 @@ def _partly_explained(study: Study) -> str:
     if not taken or not taken.share < study.rules.most:
         return "the effects found explain part of it; something else is missing"
     part = f"{taken} of the error 1 to 5 s ahead"
-    if not taken.low > 0.0 and study.shares.whole.known:
+    if not taken.low > 0.0 and study.shares.whole.low > 0.0:
         part = (
             f"{study.shares.whole} of what any function of the driving could explain of the error "
             "1 to 5 s ahead"

@@ -144,7 +144,7 @@ def _explained(study: Study) -> list[str]:
     ]
     said += as_fitted(study)
     whole = study.shares.whole
-    if whole.known and whole.value > 0.0:
+    if whole.low > 0.0:
         # The share is that of all effects added: of the names only where all of these stand.
         named = study.verdict in ("explained", "partly_explained") and not any(
             a.stands_in for a in study.added
