@@ -9,6 +9,7 @@ import numpy as np
 from .._common.arrays import FloatArray, as_float64
 from ..identify import Fit
 from ..model import Model
+from ..study.ahead.fitted_range import RARE
 from ..vehicle import AXLES
 
 # Columns of the core's evaluation, front and rear.
@@ -18,7 +19,6 @@ _FORCE = (9, 10)
 _SPEED_MPS = 20.0
 _POINTS = 61
 _SMALLEST_RANGE_RAD = 0.07
-_RARE = 99.5  # percentile
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ def driven_slip(fit: Fit) -> tuple[float, float]:
             for x, d, f in zip(motion[::5], steer[::5].tolist(), pull[::5].tolist(), strict=True)
         ]
     )
-    front, rear = np.percentile(np.abs(slip), _RARE, axis=0)
+    front, rear = np.percentile(np.abs(slip), RARE, axis=0)
     return float(front), float(rear)
 
 

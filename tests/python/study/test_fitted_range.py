@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_vehicle import Fit, Model, drive, identify, manoeuvres
+from sysid_vehicle import Fit, Log, Model, drive, identify, manoeuvres
 from sysid_vehicle.estimate import Driving
+from sysid_vehicle.study import validation
 from sysid_vehicle.study.ahead import beyond, where_models_differ
 from sysid_vehicle.study.ahead.beyond import beyond_noise, own_share
 from sysid_vehicle.study.ahead.fitted_range import fitted, within_fitted_range
-from sysid_vehicle.study.validation import AHEAD
+from sysid_vehicle.study.validation import AHEAD, at_its_best, best_within
 
 LAG = {"steer_lag.time_constant_s": 0.1}
 GENTLE_MPS2, LIMIT_MPS2 = 4.0, 7.5
@@ -102,3 +103,26 @@ def test_tyres_beyond_what_was_fitted_do_not_hide_a_share(
         monkeypatch.setattr(module, "within_fitted_range", everywhere)
     assert not own_share(without, gentle, harder, AHEAD).low > 0.0
     assert not beyond_noise((without, gentle), harder, AHEAD).low > 0.0
+
+
+def test_parameters_that_are_best_everywhere_need_not_be_so_within(
+    gentle: Fit,
+    harder: Driving,
+    late: Model,
+    course: Log,
+    fit: Fit,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A shorter lag with tyres that err less at the limit."""
+    values = {"steer_lag.time_constant_s": 0.05, "D_rear": 0.9 * late.value("D_rear")}
+    values["B_rear"] = late.value("B_rear") / 0.9
+    other = replace(gentle, model=gentle.model.with_values(values))
+    asked = replace(gentle)
+    with monkeypatch.context() as patch:
+        patch.setattr(validation, "_ways", lambda *_: [gentle, other])
+        assert at_its_best(asked, harder) is other
+        assert not within_fitted_range(other, harder, AHEAD).all()
+        assert best_within(asked, harder) is gentle
+    # What holds beyond what was fitted is asked once.
+    driving = Driving.of(course)
+    assert best_within(fit, driving) is at_its_best(fit, driving)

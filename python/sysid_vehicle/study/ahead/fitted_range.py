@@ -21,7 +21,8 @@ from ...vehicle import slip_angles
 
 _Bools = npt.NDArray[np.bool_]
 
-_RARE = 99.5  # percentile, as of the tyre curves of a report
+RARE = 99.5
+"""Percentile of slip angles up to which tyres count as fitted: larger ones may be outliers."""
 
 
 def within_fitted_range(fit: Fit, driving: Driving, horizons_s: Sequence[float]) -> _Bools:
@@ -37,10 +38,13 @@ def within_fitted_range(fit: Fit, driving: Driving, horizons_s: Sequence[float])
     Returns
     -------
     array of bool, shape (horizons, samples)
-        By the sample at which a prediction ends. All, where none is at any horizon.
+        By the sample at which a prediction ends. All, where all or none are within.
     """
-    beyond = np.concatenate([[0], np.cumsum(~fitted(fit, driving))])
+    inside = fitted(fit, driving)
     found = np.zeros((len(horizons_s), driving.samples), dtype=bool)
+    if inside.all():
+        return ~found
+    beyond = np.concatenate([[0], np.cumsum(~inside)])
     for first, end, rate in driving.spans:
         for within, horizon in zip(found, horizons_s, strict=True):
             ahead = max(round(horizon * rate), 1)
@@ -53,8 +57,8 @@ def within_fitted_range(fit: Fit, driving: Driving, horizons_s: Sequence[float])
 def fitted(fit: Fit, driving: Driving) -> _Bools:
     """At which samples the slip angle of neither axle is larger than those that were fitted.
 
-    One fitted sample in 200 may be an outlier, and is no measure. A model that errs no more beyond
-    holds there too: then all is within.
+    One fitted sample in 200 may be an outlier, and is no measure. A model that is not shown to err
+    more beyond (`Rules.explainable`, `Rules.bound`) holds there too: then all is within.
 
     Parameters
     ----------
@@ -70,15 +74,16 @@ def fitted(fit: Fit, driving: Driving) -> _Bools:
     if driving is fit.driving:
         return every
     try:
-        most = np.percentile(_slips(fit, fit.driving), _RARE, axis=1)
+        most = np.percentile(_slips(fit, fit.driving), RARE, axis=1)
         within = np.asarray((_slips(fit, driving) <= most[:, None]).all(axis=0))
         squares = _squares(fit, driving)
     except NumericalError:
         return every
     if within.all() or not within.any():
         return every
-    beyond, inside = float(np.mean(squares[~within])), float(np.mean(squares[within]))
-    return within if share_of(beyond, inside) > USUAL.explainable else every
+    beyond, inside = squares[~within], float(np.mean(squares[within]))
+    least = np.mean(beyond) - USUAL.bound * np.std(beyond) / np.sqrt(len(beyond))
+    return within if share_of(float(least), inside) > USUAL.explainable else every
 
 
 @remembered(16)
