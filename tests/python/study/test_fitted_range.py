@@ -71,6 +71,13 @@ def test_a_model_that_holds_beyond_what_was_fitted_counts_there_too(
     assert fitted(replace(gentle, model=right), harder).all()
 
 
+def test_a_small_part_beyond_is_no_matter(gentle: Fit, harder: Driving) -> None:
+    first, fast = harder.logs
+    late = fitted(gentle, harder)[first.n + 2000 : first.n + 2400]
+    assert np.mean(late) < 0.9
+    assert fitted(gentle, Driving.of([first, fast.between(20.0, 24.0)])).all()
+
+
 def test_a_prediction_counts_while_nothing_beyond_is_in_it(gentle: Fit, harder: Driving) -> None:
     within, rate = fitted(gentle, harder), harder.mean_rate_hz
     (one,) = within_fitted_range(gentle, harder, (1.0,))

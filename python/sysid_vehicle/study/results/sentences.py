@@ -155,8 +155,8 @@ def _explained(study: Study) -> list[str]:
 
 
 def extrapolates(study: Study) -> bool:
-    """Whether a part of the validation data has slip angles beyond those that were fitted."""
-    return study.explained is not None and 1.0 - study.explained.within > study.rules.explainable
+    """Whether shares leave out driving at slip angles beyond those that were fitted."""
+    return study.explained is not None and study.explained.within < 1.0
 
 
 def _within(study: Study) -> str:
