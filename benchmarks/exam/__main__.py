@@ -2,11 +2,13 @@
 
     python benchmarks/exam [--small | --full | --draw KIND=N ...] [--driving SET ...]
                            [--severity S ...] [--workers N] [--only TABLE] [--json FILE]
-                           [--plot PNG]
+                           [--plot PNG] [--course-mps2 A]
 
 `--small` (the default) takes less than a minute. `--full` does every point of the grid; `--draw`
 some of them, its truths and severities in turn. Outcomes go to the file as they come: the same
 command goes on where it was broken off, and an exam with all its outcomes on file only prints.
+`--course-mps2` makes validation courses of at least so much lateral acceleration, where by itself
+no validation course goes beyond the driving that is fitted.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from confusion import draw
@@ -66,6 +69,13 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument(
+        "--course-mps2",
+        type=float,
+        default=0.0,
+        metavar="A",
+        help="least lateral acceleration of validation courses",
+    )
     parser.add_argument("--only", choices=NAMES, help="this table, and the trials it needs")
     parser.add_argument("--json", type=Path, metavar="FILE", help="outcomes, one a line")
     parser.add_argument("--plot", type=Path, metavar="PNG", help="confusion matrix")
@@ -86,7 +96,7 @@ def _trials(args: argparse.Namespace) -> tuple[Trial, ...]:
         trials = small(args.seed)
     if args.only is not None:
         trials = tuple(t for t in trials if t.kind in KINDS_OF[args.only])
-    return trials
+    return tuple(replace(t, course_mps2=args.course_mps2) for t in trials)
 
 
 def _estimate(total: int, left: int, known: Sequence[Outcome], workers: int) -> str:

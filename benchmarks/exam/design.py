@@ -98,6 +98,9 @@ class Trial:
         Whether lateral speed is measured.
     repeat : int
         Counts trials that differ in nothing but their random numbers.
+    course_mps2 : float
+        Least lateral acceleration for which the validation course is made; usually that of the
+        training data.
     """
 
     kind: Kind
@@ -108,6 +111,7 @@ class Trial:
     with_vy: bool
     vehicle: str
     repeat: int = 0
+    course_mps2: float = 0.0
 
     @property
     def key(self) -> str:
@@ -117,6 +121,7 @@ class Trial:
         return (
             f"{self.kind}|{what}|{self.severity:g}|{self.driving}|{self.noise}|{sensor}"
             f"|{self.vehicle}|{self.repeat}"
+            + (f"|course {self.course_mps2:g}" if self.course_mps2 else "")
         )
 
     @property

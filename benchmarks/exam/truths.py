@@ -103,7 +103,8 @@ def sample(trial: Trial) -> tuple[list[sv.Log], sv.Log, float]:
     """
     for ease in _EASIER:
         rng = np.random.default_rng(trial.seed)
-        course = sv.manoeuvres.handling_course(30.0, _COURSE_MPS2[trial.driving] * ease)
+        lateral = max(_COURSE_MPS2[trial.driving], trial.course_mps2) * ease
+        course = sv.manoeuvres.handling_course(30.0, lateral)
         try:
             logs = [drive_one(trial, m, rng) for m in (*manoeuvres(trial.driving, ease), course)]
         except sv.NumericalError:
