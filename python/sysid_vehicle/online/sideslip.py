@@ -87,7 +87,7 @@ class SideslipObserver:
     2017).
 
     Readings that no car gives, by their size or by how fast they change, are refused: the tyre
-    model stands in, and `mode` says so. Steps beyond 0.05 s are divided. After a step of more than
+    model stands in, and `mode` says so. Steps beyond 0.01 s are divided. After a step of more than
     1 s, or where the estimate leaves 1.2 rad, the motion begins again with its initial covariance;
     what was learnt of the tyres stays.
 
