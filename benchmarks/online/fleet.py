@@ -298,6 +298,7 @@ class Result:
     linear_generic_deg: float
     linear_true_deg: float
     covered: float
+    width_deg: float  # mean half width of the 2-sigma band
     stiffness_off: float  # of the worse axle
     stiffness_held: bool  # within 10 % of the regression, or within its own 2 sigma
 
@@ -336,6 +337,7 @@ def judged(case: Case, **changes: float) -> Result:
         generic_ukf.error().rms_deg,
         true_ukf.error().rms_deg,
         run.error().covered,
+        2.0 * float(np.degrees(np.mean(run.beta_std_rad))),
         float(np.max(off / target)),
         bool(np.all((off <= 0.1 * target) | (off <= 2.0 * std))),
     )
@@ -345,7 +347,8 @@ def table(results: list[Result]) -> int:
     """Print a line per cell; the number of targets missed."""
     print(
         f"{'simulator':13s} {'drive':19s} {'n':>3s} {'rms':>6s} {'linear UKF':>12s} "
-        f"{'no worse':>9s} {'most':>6s} {'band':>6s} {'within 10 %':>12s} {'or 2 s':>7s}"
+        f"{'no worse':>9s} {'most':>6s} {'band':>6s} {'2 sigma':>7s} {'within 10 %':>12s} "
+        f"{'or 2 s':>7s}"
     )
     missed = 0
     for simulator in SIMULATORS:
@@ -368,6 +371,7 @@ def table(results: list[Result]) -> int:
                 f"{np.median([r.linear_generic_deg for r in cell]):5.2f}, "
                 f"{np.median([r.linear_true_deg for r in cell]):4.2f} "
                 f"{better:7.0f} %{marks[0]} {ratio.max():5.2f}{marks[1]} {band:5.1f}{marks[2]} "
+                f"{np.mean([r.width_deg for r in cell]):7.3f} "
                 f"{near:10.0f} % {held:5.0f} %{marks[3]}"
             )
     print(f"{missed} targets missed (*): 80 % no worse, never twice, band 90..98 %, stiffness 90 %")

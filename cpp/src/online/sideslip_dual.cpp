@@ -10,20 +10,24 @@ namespace {
 constexpr double kSteerUnknown = 0.15;  // random walk of its angle [rad/sqrt(s)]
 constexpr double kAtOrigin = 1.5;  // error of the curve's slope there over that at larger slips
 /// What a tyre filter expects, each over the settings: errors of the tyre model, bank of the road
-/// and how long it lasts, change of the friction, errors of what is told of the car, and offsets of
-/// sensors with forces from outside. These act like a bank where they last: where one filter takes
-/// readings for the one and another for the others, the band is wide. `doubt` is the logarithm by
-/// which it is less likely before any reading.
+/// and how long it lasts, change of the friction, errors of what is told of the car, offsets of
+/// sensors with forces from outside, and slip without force. How large offsets are has nothing to
+/// do with how well tyres are known, and no reading tells slip without force: but for a car that is
+/// all as told, the filters have these in full. Banks act like offsets where they last: where one
+/// filter takes readings for the one and another for the others, the band is wide. `doubt` is the
+/// logarithm by which it is less likely before any reading.
 struct Departures {
-    double model, road, road_lasts, grip, car, offsets, doubt;
+    double model, road, road_lasts, grip, car, offsets, slip, doubt;
 };
-constexpr std::array<Departures, 5> kDepartures = {{
-    {0.12, 0.12, 1.0, 1.0, 0.02, 0.02, 0.0},
-    {0.45, 0.45, 1.0, 1.0, 0.02, 0.02, 0.0},
-    {2.0, 2.0, 1.0, 1.0, 0.02, 0.02, 0.0},
-    // Banks: slow, as quick ones are the body that rolls.
-    {0.2, 40.0, 10.0, 5.0, 0.05, 0.02, 5.0},
-    {0.45, 0.45, 1.0, 5.0, 1.0, 1.0, 0.0},  // other tyres, inertia or sensors than was told
+constexpr std::array<Departures, 6> kDepartures = {{
+    {0.12, 0.12, 1.0, 1.0, 0.02, 0.02, 0.12, 0.0},
+    {0.12, 0.12, 1.0, 1.0, 0.02, 1.0, 1.0, 0.0},
+    {0.45, 0.45, 1.0, 1.0, 0.02, 1.0, 1.0, 0.0},
+    {2.0, 2.0, 1.0, 1.0, 0.02, 1.0, 1.0, 0.0},
+    // Banks: slow, as quick ones are the body that rolls; with the friction of the others, as a
+    // bank and less friction together explain a slide that there is not.
+    {0.2, 40.0, 10.0, 1.0, 0.05, 0.02, 1.0, 5.0},
+    {0.45, 0.45, 1.0, 5.0, 1.0, 1.0, 1.0, 0.0},  // other tyres or inertia than was told
 }};
 constexpr double kWeightTimeS = 5.0;  // of readings that decide between them
 // Errors of the model make innovations that follow each other: one tells less than its likelihood.
@@ -34,9 +38,10 @@ constexpr double kMostAgainst = 10.0;  // of the log weights, so that none is lo
 
 /// The same, with other errors of model and road.
 ObserverSettings expecting(ObserverSettings s, const Departures& d) {
-    for (double* error : {&s.error_load, &s.error_lateral, &s.error_drive, &s.error_slip_rad,
-                          &s.yaw_walk_radps, &s.sideslip_walk_rad})
+    for (double* error :
+         {&s.error_load, &s.error_lateral, &s.error_drive, &s.yaw_walk_radps, &s.sideslip_walk_rad})
         *error *= d.model;
+    s.error_slip_rad *= d.slip;
     s.road_mps2 *= d.road;
     s.road_time_s *= d.road_lasts;
     s.friction_prior *= d.grip;

@@ -77,16 +77,17 @@ class SideslipObserver:
     acceleration, braking takes its share of the grip, and stiffness and friction of both axles are
     states, as are what the tyre model does not explain and what may have been told wrong: the yaw
     inertia, how late the wheels turn, the place of the accelerometer, offsets of the sensors; and a
-    bank of the road and forces from outside, which no reading tells from these. Five tyre filters
-    expect small, middling and large departures from the model, banked roads, and another car or
-    surface than was told. They count by the likelihood of the last readings (Raftery, Kárný &
-    Ettler, *Technometrics* 52, 2010), tempered, because errors of a wrong model last (Grünwald &
-    van Ommen, *Bayesian Analysis* 12, 2017). The standard deviation covers all of it, their
-    disagreement, and the error of the tyre curve, which no reading tells. Little slip teaches less
-    of the stiffness (partial update: Brink, *J. Guid. Control Dyn.* 40, 2017).
+    bank of the road and forces from outside, which no reading tells from these. Six tyre filters
+    expect a car and sensors that are as told, small, middling and large departures from the model,
+    banked roads, and another car or surface than was told. They count by the likelihood of the last
+    readings (Raftery, Kárný & Ettler, *Technometrics* 52, 2010), tempered, because errors of a
+    wrong model last (Grünwald & van Ommen, *Bayesian Analysis* 12, 2017). The standard deviation
+    covers all of it, their disagreement, and the error of the tyre curve, which no reading tells.
+    Little slip teaches less of the stiffness (partial update: Brink, *J. Guid. Control Dyn.* 40,
+    2017).
 
     Readings that no car gives, by their size or by how fast they change, are refused: the tyre
-    model stands in, and `mode` says so. Steps beyond 0.05 s are divided. After a step of more than
+    model stands in, and `mode` says so. Steps beyond 0.01 s are divided. After a step of more than
     1 s, or where the estimate leaves 1.2 rad, the motion begins again with its initial covariance;
     what was learnt of the tyres stays.
 

@@ -42,3 +42,16 @@ def test_a_wrong_sign_is_named() -> None:
     data = burckhardt(9)
     with pytest.raises(InvalidInput, match=r"mu: of the other sign than slip .* sample \d+"):
         online.MuSlipData(data.slip, -data.mu)
+
+
+@pytest.mark.parametrize("seed", [1, 3, 7])
+def test_readings_of_little_slip_determine_no_bias(seed: int) -> None:
+    """The bias takes the peak to -1e7, where no curve is to be held against the readings."""
+    slip = np.linspace(0.0, 0.0168, 12)
+    mu = 15.0 * slip / (1.0 + (slip / 0.12) ** 2)
+    data = online.MuSlipData(slip, mu + 0.03 * np.random.default_rng(seed).standard_normal(12))
+    found = online.compare_mu_slip(data)
+    assert found.best.method == "least squares"
+    assert "corrected: left out, the readings do not determine the curve" in str(found)
+    with pytest.raises(InvalidInput, match="take readings on both sides of the peak"):
+        online.mu_slip_fit(data, corrected=True)

@@ -11,11 +11,12 @@
 // true of any tyre, but drifts) and the tyre model in the long run.
 //
 // How far a car and its road depart from the model differs by more than ten times from car to car,
-// and so does in what. There are five B, which expect small, middling and large departures, banked
-// roads, and a car or tyres that are not as told; each counts by the likelihood of its
-// last readings (Raftery, Karny & Ettler, Technometrics 52, 2010), tempered, as a wrong model makes
-// errors that last (Grunwald & van Ommen, Bayesian Analysis 12, 2017): those that explain the
-// readings about as well stay, and where they disagree the band is wide.
+// and so does in what. There are six B, which expect a car with sensors that are as told, small,
+// middling and large departures, banked roads, and a car or tyres that are not as told; each counts
+// by the likelihood of its last readings (Raftery, Karny & Ettler, Technometrics 52, 2010),
+// tempered, as a wrong model makes errors that last (Grunwald & van Ommen, Bayesian Analysis 12,
+// 2017): those that explain the readings about as well stay, and where they disagree the band is
+// wide.
 #pragma once
 
 #include <array>
@@ -62,7 +63,7 @@ class SideslipDual {
     }
 
   private:
-    static constexpr std::size_t kMembers = 5;
+    static constexpr std::size_t kMembers = 6;
 
     void start(double dt, const SensorSample& s);
     void run(double dt, const SensorSample& s);

@@ -44,7 +44,8 @@ def mu_slip_fit(
     Raises
     ------
     InvalidInput
-        If start or bounds make no sense, or the readings do not determine the parameters.
+        If start or bounds make no sense, or the readings do not determine the parameters or their
+        bias.
     """
     low, high = (
         curve.vector(b, "bounds") for b in bounds or (curve.kernels.LOWER, curve.kernels.UPPER)
@@ -69,6 +70,13 @@ def mu_slip_fit(
     notes += cautions(curve, data, values, low, high)
     if corrected:
         values = values - variance * found["bias"]
+        outside = (values < low) | (values > high)
+        if outside.any():  # an expansion that goes there holds no longer
+            name = curve.parameters[int(np.argmax(outside))]
+            raise InvalidInput(
+                f"mu: the bias of {name} takes it where it cannot be: the readings do not "
+                f"determine the {curve.name} curve; take readings on both sides of the peak"
+            )
     return MuSlipEstimate(
         "least squares, corrected" if corrected else "least squares",
         curve,
