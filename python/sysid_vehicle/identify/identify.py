@@ -79,7 +79,8 @@ def identify(
     bounds : mapping of str to (lower, upper)
         Narrower bounds of free parameters.
     priors : mapping of str to (mean, standard deviation)
-        What is known of free parameters beforehand, as normal distributions.
+        What is known of free parameters beforehand, as normal distributions. One that the data
+        contradict is told by a warning, and by `Fit.against_priors`.
     intervals : str
         `information`: 95 % intervals from the information matrix. `profile`: from the profile
         likelihood, which follows bent valleys and takes some tens of searches.
@@ -100,9 +101,10 @@ def identify(
     Raises
     ------
     InvalidInput
-        Unknown method, intervals or parameter, bounds or priors that contradict each other, no
-        free parameter, no starts or workers, a negative seed, nothing usable in the logs, or logs
-        that cannot be of this car: another mass, another steering ratio.
+        Unknown method, intervals or parameter, bounds or priors that contradict each other or are
+        not two numbers each, a fixed value that is no number or that no tyre has, no free
+        parameter, no starts or workers, a negative seed, nothing usable in the logs, or logs that
+        cannot be of this car: another mass, another steering ratio.
     NumericalError
         No start led anywhere.
     """
@@ -122,6 +124,8 @@ def identify(
         workers=workers,
         progress=progress,
     )
+    for against in fit.against_priors:
+        warn(str(against))
     if intervals == "profile":
         return profile_fit(fit, workers=workers, progress=progress)
     return predicting_ahead(fit, horizon_s) if horizon_s else fit
