@@ -38,7 +38,6 @@ from .search.usual_tyres import from_usual_tyres
 from .suspects import explaining
 
 _STARTED = 0.3  # of the time that a search has, for its starts
-_OFFSETS = 2  # times that offsets of logs and what they share are found in turn
 
 
 @explaining
@@ -227,10 +226,7 @@ def _from_ends(
         best = rivalled(objective, best, elsewhere, box, thinned)
     if best is not at_top:
         fit = top(model, driving, objective, best, table, thinned)
-    fit = on_its_road(fit)
-    if fit.model.offset_names and len(driving.logs) > 1:
-        fit = _log_by_log(fit)
-    return fit
+    return with_own_offsets(on_its_road(fit))
 
 
 def _check(model: Model, driving: Driving) -> None:
@@ -242,12 +238,15 @@ def _check(model: Model, driving: Driving) -> None:
     _say_what_is_not_seen(model, driving)
 
 
-def _log_by_log(fit: Fit) -> Fit:
-    """The same fit where each log has nuisances of its own."""
-    for _ in range(_OFFSETS):
-        model, driving = centred(fit)
-        fit = replace(refine(model, driving, fit.noise), starts=fit.starts)
-    return fit
+def with_own_offsets(fit: Fit) -> Fit:
+    """The same fit where each log has nuisances of its own, found beside all that the model has.
+
+    Those that a poorer model left hold a part of what it lacked.
+    """
+    if len(fit.driving.logs) == 1 or not fit.model.offset_names:
+        return fit
+    model, driving = centred(fit)
+    return replace(refine(model, driving, fit.noise), starts=fit.starts)
 
 
 def _told(

@@ -26,11 +26,11 @@ from ...model import Model
 from ..fit import Fit
 from ..identify import identify
 from ..intervals.estimates import Estimate, wald
+from ..search.layout import Layout
 from ..search.objective import Objective
 from ..search.settle import settle
 from ..search.starts import Starts
 from ..suspects import explaining
-from .layout import RunsLayout
 
 
 @dataclass(frozen=True)
@@ -214,9 +214,7 @@ def identify_runs(
     together = {run: Driving.of(logs).logs for run, logs in runs.items()}
     every = Driving.of([log for logs in together.values() for log in logs])
     common = identify(model, every, starts=starts, seed=seed, workers=workers, progress=progress)
-    layout = RunsLayout.of(
-        common.model, {run: len(logs) for run, logs in together.items()}, vary, tie
-    )
+    layout = Layout.of(common.model, {run: len(logs) for run, logs in together.items()}, vary, tie)
     plain = replace(common.driving, offsets=())
     logs = iter(plain.each_log())
     drivings = [Driving.joined(islice(logs, len(own))) for own in together.values()]
@@ -266,7 +264,7 @@ def _check(
 def _summary(
     common: Fit,
     drivings: Sequence[Driving],
-    layout: RunsLayout,
+    layout: Layout,
     objective: Objective,
     q: FloatArray,
     noise: FloatArray,

@@ -69,7 +69,8 @@ def nuisances(study: Study) -> list[str]:
             for p, e in own
             for value in ([of[e.name] for of in logs.values()] or [e.value])
         ]
-        if any(by >= matters and by > study.rules.interval * std for by, std, matters in off):
+        sure = study.rules.interval_of(len(logs or [1]))
+        if any(by >= matters and by > sure * std for by, std, matters in off):
             sizes = ", ".join(_sizes(p, e, logs) for p, e in own)
             found.append(f"Nuisance {part.id} ({part.title}): {sizes}")
     return found

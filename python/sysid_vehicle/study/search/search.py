@@ -18,7 +18,7 @@ from ...diagnose.diagnose import REFITS
 from ...effects import Effect
 from ...errors import Interrupted, NumericalError
 from ...estimate import Driving
-from ...identify import Fit, refine
+from ...identify import Fit, refine, with_own_offsets
 from ...rules import Rules, harmful, worse
 from ..ahead.along_the_car import changes_of
 from ..ahead.own_share import own_shares
@@ -234,6 +234,7 @@ class Search:
             if any(set(f.model.effects) == effects for f in trail.fits):
                 return
             known = set(trail.fit.model.effects)
+            found = before(self.ends, partial(with_own_offsets, found), found)
             trail.fits.append(found)
             self.say(_step(found, known))
 

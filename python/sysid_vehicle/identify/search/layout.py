@@ -13,14 +13,14 @@ from ... import _core
 from ..._common.arrays import FloatArray
 from ...estimate import Driving, noise_range
 from ...model import Model
-from ..search.box import free_box
-from ..search.mapped import Copied, Mapped
-from ..search.objective import Objective, gaussian_prior
-from ..search.search import Box
+from .box import free_box
+from .mapped import Copied, Mapped
+from .objective import Objective, gaussian_prior
+from .search import Box
 
 
 @dataclass(frozen=True)
-class RunsLayout:
+class Layout:
     """Places of all parameters: the core's, with those of the first run and log; then all others.
 
     Attributes
@@ -41,7 +41,7 @@ class RunsLayout:
     @classmethod
     def of(
         cls, model: Model, logs: Mapping[str, int], vary: tuple[str, ...], tie: Mapping[str, str]
-    ) -> RunsLayout:
+    ) -> Layout:
         """The layout of runs of a model, by how many logs each has."""
         apart = () if sum(logs.values()) < 2 else model.offset_names
         parts = [count if apart else 1 for count in logs.values()]
