@@ -352,21 +352,21 @@ def _warnings(trail: Trail, late: Sequence[str], rules: Rules = USUAL) -> tuple[
     for log in driving.logs:
         found += [f"{log.name}: {text}" for text in log.missing().values()]
     found += map(str, fit.against_priors)
-    found += [_noted(e) for e in fit.estimates if e.note]
+    given = {n for n, told in fit.model.settings.items() if told.bounds is not None}
+    found += [_noted(e, e.name in given) for e in fit.estimates if e.note]
     if not fit.converged:
         found.append("the final fit did not converge; its intervals may be too short")
         warn(found[-1])
     return tuple(dict.fromkeys(found))
 
 
-def _noted(estimate: Estimate) -> str:
-    """Why an estimate says little, in words; of a bound, which one and what lies beyond it."""
-    e = estimate
+def _noted(e: Estimate, bounded: bool) -> str:
+    """Why an estimate says little, in words; of a user's bound, what lies beyond it."""
     if e.note != "at bound":
         return f"{e.name}: {e.note} with this driving"
     unit = unit_after(e.unit)
     text = f"{e.name}: ends at its bound {number(e.value)}{unit} with this driving"
-    if e.unbounded is None:
+    if e.unbounded is None or not bounded:
         return text
     return f"{text}; the data lead beyond it, to about {number(e.unbounded[0])}{unit}"
 
