@@ -38,6 +38,7 @@ from .search.usual_tyres import from_usual_tyres
 from .suspects import explaining
 
 _STARTED = 0.3  # of the time that a search has, for its starts
+_OFFSETS = 2  # times that offsets of logs are found, and noise of other time scales is tried
 
 
 @explaining
@@ -245,8 +246,10 @@ def with_own_offsets(fit: Fit) -> Fit:
     """
     if len(fit.driving.logs) == 1 or not fit.model.offset_names:
         return fit
-    model, driving = centred(fit)
-    return replace(refine(model, driving, fit.noise), starts=fit.starts)
+    for _ in range(_OFFSETS):
+        model, driving = centred(fit)
+        fit = replace(refine(model, driving, fit.noise), starts=fit.starts)
+    return fit
 
 
 def _told(

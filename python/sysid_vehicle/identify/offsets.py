@@ -187,14 +187,15 @@ def _likeliest(alone: Model, driving: Driving, noise: NoiseModel) -> tuple[Float
 def centred(fit: Fit) -> tuple[Model, Driving]:
     """The model with the mean of what its nuisances are in each log, and these by their offsets.
 
-    Found together with all other parameters: in turn with them, what a nuisance has taken up of an
-    effect that the model lacked it would give back step by step.
+    Found log by log, then together with all other parameters: in turn with them, what a nuisance
+    has taken up of an effect that the model lacked it would give back step by step.
     """
     plain = replace(fit.driving, offsets=())
     layout = Layout.of(fit.model, {"": len(plain.logs)}, (), {})
     try:
         objective = layout.objective(plain.each_log())
-        begin = layout.start(fit.model.vector(), fit.driving.offsets or ({},) * len(plain.logs))
+        near = settled_offsets(fit, plain).driving.offsets or ({},) * len(plain.logs)
+        begin = layout.start(fit.model.vector(), near)
         q, _, _ = settle(objective, begin, fit.noise.vector(), layout.box)
     except (NumericalError, np.linalg.LinAlgError):
         return fit.model, fit.driving
