@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from . import _core
+from ._common.arguments import pair, real
 from ._common.arrays import FloatArray
 from ._common.text import html_text
 from .effects import Effect, Parameter, base_parameters, catalogue, effect, in_car
 from .errors import InvalidInput
 from .saved import save
-from .tyre import Tyre
+from .tyre import TYRE_RANGES, Tyre
 from .vehicle import Vehicle, vehicle_data
 
 NUISANCES = (
@@ -197,14 +198,24 @@ class Model:
             told[name] = replace(told.get(name, Setting()), **change)
         return replace(self, settings=told)
 
+    def _check_known(self, name: str) -> None:
+        number = real(self.values[name] if name in self.values else self.value(name))
+        if number is None or not np.isfinite(number):
+            raise InvalidInput(f"{name} = {self.values[name]!r}: give a finite number")
+        of_tyre = TYRE_RANGES.get(name[0]) if name[1:] in ("_front", "_rear") else None
+        if of_tyre and (wrong := of_tyre.complaint(name, number)):
+            raise InvalidInput(wrong)
+
     def _check_setting(self, name: str, told: Setting) -> None:
         if (told.bounds or told.prior) and name not in self.free_names:
             raise InvalidInput(
                 f"{name} has bounds or a prior but is not free; with_free(['{name}']) frees it"
             )
+        if told.free is False:
+            self._check_known(name)
         own = self._own_bounds(name)
         if told.bounds is not None:
-            low, high = told.bounds
+            low, high = pair(told.bounds, f"bounds of {name}", "(lower, upper)")
             if not own[0] <= low < high <= own[1]:
                 raise InvalidInput(
                     f"bounds of {name} are {low:g} .. {high:g}; give (lower, upper) within "
@@ -212,7 +223,7 @@ class Model:
                 )
         if told.prior is not None:
             low, high = self.bounds(name)
-            mean, std = told.prior
+            mean, std = pair(told.prior, f"prior of {name}", "(mean, standard deviation)")
             if not (low <= mean <= high and 0.0 < std < np.inf):
                 raise InvalidInput(
                     f"the prior of {name} is {mean:g} +- {std:g}; give (mean, standard deviation), "

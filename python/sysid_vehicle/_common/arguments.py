@@ -44,6 +44,21 @@ def whole(value: object, name: str, least: int = 0) -> int:
     return int(value)
 
 
+def pair(value: object, name: str, meaning: str) -> tuple[float, float]:
+    """The two real numbers as floats.
+
+    Raises
+    ------
+    InvalidInput
+        It is not two numbers; the message says what they mean.
+    """
+    several = [real(v) for v in value] if isinstance(value, Sequence | np.ndarray) else []
+    numbers = [v for v in several if v is not None]
+    if len(numbers) != 2 or len(several) != 2:
+        raise InvalidInput(f"{name}: {value!r} was given; give {meaning}, two numbers")
+    return numbers[0], numbers[1]
+
+
 def duration(seconds: object, name: str) -> float:
     """The duration as a float [s]; endless where it is None.
 

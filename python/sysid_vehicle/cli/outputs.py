@@ -14,16 +14,22 @@ from ..errors import InvalidInput
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SUFFIXES = {"SVG": ".svg", "GIF": ".gif"}
+_SUFFIXES = {"SVG": (".svg",), "GIF": (".gif",), "HTML": (".html", ".htm", "")}
 
 
 def add_output(
-    parser: argparse.ArgumentParser, *names: str, kind: str, help: str, **more: Any
+    parser: argparse.ArgumentParser,
+    *names: str,
+    kind: str,
+    help: str,
+    also: Sequence[str] = (),
+    **more: Any,
 ) -> None:
-    """Ask for a file to write, of a kind such as ``SVG``."""
+    """Ask for a file to write, of a kind such as ``SVG``, or with an ending of another kind."""
     action = parser.add_argument(*names, type=Path, metavar=kind, help=help, **more)
     known = parser.get_default("outputs") or {}
-    parser.set_defaults(outputs={**known, action.dest: _SUFFIXES.get(kind)})
+    suffixes = (*_SUFFIXES[kind][:1], *also, *_SUFFIXES[kind][1:]) if kind in _SUFFIXES else None
+    parser.set_defaults(outputs={**known, action.dest: suffixes})
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
@@ -39,14 +45,15 @@ def refuse_outputs(args: argparse.Namespace) -> None:
     InvalidInput
         Also if a name promises another kind of file than is written.
     """
-    suffixes: Mapping[str, str | None] = getattr(args, "outputs", {})
+    suffixes: Mapping[str, Sequence[str] | None] = getattr(args, "outputs", {})
     outputs = {name: getattr(args, name) for name in suffixes}
     if not outputs:
         return
     for name, path in outputs.items():
-        suffix = suffixes[name]
-        if path is not None and suffix is not None and path.suffix.lower() != suffix:
-            raise InvalidInput(f"{path}: the file will be {suffix}; end the name in {suffix}")
+        some = suffixes[name]
+        if path is not None and some is not None and path.suffix.lower() not in some:
+            told = " or ".join(suffix for suffix in some if suffix)
+            raise InvalidInput(f"{path}: the file will be {told}; end the name in {told}")
     given = [value for name, value in vars(args).items() if name not in outputs]
     several = [value if isinstance(value, Sequence) else [value] for value in given]
     check_outputs(

@@ -11,6 +11,8 @@ from . import changed, fleet, forces, lab, mu_slip, next_drive, sensors, sidesli
 from .log_arguments import LOG_HELP, add_driving, add_effects, names
 from .outputs import add_json, add_output
 
+_MARKDOWN = (".md",)  # in which a study may be reported too
+
 
 def parse(argv: list[str] | None) -> argparse.Namespace:
     """Read the arguments; ends the program with status 2 on those that make no sense."""
@@ -38,6 +40,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
         demo,
         "--report",
         kind="HTML",
+        also=_MARKDOWN,
         help="report to write (default: %(default)s)",
         default=Path("report.html"),
     )
@@ -58,7 +61,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     _driving(improve)
     _validation(improve)
     _search(improve)
-    add_output(improve, "--report", kind="HTML", help="report to write")
+    add_output(improve, "--report", kind="HTML", also=_MARKDOWN, help="report to write")
     add_json(improve)
 
     fleet.add_parser(commands)

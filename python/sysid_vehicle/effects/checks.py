@@ -64,6 +64,17 @@ _RANGES = {
 }
 
 
+_SPEEDS = {"v_x", "v_xfl", "v_xfr", "v_xrl", "v_xrr"}
+# What the slowest and lightest cars show beside it, a model car of 1.5 kg and a car that parks.
+_SLOW = {
+    **{
+        n: (low / 1e3, high / 1e3) if n[0] == "F" else (low, high)
+        for n, (low, high) in _RANGES.items()
+    },
+    **dict.fromkeys(_SPEEDS, (0.5, 8.0)),
+}
+
+
 @dataclass(frozen=True)
 class State:
     """A state of an effect of your own; :func:`state` makes it."""
@@ -93,17 +104,24 @@ def check_names(
     unknown = [t for t in functions if t not in TARGETS]
     if unknown:
         raise InvalidInput(f"{what}: there is no '{unknown[0]}'; there are {', '.join(TARGETS)}")
-    _check_parameters(what, parameters)
+    read = [*channels, *(s.name for s in states)]
+    _check_parameters(what, parameters, read)
     if len(states) > _core.USER_STATES:
         raise InvalidInput(f"{what}: it must have at most {_core.USER_STATES} states")
-    _check_read(what, [*channels, *(s.name for s in states)])
+    _check_read(what, read)
 
 
-def _check_parameters(what: str, parameters: Sequence[Parameter]) -> None:
+def _check_parameters(what: str, parameters: Sequence[Parameter], read: Sequence[str]) -> None:
     if not 1 <= len(parameters) <= _core.USER_PARAMETERS:
         raise InvalidInput(f"{what}: it must have 1 to {_core.USER_PARAMETERS} parameters")
     if len({p.name for p in parameters}) < len(parameters):
         raise InvalidInput(f"{what}: two parameters have the same name")
+    same = next((p.name for p in parameters if p.name in {*SIGNALS, *read}), None)
+    if same is not None:
+        raise InvalidInput(
+            f"{what}: the parameter {same} is called as what the functions read; rename it, so "
+            "that the equation can be read"
+        )
     scanned = [i for i, p in enumerate(parameters) if p.scan]
     if scanned and (scanned != [1] or len(parameters) != 2):
         raise InvalidInput(f"{what}: only the second of two parameters may be scanned")
@@ -130,16 +148,14 @@ def checked(
     states: Sequence[State],
 ) -> tuple[tuple[Parameter, ...], bool]:
     """Parameters that know whether a mirror turns them, and whether a slope at null is missing."""
-    rng = np.random.default_rng(0)
-    ranges = {n: _RANGES[n] for n in SIGNALS} | dict(channels) | {s.name: s.usual for s in states}
-    for name, (low, high) in ranges.items():
+    own = dict(channels) | {s.name: s.usual for s in states}
+    for name, (low, high) in own.items():
         if not -np.inf < low < high < np.inf:
             raise InvalidInput(
                 f"{what}: {name} ranges from {low:g} to {high:g}; give (lowest, highest)"
             )
-    signals = {n: rng.uniform(*between, 200) for n, between in ranges.items()}
+    signals, slow = _drawn(_RANGES, own), _drawn(_SLOW, own)
     typical = {p.name: p.typical for p in parameters}
-    mirror = _mirrored(what, signals, states, typical)
     null = {p.name: p.null_value for p in parameters}
     scanned = {p.name: p.typical for p in parameters if p.scan}
 
@@ -155,10 +171,14 @@ def checked(
             seen.append(p)
             continue
         full = values(null | scanned | {p.name: p.typical}, signals)
+        driven = signals
+        if _norm(full) == 0.0:  # what acts in slow driving alone is looked at there
+            full, driven = values(null | scanned | {p.name: p.typical}, slow), slow
         size = _size_of(p, full, what)
         near = p.null_value + _NEAR_NULL * (p.typical - p.null_value)
-        few = values(null | scanned | {p.name: near}, signals)
+        few = values(null | scanned | {p.name: near}, driven)
         steep |= not 0.02 < _norm(few) / (_NEAR_NULL * size) < 50.0
+        mirror = _mirrored(what, driven, states, typical)
         turned = values(null | scanned | {p.name: p.typical}, mirror)
         other = all(
             np.allclose(turned[t], y if t in _TURNING else -y, rtol=1e-9, atol=1e-12)
@@ -166,6 +186,15 @@ def checked(
         )
         seen.append(replace(p, mirrored=other))
     return tuple(seen), steep
+
+
+def _drawn(
+    ranges: Mapping[str, tuple[float, float]], own: Mapping[str, tuple[float, float]]
+) -> dict[str, FloatArray]:
+    """Signals of driving within these ranges, and columns and states of the effect's own."""
+    rng = np.random.default_rng(0)
+    every = {n: ranges[n] for n in SIGNALS} | dict(own)
+    return {n: rng.uniform(*between, 200) for n, between in every.items()}
 
 
 def _norm(values: Mapping[str, FloatArray]) -> float:
@@ -177,12 +206,13 @@ def _size_of(p: Parameter, full: Mapping[str, FloatArray], what: str) -> float:
     size = _norm(full)
     if not np.isfinite(size):
         raise InvalidInput(
-            f"{what}: with {p.name} = {p.typical:g} it is not finite for all of brisk driving"
+            f"{what}: with {p.name} = {p.typical:g} it is not finite for all of the driving that "
+            "a car meets"
         )
     if size == 0.0:
         raise InvalidInput(
-            f"{what}: {p.name} does nothing by itself; where it means nothing while another "
-            "is null, give it scan='range'"
+            f"{what}: {p.name} does nothing by itself, at any speed from 0.5 to 50 m/s; where it "
+            "means nothing while another is null, give it scan='range'"
         )
     return size
 

@@ -34,6 +34,10 @@ _LEAST_KNOTS = 2
 _UNARY = ("negative", "absolute", "sign", "sin", "cos", "arctan", "sqrt", "exp", "log", "tanh")
 _BINARY = ("add", "subtract", "multiply", "divide", "arctan2", "minimum", "maximum", "greater")
 _SYMBOLS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/", "greater": ">"}
+# Comparisons the other way round, and what is made of comparisons, which are one or nothing.
+_NOT_BELOW = {"greater_equal": ">=", "less_equal": "<="}
+_OF_CONDITIONS = {"and": ("multiply", "&"), "or": ("maximum", "|")}
+_LOGICAL = {f"{kind}_{name}": name for kind in ("logical", "bitwise") for name in ("and", "or")}
 
 Step = tuple[int, tuple[int, int, int], float]
 
@@ -71,8 +75,11 @@ class Traced:
 
     __array_priority__ = 1000.0
 
-    def __init__(self, tape: _Tape, place: int, text: str, *, plain: bool = True) -> None:
+    def __init__(
+        self, tape: _Tape, place: int, text: str, *, plain: bool = True, condition: bool = False
+    ) -> None:
         self._tape, self._place, self._text, self._plain = tape, place, text, plain
+        self._condition = condition
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **how: Any) -> Traced:
         name = {"true_divide": "divide", "fabs": "absolute"}.get(ufunc.__name__, ufunc.__name__)
@@ -112,16 +119,51 @@ class Traced:
             return self._apply("greater", inputs[1], inputs[0])
         if name == "positive":
             return self._of(inputs[0])
+        if name in _NOT_BELOW:
+            return self._not_below(name, *inputs)
+        if name in _LOGICAL:
+            return self._both(_LOGICAL[name], *inputs)
+        if name in ("logical_not", "invert"):
+            return self._not(self._of(inputs[0]))
         if name not in (*_UNARY, *_BINARY, "where"):
             raise InvalidInput(f"numpy.{name} cannot be followed; {_ALLOWED}")
         given = [self._of(x) for x in inputs]
         place = self._tape.add(name, *(g._place for g in given))
         if name in _SYMBOLS:
             text = f"{given[0]._bound()} {_SYMBOLS[name]} {given[1]._bound()}"
-            return Traced(self._tape, place, text, plain=False)
+            return Traced(self._tape, place, text, plain=False, condition=name == "greater")
         if name == "negative":
             return Traced(self._tape, place, f"-{given[0]._bound()}", plain=False)
         return Traced(self._tape, place, f"{name}({', '.join(g._text for g in given)})")
+
+    def _not_below(self, name: str, a: Any, b: Any) -> Traced:
+        """Whether one is not below the other, which is that the other is not greater."""
+        a, b = self._of(a), self._of(b)
+        text = f"{a._bound()} {_NOT_BELOW[name]} {b._bound()}"
+        greater = (b, a) if name == "greater_equal" else (a, b)
+        found = self._not(self._apply("greater", *greater))
+        return Traced(self._tape, found._place, text, plain=False, condition=True)
+
+    def _both(self, name: str, a: Any, b: Any) -> Traced:
+        """Whether both conditions hold, or one of them."""
+        a, b = self._of(a), self._of(b)
+        for x in (a, b):
+            x._must_be_condition()
+        operation, symbol = _OF_CONDITIONS[name]
+        place = self._apply(operation, a, b)._place
+        text = f"{a._bound()} {symbol} {b._bound()}"
+        return Traced(self._tape, place, text, plain=False, condition=True)
+
+    def _not(self, x: Traced) -> Traced:
+        x._must_be_condition()
+        place = self._apply("subtract", 1.0, x)._place
+        return Traced(self._tape, place, f"~{x._bound()}", plain=False, condition=True)
+
+    def _must_be_condition(self) -> None:
+        if not self._condition:
+            raise InvalidInput(
+                f"'&', '|' and '~' join comparisons such as (d.v_x > 3.0), not '{self._text}'"
+            )
 
     def _interpolated(self, x: Any, knots: Any, values: Any) -> Traced:
         """A table, linear between its knots and held beyond them, as numpy.interp has it."""
@@ -208,10 +250,25 @@ class Traced:
     def __lt__(self, o: Any) -> Traced:
         return self._apply("greater", o, self)
 
+    def __ge__(self, o: Any) -> Traced:
+        return self._apply("greater_equal", self, o)
+
+    def __le__(self, o: Any) -> Traced:
+        return self._apply("less_equal", self, o)
+
+    def __and__(self, o: Any) -> Traced:
+        return self._apply("logical_and", self, o)
+
+    def __or__(self, o: Any) -> Traced:
+        return self._apply("logical_or", self, o)
+
+    def __invert__(self) -> Traced:
+        return self._apply("logical_not", self)
+
     def __bool__(self) -> NoReturn:
         raise InvalidInput(
             "the function decides by a value (`if`, `and`, `max`): it must do the same to every "
-            "sample; use numpy.where, numpy.minimum or numpy.maximum"
+            "sample; use numpy.where, numpy.minimum or numpy.maximum, and & | ~ between comparisons"
         )
 
     def __float__(self) -> NoReturn:
@@ -221,8 +278,8 @@ class Traced:
 
 
 _ALLOWED = (
-    "allowed are + - * / ** and abs, numpy's where, clip, interp, square, power, tan, less, "
-    + ", ".join((*_UNARY, *_BINARY))
+    "allowed are + - * / ** and abs, comparisons with & | ~ between them, numpy's where, clip, "
+    "interp, square, power, tan, less, " + ", ".join((*_UNARY, *_BINARY))
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import runpy
 from collections.abc import Mapping, Sequence
@@ -42,10 +43,11 @@ def parameter(
     Parameters
     ----------
     name, unit : str
+        A pure number has the unit `1`.
     typical : float
         A size one may meet, other than the null value.
     lower, upper : float
-        Bounds of the search.
+        Bounds of the search, finite.
     null_value : float
         Where the effect vanishes exactly; by default 0, or the typical value if it is scanned.
     matters : float, optional
@@ -67,7 +69,7 @@ def parameter(
     nothing = 0.0 if scan else null_value
     made = Parameter(
         name=name,
-        unit=unit,
+        unit=unit.strip() or "1",
         null_value=float(null_value),
         typical=float(typical),
         matters=abs(distance) / 5.0 if matters is None else float(matters),
@@ -81,7 +83,12 @@ def parameter(
     )
     if not name.isidentifier():
         raise InvalidInput(f"parameter '{name}': the name must be a Python name")
-    if not (lower <= null_value <= upper and lower < upper and lower <= typical <= upper):
+    if not -math.inf < lower < upper < math.inf:
+        raise InvalidInput(
+            f"parameter '{name}': the bounds are {lower:g} to {upper:g}; give (lowest, highest), "
+            "finite: the search begins all over the range"
+        )
+    if not (lower <= null_value <= upper and lower <= typical <= upper):
         raise InvalidInput(
             f"parameter '{name}': null value {null_value:g} and typical size {typical:g} must lie "
             f"within the bounds {lower:g} to {upper:g}"
@@ -157,7 +164,7 @@ def define_effect(
 
     Each function takes two namespaces, `d` of arrays and `p` of parameters, and returns what it
     adds. It is followed once and runs in the compiled core: arithmetic and NumPy functions are
-    allowed, decisions only by `numpy.where`.
+    allowed, decisions only by `numpy.where`, of comparisons that `&`, `|` and `~` may join.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 from .ahead.ahead import predicting_ahead
 from .fit import Fit
-from .identify import identify, profile_fit
+from .identify import identify, profile_fit, with_own_offsets
 from .input_noise import lost_to_input_noise, with_exact_inputs
 from .intervals.estimates import Estimate
 from .intervals.posterior import Posterior
@@ -58,4 +58,5 @@ __all__ = [
     "settle",
     "unmoved",
     "with_exact_inputs",
+    "with_own_offsets",
 ]

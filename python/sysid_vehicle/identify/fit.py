@@ -17,6 +17,7 @@ from ..saved import save
 from ..vehicle import AXLES
 from .intervals.estimates import Estimate, Estimated, profiled
 from .intervals.posterior import Posterior, posterior
+from .intervals.priors import AgainstPrior, against_priors
 from .intervals.profile import Profile
 from .intervals.quantities import Quantity, parameter, std_of, tyre_quantity
 from .search.starts import Starts
@@ -127,6 +128,15 @@ class Fit(Estimated):
             found.append(Estimate(what.name, value, std, unit, note, bounds=_OF_TYRES))
         return tuple(profiled(e, self.profiles) for e in found)
 
+    @property
+    def against_priors(self) -> tuple[AgainstPrior, ...]:
+        """Priors that the data contradict, the surest first; of the likelihood's maximum alone."""
+        if self.horizon_s:
+            return ()
+        own = self.model.offset_names if self.driving.offsets else ()
+        told = {n: prior for n, prior in self.model.priors.items() if n not in own}
+        return against_priors(self.estimates, self.by_noise, told)
+
     def values_of(self, model: Model) -> dict[str, float]:
         """What `derived` is of another model, which may lack this one's effects: the true one."""
         none = np.zeros((0, 0))
@@ -225,7 +235,11 @@ class Fit(Estimated):
 
     def __str__(self) -> str:
         table = text_table(self._head, self._rows())
-        return "\n".join([self._headline(), table, *self._by_log(), "Noise", str(self.noise)])
+        lines = [self._headline(), table, *self._warnings(), *self._by_log()]
+        return "\n".join([*lines, "Noise", str(self.noise)])
+
+    def _warnings(self) -> list[str]:
+        return [f"Warning: {against}" for against in self.against_priors]
 
     def _by_log(self) -> list[str]:
         """Lines on the logs whose nuisances differ; the table has their means."""
@@ -240,6 +254,7 @@ class Fit(Estimated):
         return (
             html_paragraph(self._headline())
             + html_table(self._head, self._rows())
+            + (html_list(self._warnings()) if self.against_priors else "")
             + (html_list(self._by_log()) if self.driving.offsets else "")
             + self.noise._repr_html_()
         )

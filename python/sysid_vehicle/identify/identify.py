@@ -38,7 +38,7 @@ from .search.usual_tyres import from_usual_tyres
 from .suspects import explaining
 
 _STARTED = 0.3  # of the time that a search has, for its starts
-_OFFSETS = 2  # times that offsets of logs and what they share are found in turn
+_OFFSETS = 2  # times that offsets of logs are found, and noise of other time scales is tried
 
 
 @explaining
@@ -79,7 +79,8 @@ def identify(
     bounds : mapping of str to (lower, upper)
         Narrower bounds of free parameters.
     priors : mapping of str to (mean, standard deviation)
-        What is known of free parameters beforehand, as normal distributions.
+        What is known of free parameters beforehand, as normal distributions. One that the data
+        contradict is told by a warning, and by `Fit.against_priors`.
     intervals : str
         `information`: 95 % intervals from the information matrix. `profile`: from the profile
         likelihood, which follows bent valleys and takes some tens of searches.
@@ -100,9 +101,10 @@ def identify(
     Raises
     ------
     InvalidInput
-        Unknown method, intervals or parameter, bounds or priors that contradict each other, no
-        free parameter, no starts or workers, a negative seed, nothing usable in the logs, or logs
-        that cannot be of this car: another mass, another steering ratio.
+        Unknown method, intervals or parameter, bounds or priors that contradict each other or are
+        not two numbers each, a fixed value that is no number or that no tyre has, no free
+        parameter, no starts or workers, a negative seed, nothing usable in the logs, or logs that
+        cannot be of this car: another mass, another steering ratio.
     NumericalError
         No start led anywhere.
     """
@@ -122,6 +124,8 @@ def identify(
         workers=workers,
         progress=progress,
     )
+    for against in fit.against_priors:
+        warn(str(against))
     if intervals == "profile":
         return profile_fit(fit, workers=workers, progress=progress)
     return predicting_ahead(fit, horizon_s) if horizon_s else fit
@@ -223,10 +227,7 @@ def _from_ends(
         best = rivalled(objective, best, elsewhere, box, thinned)
     if best is not at_top:
         fit = top(model, driving, objective, best, table, thinned)
-    fit = on_its_road(fit)
-    if fit.model.offset_names and len(driving.logs) > 1:
-        fit = _log_by_log(fit)
-    return fit
+    return with_own_offsets(on_its_road(fit))
 
 
 def _check(model: Model, driving: Driving) -> None:
@@ -238,8 +239,13 @@ def _check(model: Model, driving: Driving) -> None:
     _say_what_is_not_seen(model, driving)
 
 
-def _log_by_log(fit: Fit) -> Fit:
-    """The same fit where each log has nuisances of its own."""
+def with_own_offsets(fit: Fit) -> Fit:
+    """The same fit where each log has nuisances of its own, found beside all that the model has.
+
+    Those that a poorer model left hold a part of what it lacked.
+    """
+    if len(fit.driving.logs) == 1 or not fit.model.offset_names:
+        return fit
     for _ in range(_OFFSETS):
         model, driving = centred(fit)
         fit = replace(refine(model, driving, fit.noise), starts=fit.starts)

@@ -23,8 +23,9 @@ from ..model import Model
 from .ahead.ahead import predicting_ahead
 from .fit import Fit
 from .search.box import free_box, free_prior
+from .search.layout import Layout
 from .search.objective import Objective
-from .search.settle import moved
+from .search.settle import moved, settle
 
 OFFSETS = "offsets"
 """With a fit the question that `Driving.told` may answer, by `Settled`."""
@@ -184,16 +185,27 @@ def _likeliest(alone: Model, driving: Driving, noise: NoiseModel) -> tuple[Float
 
 
 def centred(fit: Fit) -> tuple[Model, Driving]:
-    """The model with the mean of what its nuisances are in each log, and these by their offsets."""
+    """The model with the mean of what its nuisances are in each log, and these by their offsets.
+
+    Found log by log, then together with all other parameters: in turn with them, what a nuisance
+    has taken up of an effect that the model lacked it would give back step by step.
+    """
     plain = replace(fit.driving, offsets=())
-    driving = settled_offsets(fit, plain).driving
-    names = fit.model.offset_names
-    if not driving.offsets:
-        return fit.model, plain
-    mean = {n: float(np.mean([own[n] for own in driving.offsets])) for n in names}
-    offsets = tuple({n: own[n] - mean[n] for n in names} for own in driving.offsets)
-    values = {n: fit.model.value(n) + mean[n] for n in names}
-    return fit.model.with_values(values), replace(driving, offsets=offsets)
+    layout = Layout.of(fit.model, {"": len(plain.logs)}, (), {})
+    try:
+        objective = layout.objective(plain.each_log())
+        near = settled_offsets(fit, plain).driving.offsets or ({},) * len(plain.logs)
+        begin = layout.start(fit.model.vector(), near)
+        q, _, _ = settle(objective, begin, fit.noise.vector(), layout.box)
+    except (NumericalError, np.linalg.LinAlgError):
+        return fit.model, fit.driving
+    own = {n: q[layout.places(n)] for n in layout.offsets}
+    mean = {n: float(np.mean(values)) for n, values in own.items()}
+    offsets = tuple(
+        {n: float(values[i] - mean[n]) for n, values in own.items()} for i in range(len(plain.logs))
+    )
+    model = fit.model.from_vector(q[layout.source(0)]).with_values(mean)
+    return model, replace(plain, offsets=offsets)
 
 
 def marginal_information(

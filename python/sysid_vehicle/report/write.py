@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from .._common.files import write_text
+from .._common.files import as_path, write_text
 from .._common.progress import doing
 from .._common.threads import in_parallel
+from ..errors import InvalidInput
 from ..model import Model
 from ..study import Study
 from .markdown import markdown
@@ -15,6 +16,8 @@ from .page import fold, page
 from .samples import samples_of
 from .screen import first_screen
 from .sections import SECTIONS
+
+_HTML, _MARKDOWN = (".html", ".htm", ""), ".md"  # endings of names
 
 
 def write_report(study: Study, path: str | Path, *, truth: Model | None = None) -> None:
@@ -31,8 +34,11 @@ def write_report(study: Study, path: str | Path, *, truth: Model | None = None) 
     Raises
     ------
     InvalidInput
-        If the folder does not exist or is not writable.
+        If the folder does not exist or is not writable, or the name promises another kind of file.
     """
+    suffix = as_path(path).suffix.lower()
+    if suffix not in (*_HTML, _MARKDOWN):
+        raise InvalidInput(f"{path}: a report is HTML or Markdown; end the name in .html or .md")
     title = f"Study of {study.model.vehicle.name}"
     with doing("report"):
         _work_out(study)
@@ -42,7 +48,7 @@ def write_report(study: Study, path: str | Path, *, truth: Model | None = None) 
     folded = [fold(name, parts) for name, parts in made if parts]
     told = "" if samples is None else samples.json()
     whole = page(title, [*first, *folded], told)
-    write_text(path, markdown(whole) if Path(path).suffix.lower() == ".md" else whole)
+    write_text(path, markdown(whole) if suffix == _MARKDOWN else whole)
 
 
 def _work_out(study: Study) -> None:

@@ -152,15 +152,14 @@ def checked(
 
 def _names(have: set[str]) -> list[str]:
     """Faults that these channels can show; without both speeds there is little."""
-    names = [name for name, kind in FAULTS.items() if kind.channel in have]
+    hidden: set[str] = set()
     if "vy_mps" not in have:
         # The lateral equation has an unknown of its own then; only its slow part is left.
-        for name in ("delay.speeds", "arm_x", "arm_y", "turn", "delay.ay_mps2", "lean.ay_mps2"):
-            names.remove(name)
-        names.remove("gain.yaw_rate_radps")
+        hidden |= {"delay.speeds", "arm_x", "arm_y", "turn", "delay.ay_mps2", "lean.ay_mps2"}
+        hidden.add("gain.yaw_rate_radps")
     if "ax_mps2" not in have:
-        names = [name for name in names if name not in ("arm_y", "delay.vx_mps", "turn")]
-    return names
+        hidden |= {"arm_y", "delay.vx_mps", "turn"}
+    return [n for n, kind in FAULTS.items() if kind.channel in have and n not in hidden]
 
 
 def _floor(readings: Readings, told: Sequence[Signal]) -> float:

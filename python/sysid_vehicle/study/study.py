@@ -94,6 +94,8 @@ class Study:
         Disturbances of the final model that last as long as any may, in words: forces it lacks.
     stopped : tuple of str
         Effects with evidence that the time limit left untried.
+    full : tuple of str
+        Effects with evidence beyond as many as could be added.
     late_facts : tuple of str
         What the time limit left unknown, in words.
     checked : bool
@@ -130,6 +132,7 @@ class Study:
     foretold: Foretold | None = None
     slow: tuple[str, ...] = ()
     stopped: tuple[str, ...] = ()
+    full: tuple[str, ...] = ()
     late_facts: tuple[str, ...] = ()
     checked: bool = False
     matters: Mapping[str, float] | None = None

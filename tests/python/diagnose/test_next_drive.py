@@ -179,3 +179,17 @@ def test_the_next_drive_from_the_command_line(
     assert len(out["csv"].read_text("utf-8").splitlines()) > 100
     assert main([*base, "--between", "steer_lag"]) == 2
     assert "give two effects" in capsys.readouterr().err
+
+
+def test_what_acts_is_no_disturbance_that_hides_the_difference(truth: Model, start: Model) -> None:
+    """A drag that the fit lacks, told from rolling resistance by the driving at hand."""
+    car = truth.add("aero_drag").with_values({"aero_drag.drag_area_m2": 0.3})
+    log = drive(car, manoeuvres.handling_course(30.0, 4.0), seed=4)
+    fit = identify(start, log, starts=1)
+    pair = [identify(start.add(e), log, starts=1) for e in ("aero_drag", "rolling_resistance")]
+    apart = np.sqrt(2.0 * (pair[0].log_likelihood - pair[1].log_likelihood))
+    small = DriveLimits(20.0, 6.0, area_m=(60.0, 40.0))
+    found = suggest_manoeuvre(fit, "aero_drag", "rolling_resistance", size=[0.3], limits=small)
+    assert apart > 6.0
+    assert 0.5 * apart < found.now < 3.0 * apart  # the likelihood is flat far from the better one
+    assert separations(fit, ["aero_drag", "rolling_resistance"]) != {}

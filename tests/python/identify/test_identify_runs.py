@@ -148,3 +148,68 @@ def test_a_difference_without_evidence_is_called_that(found: RunsFit) -> None:
     grip = found.differences[1]
     assert grip.most < 4.0 * grip.most_std
     assert str(replace(grip, p_value=0.0)).endswith("(p < 1e-300)")
+
+
+def test_a_prior_about_nothing_hides_no_difference(start: Model, runs: dict[str, Log]) -> None:
+    """Such an effect counts as a nuisance, of which every log else has its own."""
+    roughly = start.add("mass").with_priors({LOAD: (0.0, 0.1)})
+    found = identify_runs(roughly, runs, vary=LOAD, starts=1)
+    for run, true in LOADS.items():
+        own = found[run][LOAD]
+        assert abs(own.value - true) < 4.0 * own.std
+        assert own.std < 0.01
+        assert not found[run].driving.offsets or LOAD not in found[run].driving.offsets[0]
+    assert found.differences[0].p_value < 1e-6
+
+
+def test_a_bias_may_differ_between_runs_beside_those_of_logs(
+    start: Model, runs: dict[str, Log]
+) -> None:
+    biases = {"full": 0.004, "empty": -0.002}
+    name = "gyro_bias.bias_radps"
+    moved = {
+        run: Log.from_arrays(
+            {**{c: log[c] for c in log}, "yaw_rate_radps": log["yaw_rate_radps"] + biases[run]}
+        )
+        for run, log in runs.items()
+    }
+    model = start.add("mass").with_nuisances()
+    found = identify_runs(model, moved, vary=[LOAD, name], starts=1)
+    for run, true in biases.items():
+        own = found[run][name]
+        assert abs(own.value - true) < 4.0 * own.std
+        assert own.std < 0.001
+    (told,) = (d for d in found.differences if d.name == name)
+    assert abs(told.most - 0.006) < 4.0 * told.most_std
+
+
+def test_nuisances_of_logs_stand_beside_what_differs_between_runs(
+    start: Model, runs: dict[str, Log]
+) -> None:
+    """One run of two logs, another of one: means of each, and intervals that count all of it."""
+    full = runs["full"]
+    offset, steer = "steer_offset.offset_rad", {"a": 0.004, "b": -0.002, "empty": 0.001}
+    first, second, other = (
+        Log.from_arrays({**{c: log[c] for c in log}, "steer_rad": log["steer_rad"] + of}, name=name)
+        for (name, of), log in zip(
+            steer.items(), (full.between(0, 10), full.between(10, 20), runs["empty"]), strict=True
+        )
+    )
+    model = start.add("mass").with_nuisances(["steer_offset"])
+    given = {"full": [first, second], "empty": other}
+    found = identify_runs(model, given, vary=[LOAD], starts=1)
+    (told,) = found.nuisances
+    assert told.name == offset
+    for run, mean in (("full", -0.001), ("empty", -0.001)):
+        assert found[run][offset].value == pytest.approx(mean, abs=4.0 * found[run][offset].std)
+        assert found[run][offset].std < 2e-4
+    assert told.values == tuple(found[run][offset].value for run in given)
+    for log, of in steer.items():
+        run = "empty" if log == "empty" else "full"
+        assert found[run].offsets[log][offset] == pytest.approx(-of, abs=2e-4)
+    for run, true in LOADS.items():
+        assert abs(found[run][LOAD].value - true) < 4.0 * found[run][LOAD].std
+    assert offset not in {e.name for e in found.shared}
+    assert offset in str(found)
+    size = len(found.shared) + 2 + 3
+    assert found.covariance.shape == (size, size)

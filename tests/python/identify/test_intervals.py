@@ -83,6 +83,12 @@ def test_a_prior_counts_as_one_more_reading(profiled: Fit) -> None:
         ({"fixed": ["C_frnt"]}, "no parameter 'C_frnt'"),
         ({"bounds": {"D_front": (2.0, 1.0)}}, r"bounds of D_front are 2 .. 1; give \(lower"),
         ({"priors": {"D_front": (1.0, 0.0)}}, "prior of D_front is 1 .- 0"),
+        ({"priors": {"D_front": 1.0}}, r"prior of D_front: 1\.0 was given; give \(mean, standard"),
+        ({"bounds": {"D_front": (1.0, 2.0, 3.0)}}, r"bounds of D_front: \(1.*give \(lower, upper"),
+        ({"bounds": {"D_front": ("a", None)}}, "bounds of D_front: .*two numbers"),
+        ({"fixed": {"D_front": float("nan")}}, "D_front = nan: give a finite number"),
+        ({"fixed": {"D_front": "0.9"}}, "D_front = '0.9': give a finite number"),
+        ({"fixed": {"D_front": -0.8}}, "D_front = -0.8 is out of range .* peak friction"),
         (
             {"fixed": ["D_front"], "priors": {"D_front": (1.0, 0.1)}},
             r"D_front has bounds or a prior but is not free; with_free\(\['D_front'\]\)",

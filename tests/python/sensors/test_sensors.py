@@ -241,6 +241,8 @@ def test_what_is_not_logged_cannot_be_told(perfect: Channels) -> None:
     assert lost["imu_forward_m"] == "because vy_mps is not logged"
     assert "cannot be told: IMU ahead" in str(found)
     assert "sensor_delay" not in found.settles
+    del c["ax_mps2"]
+    assert {"imu_forward_m", "imu_left_m"} <= {f.name for f in sv.check(as_log(c)).not_told}
 
 
 def test_held_and_quantised_channels_are_seen(perfect: Channels) -> None:

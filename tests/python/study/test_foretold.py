@@ -106,6 +106,23 @@ def test_an_uneven_road_is_no_reason_to_look_for_more(start: Model, truth: Model
     assert "disturbances" not in smooth.meaning
 
 
+def test_tyres_that_no_training_data_showed_are_no_disturbance(start: Model, truth: Model) -> None:
+    drives = manoeuvres.sine_sweep(25.0, 25.0, 4.0), manoeuvres.handling_course(30.0, 8.5)
+    train, test = (drive(truth, m, seed=s, rate_hz=50.0) for s, m in enumerate(drives, 41))
+    found = improve(start, train, test, candidates=CANDIDATES, sensors=False, starts=2)
+    assert found.verdict == "adequate"
+    assert found.train[-1].error < 1.05
+    assert found.test[-1].error > 1.2
+    assert found.foretold is not None
+    assert found.foretold.error < 1.05
+    assert "do not determine the tyres where these drive" in found.meaning
+    assert "disturbances" not in found.meaning
+    assert contradictions(str(found)) == []
+    # Of a study that an earlier version wrote this is not known.
+    old = replace(found, foretold=replace(found.foretold, error=np.nan))
+    assert "do not determine" not in old.meaning
+
+
 def test_a_slow_force_is_no_disturbance(start: Model, truth: Model) -> None:
     """A bank that comes and goes depends on the place: no function of the driving predicts it."""
     slow = Banked(fy_n=1.0, correlation_time_s=0.3)

@@ -9,7 +9,8 @@ nearer of them stands out from the other (T-optimality, linearised: Atkinson & F
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from ...effects import Effect, length_beyond
 from ...errors import InvalidInput, NumericalError
 from ...estimate import MEASURED, Driving
 from ...estimate.inputs import white_noise_std
-from ...identify import Fit, explaining
+from ...identify import Fit, explaining, refine
 from ...log import Log
 from ...manoeuvres import Manoeuvre
 from ...model import Model
@@ -98,7 +99,7 @@ class NextDrive(Printed):
     ----------
     first, second : Effect
     now : float
-        Standard errors between them with the driving at hand.
+        Standard errors between them, of the size asked for, with the driving at hand.
     suggestions : tuple of Suggestion
         The cheapest that is enough first; the others by standard errors.
     refused : int
@@ -225,8 +226,9 @@ def suggest_manoeuvre(
             raise InvalidInput(f"the model has '{e.id}' already; give a fit without it")
     car = fit.model.vehicle
     bounds = limits if limits is not None else DriveLimits.usual(car)
-    here = information_of(fit, fit.driving, (a, b))
     psi = None if size is None else tuple(size)
+    fit = _with_noise_beside(fit, a, psi)
+    here = information_of(fit, fit.driving, (a, b))
     now = _apart(here, a, b, psi)
     menu = _menu(bounds, length_beyond(car.wheelbase_m))
     truth = fit.model.add(a).with_values(_values(a, psi))
@@ -242,6 +244,20 @@ def suggest_manoeuvre(
         found.append(Suggestion(manoeuvre, log.duration_s, apart, drive))
     found.sort(key=lambda s: (s.sigmas < enough, s.duration_s if s.sigmas >= enough else -s.sigmas))
     return NextDrive(a, b, now, tuple(found), refused)
+
+
+def _with_noise_beside(fit: Fit, first: Effect, size: tuple[float, ...] | None) -> Fit:
+    """The fit with the noise that is left where the first effect acts.
+
+    Without it what it does counts as a disturbance, in which hardly anything would be told apart.
+    """
+    model = fit.model.add(first)
+    found = []
+    for begin in (model, model.with_values(_values(first, size))):
+        with suppress(NumericalError, np.linalg.LinAlgError):
+            found.append(refine(begin, fit.driving, fit.noise))
+    best = max(found, key=lambda f: f.log_likelihood, default=fit)
+    return replace(fit, noise=best.noise) if best.log_likelihood > fit.log_likelihood else fit
 
 
 def _apart(

@@ -91,7 +91,7 @@ class Ceiling:
         most = max(self.forces, key=lambda f: f.share)
         return (
             "no function of steering, speed and acceleration history explains what is missing (at "
-            f"best {most}): as far as this shows it is disturbance"
+            f"best {most}): as far as this shows it is disturbance and noise"
         )
 
     _repr_html_ = html_text

@@ -26,11 +26,11 @@ from ...model import Model
 from ..fit import Fit
 from ..identify import identify
 from ..intervals.estimates import Estimate, wald
+from ..search.layout import Layout
 from ..search.objective import Objective
 from ..search.settle import settle
 from ..search.starts import Starts
 from ..suspects import explaining
-from .layout import RunsLayout
 
 
 @dataclass(frozen=True)
@@ -81,11 +81,14 @@ class RunsFit(Printed):
     ties : dict of str to str
         Parameters that follow another one.
     covariance : array, shape (n, n)
-        Of `shared`, then of what differs: all runs of the first parameter, of the second, ...
+        Of `shared`, then of what differs: all runs of the first parameter, of the second, ...; then
+        of nuisances: all logs of the first one, of the second, ...
     log_likelihood : float
     common : Fit
         Of the same runs without a difference between them.
     converged : bool
+    nuisances : tuple of Difference
+        Those of the model, of which each log has its own: means over the logs of every run.
     """
 
     fits: dict[str, Fit]
@@ -96,6 +99,7 @@ class RunsFit(Printed):
     log_likelihood: float
     common: Fit
     converged: bool
+    nuisances: tuple[Difference, ...] = ()
 
     __iter__ = None  # numbers are no names
 
@@ -115,7 +119,7 @@ class RunsFit(Printed):
 
     def _rows(self) -> list[list[str]]:
         rows = []
-        for d in self.differences:
+        for d in (*self.differences, *self.nuisances):
             told = [_with_std(v, s) for v, s in zip(d.values, d.stds, strict=True)]
             most = _with_std(d.most, d.most_std)
             rows.append([d.name, *told, d.unit, most, _equals(d.p_value).removeprefix("= ")])
@@ -184,6 +188,8 @@ def identify_runs(
         The driving of each run, by the name it is to have.
     vary : iterable of str
         Free parameters that may differ between runs, such as `mass.relative_error` or `D_front`.
+        Priors are those of every run's own value. A nuisance among them has one value for each
+        run, not for each log.
     tie : mapping of str to str
         Free parameters that are always equal to another one: ``{"D_rear": "D_front"}``.
     starts, seed, workers, progress
@@ -202,20 +208,35 @@ def identify_runs(
     NumericalError
         No start led anywhere.
     """
-    vary = tuple(dict.fromkeys(vary))
+    vary = (vary,) if isinstance(vary, str) else tuple(dict.fromkeys(vary))
     _check(model, runs, vary, tie)
+    model = _by_run(model, (*vary, *tie, *tie.values()))
     together = {run: Driving.of(logs).logs for run, logs in runs.items()}
     every = Driving.of([log for logs in together.values() for log in logs])
     common = identify(model, every, starts=starts, seed=seed, workers=workers, progress=progress)
-    logs = iter(common.driving.each_log())  # with the offsets of each
-    drivings = {run: Driving.joined(islice(logs, len(own))) for run, own in together.items()}
-    layout = RunsLayout.of(common.model, tuple(runs), vary, tie)
-    objective = layout.objective(drivings)
+    layout = Layout.of(common.model, {run: len(logs) for run, logs in together.items()}, vary, tie)
+    plain = replace(common.driving, offsets=())
+    logs = iter(plain.each_log())
+    drivings = [Driving.joined(islice(logs, len(own))) for own in together.values()]
+    objective = layout.objective(plain.each_log() if layout.offsets else drivings)
     q, noise, converged = settle(
-        objective, layout.start(common.model.vector()), common.noise.vector(), layout.box
+        objective,
+        layout.start(common.model.vector(), common.driving.offsets),
+        common.noise.vector(),
+        layout.box,
     )
     noise = objective.learn_noise(q, noise, rounds=1).noise
     return _summary(common, drivings, layout, objective, q, noise, converged)
+
+
+def _by_run(model: Model, names: Iterable[str]) -> Model:
+    """The model in which effects that runs have their own values of are no offsets of logs.
+
+    An offset has one value for each log, and what differs between runs would be hidden in it.
+    """
+    ids = {name.partition(".")[0] for name in names}
+    parts = (replace(e, same_in_all_logs=True) if e.id in ids else e for e in model.parts)
+    return replace(model, parts=tuple(parts))
 
 
 def _check(
@@ -242,8 +263,8 @@ def _check(
 
 def _summary(
     common: Fit,
-    drivings: Mapping[str, Driving],
-    layout: RunsLayout,
+    drivings: Sequence[Driving],
+    layout: Layout,
     objective: Objective,
     q: FloatArray,
     noise: FloatArray,
@@ -264,46 +285,69 @@ def _summary(
         [common.model.bounds(n) for n, _ in layout.every],
     )
     told = NoiseModel.from_vector(noise)
-    at = len(layout.shared)
+    maps = [layout.of_run(i) for i in range(len(layout.runs))]
     fits = {}
-    for i, (run, driving) in enumerate(drivings.items()):
-        own = {n: at + k * len(layout.runs) + i for k, n in enumerate(layout.vary)}
-        place = {n: j for j, n in enumerate(layout.shared)} | own
-        model = common.model.from_vector(q[layout.source(i)])
+    for i, (run, driving) in enumerate(zip(layout.runs, drivings, strict=True)):
+        parts = [k for k, of in enumerate(layout.run_of) if of == i]
+        model = common.model.from_vector(q[layout.source(parts[0])])
         # What is tied is not free in the run's own fit.
         model = model.with_fixed({n: model.value(n) for n in layout.tie})
-        which = [place[n] for n in model.free_names]
-        some = tuple(replace(estimates[place[n]], name=n) for n in model.free_names)
+        own = as_float64(maps[i] @ covariance @ maps[i].T)
+        some = tuple(
+            replace(estimates[int(np.argmax(row))], name=n)
+            if row.max() == 1.0
+            else _mean_of_logs(n, row, x, own[k, k], common.model)
+            for k, (n, row) in enumerate(zip(model.free_names, maps[i], strict=True))
+        )
+        mean = {e.name: e.value for e in some if e.name in layout.offsets}
+        if len(parts) > 1 and mean:
+            apart = [{n: float(q[layout.places(n)[k]] - mean[n]) for n in mean} for k in parts]
+            driving = replace(driving, offsets=tuple(apart))
         fits[run] = Fit(
-            model,
+            model.with_values(mean),
             told,
             some,
-            as_float64(covariance[np.ix_(which, which)]),
-            float(frozen.parts[i].log_likelihood),
+            own,
+            float(sum(frozen.parts[k].log_likelihood for k in parts)),
             driving,
             Starts.none(tuple(e.name for e in some)),
             converged,
         )
+    free = list(fits[layout.runs[0]].model.free_names)
+
+    def differing(names: Sequence[str]) -> tuple[Difference, ...]:
+        rows = (np.array([of[free.index(n)] for of in maps]) for n in names)
+        return tuple(
+            _difference(n, parameters[n].unit, of @ x, of @ covariance @ of.T)
+            for n, of in zip(names, rows, strict=True)
+        )
+
     return RunsFit(
         fits,
-        tuple(estimates[:at]),
-        tuple(
-            _difference(n, parameters[n].unit, x, covariance, at + k * len(layout.runs), len(fits))
-            for k, n in enumerate(layout.vary)
-        ),
+        tuple(estimates[: len(layout.shared)]),
+        differing(layout.vary),
         dict(layout.tie),
         covariance,
         float(frozen.log_likelihood),
         common,
         converged,
+        differing(layout.offsets),
     )
 
 
-def _difference(
-    name: str, unit: str, x: FloatArray, covariance: FloatArray, first: int, runs: int
-) -> Difference:
-    own = slice(first, first + runs)
-    values, of = x[own], covariance[own, own]
+def _mean_of_logs(
+    name: str, weights: FloatArray, x: FloatArray, variance: float, model: Model
+) -> Estimate:
+    unit = model.parameters[name].unit
+    std = float(np.sqrt(variance))
+    return Estimate(name, float(weights @ x), std, unit, bounds=model.bounds(name))
+
+
+def _difference(name: str, unit: str, values: FloatArray, of: FloatArray) -> Difference:
+    runs = len(values)
+    std = np.sqrt(np.diag(of))
+    if runs == 1:
+        return Difference(name, unit, (float(values[0]),), (float(std[0]),), 0.0, 0.0, 1.0)
     contrast = np.eye(runs)[1:] - np.eye(runs)[0]
     apart = contrast @ values
     chi2 = float(apart @ np.linalg.solve(contrast @ of @ contrast.T, apart))
@@ -313,7 +357,7 @@ def _difference(
         name,
         unit,
         tuple(map(float, values)),
-        tuple(map(float, np.sqrt(np.diag(of)))),
+        tuple(map(float, std)),
         float(values[high] - values[low]),
         float(np.sqrt(max(variance, 0.0))),
         float(scipy.stats.chi2.sf(chi2, runs - 1)),

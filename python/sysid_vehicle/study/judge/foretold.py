@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 
 from ..._common.arrays import FloatArray, as_float64
+from ...compare import compare
 from ...diagnose import blocks
 from ...errors import NumericalError
 from ...estimate import Driving
@@ -36,11 +37,15 @@ class Foretold:
         Of validation data that are like the training data.
     rules : Rules
         By which they are not.
+    error : float
+        On validation data one step ahead, with the parameters that serve both, in units of the
+        noise floor; NaN where that is not known.
     """
 
     ratio: float
     p_value: float
     rules: Rules = USUAL
+    error: float = np.nan
 
     @property
     def unforeseen(self) -> bool:
@@ -83,7 +88,8 @@ def foretold(fit: Fit, test: Driving, rules: Rules = USUAL) -> Foretold:
     std = float(np.std(known, ddof=1)) * np.sqrt(1.0 / n + 1.0 / m)
     apart = float(np.mean(new) - np.mean(known))
     p_value = float(scipy.stats.t.sf(apart / max(std, 1e-12), n - 1))
-    return Foretold(float(np.mean(new) / np.mean(known)), p_value, rules)
+    error = compare(other, test, noise=fit.noise).error
+    return Foretold(float(np.mean(new) / np.mean(known)), p_value, rules, error)
 
 
 def _squares(fit: Fit, driving: Driving) -> FloatArray:

@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from ..._common.arrays import FloatArray
-from ..._common.text import few
+from ..._common.text import few, number, unit_after
 from ..._common.threads import before, in_parallel
 from ...compare import Comparison, compare
 from ...diagnose import Instead, Omnibus, Verdicts, instead, judge, omnibus, widened
 from ...errors import warn
 from ...estimate import Driving
-from ...identify import Fit, driving_of
+from ...identify import Estimate, Fit, driving_of
 from ...log import unexcited
-from ...rules import LACKING, Facts, Rules, incomplete, standing, verdict
+from ...rules import LACKING, USUAL, Facts, Rules, incomplete, standing, verdict
 from ..ahead.beyond import Beyond
 from ..ahead.own_share import (
     alike,
@@ -179,7 +179,7 @@ class Judge:
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
             verdicts=told,
-            warnings=_warnings(self.trail, late),
+            warnings=_warnings(self.trail, late, rules),
             seconds=time.perf_counter() - began,
             rules=rules,
             explained=explained,
@@ -187,6 +187,7 @@ class Judge:
             foretold=expected,
             slow=slow,
             stopped=self.trail.stopped,
+            full=self.trail.full,
             late_facts=late,
             checked=checked,
             matters=self.sizes,
@@ -319,12 +320,18 @@ def _together(train: Driving, test: Driving) -> Driving:
     return Driving.joined((train, test)) if same else train
 
 
-def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:
+def _warnings(trail: Trail, late: Sequence[str], rules: Rules = USUAL) -> tuple[str, ...]:
     fit, found = trail.fit, []
     driving = fit.driving
     if trail.stopped or late:
         found.append(_cut_short(trail.stopped, late))
         warn(found[-1])
+    if trail.full:
+        found.append(
+            "the search ended with as many effects as may be added, one for each "
+            f"{rules.lasts:g} s of training data at most; there is evidence for "
+            f"{few(trail.full)}: raise `most_effects` (`--max-effects`), or record more"
+        )
     if trail.harmful:
         found.append(
             f"{' and '.join(trail.harmful)} removed again: where such an effect acts, errors 1 to "
@@ -344,11 +351,24 @@ def _warnings(trail: Trail, late: Sequence[str]) -> tuple[str, ...]:
         warn(found[-1])
     for log in driving.logs:
         found += [f"{log.name}: {text}" for text in log.missing().values()]
-    found += [f"{e.name}: {e.note} with this driving" for e in fit.estimates if e.note]
+    found += map(str, fit.against_priors)
+    given = {n for n, told in fit.model.settings.items() if told.bounds is not None}
+    found += [_noted(e, e.name in given) for e in fit.estimates if e.note]
     if not fit.converged:
         found.append("the final fit did not converge; its intervals may be too short")
         warn(found[-1])
     return tuple(dict.fromkeys(found))
+
+
+def _noted(e: Estimate, bounded: bool) -> str:
+    """Why an estimate says little, in words; of a user's bound, what lies beyond it."""
+    if e.note != "at bound":
+        return f"{e.name}: {e.note} with this driving"
+    unit = unit_after(e.unit)
+    text = f"{e.name}: ends at its bound {number(e.value)}{unit} with this driving"
+    if e.unbounded is None or not bounded:
+        return text
+    return f"{text}; the data lead beyond it, to about {number(e.unbounded[0])}{unit}"
 
 
 def _cut_short(stopped: Sequence[str], late: Sequence[str]) -> str:

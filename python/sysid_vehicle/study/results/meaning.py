@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
-from ...rules import NONE_GONE
+from ..._common.text import few
+from ...rules import NONE_GONE, share_of
 from .sentences import (
     disturbance,
     elsewhere,
@@ -55,6 +57,13 @@ def _unknown(study: Study) -> str:
         )
     if not names and only_elsewhere(study):
         return f"something is missing that shows in the validation data; it {in_training(study)}"
+    if study.full and not names:
+        return (
+            "something is missing; no effect was to be added, and there is evidence for "
+            f"{few(study.full)}"
+        )
+    if not study.diagnoses[-1].ranking:
+        return "something is missing, and no effect was considered"
     return "something is missing and no effect of the catalogue explains it"
 
 
@@ -92,13 +101,18 @@ def _adequate(study: Study) -> str:
         helps = study.predicting is not None and study.predicting.helps
         how = " with parameters fitted to predictions (`study.predicting.final`)" if helps else ""
         return f"an error remains, but 0.5 to 5 s ahead it is below {_matters(study)}{how}"
-    error, foretold = study.test[-1].error, study.foretold is not None
-    if foretold and share_beyond_noise(error) > study.rules.explainable:
+    error, most = study.test[-1].error, study.rules.explainable
+    if study.foretold is None or not share_beyond_noise(error) > most:
+        return _COMPLETE
+    told = f"{_COMPLETE}; the validation error is {error:.2g} noise floors"
+    serving = study.foretold.error
+    known = math.isfinite(serving)
+    if known and (share_beyond_noise(serving) <= most or share_of(error**2, serving**2) > most):
         return (
-            f"{_COMPLETE}; the validation error is {error:.2g} noise floors, from disturbances "
-            "like those of the training data"
+            f"{told}, and {serving:.2g} with parameters that serve validation data too: the "
+            "training data do not determine the tyres where these drive; add such driving to them"
         )
-    return _COMPLETE
+    return f"{told}, from disturbances like those of the training data"
 
 
 def _named(study: Study) -> str:

@@ -89,7 +89,27 @@ def _worth_a_drive(aliases: Sequence[AddedEffect]) -> list[AddedEffect]:
 
 
 def _of_what_is_left(study: Study) -> list[str]:
-    return [*_of_the_search(study), *_of_sensors(study), *_of_driving(study), *_of_use(study)]
+    told = _of_what_was_told(study)
+    return [
+        *told,
+        *_of_the_search(study),
+        *_of_sensors(study),
+        *_of_driving(study),
+        *_of_use(study),
+    ]
+
+
+def _of_what_was_told(study: Study) -> list[str]:
+    """Priors and bounds of the user that the data contradict: they look like a missing effect."""
+    fit, found = study.fit, []
+    wrong = [a.name for a in fit.against_priors]
+    if wrong:
+        found.append(f"correct the prior of {few(wrong)}, or widen it: the data contradict it")
+    given = {n for n, told in fit.model.settings.items() if told.bounds is not None}
+    held = [e.name for e in fit.estimates if e.note == "at bound" and e.name in given]
+    if held:
+        found.append(f"correct the bounds of {few(held)}, or widen them: the fit ends at them")
+    return found
 
 
 def _of_the_search(study: Study) -> list[str]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._common.text import number, unit_after
+from ..._common.text import few, number, unit_after
 from ...estimate import UNITS
 from ...estimate.driving import WORDS
 from ...rules import LACKING, NONE_GONE, share_of
@@ -17,6 +18,8 @@ from .as_fitted import as_fitted
 from .widened import times_wider
 
 if TYPE_CHECKING:
+    from ...effects import Parameter
+    from ...identify import Estimate
     from ..study import Study
 
 
@@ -49,18 +52,36 @@ def small(study: Study) -> bool:
 
 
 def nuisances(study: Study) -> list[str]:
-    """Those that are clearly there and of a size that matters, in words; none is a finding."""
+    """Those that are clearly there and of a size that matters, in words; none is a finding.
+
+    Of several logs each has its own, whose mean may be nothing.
+    """
     model, found = study.fit.model, []
     known = {e.name: e for e in study.estimates}
+    by_log = study.fit.offsets if study.fit.driving.offsets else {}
     for part in model.parts:
         if part.id not in model.nuisances:
             continue
         own = [(p, known[f"{part.id}.{p.name}"]) for p in part.parameters]
-        off = [(abs(e.value - p.null_value), e.std, p.matters) for p, e in own]
-        if any(by >= matters and by > study.rules.interval * std for by, std, matters in off):
-            sizes = ", ".join(f"{p.name} {e.size}{unit_after(p.unit)}" for p, e in own)
+        logs = {log: of for log, of in by_log.items() if own[0][1].name in of}
+        off = [
+            (abs(value - p.null_value), e.std * len(logs or [1]) ** 0.5, p.matters)
+            for p, e in own
+            for value in ([of[e.name] for of in logs.values()] or [e.value])
+        ]
+        sure = study.rules.interval_of(len(logs or [1]))
+        if any(by >= matters and by > sure * std for by, std, matters in off):
+            sizes = ", ".join(_sizes(p, e, logs) for p, e in own)
             found.append(f"Nuisance {part.id} ({part.title}): {sizes}")
     return found
+
+
+def _sizes(p: Parameter, e: Estimate, logs: Mapping[str, Mapping[str, float]]) -> str:
+    unit = unit_after(p.unit)
+    if not logs:
+        return f"{p.name} {e.size}{unit}"
+    each = few([f"{number(of[e.name], 3)} in {log}" for log, of in logs.items()])
+    return f"{p.name}{unit and f' [{p.unit}]'} {each}"
 
 
 def disturbance(study: Study) -> bool:

@@ -18,7 +18,7 @@ from ...diagnose.diagnose import REFITS
 from ...effects import Effect
 from ...errors import Interrupted, NumericalError
 from ...estimate import Driving
-from ...identify import Fit, refine
+from ...identify import Fit, refine, with_own_offsets
 from ...rules import Rules, harmful, worse
 from ..ahead.along_the_car import changes_of
 from ..ahead.own_share import own_shares
@@ -53,6 +53,8 @@ class Trail:
         Parameters of rivals and their standard errors, each refitted in place of what was chosen.
     stopped : tuple of str
         Effects with evidence that the time limit left untried.
+    full : tuple of str
+        Effects with evidence that would have been one more than may be added.
     taken_back : tuple of str
         Effects of last steps without which the model predicts better (`without_harm`).
     harmful : tuple of str
@@ -66,6 +68,7 @@ class Trail:
     nearly: dict[str, tuple[Candidate, ...]] = field(default_factory=dict)
     sizes: dict[str, Size] = field(default_factory=dict)
     stopped: tuple[str, ...] = ()
+    full: tuple[str, ...] = ()
     taken_back: tuple[str, ...] = ()
     harmful: tuple[str, ...] = ()
 
@@ -212,6 +215,8 @@ class Search:
             else:
                 if time.perf_counter() > self.ends:
                     trail.stopped = tuple(c.id for c in dx.significant)
+                elif not self.most_effects:
+                    trail.full = tuple(c.id for c in dx.significant)
                 return
             found = exchanged(
                 lean,
@@ -224,10 +229,12 @@ class Search:
             effects = set(found.model.effects)
             # One more than allowed may make another needless.
             if len(effects) > self.most_effects:
+                trail.full = tuple(sorted(effects - set(trail.fit.model.effects)))
                 return
             if any(set(f.model.effects) == effects for f in trail.fits):
                 return
             known = set(trail.fit.model.effects)
+            found = before(self.ends, partial(with_own_offsets, found), found)
             trail.fits.append(found)
             self.say(_step(found, known))
 
