@@ -154,6 +154,7 @@ def improve(
             search.follow(found)
             found.without_harm(test_driving, rules)
             search.take_out_harmful(found)
+            search.give_back(found)
         return found
 
     begun = time.perf_counter()

@@ -28,6 +28,7 @@ from .steps import (
     exchanged,
     first_that_holds,
     in_common,
+    lead,
     likeliest,
 )
 from .together import first_together, in_place_of
@@ -234,7 +235,6 @@ class Search:
             if any(set(f.model.effects) == effects for f in trail.fits):
                 return
             known = set(trail.fit.model.effects)
-            found = before(self.ends, partial(with_own_offsets, found), found)
             trail.fits.append(found)
             self.say(_step(found, known))
 
@@ -263,6 +263,20 @@ class Search:
             else:
                 del trail.fits[1:], trail.diagnoses[1:]
             self.say(f"Removed {name}.")
+
+    def give_back(self, trail: Trail) -> None:
+        """Find anew what nuisances are in each log, with all effects of the last model beside them.
+
+        They were found with the baseline, and hold what they had taken up of the effects. Where all
+        data prefer what the search found, it stays.
+        """
+        if len(trail.fits) < 2:
+            return
+        fit = trail.fit
+        found = before(self.judged_by, partial(with_own_offsets, fit), fit)
+        if found is not fit and lead(found, fit, self.test) > 0.0:
+            trail.fits[-1] = found
+            trail.diagnoses[-1] = self._diagnosis(found, (), refits=0)
 
     def _without(self, fit: Fit, name: str) -> Fit | None:
         try:
