@@ -27,7 +27,7 @@ from ..log import Log, several_logs
 from ..rules import ErrorChange, Gain
 from .ahead.along_the_car import along_alone, changes_of
 from .ahead.beyond import Beyond, beyond_noise
-from .ahead.fitted_range import within_fitted_range
+from .ahead.fitted_range import Bools, fitted, within_fitted_range
 from .ahead.horizons import ALONG, typical_error
 
 _SHARE = 0.3
@@ -186,7 +186,10 @@ def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[ErrorChange,
 
 def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
     """Errors 1 to 5 s ahead beyond the noise, of models with the parameters of `best_within`."""
-    return beyond_noise(in_parallel(lambda fit: best_within(fit, test), fits), test, AHEAD)
+    final = fits[-1]
+    best = in_parallel(lambda fit: best_within(fit, test, final), fits)
+    found = beyond_noise(best, test, AHEAD, counted=counted_in_shares(final, test))
+    return replace(found, within=float(np.mean(fitted(at_its_best(final, test), test))))
 
 
 def as_elsewhere(fit: Fit, test: Driving) -> Fit:
@@ -212,17 +215,23 @@ def at_its_best(fit: Fit, test: Driving) -> Fit:
     return min(_ways(fit, test), key=lambda f: typical_error(f, noise, test, AHEAD))
 
 
-@remembered(16)
-def best_within(fit: Fit, test: Driving) -> Fit:
-    """As `at_its_best`, by predictions that stay within the slip angles that were fitted.
+@remembered(4)
+def counted_in_shares(final: Fit, test: Driving) -> Bools:
+    """Predictions of `AHEAD` that count in shares of the errors on validation data.
 
-    Where parameters that are best everywhere err more beyond (`within_fitted_range`).
+    Those in which the tyres work as far as they were fitted, where the final model fails beyond
+    (`within_fitted_range`).
     """
-    best, noise = at_its_best(fit, test), fit.noise.floor()
-    within = within_fitted_range(best, test, AHEAD)
-    if within.all():
-        return best
-    return min(_ways(fit, test), key=lambda f: typical_error(f, noise, test, AHEAD, within))
+    return within_fitted_range(at_its_best(final, test), test, AHEAD)
+
+
+@remembered(32)
+def best_within(fit: Fit, test: Driving, final: Fit) -> Fit:
+    """As `at_its_best`, by the predictions that count in shares beside a final model."""
+    counted, noise = counted_in_shares(final, test), fit.noise.floor()
+    if counted.all():
+        return at_its_best(fit, test)
+    return min(_ways(fit, test), key=lambda f: typical_error(f, noise, test, AHEAD, counted))
 
 
 def _ways(fit: Fit, test: Driving) -> list[Fit]:

@@ -81,7 +81,7 @@ def test_of_errors_that_grow_no_share_is_taken(
     monkeypatch.setattr(own, "own_share", lambda *_, **__: Share(0.3, 0.2, 0.5))
     heavier = replace(fit, model=fit.model.add("mass"))
     for told, least in ((grown, -0.25), (unsure, 0.2)):
-        monkeypatch.setattr(own, "taken_of", lambda *_, told=told: told)
+        monkeypatch.setattr(own, "taken_of", lambda *_, told=told, **__: told)
         assert together_by_motion([fit, heavier], ["mass"], lanes)["mass"][1] == least
 
 

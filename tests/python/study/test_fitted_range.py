@@ -8,10 +8,15 @@ import pytest
 from sysid_vehicle import Fit, Log, Model, drive, identify, manoeuvres
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.study import validation
-from sysid_vehicle.study.ahead import beyond, where_models_differ
 from sysid_vehicle.study.ahead.beyond import beyond_noise, own_share
 from sysid_vehicle.study.ahead.fitted_range import fitted, within_fitted_range
-from sysid_vehicle.study.validation import AHEAD, at_its_best, best_within
+from sysid_vehicle.study.validation import (
+    AHEAD,
+    at_its_best,
+    best_within,
+    beyond_noise_ahead,
+    counted_in_shares,
+)
 
 LAG = {"steer_lag.time_constant_s": 0.1}
 GENTLE_MPS2, LIMIT_MPS2 = 4.0, 7.5
@@ -92,22 +97,12 @@ def test_where_every_prediction_goes_beyond_all_of_them_count(gentle: Fit, harde
     assert within_fitted_range(gentle, harder, (1e3,)).all()
 
 
-def test_tyres_beyond_what_was_fitted_do_not_hide_a_share(
-    gentle: Fit, harder: Driving, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_tyres_beyond_what_was_fitted_do_not_hide_a_share(gentle: Fit, harder: Driving) -> None:
     """They err with the effect and without it, in the larger part of the driving."""
     without = replace(gentle, model=gentle.model.with_values({"steer_lag.time_constant_s": 0.0}))
-    found = own_share(without, gentle, harder, AHEAD)
-    assert found.low > 0.15
-    told = beyond_noise((without, gentle), harder, AHEAD)
-    assert told.low > 0.15
-    assert told.within == pytest.approx(np.mean(fitted(gentle, harder)))
-
-    def everywhere(_: Fit, driving: Driving, horizons_s: tuple[float, ...]) -> np.ndarray:
-        return np.ones((len(horizons_s), driving.samples), dtype=bool)
-
-    for module in (beyond, where_models_differ):
-        monkeypatch.setattr(module, "within_fitted_range", everywhere)
+    counted = within_fitted_range(gentle, harder, AHEAD)
+    assert own_share(without, gentle, harder, AHEAD, counted=counted).low > 0.15
+    assert beyond_noise((without, gentle), harder, AHEAD, counted=counted).low > 0.15
     assert not own_share(without, gentle, harder, AHEAD).low > 0.0
     assert not beyond_noise((without, gentle), harder, AHEAD).low > 0.0
 
@@ -124,12 +119,19 @@ def test_parameters_that_are_best_everywhere_need_not_be_so_within(
     values = {"steer_lag.time_constant_s": 0.05, "D_rear": 0.9 * late.value("D_rear")}
     values["B_rear"] = late.value("B_rear") / 0.9
     other = replace(gentle, model=gentle.model.with_values(values))
-    asked = replace(gentle)
+    asked, poorer = replace(gentle), replace(gentle)
     with monkeypatch.context() as patch:
         patch.setattr(validation, "_ways", lambda *_: [gentle, other])
         assert at_its_best(asked, harder) is other
-        assert not within_fitted_range(other, harder, AHEAD).all()
-        assert best_within(asked, harder) is gentle
+        counted = counted_in_shares(asked, harder)
+        assert not counted.all()
+        assert np.array_equal(counted, within_fitted_range(other, harder, AHEAD))
+        # So for every model that is held against the final one.
+        assert best_within(asked, harder, asked) is gentle
+        assert best_within(poorer, harder, asked) is gentle
+        told = beyond_noise_ahead((poorer, asked), harder)
+        assert told.within == pytest.approx(np.mean(fitted(other, harder)))
     # What holds beyond what was fitted is asked once.
     driving = Driving.of(course)
-    assert best_within(fit, driving) is at_its_best(fit, driving)
+    assert counted_in_shares(fit, driving).all()
+    assert best_within(fit, driving, fit) is at_its_best(fit, driving)

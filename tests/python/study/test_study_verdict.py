@@ -67,7 +67,8 @@ def test_validation_data_are_asked_only_where_a_name_has_a_share(
     fit: Fit, lap: Log, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[Fit] = []
-    monkeypatch.setattr(own, "best_within", lambda fit, _: asked.append(fit) or fit)
+    monkeypatch.setattr(own, "best_within", lambda fit, *_: asked.append(fit) or fit)
+    monkeypatch.setattr(own, "counted_in_shares", lambda *_: None)
     needless = refit(fit.model.add("gyro_scale"), fit.driving, fit.noise)
     shares = own_shares(needless, ["gyro_scale"], ["gyro_scale"], Driving.of(lap))
     assert not asked
@@ -167,7 +168,8 @@ def test_shares_for_which_there_is_no_time_are_left_out(
     both = ["gyro_scale", "gyro_bias"]
     richer = replace(fit, model=fit.model.add(*both))
     asked: list[Fit] = []
-    monkeypatch.setattr(own, "best_within", lambda fit, _: asked.append(fit) or fit)
+    monkeypatch.setattr(own, "best_within", lambda fit, *_: asked.append(fit) or fit)
+    monkeypatch.setattr(own, "counted_in_shares", lambda *_: None)
     assert set(own_shares(richer, both, both, Driving.of(lap), 13.0)) == {*both}
     assert asked
     # Without a share of the training data validation data are not asked.

@@ -12,7 +12,7 @@ from ..._common.arrays import FloatArray, as_float64, in_turn, mean_of_known, me
 from ...estimate import Driving
 from ...identify import Fit
 from ...rules import UNKNOWN, Share, share_of
-from .fitted_range import fitted, within_fitted_range
+from .fitted_range import Bools
 from .horizons import squares_ahead
 from .where_models_differ import apart
 
@@ -55,11 +55,14 @@ _UNSEEN = Beyond((0.0, 0.0), 1.0, 0.0, 1.0)
 
 
 def beyond_noise(
-    fits: Sequence[Fit], driving: Driving, horizons_s: Sequence[float], *, seed: int = 0
+    fits: Sequence[Fit],
+    driving: Driving,
+    horizons_s: Sequence[float],
+    *,
+    counted: Bools | None = None,
+    seed: int = 0,
 ) -> Beyond:
     """Work out what errors some seconds ahead are beyond the noise of the sensors.
-
-    Of predictions in which the tyres work as far as they were fitted (`within_fitted_range`).
 
     Parameters
     ----------
@@ -67,16 +70,16 @@ def beyond_noise(
         The last one's noise starts every prediction.
     driving : Driving
     horizons_s : sequence of float
+    counted : array of bool, shape (horizons, samples), optional
+        Predictions that count, by the sample at which they end; by default all.
     seed : int
         Of the draws.
     """
-    counted = within_fitted_range(fits[-1], driving, horizons_s)
     squares, sensor, seen = squares_ahead(fits, driving, horizons_s, counted)
     if not seen.any():  # too short for any prediction
         return replace(_UNSEEN, squares=(0.0,) * len(fits))
     noise = as_float64(np.broadcast_to(sensor**2, seen.shape)[seen])
-    within = float(np.mean(fitted(fits[-1], driving)))
-    return replace(_taken(squares[:, :, seen], noise, seed), within=within)
+    return _taken(squares[:, :, seen], noise, seed)
 
 
 def own_share(
@@ -86,6 +89,7 @@ def own_share(
     horizons_s: Sequence[float],
     *,
     channels: Collection[str] = (),
+    counted: Bools | None = None,
     seed: int = 0,
 ) -> Share:
     """Work out what a model takes off the errors of one that lacks a part of it.
@@ -103,10 +107,12 @@ def own_share(
     horizons_s : sequence of float
     channels : collection of str
         Those that count; by default, and where none of them is predicted, all.
+    counted : array of bool, shape (horizons, samples), optional
+        As for `beyond_noise`.
     seed : int
         Of the draws.
     """
-    squares, noise = apart(without, final, driving, horizons_s, channels)
+    squares, noise = apart(without, final, driving, horizons_s, channels, counted)
     if not squares.size:
         return UNKNOWN
     beyond = np.maximum(squares - noise, 0.0)
@@ -130,6 +136,7 @@ def taken_of(
     horizons_s: Sequence[float],
     channels: Collection[str],
     *,
+    counted: Bools | None = None,
     seed: int = 0,
 ) -> Beyond:
     """Work out what a model takes off the errors of the baseline in some channels.
@@ -144,10 +151,12 @@ def taken_of(
     horizons_s : sequence of float
     channels : collection of str
         Those that count; where none of them is predicted, all.
+    counted : array of bool, shape (horizons, samples), optional
+        As for `beyond_noise`.
     seed : int
         Of the draws.
     """
-    squares, noise = apart(first, last, driving, horizons_s, channels)
+    squares, noise = apart(first, last, driving, horizons_s, channels, counted)
     if not squares.size:
         return _UNSEEN
     return _taken(squares, noise, seed)

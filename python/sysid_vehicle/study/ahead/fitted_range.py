@@ -19,13 +19,13 @@ from ...identify import Fit, driving_of
 from ...rules import USUAL, share_of
 from ...vehicle import slip_angles
 
-_Bools = npt.NDArray[np.bool_]
+Bools = npt.NDArray[np.bool_]
 
 RARE = 99.5
 """Percentile of slip angles up to which tyres count as fitted: larger ones may be outliers."""
 
 
-def within_fitted_range(fit: Fit, driving: Driving, horizons_s: Sequence[float]) -> _Bools:
+def within_fitted_range(fit: Fit, driving: Driving, horizons_s: Sequence[float]) -> Bools:
     """Find the predictions in which both axles stay within the slip angles that were fitted.
 
     Parameters
@@ -54,7 +54,7 @@ def within_fitted_range(fit: Fit, driving: Driving, horizons_s: Sequence[float])
 
 
 @remembered(16)
-def fitted(fit: Fit, driving: Driving) -> _Bools:
+def fitted(fit: Fit, driving: Driving) -> Bools:
     """At which samples the slip angle of neither axle is larger than those that were fitted.
 
     One fitted sample in 200 may be an outlier, and is no measure. A model that is not shown to err

@@ -13,7 +13,13 @@ from ...errors import NumericalError
 from ...estimate import Driving
 from ...identify import Fit, refit
 from ...rules import UNKNOWN, USUAL, Rules, Share
-from ..validation import AHEAD, at_its_best, best_within, gain_in_log_likelihood
+from ..validation import (
+    AHEAD,
+    at_its_best,
+    best_within,
+    counted_in_shares,
+    gain_in_log_likelihood,
+)
 from .beyond import Beyond, own_share, taken_of
 from .horizons import LATERAL, moved_by
 from .shares import shares
@@ -157,13 +163,14 @@ def _shares(
     def on_test(few: tuple[str, ...]) -> Share:
         fit = without(final, few)
         assert fit is not None  # its share of the training data is known
-        best, poorer = best_within(final, test), best_within(fit, test)
-        return own_share(poorer, best, test, AHEAD, channels=moved[few])
+        poorer, best = (best_within(f, test, final) for f in (fit, final))
+        counted = counted_in_shares(final, test)
+        return own_share(poorer, best, test, AHEAD, channels=moved[few], counted=counted)
 
     fitted = in_time(on_train, asked)
     judged: dict[tuple[str, ...], Share] = {}
     if any(fitted[e].low > 0.0 for e in fitted if e in named):
-        before(ends, lambda: best_within(final, test), None)  # once for all of them
+        before(ends, lambda: best_within(final, test, final), None)  # once for all of them
         judged = in_time(on_test, fitted)
     return {e: (judged.get(e, UNKNOWN), fitted.get(e, UNKNOWN)) for e in asked if e not in late}
 
@@ -261,12 +268,13 @@ def together_by_motion(
         By effect, of the motion that it moves: squares of the errors of the baseline and of the
         final model, and the lower end of the share.
     """
-    first, last = (best_within(fit, test) for fit in (fits[0], fits[-1]))
+    first, last = (best_within(fit, test, fits[-1]) for fit in (fits[0], fits[-1]))
+    counted = counted_in_shares(fits[-1], test)
     parts = {part.id: moved_by(part) for part in fits[-1].model.parts}
     found: dict[frozenset[str], tuple[tuple[float, float], float]] = {}
     for channels in {parts[e] for e in added}:
-        taken = taken_of(first, last, test, AHEAD, channels)
-        low = own_share(first, last, test, AHEAD, channels=channels).low
+        taken = taken_of(first, last, test, AHEAD, channels, counted=counted)
+        low = own_share(first, last, test, AHEAD, channels=channels, counted=counted).low
         if not taken.share > 0.0:
             low = min(low, taken.share)
         elif not low > 0.0 and not channels.isdisjoint(LATERAL):

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ..._common.arrays import FloatArray, as_float64, spread_of_known
 from ...estimate import MEASURED, Driving, equal_blocks, moving
 from ...identify import Fit
-from .fitted_range import within_fitted_range
+from .fitted_range import Bools
 from .horizons import PREDICTED, errors_ahead, explainable, lost_as_large
 
 
@@ -36,14 +36,18 @@ class Apart(NamedTuple):
 
 
 def apart(
-    one: Fit, other: Fit, driving: Driving, horizons_s: Sequence[float], channels: Collection[str]
+    one: Fit,
+    other: Fit,
+    driving: Driving,
+    horizons_s: Sequence[float],
+    channels: Collection[str],
+    counted: Bools | None = None,
 ) -> Apart:
     """Work out errors some seconds ahead where two models differ.
 
     That is by the prediction of some channels, where it differs by a quarter at least of what it
     does over all the driving (`moving`), for each horizon by itself. Blocks hold equal times of
-    that. Predictions in which tyres work further than they were fitted are left out
-    (`within_fitted_range`).
+    that.
 
     Parameters
     ----------
@@ -53,17 +57,20 @@ def apart(
     horizons_s : sequence of float
     channels : collection of str
         Those that count; where none of them is predicted, all.
+    counted : array of bool, shape (horizons, samples), optional
+        Predictions that count, by the sample at which they end; by default all.
     """
     noise = other.noise.floor()
     predicted = [c for c in explainable(driving) if c in driving.present]
-    counted = [c for c in predicted if c in channels] or predicted
-    columns = [PREDICTED.index(c) for c in counted]
+    asked = [c for c in predicted if c in channels] or predicted
+    columns = [PREDICTED.index(c) for c in asked]
     ahead = tuple(horizons_s)
     errors = np.stack(
         [errors_ahead(fit, noise, driving, ahead)[..., columns] for fit in (one, other)]
     )
-    errors[:, ~within_fitted_range(other, driving, ahead)] = np.nan
-    differ = np.stack([_differ(e, counted, driving) for e in errors.swapaxes(0, 1)])
+    if counted is not None:
+        errors[:, ~counted] = np.nan
+    differ = np.stack([_differ(e, asked, driving) for e in errors.swapaxes(0, 1)])
     there = ~np.any(np.isnan(errors), axis=0) & differ[..., None]
     starts = equal_blocks(as_float64(differ.mean(axis=0)), driving)
     found = np.add.reduceat(np.where(there, errors, 0.0) ** 2, starts, axis=2)
@@ -72,7 +79,7 @@ def apart(
         means = np.where(count > 0.0, found / count, np.nan)
     squares = lost_as_large(as_float64(means.swapaxes(1, 2)))
     seen = np.isfinite(squares).any(axis=(0, 1))
-    sensor = np.array([noise.sensor[MEASURED.index(c)] for c in counted]) ** 2
+    sensor = np.array([noise.sensor[MEASURED.index(c)] for c in asked]) ** 2
     return Apart(
         as_float64(squares[:, :, seen]),
         as_float64(np.broadcast_to(sensor, seen.shape)[seen]),
