@@ -23,6 +23,7 @@ from ...estimate import MEASURED, UNITS, Driving, NoiseModel, turning, turning_b
 from ...identify import Fit
 from ...identify.ahead.ahead import of_few
 from ...rules import ErrorChange
+from .fitted_range import Bools
 from .waterfall import all_ahead
 
 ALONG = ("vx_mps", "ax_mps2")
@@ -213,7 +214,7 @@ def squares_ahead(
     fits: Sequence[Fit],
     driving: Driving,
     horizons_s: Sequence[float],
-    counted: npt.NDArray[np.bool_] | None = None,
+    counted: Bools | None = None,
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
     """Squares of errors, noise of the sensors, and which horizons and channels are seen.
 
@@ -268,7 +269,7 @@ def _errors_of(
     noise: NoiseModel,
     driving: Driving,
     horizons_s: tuple[float, ...],
-    counted: npt.NDArray[np.bool_] | None,
+    counted: Bools | None,
 ) -> FloatArray:
     """As `block_errors`, of the predictions that count."""
     if counted is None or counted.all():
@@ -283,7 +284,7 @@ def typical_error(
     noise: NoiseModel,
     driving: Driving,
     horizons_s: Sequence[float],
-    counted: npt.NDArray[np.bool_] | None = None,
+    counted: Bools | None = None,
 ) -> float:
     """Mean logarithm of the median errors of the lateral channels, over all horizons.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -272,8 +272,9 @@ class Search:
         """
         if len(trail.fits) < 2:
             return
-        fit = trail.fit
-        found = before(self.judged_by, partial(with_own_offsets, fit), fit)
+        fit = found = trail.fit
+        with suppress(NumericalError, np.linalg.LinAlgError):
+            found = before(self.judged_by, partial(with_own_offsets, fit), fit)
         if found is not fit and lead(found, fit, self.test) > 0.0:
             trail.fits[-1] = found
             trail.diagnoses[-1] = self._diagnosis(found, (), refits=0)
