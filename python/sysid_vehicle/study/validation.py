@@ -187,9 +187,11 @@ def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[ErrorChange,
 def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
     """Errors 1 to 5 s ahead beyond the noise, of models with the parameters of `best_within`."""
     final = fits[-1]
-    best = in_parallel(lambda fit: best_within(fit, test, final), fits)
-    found = beyond_noise(best, test, AHEAD, counted=counted_in_shares(final, test))
-    return replace(found, within=float(np.mean(fitted(at_its_best(final, test), test))))
+    best = in_parallel(lambda fit: at_its_best(fit, test), fits)
+    within, counted = float(np.mean(fitted(best[-1], test))), counted_in_shares(final, test)
+    if not counted.all():
+        best = in_parallel(lambda fit: best_within(fit, test, final), fits)
+    return replace(beyond_noise(best, test, AHEAD, counted=counted), within=within)
 
 
 def as_elsewhere(fit: Fit, test: Driving) -> Fit:

@@ -11,6 +11,7 @@ from sysid_vehicle._common.threads import at_most
 from sysid_vehicle.errors import InvalidInput, SysidWarning
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.study import validation
+from sysid_vehicle.study.ahead.beyond import Beyond
 from sysid_vehicle.study.validation import _with_error, set_aside
 
 
@@ -92,12 +93,19 @@ def test_two_models_are_judged_side_by_side(
 
     for name in ("at_its_best", "_prediction"):
         monkeypatch.setattr(validation, name, waiting)
-    for name in ("changes_of", "beyond_noise"):
-        monkeypatch.setattr(validation, name, lambda *told, **_: told)
+    asked = []
+    none = Beyond((1.0, 1.0), 0.0, 0.0, 0.0)
+    monkeypatch.setattr(validation, "changes_of", lambda *told, **_: told)
+    monkeypatch.setattr(
+        validation, "beyond_noise", lambda fits, *_, **__: asked.append(fits) or none
+    )
+    for name in ("counted_in_shares", "fitted"):
+        monkeypatch.setattr(validation, name, lambda *_: np.ones(1, dtype=bool))
     richer = replace(fit)
     with at_most(2):
         assert validation.changes_ahead(fit, richer, test)[:2] == (fit, richer)
-        assert validation.beyond_noise_ahead([fit, richer], test)[0] == [fit, richer]
+        assert validation.beyond_noise_ahead([fit, richer], test) == none
+        assert asked == [[fit, richer]]
         with pytest.raises(AttributeError, match="sureness"):
             validation.as_sure(fit, richer, test)
     monkeypatch.undo()
