@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,14 +15,7 @@ from sysid_vehicle.effects.formula import trace
 
 FORCE = sv.parameter("force", "N", typical=80.0, lower=0.0, upper=900.0)
 
-
-@pytest.fixture(autouse=True)
-def no_effects_left() -> Iterator[None]:
-    before = {e.id for e in sv.catalogue()}
-    yield
-    for e in sv.catalogue():
-        if e.id not in before:
-            sv.forget_effect(e.id)
+pytestmark = pytest.mark.usefixtures("no_effects_left")
 
 
 def conditions(d: Any, p: Any) -> Any:

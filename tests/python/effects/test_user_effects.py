@@ -6,7 +6,6 @@ import copy
 import pickle
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -24,14 +23,7 @@ from sysid_vehicle.model import Model
 CHANNEL, STATE = (_core.formula_parts()["operations"].index(n) for n in ("channel", "state"))
 WIND = [sv.parameter("gain", "N s2/m2", typical=0.6, lower=-5.0, upper=5.0)]
 
-
-@pytest.fixture(autouse=True)
-def no_effects_left() -> Iterator[None]:
-    before = {e.id for e in sv.catalogue()}
-    yield
-    for e in sv.catalogue():
-        if e.id not in before:
-            sv.forget_effect(e.id)
+pytestmark = pytest.mark.usefixtures("no_effects_left")
 
 
 def drag_of_users(**changes: object) -> sv.Effect:
