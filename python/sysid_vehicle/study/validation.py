@@ -188,8 +188,9 @@ def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
     """Errors 1 to 5 s ahead beyond the noise, of models with the parameters of `best_within`."""
     final = fits[-1]
     best = in_parallel(lambda fit: at_its_best(fit, test), fits)
-    within, counted = float(np.mean(fitted(best[-1], test))), counted_in_shares(final, test)
+    within, counted = 1.0, counted_in_shares(final, test)
     if not counted.all():
+        within = float(np.mean(fitted(best[-1], test)))
         best = in_parallel(lambda fit: best_within(fit, test, final), fits)
     return replace(beyond_noise(best, test, AHEAD, counted=counted), within=within)
 

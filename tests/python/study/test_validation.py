@@ -99,8 +99,9 @@ def test_two_models_are_judged_side_by_side(
     monkeypatch.setattr(
         validation, "beyond_noise", lambda fits, *_, **__: asked.append(fits) or none
     )
-    for name in ("counted_in_shares", "fitted"):
-        monkeypatch.setattr(validation, name, lambda *_: np.ones(1, dtype=bool))
+    # Where no prediction stays within what was fitted all of them count, and nothing is left out.
+    monkeypatch.setattr(validation, "counted_in_shares", lambda *_: np.ones(1, dtype=bool))
+    monkeypatch.setattr(validation, "fitted", lambda *_: np.zeros(1, dtype=bool))
     richer = replace(fit)
     with at_most(2):
         assert validation.changes_ahead(fit, richer, test)[:2] == (fit, richer)
