@@ -104,6 +104,9 @@ def diagnose(
         finished.sort(key=lambda c: -_merit(c, driving.samples))
         if refits:
             finished += chosen.hidden(ranked, finished, left, board)
+            on_the_level = chosen.hidden_by_the_road(ranked, [*finished, *far])
+            found = {c.id for c in on_the_level}
+            finished = [*on_the_level, *(c for c in finished if c.id not in found)]
     finished.sort(key=lambda c: -_merit(c, driving.samples))
     finished = [_with_refit_rivals(c, finished, 2.0 * rules.apart) for c in finished]
     done = {c.id for c in finished}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -84,28 +84,38 @@ def is_hidden_by_noise(effect: Effect) -> bool:
 
 
 def from_typical(fit: Fit, c: Candidate, tests: int, alpha: float = np.inf) -> Candidate:
-    """The candidate fitted with noise of its own from its typical size, and tested by likelihood.
-
-    Its p-value is that of the likelihood ratio, on one side where the parameter has one sign, over
-    the variance ratio of its score, corrected for so many tests (Bonferroni). Where that comes out
-    above `alpha` the candidate may be left as it is: a lag that ends at nothing is not climbed.
-    """
+    """The candidate fitted with noise of its own from its typical size (`from_size`)."""
     ((name, p),) = c.effect.named.items()
-    model = fit.model.add(c.effect).with_values({name: p.typical})
-    sides, ratio = 0.5 if p.one_sided else 1.0, max(c.variance_ratio, 1.0)
+    asked = alpha if is_hidden_by_noise(c.effect) else np.inf
+    return from_size(fit, c, {name: p.typical}, tests, asked)
+
+
+def from_size(
+    fit: Fit, c: Candidate, size: Mapping[str, float], tests: int, alpha: float = np.inf
+) -> Candidate:
+    """The candidate fitted with noise of its own from a size, and tested by likelihood.
+
+    Its p-value is that of the likelihood ratio, on one side where its only parameter has one sign,
+    over the variance ratio of its score, corrected for so many tests (Bonferroni). Where that comes
+    out above `alpha` the candidate may be left as it is: what ends at nothing is not climbed.
+    """
+    parameters = c.effect.parameters
+    sides = 0.5 if len(parameters) == 1 and parameters[0].one_sided else 1.0
+    degrees, ratio = len(parameters), max(c.variance_ratio, 1.0)
     least = -np.inf
-    if is_hidden_by_noise(c.effect) and alpha < sides * tests:
+    if alpha < sides * tests:
         least = fit.log_likelihood + 0.5 * ratio * float(
-            scipy.special.chdtri(1, alpha / sides / tests)
+            scipy.special.chdtri(degrees, alpha / sides / tests)
         )
     try:
+        model = fit.model.add(c.effect).with_values(size)
         likelier = refine_above(model, fit.driving, fit, least)
     except (NumericalError, np.linalg.LinAlgError):
         return c
     if likelier is None:
         return c
     found = _with_fit(fit, c, likelier)
-    alone = sides * float(scipy.special.chdtrc(1, max(found.statistic, 0.0) / ratio))
+    alone = sides * float(scipy.special.chdtrc(degrees, max(found.statistic, 0.0) / ratio))
     return replace(found, finished=True, p_value=min(tests * alone, 1.0))
 
 
@@ -122,12 +132,18 @@ def _with_fit(fit: Fit, c: Candidate, found: Fit) -> Candidate:
     )
 
 
-def _starts(c: Candidate) -> list[dict[str, float]]:
+def predicted_size(c: Candidate) -> dict[str, float]:
+    """What the score predicts, no further from nothing than a refit may begin."""
     predicted = {}
     for (name, p), v in zip(c.effect.named.items(), c.value, strict=True):
         reach = np.inf if p.scan else _BEYOND * p.typical
         value = float(np.clip(v, p.null_value - reach, p.null_value + reach))
         predicted[name] = float(np.clip(value, p.lower, p.upper))
+    return predicted
+
+
+def _starts(c: Candidate) -> list[dict[str, float]]:
+    predicted = predicted_size(c)
     starts = [predicted]
     lead, first = next(iter(c.effect.named.items()))
     if len(c.effect.parameters) == 1 and first.another_dynamics(predicted[lead]):

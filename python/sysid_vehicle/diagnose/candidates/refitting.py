@@ -16,7 +16,16 @@ from ...rules import Rules
 from ..unexplained.omnibus import Omnibus, omnibus
 from .candidate import Candidate
 from .confirm import hopeless
-from .refits import finished, from_typical, in_time, is_hidden_by_noise, refitted
+from .on_the_level import needs_road, shown_on_the_level
+from .refits import (
+    finished,
+    from_size,
+    from_typical,
+    in_time,
+    is_hidden_by_noise,
+    predicted_size,
+    refitted,
+)
 from .reservation import beside
 from .score import ScoreBoard
 
@@ -110,6 +119,27 @@ class Refitting:
         suspects = _suspected(hidden, known, board, rules)
         work = in_time(lambda c: from_typical(self.fit, c, n), self.ends)
         return [c for c in self.pool.map(work, suspects) if c.finished]
+
+    def hidden_by_the_road(
+        self, ranked: Sequence[Candidate], known: Sequence[Candidate]
+    ) -> list[Candidate]:
+        """Refits of what a road whose slope varies may hide, from the sizes that a level one shows.
+
+        A body that leans in corners reads as a bank would: under noise that has learned such a road
+        neither score nor refit shows it. The likelihood, with noise of its own, tells which it is.
+        """
+        if not self.fit.noise.sloping or time.perf_counter() >= self.ends:
+            return []
+        done = {c.id: c.fit for c in known if c.fit is not None}
+        shown = shown_on_the_level(self.fit, self.driving, ranked, self.rules)
+        asked = [c for c in shown if c.id not in done or needs_road(done[c.id], self.fit)]
+        n, alpha = len(ranked), self.rules.alpha
+        work = in_time(
+            lambda c: from_size(self.fit, c, predicted_size(c), n, alpha), self.ends
+        )
+        best = {c.id: c.statistic for c in known}
+        tried = [c for c in self.pool.map(work, asked) if c.finished and c.p_value < alpha]
+        return [c for c in tried if c.statistic > best.get(c.id, 0.0)]
 
     def _worth_refitting(self, significant: Sequence[Candidate], refits: int) -> list[Candidate]:
         """The best few, those asked for, and what the catalogue says acts like the very best."""
