@@ -21,7 +21,8 @@ from .candidates.diagnosis import Diagnosis
 from .candidates.possible import considered
 from .candidates.posterior import causes_of
 from .candidates.refitting import Refitting
-from .candidates.score import Score, ScoreBoard, score_board_of
+from .candidates.rivals import score_rivals, with_refit_rivals
+from .candidates.score import score_board_of
 from .evidence.evidence import Evidence
 from .unexplained.omnibus import Unknown, omnibus_of
 
@@ -94,7 +95,7 @@ def diagnose(
             s.std,
             s.retained,
             s.variance_ratio,
-            indistinguishable_from=_score_rivals(board, s, 2.0 * rules.apart),
+            indistinguishable_from=score_rivals(board, s, 2.0 * rules.apart),
         )
         for s in board.scores
     ]
@@ -107,8 +108,8 @@ def diagnose(
             on_the_level = chosen.hidden_by_the_road(ranked, [*finished, *far])
             found = {c.id for c in on_the_level}
             finished = [*on_the_level, *(c for c in finished if c.id not in found)]
-    finished.sort(key=lambda c: -_merit(c, driving.samples))
-    finished = [_with_refit_rivals(c, finished, 2.0 * rules.apart) for c in finished]
+        finished.sort(key=lambda c: -_merit(c, driving.samples))
+        finished = with_refit_rivals(finished, driving, rules, pool, ends)
     done = {c.id for c in finished}
     far = [c for c in far if c.id not in done]
     done |= {c.id for c in far}
@@ -128,39 +129,3 @@ def _with_errors(dx: Diagnosis) -> Diagnosis:
 def _merit(c: Candidate, samples: int) -> float:
     """Gain in log-likelihood less the Bayesian price of its parameters."""
     return bic(0.5 * c.statistic, len(c.effect.parameters), samples)
-
-
-def _score_rivals(board: ScoreBoard, score: Score, apart: float) -> tuple[str, ...]:
-    """Rivals which leave nothing for the effect, and for which the effect leaves nothing."""
-    own = board.joint_statistic(score.effect.id)
-    confounded = []
-    if own < apart:
-        return ()
-    for rival in board.scores:
-        if rival.effect.id == score.effect.id:
-            continue
-        theirs = board.joint_statistic(rival.effect.id)
-        if abs(theirs - own) >= apart:
-            continue  # together they tell at least as much as either
-        both = board.joint_statistic(score.effect.id, rival.effect.id)
-        if both - theirs < apart and both - own < apart:
-            confounded.append(rival.effect.id)
-    return tuple(confounded)
-
-
-def _with_refit_rivals(c: Candidate, all_: list[Candidate], apart: float) -> Candidate:
-    """Among refitted effects the likelihood itself says which cannot be told apart.
-
-    A lag filters noise of the inputs. What that is worth is told to first order, before noise is
-    learned anew: it may be as wrong as it is large.
-    """
-
-    def unsure(o: Candidate) -> float:
-        return abs(o.of_inputs - c.of_inputs) if o.effect.states or c.effect.states else 0.0
-
-    near = tuple(
-        o.id for o in all_ if o is not c and abs(o.statistic - c.statistic) < apart + unsure(o)
-    )
-    refitted = {o.id for o in all_}
-    confounded = (*near, *(t for t in c.indistinguishable_from if t not in refitted))
-    return replace(c, indistinguishable_from=confounded)

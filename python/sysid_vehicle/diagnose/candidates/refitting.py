@@ -134,9 +134,7 @@ class Refitting:
         shown = shown_on_the_level(self.fit, self.driving, ranked, self.rules)
         asked = [c for c in shown if c.id not in done or needs_road(done[c.id], self.fit)]
         n, alpha = len(ranked), self.rules.alpha
-        work = in_time(
-            lambda c: from_size(self.fit, c, predicted_size(c), n, alpha), self.ends
-        )
+        work = in_time(lambda c: from_size(self.fit, c, predicted_size(c), n, alpha), self.ends)
         best = {c.id: c.statistic for c in known}
         tried = [c for c in self.pool.map(work, asked) if c.finished and c.p_value < alpha]
         return [c for c in tried if c.statistic > best.get(c.id, 0.0)]
