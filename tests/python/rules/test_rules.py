@@ -39,6 +39,7 @@ NUMERICAL = {
     "diagnose/candidates/constancy.py": {"_PIECE_S", "_MOST_PIECES"},
     "diagnose/evidence/coordinates.py": {"BLOCK_S"},
     "diagnose/diagnose.py": {"REFITS"},
+    "diagnose/candidates/on_the_level.py": {"_MOST", "_NEAR"},  # what is refitted
     "diagnose/candidates/refitting.py": {
         "_HOPELESS", "_HOPELESS_WITH_STATES", "_NEAR", "_RIVALS",
     },
