@@ -98,6 +98,17 @@ def car_of(case: Other, number: int) -> SimpleNamespace:
     return p
 
 
+def read_ahead(columns: dict[str, np.ndarray], ahead_m: float) -> dict[str, np.ndarray]:
+    """Channels of sensors so far ahead of the centre of mass: a payload moves it, not them."""
+    r = columns["yaw_rate_radps"]
+    moved = {
+        "vy_mps": ahead_m * r,
+        "ax_mps2": -ahead_m * r**2,
+        "ay_mps2": ahead_m * np.gradient(r, 1.0 / _RATE_HZ),
+    }
+    return columns | {c: columns[c] + more for c, more in moved.items()}
+
+
 def workshop(number: int) -> sv.Vehicle:
     """What is known of the car, with generic tyres."""
     p = multibody.base_car(number)
@@ -146,6 +157,7 @@ def driven(which: str) -> dict[tuple[int, str, int], dict[str, np.ndarray]]:
     found = {}
     for j, lane in enumerate(lanes):
         own = {c: v[: round(drives[lane[2]].duration_s * _RATE_HZ), j] for c, v in channels.items()}
+        own = read_ahead(own, cars[j].a - multibody.base_car(lane[0]).a)
         slip = np.abs(np.arctan2(own["vy_mps"], own["vx_mps"]))
         if not slip.max() < _MOST_SLIP_RAD:
             raise RuntimeError(f"the car was lost: car {lane[0]}, {lane[1]}, {which}")

@@ -6,7 +6,14 @@ from .candidates.constancy import Constancy, constancy
 from .candidates.diagnosis import Diagnosis
 from .candidates.instead import Instead, instead
 from .candidates.judge import judge, verdicts
-from .candidates.possible import Size, considered, possible, refused
+from .candidates.possible import (
+    Size,
+    beside_what_they_refine,
+    considered,
+    possible,
+    refining,
+    refused,
+)
 from .candidates.verdicts import EffectVerdict, Verdicts
 from .candidates.widened import widened
 from .change.change import Change
@@ -61,6 +68,7 @@ __all__ = [
     "Unknown",
     "Verdicts",
     "Where",
+    "beside_what_they_refine",
     "bias_report",
     "blocks",
     "ceiling",
@@ -73,6 +81,7 @@ __all__ = [
     "judge",
     "omnibus",
     "possible",
+    "refining",
     "refused",
     "separations",
     "suggest_manoeuvre",

@@ -127,9 +127,9 @@ class Effect:
         `readings late`, `readings elsewhere`, `answers late`, `on a slope`, or empty.
     same_in_all_logs : bool
         As a nuisance it is the same in all logs of a car, where others differ from log to log.
-    on_request : bool
-        A candidate only where a user names it: it refines another effect, and beside that has no
-        share of the errors that is its own.
+    refines : tuple of str
+        Effects that it refines: a candidate only beside one of them, or where a user names it.
+        Where both are in a model neither takes a share of the errors that is its own.
     states : int
         How many states of its own it adds to the model.
     acts : tuple
@@ -156,7 +156,7 @@ class Effect:
     states: int
     breaks: str = ""
     same_in_all_logs: bool = False
-    on_request: bool = False
+    refines: tuple[str, ...] = ()
     acts: tuple[tuple[int, Any], ...] = ()
     channels: tuple[str, ...] = ()
     own_states: tuple[OwnState, ...] = ()
@@ -274,8 +274,9 @@ class Effect:
             lines.append(f"  through     {self.through}")
         if self.breaks:
             lines.append(f"  breaks      laws of motion: {self.breaks}")
-        if self.on_request:
-            lines.append("  considered  only where it is named among the candidates")
+        if self.refines:
+            named = "or where it is named among the candidates"
+            lines.append(f"  considered  beside {' or '.join(self.refines)}, {named}")
         if self.same_in_all_logs:
             lines.append("  nuisance    the same in all logs of a car")
         return "\n".join(lines)

@@ -52,8 +52,8 @@ def test_every_effect_is_judged_once(judged: Verdicts, found: Diagnosis) -> None
     assert sum(len(judged.of(f)) for f in ("missing", "one of a group", "proxy")) < len(ids) / 2
 
 
-def test_an_effect_on_request_is_judged_where_it_was_asked_for(found: Diagnosis) -> None:
-    assert effect("body_roll").on_request
+def test_what_refines_another_is_judged_where_it_was_asked_for(found: Diagnosis) -> None:
+    assert effect("body_roll").refines
     asked = diagnose(found.fit, candidates=["steer_offset", "body_roll"])
     assert {"steer_offset", "body_roll"} == {c.id for c in asked.ranking}
     assert verdicts(asked)["body_roll"].finding != "missing"

@@ -14,7 +14,7 @@ from sysid_vehicle import (
     effect,
     example_vehicle,
 )
-from sysid_vehicle.diagnose import considered
+from sysid_vehicle.diagnose import beside_what_they_refine, considered, refining
 from sysid_vehicle.effects import base_parameters
 from sysid_vehicle.estimate import Driving
 from sysid_vehicle.estimate.driving import MEASURED
@@ -89,12 +89,17 @@ def test_effects_say_what_they_break_and_what_logs_share() -> None:
     assert all("the same in all logs of a car" in str(effect(e)) for e in shared)
 
 
-def test_an_effect_on_request_is_a_candidate_where_it_is_named() -> None:
-    asked = {e.id for e in catalogue() if e.on_request}
-    assert asked == {"body_roll"}
-    assert "considered  only where it is named" in str(effect("body_roll"))
+def test_what_refines_another_is_a_candidate_beside_it_or_where_it_is_named() -> None:
+    finer = {e.id for e in catalogue() if e.refines}
+    assert finer == {"body_roll"} == {e.id for e in refining()}
+    assert "beside body_attitude or accelerometer_scale, or where" in str(effect("body_roll"))
     model = Model(example_vehicle())
-    assert not asked & {e.id for e in model.candidates}
+    assert not finer & {e.id for e in model.candidates}
+    for refined in effect("body_roll").refines:
+        beside = model.add(refined)
+        assert finer <= {e.id for e in beside.candidates}
+        assert beside_what_they_refine(refining(), beside) == refining()
+    assert beside_what_they_refine(refining(), model.add("mass")) == ()
     assert [e.id for e in considered(model, ["mass", "body_roll"])] == ["mass", "body_roll"]
     assert considered(model.add("body_roll"), ["body_roll"]) == ()
     assert considered(model, None) == model.candidates

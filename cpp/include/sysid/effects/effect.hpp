@@ -68,9 +68,9 @@ struct EffectInfo {
     Breaks breaks = Breaks::kNothing;
     // As a nuisance it is the same in all logs of a car, where others differ from log to log.
     bool same_in_all_logs = false;
-    // A candidate only where a user names it: it refines another effect, and where both are in a
-    // model neither takes a share of the errors that is its own.
-    bool on_request = false;
+    // Effects that it refines: a candidate only beside one of them, or where a user names it. Where
+    // both are in a model neither takes a share of the errors that is its own.
+    const char* refines = "";
 
     constexpr std::size_t parameter_count() const {
         std::size_t n = 0;

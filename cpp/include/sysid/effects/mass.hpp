@@ -201,7 +201,7 @@ struct BodyRoll : Effect {
                         .usual = {1.2, 3.5},
                         .scan = Scan::kRange}},
         .states = {{"roll_per_gradient", "1"}, {"roll_rate_per_gradient", "1/s"}},
-        .on_request = true,
+        .refines = "body_attitude, accelerometer_scale",
     };
     static constexpr double state_spread = 0.1;
     /// About a fixed axis cars roll at 1 to 2.5 Hz with a damping ratio of 0.2 to 0.5; about their

@@ -185,7 +185,7 @@ class Diagnosis(Printed):
 
     @property
     def lacked(self) -> set[str]:
-        """What the model lacks of the catalogue, and what was asked for on request."""
+        """What the model lacks of the catalogue, and what was asked for beside that."""
         return {e.id for e in self.fit.model.candidates} | {c.id for c in self.ranking}
 
     @cached_property

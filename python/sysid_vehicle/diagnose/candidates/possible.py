@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -33,8 +33,8 @@ OF_A_FACTOR = "_error"
 def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple[Effect, ...]:
     """What may be added to a model: all that it lacks, or what is wanted of that.
 
-    Effects on request are among it only where they are wanted. An effect that is given itself keeps
-    the bounds that it has.
+    What refines another effect is among it only beside that, or where it is wanted. An effect that
+    is given itself keeps the bounds that it has.
     """
     if candidates is None:
         return model.candidates
@@ -43,10 +43,20 @@ def considered(model: Model, candidates: Sequence[str | Effect] | None) -> tuple
 
 
 def lacking(model: Model, names: Container[str]) -> tuple[Effect, ...]:
-    """What a model lacks of these effects, those on request among them."""
-    asked = [model.effect(e) for e in catalogue() if e.on_request and e.id not in model.effects]
-    known = sorted((*model.candidates, *model.seated(asked)), key=lambda e: e.index)
-    return tuple(e for e in known if e.id in names)
+    """What a model lacks of these effects, those that refine others among them."""
+    asked = [model.effect(e) for e in refining() if e.id not in model.effects]
+    known = {e.id: e for e in (*model.candidates, *model.seated(asked))}
+    return tuple(sorted((e for e in known.values() if e.id in names), key=lambda e: e.index))
+
+
+def beside_what_they_refine(finer: Iterable[Effect], model: Model) -> tuple[Effect, ...]:
+    """Those of which a model has what they refine."""
+    return tuple(e for e in finer if not {*e.refines}.isdisjoint(model.effects))
+
+
+def refining() -> tuple[Effect, ...]:
+    """Effects of the catalogue that refine others."""
+    return tuple(e for e in catalogue() if e.refines)
 
 
 def _between(e: Effect, given: Effect) -> Effect:

@@ -88,6 +88,8 @@ def shares_of_groups(
 def alike(final: Fit, effects: Collection[str]) -> tuple[tuple[str, ...], ...]:
     """Find groups of effects of a model that act alike, by the catalogue, and move the same motion.
 
+    What refines another is in one group with it: it moves more.
+
     Parameters
     ----------
     final : Fit
@@ -130,7 +132,8 @@ def without_idle(
 
 
 def _act_alike(one: Effect, other: Effect) -> bool:
-    return one.is_like(other) and moved_by(one) == moved_by(other)
+    refines = other.id in one.refines or one.id in other.refines
+    return refines or (one.is_like(other) and moved_by(one) == moved_by(other))
 
 
 def _shares(

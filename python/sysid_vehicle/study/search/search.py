@@ -13,7 +13,14 @@ import numpy as np
 
 from ..._common.text import unit_after
 from ..._common.threads import before, in_parallel
-from ...diagnose import Candidate, Diagnosis, Size, diagnose, omnibus
+from ...diagnose import (
+    Candidate,
+    Diagnosis,
+    Size,
+    beside_what_they_refine,
+    diagnose,
+    omnibus,
+)
 from ...diagnose.diagnose import REFITS
 from ...effects import Effect
 from ...errors import Interrupted, NumericalError
@@ -172,6 +179,8 @@ class Search:
     ----------
     test : Driving
         Validation data, which every step must predict better.
+    finer : sequence of Effect
+        Candidates where the model has what they refine.
     ends : float
         When refits end, by `time.perf_counter`.
     rules : Rules
@@ -180,7 +189,8 @@ class Search:
     """
 
     test: Driving
-    candidates: Sequence[str | Effect] | None
+    candidates: Sequence[str | Effect]
+    finer: Sequence[Effect]
     most_effects: int
     ends: float
     rules: Rules
@@ -310,7 +320,7 @@ class Search:
         left = self.ends - time.perf_counter()
         return diagnose(
             fit,
-            candidates=self.candidates,
+            candidates=(*self.candidates, *beside_what_they_refine(self.finer, fit.model)),
             rules=self.rules,
             refits=refits if left > 0.0 else 0,
             again=again if left > 0.0 else (),
