@@ -318,9 +318,11 @@ class Search:
     def _diagnosis(self, fit: Fit, again: Sequence[str], refits: int = REFITS) -> Diagnosis:
         """All effects scored, some refitted again; where no time is left none is refitted."""
         left = self.ends - time.perf_counter()
+        finer = beside_what_they_refine(self.finer, fit.model)
+        again = (*again, *(e.id for e in finer))  # whatever leads: that may stand in for them
         return diagnose(
             fit,
-            candidates=(*self.candidates, *beside_what_they_refine(self.finer, fit.model)),
+            candidates=(*self.candidates, *finer),
             rules=self.rules,
             refits=refits if left > 0.0 else 0,
             again=again if left > 0.0 else (),
