@@ -45,6 +45,8 @@ def test_effects_that_copy_each_other_have_a_share_together(truth: Model, start:
     groups = alike(fit, asked)
     assert groups == (("aero_drag", "rolling_resistance"),)
     assert alike(fit, ("aero_drag", "steer_lag")) == ()
+    lean = replace(fit, model=start.add("accelerometer_scale", "body_roll"))
+    assert alike(lean, lean.model.effects) == (("accelerometer_scale", "body_roll"),)
     found = shares_of_groups(fit, groups, Driving.of(test))
     alone = own_shares(fit, asked, asked, Driving.of(test))
     for i, together in enumerate(found[groups[0]]):

@@ -179,18 +179,17 @@ class Search:
     ----------
     test : Driving
         Validation data, which every step must predict better.
-    finer : sequence of Effect
-        Candidates where the model has what they refine.
     ends : float
         When refits end, by `time.perf_counter`.
     rules : Rules
     judged_by : float
         Until when validation data are asked whether what was refitted holds.
+    finer : sequence of Effect
+        Candidates where the model has what they refine.
     """
 
     test: Driving
     candidates: Sequence[str | Effect]
-    finer: Sequence[Effect]
     most_effects: int
     ends: float
     rules: Rules
@@ -198,6 +197,7 @@ class Search:
     progress: bool | None
     say: Callable[[str], None]
     judged_by: float = math.inf
+    finer: Sequence[Effect] = ()
 
     def follow(self, trail: Trail) -> None:
         """Add what is missing to the last model until nothing more is that the driving can show."""
