@@ -100,6 +100,8 @@ def test_what_refines_another_is_a_candidate_beside_it_or_where_it_is_named() ->
         assert finer <= {e.id for e in beside.candidates}
         assert beside_what_they_refine(refining(), beside) == refining()
     assert beside_what_they_refine(refining(), model.add("mass")) == ()
+    # What they refine may have been dropped since.
+    assert beside_what_they_refine(refining(), model.add("body_roll")) == refining()
     assert [e.id for e in considered(model, ["mass", "body_roll"])] == ["mass", "body_roll"]
     assert considered(model.add("body_roll"), ["body_roll"]) == ()
     assert considered(model, None) == model.candidates

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid_vehicle import Model, diagnose, drive, identify, manoeuvres
+from sysid_vehicle import Model, diagnose, drive, identify, improve, manoeuvres
 from sysid_vehicle.diagnose import Candidate
 from sysid_vehicle.effects import effect
 from sysid_vehicle.estimate import Driving
@@ -120,3 +120,19 @@ def test_what_was_not_searched_to_its_end_is_before_it_takes_a_place(
     assert exchanged(windy, nearly, driving, most_effects=4) is ended  # type: ignore[arg-type]
     begun.converged = True
     assert exchanged(windy, nearly, driving, most_effects=4) is begun  # type: ignore[arg-type]
+
+
+def test_a_body_that_rolls_late_takes_the_place_of_one_that_leans(
+    truth: Model, start: Model
+) -> None:
+    """It is a candidate only beside what it refines, which is needless then."""
+    hidden = {"body_roll.roll_per_g_rad": 0.05, "body_roll.frequency_hz": 2.0}
+    car = truth.add("body_roll").with_values(hidden)
+    train = drive(car, manoeuvres.lap(20.0), seed=5552, rate_hz=50.0)
+    test = drive(car, manoeuvres.handling_course(20.0), seed=6552, rate_hz=50.0)
+    study = improve(start, train, test, seed=1)
+    assert [e.id for e in study.added] == ["body_roll"]
+    assert study.verdicts["body_roll"].finding == "missing"
+    assert study.verdict == "explained"
+    for name, value in hidden.items():
+        assert abs(study.fit[name].value - value) < 3.0 * study.fit[name].std

@@ -50,8 +50,8 @@ def lacking(model: Model, names: Container[str]) -> tuple[Effect, ...]:
 
 
 def beside_what_they_refine(finer: Iterable[Effect], model: Model) -> tuple[Effect, ...]:
-    """Those of which a model has what they refine."""
-    return tuple(e for e in finer if not {*e.refines}.isdisjoint(model.effects))
+    """Those of which a model has what they refine, or that have taken its place."""
+    return tuple(e for e in finer if not {e.id, *e.refines}.isdisjoint(model.effects))
 
 
 def refining() -> tuple[Effect, ...]:
