@@ -128,11 +128,13 @@ def test_a_body_that_rolls_late_takes_the_place_of_one_that_leans(
     """It is a candidate only beside what it refines, which is needless then."""
     hidden = {"body_roll.roll_per_g_rad": 0.05, "body_roll.frequency_hz": 2.0}
     car = truth.add("body_roll").with_values(hidden)
-    train = drive(car, manoeuvres.lap(20.0), seed=5552, rate_hz=50.0)
-    test = drive(car, manoeuvres.handling_course(20.0), seed=6552, rate_hz=50.0)
+    train = drive(car, manoeuvres.lap(20.0), seed=5552)
+    test = drive(car, manoeuvres.handling_course(20.0), seed=6552)
     study = improve(start, train, test, seed=1)
     assert [e.id for e in study.added] == ["body_roll"]
-    assert study.verdicts["body_roll"].finding == "missing"
+    told = study.verdicts["body_roll"]
+    assert told.finding in ("missing", "one of a group")
+    assert {*told.group} <= {*told.effect.refines}
     assert study.verdict == "explained"
     for name, value in hidden.items():
         assert abs(study.fit[name].value - value) < 3.0 * study.fit[name].std
