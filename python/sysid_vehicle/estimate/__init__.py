@@ -17,6 +17,7 @@ from .noise import (
     promised_by_noise,
 )
 from .turning import equal_blocks, moving, turning, turning_blocks
+from .wheel_force import alike_in_force, without_force
 
 __all__ = [
     "MEASURED",
@@ -30,6 +31,7 @@ __all__ = [
     "NoiseModel",
     "StateFilter",
     "StateModel",
+    "alike_in_force",
     "equal_blocks",
     "first_guess",
     "generous",
@@ -44,4 +46,5 @@ __all__ = [
     "turning",
     "turning_blocks",
     "whiteness_check",
+    "without_force",
 ]

@@ -35,15 +35,24 @@ class Built:
 
 
 def build(
-    data: Columns, name: str, despike: Iterable[str], check: bool, vehicle: Vehicle | None = None
+    data: Columns,
+    name: str,
+    despike: Iterable[str] = (),
+    check: bool = False,
+    vehicle: Vehicle | None = None,
+    *,
+    told: bool = False,
 ) -> Built:
-    """Make the channels of a log; every error and warning begins with the log's `name`."""
+    """Make the channels of a log; every error and warning begins with the log's `name`.
+
+    What was `told` when the log was read is no warning again.
+    """
     notes: list[str] = []
     try:
         built = _build(data, tuple(despike), check, vehicle, notes)
     except InvalidInput as error:
         raise InvalidInput(f"{name}: {error}") from error
-    for note in notes:
+    for note in () if told else notes:
         warn(f"{name}: {note}")
     return built
 

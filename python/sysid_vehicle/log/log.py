@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -203,6 +203,23 @@ class Log:
         part = {name: values[first:last] for name, values in self._data.items()}
         name = f"{self.name} [{time_s[first]:.6g} to {time_s[last - 1]:.6g} s]"
         return Log(name, self.rate_hz, self.uniform, part, self.corrections, self.retimed)
+
+    def without(self, *channels: str) -> Log:
+        """Return the log as if some channels had not been recorded.
+
+        Without ``fx_n`` the acceleration drives the model: short holes of it are then filled, as
+        those of every input.
+
+        Raises
+        ------
+        InvalidInput
+            If a channel is absent, or one that every log needs.
+        """
+        for channel in channels:
+            self[channel]
+        data = {name: values for name, values in self._data.items() if name not in channels}
+        built = build(data, self.name, told=True)
+        return replace(self, _data=built.channels)
 
     def corrected(
         self,

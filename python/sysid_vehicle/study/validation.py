@@ -14,7 +14,7 @@ from .._common.memo import remembered
 from .._common.threads import in_parallel
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
-from ..estimate import MEASURED, Driving
+from ..estimate import MEASURED, Driving, alike_in_force
 from ..identify import (
     Fit,
     Prediction,
@@ -48,10 +48,10 @@ def set_aside(
     """Training and validation data; without `test`: the last log, or 30 % of the only one."""
     logs = several_logs(train)
     if test is not None:
-        return Driving.of(logs), Driving.of(test)
+        return _driven_alike(logs, several_logs(test))
     if len(logs) > 1:
         warn(f"no validation data were given: '{logs[-1].name}' is taken for them")
-        return Driving.of(logs[:-1]), Driving.of(logs[-1:])
+        return _driven_alike(logs[:-1], logs[-1:])
     log = logs[0]
     cut = float(log["time_s"][int((1.0 - _SHARE) * log.n)])
     warn(
@@ -59,6 +59,12 @@ def set_aside(
         "taken for them; another manoeuvre would tell more"
     )
     return Driving.of(log.between(-np.inf, cut)), Driving.of(log.between(cut, np.inf))
+
+
+def _driven_alike(train: Sequence[Log], test: Sequence[Log]) -> tuple[Driving, Driving]:
+    """Both by the wheel force, or neither: noise that was learned with it is another one."""
+    logs = alike_in_force((*train, *test))
+    return Driving.of(logs[: len(train)]), Driving.of(logs[len(train) :])
 
 
 def gain_in_log_likelihood(

@@ -1,6 +1,7 @@
 """Validation data: what is set aside, what it says of two models, and how surely."""
 
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -117,3 +118,13 @@ def test_two_models_are_judged_side_by_side(
             told.append(validation.gain_in_log_likelihood(fit, richer, test))
             told.append(validation.fall_in_error(fit, richer, test))
     assert told[:2] == told[2:]
+
+
+def test_training_and_validation_data_are_driven_by_the_same_input(
+    lap: Log, course: Log, altered: Callable[..., Log]
+) -> None:
+    blind = altered(course, without=("fx_n",))
+    for train, test in ((lap, blind), (blind, lap)):
+        with pytest.warns(SysidWarning, match="course has no fx_n: the wheel force of lap is not"):
+            assert [d.force_known for d in set_aside(train, test)] == [False, False]
+    assert [d.force_known for d in set_aside(lap, course)] == [True, True]

@@ -227,7 +227,7 @@ class Judge:
 
     def _rivals(self) -> Instead:
         both = serving(self.fit, self.test)
-        everywhere = _together(self.fit.driving, driving_of(both, self.test))
+        everywhere = Driving.joined((self.fit.driving, driving_of(both, self.test)))
         return instead(both, everywhere, self.added, self.rules)
 
     def _alone(self, rivals: Instead | None) -> Verdicts:
@@ -312,12 +312,6 @@ class Judge:
             _TOGETHER, lambda: together_by_motion(self.outer, self.added, self.test)
         )
         return facts if motions is None else facts.with_motions(motions)
-
-
-def _together(train: Driving, test: Driving) -> Driving:
-    """All driving; the training data where one of the two lacks the wheel force."""
-    same = train.force_known == test.force_known
-    return Driving.joined((train, test)) if same else train
 
 
 def _warnings(trail: Trail, late: Sequence[str], rules: Rules = USUAL) -> tuple[str, ...]:
