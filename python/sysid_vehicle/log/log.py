@@ -16,7 +16,7 @@ from .._common.tables import dataset, frame
 from .._common.text import html_paragraph, html_table
 from ..errors import InvalidInput, near_names
 from ..vehicle import Vehicle
-from .build import build
+from .build import LEAST_STRETCH_S, build
 from .channels import CHANNELS
 from .columns import Columns
 from .laws.laws import Contradiction
@@ -263,7 +263,7 @@ class Log:
         return least_speed_mps(self["vx_mps"])
 
     def stretches(
-        self, min_speed_mps: float | None = None, min_duration_s: float = 1.0
+        self, min_speed_mps: float | None = None, min_duration_s: float = LEAST_STRETCH_S
     ) -> list[slice]:
         """Return the contiguous sample ranges in which the model can run.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -11,6 +12,7 @@ import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
 from .._common.memo import remembered
+from .._common.text import few
 from .._common.threads import in_parallel
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
@@ -23,7 +25,7 @@ from ..identify import (
     predict,
     predicting_ahead,
 )
-from ..log import Log, several_logs
+from ..log import LEAST_USABLE_S, Log, several_logs
 from ..rules import ErrorChange, Gain
 from .ahead.along_the_car import along_alone, changes_of
 from .ahead.beyond import Beyond, beyond_noise
@@ -45,13 +47,19 @@ _NONE = Gain(-np.inf, 0.0, -np.inf, 0.0)
 def set_aside(
     train: Log | Sequence[Log], test: Log | Sequence[Log] | None
 ) -> tuple[Driving, Driving]:
-    """Training and validation data; without `test`: the last log, or 30 % of the only one."""
+    """Training and validation data; without `test`: the last log, or 30 % of the only one.
+
+    Of logs of single manoeuvres, the last of which is too short to tell anything, the last 30 %.
+    """
     logs = several_logs(train)
     if test is not None:
         return _driven_alike(logs, several_logs(test))
     if len(logs) > 1:
-        warn(f"no validation data were given: '{logs[-1].name}' is taken for them")
-        return _driven_alike(logs[:-1], logs[-1:])
+        short = logs[-1].duration_s < LEAST_USABLE_S
+        first = -math.ceil(_SHARE * len(logs)) if short else -1
+        taken = few([f"'{log.name}'" for log in logs[first:]]) + (" is" if first == -1 else " are")
+        warn(f"no validation data were given: {taken} taken for them")
+        return _driven_alike(logs[:first], logs[first:])
     log = logs[0]
     cut = float(log["time_s"][int((1.0 - _SHARE) * log.n)])
     warn(

@@ -275,6 +275,16 @@ def test_straight_driving_warns(start: Model, truth: Model) -> None:
     assert "D_front" in found.undetermined
 
 
+def test_short_logs_are_enough_together(fit: Fit, start: Model, lap: Log) -> None:
+    pieces = [lap.between(4.0 * i, 4.0 * i + 3.0) for i in range(10)]
+    found = identify(start, pieces, starts=1)
+    stiffness = found["cornering stiffness front"]
+    expected = fit["cornering stiffness front"].value
+    assert stiffness.value == pytest.approx(expected, abs=4.0 * stiffness.std)
+    with pytest.raises(InvalidInput, match=r"lap \[0 to 3 s\]: 3.0 s usable.*at least 5 s.*add"):
+        identify(start, pieces[0])
+
+
 def test_going_on_from_a_fit_changes_nothing(fit: Fit) -> None:
     again = refine(fit.model, fit.driving, fit.noise)
     assert abs(again.log_likelihood - fit.log_likelihood) < 1.0

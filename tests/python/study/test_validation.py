@@ -120,6 +120,14 @@ def test_two_models_are_judged_side_by_side(
     assert told[:2] == told[2:]
 
 
+def test_of_logs_of_single_manoeuvres_more_than_the_last_are_set_aside(course: Log) -> None:
+    pieces = [course.between(3.0 * i, 3.0 * i + 3.0) for i in range(10)]
+    with pytest.warns(SysidWarning, match=r"'.*21 to 24.*', '.*, '.*27 to 30.*' are taken"):
+        train, test = set_aside(pieces, None)
+    assert train.logs == tuple(pieces[:7])
+    assert test.logs == tuple(pieces[7:])
+
+
 def test_training_and_validation_data_are_driven_by_the_same_input(
     lap: Log, course: Log, altered: Callable[..., Log]
 ) -> None:
