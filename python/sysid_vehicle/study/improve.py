@@ -181,6 +181,7 @@ def improve(
         lacked=[e.id for e in wanted],
         sizes=sizes,
         seed=seed,
+        settled=settled,
     )
     with kept(found):
         return judge.study(began, checked=bool(sensors))

@@ -41,6 +41,7 @@ from .answers import answers_of
 from .contested import spoken_against
 from .foretold import foretold
 from .matters import buried, sufficient
+from .one_for_all import one_for_all
 from .slow import slow_forces
 from .structure import structure
 from .useful import useless
@@ -74,6 +75,8 @@ class Judge:
         Effects that were considered.
     sizes : mapping or None
         Errors that matter, where a user said which.
+    settled : collection of str
+        Effects that a check of the sensors has answered.
     """
 
     trail: Trail
@@ -83,6 +86,7 @@ class Judge:
     lacked: Collection[str]
     sizes: Mapping[str, float] | None
     seed: int
+    settled: Collection[str] = ()
 
     @property
     def fit(self) -> Fit:
@@ -156,6 +160,7 @@ class Judge:
         told, late = in_the_light_of(decision, alone), tuple(asks.left_out)
         wide = self._wide if decision.verdict in LACKING else None
         idle = before(asks.ends, lambda: useless(fits, self.test, rules), frozenset[str]())
+        one = before(asks.ends, self._one_for_all, "")
         return Study(
             verdict=decision.verdict,
             fits=tuple(fits),
@@ -179,7 +184,7 @@ class Judge:
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
             verdicts=told,
-            warnings=_warnings(self.trail, late, rules),
+            warnings=_warnings(self.trail, late, rules, one),
             seconds=time.perf_counter() - began,
             rules=rules,
             explained=explained,
@@ -195,6 +200,10 @@ class Judge:
             answers=answers_of(fits, self.test),
             widened=wide,
         )
+
+    def _one_for_all(self) -> str:
+        asked = {*self.lacked, *self.settled}
+        return one_for_all(self.trail.fits[0], self.fit, self.added, asked, self.rules)
 
     def _explained(self) -> Beyond:
         return beyond_noise_ahead(self.outer, self.test)
@@ -314,9 +323,14 @@ class Judge:
         return facts if motions is None else facts.with_motions(motions)
 
 
-def _warnings(trail: Trail, late: Sequence[str], rules: Rules = USUAL) -> tuple[str, ...]:
+def _warnings(
+    trail: Trail, late: Sequence[str], rules: Rules = USUAL, one: str = ""
+) -> tuple[str, ...]:
     fit, found = trail.fit, []
     driving = fit.driving
+    if one:
+        found.append(one)
+        warn(one)
     if trail.stopped or late:
         found.append(_cut_short(trail.stopped, late))
         warn(found[-1])
