@@ -8,7 +8,7 @@ from .held import held_rows
 from .laws.laws import Contradiction
 from .log import Log, Retimed
 from .stamps import as_seconds, seconds_of_stamps
-from .together import check_excitation, several_logs, unexcited
+from .together import check_excitation, copies, several_logs, unexcited
 
 __all__ = [
     "CHANNELS",
@@ -23,6 +23,7 @@ __all__ = [
     "as_seconds",
     "check_car",
     "check_excitation",
+    "copies",
     "held_rows",
     "listed",
     "named_columns",

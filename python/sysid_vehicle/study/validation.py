@@ -25,7 +25,7 @@ from ..identify import (
     predict,
     predicting_ahead,
 )
-from ..log import LEAST_USABLE_S, Log, several_logs
+from ..log import LEAST_USABLE_S, Log, copies, several_logs
 from ..rules import ErrorChange, Gain
 from .ahead.along_the_car import along_alone, changes_of
 from .ahead.beyond import Beyond, beyond_noise
@@ -70,7 +70,15 @@ def set_aside(
 
 
 def _driven_alike(train: Sequence[Log], test: Sequence[Log]) -> tuple[Driving, Driving]:
-    """Both by the wheel force, or neither: noise that was learned with it is another one."""
+    """Both by the wheel force, or neither: noise that was learned with it is another one.
+
+    A log that is on both sides is told.
+    """
+    both = copies(test, train)
+    if both:
+        warn(
+            f"{few(both)} is training and validation data; the validation error then proves nothing"
+        )
     logs = alike_in_force((*train, *test))
     return Driving.of(logs[: len(train)]), Driving.of(logs[len(train) :])
 

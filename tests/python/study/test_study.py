@@ -23,6 +23,7 @@ from sysid_vehicle import (
     manoeuvres,
 )
 from sysid_vehicle.diagnose import Verdicts
+from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import Gain
 from sysid_vehicle.study.ahead.beyond import Beyond
 from sysid_vehicle.study.ahead.shares import shares
@@ -354,7 +355,7 @@ def test_validation_data_tell_the_richer_model(study: Study, lagging: tuple[Log,
 
 
 def test_a_model_that_fails_on_validation_data_gains_nothing(fit: Fit, course: Log) -> None:
-    test = set_aside([course], course)[1]
+    test = Driving.of(course)
     broken = Fit(
         fit.model.with_values({"B_front": float("nan")}),
         *(getattr(fit, f) for f in list(Fit.__dataclass_fields__)[1:]),

@@ -136,3 +136,14 @@ def test_training_and_validation_data_are_driven_by_the_same_input(
         with pytest.warns(SysidWarning, match="course has no fx_n: the wheel force of lap is not"):
             assert [d.force_known for d in set_aside(train, test)] == [False, False]
     assert [d.force_known for d in set_aside(lap, course)] == [True, True]
+
+
+def test_a_log_that_is_in_training_and_validation_data_is_noticed(
+    lap: Log, course: Log, altered: Callable[..., Log]
+) -> None:
+    """By its readings, whatever it is called."""
+    again = Log.from_arrays({c: lap[c] for c in lap}, name="again")
+    with pytest.warns(SysidWarning, match="again is training and validation data; the validation"):
+        set_aside([lap, course], again)
+    changed = altered(lap, vx_mps=lap["vx_mps"] + 1e-9)
+    assert [d.logs[0].name for d in set_aside(lap, changed)] == ["lap", "lap"]
