@@ -26,7 +26,7 @@ from ..identify import (
     predicting_ahead,
 )
 from ..log import LEAST_USABLE_S, Log, copies, several_logs
-from ..rules import ErrorChange, Gain
+from ..rules import USUAL, ErrorChange, Gain, Rules
 from .ahead.along_the_car import along_alone, changes_of
 from .ahead.beyond import Beyond, beyond_noise
 from .ahead.fitted_range import Bools, fitted, within_fitted_range
@@ -206,14 +206,14 @@ def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[ErrorChange,
     return changes_of(one, other, test, AHEAD)
 
 
-def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
+def beyond_noise_ahead(fits: Sequence[Fit], test: Driving, rules: Rules = USUAL) -> Beyond:
     """Errors 1 to 5 s ahead beyond the noise, of models with the parameters of `best_within`."""
     final = fits[-1]
     best = in_parallel(lambda fit: at_its_best(fit, test), fits)
-    within, counted = 1.0, counted_in_shares(final, test)
+    within, counted = 1.0, counted_in_shares(final, test, rules)
     if not counted.all():
-        within = float(np.mean(fitted(best[-1], test)))
-        best = in_parallel(lambda fit: best_within(fit, test, final), fits)
+        within = float(np.mean(fitted(best[-1], test, rules)))
+        best = in_parallel(lambda fit: best_within(fit, test, final, rules), fits)
     return replace(beyond_noise(best, test, AHEAD, counted=counted), within=within)
 
 
@@ -241,19 +241,19 @@ def at_its_best(fit: Fit, test: Driving) -> Fit:
 
 
 @remembered(4)
-def counted_in_shares(final: Fit, test: Driving) -> Bools:
+def counted_in_shares(final: Fit, test: Driving, rules: Rules = USUAL) -> Bools:
     """Predictions of `AHEAD` that count in shares of the errors on validation data.
 
     Those in which the tyres work as far as they were fitted, where the final model fails beyond
     (`within_fitted_range`).
     """
-    return within_fitted_range(at_its_best(final, test), test, AHEAD)
+    return within_fitted_range(at_its_best(final, test), test, AHEAD, rules)
 
 
 @remembered(32)
-def best_within(fit: Fit, test: Driving, final: Fit) -> Fit:
+def best_within(fit: Fit, test: Driving, final: Fit, rules: Rules = USUAL) -> Fit:
     """As `at_its_best`, by the predictions that count in shares beside a final model."""
-    counted, noise = counted_in_shares(final, test), fit.noise.floor()
+    counted, noise = counted_in_shares(final, test, rules), fit.noise.floor()
     if counted.all():
         return at_its_best(fit, test)
     return min(_ways(fit, test), key=lambda f: typical_error(f, noise, test, AHEAD, counted))

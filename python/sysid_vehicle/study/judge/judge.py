@@ -206,7 +206,7 @@ class Judge:
         return one_for_all(self.trail.fits[0], self.fit, self.added, asked, self.rules)
 
     def _explained(self) -> Beyond:
-        return beyond_noise_ahead(self.outer, self.test)
+        return beyond_noise_ahead(self.outer, self.test, self.rules)
 
     @cached_property
     def _wide(self) -> FloatArray | None:
@@ -302,7 +302,7 @@ class Judge:
         """What is known, with what each effect takes off the errors ahead, and all together."""
         fit, test, ends = self.fit, self.test, self.asks.ends
         named = {a.id for a in facts.added if a.named}
-        shares = own_shares(fit, self.added, named, test, ends)
+        shares = own_shares(fit, self.added, named, test, ends, self.rules)
         unknown = [e for e in self.added if e not in shares]
 
         below = bool(named) and before(
@@ -312,13 +312,13 @@ class Judge:
         facts = replace(facts.with_own(shares, unknown, sure), buried=below)
         self.asks.note(unknown, _ALONE)
         groups = without_idle(alike(fit, named), shares, self.rules)
-        facts = facts.with_groups(shares_of_groups(fit, groups, test, ends))
+        facts = facts.with_groups(shares_of_groups(fit, groups, test, ends, self.rules))
         if explained is None:
             return facts
         low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.outer, self.test))
         facts = replace(facts, taken_low=low)
         motions = self.asks.asked(
-            _TOGETHER, lambda: together_by_motion(self.outer, self.added, self.test)
+            _TOGETHER, lambda: together_by_motion(self.outer, self.added, self.test, self.rules)
         )
         return facts if motions is None else facts.with_motions(motions)
 
