@@ -1,6 +1,7 @@
 """State estimation: prepared driving, the noise model, filters for models of one's own."""
 
 from ..log import MEASURED
+from .alike import alike_in_force, without_force, without_unlearned
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
 from .driving import UNITS, Driving
 from .filters import FilterRun, FilterState, StateFilter, StateModel
@@ -17,7 +18,6 @@ from .noise import (
     promised_by_noise,
 )
 from .turning import equal_blocks, moving, turning, turning_blocks
-from .wheel_force import alike_in_force, without_force
 
 __all__ = [
     "MEASURED",
@@ -47,4 +47,5 @@ __all__ = [
     "turning_blocks",
     "whiteness_check",
     "without_force",
+    "without_unlearned",
 ]

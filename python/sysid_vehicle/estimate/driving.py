@@ -18,13 +18,13 @@ from ..log import CHANNELS, MEASURED, Log, several_logs
 from ..model import Model
 from ..sensors import quantum
 from . import pieces
+from .alike import alike_in_force
 from .channels import check_channels, has_channels, logged_channels
 from .inputs import quiet
 from .known_filters import KnownFilters, KnownProblem
 from .leads import cut
 from .pieces import DrivingProblem, PiecewiseProblem
 from .samples import Samples, between, thinned
-from .wheel_force import alike_in_force
 
 UNITS = {c: CHANNELS[c].unit for c in MEASURED}
 WORDS = dict(zip(MEASURED, ("v_x", "v_y", "yaw rate", "a_x", "a_y"), strict=True))

@@ -16,7 +16,7 @@ from .._common.text import few
 from .._common.threads import in_parallel
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
-from ..estimate import MEASURED, Driving, alike_in_force
+from ..estimate import MEASURED, Driving, alike_in_force, without_unlearned
 from ..identify import (
     Fit,
     Prediction,
@@ -72,7 +72,7 @@ def set_aside(
 def _driven_alike(train: Sequence[Log], test: Sequence[Log]) -> tuple[Driving, Driving]:
     """Both by the wheel force, or neither: noise that was learned with it is another one.
 
-    A log that is on both sides is told.
+    A log that is on both sides is told. Channels that training data lack are left out.
     """
     both = copies(test, train)
     if both:
@@ -80,7 +80,8 @@ def _driven_alike(train: Sequence[Log], test: Sequence[Log]) -> tuple[Driving, D
             f"{few(both)} is training and validation data; the validation error then proves nothing"
         )
     logs = alike_in_force((*train, *test))
-    return Driving.of(logs[: len(train)]), Driving.of(logs[len(train) :])
+    own, others = logs[: len(train)], logs[len(train) :]
+    return Driving.of(own), Driving.of(without_unlearned(others, own))
 
 
 def gain_in_log_likelihood(

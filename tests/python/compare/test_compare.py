@@ -98,6 +98,18 @@ def test_a_force_that_the_fit_did_not_have_is_not_used_and_this_is_said(
         compare(blind, altered(course, without=["ax_mps2"]))
 
 
+def test_a_channel_whose_noise_the_fit_did_not_learn_has_no_score(
+    start: Model, lap: Log, course: Log
+) -> None:
+    """It was called twelve times as wrong as its noise, for a model without error."""
+    blind = identify(start, lap.without("ax_mps2"), starts=1)
+    with pytest.warns(SysidWarning, match="ax_mps2 of handling_course is not used: lap does not"):
+        found = compare(blind, course)
+    assert "ax_mps2" not in found.channels
+    assert found.error == pytest.approx(1.0, abs=0.05)
+    assert set(compare(blind, course.without("ax_mps2")).channels) == set(found.channels)
+
+
 def test_samples_keep_their_place(validation: Comparison, fit: Fit, course: Log) -> None:
     assert np.array_equal(validation.time_s, course["time_s"])
     assert validation.residual.shape == (course.n, 5)

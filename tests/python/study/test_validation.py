@@ -10,7 +10,7 @@ import pytest
 from sysid_vehicle import Fit, Log
 from sysid_vehicle._common.threads import at_most
 from sysid_vehicle.errors import InvalidInput, SysidWarning
-from sysid_vehicle.estimate import Driving
+from sysid_vehicle.estimate import MEASURED, Driving
 from sysid_vehicle.study import validation
 from sysid_vehicle.study.ahead.beyond import Beyond
 from sysid_vehicle.study.validation import _with_error, set_aside
@@ -147,3 +147,17 @@ def test_a_log_that_is_in_training_and_validation_data_is_noticed(
         set_aside([lap, course], again)
     changed = altered(lap, vx_mps=lap["vx_mps"] + 1e-9)
     assert [d.logs[0].name for d in set_aside(lap, changed)] == ["lap", "lap"]
+
+
+def test_channels_whose_noise_was_not_learned_are_left_out_of_validation_data(
+    lap: Log, course: Log
+) -> None:
+    with pytest.warns(SysidWarning, match="vy_mps, ax_mps2 of handling_course is not used: lap"):
+        train, test = set_aside(lap.without("vy_mps", "ax_mps2"), course)
+    assert train.present == test.present == ("vx_mps", "yaw_rate_radps", "ay_mps2")
+    # Where it drives the model, the acceleration is nothing that is predicted.
+    blind = [log.without("fx_n") for log in (lap, course)]
+    assert all(log.has("ax_mps2") for d in set_aside(*blind) for log in d.logs)
+    # One training log that has it is enough.
+    both = set_aside([lap.without("vy_mps"), lap.between(0.0, 20.0)], course)
+    assert both[1].present == MEASURED

@@ -1,4 +1,4 @@
-"""The wheel force of logs that are used together: known in all of them, or used in none."""
+"""What logs that are used together share: what drives the model, channels of known noise."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from .._common.text import few
 from ..errors import InvalidInput, warn
-from ..log import Log
+from ..log import MEASURED, Log
 
 
 def alike_in_force(logs: Sequence[Log]) -> tuple[Log, ...]:
@@ -54,3 +54,38 @@ def without_force(logs: Sequence[Log], why: str) -> tuple[Log, ...]:
             "the two in all of them; record or map it, or leave one sort of log out"
         )
     return tuple(log.without("fx_n") if log.has("fx_n") else log for log in logs)
+
+
+def without_unlearned(logs: Sequence[Log], learned: Sequence[Log]) -> Sequence[Log]:
+    """The logs without readings that no log has of which the noise was learned.
+
+    Measured by a noise that nobody knows they would be the largest errors, or none.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+    learned : sequence of Log
+        Driven by the same as the others.
+
+    Returns
+    -------
+    sequence of Log
+        `logs` itself where nothing is left out.
+
+    Warns
+    -----
+    SysidWarning
+        A channel is left out.
+    """
+    known = {c for log in learned for c in MEASURED if log.has(c)}
+    if not all(log.has("fx_n") for log in logs):
+        known.add("ax_mps2")  # it drives the model
+    lost = [c for c in MEASURED if c not in known and any(log.has(c) for log in logs)]
+    if not lost:
+        return logs
+    warn(
+        f"{', '.join(lost)} of {few([log.name for log in logs])} is not used: "
+        f"{few([log.name for log in learned])} does not have it, so that its noise was not "
+        "learned; have it in what is fitted, too"
+    )
+    return [log.without(*(c for c in lost if log.has(c))) for log in logs]
