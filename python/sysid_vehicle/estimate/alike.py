@@ -32,8 +32,9 @@ def alike_in_force(logs: Sequence[Log]) -> tuple[Log, ...]:
     used = without_force(having, f"{lacking} has no fx_n")
     warn(
         f"{lacking} has no fx_n: the wheel force of {few([log.name for log in having])} is not "
-        "used either, and ax_mps2 takes its place in all of them, so that errors of drag, mass and "
-        "drive force are not seen; record or map fx_n for all logs, or leave out those without it"
+        "used either, and ax_mps2 takes its place in all of them, so that errors of drag and drive "
+        "force are not seen, and of mass hardly; record or map fx_n for all logs, or leave out "
+        "those without it"
     )
     by_name = dict(zip(map(id, having), used, strict=True))
     return tuple(by_name.get(id(log), log) for log in logs)

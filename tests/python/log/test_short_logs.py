@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sysid_vehicle import InvalidInput, Log, SysidWarning
+from sysid_vehicle.log import check_excitation
 
 
 def columns(log: Log, n: int, first: int = 0) -> dict[str, np.ndarray]:
@@ -16,6 +17,16 @@ def test_the_log_of_a_single_manoeuvre_is_read_without_a_word(lap: Log) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert Log.from_arrays(columns(lap, 300, 1500)).duration_s == pytest.approx(2.99)
+
+
+def test_a_short_straight_is_no_want_of_corners(lap: Log) -> None:
+    """Others of the same car hold them; a fit to all of them asks."""
+    straight = columns(lap, 300)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        log = Log.from_arrays(straight)
+    with pytest.warns(SysidWarning, match=r"not excited.*drive corners"):
+        assert not check_excitation(log)
 
 
 def test_less_than_a_stretch_that_is_used_is_refused(lap: Log) -> None:
