@@ -158,10 +158,6 @@ def _study(args: argparse.Namespace, heard: Warnings) -> Study:
         model = model.with_nuisances()
     train = read_logs(args.logs, args, model.vehicle)
     test = read_logs(args.test, args, model.vehicle) if args.test else None
-    for path in {p.resolve() for p in args.logs} & {p.resolve() for p in args.test}:
-        warn(
-            f"{path.name} is training and validation data; the validation error then proves nothing"
-        )
     study = improve(
         model,
         train,

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from .._common.progress import note
+from ..errors import InvalidInput
 from ..fleet import manifest_jobs
 from ..fleet.improve_many import run as improve_all
 from .log_arguments import say_it_runs
@@ -46,3 +47,5 @@ def run(args: argparse.Namespace, heard: list[str]) -> None:
     )
     print(fleet)
     print(f"Report: {args.out / 'report.html'}")
+    if fleet.failed and not fleet.done:
+        raise InvalidInput(f"none of the {len(fleet.failed)} studies could be done")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .._common.style import new_figure
-from ..errors import warn
+from ..errors import InvalidInput, warn
 from ..identify import METHODS
 from ..lab import (
     EMResult,
@@ -26,6 +26,7 @@ from ..lab import (
     validate_tyres,
 )
 from ..lab.observer.observed import READINGS
+from ..log import Log, check_car
 from ..vehicle import AXLES, Vehicle
 from .log_arguments import LOG_HELP, add_reading, read_logs
 from .outputs import add_json, add_output, write_figures, write_picture
@@ -70,7 +71,12 @@ def em(args: argparse.Namespace, heard: list[str]) -> None:
     car = ObserverCar.of(vehicle, drag_nspm=args.drag)
     tyres = (vehicle.tyre_front, vehicle.tyre_rear)
     front, rear = args.stiffness or [tyre.cornering_stiffness_per_load for tyre in tyres]
-    logs = read_logs(args.logs, args, vehicle)
+    if not min(front, rear) > 0.0:
+        raise InvalidInput(
+            f"--stiffness {front:g} {rear:g}: give two numbers above 0, the cornering stiffness of "
+            "either axle per load in 1/rad; cars have 8 to 30"
+        )
+    logs = _logs_of(args, vehicle)
     records = [ObserverRecord.from_log(log, car, (front, rear)) for log in logs]
     pair = (("yaw_rate_radps", "ay_mps2"),) if args.correlated else ()
     result = learn_observer_noise(
@@ -137,8 +143,7 @@ def identify(args: argparse.Namespace, heard: list[str]) -> None:
     """Identify, print, and write what was asked for."""
     vehicle = vehicle_of(args)
     car = GreyBoxVehicle.of(vehicle, mass_tolerance=args.mass_tolerance)
-    read = read_logs(args.logs, args, vehicle)
-    logs = [part for log in read for part in TyreLog.from_log(log, car)]
+    logs = [part for log in _logs_of(args, vehicle) for part in TyreLog.from_log(log, car)]
     if args.no_sideslip:
         logs = [log.without_sideslip() for log in logs]
     fit = identify_tyres(
@@ -194,6 +199,14 @@ def validate(args: argparse.Namespace, heard: list[str]) -> None:
             found[0].plot(axes, reading=reading)
         write_picture(args.plot, figure)
     write_figures(args.json, {"drives": [v.to_dict() for v in found]}, heard)
+
+
+def _logs_of(args: argparse.Namespace, vehicle: Vehicle) -> list[Log]:
+    """Logs of this car: with another mass or wheelbase a search is long, and finds nothing."""
+    logs = read_logs(args.logs, args, vehicle)
+    for log in () if args.unchecked else logs:
+        check_car(log, mass_kg=vehicle.mass_kg, wheelbase_m=vehicle.wheelbase_m)
+    return logs
 
 
 def _log_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ from ..compare import one_step_error
 from ..effects import Effect
 from ..errors import InvalidInput
 from ..estimate import Driving
-from ..identify import Fit, driving_of, explaining
+from ..identify import Fit, explaining
 from ..log import Log
 from ..rules import USUAL, Rules, bic
 from .candidates.candidate import Candidate
@@ -23,7 +23,7 @@ from .candidates.posterior import causes_of
 from .candidates.refitting import Refitting
 from .candidates.rivals import score_rivals, with_refit_rivals
 from .candidates.score import score_board_of
-from .evidence.evidence import Evidence
+from .evidence.evidence import Evidence, evident
 from .unexplained.omnibus import Unknown, omnibus_of
 
 REFITS = 5
@@ -79,7 +79,7 @@ def diagnose(
             f"the fit is one to predictions {fit.horizon_s:g} s ahead, and evidence is of the "
             "likelihood; identify without horizon_s"
         )
-    driving = fit.driving if logs is None else driving_of(fit, logs)
+    driving = evident(fit, logs)
     possible = considered(fit.model, candidates)
     evidence = Evidence(fit, driving)
     board = score_board_of(evidence, possible, rules, Unknown(evidence), *shifts(evidence))

@@ -1,6 +1,7 @@
 """State estimation: prepared driving, the noise model, filters for models of one's own."""
 
 from ..log import MEASURED
+from .alike import alike_in_force, without_force, without_unlearned
 from .consistency import Consistency, nees_check, nis_check, whiteness_check
 from .driving import UNITS, Driving
 from .filters import FilterRun, FilterState, StateFilter, StateModel
@@ -30,6 +31,7 @@ __all__ = [
     "NoiseModel",
     "StateFilter",
     "StateModel",
+    "alike_in_force",
     "equal_blocks",
     "first_guess",
     "generous",
@@ -44,4 +46,6 @@ __all__ = [
     "turning",
     "turning_blocks",
     "whiteness_check",
+    "without_force",
+    "without_unlearned",
 ]

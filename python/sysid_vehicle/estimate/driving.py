@@ -18,6 +18,7 @@ from ..log import CHANNELS, MEASURED, Log, several_logs
 from ..model import Model
 from ..sensors import quantum
 from . import pieces
+from .alike import alike_in_force
 from .channels import check_channels, has_channels, logged_channels
 from .inputs import quiet
 from .known_filters import KnownFilters, KnownProblem
@@ -56,8 +57,8 @@ class Driving:
     logs : tuple of Log
         Separate runs of the same car.
     force_known : bool
-        Whether the total wheel force was logged in all of them. If not, the measured longitudinal
-        acceleration stands in for it and is no longer a measurement to predict.
+        Whether the total wheel force was logged. If not, the measured longitudinal acceleration
+        stands in for it and is no longer a measurement to predict.
     offsets : tuple of mapping of str to float, optional
         By log, how much parameters of a model differ there from their values, by full name.
     part : Stretch, optional
@@ -76,18 +77,17 @@ class Driving:
         Raises
         ------
         InvalidInput
-            No log, or no usable stretch in them.
+            No log, no usable stretch in them, or nothing that drives all of them.
         """
         if isinstance(logs, Driving):
             return logs
-        several = several_logs(logs)
-        found = cls(several, all(log.has("fx_n") for log in several))
+        several = alike_in_force(several_logs(logs))
+        found = cls(several, several[0].has("fx_n"))
         if not found.stretches:
             names = ", ".join(log.name for log in several)
             least = min(log.least_speed_mps for log in several)
             raise InvalidInput(
-                f"{names}: no stretch of 1 s or more at {least:.3g} m/s or faster has the inputs "
-                f"it needs"
+                f"{names}: no stretch of 1 s or more at {least:.3g} m/s or faster has its inputs"
             )
         return found
 

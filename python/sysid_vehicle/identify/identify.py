@@ -10,10 +10,11 @@ from types import MappingProxyType
 import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
+from .._common.text import few
 from .._common.threads import before
 from ..errors import InvalidInput, warn
 from ..estimate import Driving, NoiseModel, first_guess
-from ..log import Log, check_car, check_excitation
+from ..log import LEAST_USABLE_S, Log, check_car, check_excitation, copies
 from ..model import Model
 from .ahead.ahead import predicting_ahead
 from .fit import Fit
@@ -233,6 +234,17 @@ def _from_ends(
 def _check(model: Model, driving: Driving) -> None:
     if not model.free_names:
         raise InvalidInput("every parameter is fixed: nothing is left to identify; use compare")
+    if driving.usable_s < LEAST_USABLE_S:
+        raise InvalidInput(
+            f"{driving}: at least {LEAST_USABLE_S:g} s are needed, 30 s with corners are good; add "
+            "logs of other manoeuvres of the same car"
+        )
+    again = copies(driving.logs)
+    if again:
+        warn(
+            f"{few(again)} is given twice and counts twice: intervals come out too narrow; leave "
+            "one of the two out"
+        )
     for log in driving.logs:
         check_car(log, mass_kg=model.vehicle.mass_kg, wheelbase_m=model.vehicle.wheelbase_m)
     check_excitation(list(driving.logs))

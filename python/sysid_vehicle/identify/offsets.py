@@ -16,8 +16,9 @@ import scipy
 
 from .._common.arrays import FloatArray, as_float64
 from .._common.memo import remembered
-from ..errors import InvalidInput, NumericalError
-from ..estimate import Driving, NoiseModel, noise_range
+from .._common.text import few
+from ..errors import InvalidInput, NumericalError, warn
+from ..estimate import Driving, NoiseModel, noise_range, without_force, without_unlearned
 from ..log import Log
 from ..model import Model
 from .ahead.ahead import predicting_ahead
@@ -34,9 +35,10 @@ _STANDS = 0.1  # nats
 
 
 def driving_of(fit: Fit, logs: Log | Sequence[Log] | Driving) -> Driving:
-    """Driving whose logs have the offsets that are best under a fit.
+    """Driving as a fit reads it: its logs have the offsets that are best under the fit.
 
     The likeliest ones with noise of the log's own; of a fit to predictions those that predict best.
+    A wheel force, or a channel, that the fit did not have is not used.
 
     Parameters
     ----------
@@ -49,10 +51,30 @@ def driving_of(fit: Fit, logs: Log | Sequence[Log] | Driving) -> Driving:
     -------
     Driving
     """
-    driving = Driving.of(logs)
+    driving = _as_measured(fit, Driving.of(logs))
     if driving is fit.driving or driving.offsets or not fit.model.offset_names:
         return driving
     return settled_offsets(fit, driving).driving
+
+
+def _as_measured(fit: Fit, driving: Driving) -> Driving:
+    """Driving without the wheel force, and without readings, where the fit had none.
+
+    What noise they have the fit has not learned.
+    """
+    if driving is fit.driving:
+        return driving
+    if driving.force_known and not fit.driving.force_known:
+        why = "the fit was made without the wheel force"
+        logs = without_force(driving.logs, why)
+        warn(
+            f"{few([log.name for log in logs])}: {why}, whose noise it did not learn: fx_n is not "
+            "used here, and ax_mps2 takes its place; identify with logs that have fx_n to see "
+            "errors of it"
+        )
+        driving = replace(driving, logs=logs, force_known=False)
+    logs = tuple(without_unlearned(driving.logs, fit.driving.logs))
+    return driving if logs == driving.logs else replace(driving, logs=logs)
 
 
 def driving_beside(fit: Fit, near: Fit, logs: Log | Sequence[Log] | Driving) -> Driving:

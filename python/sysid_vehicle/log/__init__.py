@@ -1,16 +1,18 @@
 """Driving logs: canonical channels on a uniform grid, checked before they are used."""
 
 from .against_car import check_car, times_wheelbase
+from .build import LEAST_USABLE_S
 from .channels import CHANNELS, MEASURED, Channel
 from .columns import Columns, as_floats, listed, named_columns
 from .held import held_rows
 from .laws.laws import Contradiction
 from .log import Log, Retimed
 from .stamps import as_seconds, seconds_of_stamps
-from .together import check_excitation, several_logs, unexcited
+from .together import check_excitation, copies, several_logs, unexcited
 
 __all__ = [
     "CHANNELS",
+    "LEAST_USABLE_S",
     "MEASURED",
     "Channel",
     "Columns",
@@ -21,6 +23,7 @@ __all__ = [
     "as_seconds",
     "check_car",
     "check_excitation",
+    "copies",
     "held_rows",
     "listed",
     "named_columns",

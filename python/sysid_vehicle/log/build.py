@@ -19,7 +19,10 @@ from .laws.plausibility import check_coherence
 from .laws.ranges import dropouts
 from .signals import fill_short_gaps, spikes
 
-_MIN_USABLE_S = 5.0
+LEAST_STRETCH_S = 1.0
+"""Driving without a break that is used at least [s]."""
+LEAST_USABLE_S = 5.0
+"""Driving that something can be learned from, in all logs together [s]."""
 _CLOCK_S = 1e6  # a time that begins later is that of a clock, counted from a date
 _FILL_S = 0.1
 _FILL_SLOW_S = 0.25  # an input that is sampled more slowly is not interpolated
@@ -35,15 +38,24 @@ class Built:
 
 
 def build(
-    data: Columns, name: str, despike: Iterable[str], check: bool, vehicle: Vehicle | None = None
+    data: Columns,
+    name: str,
+    despike: Iterable[str] = (),
+    check: bool = False,
+    vehicle: Vehicle | None = None,
+    *,
+    told: bool = False,
 ) -> Built:
-    """Make the channels of a log; every error and warning begins with the log's `name`."""
+    """Make the channels of a log; every error and warning begins with the log's `name`.
+
+    What was `told` when the log was read is no warning again.
+    """
     notes: list[str] = []
     try:
         built = _build(data, tuple(despike), check, vehicle, notes)
     except InvalidInput as error:
         raise InvalidInput(f"{name}: {error}") from error
-    for note in notes:
+    for note in () if told else notes:
         warn(f"{name}: {note}")
     return built
 
@@ -157,12 +169,16 @@ def _check(
 ) -> None:
     time_s = channels["time_s"]
     usable = checks.usable_seconds(channels, rate_hz)
-    if usable < _MIN_USABLE_S:
-        raise InvalidInput(
+    if usable < LEAST_STRETCH_S or usable < LEAST_USABLE_S <= time_s[-1] - time_s[0]:
+        said = (
             f"vx_mps and steer_rad: only {usable:.3g} s of the log can be used (samples 0 to "
             f"{time_s.size - 1}, t = {time_s[0]:.6g} to {time_s[-1]:.6g} s, car moving, steering "
-            f"known); at least {_MIN_USABLE_S:g} s are needed, 30 s with corners are good"
+            f"known); at least {LEAST_STRETCH_S:g} s of each log and {LEAST_USABLE_S:g} s of all "
+            "that are used together are needed, 30 s with corners are good"
         )
+        if usable < LEAST_STRETCH_S:
+            raise InvalidInput(said)
+        notes.append(said)
     with np.errstate(over="ignore"):
         found = check_coherence(channels, rate_hz)
     # What is doubted for cars of usual size is compared with the car itself where it is fitted.
@@ -171,4 +187,5 @@ def _check(
     notes += checks.low_rate_note(rate_hz)
     notes += checks.placeholder_notes(channels, excited=not dull)
     notes += checks.frozen_notes(channels, rate_hz, excited=not dull)
-    notes += [dull] if dull else []
+    # Of single manoeuvres it is asked where they are used, of all together (`check_excitation`).
+    notes += [dull] if dull and usable >= LEAST_USABLE_S else []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from .._common.tables import dataset, frame
 from .._common.text import html_paragraph, html_table
 from ..errors import InvalidInput, near_names
 from ..vehicle import Vehicle
-from .build import build
+from .build import LEAST_STRETCH_S, build
 from .channels import CHANNELS
 from .columns import Columns
 from .laws.laws import Contradiction
@@ -204,6 +204,23 @@ class Log:
         name = f"{self.name} [{time_s[first]:.6g} to {time_s[last - 1]:.6g} s]"
         return Log(name, self.rate_hz, self.uniform, part, self.corrections, self.retimed)
 
+    def without(self, *channels: str) -> Log:
+        """Return the log as if some channels had not been recorded.
+
+        Without ``fx_n`` the acceleration drives the model: short holes of it are then filled, as
+        those of every input.
+
+        Raises
+        ------
+        InvalidInput
+            If a channel is absent, or one that every log needs.
+        """
+        for channel in channels:
+            self[channel]
+        data = {name: values for name, values in self._data.items() if name not in channels}
+        built = build(data, self.name, told=True)
+        return replace(self, _data=built.channels)
+
     def corrected(
         self,
         channels: Mapping[str, FloatArray],
@@ -246,7 +263,7 @@ class Log:
         return least_speed_mps(self["vx_mps"])
 
     def stretches(
-        self, min_speed_mps: float | None = None, min_duration_s: float = 1.0
+        self, min_speed_mps: float | None = None, min_duration_s: float = LEAST_STRETCH_S
     ) -> list[slice]:
         """Return the contiguous sample ranges in which the model can run.
 

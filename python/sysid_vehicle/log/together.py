@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from .._common.arguments import expect
 from ..errors import InvalidInput, warn
 from .checks import excitation_note
@@ -62,3 +64,27 @@ def unexcited(logs: Sequence[Log]) -> str:
             return ""
         notes.append(f"{log.name}: {note}")
     return "; ".join(notes)
+
+
+def copies(logs: Sequence[Log], others: Sequence[Log] | None = None) -> list[str]:
+    """Names of logs that hold what another one holds, by their readings.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+    others : sequence of Log, optional
+        Those to compare with; by default those of `logs` that stand before each.
+    """
+    return [
+        log.name
+        for i, log in enumerate(logs)
+        if any(_same(log, other) for other in (logs[:i] if others is None else others))
+    ]
+
+
+def _same(log: Log, other: Log) -> bool:
+    if log is other:
+        return True
+    if log.n != other.n or set(log) != set(other):
+        return False
+    return all(np.array_equal(log[name], other[name], equal_nan=True) for name in log)

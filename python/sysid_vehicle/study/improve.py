@@ -184,6 +184,7 @@ def improve(
         lacked=[e.id for e in (*wanted, *beside_what_they_refine(finer, found.fit.model))],
         sizes=sizes,
         seed=seed,
+        settled=settled,
     )
     with kept(found):
         return judge.study(began, checked=bool(sensors))

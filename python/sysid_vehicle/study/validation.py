@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -11,10 +12,11 @@ import numpy as np
 
 from .._common.arrays import FloatArray, as_float64
 from .._common.memo import remembered
+from .._common.text import few
 from .._common.threads import in_parallel
 from ..diagnose import blocks
 from ..errors import NumericalError, warn
-from ..estimate import MEASURED, Driving
+from ..estimate import MEASURED, Driving, alike_in_force, without_unlearned
 from ..identify import (
     Fit,
     Prediction,
@@ -23,8 +25,8 @@ from ..identify import (
     predict,
     predicting_ahead,
 )
-from ..log import Log, several_logs
-from ..rules import ErrorChange, Gain
+from ..log import LEAST_USABLE_S, Log, copies, several_logs
+from ..rules import USUAL, ErrorChange, Gain, Rules
 from .ahead.along_the_car import along_alone, changes_of
 from .ahead.beyond import Beyond, beyond_noise
 from .ahead.fitted_range import Bools, fitted, within_fitted_range
@@ -45,13 +47,19 @@ _NONE = Gain(-np.inf, 0.0, -np.inf, 0.0)
 def set_aside(
     train: Log | Sequence[Log], test: Log | Sequence[Log] | None
 ) -> tuple[Driving, Driving]:
-    """Training and validation data; without `test`: the last log, or 30 % of the only one."""
+    """Training and validation data; without `test`: the last log, or 30 % of the only one.
+
+    Of logs of single manoeuvres, the last of which is too short to tell anything, the last 30 %.
+    """
     logs = several_logs(train)
     if test is not None:
-        return Driving.of(logs), Driving.of(test)
+        return _driven_alike(logs, several_logs(test))
     if len(logs) > 1:
-        warn(f"no validation data were given: '{logs[-1].name}' is taken for them")
-        return Driving.of(logs[:-1]), Driving.of(logs[-1:])
+        short = logs[-1].duration_s < LEAST_USABLE_S
+        first = -math.ceil(_SHARE * len(logs)) if short else -1
+        taken = few([f"'{log.name}'" for log in logs[first:]]) + (" is" if first == -1 else " are")
+        warn(f"no validation data were given: {taken} taken for them")
+        return _driven_alike(logs[:first], logs[first:])
     log = logs[0]
     cut = float(log["time_s"][int((1.0 - _SHARE) * log.n)])
     warn(
@@ -59,6 +67,21 @@ def set_aside(
         "taken for them; another manoeuvre would tell more"
     )
     return Driving.of(log.between(-np.inf, cut)), Driving.of(log.between(cut, np.inf))
+
+
+def _driven_alike(train: Sequence[Log], test: Sequence[Log]) -> tuple[Driving, Driving]:
+    """Both by the wheel force, or neither: noise that was learned with it is another one.
+
+    A log that is on both sides is told. Channels that training data lack are left out.
+    """
+    both = copies(test, train)
+    if both:
+        warn(
+            f"{few(both)} is training and validation data; the validation error then proves nothing"
+        )
+    logs = alike_in_force((*train, *test))
+    own, others = logs[: len(train)], logs[len(train) :]
+    return Driving.of(own), Driving.of(without_unlearned(others, own))
 
 
 def gain_in_log_likelihood(
@@ -184,14 +207,14 @@ def changes_ahead(poorer: Fit, richer: Fit, test: Driving) -> tuple[ErrorChange,
     return changes_of(one, other, test, AHEAD)
 
 
-def beyond_noise_ahead(fits: Sequence[Fit], test: Driving) -> Beyond:
+def beyond_noise_ahead(fits: Sequence[Fit], test: Driving, rules: Rules = USUAL) -> Beyond:
     """Errors 1 to 5 s ahead beyond the noise, of models with the parameters of `best_within`."""
     final = fits[-1]
     best = in_parallel(lambda fit: at_its_best(fit, test), fits)
-    within, counted = 1.0, counted_in_shares(final, test)
+    within, counted = 1.0, counted_in_shares(final, test, rules)
     if not counted.all():
-        within = float(np.mean(fitted(best[-1], test)))
-        best = in_parallel(lambda fit: best_within(fit, test, final), fits)
+        within = float(np.mean(fitted(best[-1], test, rules)))
+        best = in_parallel(lambda fit: best_within(fit, test, final, rules), fits)
     return replace(beyond_noise(best, test, AHEAD, counted=counted), within=within)
 
 
@@ -219,19 +242,19 @@ def at_its_best(fit: Fit, test: Driving) -> Fit:
 
 
 @remembered(4)
-def counted_in_shares(final: Fit, test: Driving) -> Bools:
+def counted_in_shares(final: Fit, test: Driving, rules: Rules = USUAL) -> Bools:
     """Predictions of `AHEAD` that count in shares of the errors on validation data.
 
     Those in which the tyres work as far as they were fitted, where the final model fails beyond
     (`within_fitted_range`).
     """
-    return within_fitted_range(at_its_best(final, test), test, AHEAD)
+    return within_fitted_range(at_its_best(final, test), test, AHEAD, rules)
 
 
 @remembered(32)
-def best_within(fit: Fit, test: Driving, final: Fit) -> Fit:
+def best_within(fit: Fit, test: Driving, final: Fit, rules: Rules = USUAL) -> Fit:
     """As `at_its_best`, by the predictions that count in shares beside a final model."""
-    counted, noise = counted_in_shares(final, test), fit.noise.floor()
+    counted, noise = counted_in_shares(final, test, rules), fit.noise.floor()
     if counted.all():
         return at_its_best(fit, test)
     return min(_ways(fit, test), key=lambda f: typical_error(f, noise, test, AHEAD, counted))

@@ -53,7 +53,9 @@ class _Standing(ABC):
 
     def clone(self) -> Self:
         """Make another that stands here."""
-        return copy.copy(self)
+        other = copy.copy(self)
+        other._state = self._state.copy()
+        return other
 
 
 class NativeTwin(_Standing):
@@ -144,9 +146,12 @@ class NativeTwin(_Standing):
 
 
 class CallableTwin(_Standing):
-    """A twin made of two functions of state, inputs and parameters.
+    """A twin made of two functions of state, inputs and parameters, and of nothing else.
 
-    It pickles if its functions do: functions of a module do, those made in place do not.
+    What they keep to themselves, clones of the twin would share: `observe_with` refuses functions
+    that give something else when they are asked again. They may write into the state they are
+    given, which is a copy. It pickles if its functions do: functions of a module do, those made in
+    place do not.
 
     Parameters
     ----------
@@ -197,12 +202,26 @@ class CallableTwin(_Standing):
             )
 
     def outputs(self, inputs: FloatArray) -> FloatArray:
-        """What it reads now."""
-        return as_float64(self._outputs(self._state, inputs, self._parameters))
+        """What it reads now.
+
+        Raises
+        ------
+        InvalidInput
+            If the function gives anything but a number for each name.
+        """
+        found = self._outputs(self._state.copy(), inputs, dict(self._parameters))
+        return _numbers(found, self.output_names, "outputs")
 
     def step(self, inputs: FloatArray) -> None:
-        """Advance one step."""
-        self._state = as_float64(self._step(self._state, inputs, self._parameters))
+        """Advance one step.
+
+        Raises
+        ------
+        InvalidInput
+            If the function gives anything but a number for each name.
+        """
+        found = self._step(self._state.copy(), inputs, dict(self._parameters))
+        self._state = _numbers(found, self.state_names, "step")
 
     def get_parameters(self) -> dict[str, float]:
         """Its parameters."""
@@ -215,3 +234,17 @@ class CallableTwin(_Standing):
     def set_wrench(self, force_n: FloatArray, moment_nm: FloatArray) -> None:
         """Refuse: functions of states take no push."""
         raise InvalidInput("a twin of functions takes no push; its states can be set")
+
+
+def _numbers(found: Any, names: Sequence[str], what: str) -> FloatArray:
+    """What a function of the user's gave, with a number for each name."""
+    asked = f"give an array of {len(names)}: {', '.join(names)}"
+    if found is None:
+        raise InvalidInput(f"{what} of the twin gave None; {asked}")
+    try:
+        numbers = as_float64(found)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"{what} of the twin gave no numbers ({error}); {asked}") from error
+    if numbers.shape != (len(names),):
+        raise InvalidInput(f"{what} of the twin gave an array of shape {numbers.shape}; {asked}")
+    return numbers

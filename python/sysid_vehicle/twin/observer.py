@@ -20,6 +20,7 @@ from ..errors import InvalidInput, NumericalError, warn
 from .car import LOAD_NAMES, Load, TwinCar
 from .checks import checked_rows, checked_step
 from .drives import INPUTS, OUTPUTS, WHEELS
+from .failing import check_start
 from .laws import INPUT_SCALE, ParameterLaw, Schedule, SideBySide, place_of
 from .readings import READINGS, Readings
 from .residuals import ChannelResidual, contradictions, residual_of
@@ -95,6 +96,13 @@ class Observer:
     batch: SideBySide | None = None
     schedule: Schedule = field(default_factory=Schedule)
     derivative_hz: float = 20.0
+
+    @property
+    def limits(self) -> list[tuple[str, float, float]]:
+        """Parameters that are looked for, with their lower and upper limits."""
+        batch = () if self.batch is None else self.batch.unknowns
+        found = [(u.parameter, u.lower, u.upper) for u in batch]
+        return found + [(law.parameter, law.lower, law.upper) for law in self.laws]
 
     def core_laws(
         self, parameters: Sequence[str], channels: Sequence[str], dt_s: float
@@ -240,6 +248,7 @@ def observe(
             f"{len(rows)} rows of inputs but {len(values)} of readings; give equally many"
         )
     stride = whole(stride, "stride", 1)
+    check_start(observer.limits, vars(load))
     twin = car.core(load)
     speed = _first_speed(car, readings) if speed_mps is None else float(speed_mps)
     if not abs(speed) <= _FASTEST_MPS:

@@ -21,9 +21,10 @@ import numpy as np
 from .._common.arguments import whole
 from .._common.arrays import FloatArray, as_float64
 from .._common.progress import doing
-from ..errors import InvalidInput, NumericalError, near_names
+from ..errors import InvalidInput, near_names
 from .car import LOAD_NAMES
 from .checks import checked_rows, checked_step
+from .failing import all_numbers, blamed_on, check_repeats, check_start
 from .observer import Observation, Observer, judged
 
 CAPABILITIES = ("parameters", "state", "wrench", "snapshot", "clone")
@@ -120,7 +121,8 @@ def observe_with(
     InvalidInput
         If the observer needs what the twin cannot do, or arrays do not fit; the message says what.
     NumericalError
-        If an output of the twin is no number any more; the message names the time.
+        If an output of the twin is no number any more, or the simulator failed; the message names
+        the time, and the parameters that it had.
     """
     dt, names = checked_step(twin.dt_s), twin.parameter_names
     inputs = checked_rows(inputs, twin.input_names, "inputs", dt, any_size=True)
@@ -129,15 +131,17 @@ def observe_with(
     read = _table(twin, measured, n, dt)
     _check(twin, observer)
     _heard(observer, measured)
+    check_repeats(twin, inputs[0])
     several = _Several(twin, observer, dt)
+    check_start(observer.limits, dict(zip(names, several.estimate, strict=False)))
     kept: list[tuple[list[float], FloatArray, int]] = []
     for k in range(n):
-        outputs = several.outputs(inputs[k])
-        _all_numbers(twin, outputs[0], k, dt)
-        if k % stride == 0:
-            kept.append((list(several.estimate), outputs[0], several.stage))
-        several.learn(read[k], outputs)
-        several.step()
+        with blamed_on(several, k, dt):
+            outputs = several.outputs(inputs[k])
+            if k % stride == 0:
+                kept.append((list(several.estimate), outputs[0], several.stage))
+            several.learn(read[k], outputs)
+            several.step()
     history = np.array([row[0] for row in kept])
     seen = np.array([row[1] for row in kept])
     return judged(
@@ -169,6 +173,7 @@ class _Several:
         self.estimate += [0.0] * (_MOST_PARAMETERS - len(self.estimate)) + [1.0]
         self._gains = [g.row(read, _correctable(twin)) for g in observer.gains]
         self._twins = [twin, *(twin.clone() for _ in range(count - 1))]
+        self.at_work = twin
         self._has_states = "state" in twin.capabilities
         self._told = np.zeros((count, len(twin.input_names)))
         self._scales = np.ones((count, 1))
@@ -189,8 +194,11 @@ class _Several:
         """What each of them reads with these inputs, the twin itself first."""
         self._told[:] = inputs
         self._told[:, self._scaled] *= self._scales
-        pairs = zip(self._twins, self._told, strict=True)
-        return np.array([t.outputs(u) for t, u in pairs], dtype=np.float64)
+        found = []
+        for t, u in zip(self._twins, self._told, strict=True):
+            self.at_work = t
+            found.append(all_numbers(t, t.outputs(u)))
+        return np.array(found, dtype=np.float64)
 
     def learn(self, read: FloatArray, outputs: FloatArray) -> None:
         """Correct states and estimates by what the car read."""
@@ -210,6 +218,7 @@ class _Several:
     def step(self) -> None:
         """Advance all of them with the inputs held."""
         for t, u in zip(self._twins, self._told, strict=True):
+            self.at_work = t
             t.step(u)
 
     def _put(self) -> None:
@@ -217,15 +226,6 @@ class _Several:
             own = self.estimate if self._batch is None else self._batch.of_twin(j, self.estimate)
             t.set_parameters(_named(self._names, own))
             self._scales[j] = own[-1]
-
-
-def _all_numbers(twin: Twin, outputs: FloatArray, k: int, dt: float) -> None:
-    if not np.all(np.isfinite(outputs)):
-        where = twin.output_names[int(np.flatnonzero(~np.isfinite(outputs))[0])]
-        raise NumericalError(
-            f"the twin's {where} is no number at sample {k}, t = {k * dt:.6g} s; take smaller "
-            f"gains or a nearer start"
-        )
 
 
 def _named(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:

@@ -333,21 +333,6 @@ def test_warnings_of_a_study_come_once_and_reach_the_json(
         assert text not in out
 
 
-def test_a_log_that_is_in_training_and_validation_data_is_noticed(
-    arguments: list[str],
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def stop(*_: Any, **__: Any) -> None:
-        raise sv.NumericalError("far enough")
-
-    monkeypatch.setattr(commands, "improve", stop)
-    assert main(["diagnose", *arguments, "--test", arguments[0]]) == 2
-    err = capsys.readouterr().err.splitlines()
-    assert "lap.csv is training and validation data" in err[0]
-    assert err[1] == "sysid-vehicle: error: far enough"
-
-
 @pytest.mark.parametrize("asked_for", [False, True])
 def test_offsets_of_measured_logs_are_in_the_model_on_demand(
     arguments: list[str], monkeypatch: pytest.MonkeyPatch, asked_for: bool

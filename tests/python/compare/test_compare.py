@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 from matplotlib import pyplot
 
-from sysid_vehicle import Comparison, Driving, Fit, Log, Model, compare, drive, manoeuvres
+from sysid_vehicle import (
+    Comparison,
+    Driving,
+    Fit,
+    InvalidInput,
+    Log,
+    Model,
+    SysidWarning,
+    compare,
+    drive,
+    identify,
+    manoeuvres,
+)
 from sysid_vehicle.compare import FailureMap
 from sysid_vehicle.estimate import MEASURED
 
@@ -71,6 +83,31 @@ def test_channels_that_were_not_measured_have_none(
     assert blind.error == pytest.approx(1.0, abs=0.03)
     no_force = compare(fit, altered(course, without=["fx_n"]))
     assert "ax_mps2" not in no_force.channels
+
+
+def test_a_force_that_the_fit_did_not_have_is_not_used_and_this_is_said(
+    start: Model, lap: Log, course: Log, altered: Callable[..., Log]
+) -> None:
+    """Its accelerometer has no noise in that fit, and every reading would seem a failure."""
+    blind = identify(start, altered(lap, without=["fx_n"]), starts=1)
+    with pytest.warns(SysidWarning, match=r"course.*without the wheel force.*fx_n is not used"):
+        found = compare(blind, course)
+    assert "ax_mps2" not in found.channels
+    assert found.error == pytest.approx(1.0, abs=0.05)
+    with pytest.raises(InvalidInput, match=r"course.*has no ax_mps2, and the fit was made without"):
+        compare(blind, altered(course, without=["ax_mps2"]))
+
+
+def test_a_channel_whose_noise_the_fit_did_not_learn_has_no_score(
+    start: Model, lap: Log, course: Log
+) -> None:
+    """It was called twelve times as wrong as its noise, for a model without error."""
+    blind = identify(start, lap.without("ax_mps2"), starts=1)
+    with pytest.warns(SysidWarning, match="ax_mps2 of handling_course is not used: lap does not"):
+        found = compare(blind, course)
+    assert "ax_mps2" not in found.channels
+    assert found.error == pytest.approx(1.0, abs=0.05)
+    assert set(compare(blind, course.without("ax_mps2")).channels) == set(found.channels)
 
 
 def test_samples_keep_their_place(validation: Comparison, fit: Fit, course: Log) -> None:

@@ -1,5 +1,6 @@
 """What changed since a reference: named with its size, and nothing where nothing did."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -239,6 +240,23 @@ def test_drives_with_and_without_wheel_force_do_not_compare(fit: Fit, course: Lo
     columns = {c: course[c] for c in course.channels if c != "fx_n"}
     with pytest.raises(InvalidInput, match="fx_n is known in one of the drivings only"):
         changed(fit, Log.from_arrays(columns))
+
+
+@pytest.mark.parametrize(
+    ("channel", "name", "untold"),
+    [("vy_mps", "speed_sensor_lever_arm", 0), ("ax_mps2", "body_attitude", 0)],
+)
+def test_of_what_is_not_measured_any_more_no_change_is_told(
+    channel: str, name: str, untold: int, truth: Model, before: Fit
+) -> None:
+    """Its size was 0 +- 0, and divided what would be seen."""
+    change = changed(before, later(truth).without(channel), candidates=[name, "steer_offset"])
+    found = change[name]
+    assert found.std[untold] == found.least[untold] == np.inf
+    assert np.isfinite(found.std[1 - untold])
+    assert found.said == "not testable"
+    json.dumps(change.to_dict(), allow_nan=False)
+    assert "at a bound, or never felt" in str(found)
 
 
 def test_a_fit_to_predictions_is_no_reference(before: Fit, course: Log) -> None:

@@ -11,6 +11,7 @@ from sysid_vehicle import (
     Diagnosis,
     Fit,
     InvalidInput,
+    Log,
     Model,
     catalogue,
     compare,
@@ -19,6 +20,7 @@ from sysid_vehicle import (
     identify,
     manoeuvres,
 )
+from sysid_vehicle.diagnose import where
 from sysid_vehicle.diagnose.candidates.refitting import _rivals, _too_fast
 from sysid_vehicle.identify import with_exact_inputs
 
@@ -185,3 +187,13 @@ def test_a_rival_that_scores_nearly_as_well_is_refitted(truth: Model, start: Mod
     assert _rivals(replace(twin, statistic=0.5 * best.statistic), best)
     assert not _rivals(replace(twin, statistic=0.2 * best.statistic), best)
     assert not _rivals(replace(stranger, statistic=0.9 * best.statistic), best)
+
+
+def test_logs_without_the_force_that_the_fit_had_are_refused(
+    fit: Fit, course: Log, altered: Callable[..., Log]
+) -> None:
+    """Noise of the acceleration in its place was not learned: it would be an effect that lacks."""
+    blind = altered(course, without=["fx_n"])
+    for ask in (diagnose, where):
+        with pytest.raises(InvalidInput, match=r"course.*the fit was made with the wheel force"):
+            ask(fit, blind)

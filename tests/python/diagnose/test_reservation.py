@@ -13,6 +13,7 @@ from sysid_vehicle import (
     InvalidInput,
     Log,
     Model,
+    SysidWarning,
     compare,
     diagnose,
     drive,
@@ -68,7 +69,8 @@ def test_a_comparison_tells_of_a_shuffled_channel(of_shuffled: Diagnosis, shuffl
 
 def test_a_study_of_a_shuffled_channel_knows_nothing(truth: Model, shuffled: Log) -> None:
     few = ["accelerometer_scale", "accelerometer_bias", "mass"]
-    found = improve(truth, shuffled, shuffled, starts=1, candidates=few)
+    with pytest.warns(SysidWarning, match="training and validation data"):
+        found = improve(truth, shuffled, shuffled, starts=1, candidates=few)
     assert found.verdict == "unknown"
     assert all(a.stands_in for a in found.added)
     assert "Something else is wrong: ay_mps2" in str(found)
@@ -104,7 +106,8 @@ def test_a_late_yaw_rate_is_told_and_no_inertia_is_named(
     assert float(told[1]) == pytest.approx(0.1, abs=2.0 * float(told[2]))
     assert float(told[2]) < 0.02
     assert not [v for v in verdicts(dx).all if v.finding in NAMED]
-    found = improve(truth, log, log, starts=1, candidates=few, sensors=False)
+    with pytest.warns(SysidWarning, match="training and validation data"):
+        found = improve(truth, log, log, starts=1, candidates=few, sensors=False)
     assert found.verdict == "unknown"
     assert all(a.stands_in for a in found.added)
     assert "yaw_rate_radps: lags behind" in str(found)

@@ -1,5 +1,6 @@
 """Logs made ready for the core: what is usable, and what stands in for what is missing."""
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -65,12 +66,44 @@ def test_without_force_the_acceleration_becomes_an_input(
     assert driving.problem(truth).samples == short.n
 
 
-def test_one_log_without_force_decides_for_all(
+def test_one_log_without_force_decides_for_all_and_this_is_said(
     short: Log, course: Log, altered: Callable[..., Log]
 ) -> None:
-    driving = Driving.of([altered(short, without=["fx_n"]), course])
+    blind = altered(short, without=["fx_n"])
+    with pytest.warns(
+        SysidWarning, match=rf"^{re.escape(short.name)} has no fx_n.*of {course.name} is not"
+    ):
+        driving = Driving.of([blind, course])
     assert not driving.force_known
     assert np.isnan(driving.measured[:, MEASURED.index("ax_mps2")]).all()
+
+
+def test_logs_that_share_neither_force_nor_acceleration_are_refused(
+    short: Log, course: Log, altered: Callable[..., Log]
+) -> None:
+    logs = [altered(short, without=["fx_n"]), altered(course, without=["ax_mps2"])]
+    with pytest.raises(
+        InvalidInput, match=f"{course.name} has no ax_mps2, and {re.escape(short.name)} has"
+    ):
+        Driving.of(logs)
+
+
+def test_where_the_acceleration_takes_the_place_of_a_force_it_counts_as_an_input(
+    short: Log, course: Log, altered: Callable[..., Log]
+) -> None:
+    """Its short holes are filled, and where it is missing for long the model does not run."""
+    ax = course["ax_mps2"].copy()
+    ax[100:103] = np.nan
+    ax[2000:2100] = np.nan
+    with pytest.warns(SysidWarning, match="ax_mps2: no values at samples 2000 to 2099"):
+        holed = altered(course, ax_mps2=ax)
+    with pytest.warns(SysidWarning, match="has no fx_n"):
+        driving = Driving.of([altered(short, without=["fx_n"]), holed])
+    assert [(s.where.start, s.where.stop) for s in driving.stretches[1:]] == [
+        (0, 2000),
+        (2100, course.n),
+    ]
+    assert np.isfinite(driving.inputs()).all()
 
 
 def test_an_absent_channel_is_missing_only_where_it_is_absent(

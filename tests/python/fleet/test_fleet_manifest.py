@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 import sysid_vehicle as sv
+from sysid_vehicle.cli import main
 from sysid_vehicle.fleet import manifest_jobs
 from sysid_vehicle.model import NUISANCES
 
@@ -91,3 +92,15 @@ def test_a_manifest_that_makes_no_sense(garage: Path, text: str, message: str) -
     (garage / "wrong.toml").write_text(text)
     with pytest.raises(sv.InvalidInput, match=message):
         manifest_jobs(garage / "wrong.toml")
+
+
+def test_a_fleet_of_which_nothing_could_be_done_is_no_success(
+    garage: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its report is there all the same."""
+    asked = ["improve-many", str(garage / "fleet.toml"), "--out", str(tmp_path), "--workers", "1"]
+    assert main(asked) == 2
+    out, err = capsys.readouterr()
+    assert "Failed: a/one: " in out
+    assert (tmp_path / "report.html").exists()
+    assert err.splitlines()[-1] == "sysid-vehicle: error: none of the 4 studies could be done"

@@ -106,10 +106,10 @@ class Impatient(Terminal):
 def test_a_study_tells_its_steps_and_after_ctrl_c_what_is_known(
     monkeypatch: pytest.MonkeyPatch, truth: sv.Model
 ) -> None:
-    log = sv.drive(truth, sv.manoeuvres.lap(20.0), seed=1, rate_hz=25.0)
+    logs = [sv.drive(truth, sv.manoeuvres.lap(20.0), seed=s, rate_hz=25.0) for s in (1, 2)]
     monkeypatch.setattr(sys, "stderr", Impatient())
     with pytest.raises(sv.Interrupted, match=r"after 0 step.*no effect was added yet") as caught:
-        sv.improve(truth, log, log, candidates=["steer_offset"], starts=1)
+        sv.improve(truth, *logs, candidates=["steer_offset"], starts=1)
     (fit,) = caught.value.fits
     assert fit.model.effects == ()
     assert isinstance(caught.value, KeyboardInterrupt), "a loop over studies ends, too"

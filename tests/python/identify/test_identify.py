@@ -275,6 +275,23 @@ def test_straight_driving_warns(start: Model, truth: Model) -> None:
     assert "D_front" in found.undetermined
 
 
+def test_short_logs_are_enough_together(fit: Fit, start: Model, lap: Log) -> None:
+    pieces = [lap.between(4.0 * i, 4.0 * i + 3.0) for i in range(10)]
+    found = identify(start, pieces, starts=1)
+    stiffness = found["cornering stiffness front"]
+    expected = fit["cornering stiffness front"].value
+    assert stiffness.value == pytest.approx(expected, abs=4.0 * stiffness.std)
+    with pytest.raises(InvalidInput, match=r"lap \[0 to 3 s\]: 3.0 s usable.*at least 5 s.*add"):
+        identify(start, pieces[0])
+
+
+def test_a_log_that_is_given_twice_is_told(start: Model, lap: Log) -> None:
+    """It counts twice, and what it tells does not."""
+    short = [lap.between(10.0, 20.0) for _ in range(2)]
+    with pytest.warns(SysidWarning, match=r"lap \[10 to 20 s\] is given twice.*too narrow"):
+        identify(start, short, starts=1)
+
+
 def test_going_on_from_a_fit_changes_nothing(fit: Fit) -> None:
     again = refine(fit.model, fit.driving, fit.noise)
     assert abs(again.log_likelihood - fit.log_likelihood) < 1.0

@@ -167,7 +167,7 @@ def test_every_interval_of_a_fit_keeps_to_its_bounds(truth: Model, short: Log) -
     model = truth.add("tyre_relaxation", "aero_drag").with_bounds(
         {"aero_drag.drag_area_m2": (-0.1, 3.0)}
     )
-    few = short.between(4.0, 8.0)  # one corner: hardly anything is known well
+    few = short.between(4.0, 9.0)  # one corner: hardly anything is known well
     fit = identify(model, few, starts=1)
     cut = 0
     for e in fit.estimates:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sysid_vehicle import example_vehicle, read_log
+from sysid_vehicle import Log, example_vehicle, read_log
 from sysid_vehicle.cli import main
 from sysid_vehicle.cli.lab_logs import vehicle_of
 
@@ -77,3 +77,26 @@ def test_the_published_car_is_not_taken_in_silence(tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert vehicle_of(argparse.Namespace(vehicle=tmp_path / "car.toml")) == taken
+
+
+@pytest.mark.parametrize("command", ["identify", "em"])
+def test_logs_of_another_car_are_refused(
+    command: str, lap: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With its mass a search took minutes, and gave stiffness to a tenth of a per cent."""
+    lap.to_csv(tmp_path / "lap.csv")
+    light = example_vehicle().replace(mass_kg=400.0, yaw_inertia_kgm2=600.0)
+    light.to_toml(tmp_path / "car.toml")
+    asked = ["lab", command, str(tmp_path / "lap.csv"), "--vehicle", str(tmp_path / "car.toml")]
+    assert main(asked) == 2
+    assert "lap: mass_kg = 400, but fx_n moves the car as if it had 12" in capsys.readouterr().err
+
+
+def test_a_stiffness_that_no_tyre_has_is_refused_by_its_name(
+    lap: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lap.to_csv(tmp_path / "lap.csv")
+    example_vehicle().to_toml(tmp_path / "car.toml")
+    asked = ["lab", "em", str(tmp_path / "lap.csv"), "--vehicle", str(tmp_path / "car.toml")]
+    assert main([*asked, "--stiffness", "15", "0"]) == 2
+    assert "--stiffness 15 0: give two numbers above 0" in capsys.readouterr().err

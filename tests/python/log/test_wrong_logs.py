@@ -136,8 +136,6 @@ ERRORS: dict[str, tuple[Change, list[str]]] = {
     "time in us": (times(time_s=1e6), ["time_s: steps of 1e+04", "factor = 1e-6"]),
     "empty channel": (put("ay_mps2", slice(None), np.nan), ["ay_mps2: holds no value", "map"]),
     "infinite": (put("ay_mps2", 50, np.inf), ["ay_mps2: infinite at sample 50 (t = 0.5 s)"]),
-    "one second": (rows(slice(0, 101)), ["only 1.01 s", "samples 0 to 100", "5 s are needed"]),
-    "hardly moving": (parked, ["vx_mps", "only 3 s", "samples 0 to 3999", "5 s are needed"]),
     "steer in deg": (times(steer_rad=DEG), ["steer_rad", "at sample", "factor = 0.0174533"]),
     "small steer in deg": (
         lambda data: data.update(drive(0.4), steer_rad=drive(0.4)["steer_rad"] * DEG),

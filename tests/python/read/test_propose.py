@@ -284,6 +284,16 @@ def test_a_clock_of_any_name(right: sv.Log, name: str) -> None:
     assert ("time_s" in sv.propose_channels(data).channels) == (name != "n")
 
 
+@pytest.mark.parametrize("finer", [1e3, 1e6, 1e9])
+def test_a_clock_that_is_called_seconds_and_counts_finer(right: sv.Log, finer: float) -> None:
+    columns = {c: right[c] for c in right}
+    columns["time_s"] = 1.7e9 * finer + np.round(finer * right["time_s"])
+    found = sv.propose_channels(columns)
+    assert found.channels["time_s"].factor == pytest.approx(1.0 / finer)
+    assert "steps of" in found.channels["time_s"].why
+    assert found.channels["vx_mps"].factor == pytest.approx(1.0)
+
+
 def test_what_is_not_found_is_left_to_fill_in() -> None:
     data = {"time": np.arange(200) * 0.01, "speed": np.full(200, 20.0), "x1": np.zeros(200)}
     proposal = sv.propose_channels(data)

@@ -90,7 +90,11 @@ def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     )
     example_vehicle().to_toml(tmp_path / "car.toml")
     known = ["--vehicle", str(tmp_path / "car.toml"), "--channels", str(tmp_path / "map.toml")]
-    for command in (["compare"], ["check"], ["lab", "identify"]):
-        assert main([*command, str(path), *known, "--dbc", str(dbc)]) == 2
-        # It was decoded: the four seconds of it are too short a drive.
-        assert "only 4 s of the log can be used" in capsys.readouterr().err
+    # It was decoded: the four seconds of it are too short to fit a car to.
+    for command, said in (
+        (["compare"], (2, "run: 4.0 s usable in 1 stretch(es): at least 5 s are needed")),
+        (["check"], (0, "run: 1 sensor fault was found")),
+        (["lab", "identify", "--fast"], (0, "Tyres from run: 4.0 s at 100 Hz, 20 to 23 m/s")),
+    ):
+        assert main([*command, str(path), *known, "--dbc", str(dbc)]) == said[0]
+        assert said[1] in "".join(capsys.readouterr())

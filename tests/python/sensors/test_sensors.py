@@ -315,8 +315,9 @@ def test_a_study_uses_what_the_check_settled(
     from sysid_vehicle.study import improve as module
 
     monkeypatch.setattr(sys.modules[module.__module__], "maximised", stop)
-    with pytest.raises(Stop):
-        sv.improve(sv.Model(sv.example_vehicle()), faulty.logs[0], faulty.logs[0], sensors=faulty)
+    log, model = faulty.logs[0], sv.Model(sv.example_vehicle())
+    with pytest.raises(Stop), pytest.warns(sv.SysidWarning, match="training and validation data"):
+        sv.improve(model, log, log, sensors=faulty)
     (driving,) = heard
     assert all(log.corrections for log in driving.logs)
     assert "gyro_bias" in faulty.settles
@@ -373,7 +374,7 @@ def test_a_study_seeks_no_more_than_the_check_leaves(
         faults=tuple(replace(f, told=f.told and f.name != "gain_ax") for f in faulty.faults),
     )
     model = sv.Model(sv.example_vehicle())
-    with pytest.raises(Stop):
+    with pytest.raises(Stop), pytest.warns(sv.SysidWarning, match="training and validation data"):
         sv.improve(model, unsure.logs[0], unsure.logs[0], sensors=unsure)
     ((scale,),) = ([e for e in some if e.id == "accelerometer_scale"] for some in heard)
     assert scale.parameters[0].upper < 0.1 < effect("accelerometer_scale").parameters[0].upper

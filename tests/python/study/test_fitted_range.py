@@ -7,9 +7,11 @@ import pytest
 
 from sysid_vehicle import Fit, Log, Model, drive, identify, manoeuvres
 from sysid_vehicle.estimate import Driving
+from sysid_vehicle.rules import USUAL
 from sysid_vehicle.study import validation
 from sysid_vehicle.study.ahead.beyond import beyond_noise, own_share
 from sysid_vehicle.study.ahead.fitted_range import fitted, within_fitted_range
+from sysid_vehicle.study.ahead.own_share import together_by_motion
 from sysid_vehicle.study.validation import (
     AHEAD,
     at_its_best,
@@ -91,6 +93,26 @@ def test_a_prediction_counts_while_nothing_beyond_is_in_it(gentle: Fit, harder: 
         assert one[k] == within[k - round(rate) : k + 1].all()
     for span in harder.spans:  # none ends sooner than it could begin
         assert not one[span.first : span.first + round(rate)].any()
+
+
+def test_what_counts_as_fitted_is_by_the_rules_that_are_given(
+    gentle: Fit, harder: Driving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Under rules by which hardly any part is explainable no error says that tyres fail beyond."""
+    lenient = replace(USUAL, most=0.001)
+    assert not fitted(gentle, harder).all()
+    assert fitted(gentle, harder, lenient).all()
+    assert within_fitted_range(gentle, harder, AHEAD, lenient).all()
+    monkeypatch.setattr(validation, "_ways", lambda fit, *_: [fit])
+    asked = replace(gentle)
+    assert not counted_in_shares(asked, harder, USUAL).all()
+    assert counted_in_shares(asked, harder, lenient).all()
+    both = replace(gentle), asked
+    assert beyond_noise_ahead(both, harder, lenient).within == 1.0
+    assert beyond_noise_ahead(both, harder).within < 1.0
+    names = ["steer_lag"]
+    told, usual = (together_by_motion(both, names, harder, r)[names[0]] for r in (lenient, USUAL))
+    assert told[0] != usual[0]
 
 
 def test_where_every_prediction_goes_beyond_all_of_them_count(gentle: Fit, harder: Driving) -> None:

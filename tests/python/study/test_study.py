@@ -23,6 +23,7 @@ from sysid_vehicle import (
     manoeuvres,
 )
 from sysid_vehicle.diagnose import Verdicts
+from sysid_vehicle.estimate import Driving
 from sysid_vehicle.rules import Gain
 from sysid_vehicle.study.ahead.beyond import Beyond
 from sysid_vehicle.study.ahead.shares import shares
@@ -325,12 +326,10 @@ def test_several_logs_are_fitted_together(start: Model, lap: Log, course: Log) -
     assert set(found.test[0].log_number) == {0.0}
 
 
-def test_absent_channels_are_among_the_warnings(
-    start: Model, lap: Log, course: Log, altered: Callable[..., Log]
-) -> None:
-    train = altered(lap.between(0.0, 12.0), without=["vy_mps"])
+def test_absent_channels_are_among_the_warnings(start: Model, lap: Log, course: Log) -> None:
+    train, test = lap.between(0.0, 12.0).without("vy_mps"), course.without("vy_mps")
     with pytest.warns(SysidWarning, match=r"12\.0 s usable .* too short to tell many effects"):
-        found = improve(start, train, course, starts=1, most_effects=0)
+        found = improve(start, train, test, starts=1, most_effects=0)
     assert any("record 20 s or more" in w for w in found.warnings)
     assert [w for w in found.warnings if w.startswith("lap") and train.missing()["vy_mps"] in w]
 
@@ -354,7 +353,7 @@ def test_validation_data_tell_the_richer_model(study: Study, lagging: tuple[Log,
 
 
 def test_a_model_that_fails_on_validation_data_gains_nothing(fit: Fit, course: Log) -> None:
-    test = set_aside([course], course)[1]
+    test = Driving.of(course)
     broken = Fit(
         fit.model.with_values({"B_front": float("nan")}),
         *(getattr(fit, f) for f in list(Fit.__dataclass_fields__)[1:]),

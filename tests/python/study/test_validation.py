@@ -1,6 +1,7 @@
 """Validation data: what is set aside, what it says of two models, and how surely."""
 
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from sysid_vehicle import Fit, Log
 from sysid_vehicle._common.threads import at_most
 from sysid_vehicle.errors import InvalidInput, SysidWarning
-from sysid_vehicle.estimate import Driving
+from sysid_vehicle.estimate import MEASURED, Driving
 from sysid_vehicle.study import validation
 from sysid_vehicle.study.ahead.beyond import Beyond
 from sysid_vehicle.study.validation import _with_error, set_aside
@@ -117,3 +118,46 @@ def test_two_models_are_judged_side_by_side(
             told.append(validation.gain_in_log_likelihood(fit, richer, test))
             told.append(validation.fall_in_error(fit, richer, test))
     assert told[:2] == told[2:]
+
+
+def test_of_logs_of_single_manoeuvres_more_than_the_last_are_set_aside(course: Log) -> None:
+    pieces = [course.between(3.0 * i, 3.0 * i + 3.0) for i in range(10)]
+    with pytest.warns(SysidWarning, match=r"'.*21 to 24.*', '.*, '.*27 to 30.*' are taken"):
+        train, test = set_aside(pieces, None)
+    assert train.logs == tuple(pieces[:7])
+    assert test.logs == tuple(pieces[7:])
+
+
+def test_training_and_validation_data_are_driven_by_the_same_input(
+    lap: Log, course: Log, altered: Callable[..., Log]
+) -> None:
+    blind = altered(course, without=("fx_n",))
+    for train, test in ((lap, blind), (blind, lap)):
+        with pytest.warns(SysidWarning, match="course has no fx_n: the wheel force of lap is not"):
+            assert [d.force_known for d in set_aside(train, test)] == [False, False]
+    assert [d.force_known for d in set_aside(lap, course)] == [True, True]
+
+
+def test_a_log_that_is_in_training_and_validation_data_is_noticed(
+    lap: Log, course: Log, altered: Callable[..., Log]
+) -> None:
+    """By its readings, whatever it is called."""
+    again = Log.from_arrays({c: lap[c] for c in lap}, name="again")
+    with pytest.warns(SysidWarning, match="again is training and validation data; the validation"):
+        set_aside([lap, course], again)
+    changed = altered(lap, vx_mps=lap["vx_mps"] + 1e-9)
+    assert [d.logs[0].name for d in set_aside(lap, changed)] == ["lap", "lap"]
+
+
+def test_channels_whose_noise_was_not_learned_are_left_out_of_validation_data(
+    lap: Log, course: Log
+) -> None:
+    with pytest.warns(SysidWarning, match="vy_mps, ax_mps2 of handling_course is not used: lap"):
+        train, test = set_aside(lap.without("vy_mps", "ax_mps2"), course)
+    assert train.present == test.present == ("vx_mps", "yaw_rate_radps", "ay_mps2")
+    # Where it drives the model, the acceleration is nothing that is predicted.
+    blind = [log.without("fx_n") for log in (lap, course)]
+    assert all(log.has("ax_mps2") for d in set_aside(*blind) for log in d.logs)
+    # One training log that has it is enough.
+    both = set_aside([lap.without("vy_mps"), lap.between(0.0, 20.0)], course)
+    assert both[1].present == MEASURED

@@ -152,7 +152,9 @@ def test_what_a_twin_cannot_do_is_said() -> None:
         observe_with(twin, np.zeros((9, 1)), measured, Observer())
     broken = point_mass()
     broken.set_state(np.array([np.nan]))
-    with pytest.raises(NumericalError, match=r"vx_mps is no number at sample 0, t = 0 s"):
+    with pytest.raises(
+        NumericalError, match=r"vx_mps is no number \(sample 0, t = 0 s, mass_kg = 1000\)"
+    ):
         observe_with(broken, force, measured, Observer())
 
 

@@ -180,7 +180,9 @@ class Competition:
             own = list(self._whole[m.id].columns)
             for name, c in zip(m.names, own, strict=True):
                 self.sizes[name] = float(mine[c, 0])
-                self.stds[name] = float(mine[c, 1] * np.sqrt(wide[c]))
+                # What no driving tells of it, as nothing that it acts on is measured.
+                known = mine[c, 1] > 0.0
+                self.stds[name] = float(mine[c, 1] * np.sqrt(wide[c])) if known else np.inf
         ratio = ratios[n:]
         for name, h in self._whole.items():
             own = list(h.columns)

@@ -139,7 +139,13 @@ class EffectChange:
             "stiffness": None if self.stiffness is None else list(self.stiffness),
             "least_stiffness": _finite(self.least_stiffness),
             "change": {
-                n: {"value": v, "std": s, "bound": b, "least": _finite(m), "unit": u}
+                n: {
+                    "value": v,
+                    "std": _finite(s),
+                    "bound": _finite(b),
+                    "least": _finite(m),
+                    "unit": u,
+                }
                 for n, v, s, b, m, u in zip(self.names, *figures, strict=True)
             },
         }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,10 +12,12 @@ import numpy as np
 from ... import _core
 from ..._common.arrays import FloatArray, as_float64
 from ..._common.threads import Workers, check_time
+from ...errors import InvalidInput
 from ...estimate import Driving
 from ...estimate.leads import Part, Work
 from ...estimate.pieces import DrivingProblem, PiecewiseProblem
-from ...identify import Fit
+from ...identify import Fit, driving_of
+from ...log import Log
 from .projection import orthonormal_basis, pseudo_inverse, variance_ratio
 
 # Targets in the core's order: external F_x, F_y, M_z, then accelerations, then sensor readings.
@@ -46,6 +48,24 @@ class Solution:
     size: FloatArray
     covariance: FloatArray
     ratio: float
+
+
+def evident(fit: Fit, logs: Log | Sequence[Log] | Driving | None) -> Driving:
+    """Driving in which a fit's noise is that of what is left; by default what it was fitted to.
+
+    Raises
+    ------
+    InvalidInput
+        The fit had the wheel force and a log has none: noise of the acceleration that takes its
+        place, which the fit did not learn, would look like something that is missing.
+    """
+    driving = fit.driving if logs is None else driving_of(fit, logs)
+    if fit.driving.force_known and not driving.force_known:
+        raise InvalidInput(
+            f"{driving}: the fit was made with the wheel force fx_n, and here it is not known; "
+            "identify with logs without it too, or diagnose logs that have it"
+        )
+    return driving
 
 
 @dataclass(frozen=True, eq=False)

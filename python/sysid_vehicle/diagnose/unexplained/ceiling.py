@@ -21,10 +21,11 @@ from ..._common.arrays import FloatArray, as_float64
 from ..._common.text import html_text
 from ..._common.threads import check_time
 from ...estimate import Driving
-from ...identify import Fit, driving_of, explaining
+from ...identify import Fit, explaining
 from ...log import Log
 from ...rules import USUAL, Rules
 from ..evidence.coordinates import BLOCK_S, begins, blocks
+from ..evidence.evidence import evident
 from .force_map import UNITS, missing_forces
 
 Whole = npt.NDArray[np.intp]
@@ -138,7 +139,7 @@ def ceiling(
     -------
     Ceiling
     """
-    train, other = fit.driving if logs is None else driving_of(fit, logs), driving_of(fit, test)
+    train, other = evident(fit, logs), evident(fit, test)
     rng = generator(seed)
     few, there = thinned(train), thinned(other)
     inputs = Inputs.of(fit, train, other)

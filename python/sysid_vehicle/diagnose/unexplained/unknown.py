@@ -12,9 +12,9 @@ import numpy as np
 from ..._common.arrays import FloatArray
 from ..._common.text import brief
 from ...estimate import Driving
-from ...identify import Fit, driving_of, explaining
+from ...identify import Fit, explaining
 from ...log import Log
-from ..evidence.evidence import Evidence
+from ..evidence.evidence import Evidence, evident
 from .force_map import force_maps
 from .proposals import Proposal, propose
 from .shape import Curve, Surface, curves, surface
@@ -114,12 +114,12 @@ def unknown(
     seed : int
         Of the draws that make the bands.
     """
-    driving = fit.driving if logs is None else driving_of(fit, logs)
+    driving = evident(fit, logs)
     evidence = Evidence(fit, driving)
     maps, _ = force_maps(fit, driving)
     best = next(m.coordinates for m in maps if len(m.coordinates) == 2)
     return Unknown(
         curves(evidence, seed),
         surface(evidence, (best[0], best[1]), seed),
-        propose(evidence, Evidence(fit, driving_of(fit, test))),
+        propose(evidence, Evidence(fit, evident(fit, test))),
     )

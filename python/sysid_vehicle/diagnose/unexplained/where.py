@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from ..._common.text import brief
 from ..._common.threads import Workers
 from ...estimate import Driving
-from ...identify import Fit, driving_of, explaining
+from ...identify import Fit, explaining
 from ...log import Log
-from ..evidence.evidence import Evidence
+from ..evidence.evidence import Evidence, evident
 from .change_points import ChangePoint, change_points
 from .coherence import Coherence, coherence
 from .force_map import UNITS, ForceMap, force_maps
@@ -178,7 +178,7 @@ def where(
     omnibus : Omnibus, optional
         Of the model on this driving, where it is known already.
     """
-    driving = fit.driving if logs is None else driving_of(fit, logs)
+    driving = evident(fit, logs)
     evidence = Evidence(fit, driving)
     with Workers() as pool:
         mapped = pool.submit(force_maps, fit, driving)

@@ -125,17 +125,23 @@ class _Guess:
             self.why.setdefault(channel, []).append(text)
 
     def _time(self, time: str, held: Mapping[str, Signal]) -> None:
-        """Take the unit of time for the one that is stated, or for one that its steps ask for."""
+        """Take the unit of time for the one that is stated, or for one that its steps ask for.
+
+        A column that is called `time_s` may count nanoseconds.
+        """
         if self.view.is_stamps(time):
             self.factors["time_s"] = 1.0
             self._note("time_s", "time stamps")
-        elif "time_s" in self.stated or not held:
-            self.factors["time_s"] = self.stated.get("time_s", 1.0)
+            return
+        known = self.stated.get("time_s", 0.0)
+        clock = next(iter(held.values()))[0] if held else np.zeros(0)
+        step = float(np.median(np.diff(clock))) if clock.size > 1 else 0.0
+        longest = _FINER[1 if self.view.unit(time, "s") else 0][0]
+        if known and known * step < longest:
+            self.factors["time_s"] = known
         else:
-            clock = next(iter(held.values()))[0]
-            step = float(np.median(np.diff(clock))) if clock.size > 1 else 0.0
             self.factors["time_s"] = next(f for below, f in _FINER if step < below)
-            self._note("time_s", f"steps of {step:.4g}")
+            self._note("time_s", f"steps of {step:.4g}" if held else "")
 
     def _by_motion(
         self, signals: Mapping[str, Signal], wheelbase_m: float | None

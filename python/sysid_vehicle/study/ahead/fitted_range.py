@@ -16,7 +16,7 @@ from ..._common.memo import remembered
 from ...errors import NumericalError
 from ...estimate import Driving
 from ...identify import Fit, driving_of
-from ...rules import USUAL, share_of
+from ...rules import USUAL, Rules, share_of
 from ...vehicle import slip_angles
 
 Bools = npt.NDArray[np.bool_]
@@ -25,7 +25,9 @@ RARE = 99.5
 """Percentile of slip angles up to which tyres count as fitted: larger ones may be outliers."""
 
 
-def within_fitted_range(fit: Fit, driving: Driving, horizons_s: Sequence[float]) -> Bools:
+def within_fitted_range(
+    fit: Fit, driving: Driving, horizons_s: Sequence[float], rules: Rules = USUAL
+) -> Bools:
     """Find the predictions in which both axles stay within the slip angles that were fitted.
 
     Parameters
@@ -34,13 +36,14 @@ def within_fitted_range(fit: Fit, driving: Driving, horizons_s: Sequence[float])
     driving : Driving
         Of that of the fit itself, all is within.
     horizons_s : sequence of float
+    rules : Rules
 
     Returns
     -------
     array of bool, shape (horizons, samples)
         By the sample at which a prediction ends. All, where all or none are within.
     """
-    inside = fitted(fit, driving)
+    inside = fitted(fit, driving, rules)
     found = np.zeros((len(horizons_s), driving.samples), dtype=bool)
     if inside.all():
         return ~found
@@ -54,7 +57,7 @@ def within_fitted_range(fit: Fit, driving: Driving, horizons_s: Sequence[float])
 
 
 @remembered(16)
-def fitted(fit: Fit, driving: Driving) -> Bools:
+def fitted(fit: Fit, driving: Driving, rules: Rules = USUAL) -> Bools:
     """At which samples the slip angle of neither axle is larger than those that were fitted.
 
     One fitted sample in 200 may be an outlier, and is no measure. A model that is not shown to err
@@ -65,6 +68,7 @@ def fitted(fit: Fit, driving: Driving) -> Bools:
     ----------
     fit : Fit
     driving : Driving
+    rules : Rules
 
     Returns
     -------
@@ -80,11 +84,11 @@ def fitted(fit: Fit, driving: Driving) -> Bools:
         squares = _squares(fit, driving)
     except NumericalError:
         return every
-    if not within.any() or not 1.0 - np.mean(within) > USUAL.explainable:
+    if not within.any() or not 1.0 - np.mean(within) > rules.explainable:
         return every
     beyond, inside = squares[~within], float(np.mean(squares[within]))
-    least = np.mean(beyond) - USUAL.bound * np.std(beyond) / np.sqrt(len(beyond))
-    return within if share_of(float(least), inside) > USUAL.explainable else every
+    least = np.mean(beyond) - rules.bound * np.std(beyond) / np.sqrt(len(beyond))
+    return within if share_of(float(least), inside) > rules.explainable else every
 
 
 @remembered(16)

@@ -31,6 +31,7 @@ def own_shares(
     named: Collection[str],
     test: Driving,
     ends: float = np.inf,
+    rules: Rules = USUAL,
 ) -> dict[str, tuple[Share, Share]]:
     """Find the share of the error 1 to 5 s ahead that is an effect's own.
 
@@ -52,6 +53,8 @@ def own_shares(
         Validation data.
     ends : float
         When the work ends, wherever it is, by `time.perf_counter`.
+    rules : Rules
+        By which driving counts as fitted (`fitted_range`).
 
     Returns
     -------
@@ -60,12 +63,16 @@ def own_shares(
         which there was no time are not in it.
     """
     each = [(e,) for e in effects]
-    found = _shares(final, each, [(e,) for e in named], test, ends)
+    found = _shares(final, each, [(e,) for e in named], test, ends, rules)
     return {one: both for (one,), both in found.items()}
 
 
 def shares_of_groups(
-    final: Fit, groups: Sequence[tuple[str, ...]], test: Driving, ends: float = np.inf
+    final: Fit,
+    groups: Sequence[tuple[str, ...]],
+    test: Driving,
+    ends: float = np.inf,
+    rules: Rules = USUAL,
 ) -> dict[tuple[str, ...], tuple[Share, Share]]:
     """Find what all effects of a group take off the error 1 to 5 s ahead together.
 
@@ -79,10 +86,10 @@ def shares_of_groups(
         As `alike` finds them.
     test : Driving
         Validation data.
-    ends : float
+    ends, rules
         As for `own_shares`.
     """
-    return _shares(final, groups, groups, test, ends)
+    return _shares(final, groups, groups, test, ends, rules)
 
 
 def alike(final: Fit, effects: Collection[str]) -> tuple[tuple[str, ...], ...]:
@@ -142,6 +149,7 @@ def _shares(
     named: Collection[tuple[str, ...]],
     test: Driving,
     ends: float,
+    rules: Rules,
 ) -> dict[tuple[str, ...], tuple[Share, Share]]:
     """Of effects that are taken out together, on validation and on training data."""
     late: set[tuple[str, ...]] = set()
@@ -166,14 +174,14 @@ def _shares(
     def on_test(few: tuple[str, ...]) -> Share:
         fit = without(final, few)
         assert fit is not None  # its share of the training data is known
-        poorer, best = (best_within(f, test, final) for f in (fit, final))
-        counted = counted_in_shares(final, test)
+        poorer, best = (best_within(f, test, final, rules) for f in (fit, final))
+        counted = counted_in_shares(final, test, rules)
         return own_share(poorer, best, test, AHEAD, channels=moved[few], counted=counted)
 
     fitted = in_time(on_train, asked)
     judged: dict[tuple[str, ...], Share] = {}
     if any(fitted[e].low > 0.0 for e in fitted if e in named):
-        before(ends, lambda: best_within(final, test, final), None)  # once for all of them
+        before(ends, lambda: best_within(final, test, final, rules), None)  # once for all of them
         judged = in_time(on_test, fitted)
     return {e: (judged.get(e, UNKNOWN), fitted.get(e, UNKNOWN)) for e in asked if e not in late}
 
@@ -247,7 +255,7 @@ def shown_together(explained: Beyond, fits: Sequence[Fit], test: Driving) -> flo
 
 
 def together_by_motion(
-    fits: Sequence[Fit], added: Sequence[str], test: Driving
+    fits: Sequence[Fit], added: Sequence[str], test: Driving, rules: Rules = USUAL
 ) -> dict[str, tuple[tuple[float, float], float]]:
     """Find what all effects together take off the error 1 to 5 s ahead, motion by motion.
 
@@ -264,6 +272,8 @@ def together_by_motion(
         Effects.
     test : Driving
         Validation data.
+    rules : Rules
+        As for `own_shares`.
 
     Returns
     -------
@@ -271,8 +281,8 @@ def together_by_motion(
         By effect, of the motion that it moves: squares of the errors of the baseline and of the
         final model, and the lower end of the share.
     """
-    first, last = (best_within(fit, test, fits[-1]) for fit in (fits[0], fits[-1]))
-    counted = counted_in_shares(fits[-1], test)
+    first, last = (best_within(fit, test, fits[-1], rules) for fit in (fits[0], fits[-1]))
+    counted = counted_in_shares(fits[-1], test, rules)
     parts = {part.id: moved_by(part) for part in fits[-1].model.parts}
     found: dict[frozenset[str], tuple[tuple[float, float], float]] = {}
     for channels in {parts[e] for e in added}:

@@ -41,6 +41,7 @@ from .answers import answers_of
 from .contested import spoken_against
 from .foretold import foretold
 from .matters import buried, sufficient
+from .one_for_all import one_for_all
 from .slow import slow_forces
 from .structure import structure
 from .useful import useless
@@ -74,6 +75,8 @@ class Judge:
         Effects that were considered.
     sizes : mapping or None
         Errors that matter, where a user said which.
+    settled : collection of str
+        Effects that a check of the sensors has answered.
     """
 
     trail: Trail
@@ -83,6 +86,7 @@ class Judge:
     lacked: Collection[str]
     sizes: Mapping[str, float] | None
     seed: int
+    settled: Collection[str] = ()
 
     @property
     def fit(self) -> Fit:
@@ -156,6 +160,7 @@ class Judge:
         told, late = in_the_light_of(decision, alone), tuple(asks.left_out)
         wide = self._wide if decision.verdict in LACKING else None
         idle = before(asks.ends, lambda: useless(fits, self.test, rules), frozenset[str]())
+        one = before(asks.ends, self._one_for_all, "")
         return Study(
             verdict=decision.verdict,
             fits=tuple(fits),
@@ -179,7 +184,7 @@ class Judge:
             omnibus=self.fitted,
             omnibus_together=None if rivals is None else rivals.omnibus,
             verdicts=told,
-            warnings=_warnings(self.trail, late, rules),
+            warnings=_warnings(self.trail, late, rules, one),
             seconds=time.perf_counter() - began,
             rules=rules,
             explained=explained,
@@ -196,8 +201,12 @@ class Judge:
             widened=wide,
         )
 
+    def _one_for_all(self) -> str:
+        asked = {*self.lacked, *self.settled}
+        return one_for_all(self.trail.fits[0], self.fit, self.added, asked, self.rules)
+
     def _explained(self) -> Beyond:
-        return beyond_noise_ahead(self.outer, self.test)
+        return beyond_noise_ahead(self.outer, self.test, self.rules)
 
     @cached_property
     def _wide(self) -> FloatArray | None:
@@ -227,7 +236,7 @@ class Judge:
 
     def _rivals(self) -> Instead:
         both = serving(self.fit, self.test)
-        everywhere = _together(self.fit.driving, driving_of(both, self.test))
+        everywhere = Driving.joined((self.fit.driving, driving_of(both, self.test)))
         return instead(both, everywhere, self.added, self.rules)
 
     def _alone(self, rivals: Instead | None) -> Verdicts:
@@ -293,7 +302,7 @@ class Judge:
         """What is known, with what each effect takes off the errors ahead, and all together."""
         fit, test, ends = self.fit, self.test, self.asks.ends
         named = {a.id for a in facts.added if a.named}
-        shares = own_shares(fit, self.added, named, test, ends)
+        shares = own_shares(fit, self.added, named, test, ends, self.rules)
         unknown = [e for e in self.added if e not in shares]
 
         below = bool(named) and before(
@@ -303,26 +312,25 @@ class Judge:
         facts = replace(facts.with_own(shares, unknown, sure), buried=below)
         self.asks.note(unknown, _ALONE)
         groups = without_idle(alike(fit, named), shares, self.rules)
-        facts = facts.with_groups(shares_of_groups(fit, groups, test, ends))
+        facts = facts.with_groups(shares_of_groups(fit, groups, test, ends, self.rules))
         if explained is None:
             return facts
         low = self.asks.asked(_TOGETHER, lambda: shown_together(explained, self.outer, self.test))
         facts = replace(facts, taken_low=low)
         motions = self.asks.asked(
-            _TOGETHER, lambda: together_by_motion(self.outer, self.added, self.test)
+            _TOGETHER, lambda: together_by_motion(self.outer, self.added, self.test, self.rules)
         )
         return facts if motions is None else facts.with_motions(motions)
 
 
-def _together(train: Driving, test: Driving) -> Driving:
-    """All driving; the training data where one of the two lacks the wheel force."""
-    same = train.force_known == test.force_known
-    return Driving.joined((train, test)) if same else train
-
-
-def _warnings(trail: Trail, late: Sequence[str], rules: Rules = USUAL) -> tuple[str, ...]:
+def _warnings(
+    trail: Trail, late: Sequence[str], rules: Rules = USUAL, one: str = ""
+) -> tuple[str, ...]:
     fit, found = trail.fit, []
     driving = fit.driving
+    if one:
+        found.append(one)
+        warn(one)
     if trail.stopped or late:
         found.append(_cut_short(trail.stopped, late))
         warn(found[-1])

@@ -258,7 +258,7 @@ class Search:
         while len(trail.fits) > 1 and trail.diagnoses[-1].omnibus.rejects:
             fit = trail.fit
             added = [e for e in fit.model.effects if e not in baseline]
-            own = own_shares(fit, added, added, self.test, self.judged_by)
+            own = own_shares(fit, added, added, self.test, self.judged_by, self.rules)
             worst = [(s.value, e) for e, (s, _) in own.items() if harmful(s, self.rules)]
             if not worst:
                 return

@@ -1,0 +1,95 @@
+"""Whether one effect that was not sought explains all that was found: one error in several names.
+
+A wrong mass scales every force. Where a user takes the mass for known, a study finds a gain of the
+wheel force, a yaw inertia and a drag of the same size, each for itself and rightly by the data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from ..._common.text import few, unit_after, with_error
+from ...diagnose.diagnose import diagnose
+from ...effects import Effect
+from ...errors import NumericalError
+from ...identify import Fit, refine, with_exact_inputs
+from ...rules import Rules, bic
+
+_IN_THE_FILE = {
+    "aero_drag": "drag_area_m2 of the vehicle file",
+    "cg_position": "lf_m and lr_m of the vehicle file",
+    "mass": "mass_kg of the vehicle file",
+    "steer_ratio": "the factor of steer_rad in the channel map",
+    "yaw_inertia": "yaw_inertia_kgm2 of the vehicle file",
+}
+
+
+def one_for_all(
+    baseline: Fit, final: Fit, added: Sequence[str], sought: Collection[str], rules: Rules
+) -> str:
+    """Say which effect that was left out, or is fixed, explains as much as all that were added.
+
+    Refitted in their place, it has to be as likely on the training data by the BIC, which its fewer
+    parameters may let it be, and of a size that a car can have.
+
+    Parameters
+    ----------
+    baseline, final : Fit
+    added : sequence of str
+        Effects of the final model that the baseline lacks; one has no common cause with itself.
+    sought : collection of str
+        Effects that were considered.
+    rules : Rules
+
+    Returns
+    -------
+    str
+        A sentence; empty where there is no such effect.
+    """
+    if len(added) < 2:
+        return ""
+    enough = _merit(final)
+    found = [
+        (e, fit)
+        for e, fit in (*_fixed(baseline), *_left_out(baseline, sought, rules))
+        if _merit(fit) >= enough
+    ]
+    if not found:
+        return ""
+    e, fit = max(found, key=lambda at: _merit(at[1]))
+    sizes = ", ".join(
+        f"{p.name} {with_error(fit[n].value, fit[n].std, fit[n].bounds)}{unit_after(p.unit)}"
+        for n, p in e.named.items()
+    )
+    where = _IN_THE_FILE.get(e.id, "what is known of it")
+    return (
+        f"{few(added)} may be one error: {e.id}, which was not sought, explains the training data "
+        f"as well in place of all of them ({sizes}); check {where}, or let the study seek {e.id}"
+    )
+
+
+def _merit(fit: Fit) -> float:
+    return bic(with_exact_inputs(fit), len(fit.model.free_names), fit.driving.samples)
+
+
+def _fixed(baseline: Fit) -> list[tuple[Effect, Fit]]:
+    """Effects that the model has at fixed values, each with a fit in which it is free."""
+    free, found = baseline.model.free_names, []
+    for e in baseline.model.parts:
+        if set(e.named).isdisjoint(free):
+            with suppress(NumericalError, np.linalg.LinAlgError):
+                model = baseline.model.with_free(e.named)
+                found.append((e, refine(model, baseline.driving, baseline.noise)))
+    return found
+
+
+def _left_out(baseline: Fit, sought: Collection[str], rules: Rules) -> list[tuple[Effect, Fit]]:
+    """The likeliest of the effects that the model lacks and nobody sought, with its fit."""
+    others = [e for e in baseline.model.candidates if e.id not in sought]
+    if not others:
+        return []
+    ranking = diagnose(baseline, candidates=others, rules=rules, refits=1).ranking
+    return [(c.effect, c.fit) for c in ranking if c.fit is not None and c.can_be(rules)]
