@@ -44,6 +44,9 @@ from sysid_vehicle.rules import USUAL
 from sysid_vehicle.sensors.low_pass.low_pass import _Problem
 from sysid_vehicle.sensors.low_pass.spectrum import _bias, _of_windows, spectrum_of
 from sysid_vehicle.study import validation
+from sysid_vehicle.study.ahead import horizons
+from sysid_vehicle.study.ahead.waterfall import all_ahead
+from sysid_vehicle.study.ahead.where_models_differ import apart
 from sysid_vehicle.study.judge.answers import answers_of
 from sysid_vehicle.study.results import failing
 from sysid_vehicle.study.results.failing import late
@@ -246,6 +249,28 @@ def test_what_is_insignificant_is_dropped_once(fit: Fit, monkeypatch: pytest.Mon
     assert lean.model.effects == fit.model.effects
     assert without_insignificant(richer, USUAL) is lean
     assert len(calls) == 1
+
+
+def test_errors_of_a_final_model_are_worked_out_once(
+    fit: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[Fit] = []
+
+    def counted(one: Fit, *args: Any, **kwargs: Any) -> np.ndarray:
+        calls.append(one)
+        return all_ahead(one, *args, **kwargs)
+
+    monkeypatch.setattr(horizons, "all_ahead", counted)
+    poorer = [replace(fit), replace(fit)]
+    for one in poorer:
+        apart(one, fit, fit.driving, (1.0,), horizons.LATERAL)
+    assert calls == [poorer[0], fit, poorer[1]]
+    forget()
+    # Of long driving they would fill the memory.
+    monkeypatch.setattr(horizons._core, "TOLD_SAMPLES", 100)
+    for _ in range(2):
+        horizons.errors_ahead(fit, fit.noise, fit.driving, (1.0,))
+    assert calls[3:] == [fit, fit]
 
 
 def test_where_a_search_begins_is_looked_at_once(fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ... import _core
 from ..._common.arrays import NORMAL_MAD, FloatArray, as_float64, median_of_known
 from ..._common.memo import remembered
 from ..._common.text import html_table, number, text_table
@@ -243,14 +244,25 @@ def errors_ahead(
 ) -> FloatArray:
     """Errors of the predicted channels, (horizons, samples, 5), infinite where the model fails.
 
-    NaN where no prediction ends, or nothing was measured.
+    NaN where no prediction ends, or nothing was measured. Of short driving the last few are
+    remembered: a final model is held against that without each of its effects in turn.
     """
+    kept = driving.samples <= _core.TOLD_SAMPLES
+    return (_errors_remembered if kept else _errors_worked_out)(fit, noise, driving, horizons_s)
+
+
+def _errors_worked_out(
+    fit: Fit, noise: NoiseModel, driving: Driving, horizons_s: tuple[float, ...]
+) -> FloatArray:
     columns = [MEASURED.index(c) for c in PREDICTED]
     try:
         e = all_ahead(fit, noise, driving, horizons_s, apart=_APART)[:, :, columns]
     except NumericalError:
         return np.full((len(horizons_s), driving.samples, len(PREDICTED)), np.inf)
     return as_float64(np.where(np.isfinite(driving.measured[:, columns]), e, np.nan))
+
+
+_errors_remembered = remembered(8)(_errors_worked_out)
 
 
 def _by_block(e: FloatArray, driving: Driving) -> FloatArray:
@@ -275,8 +287,7 @@ def _errors_of(
     if counted is None or counted.all():
         return block_errors(fit, noise, driving, horizons_s)
     errors = errors_ahead(fit, noise, driving, horizons_s)
-    errors[~counted] = np.nan
-    return _by_block(errors, driving)
+    return _by_block(as_float64(np.where(counted[..., None], errors, np.nan)), driving)
 
 
 def typical_error(
