@@ -97,7 +97,13 @@ def refine_above(model: Model, driving: Driving, fit: Fit, least: float = -np.in
     return top(model, driving, objective, found, Starts.none(model.free_names), thinned)
 
 
-def refine_beside(model: Model, driving: Driving, fit: Fit, least: float) -> Fit | None:
+def refine_beside(
+    model: Model,
+    driving: Driving,
+    fit: Fit,
+    least: float,
+    worth: Callable[[Fit], bool] = lambda _: True,
+) -> Fit | None:
     """As `refine`, to be compared with a fit of other effects; None where it ends far below that.
 
     Few samples, on which it climbs to the end, tell it before all of them are asked.
@@ -111,6 +117,8 @@ def refine_beside(model: Model, driving: Driving, fit: Fit, least: float) -> Fit
     least : float
         Log-likelihood below which nobody asks for the maximum (`far_below`): noise of other time
         scales is not tried from there.
+    worth : callable, optional
+        Whether it is tried from the fit at the end of the climb; None where not.
     """
     objective, thinned = objectives(model, driving)
     box, led = free_box(model), (model.vector(), fit.noise.vector())
@@ -120,7 +128,15 @@ def refine_beside(model: Model, driving: Driving, fit: Fit, least: float) -> Fit
         if few.log_likelihood(*led) < _by_few(fit, objective) - _FAR_BELOW_BY_FEW:
             return None
     found = settle(objective, model.vector(), fit.noise.vector(), box, led=led)
-    return top(model, driving, objective, found, Starts.none(model.free_names), thinned, least)
+    starts = Starts.none(model.free_names)
+    at_top = to_the_top(objective, *found[:2], box, least=least - FAR_BELOW)
+    told = NoiseModel.from_vector(at_top[1])
+    near = summary(model, driving, objective, at_top[0], told, starts, found[2])
+    if far_below(near.log_likelihood, least):
+        return replace(near, converged=False)
+    if not worth(near):
+        return None
+    return _likeliest(model, driving, objective, at_top, starts, thinned, found[2])
 
 
 def _by_few(fit: Fit, objective: Objective) -> float:

@@ -55,3 +55,18 @@ def test_noise_of_other_time_scales_is_not_tried_far_below(
         assert found is not None
         assert len(asked) == times
         assert np.isfinite(found.log_likelihood)
+
+
+def test_noise_of_other_time_scales_is_not_tried_where_nobody_wants_it(
+    relaxing: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(refine_beside.__globals__, "likelier_noise", pytest.fail)
+    asked: list[Fit] = []
+
+    def worth(near: Fit) -> bool:
+        asked.append(near)
+        return False
+
+    near = (relaxing.model, relaxing.driving, relaxing, relaxing.log_likelihood)
+    assert refine_beside(*near, worth) is None
+    assert asked[0].log_likelihood == pytest.approx(relaxing.log_likelihood, abs=0.5)

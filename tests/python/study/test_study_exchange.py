@@ -15,6 +15,8 @@ from sysid_vehicle.identify import refine
 from sysid_vehicle.rules import USUAL
 from sysid_vehicle.study.search.steps import _with_others, exchanged, in_common
 
+NO_TEST: Any = None
+
 
 def test_an_effect_that_was_tried_against_the_same_ones_is_not_refitted(
     start: Model, monkeypatch: pytest.MonkeyPatch
@@ -29,7 +31,7 @@ def test_an_effect_that_was_tried_against_the_same_ones_is_not_refitted(
     drag = Candidate(
         effect("aero_drag"), 9.0, 0.0, (0.6,), (0.1,), 1.0, 1.0, fit=tried, finished=True
     )
-    assert _with_others(windy, "head_wind", (drag,), USUAL) is tried
+    assert _with_others(windy, "head_wind", (drag,), NO_TEST, USUAL) is tried
     elsewhere: Any = SimpleNamespace(model=tried.model, driving=object())
     beside: Any = SimpleNamespace(model=tried.model.add("rolling_resistance"), driving=driving)
     for other in (
@@ -37,7 +39,7 @@ def test_an_effect_that_was_tried_against_the_same_ones_is_not_refitted(
         replace(drag, fit=elsewhere),
         replace(drag, fit=beside),
     ):
-        assert _with_others(windy, "head_wind", (other,), USUAL) is refined
+        assert _with_others(windy, "head_wind", (other,), NO_TEST, USUAL) is refined
 
 
 def windy_fit(start: Model, driving: object) -> Any:
@@ -56,7 +58,7 @@ def test_a_trial_far_below_is_not_made_simpler(
     """Twenty nats, and the price of the wind, are more than a simpler model gains."""
     asked, told = [], {}
 
-    def refining(_: object, __: object, ___: object, least: float) -> Any:
+    def refining(_: object, __: object, ___: object, least: float, ____: object) -> Any:
         told["least"] = least
         return SimpleNamespace(log_likelihood=-below)
 
@@ -68,12 +70,35 @@ def test_a_trial_far_below_is_not_made_simpler(
     monkeypatch.setitem(_with_others.__globals__, "without_insignificant", simplified)
     drag = Candidate(effect("aero_drag"), 9.0, 0.0, (0.6,), (0.1,), 1.0, 1.0)
     windy = windy_fit(start, SimpleNamespace(samples=1000))
-    found = _with_others(windy, "head_wind", (drag,), USUAL)
+    found = _with_others(windy, "head_wind", (drag,), NO_TEST, USUAL)
     assert found is not None
     assert found.log_likelihood == -below
     price = 0.5 * len(windy.estimates) * np.log(1000.0)
     assert told["least"] == pytest.approx(-price)
     assert bool(asked) == simpler
+
+
+@pytest.mark.parametrize(("ahead", "goes_on"), [(-15.0, True), (-30.0, False)])
+def test_what_lies_far_behind_by_all_data_is_not_searched_to_its_end(
+    start: Model, monkeypatch: pytest.MonkeyPatch, ahead: float, goes_on: bool
+) -> None:
+    drag = Candidate(effect("aero_drag"), 9.0, 0.0, (0.6,), (0.1,), 1.0, 1.0)
+    windy = windy_fit(start, SimpleNamespace(samples=1000))
+    near, asked = SimpleNamespace(log_likelihood=0.0), []
+
+    def refining(*given: Any) -> Any:
+        return near if given[-1](near) else None
+
+    def lead(*of: object) -> float:
+        asked.append(of)
+        return ahead
+
+    names = {"refine_beside": refining, "lead": lead, "without_insignificant": lambda fit, _: fit}
+    for name, stand_in in names.items():
+        monkeypatch.setitem(_with_others.__globals__, name, stand_in)
+    found = _with_others(windy, "head_wind", (drag,), NO_TEST, USUAL)
+    assert found is (near if goes_on else None)
+    assert asked == [(near, windy, NO_TEST)]
 
 
 def test_two_that_are_confounded_are_tried_against_what_they_have_in_common(

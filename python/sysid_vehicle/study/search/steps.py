@@ -202,7 +202,7 @@ def exchanged(
     while True:
         best = fit
         asked = [
-            partial(_with_others, fit, name, others, rules)
+            partial(_with_others, fit, name, others, test, rules)
             for name, others in _exchanges(fit, nearly, most_effects)
         ]
         for trial in in_parallel(lambda work: before(ends, work, None), asked):
@@ -234,10 +234,12 @@ def _exchanges(
                 yield name, others
 
 
-def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules) -> Fit | None:
+def _with_others(
+    fit: Fit, name: str, others: Sequence[Candidate], test: Driving, rules: Rules
+) -> Fit | None:
     """The fit with others in place of an effect, and without what is not significant then.
 
-    None where the search fails, or ends far below.
+    None where the search fails, or ends far below, by training data or by all that speak for it.
     """
     model = fit.model.drop(name)
     for c in others:
@@ -252,7 +254,9 @@ def _with_others(fit: Fit, name: str, others: Sequence[Candidate], rules: Rules)
     bare = [e for e in fit.estimates if "." not in e.name or _part(e) in model.nuisances]
     least = _as_searched(fit) - bic(0.0, len(bare), fit.driving.samples)
     try:
-        found = refine_beside(model, fit.driving, fit, least)
+        found = refine_beside(
+            model, fit.driving, fit, least, lambda near: not far_below(lead(near, fit, test), 0.0)
+        )
         if found is None or far_below(found.log_likelihood, least):
             return found
         return without_insignificant(found, rules)
