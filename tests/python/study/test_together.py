@@ -183,3 +183,21 @@ def test_what_fits_as_well_in_the_place_of_one_of_several_is_told(
     monkeypatch.setattr(together, "beside", unscored)
     alone = in_place_of(found, ("road_grade",), dx)
     assert alone["road_grade"].names == ("rolling_resistance",)
+
+
+def test_a_mass_with_a_yaw_inertia_may_be_a_gain_of_the_force(truth: Model, start: Model) -> None:
+    heavy = {"mass.relative_error": 0.16, "yaw_inertia.relative_error": 0.16}
+    car = truth.add("mass", "yaw_inertia").with_values(heavy)
+    train = drive(car, manoeuvres.lap(20.0), seed=5, rate_hz=RATE_HZ)
+    some = ("force_gain", "mass", "yaw_inertia", "aero_drag")
+    dx = diagnose(identify(start, train, starts=1), candidates=some, refits=0)
+    found = identify(start.add("force_gain"), train, starts=1)
+    in_place = in_place_of(found, ("force_gain",), dx)["force_gain"]
+    mass = next(c for c in in_place.rivals if c.id == "mass")
+    assert mass.fit is not None
+    assert {*mass.fit.model.effects} == {"mass", "yaw_inertia"}
+    assert abs(mass.value[0] - 0.16) < 3.0 * mass.std[0]
+    # Where no yaw inertia is sought the mass alone is none.
+    few = diagnose(found, candidates=("mass", "aero_drag"), refits=0)
+    alone = in_place_of(found, ("force_gain",), few)["force_gain"]
+    assert "mass" not in alone.names

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from ..._common.threads import before, in_parallel
 from ...diagnose import Candidate, Diagnosis
+from ...diagnose.candidates.possible import possible_in
 from ...diagnose.candidates.refits import refitted
 from ...diagnose.candidates.reservation import beside
 from ...effects import Effect
 from ...errors import NumericalError
 from ...estimate import Driving
-from ...identify import Fit, refine_while, refit, with_exact_inputs
+from ...identify import Fit, refine, refine_while, refit, with_exact_inputs
 from ...model import Model
 from ...rules import USUAL, Rules, bic
 from ..ahead.own_share import without
@@ -138,12 +139,40 @@ def _in_place(fit: Fit, name: str, dx: Diagnosis) -> InPlace:
     for s in sorted(near, key=lambda s: -by[s.effect.id]):
         told = s.statistic, s.p_value, s.value, s.std, s.retained, s.variance_ratio
         c = refitted(poorer, poorer.driving, Candidate(s.effect, *told))
+        more = len(c.effect.parameters) - len(parts[name].parameters)
+        if c.statistic <= gained - 2.0 * rules.apart and parts[name].along_alone:
+            c, others = _undone_sideways(c, poorer, {name}, dx)
+            more += others
         as_well = c.statistic > gained - 2.0 * rules.apart
         if as_well and c.can_be(rules):
-            more = len(c.effect.parameters) - len(parts[name].parameters)
             rivals.append(c)
             leads.append(bic(0.5 * (c.statistic - gained), more, fit.driving.samples))
     return InPlace(tuple(rivals), tuple(leads))
+
+
+def _undone_sideways(
+    c: Candidate, poorer: Fit, left_out: Collection[str], dx: Diagnosis
+) -> tuple[Candidate, int]:
+    """A candidate beside what undoes its lateral action, and how many parameters more that takes.
+
+    A mass in place of a gain of the wheel force turns the car more slowly, too: with a yaw inertia
+    that is larger by as much it turns as before. Noise is learned anew, as that of the model with
+    the gain has what it does.
+    """
+    best, more = c, 0
+    for e in () if c.fit is None else c.fit.model.candidates:
+        beside_it = e.is_like(c.effect) and not e.along_alone and not e.states
+        if c.fit is None or not beside_it or e.id in left_out or e.id not in dx.family:
+            continue
+        with suppress(NumericalError, np.linalg.LinAlgError):
+            both = refine(c.fit.model.add(e), poorer.driving, c.fit.noise)
+            gained = 2.0 * (with_exact_inputs(both) - with_exact_inputs(poorer))
+            if gained > best.statistic and possible_in(both, e, dx.rules):
+                told = [both[n] for n in c.effect.named]
+                value, std = tuple(v.value for v in told), tuple(v.std for v in told)
+                best = replace(c, statistic=gained, value=value, std=std, fit=both)
+                more = len(e.parameters)
+    return best, more
 
 
 def _leading_subsets(dx: Diagnosis, room: int) -> list[tuple[str, ...]]:
