@@ -79,6 +79,10 @@ def test_names_are_asked_of_values_and_of_what_is_likelier_in_their_place(
     assert against(4.0) == {}
     assert against(5.0, gain=-1.0) == {}
     assert "tyre_temperature in its place would fit" in against(5.0)["aero_downforce"]
+    # What makes it likelier is said to be beside it.
+    rival = replace(rival, fit=replace(fit, model=fit.model.add("tyre_temperature", "yaw_inertia")))
+    told = against(5.0)["aero_downforce"]
+    assert "tyre_temperature with yaw_inertia in its place would fit" in told
     other = {
         "aero_downforce": "aero_downforce.cl_a_rear_m2 1.4 from training data, 0.2 from others"
     }

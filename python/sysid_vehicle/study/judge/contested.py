@@ -76,8 +76,9 @@ def spoken_against(
             found[effect] = f"validation data alone give another value ({others})"
     for effect, rivals in in_place.items():
         if not found.get(effect, "told"):
+            known = {*final.model.effects}
             better = [
-                c.id
+                " with ".join((c.id, *(e for e in c.fit.model.effects if e not in known | {c.id})))
                 for c in rivals.better(rules)
                 if c.fit is not None and gain_with_exact_inputs(final, c.fit, test) > 0.0
             ]

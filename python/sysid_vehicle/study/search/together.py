@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -141,7 +141,7 @@ def _in_place(fit: Fit, name: str, dx: Diagnosis) -> InPlace:
         c = refitted(poorer, poorer.driving, Candidate(s.effect, *told))
         more = len(c.effect.parameters) - len(parts[name].parameters)
         if c.statistic <= gained - 2.0 * rules.apart and parts[name].along_alone:
-            c, others = _undone_sideways(c, poorer, {name}, dx)
+            c, others = _undone_sideways(c, poorer, name, dx)
             more += others
         as_well = c.statistic > gained - 2.0 * rules.apart
         if as_well and c.can_be(rules):
@@ -151,7 +151,7 @@ def _in_place(fit: Fit, name: str, dx: Diagnosis) -> InPlace:
 
 
 def _undone_sideways(
-    c: Candidate, poorer: Fit, left_out: Collection[str], dx: Diagnosis
+    c: Candidate, poorer: Fit, left_out: str, dx: Diagnosis
 ) -> tuple[Candidate, int]:
     """A candidate beside what undoes its lateral action, and how many parameters more that takes.
 
@@ -160,9 +160,11 @@ def _undone_sideways(
     the gain has what it does.
     """
     best, more = c, 0
-    for e in () if c.fit is None else c.fit.model.candidates:
+    if c.fit is None:
+        return best, more
+    for e in c.fit.model.candidates:
         beside_it = e.is_like(c.effect) and not e.along_alone and not e.states
-        if c.fit is None or not beside_it or e.id in left_out or e.id not in dx.family:
+        if not beside_it or e.id == left_out or e.id not in dx.family:
             continue
         with suppress(NumericalError, np.linalg.LinAlgError):
             both = refine(c.fit.model.add(e), poorer.driving, c.fit.noise)
