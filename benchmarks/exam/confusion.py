@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+from design import catalogue
 from matplotlib.axes import Axes
 from trial import Outcome
-
-import sysid_vehicle as sv
 
 NOTHING = "nothing"
 
@@ -25,7 +24,7 @@ def confusion(
         `nothing`, then the catalogue.
     counts : array, shape (names, names)
     """
-    names = (NOTHING, *(e.id for e in sv.catalogue()))
+    names = (NOTHING, *(e.id for e in catalogue()))
     at = {n: i for i, n in enumerate(names)}
     counts = np.zeros((len(names), len(names)), dtype=np.int64)
     for o in outcomes:

@@ -147,9 +147,14 @@ class Trial:
         return {**asdict(self), "truth": list(self.truth)}
 
 
+def catalogue() -> tuple[sv.Effect, ...]:
+    """Effects that are hidden, and looked for: none that is no candidate without a leaning body."""
+    return tuple(e for e in sv.catalogue() if not e.beside)
+
+
 def _truths() -> Iterator[tuple[Kind, tuple[str, ...], tuple[float, ...]]]:
     yield "null", (), (1.0,)
-    for e in sv.catalogue():
+    for e in catalogue():
         yield "effect", (e.id,), SEVERITIES
         yield "itself removed", (e.id,), SEVERITIES
         yield "group removed", (e.id,), SEVERITIES

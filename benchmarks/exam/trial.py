@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import truths
-from design import Trial
+from design import Trial, catalogue
 from rivals import separate
 
 import sysid_vehicle as sv
@@ -47,7 +47,7 @@ def examine(trial: Trial, among: Sequence[str] | None = None) -> Outcome:
         try:
             if trial.kind == "rivals":
                 return outcome | separate(trial, train) | {"seconds": time.perf_counter() - began}
-            known = [e.id for e in sv.catalogue()] if among is None else among
+            known = [e.id for e in catalogue()] if among is None else among
             candidates = [e for e in known if e not in trial.removed]
             study = sv.improve(
                 truths.baseline(trial.vehicle),

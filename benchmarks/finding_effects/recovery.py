@@ -35,6 +35,8 @@ HIDDEN: dict[str, tuple[float, ...]] = {
     "cg_position": (0.08,),
     "imu_lever_arm": (0.5, 0.0),
     "body_roll": (0.06, 2.0),
+    "front_roll_steer": (0.02, 2.0),
+    "rear_roll_steer": (0.02, 2.0),
     "accelerometer_bias": (0.0, 0.25),
 }
 SENSORS = sv.SensorNoise(

@@ -71,7 +71,7 @@ def measured(trial: design.Trial, what: str, limit: float | None) -> Outcome:
     except sv.NumericalError as error:
         return {"why": str(error)}
     model = truths.baseline(trial.vehicle)
-    names = [e.id for e in sv.catalogue() if e.id not in trial.removed]
+    names = [e.id for e in design.catalogue() if e.id not in trial.removed]
     fit = sv.identify(model, train) if what == "diagnose" else None
     wall, cpu = time.perf_counter(), time.process_time()
     told: Outcome = {}

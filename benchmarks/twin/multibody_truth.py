@@ -8,8 +8,9 @@ one by seed, driven in closed loop; claims are counted as in `diagnosis_truth.py
 car follows from its equations. Every tyre force and stiffness is in proportion to the wheel's load,
 so load sensitivity, and grip lost by lateral load transfer, are not in it. Nor are drag, rolling
 resistance, lift, aligning moment, or compliance of the steering. The vehicle file has the height of
-the sprung mass, by which the springs take the load transfer. Camber gives side force that jumps
-with the sign of the camber (`p_hy1`, `p_vy1`), for which the catalogue has no name.
+the sprung mass, by which the springs take the load transfer. Wheels lean with the body, which gives
+side force: a part of it grows with the camber (`p_hy3`, `p_vy3`), and one jumps with its sign
+(`p_hy1`, `p_vy1`), for which the catalogue has no name.
 """
 
 import sys
@@ -31,6 +32,10 @@ ALWAYS = {
     "accelerometer_scale": "the accelerometer leans with the body: a_y + g roll, roll about a_y",
     "body_attitude": "the sprung mass rolls and pitches, and the accelerometer with it",
     "body_roll": "the sprung mass rolls about an axis below it",
+    **dict.fromkeys(
+        ("front_roll_steer", "rear_roll_steer"),
+        "wheels lean with the body: p_hy3, p_vy3, and D_f, D_r of the suspension",
+    ),
     "combined_slip": "Magic Formula with combined slip, r_bx1 to r_vy6",
     "drive_yaw_moment": "a driven tyre pushes sideways, r_vy1 r_vy5 r_vy6 / p_kx1 = 0.025 N per N",
     **dict.fromkeys(

@@ -130,6 +130,8 @@ class Effect:
     refines : tuple of str
         Effects that it refines: a candidate only beside one of them, or where a user names it.
         Where both are in a model neither takes a share of the errors that is its own.
+    beside : tuple of str
+        Effects that show what this one follows from: a candidate only beside one of them, too.
     states : int
         How many states of its own it adds to the model.
     acts : tuple
@@ -157,6 +159,7 @@ class Effect:
     breaks: str = ""
     same_in_all_logs: bool = False
     refines: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
     acts: tuple[tuple[int, Any], ...] = ()
     channels: tuple[str, ...] = ()
     own_states: tuple[OwnState, ...] = ()
@@ -242,6 +245,11 @@ class Effect:
         return next((p for p in self.parameters if p.scan), None)
 
     @property
+    def waits_for(self) -> tuple[str, ...]:
+        """Effects of which a model must have one before this is a candidate by itself."""
+        return (*self.refines, *self.beside)
+
+    @property
     def form(self) -> str:
         """How it is scored without a refit; a refit always has the equation as it stands."""
         if self.scored_at_typical:
@@ -274,9 +282,9 @@ class Effect:
             lines.append(f"  through     {self.through}")
         if self.breaks:
             lines.append(f"  breaks      laws of motion: {self.breaks}")
-        if self.refines:
+        if self.waits_for:
             named = "or where it is named among the candidates"
-            lines.append(f"  considered  beside {' or '.join(self.refines)}, {named}")
+            lines.append(f"  considered  beside {' or '.join(self.waits_for)}, {named}")
         if self.same_in_all_logs:
             lines.append("  nuisance    the same in all logs of a car")
         return "\n".join(lines)

@@ -27,7 +27,8 @@ NOT_TOLD = {"friction_change", "steer_delay"}  # what they need: the time, the r
 CATALOGUE = tuple(e.id for e in sv.catalogue() if not e.acts)
 ALL = tuple(e for e in CATALOGUE if e not in SENSORS | NOT_TOLD)
 # Their states feed back on what they follow: `settled` does not find where they rest.
-SETTLING = tuple(e for e in ALL if e not in ("tyre_temperature", "body_roll"))
+ROLLING = {"body_roll", "front_roll_steer", "rear_roll_steer"}
+SETTLING = tuple(e for e in ALL if e not in ROLLING | {"tyre_temperature"})
 
 
 def compiled(model: sv.Model, motion: np.ndarray, steer: float, force: float) -> np.ndarray:
@@ -88,19 +89,18 @@ def test_heat_of_the_tyres_over_seconds_of_a_lap(truth: sv.Model) -> None:
     assert state[names.index("sliding_front")] > 0.5  # kW: two percent of the grip
 
 
-def test_a_rolling_body_over_seconds_of_a_lap(truth: sv.Model) -> None:
-    model = typical(truth, "body_roll")
+@pytest.mark.parametrize("effect", sorted(ROLLING))
+def test_a_rolling_body_over_seconds_of_a_lap(truth: sv.Model, effect: str) -> None:
+    model = typical(truth, effect)
     calm = sv.RoadDisturbance(0.0, 0.0, 0.0)
     driven = drive_truth(model, sv.manoeuvres.lap(60.0), seed=1, disturbance=calm)
     exported = module_of(model)
-    names = [s.name for s in equations(model).states]
-    angle, rate = names.index("roll_per_gradient"), names.index("roll_rate_per_gradient")
     leant = rolled = 0.0
     state = np.concatenate((driven.states[0, :3], (0.0, 0.0)))
     for k in range(4000):
         state = exported["step"](state, driven.inputs[k], driven.inputs[k + 1], 0.01)
         np.testing.assert_allclose(state[:3], driven.states[k + 1, :3], rtol=0.0, atol=1e-4)
-        leant, rolled = max(leant, abs(state[angle])), max(rolled, abs(state[rate]))
+        leant, rolled = np.maximum((leant, rolled), np.abs(state[-2:]))
     assert rolled > 0.5  # 1/s: 1.7 deg/s of roll
     assert 0.3 < leant < 1.2
 

@@ -14,6 +14,7 @@
 #include "sysid/effects/road.hpp"
 #include "sysid/effects/sensors.hpp"
 #include "sysid/effects/steering.hpp"
+#include "sysid/effects/suspension.hpp"
 #include "sysid/effects/tyre.hpp"
 
 namespace sysid {
@@ -21,16 +22,15 @@ namespace sysid {
 /// The order matters within a stage: what the grip is comes before what the friction ellipse leaves
 /// of it, errors of the logged angle before its lag, where sensors are before how they
 /// are turned, the lean of an accelerometer before its own errors.
-using Catalogue =
-    std::tuple<AeroDownforce, AeroDrag, RollingResistance, HeadWind, TyreLoadSensitivity,
-               LateralLoadTransfer, LongitudinalLoadTransfer, FrictionChange, TyreTemperature,
-               ForceGain, ForceLag, WheelInertia, ForceSplit, CombinedSlip, AligningMoment, RearToe,
-               TyreRelaxation, FrontTyreRelaxation, RearTyreRelaxation, SteerDelay, SteerOffset,
-               SteerRatio, SteerNonlinearity, SteerLag, SteerCompliance, RoadBank, RoadGrade,
-               SideWind, Mass, YawInertia, LockedDifferential, LimitedSlipDifferential,
-               DriveYawMoment, SensorDelay, CgPosition, SpeedSensorLeverArm,
-               SpeedSensorMisalignment, ImuLeverArm, InsLeverArm, BodyAttitude, BodyRoll,
-               AccelerometerBias, GyroScale, GyroBias, AccelerometerScale>;
+using Catalogue = std::tuple<
+    AeroDownforce, AeroDrag, RollingResistance, HeadWind, TyreLoadSensitivity, LateralLoadTransfer,
+    LongitudinalLoadTransfer, FrictionChange, TyreTemperature, ForceGain, ForceLag, WheelInertia,
+    ForceSplit, CombinedSlip, AligningMoment, RearToe, TyreRelaxation, FrontTyreRelaxation,
+    RearTyreRelaxation, SteerDelay, SteerOffset, SteerRatio, SteerNonlinearity, SteerLag,
+    SteerCompliance, RoadBank, RoadGrade, SideWind, Mass, YawInertia, LockedDifferential,
+    LimitedSlipDifferential, DriveYawMoment, SensorDelay, CgPosition, SpeedSensorLeverArm,
+    SpeedSensorMisalignment, ImuLeverArm, InsLeverArm, BodyAttitude, BodyRoll, FrontRollSteer,
+    RearRollSteer, AccelerometerBias, GyroScale, GyroBias, AccelerometerScale>;
 
 constexpr std::size_t kEffectCount = std::tuple_size_v<Catalogue>;
 

@@ -1,8 +1,5 @@
-// Mass, inertia, where the centre of gravity lies, the load that moves with it, and the body that
-// leans on its springs.
+// Mass, inertia, where the centre of gravity lies, and the load that moves with it.
 #pragma once
-
-#include <numbers>
 
 #include "sysid/effects/effect.hpp"
 #include "sysid/model/kinematics.hpp"
@@ -163,67 +160,6 @@ struct LongitudinalLoadTransfer : Effect {
     template <class T, class S>
     static void vehicle(const T* p, Workings<S>& w) {
         w.h += p[0];
-    }
-};
-
-/// The body rolls on its springs, late and with overshoot, and the accelerometer with it. The state
-/// is the roll angle over its gradient, which is a_y/g in a long corner. The mass reacts through
-/// the tyres: while it rolls outwards, the axles move inwards under it, and slip less. (2) stays as
-/// it is, because it is about the centre of gravity, where sensors of speed are taken to be. The
-/// roll axis is taken to lie at a fifth of its height. f is that of rolling about the centre of
-/// gravity, which the tyres let go sideways.
-struct BodyRoll : Effect {
-    static constexpr EffectInfo info{
-        .id = "body_roll",
-        .title = "body that rolls with a natural frequency, and its inertia",
-        .equation =
-            "s'' + 0.7 w s' + w^2 s = w^2 a_y/g, w = 2 pi f, phi = K s: a_y' = a_y cos(phi) + "
-            "g sin(phi), tan(alpha_i) of v_y + 0.8 h phi'",
-        .source =
-            "Segel, Proc. IMechE Auto. Div. 7 (1956), 310-330; Rajamani, Vehicle Dynamics and "
-            "Control, ch. 15; Gillespie, Fundamentals of Vehicle Dynamics, ch. 6",
-        .excited_by = "steps of the steering and sweeps up to 3 Hz, then a long corner",
-        .moves = "ay_mps2, yaw_rate_radps",
-        .needs = "steer_rad, vx_mps, yaw_rate_radps, ay_mps2",
-        .confounded_with = "body_attitude, accelerometer_scale, tyre_relaxation",
-        .parameters = {{.name = "roll_per_g_rad",
-                        .unit = "rad",
-                        .typical = 0.06,
-                        .matters = 0.01,
-                        .bounds = {0.0, 0.4},
-                        .usual = {0.02, 0.09}},
-                       {.name = "frequency_hz",
-                        .unit = "Hz",
-                        .null_value = 2.0,
-                        .typical = 2.0,
-                        .matters = 0.4,
-                        .bounds = {0.5, 6.0},
-                        .usual = {1.2, 3.5},
-                        .scan = Scan::kRange}},
-        .states = {{"roll_per_gradient", "1"}, {"roll_rate_per_gradient", "1/s"}},
-        .refines = "body_attitude, accelerometer_scale",
-    };
-    static constexpr double state_spread = 0.1;
-    /// About a fixed axis cars roll at 1 to 2.5 Hz with a damping ratio of 0.2 to 0.5; about their
-    /// centre of gravity both are higher by a fifth or so, as the inertia is smaller.
-    static constexpr double kDamping = 0.35;
-    /// Of the height of the centre of gravity, what is above the roll axis.
-    static constexpr double kAboveAxis = 0.8;
-
-    template <class T, class S>
-    static void steering(const T* p, Workings<S>& w, Lags<S> lags) {
-        w.v_road = w.v_road + (kAboveAxis * p[0]) * (w.h * lags.states()[1]);
-    }
-    template <class T, class S>
-    static void follow(const T* p, const Workings<S>& w, Lags<S> lags) {
-        lags.swing(0, w.a_y / kGravity, S((2.0 * std::numbers::pi) * p[1]), kDamping);
-    }
-    template <class T, class S>
-    static void sensors(const T* p, const Workings<S>& /*w*/, const S* state, S* y) {
-        using std::cos;
-        using std::sin;
-        const S phi = named("roll", p[0] * state[0]);
-        y[kAy] = y[kAy] * cos(phi) + kGravity * sin(phi);
     }
 };
 

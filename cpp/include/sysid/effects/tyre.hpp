@@ -71,7 +71,7 @@ struct TyreRelaxation : Effect {
         .moves = "ay_mps2, yaw_rate_radps",
         .confounded_with =
             "steer_lag, steer_delay, yaw_inertia, front_tyre_relaxation, rear_tyre_relaxation, "
-            "body_roll",
+            "body_roll, front_roll_steer, rear_roll_steer",
         .states = {{"slip_front", "rad"}, {"slip_rear", "rad"}},
         .breaks = Breaks::kAnswersLate,
     });
@@ -100,7 +100,7 @@ struct OneAxleRelaxation : Effect {
                   .moves = "yaw_rate_radps, ay_mps2",
                   .confounded_with =
                       "tyre_relaxation, rear_tyre_relaxation, steer_lag, steer_delay, yaw_inertia, "
-                      "sensor_delay",
+                      "sensor_delay, front_roll_steer",
                   .states = {{"own_slip_front", "rad"}},
                   .breaks = Breaks::kAnswersLate,
               })
@@ -109,7 +109,8 @@ struct OneAxleRelaxation : Effect {
                   .title = "tyre relaxation length of the rear axle",
                   .equation = "(sigma_r / v_x) d(alpha_r')/dt + alpha_r' = alpha_r",
                   .moves = "ay_mps2, yaw_rate_radps",
-                  .confounded_with = "tyre_relaxation, front_tyre_relaxation, yaw_inertia",
+                  .confounded_with =
+                      "tyre_relaxation, front_tyre_relaxation, yaw_inertia, rear_roll_steer",
                   .states = {{"own_slip_rear", "rad"}},
               });
 
