@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..._common.arrays import FloatArray
-from ...log import CHANNELS
+from ...log import CHANNELS, standing
 from ..recording import Recording
 from ..table import Table
 from ..units import factor_to, unit_at_end, unit_in_name
@@ -103,6 +103,7 @@ def even(
     known = {}
     for channel, (clock, values) in held.items():
         there = np.isfinite(clock) & np.isfinite(values)
+        there[standing(values, fewest=1)] = False  # a dropout, whatever its unit
         if np.count_nonzero(there) >= _FEWEST and (np.diff(clock[there]) > 0.0).all():
             known[channel] = factor * clock[there], values[there]
     if not known:

@@ -1,0 +1,88 @@
+"""Sensors that drop out to a value that a car may have, and stand there."""
+
+import numpy as np
+import pytest
+
+import sysid_vehicle as sv
+from sysid_vehicle.errors import SysidWarning
+from sysid_vehicle.log import standing
+
+LOST = slice(2000, 2040)
+
+
+@pytest.fixture(scope="module")
+def driven() -> dict[str, np.ndarray]:
+    car = sv.Model(sv.example_vehicle())
+    log = sv.drive(car, sv.manoeuvres.handling_course(), seed=653451)
+    return {name: np.array(log[name]) for name in log.channels}
+
+
+@pytest.mark.parametrize(
+    ("channel", "value"), [("vx_mps", 0.0), ("vx_mps", 120.0), ("yaw_rate_radps", 5.719)]
+)
+def test_what_stands_between_jumps_is_missing(
+    driven: dict[str, np.ndarray], channel: str, value: float
+) -> None:
+    columns = {**driven, channel: driven[channel].copy()}
+    columns[channel][LOST] = value
+    with pytest.warns(
+        SysidWarning, match=rf"{channel}: jumps to {value:.4g}.*samples 2000 to 2039"
+    ):
+        log = sv.read_log(columns)
+    expected = driven[channel].copy()
+    expected[LOST] = np.nan
+    np.testing.assert_array_equal(log[channel], expected)
+
+
+def test_a_speed_that_stops_is_no_dropout(driven: dict[str, np.ndarray]) -> None:
+    speed = driven["vx_mps"].copy()
+    speed[-600:-400] = np.linspace(speed[-600], 0.0, 200)
+    speed[-400:-200] = 0.0
+    speed[-200:] = np.linspace(0.0, 8.0, 200)
+    assert standing(speed).size == 0
+
+
+def test_driving_holds_none(driven: dict[str, np.ndarray]) -> None:
+    for name in sv.log.MEASURED:
+        assert standing(driven[name]).size == 0, name
+
+
+def test_repeated_values_and_quanta_are_none(driven: dict[str, np.ndarray]) -> None:
+    speed = driven["vx_mps"]
+    assert standing(np.repeat(speed[::10], 10)).size == 0
+    assert standing(np.round(speed, 1)).size == 0
+    assert standing(np.zeros(500)).size == 0
+    assert standing(np.full(500, np.nan)).size == 0
+
+
+@pytest.mark.parametrize("lost", [slice(2000, 2001), LOST])
+@pytest.mark.parametrize("value", [5753.5, -3276.8])
+def test_a_map_is_proposed_beside_dropouts_of_the_steering(
+    driven: dict[str, np.ndarray], lost: slice, value: float
+) -> None:
+    """In whatever unit the column is: no range of the channel tells them yet."""
+    columns = {**driven, "steer": np.rad2deg(15.0 * driven["steer_rad"])}
+    del columns["steer_rad"]
+    right = sv.propose_channels(columns, vehicle=sv.example_vehicle()).channels["steer_rad"]
+    columns["steer"] = columns["steer"].copy()
+    columns["steer"][lost] = value
+    found = sv.propose_channels(columns, vehicle=sv.example_vehicle()).channels["steer_rad"]
+    assert found.factor == pytest.approx(right.factor, rel=0.02)
+
+
+def test_a_map_is_proposed_beside_dropouts_of_the_speed(driven: dict[str, np.ndarray]) -> None:
+    columns = {**driven, "steer": np.rad2deg(15.0 * driven["steer_rad"])}
+    del columns["steer_rad"]
+    right = sv.propose_channels(columns, vehicle=sv.example_vehicle()).channels["steer_rad"]
+    columns["vx_mps"] = driven["vx_mps"].copy()
+    columns["vx_mps"][LOST] = 0.0
+    found = sv.propose_channels(columns, vehicle=sv.example_vehicle()).channels["steer_rad"]
+    assert found.factor == pytest.approx(right.factor, rel=0.02)
+
+
+def test_a_steering_robot_is_no_dropout() -> None:
+    """It turns in a tenth of a second, and stands still but for the quanta of the sensor."""
+    time_s = np.arange(3000) * 0.01
+    turned = np.interp(time_s, [10.0, 10.1, 11.2, 11.3], [0.0, 40.0, 40.0, 0.0])
+    drift = np.where((time_s > 9.0) & (time_s < 12.0), 0.0, 0.2 * np.sin(time_s))
+    assert standing(np.round(turned + drift, 1), fewest=1).size == 0
