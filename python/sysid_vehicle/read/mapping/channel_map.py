@@ -12,7 +12,7 @@ import numpy as np
 from ..._common.arrays import FloatArray
 from ..._common.files import read_toml, refuse_unknown
 from ...errors import InvalidInput
-from ...log import CHANNELS
+from ...log import CHANNELS, listed
 from ..recording import Recording
 from ..table import Table
 from .ground import Ground
@@ -191,6 +191,7 @@ class ChannelMap:
         if self.ground is not None:
             result.update(self.ground.in_the_body(result, over_ground))
         self._slip_to_speed(result)
+        _refuse_text(table, result)
         return result
 
     def _slip_to_speed(self, columns: dict[str, FloatArray]) -> None:
@@ -205,3 +206,25 @@ class ChannelMap:
         if "vx_mps" not in columns or "time_s" not in columns:
             return  # the log is refused for it
         columns["vy_mps"] = lateral_speed(columns["time_s"], columns["vx_mps"], angle)
+
+
+def _refuse_text(table: Table, columns: Mapping[str, FloatArray]) -> None:
+    """Tell of columns that hold text where a channel that every log needs is not among the others.
+
+    Raises
+    ------
+    InvalidInput
+        The message names the first cell.
+    """
+    absent = [
+        name for name, channel in CHANNELS.items() if channel.required and name not in columns
+    ]
+    text = [name for name in table.not_numbers if name not in table.seconds]
+    if absent and text:
+        bad = table.not_numbers[text[0]]
+        raise InvalidInput(
+            f"missing column{'s' if len(absent) > 1 else ''} {', '.join(absent)}, but "
+            f"{listed(text)} hold{'s' if len(text) == 1 else ''} no numbers (of {text[0]} the "
+            f"first cell is {bad}): export plain numbers, or name other columns in the channel map "
+            f"(columns of numbers: {listed(table.columns) or 'none'})"
+        )
