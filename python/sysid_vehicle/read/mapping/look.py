@@ -46,9 +46,14 @@ class View:
         columns = self._held.columns if isinstance(self._held, Table) else {}
         return [n for n, x in columns.items() if x.size >= _FEWEST and (np.diff(x) > 0.0).all()]
 
+    @property
+    def stamps(self) -> list[str]:
+        """Columns of a table that hold dates and times of day."""
+        return list(self._held.seconds) if isinstance(self._held, Table) else []
+
     def is_stamps(self, name: str) -> bool:
         """Whether a column of a table holds dates and times of day."""
-        return isinstance(self._held, Table) and name in self._held.seconds
+        return name in self.stamps
 
     def values(self, names: list[str], time: str | None) -> dict[str, Signal]:
         """Return times and values by name; a table's column ``time`` tells its times."""
