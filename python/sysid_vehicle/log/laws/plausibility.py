@@ -43,6 +43,7 @@ from .laws import (
 )
 from .longitudinal import check_force, check_longitudinal, held_speed_note
 from .motion import Motion
+from .over_ground import check_over_ground
 from .ranges import WHITE, blank, check_lost, check_ranges, dropouts
 from .regression import in_most, size_of
 from .wheelbase import check_steering, gripping, is_model_car
@@ -150,6 +151,8 @@ def contradictions(columns: Mapping[str, FloatArray], rate_hz: float) -> tuple[C
 def _check_laws(drive: Drive, model_car: bool) -> tuple[list[Contradiction], list[Contradiction]]:
     """Refuse what breaks a law; return notes on the clock of the steering, and on sizes."""
     channels = drive.motion.channels
+    if "vy_mps" in channels:
+        check_over_ground(drive)
     speed = drive.mean(channels["vx_mps"])
     if np.median(speed) < 0.0:
         raise wrong_sign("vx_mps", "is negative for most of the drive", speed, drive)

@@ -16,7 +16,15 @@ from ..registry import blamed, recognised
 from .ground import PARTS
 from .look import Signal, View, by_name, ended, even, ranked, stated
 from .names import is_sideslip, si_unit
-from .navigation import NAMED, Navigation, combination, ground_speed, told
+from .navigation import (
+    NAMED,
+    Navigation,
+    combination,
+    ground_speed,
+    is_over_ground,
+    told,
+    twins,
+)
 from .physics import scales, sideways
 from .proposal import Proposal, Proposed
 
@@ -71,9 +79,17 @@ def propose_channels(
             if not (channel == "time_s" and view.has_times) and (found := ranked(view, channel))
         }
         if "time_s" not in chosen and not view.has_times:
-            rising = [name for name in view.rising if not any(name in c for c in chosen.values())]
+            rising = view.stamps or [
+                name for name in view.rising if not any(name in c for c in chosen.values())
+            ]
             chosen = {"time_s": rising, **chosen} if len(rising) == 1 else chosen
         return _Guess(view, chosen).proposal(None if vehicle is None else vehicle.wheelbase_m)
+
+
+def _in_seconds(time: FloatArray) -> FloatArray:
+    """Return times in the unit that their steps ask for, which no name or unit is asked for."""
+    step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    return time * next(factor for below, factor in _FINER if step < below)
 
 
 class _Guess:
@@ -87,8 +103,9 @@ class _Guess:
             free = [name for name in names if name not in self.first.values()]
             if free:
                 self.first[channel] = free[0]
+        self.parts = self._over_ground()
         self.stated = stated(view, self.first)
-        self.parts = self._navigated()
+        self.parts = self.parts or self._navigated()
         self.factors: dict[str, float] = {}
         self.why: dict[str, list[str]] = {}
 
@@ -110,6 +127,31 @@ class _Guess:
         own = {part: held[name] for part, name in self.parts.items() if name in held}
         nav = None if drive is None else self._by_navigation(own, units, *drive)
         return self._told(nav)
+
+    def _over_ground(self) -> dict[str, str]:
+        """Columns of a velocity over ground that is called as that of the body, and the heading.
+
+        Messages of ROS have both in fields of one name: of several that which points along the car
+        is taken.
+        """
+        needed = {"vx_mps", "vy_mps", "yaw_rate_radps"}
+        if not needed <= {*self.first} or is_sideslip(self.first["vy_mps"]):
+            return {}
+        yaw = self.first["yaw_rate_radps"]
+        unit = stated(self.view, {"yaw_rate_radps": yaw}).get("yaw_rate_radps")
+        kept = {n for c, n in self.first.items() if c not in ("vx_mps", "vy_mps")}
+        heading = [n for n in ranked(self.view, "heading") if n not in kept]
+        pairs = twins(self.first["vx_mps"], self.first["vy_mps"], self.chosen)
+        for number, (along, across) in enumerate(pairs):
+            held = self.view.values([along, across, yaw], self.first.get("time_s"))
+            held = {name: (_in_seconds(time), x) for name, (time, x) in held.items()}
+            if not held or not is_over_ground(held[along], held[across], held[yaw], unit):
+                self.first.update({"vx_mps": along, "vy_mps": across} if number else {})
+                return {}
+        if not heading:
+            return {}
+        del self.first["vy_mps"]
+        return {"east": pairs[0][0], "north": pairs[0][1], "heading": heading[0]}
 
     def _navigated(self) -> dict[str, str]:
         """Columns of what navigation knows, where they make a lateral speed that is not logged."""
