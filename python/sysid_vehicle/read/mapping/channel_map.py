@@ -64,8 +64,9 @@ class ChannelMap:
         """Read a channel map, a TOML file with the table ``[channels]``, or ``[ground]``, or both.
 
         Each entry is the name of the source column, a table with ``column``, ``factor`` (1),
-        ``offset`` (0), ``despike`` (false), ``delay_s`` (0) and, for ``vy_mps``, ``sideslip``
-        (false), or ``false`` to ignore the channel;
+        ``offset`` (0), ``despike`` (false), ``delay_s`` (0), ``sign`` (the column that is 1 where
+        the value is negative) and, for ``vy_mps``, ``sideslip`` (false), or ``false`` to ignore
+        the channel;
         ``time_s = { rate_hz = 100 }`` numbers the rows of a file without time. ``[ground]`` has
         ``heading`` and ``east`` and ``north``, or ``speed`` and ``course``, in the same form, and
         for angles ``from``, which is ``"north"`` (clockwise) or ``"east"`` (anticlockwise).
@@ -135,6 +136,7 @@ class ChannelMap:
             If a source is not there, or if the map gives the time, which each channel has itself.
         """
         wanted = {c: source.column for c, source in self.sources.items() if c != "time_s"}
+        wanted |= {f"sign of {c}": s.sign for c, s in self.sources.items() if s.sign}
         time = self.sources["time_s"].column if "time_s" in self.sources else "time_s"
         if self.rate_hz is not None or time != "time_s":
             if recording.clocked is None:
@@ -177,7 +179,7 @@ class ChannelMap:
                 result[channel] = source.on_time(result["time_s"], result[channel])
         over_ground = {} if self.ground is None else self.ground.read(table, result, notes)
         skipped = {*result, *self.absent, *(_OVER_GROUND if over_ground else ())}
-        used = {source.column for source in self.sources.values()}
+        used = {column for source in self.sources.values() for column in source.columns}
         if self.ground is not None:
             used |= {source.column for source in self.ground.sources.values()}
         for name in dict.fromkeys(table.names):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections import Counter
+from collections.abc import Iterable
 
 from ..units import FACTORS, plain, states_nothing, unit_at_end, without_unit
 from .ground import PARTS
@@ -108,6 +110,9 @@ _SI = {
 }
 
 
+_SIGN = {"vz", "vorzeichen", "sign", "sgn"}
+"""Words in names of what is not 0 where another signal is negative."""
+
 # As the databases of cars shorten words, whose names may have 32 letters.
 _SHORT = {"spd": "speed", "whl": "wheel", "lgt": "long", "lng": "long"}
 _UMLAUTS = {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"}
@@ -133,7 +138,7 @@ def rank(name: str, unit: str, channel: str) -> float:
     text = words(name)
     if name == channel:
         return 10.0
-    if re.search(_REFUSED[channel], text):
+    if re.search(_REFUSED[channel], text) or _SIGN & {*text.split()}:
         return 0.0
     patterns = _PATTERNS[channel]
     # As it is, and without a unit at its end: vx_kmh is one of vx.
@@ -164,3 +169,16 @@ def si_unit(channel: str, name: str) -> str:
 def is_sideslip(name: str) -> bool:
     """Tell whether a name is that of the sideslip angle."""
     return re.search(_SIDESLIP, words(name)) is not None
+
+
+def sign_of(name: str, others: Iterable[str]) -> str:
+    """Return the column that holds the sign of another, by its name; empty if there is none.
+
+    ``ESP_VZ_Gierrate`` is that of ``ESP_Gierrate``, ``YawRate_Sign`` that of ``YawRate``.
+    """
+    own = Counter(words(name).split())
+    for other in others:
+        there = Counter(words(other).split())
+        if {*there} & _SIGN and Counter({w: k for w, k in there.items() if w not in _SIGN}) == own:
+            return other
+    return ""

@@ -22,11 +22,12 @@ class Proposed:
     why: str
     others: tuple[str, ...]
     sideslip: bool = False
+    sign: str = ""
 
     @property
     def source(self) -> Source:
         """As a channel map has it."""
-        return Source(self.column, self.factor, sideslip=self.sideslip)
+        return Source(self.column, self.factor, sideslip=self.sideslip, sign=self.sign)
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ class Proposal:
                 lines.append(f"#   or one of: {listed(map(_quoted, p.others))}")
             entry = f"column = {_quoted(p.column)}, factor = {p.factor!r}"
             entry += ", sideslip = true" if p.sideslip else ""
+            entry += f", sign = {_quoted(p.sign)}" if p.sign else ""
             lines.append(f"{channel} = {{ {entry} }}")
         for name in self.missing:
             lines.append(f"# {CHANNELS[name].meaning} [{CHANNELS[name].unit}]: nothing was found")

@@ -15,7 +15,7 @@ from ...vehicle import Vehicle
 from ..registry import blamed, recognised
 from .ground import PARTS
 from .look import Signal, View, by_name, ended, even, ranked, stated
-from .names import is_sideslip, si_unit
+from .names import is_sideslip, si_unit, sign_of
 from .navigation import (
     NAMED,
     Navigation,
@@ -27,6 +27,7 @@ from .navigation import (
 )
 from .physics import scales, sideways
 from .proposal import Proposal, Proposed
+from .source import signed
 
 _TURNED = ("yaw_rate_radps", "ay_mps2", "steer_rad")  # together, where the axes have z down
 _FINER = ((0.5, 1.0), (500.0, 1e-3), (5e5, 1e-6), (np.inf, 1e-9))  # steps below, factor of time
@@ -108,6 +109,7 @@ class _Guess:
         self.parts = self.parts or self._navigated()
         self.factors: dict[str, float] = {}
         self.why: dict[str, list[str]] = {}
+        self.signs: dict[str, str] = {}
 
     def proposal(self, wheelbase_m: float | None) -> Proposal:
         """Ask the laws of motion for what names and units leave open."""
@@ -115,6 +117,7 @@ class _Guess:
         columns = [*(n for c, n in self.first.items() if c != "time_s"), *self.parts.values()]
         held = self.view.values(columns, time)
         signals = {c: held[n] for c, n in self.first.items() if n in held}
+        self._signed(signals, time)
         units = stated(self.view, self.parts)
         if "east" in self.parts and held:
             signals["vx_mps"] = ground_speed(held[self.parts["east"]], held[self.parts["north"]])
@@ -161,6 +164,19 @@ class _Guess:
         there = {p: [n for n in ranked(self.view, p) if n not in kept] for p in NAMED}
         found = combination(there)
         return found if "east" in found or "vx_mps" in self.first else {}
+
+    def _signed(self, signals: dict[str, Signal], time: str | None) -> None:
+        """Give their signs to channels that a bus sends as sizes, with the sign beside."""
+        for channel, (clock, values) in list(signals.items()):
+            sign = sign_of(self.first[channel], self.view.names)
+            if not sign or np.nanmin(values, initial=0.0) < 0.0:
+                continue
+            own_s, own = self.view.values([sign], time)[sign]
+            at = np.clip(np.searchsorted(own_s, clock, side="right") - 1, 0, None)
+            if own.size and {*np.unique(own[np.isfinite(own)]).tolist()} <= {0.0, 1.0}:
+                signals[channel] = clock, signed(values, own[at])
+                self.signs[channel] = sign
+                self._note(channel, "with its sign beside it")
 
     def _note(self, channel: str, text: str) -> None:
         if text:
@@ -254,6 +270,7 @@ class _Guess:
             "; ".join(filter(None, [*reasons, *self.why.get(channel, [])])),
             tuple(n for n in self.chosen[channel] if n != name)[:5],
             channel == "vy_mps" and is_sideslip(name),
+            self.signs.get(channel, ""),
         )
 
     def _ground(self, nav: Navigation) -> dict[str, Proposed]:

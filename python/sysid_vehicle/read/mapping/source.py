@@ -16,7 +16,7 @@ from ...log import CHANNELS, listed
 from ..table import Table
 from ..units import WHAT, factor_to, measures, states_nothing
 
-_SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s", "sideslip")
+_SOURCE_KEYS = ("column", "factor", "offset", "despike", "delay_s", "sideslip", "sign")
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,8 @@ class Source:
 
     `delay_s` is how late the column is [s]: its values are taken from so much later in the file.
     `sideslip`, for `vy_mps` alone: the column is the sideslip angle, which `factor` makes radians;
-    the lateral speed is ``vx_mps tan(angle)``.
+    the lateral speed is ``vx_mps tan(angle)``. `sign`: another column that is not 0 where the
+    value is negative, for buses that send size and sign apart.
     """
 
     column: str
@@ -34,6 +35,12 @@ class Source:
     despike: bool = False
     delay_s: float = 0.0
     sideslip: bool = False
+    sign: str = ""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """All columns that it is read from."""
+        return (self.column, self.sign) if self.sign else (self.column,)
 
     def unit_of(self, channel: str) -> str:
         """The unit to which `factor` brings the column."""
@@ -50,13 +57,16 @@ class Source:
         InvalidInput
             If the column is not in the table (near names are given) or not numeric.
         """
-        if not table.counts[self.column]:
-            hint = near_names(self.column, table.names)
-            raise InvalidInput(
-                f"{channel}: the channel map names column '{self.column}', which is not in "
-                f"the file{hint}; columns are {listed(table.names)}"
-            )
+        for name in self.columns:
+            if not table.counts[name]:
+                hint = near_names(name, table.names)
+                raise InvalidInput(
+                    f"{channel}: the channel map names column '{name}', which is not in "
+                    f"the file{hint}; columns are {listed(table.names)}"
+                )
         values = values_of(table, self.column, channel)
+        if self.sign:
+            values = signed(values, table.column(self.sign))
         if (self.factor, self.offset) == (1.0, 0.0):
             values = values * stated_factor(table, self.column, channel, si_unit, notes)
         with np.errstate(over="ignore", invalid="ignore"):  # what is endless is refused later
@@ -65,6 +75,16 @@ class Source:
     def on_time(self, time_s: FloatArray, values: FloatArray) -> FloatArray:
         """Return values that were read, earlier by `delay_s`; beyond the ends none is known."""
         return _earlier(time_s, values, self.delay_s) if self.delay_s else values
+
+
+def signed(values: FloatArray, sign: FloatArray) -> FloatArray:
+    """Return sizes with their sign, which holds until it is sent again; unknown before."""
+    known = np.flatnonzero(np.isfinite(sign))
+    if known.size == 0:
+        return np.full(values.shape, np.nan)
+    last = np.searchsorted(known, np.arange(values.size), side="right") - 1
+    negative = sign[known[np.maximum(last, 0)]] != 0.0
+    return as_float64(np.where(last < 0, np.nan, np.where(negative, -values, values)))
 
 
 def values_of(table: Table, column: str, channel: str) -> FloatArray:
@@ -144,7 +164,10 @@ def source_of(entry: Mapping[str, Any], channel: str, where: str) -> Source:
     if delay_s and channel == "time_s":
         raise InvalidInput(f"{where}: delay_s has no meaning for the time; give it for a channel")
     offset = number(entry, "offset", 0.0, where)
-    return Source(column, factor, offset, despike, delay_s, sideslip)
+    sign = entry.get("sign", "")
+    if not isinstance(sign, str):
+        raise InvalidInput(f"{where}: sign = {sign!r}; give the name of the column with the sign")
+    return Source(column, factor, offset, despike, delay_s, sideslip, sign)
 
 
 def _flag(entry: Mapping[str, Any], key: str, where: str) -> bool:
