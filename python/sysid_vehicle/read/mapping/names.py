@@ -25,7 +25,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"\btime\b|^(header )?stamp\b|^(sec(ond)?s|elapsed|epoch)\b",
     ),
     "vx_mps": (
-        r"^v ?x( mps)?$",
+        r"^[uv] ?x( mps)?$",
         r"twist linear x$|(long\w*|forward) (speed|vel\w*)|(speed|vel\w*) (x|long\w*)$",
         r"(vehicle|ground|corr\w*|gps|car|veh) (speed|vel\w*)|^v (veh|car|ego)|v (fzg|signal)",
         r"(speed|vel\w*) forward$|\bvel\w* hor x$|^wheel based vehicle speed",
@@ -34,7 +34,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"^(vitesse|velocita|velocidade?|snelheid|hastighet)\b|車速|车速",
     ),
     "vy_mps": (
-        r"^v ?y( mps)?$",
+        r"^[uv] ?y( mps)?$",
         r"twist linear y$|lat\w* (speed|vel\w*)|(speed|vel\w*) (y|lat\w*)$|quergeschw\w*",
         r"(vitesse|velocita|velocidade?) (lat\w*|trans\w*)",
         _SIDESLIP,
@@ -43,18 +43,18 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
         r"yaw ?rate|yaw ?vel\w*|gier ?(rate|geschw\w*)",
         r"angular velocity z$|gyro\w* (z|yaw)|twist angular z$|psi ?(p|dot|rate)$",
         r"^(w|omega|rate|gyro|ang vel) ?z$|\bgyro z\b|\byaw\b.*\b(dps|radps|degps)\b",
-        r"\b(ang\w*|rotation) rate (z|down)$|\brate (body|hor) z$|\bheading rate$|^r$",
+        r"\b(ang\w*|rotation) rate (z|down)$|\brate (body|hor) z$|\bheading rate$|^r$|^d ?psi$",
         r"\b(lacet|imbardata|guinada)\b|^gier|girhastighet|ヨーレート|横摆角速度",
     ),
     "ax_mps2": (
-        r"^a ?x( mps2)?$|acc ?x$|x acc\w*$",
+        r"^a ?x( cg)?( mps2)?$|acc ?x$|x acc\w*$",
         r"long\w* (acc\w*|g\b)|acc\w* (x|long\w*)|g (force )?(long|x)\w*",
         r"inline acc\w*|laengsbeschl\w*|langsversnelling",
         r"^ace?l\w* lon\w*|^acc?el\w* lon\w*|前後(加速度|g)|纵向加速度",
         r"\bacc (body|hor) x$|acc\w* forward$|^lon acc\w*$|^a ?(lon|long|laengs)$",
     ),
     "ay_mps2": (
-        r"^a ?y( mps2)?$|acc ?y$|y acc\w*$",
+        r"^a ?y( cg)?( mps2)?$|acc ?y$|y acc\w*$",
         r"lat\w* (acc\w*|g\b)|acc\w* (y|lat\w*)|g (force )?(lat|y)\w*|querbeschl\w*",
         r"^ace?l\w* (lat|trans)\w*|^acc?el\w* trans\w*|dwarsversnelling",
         r"\bacc (body|hor) y$|^a ?(lat|quer)$|横(加速度|g)|(侧|横)向加速度",
@@ -62,7 +62,7 @@ _PATTERNS: dict[str, tuple[str, ...]] = {
     "steer_rad": (
         r"road ?wheel angle|^steer rad$|front wheel angle",
         r"steer\w* ?(wheel )?ang\w*|lenk(rad)?winkel|\bswa\b|str\w* ?wheel ?ang\w*|hand ?wheel",
-        r"\b(steer|steering|steered|delta)\b|\b(sas|lws|lwi) (ang\w*|winkel)$",
+        r"\b(steer|steering|steered|delta( ?wheel)?)\b|\b(sas|lws|lwi) (ang\w*|winkel)$",
         r"\b(volant|volante|sterzo|braquage)\b|stuurhoek|rattvinkel|操舵角|ハンドル角|舵角|方向盘转角",
     ),
     "fx_n": (

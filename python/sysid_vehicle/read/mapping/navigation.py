@@ -73,17 +73,17 @@ def is_over_ground(along: Signal, across: Signal, yaw_rate: Signal, unit: float 
         Factor of the yaw rate, if it is stated.
     """
     (time_s, x), (other_s, y) = along, across
-    there = np.isfinite(other_s) & np.isfinite(y)
-    if np.count_nonzero(there) < 2:
+    rate_s, rate = yaw_rate
+    there, turning = np.isfinite(other_s) & np.isfinite(y), np.isfinite(rate)
+    if min(np.count_nonzero(there), np.count_nonzero(turning)) < 2:
         return False
     y = np.interp(time_s, other_s[there], y[there])
     course = np.full(time_s.shape, np.nan)
     moving = np.hypot(x, y) > 0.0
     course[moving] = np.unwrap(np.arctan2(y[moving], x[moving]))
-    rate_s, rate = yaw_rate
     if unit is None:
         unit = _DEG if float(np.nanmax(np.abs(rate), initial=0.0)) > _IN_DEGREES else 1.0
-    rate = np.interp(time_s, rate_s[np.isfinite(rate)], unit * rate[np.isfinite(rate)])
+    rate = np.interp(time_s, rate_s[turning], unit * rate[turning])
     turns = turns_of(time_s, course, as_float64(rate), as_float64(np.hypot(x, y)))
     return WITH_THE_CAR[0] < abs(turns) < WITH_THE_CAR[1]
 
