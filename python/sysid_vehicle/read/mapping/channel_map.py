@@ -63,7 +63,8 @@ class ChannelMap:
     def from_toml(cls, path: str | Path) -> ChannelMap:
         """Read a channel map, a TOML file with the table ``[channels]``, or ``[ground]``, or both.
 
-        Each entry is the name of the source column, a table with ``column``, ``factor`` (1),
+        Each entry is the name of the source column, a table with ``column``, ``mean_with`` (a list
+        of others, whose mean with it is taken), ``factor`` (1),
         ``offset`` (0), ``despike`` (false), ``delay_s`` (0), ``sign`` (the column that is 1 where
         the value is negative) and, for ``vy_mps``, ``sideslip`` (false), or ``false`` to ignore
         the channel;
@@ -136,7 +137,7 @@ class ChannelMap:
             If a source is not there, or if the map gives the time, which each channel has itself.
         """
         wanted = {c: source.column for c, source in self.sources.items() if c != "time_s"}
-        wanted |= {f"sign of {c}": s.sign for c, s in self.sources.items() if s.sign}
+        wanted |= {f"{c}, {n}": n for c, s in self.sources.items() for n in s.columns[1:]}
         time = self.sources["time_s"].column if "time_s" in self.sources else "time_s"
         if self.rate_hz is not None or time != "time_s":
             if recording.clocked is None:

@@ -113,6 +113,13 @@ _SI = {
 _SIGN = {"vz", "vorzeichen", "sign", "sgn"}
 """Words in names of what is not 0 where another signal is negative."""
 
+_WHEELS = {  # in English and German
+    **dict.fromkeys(("fl", "lf", "vl"), ("front", "left")),
+    **dict.fromkeys(("fr", "rf", "vr"), ("front", "right")),
+    **dict.fromkeys(("rl", "lr", "hl"), ("rear", "left")),
+    **dict.fromkeys(("rr", "hr"), ("rear", "right")),
+}
+
 # As the databases of cars shorten words, whose names may have 32 letters.
 _SHORT = {"spd": "speed", "whl": "wheel", "lgt": "long", "lng": "long"}
 _UMLAUTS = {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"}
@@ -182,3 +189,14 @@ def sign_of(name: str, others: Iterable[str]) -> str:
         if {*there} & _SIGN and Counter({w: k for w, k in there.items() if w not in _SIGN}) == own:
             return other
     return ""
+
+
+def wheel_of(name: str) -> tuple[str, str] | None:
+    """Return axle and side of the wheel that a name belongs to; None if it names no wheel."""
+    there = words(name).split()
+    for word in there:
+        if word in _WHEELS:
+            return _WHEELS[word]
+    axle = next((axle for axle in ("front", "rear") if axle in there), "")
+    side = next((side for side in ("left", "right") if side in there), "")
+    return (axle, side) if axle and side else None

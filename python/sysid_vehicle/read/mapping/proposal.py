@@ -23,11 +23,18 @@ class Proposed:
     others: tuple[str, ...]
     sideslip: bool = False
     sign: str = ""
+    mean_with: tuple[str, ...] = ()
 
     @property
     def source(self) -> Source:
         """As a channel map has it."""
-        return Source(self.column, self.factor, sideslip=self.sideslip, sign=self.sign)
+        return Source(
+            self.column,
+            self.factor,
+            sideslip=self.sideslip,
+            sign=self.sign,
+            mean_with=self.mean_with,
+        )
 
 
 @dataclass(frozen=True)
@@ -69,6 +76,8 @@ class Proposal:
             if p.others:
                 lines.append(f"#   or one of: {listed(map(_quoted, p.others))}")
             entry = f"column = {_quoted(p.column)}, factor = {p.factor!r}"
+            if p.mean_with:
+                entry += f", mean_with = [{', '.join(map(_quoted, p.mean_with))}]"
             entry += ", sideslip = true" if p.sideslip else ""
             entry += f", sign = {_quoted(p.sign)}" if p.sign else ""
             lines.append(f"{channel} = {{ {entry} }}")

@@ -13,9 +13,10 @@ from ...errors import InvalidInput
 from ...log import CHANNELS, Columns, Log
 from ...vehicle import Vehicle
 from ..registry import blamed, recognised
+from ..units import factor_to
 from .ground import PARTS
 from .look import Signal, View, by_name, ended, even, ranked, stated
-from .names import is_sideslip, si_unit, sign_of
+from .names import is_sideslip, si_unit, sign_of, wheel_of
 from .navigation import (
     NAMED,
     Navigation,
@@ -84,7 +85,11 @@ def propose_channels(
                 name for name in view.rising if not any(name in c for c in chosen.values())
             ]
             chosen = {"time_s": rising, **chosen} if len(rising) == 1 else chosen
-        return _Guess(view, chosen).proposal(None if vehicle is None else vehicle.wheelbase_m)
+        axles = ("rear", "front")
+        if vehicle is not None and vehicle.drive_front_share < 0.5:
+            axles = ("front", "rear")
+        guess = _Guess(view, chosen, axles)
+        return guess.proposal(None if vehicle is None else vehicle.wheelbase_m)
 
 
 def _in_seconds(time: FloatArray) -> FloatArray:
@@ -96,7 +101,7 @@ def _in_seconds(time: FloatArray) -> FloatArray:
 class _Guess:
     """What the columns are taken for, step by step."""
 
-    def __init__(self, view: View, chosen: Mapping[str, list[str]]) -> None:
+    def __init__(self, view: View, chosen: Mapping[str, list[str]], axles: tuple[str, ...]) -> None:
         self.view, self.chosen = view, chosen
         # A column is one channel: the one that is first in the list of channels.
         self.first: dict[str, str] = {}
@@ -105,18 +110,25 @@ class _Guess:
             if free:
                 self.first[channel] = free[0]
         self.parts = self._over_ground()
-        self.stated = stated(view, self.first)
-        self.parts = self.parts or self._navigated()
         self.factors: dict[str, float] = {}
         self.why: dict[str, list[str]] = {}
         self.signs: dict[str, str] = {}
+        self.beside: tuple[str, ...] = ()
+        self.parts = self.parts or self._navigated()
+        if "vx_mps" not in self.first and "east" not in self.parts:
+            self._wheels(axles)
+        self.stated = stated(view, self.first)
 
     def proposal(self, wheelbase_m: float | None) -> Proposal:
         """Ask the laws of motion for what names and units leave open."""
         time = self.first.get("time_s")
         columns = [*(n for c, n in self.first.items() if c != "time_s"), *self.parts.values()]
+        columns += self.beside
         held = self.view.values(columns, time)
         signals = {c: held[n] for c, n in self.first.items() if n in held}
+        for name in self.beside if held else ():
+            clock, values = signals["vx_mps"]
+            signals["vx_mps"] = clock, 0.5 * (values + np.interp(clock, *held[name]))
         self._signed(signals, time)
         units = stated(self.view, self.parts)
         if "east" in self.parts and held:
@@ -130,6 +142,28 @@ class _Guess:
         own = {part: held[name] for part, name in self.parts.items() if name in held}
         nav = None if drive is None else self._by_navigation(own, units, *drive)
         return self._told(nav)
+
+    def _wheels(self, axles: tuple[str, ...]) -> None:
+        """Take the wheels of one axle where no other speed is logged, if their unit is stated.
+
+        An angular speed of a wheel looks like a speed in km/h.
+        """
+        speeds = {
+            wheel: name
+            for name in self.view.names
+            if (wheel := wheel_of(name)) and factor_to("m/s", self.view.said(name, "m/s"))
+        }
+        for axle in axles:
+            pair = [speeds.get((axle, side), "") for side in ("left", "right")]
+            if all(pair):
+                self.first["vx_mps"], self.beside = pair[0], (pair[1],)
+                self.chosen = {**self.chosen, "vx_mps": list(speeds.values())}
+                self._note(
+                    "vx_mps",
+                    f"mean of both wheels of the {axle} axle, which is the speed where they do "
+                    f"not slip: take the axle that is not driven",
+                )
+                return
 
     def _over_ground(self) -> dict[str, str]:
         """Columns of a velocity over ground that is called as that of the body, and the heading.
@@ -271,6 +305,7 @@ class _Guess:
             tuple(n for n in self.chosen[channel] if n != name)[:5],
             channel == "vy_mps" and is_sideslip(name),
             self.signs.get(channel, ""),
+            self.beside if channel == "vx_mps" else (),
         )
 
     def _ground(self, nav: Navigation) -> dict[str, Proposed]:
