@@ -1,5 +1,7 @@
 """Sensors that drop out to a value that a car may have, and stand there."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -58,7 +60,7 @@ def test_repeated_values_and_quanta_are_none(driven: dict[str, np.ndarray]) -> N
 @pytest.mark.parametrize("lost", [slice(2000, 2001), LOST])
 @pytest.mark.parametrize("value", [5753.5, -3276.8])
 def test_a_map_is_proposed_beside_dropouts_of_the_steering(
-    driven: dict[str, np.ndarray], lost: slice, value: float
+    driven: dict[str, np.ndarray], tmp_path: Path, lost: slice, value: float
 ) -> None:
     """In whatever unit the column is: no range of the channel tells them yet."""
     columns = {**driven, "steer": np.rad2deg(15.0 * driven["steer_rad"])}
@@ -66,8 +68,16 @@ def test_a_map_is_proposed_beside_dropouts_of_the_steering(
     right = sv.propose_channels(columns, vehicle=sv.example_vehicle()).channels["steer_rad"]
     columns["steer"] = columns["steer"].copy()
     columns["steer"][lost] = value
-    found = sv.propose_channels(columns, vehicle=sv.example_vehicle()).channels["steer_rad"]
+    proposal = sv.propose_channels(columns, vehicle=sv.example_vehicle())
+    found = proposal.channels["steer_rad"]
     assert found.factor == pytest.approx(right.factor, rel=0.02)
+    assert (right.despike, found.despike) == (False, True)
+    (tmp_path / "map.toml").write_text(proposal.to_toml())
+    with pytest.warns(SysidWarning, match="steer_rad: removed"):
+        log = sv.read_log(columns, tmp_path / "map.toml")
+    known = np.isfinite(log["steer_rad"])
+    near = found.factor * np.rad2deg(15.0 * driven["steer_rad"])
+    np.testing.assert_allclose(log["steer_rad"][known], near[known], atol=1e-3)
 
 
 def test_a_map_is_proposed_beside_dropouts_of_the_speed(driven: dict[str, np.ndarray]) -> None:

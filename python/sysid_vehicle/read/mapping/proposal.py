@@ -24,6 +24,7 @@ class Proposed:
     sideslip: bool = False
     sign: str = ""
     mean_with: tuple[str, ...] = ()
+    despike: bool = False
 
     @property
     def source(self) -> Source:
@@ -34,6 +35,7 @@ class Proposed:
             sideslip=self.sideslip,
             sign=self.sign,
             mean_with=self.mean_with,
+            despike=self.despike,
         )
 
 
@@ -79,6 +81,7 @@ class Proposal:
             if p.mean_with:
                 entry += f", mean_with = [{', '.join(map(_quoted, p.mean_with))}]"
             entry += ", sideslip = true" if p.sideslip else ""
+            entry += ", despike = true" if p.despike else ""
             entry += f", sign = {_quoted(p.sign)}" if p.sign else ""
             lines.append(f"{channel} = {{ {entry} }}")
         for name in self.missing:

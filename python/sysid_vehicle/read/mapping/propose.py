@@ -10,7 +10,7 @@ import numpy as np
 from ..._common.arrays import FloatArray
 from ..._common.files import as_path
 from ...errors import InvalidInput
-from ...log import CHANNELS, Columns, Log
+from ...log import CHANNELS, Columns, Log, standing
 from ...vehicle import Vehicle
 from ..registry import blamed, recognised
 from ..units import factor_to
@@ -30,6 +30,7 @@ from .physics import scales, sideways
 from .proposal import Proposal, Proposed
 from .source import signed
 
+_DESPIKED = ("steer_rad", "ax_mps2", "ay_mps2")  # of states a log leaves dropouts out by itself
 _TURNED = ("yaw_rate_radps", "ay_mps2", "steer_rad")  # together, where the axes have z down
 _FINER = ((0.5, 1.0), (500.0, 1e-3), (5e5, 1e-6), (np.inf, 1e-9))  # steps below, factor of time
 
@@ -114,6 +115,7 @@ class _Guess:
         self.why: dict[str, list[str]] = {}
         self.signs: dict[str, str] = {}
         self.beside: tuple[str, ...] = ()
+        self.lost: set[str] = set()
         self.parts = self.parts or self._navigated()
         if "vx_mps" not in self.first and "east" not in self.parts:
             self._wheels(axles)
@@ -129,6 +131,7 @@ class _Guess:
         for name in self.beside if held else ():
             clock, values = signals["vx_mps"]
             signals["vx_mps"] = clock, 0.5 * (values + np.interp(clock, *held[name]))
+        self._dropouts(signals)
         self._signed(signals, time)
         units = stated(self.view, self.parts)
         if "east" in self.parts and held:
@@ -198,6 +201,15 @@ class _Guess:
         there = {p: [n for n in ranked(self.view, p) if n not in kept] for p in NAMED}
         found = combination(there)
         return found if "east" in found or "vx_mps" in self.first else {}
+
+    def _dropouts(self, signals: Mapping[str, Signal]) -> None:
+        """Ask for what sensors read while they drop out to be taken out."""
+        for channel in [c for c in _DESPIKED if c in signals]:
+            found = standing(signals[channel][1], fewest=1)
+            if found.size:
+                self.lost.add(channel)
+                value = float(signals[channel][1][found[0]])
+                self._note(channel, f"drops out, first to {value:.6g}, {found.size} samples in all")
 
     def _signed(self, signals: dict[str, Signal], time: str | None) -> None:
         """Give their signs to channels that a bus sends as sizes, with the sign beside."""
@@ -306,6 +318,7 @@ class _Guess:
             channel == "vy_mps" and is_sideslip(name),
             self.signs.get(channel, ""),
             self.beside if channel == "vx_mps" else (),
+            channel in self.lost,
         )
 
     def _ground(self, nav: Navigation) -> dict[str, Proposed]:
