@@ -16,6 +16,7 @@ from .grid import between
 from .signals import runs, standing
 
 _STATES = ("vx_mps", "vy_mps", "yaw_rate_radps")
+_CREEP_MPS = 1.0  # below, many sensors of speed read zero: it is no dropout
 
 
 def blank_standing(
@@ -39,13 +40,20 @@ def blank_standing(
             continue
         lost = np.zeros(time_s.size, dtype=bool)
         lost[found] = True
+        known = np.flatnonzero(np.isfinite(columns[name]))
+        for a, b in runs(lost):
+            before = columns[name][known[np.searchsorted(known, a) - 1]]
+            if name == "vx_mps" and abs(columns[name][a] - before) < _CREEP_MPS:
+                lost[a:b] = False
         blocks = runs(lost)
+        if not blocks:
+            continue
         a, b = max(blocks, key=lambda block: block[1] - block[0])
         more = f" and {len(blocks) - 1} more time(s)" if len(blocks) > 1 else ""
         notes.append(
             f"{name}: jumps to {columns[name][a]:.4g} {CHANNELS[name].unit} and stands there at "
-            f"{between(a, b, time_s)}{more}, as no car moves; {found.size} samples count as "
-            f"missing: check the sensor"
+            f"{between(a, b, time_s)}{more}, as no car moves; {np.count_nonzero(lost)} samples "
+            f"count as missing: check the sensor"
         )
         result[name] = np.where(lost, np.nan, columns[name])
     return result

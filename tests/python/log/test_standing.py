@@ -8,6 +8,7 @@ import pytest
 import sysid_vehicle as sv
 from sysid_vehicle.errors import SysidWarning
 from sysid_vehicle.log import standing
+from sysid_vehicle.log.standing import blank_standing
 
 LOST = slice(2000, 2040)
 
@@ -42,6 +43,23 @@ def test_a_speed_that_stops_is_no_dropout(driven: dict[str, np.ndarray]) -> None
     speed[-400:-200] = 0.0
     speed[-200:] = np.linspace(0.0, 8.0, 200)
     assert standing(speed).size == 0
+
+
+def test_a_speed_sensor_that_reads_zero_at_a_creep_drops_out_nowhere(
+    driven: dict[str, np.ndarray],
+) -> None:
+    """Many read nothing below 3 km/h: the car stops, stands and drives on."""
+    time_s = driven["time_s"]
+    quiet = np.interp(time_s, time_s[::50], driven["vx_mps"][::50])  # as wheels measure it
+    columns = {**driven, "vx_mps": quiet}
+    stops = np.concatenate((np.linspace(6.0, 0.0, 150), np.zeros(80), np.linspace(0.0, 6.0, 150)))
+    columns["vx_mps"][-stops.size :] = np.where(stops < 0.8, 0.0, stops)
+    columns["vx_mps"][-700 : -stops.size] = np.linspace(columns["vx_mps"][-700], 6.0, 700 - 380)
+    assert standing(columns["vx_mps"]).size > 0
+    told: list[str] = []
+    kept = blank_standing(columns, columns["time_s"], told)
+    assert told == []
+    assert np.isfinite(kept["vx_mps"]).all()
 
 
 def test_driving_holds_none(driven: dict[str, np.ndarray]) -> None:
