@@ -73,6 +73,15 @@ def test_what_is_no_list_of_columns_is_refused(rolling: Columns, others: Any) ->
         sv.read_log(rolling, {"vx_mps": {"column": "RL", "mean_with": others}})
 
 
+def test_columns_of_different_times_have_no_mean(rolling: Columns) -> None:
+    pairs: dict[str, Any] = {c: (rolling["time_s"], x) for c, x in rolling.items() if c != "time_s"}
+    late = rolling["time_s"] + 0.004
+    pairs["WhlSpd_RR [km/h]"] = late, rolling["WhlSpd_RR [km/h]"]
+    both = {"column": "WhlSpd_RL [km/h]", "mean_with": ["WhlSpd_RR [km/h]"], "factor": 1.0 / 3.6}
+    with pytest.raises(InvalidInput, match="have no sample at the same time"):
+        sv.read_log(pairs, {"vx_mps": both})
+
+
 def test_a_column_of_the_list_that_is_absent_is_named(rolling: Columns) -> None:
     with pytest.raises(InvalidInput, match="names column 'Hinten', which is not in the file"):
         sv.read_log(rolling, {"vx_mps": {"column": "WhlSpd_RL [km/h]", "mean_with": ["Hinten"]}})

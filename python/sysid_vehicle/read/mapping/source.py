@@ -73,6 +73,11 @@ class Source:
                 factor = stated_factor(table, name, channel, si_unit, [] if own else notes)
             own.append(factor * values_of(table, name, channel))
         values = as_float64(np.mean(own, axis=0))
+        if not np.isfinite(values).any() and all(np.isfinite(x).any() for x in own):
+            raise InvalidInput(
+                f"{channel}: {listed((self.column, *self.mean_with))} have no sample at the same "
+                f"time, so there is no mean of them; take mean_with out of the channel map"
+            )
         if self.sign:
             values = signed(values, table.column(self.sign))
         with np.errstate(over="ignore", invalid="ignore"):  # what is endless is refused later
